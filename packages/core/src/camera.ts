@@ -1,0 +1,111 @@
+import { GaussianSplatError } from './errors.js';
+import { cross, dot, normalize, subtract, type Matrix4, type Vector3 } from './vector.js';
+
+/**
+ * A pinhole camera in OpenCV's convention: x right, y down, z forward; pixel centres at +0.5.
+ * A world point p lands on the pixel (fx·x/z + cx, fy·y/z + cy) with (x, y, z) = worldToCamera · p.
+ */
+export interface Camera {
+  /** Image size in pixels. */
+  readonly width: number;
+  readonly height: number;
+  /** Focal lengths in pixels. */
+  readonly fx: number;
+  readonly fy: number;
+  /** Principal point in pixels. */
+  readonly cx: number;
+  readonly cy: number;
+  /** World to camera, row-major 4x4, last row (0, 0, 0, 1), float64. */
+  readonly worldToCamera: Matrix4;
+  /** Centres nearer than this, in world units along z, are not drawn. */
+  readonly near: number;
+  /** Centres farther than this, in world units along z, are not drawn. */
+  readonly far: number;
+}
+
+/** Near plane of INRIA's rasterizer, which scenes are trained with, in world units. */
+export const DEFAULT_NEAR = 0.2;
+/** Far plane of gsplat, in world units. */
+export const DEFAULT_FAR = 1e10;
+
+/** A camera as calibration files write it, for example one view of a `cameras.json`. */
+export interface CalibratedView {
+  /** Pixels. */
+  readonly width: number;
+  readonly height: number;
+  /** 3x3 intrinsics [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels. */
+  readonly K: readonly (readonly number[])[];
+  /** 4x4 world to camera, rows outermost, OpenCV axes. */
+  readonly worldToCamera: readonly (readonly number[])[];
+  /** World units; default {@link DEFAULT_NEAR}. */
+  readonly near?: number;
+  /** World units; default {@link DEFAULT_FAR}. */
+  readonly far?: number;
+}
+
+/** Reads a calibrated view, checking every field; throws `argument/camera`. `where` names its source in the error. */
+export function cameraFromCalibration(view: CalibratedView, where = 'camera'): Camera {
+  const { width, height, K, worldToCamera } = view ?? {};
+  const isMatrix = (m: unknown, size: number): boolean =>
+    Array.isArray(m) && m.length === size && m.every((row) => Array.isArray(row) && row.length === size);
+  if (!isMatrix(K, 3)) fail(`${where}.K`, 'a 3x3 array of numbers in pixels', describe(K));
+  if (!isMatrix(worldToCamera, 4)) fail(`${where}.worldToCamera`, 'a 4x4 array of numbers', describe(worldToCamera));
+  const camera: Camera = {
+    width,
+    height,
+    fx: K[0][0],
+    fy: K[1][1],
+    cx: K[0][2],
+    cy: K[1][2],
+    worldToCamera: worldToCamera.flat(),
+    near: view.near ?? DEFAULT_NEAR,
+    far: view.far ?? DEFAULT_FAR,
+  };
+  validateCamera(camera, where);
+  if (K[0][1] !== 0) fail(`${where}.K[0][1]`, '0 (no skew)', describe(K[0][1]));
+  return camera;
+}
+
+/** Throws `argument/camera` if a field of the camera is out of its documented range. */
+export function validateCamera(camera: Camera, where = 'camera'): void {
+  const { width, height, fx, fy, cx, cy, worldToCamera, near, far } = camera;
+  for (const [name, value] of Object.entries({ width, height })) {
+    if (!Number.isInteger(value) || value < 1) fail(`${where}.${name}`, 'a whole number of pixels, 1 or more', describe(value));
+  }
+  for (const [name, value] of Object.entries({ fx, fy })) {
+    if (!(Number.isFinite(value) && value > 0)) fail(`${where}.${name}`, 'a focal length in pixels above 0', describe(value));
+  }
+  for (const [name, value] of Object.entries({ cx, cy })) {
+    if (!Number.isFinite(value)) fail(`${where}.${name}`, 'a finite number of pixels', describe(value));
+  }
+  if (!(near > 0 && near < far)) fail(`${where}.near`, 'a distance above 0 and below far', `near ${near}, far ${far}`);
+  if (worldToCamera?.length !== 16 || !Array.prototype.every.call(worldToCamera, Number.isFinite)) {
+    fail(`${where}.worldToCamera`, '16 finite numbers, row-major', describe(worldToCamera));
+  }
+}
+
+/**
+ * World-to-camera matrix (row-major, OpenCV axes) of an eye that looks at a target.
+ * @param up direction that points up in the picture; must not be parallel to the line of sight.
+ */
+export function lookAt(eye: Vector3, target: Vector3, up: Vector3): Float64Array {
+  const forward = normalize(subtract(target, eye));
+  const right = normalize(cross(forward, up));
+  const down = cross(forward, right);
+  const row = (axis: Vector3): number[] => [...axis, -dot(axis, eye)];
+  return Float64Array.from([...row(right), ...row(down), ...row(forward), 0, 0, 0, 1]);
+}
+
+function describe(value: unknown): string {
+  const text = JSON.stringify(value);
+  return text === undefined ? 'nothing' : text.length > 80 ? `${text.slice(0, 77)}...` : text;
+}
+
+function fail(where: string, expected: string, found: string): never {
+  throw new GaussianSplatError('argument/camera', {
+    where,
+    expected,
+    found,
+    remedy: 'give {width, height, K, worldToCamera} in pixels and OpenCV axes (x right, y down, z forward)',
+  });
+}

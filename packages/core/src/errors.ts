@@ -1,0 +1,104 @@
+/**
+ * Errors for people: what was expected, what was found, where, and what to do; with a code that never changes.
+ */
+
+/** Stable codes. The part before the slash is the family that `<gaussian-splat>` reports as `error.code`. */
+export type ErrorCode =
+  /** The bytes are not a Gaussian splat scene that any reader knows. */
+  | 'decode/unknown-format'
+  /** The file is a web page (often a 404 or a login page served with status 200). */
+  | 'decode/html'
+  /** The file is a git-LFS pointer: the real file was never downloaded. */
+  | 'decode/lfs-pointer'
+  /** A known format without splats in it, for example a PLY triangle mesh or point cloud. */
+  | 'decode/not-splats'
+  /** The header of a known format contradicts itself or its specification. */
+  | 'decode/header'
+  /** The file ends before the data that its header announces. */
+  | 'decode/truncated'
+  /** The body contradicts the header, or a compressed stream is damaged. */
+  | 'decode/corrupt'
+  /** A known format, in a version or variant that this reader does not read. */
+  | 'decode/unsupported'
+  /** A scene file with no valid splat in it. */
+  | 'decode/empty'
+  /** The server could not be reached, or the browser refused the answer (CORS, mixed content, offline). */
+  | 'network/unreachable'
+  /** The server answered with an HTTP error status. */
+  | 'network/status'
+  /** The connection broke off before the last byte. */
+  | 'network/interrupted'
+  /** The URL cannot be parsed. */
+  | 'network/url'
+  /** The page cannot use WebGPU: no API, insecure context, no adapter, or a limit too low. */
+  | 'unsupported/insecure-context'
+  | 'unsupported/no-webgpu'
+  | 'unsupported/no-adapter'
+  | 'unsupported/limits'
+  /** The scene needs more GPU memory than a buffer or the device may hold. */
+  | 'out-of-memory/buffer-limit'
+  | 'out-of-memory/allocation'
+  /** The GPU device was lost and could not be brought back. */
+  | 'device-lost/unrecoverable'
+  /** A caller's argument breaks the documented contract of a function. */
+  | 'argument/camera'
+  | 'argument/cloud'
+  | 'argument/value';
+
+/** What a person needs to mend the fault. Every field is a full phrase without a trailing full stop. */
+export interface ErrorDetails {
+  /** What was expected. */
+  readonly expected: string;
+  /** What was found instead. */
+  readonly found: string;
+  /** File, element, byte or property in question. */
+  readonly where: string;
+  /** What to do about it. */
+  readonly remedy: string;
+  /** The lower-level error, if one caused this. */
+  readonly cause?: unknown;
+}
+
+/** A `GaussianSplatError` as plain data: structured clone (workers) drops class and fields of errors. */
+export interface ErrorData extends Omit<ErrorDetails, 'cause'> {
+  readonly code: ErrorCode;
+}
+
+/** The one error class of all packages. */
+export class GaussianSplatError extends Error implements ErrorDetails {
+  override readonly name = 'GaussianSplatError';
+  readonly code: ErrorCode;
+  readonly expected: string;
+  readonly found: string;
+  readonly where: string;
+  readonly remedy: string;
+
+  constructor(code: ErrorCode, details: ErrorDetails) {
+    const { expected, found, where, remedy, cause } = details;
+    super(`${where}: expected ${expected}, found ${found}. ${capitalise(remedy)}. [${code}]`, { cause });
+    this.code = code;
+    this.expected = expected;
+    this.found = found;
+    this.where = where;
+    this.remedy = remedy;
+  }
+
+  /** Family of the code: `decode`, `network`, `unsupported`, `out-of-memory`, `device-lost` or `argument`. */
+  get family(): string {
+    return this.code.slice(0, this.code.indexOf('/'));
+  }
+
+  /** Plain data that survives `postMessage`; {@link GaussianSplatError.fromData} restores it. */
+  toData(): ErrorData {
+    const { code, expected, found, where, remedy } = this;
+    return { code, expected, found, where, remedy };
+  }
+
+  static fromData(data: ErrorData): GaussianSplatError {
+    return new GaussianSplatError(data.code, data);
+  }
+}
+
+function capitalise(text: string): string {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

@@ -1,0 +1,140 @@
+import { GaussianSplatError } from './errors.js';
+import type { Vector3 } from './vector.js';
+
+/** Degree of the spherical harmonics of a cloud. Degree d has (d + 1)² coefficients for each colour channel. */
+export type ShDegree = 0 | 1 | 2 | 3;
+
+/** Number of spherical-harmonics coefficients for each colour channel: (d + 1)². */
+export function shCoefficientCount(degree: ShDegree): 1 | 4 | 9 | 16 {
+  return ((degree + 1) * (degree + 1)) as 1 | 4 | 9 | 16;
+}
+
+/**
+ * Gaussians on the CPU, activated and ready to draw; every format is read into this one shape.
+ *
+ * Frame: that of the trainers and of INRIA's PLY files, which is OpenCV's for an upright capture
+ * (x right, y down, z forward). Readers of formats with another frame convert.
+ */
+export interface GaussianCloud {
+  /** Number of Gaussians N. */
+  readonly count: number;
+  /** World position, in float64, of the local point (0, 0, 0) that {@link positions} are relative to. */
+  readonly origin: Vector3;
+  /** [N, 3] centres in world units, relative to {@link origin}. */
+  readonly positions: Float32Array;
+  /** [N, 3] standard deviations along the local axes in world units, linear (not log). */
+  readonly scales: Float32Array;
+  /** [N, 4] unit quaternions in the order (w, x, y, z), local axes to world. */
+  readonly rotations: Float32Array;
+  /** [N] opacities in 0..1, linear (not logit). */
+  readonly opacities: Float32Array;
+  /**
+   * [N, (d+1)², 3] spherical-harmonics coefficients, red, green and blue innermost. Colour = 0.5 + Σ c·Y(direction),
+   * sRGB-encoded; the first coefficient is the constant one ("DC").
+   */
+  readonly sh: Float32Array;
+  readonly shDegree: ShDegree;
+  /** True if the scene was trained with opacity compensation for the screen-space dilation (Mip-Splatting style). */
+  readonly antialiased: boolean;
+  /** Number of splats of the source that were left out because a value was not usable; see {@link keepUsable}. */
+  readonly droppedCount: number;
+}
+
+/**
+ * Largest standard deviation, in world units, that a splat may have along its longest axis: squared screen sizes must
+ * fit float32. Below the smallest a splat has no extent.
+ */
+export const MAX_SCALE = 1e12;
+export const MIN_LONGEST_SCALE = 1e-12;
+
+/** Throws `argument/cloud` unless the arrays of a cloud have the lengths that `count` and `shDegree` ask for. */
+export function validateCloud(cloud: GaussianCloud): void {
+  const { count, shDegree } = cloud;
+  const fail = (where: string, expected: string, found: string): never => {
+    throw new GaussianSplatError('argument/cloud', {
+      where: `GaussianCloud.${where}`,
+      expected,
+      found,
+      remedy: 'pass arrays whose lengths match count and shDegree',
+    });
+  };
+  if (!Number.isInteger(count) || count < 0) fail('count', 'a non-negative integer', String(count));
+  if (![0, 1, 2, 3].includes(shDegree)) fail('shDegree', '0, 1, 2 or 3', String(shDegree));
+  const lengths = {
+    positions: 3 * count,
+    scales: 3 * count,
+    rotations: 4 * count,
+    opacities: count,
+    sh: 3 * shCoefficientCount(shDegree) * count,
+  };
+  for (const [name, length] of Object.entries(lengths)) {
+    const array = cloud[name as keyof typeof lengths];
+    if (!(array instanceof Float32Array) || array.length !== length) {
+      fail(name, `a Float32Array of ${length} numbers`, `${array?.constructor?.name} of ${array?.length}`);
+    }
+  }
+}
+
+/**
+ * Tells whether splat `i` can be drawn: all numbers finite, a rotation that is not zero, the longest standard deviation
+ * within {@link MIN_LONGEST_SCALE}..{@link MAX_SCALE} and none negative. Single axes may be 0: flat discs and needles
+ * are fine. The shader `cull.wgsl` applies the same rule to buffers that no CPU has seen.
+ */
+export function isUsable(cloud: GaussianCloud, i: number): boolean {
+  const { positions, scales, rotations, opacities, sh, shDegree } = cloud;
+  const shLength = 3 * shCoefficientCount(shDegree);
+  // A sum is finite only if every term is; sh is the longest array, so this is the inner loop of loading.
+  let sum = opacities[i];
+  for (let k = 0; k < 3; k++) sum += Math.abs(positions[3 * i + k]);
+  for (let k = 0; k < shLength; k++) sum += Math.abs(sh[shLength * i + k]);
+  if (!Number.isFinite(sum)) return false;
+  const [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
+  const norm = w * w + x * x + y * y + z * z;
+  if (!(norm > 0 && Number.isFinite(norm))) return false;
+  const [a, b, c] = [scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]];
+  if (!(a >= 0 && b >= 0 && c >= 0)) return false;
+  const longest = Math.max(a, b, c);
+  return longest >= MIN_LONGEST_SCALE && longest <= MAX_SCALE;
+}
+
+/**
+ * Normalises rotations and leaves out the splats that {@link isUsable} refuses, counting them in `droppedCount`.
+ * Works in place on the arrays of `cloud` (which must not be used afterwards) and keeps the order of the rest.
+ */
+export function keepUsable(cloud: GaussianCloud): GaussianCloud {
+  const { count, positions, scales, rotations, opacities, sh, shDegree } = cloud;
+  const shLength = 3 * shCoefficientCount(shDegree);
+  let kept = 0;
+  for (let i = 0; i < count; i++) {
+    if (!isUsable(cloud, i)) continue;
+    if (kept !== i) {
+      positions.copyWithin(3 * kept, 3 * i, 3 * i + 3);
+      scales.copyWithin(3 * kept, 3 * i, 3 * i + 3);
+      rotations.copyWithin(4 * kept, 4 * i, 4 * i + 4);
+      opacities[kept] = opacities[i];
+      sh.copyWithin(shLength * kept, shLength * i, shLength * (i + 1));
+    }
+    normaliseQuaternion(rotations, 4 * kept);
+    opacities[kept] = Math.min(1, Math.max(0, opacities[kept]));
+    kept++;
+  }
+  return {
+    ...cloud,
+    count: kept,
+    positions: positions.subarray(0, 3 * kept),
+    scales: scales.subarray(0, 3 * kept),
+    rotations: rotations.subarray(0, 4 * kept),
+    opacities: opacities.subarray(0, kept),
+    sh: sh.subarray(0, shLength * kept),
+    droppedCount: cloud.droppedCount + count - kept,
+  };
+}
+
+function normaliseQuaternion(rotations: Float32Array, at: number): void {
+  const [w, x, y, z] = [rotations[at], rotations[at + 1], rotations[at + 2], rotations[at + 3]];
+  const scale = 1 / Math.hypot(w, x, y, z);
+  rotations[at] = w * scale;
+  rotations[at + 1] = x * scale;
+  rotations[at + 2] = y * scale;
+  rotations[at + 3] = z * scale;
+}

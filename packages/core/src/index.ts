@@ -1,0 +1,5 @@
+export * from './bounds.js';
+export * from './camera.js';
+export * from './errors.js';
+export * from './gaussian-cloud.js';
+export * from './vector.js';
