@@ -1,0 +1,30 @@
+import { TEXTURE_USAGE } from './gpu/kernel.js';
+import type { Accumulation, AccumulationFormat } from './rasterizers/rasterizer.js';
+
+const BYTES_PER_PIXEL: Record<AccumulationFormat, number> = { rgba16float: 8, rgba32float: 16 };
+
+/** The float texture that splats are blended into, of the size of the image. */
+export class AccumulationTexture implements Accumulation {
+  readonly width: number;
+  readonly height: number;
+  readonly view: GPUTextureView;
+  readonly byteLength: number;
+  readonly #texture: GPUTexture;
+
+  constructor(device: GPUDevice, format: AccumulationFormat, width: number, height: number) {
+    this.width = width;
+    this.height = height;
+    this.byteLength = width * height * BYTES_PER_PIXEL[format];
+    this.#texture = device.createTexture({
+      label: 'gs.rasterize.accumulation',
+      size: [width, height],
+      format,
+      usage: TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.textureBinding,
+    });
+    this.view = this.#texture.createView();
+  }
+
+  destroy(): void {
+    this.#texture.destroy();
+  }
+}

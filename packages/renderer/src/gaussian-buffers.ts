@@ -1,0 +1,87 @@
+import type { ShDegree, Vector3 } from '@gaussian-splat/core';
+import { constants } from './generated/shaders.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
+import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { GEOMETRY_WORDS, shWords, type PackedGaussians } from './pack.js';
+
+/** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
+export interface GaussianPage {
+  readonly count: number;
+  /** array<PackedGaussian> */
+  readonly geometry: GPUBuffer;
+  /** array<vec2u>: float16 spherical harmonics */
+  readonly sh: GPUBuffer;
+}
+
+/** Gaussians on the GPU, ready for any {@link Renderer} of the same device. */
+export class GaussianBuffers {
+  readonly count: number;
+  readonly shDegree: ShDegree;
+  /** True if the scene was trained with opacity compensation; the renderer follows. */
+  readonly antialiased: boolean;
+  /** World position, in float64, that the positions on the GPU are relative to. */
+  readonly origin: Vector3;
+  /** Splats of the source that were left out because a value was not usable. */
+  readonly droppedCount: number;
+  readonly pages: readonly GaussianPage[];
+  readonly #memory: GpuMemory;
+
+  private constructor(device: GPUDevice, packed: PackedGaussians) {
+    ({
+      count: this.count,
+      shDegree: this.shDegree,
+      antialiased: this.antialiased,
+      origin: this.origin,
+      droppedCount: this.droppedCount,
+    } = packed);
+    this.#memory = new GpuMemory(device);
+    try {
+      this.pages = uploadPages(device, packed, this.#memory);
+    } catch (error) {
+      this.#memory.destroy();
+      throw error;
+    }
+  }
+
+  /**
+   * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for.
+   * @throws GaussianSplatError `out-of-memory/allocation` if the device has no room.
+   */
+  static upload(device: GPUDevice, packed: PackedGaussians): Promise<GaussianBuffers> {
+    return withMemoryCheck(device, `scene of ${packed.count} splats`, () => new GaussianBuffers(device, packed));
+  }
+
+  /** Bytes of GPU memory held. */
+  get byteLength(): number {
+    return this.#memory.byteLength;
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+  }
+}
+
+function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemory): GaussianPage[] {
+  const shStride = shWords(packed.shDegree);
+  const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
+  const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination;
+  const pages: GaussianPage[] = [];
+  for (let first = 0; first < packed.count; first += capacity) {
+    const end = Math.min(first + capacity, packed.count);
+    const part = (label: string, words: Uint32Array, stride: number): GPUBuffer =>
+      memory.buffer(label, 4 * stride * (end - first), usage, words.subarray(stride * first, stride * end));
+    pages.push({
+      count: end - first,
+      geometry: part('gs.gaussians.geometry', packed.geometry, GEOMETRY_WORDS),
+      sh: part('gs.gaussians.sh', packed.sh, shStride),
+    });
+  }
+  return pages;
+}
+
+/** Splats in a page: what the limits allow, in whole workgroups of `cull`. */
+function pageCapacity(device: GPUDevice, bytesPerSplat: number): number {
+  const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
+  const splats = Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / bytesPerSplat);
+  return Math.floor(splats / constants.CULL_GROUP) * constants.CULL_GROUP;
+}

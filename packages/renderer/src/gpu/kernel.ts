@@ -1,0 +1,124 @@
+/** What scripts/build-shaders.mjs says of one shader. */
+export interface ShaderDescription {
+  readonly name: string;
+  readonly code: string;
+  readonly bindings: Readonly<Record<string, ShaderBinding>>;
+}
+
+interface ShaderBinding {
+  readonly binding: number;
+  readonly type: 'uniform' | 'storage' | 'read-only-storage' | 'texture';
+}
+
+/** A resource for each binding of a shader, by its name in the WGSL. */
+export type Resources<S extends ShaderDescription> = Readonly<Record<keyof S['bindings'], Resource>>;
+
+/** A whole buffer, a part of one, or a texture view. */
+export type Resource = GPUBuffer | GPUBufferBinding | GPUTextureView;
+
+/** The bind group layout and shader module of a shader on one device. */
+export class ShaderProgram<S extends ShaderDescription> {
+  readonly module: GPUShaderModule;
+  readonly pipelineLayout: GPUPipelineLayout;
+  readonly #device: GPUDevice;
+  readonly #shader: S;
+  readonly #bindGroupLayout: GPUBindGroupLayout;
+
+  constructor(device: GPUDevice, shader: S, visibility: GPUShaderStageFlags) {
+    const label = `gs.${shader.name}`;
+    this.#device = device;
+    this.#shader = shader;
+    this.module = device.createShaderModule({ label, code: shader.code });
+    this.#bindGroupLayout = device.createBindGroupLayout({
+      label,
+      entries: Object.values(shader.bindings).map(({ binding, type }) => ({
+        binding,
+        visibility,
+        ...(type === 'texture' ? { texture: { sampleType: 'unfilterable-float' as const } } : { buffer: { type } }),
+      })),
+    });
+    this.pipelineLayout = device.createPipelineLayout({ label, bindGroupLayouts: [this.#bindGroupLayout] });
+  }
+
+  bind(resources: Resources<S>): GPUBindGroup {
+    return this.#device.createBindGroup({
+      label: `gs.${this.#shader.name}`,
+      layout: this.#bindGroupLayout,
+      entries: Object.entries(this.#shader.bindings).map(([name, { binding }]) => ({
+        binding,
+        resource: asBindingResource(resources[name as keyof S['bindings']]),
+      })),
+    });
+  }
+}
+
+/** Bare buffers are a recent addition to WebGPU: older browsers want them wrapped. */
+function asBindingResource(resource: Resource): GPUBindingResource {
+  return 'mapState' in resource ? { buffer: resource } : resource;
+}
+
+/** A compute shader ready to be dispatched. Its entry point is `main`. */
+export class ComputeKernel<S extends ShaderDescription> {
+  readonly #program: ShaderProgram<S>;
+  readonly #pipeline: GPUComputePipeline;
+
+  constructor(device: GPUDevice, shader: S) {
+    this.#program = new ShaderProgram(device, shader, SHADER_STAGE.compute);
+    this.#pipeline = device.createComputePipeline({
+      label: `gs.${shader.name}`,
+      layout: this.#program.pipelineLayout,
+      compute: { module: this.#program.module, entryPoint: 'main' },
+    });
+  }
+
+  bind(resources: Resources<S>): GPUBindGroup {
+    return this.#program.bind(resources);
+  }
+
+  /** Dispatches a number of workgroups, in two dimensions beyond 65,535: the shader finds its number by `group_index`. */
+  dispatch(pass: GPUComputePassEncoder, bindGroup: GPUBindGroup, groups: number): void {
+    if (groups === 0) return;
+    pass.setPipeline(this.#pipeline);
+    pass.setBindGroup(0, bindGroup);
+    pass.dispatchWorkgroups(Math.min(groups, MAX_GROUPS), Math.ceil(groups / MAX_GROUPS));
+  }
+
+  dispatchIndirect(pass: GPUComputePassEncoder, bindGroup: GPUBindGroup, buffer: GPUBuffer, offset: number): void {
+    pass.setPipeline(this.#pipeline);
+    pass.setBindGroup(0, bindGroup);
+    pass.dispatchWorkgroupsIndirect(buffer, offset);
+  }
+}
+
+/** WebGPU's default limit of workgroups in one dimension (`MAX_GROUPS_X` in the shaders). */
+const MAX_GROUPS = 65535;
+
+/** `GPUShaderStage`, which does not exist where a module is merely imported. */
+export const SHADER_STAGE = { vertex: 1, fragment: 2, compute: 4 } as const;
+
+/** `GPUBufferUsage` and `GPUTextureUsage`, likewise. */
+export const BUFFER_USAGE = {
+  mapRead: 0x1,
+  copySource: 0x4,
+  copyDestination: 0x8,
+  index: 0x10,
+  uniform: 0x40,
+  storage: 0x80,
+  indirect: 0x100,
+} as const;
+export const TEXTURE_USAGE = { copySource: 0x1, textureBinding: 0x4, renderAttachment: 0x10 } as const;
+
+const cache = new WeakMap<GPUDevice, Map<string, unknown>>();
+
+/** Something that is made once for a device (a pipeline, say) and shared by all renderers on it. */
+export function perDevice<T>(device: GPUDevice, key: string, make: () => T): T {
+  let made = cache.get(device);
+  if (made === undefined) cache.set(device, (made = new Map()));
+  if (!made.has(key)) made.set(key, make());
+  return made.get(key) as T;
+}
+
+/** The kernel of a compute shader, made once for a device. */
+export function kernelOf<S extends ShaderDescription>(device: GPUDevice, shader: S): ComputeKernel<S> {
+  return perDevice(device, shader.name, () => new ComputeKernel(device, shader));
+}

@@ -1,0 +1,85 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+
+/** GPU objects with one owner: counts their bytes, checks the device's limits, and destroys them together. */
+export class GpuMemory {
+  readonly #device: GPUDevice;
+  readonly #buffers = new Map<GPUBuffer, number>();
+
+  constructor(device: GPUDevice) {
+    this.#device = device;
+  }
+
+  /** Bytes of all living buffers. */
+  get byteLength(): number {
+    let total = 0;
+    for (const size of this.#buffers.values()) total += size;
+    return total;
+  }
+
+  /**
+   * Creates a buffer, its size rounded up to 4 bytes and at least 16.
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` if the device does not allow a buffer of that size.
+   */
+  buffer(label: string, byteLength: number, usage: GPUBufferUsageFlags, content?: Uint32Array): GPUBuffer {
+    const size = Math.max(16, Math.ceil(byteLength / 4) * 4);
+    requireBufferSize(this.#device, label, size);
+    const buffer = this.#device.createBuffer({ label, size, usage, mappedAtCreation: content !== undefined });
+    if (content !== undefined) {
+      new Uint32Array(buffer.getMappedRange()).set(content);
+      buffer.unmap();
+    }
+    this.#buffers.set(buffer, size);
+    return buffer;
+  }
+
+  free(buffer: GPUBuffer): void {
+    if (this.#buffers.delete(buffer)) buffer.destroy();
+  }
+
+  destroy(): void {
+    for (const buffer of this.#buffers.keys()) buffer.destroy();
+    this.#buffers.clear();
+  }
+}
+
+function requireBufferSize(device: GPUDevice, label: string, size: number): void {
+  const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
+  const limit = Math.min(maxBufferSize, maxStorageBufferBindingSize);
+  if (size <= limit) return;
+  throw new GaussianSplatError('out-of-memory/buffer-limit', {
+    where: `GPU buffer ${label}`,
+    expected: `at most ${limit} bytes (maxBufferSize ${maxBufferSize}, maxStorageBufferBindingSize ${maxStorageBufferBindingSize})`,
+    found: `${size} bytes`,
+    remedy: 'ask for the adapter\'s limits with deviceDescriptor(adapter), or show a smaller scene',
+  });
+}
+
+/**
+ * Runs `allocate` and waits until the device has really found the memory.
+ * @throws GaussianSplatError `out-of-memory/allocation`; what `allocate` threw, if it threw.
+ */
+export async function withMemoryCheck<T extends { destroy(): void }>(
+  device: GPUDevice,
+  where: string,
+  allocate: () => T,
+): Promise<T> {
+  device.pushErrorScope('out-of-memory');
+  let made: T | undefined;
+  let thrown: unknown;
+  try {
+    made = allocate();
+  } catch (error) {
+    thrown = error;
+  }
+  const refusal = await device.popErrorScope();
+  if (thrown instanceof GaussianSplatError) throw thrown;
+  if (made !== undefined && refusal === null) return made;
+  made?.destroy();
+  throw new GaussianSplatError('out-of-memory/allocation', {
+    where,
+    expected: 'enough free GPU memory',
+    found: refusal?.message ?? String(thrown),
+    remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
+    cause: refusal ?? thrown,
+  });
+}

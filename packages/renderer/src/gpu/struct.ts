@@ -1,0 +1,24 @@
+/** Byte layout of a WGSL struct, as scripts/build-shaders.mjs reflects it. */
+export interface StructLayout {
+  readonly size: number;
+  readonly fields: Readonly<Record<string, { readonly offset: number; readonly type: string }>>;
+}
+
+export type StructValues<L extends StructLayout> = Readonly<Record<keyof L['fields'], number | ArrayLike<number>>>;
+
+/** Writes a struct into `target` at a byte offset: whole numbers for `u32`, float32 for everything else. */
+export function writeStruct<L extends StructLayout>(
+  layout: L,
+  values: StructValues<L>,
+  target: ArrayBuffer,
+  byteOffset = 0,
+): void {
+  const floats = new Float32Array(target, byteOffset, layout.size / 4);
+  const integers = new Uint32Array(target, byteOffset, layout.size / 4);
+  for (const [name, { offset, type }] of Object.entries(layout.fields)) {
+    const value = values[name as keyof L['fields']];
+    if (type === 'u32') integers[offset / 4] = value as number;
+    else if (typeof value === 'number') floats[offset / 4] = value;
+    else floats.set(value, offset / 4);
+  }
+}

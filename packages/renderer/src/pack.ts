@@ -1,0 +1,65 @@
+import { shCoefficientCount, validateCloud, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { layouts } from './generated/shaders.js';
+import { halfBits } from './gpu/half.js';
+
+/**
+ * A cloud in the exact bytes that the GPU reads. Plain data with transferable buffers, so that a worker can make it.
+ */
+export interface PackedGaussians {
+  readonly count: number;
+  readonly shDegree: ShDegree;
+  readonly antialiased: boolean;
+  readonly origin: Vector3;
+  readonly droppedCount: number;
+  /** [N, 12] words: `PackedGaussian` of shaders/shared/gaussian.wgsl. */
+  readonly geometry: Uint32Array;
+  /** [N, {@link shWords}] words: float16 coefficients in the order [coefficient][channel], padded to 8 bytes. */
+  readonly sh: Uint32Array;
+}
+
+/** 32-bit words of one splat's geometry. */
+export const GEOMETRY_WORDS = layouts.PackedGaussian.size / 4;
+
+/** 32-bit words of one splat's spherical harmonics: 2, 6, 14 or 24 for degree 0 to 3. */
+export function shWords(degree: ShDegree): number {
+  return 2 * Math.ceil((3 * shCoefficientCount(degree)) / 4);
+}
+
+/**
+ * Packs a cloud for {@link GaussianBuffers.upload}. Coefficients are rounded to float16 (98 dB on captured scenes),
+ * everything else stays float32.
+ * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
+ */
+export function packGaussians(cloud: GaussianCloud): PackedGaussians {
+  validateCloud(cloud);
+  const { count, shDegree, antialiased, origin, droppedCount } = cloud;
+  return { count, shDegree, antialiased, origin, droppedCount, geometry: packGeometry(cloud), sh: packSh(cloud) };
+}
+
+function packGeometry({ count, positions, opacities, rotations, scales }: GaussianCloud): Uint32Array {
+  const words = new Float32Array(count * GEOMETRY_WORDS);
+  for (let i = 0, at = 0; i < count; i++, at += GEOMETRY_WORDS) {
+    words[at] = positions[3 * i];
+    words[at + 1] = positions[3 * i + 1];
+    words[at + 2] = positions[3 * i + 2];
+    words[at + 3] = opacities[i];
+    words[at + 4] = rotations[4 * i];
+    words[at + 5] = rotations[4 * i + 1];
+    words[at + 6] = rotations[4 * i + 2];
+    words[at + 7] = rotations[4 * i + 3];
+    words[at + 8] = scales[3 * i];
+    words[at + 9] = scales[3 * i + 1];
+    words[at + 10] = scales[3 * i + 2];
+  }
+  return new Uint32Array(words.buffer);
+}
+
+function packSh({ count, sh, shDegree }: GaussianCloud): Uint32Array {
+  const numbers = 3 * shCoefficientCount(shDegree);
+  const stride = 2 * shWords(shDegree);
+  const halves = new Uint16Array(count * stride);
+  for (let i = 0; i < count; i++) {
+    for (let k = 0; k < numbers; k++) halves[i * stride + k] = halfBits(sh[i * numbers + k]);
+  }
+  return new Uint32Array(halves.buffer);
+}

@@ -1,0 +1,95 @@
+import { constants, layouts, rasterizeQuads } from '../generated/shaders.js';
+import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/kernel.js';
+import { writeStruct } from '../gpu/struct.js';
+import { planOffsets } from '../scratch.js';
+import type { Accumulation, AccumulationFormat, Rasterizer, RasterizerInputs } from './rasterizer.js';
+
+type Program = ShaderProgram<typeof rasterizeQuads>;
+
+/** Hardware quads, back to front, blended into a float texture. */
+export class QuadsRasterizer implements Rasterizer {
+  readonly name = 'quads';
+  readonly #device: GPUDevice;
+  readonly #program: Program;
+  readonly #pipeline: GPURenderPipeline;
+  readonly #indices: GPUBuffer;
+  readonly #uniform: GPUBuffer;
+  readonly #uniformBytes = new ArrayBuffer(layouts.RasterView.size);
+  #bindings: GPUBindGroup | undefined;
+  #plan: GPUBuffer | undefined;
+
+  constructor(device: GPUDevice, format: AccumulationFormat) {
+    this.#device = device;
+    this.#program = perDevice(
+      device,
+      'quads',
+      () => new ShaderProgram(device, rasterizeQuads, SHADER_STAGE.vertex | SHADER_STAGE.fragment),
+    );
+    this.#pipeline = perDevice(device, `quads ${format}`, () => makePipeline(device, this.#program, format));
+    this.#indices = perDevice(device, 'quads indices', () => makeIndices(device));
+    this.#uniform = device.createBuffer({
+      label: 'gs.rasterize.view',
+      size: 16,
+      usage: BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination,
+    });
+  }
+
+  bind({ plan, splats, order }: RasterizerInputs): void {
+    this.#plan = plan;
+    this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });
+  }
+
+  record(encoder: GPUCommandEncoder, { view, width, height }: Accumulation): void {
+    writeStruct(layouts.RasterView, { viewport: [width, height] }, this.#uniformBytes);
+    this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
+    const pass = encoder.beginRenderPass({
+      label: 'gs.rasterize',
+      // Nothing painted yet: black, and all light still to come from behind.
+      colorAttachments: [{ view, clearValue: { r: 0, g: 0, b: 0, a: 1 }, loadOp: 'clear', storeOp: 'store' }],
+    });
+    if (this.#plan !== undefined) {
+      pass.setPipeline(this.#pipeline);
+      pass.setBindGroup(0, this.#bindings);
+      pass.setIndexBuffer(this.#indices, 'uint16');
+      pass.drawIndexedIndirect(this.#plan, planOffsets.quads);
+    }
+    pass.end();
+  }
+
+  destroy(): void {
+    this.#uniform.destroy();
+  }
+}
+
+function makePipeline(device: GPUDevice, program: Program, format: AccumulationFormat): GPURenderPipeline {
+  const { module, pipelineLayout } = program;
+  const blend: GPUBlendState = {
+    color: { srcFactor: 'one', dstFactor: 'one-minus-src-alpha', operation: 'add' },
+    // Transmittance keeps its relative precision as a product; 1 - transmittance would lose it near opacity 1.
+    alpha: { srcFactor: 'zero', dstFactor: 'one-minus-src-alpha', operation: 'add' },
+  };
+  return device.createRenderPipeline({
+    label: `gs.rasterize.quads.${format}`,
+    layout: pipelineLayout,
+    vertex: { module, entryPoint: 'vertex' },
+    fragment: { module, entryPoint: 'fragment', targets: [{ format, blend }] },
+    primitive: { topology: 'triangle-list', cullMode: 'none' },
+  });
+}
+
+/** Two triangles for each quad of a batch: corners 0, 1, 2 and 2, 1, 3. */
+function makeIndices(device: GPUDevice): GPUBuffer {
+  const indices = Uint16Array.from({ length: constants.QUAD_BATCH * constants.INDICES_PER_QUAD }, (_, i) => {
+    const quad = Math.floor(i / constants.INDICES_PER_QUAD);
+    return 4 * quad + [0, 1, 2, 2, 1, 3][i % constants.INDICES_PER_QUAD];
+  });
+  const buffer = device.createBuffer({
+    label: 'gs.rasterize.indices',
+    size: indices.byteLength,
+    usage: BUFFER_USAGE.index,
+    mappedAtCreation: true,
+  });
+  new Uint16Array(buffer.getMappedRange()).set(indices);
+  buffer.unmap();
+  return buffer;
+}

@@ -1,0 +1,84 @@
+import { constants, layouts } from './generated/shaders.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
+import { GpuMemory } from './gpu/memory.js';
+
+/** How much the buffers between the stages must hold. */
+export interface ScratchSize {
+  /** Splats of all pages. */
+  readonly splats: number;
+  /** Cull groups of all pages. */
+  readonly groups: number;
+  readonly pages: number;
+}
+
+const { size: PLAN_SIZE } = layouts.Plan;
+const { size: PAGE_PLAN_SIZE, fields: pagePlanFields } = layouts.PagePlan;
+
+/** Byte offsets of the indirect arguments within the plan. */
+export const planOffsets = {
+  sort: layouts.Plan.fields.sort_x.offset,
+  quads: layouts.Plan.fields.quad_indices.offset,
+  unusable: layouts.Plan.fields.unusable.offset,
+  project: (page: number): number => PLAN_SIZE + page * PAGE_PLAN_SIZE + pagePlanFields.project_x.offset,
+};
+
+/** The buffers that carry a frame from stage to stage. Their size follows the scene, never the camera. */
+export class Scratch {
+  /** Splats that may be visible at once. Survivors beyond it are not drawn, and counted in `Plan.overflow`. */
+  readonly capacity: number;
+  /** One bit for each splat. */
+  readonly visibleBits: GPUBuffer;
+  /** Survivors of each cull group, then their exclusive prefix sums and the total. */
+  readonly groupOffsets: GPUBuffer;
+  readonly plan: GPUBuffer;
+  /** First cull group of each page, and the number of all groups. */
+  readonly pageGroups: GPUBuffer;
+  /** array<ProjectedSplat> by slot. */
+  readonly splats: GPUBuffer;
+  /** Depth keys; the sort goes back and forth between two, and ends in the first. */
+  readonly keys: readonly [GPUBuffer, GPUBuffer];
+  /** Slots in the order of their keys, likewise. Before the sort the first lists the survivors. */
+  readonly order: readonly [GPUBuffer, GPUBuffer];
+  /** [digit][block] */
+  readonly digitCounts: GPUBuffer;
+  readonly digitTotals: GPUBuffer;
+  readonly #memory: GpuMemory;
+
+  constructor(device: GPUDevice, { splats, groups, pages }: ScratchSize) {
+    const memory = new GpuMemory(device);
+    this.#memory = memory;
+    const { storage, copyDestination, copySource, indirect } = BUFFER_USAGE;
+    this.capacity = Math.min(splats, maxVisible(device));
+    const buffer = (name: string, bytes: number, usage = storage | copySource | copyDestination): GPUBuffer =>
+      memory.buffer(`gs.${name}`, bytes, usage);
+    const perSplat = (name: string): GPUBuffer => buffer(name, 4 * this.capacity);
+    try {
+      this.visibleBits = buffer('cull.visible_bits', 4 * constants.WORDS_PER_GROUP * groups);
+      this.groupOffsets = buffer('scan.group_offsets', 4 * (groups + 1));
+      this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * pages, storage | indirect | copySource | copyDestination);
+      this.pageGroups = buffer('plan.page_groups', 4 * (pages + 1));
+      this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
+      this.keys = [perSplat('sort.keys_a'), perSplat('sort.keys_b')];
+      this.order = [perSplat('sort.order_a'), perSplat('sort.order_b')];
+      this.digitCounts = buffer('sort.digit_counts', 4 * constants.DIGITS * Math.ceil(this.capacity / constants.SORT_BLOCK));
+      this.digitTotals = buffer('sort.digit_totals', 4 * constants.DIGITS);
+    } catch (error) {
+      memory.destroy();
+      throw error;
+    }
+  }
+
+  get byteLength(): number {
+    return this.#memory.byteLength;
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+  }
+}
+
+/** Most projected splats that one storage buffer of the device can hold. */
+function maxVisible(device: GPUDevice): number {
+  const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
+  return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / layouts.ProjectedSplat.size);
+}

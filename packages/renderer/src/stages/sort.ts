@@ -1,0 +1,88 @@
+import { constants, layouts, sortCount, sortScan, sortScatter } from '../generated/shaders.js';
+import { BUFFER_USAGE, kernelOf, perDevice, type ComputeKernel } from '../gpu/kernel.js';
+import { writeStruct } from '../gpu/struct.js';
+import { planOffsets } from '../scratch.js';
+
+/** The buffers that {@link SortStage} works on. */
+export interface SortBuffers {
+  /** `Plan`: how many keys there are, and the indirect arguments. */
+  readonly plan: GPUBuffer;
+  /** The keys lie in the first and end, sorted, in the first. */
+  readonly keys: readonly [GPUBuffer, GPUBuffer];
+  /** Ends, in the first, as the indices of the keys in ascending and stable order. */
+  readonly order: readonly [GPUBuffer, GPUBuffer];
+  readonly digitCounts: GPUBuffer;
+  readonly digitTotals: GPUBuffer;
+}
+
+/** Bind groups of one pass over the keys. */
+interface SortPass {
+  readonly count: GPUBindGroup;
+  readonly scan: GPUBindGroup;
+  readonly scatter: GPUBindGroup;
+}
+
+const DIGIT_BITS = Math.log2(constants.DIGITS);
+const KEY_BITS = 32;
+
+/**
+ * Stable least-significant-digit radix sort of 32-bit keys: four passes of count, scan, scatter. Counts are reduced and
+ * scanned between dispatches, so no workgroup ever waits for another.
+ */
+export class SortStage {
+  readonly #count: ComputeKernel<typeof sortCount>;
+  readonly #scan: ComputeKernel<typeof sortScan>;
+  readonly #scatter: ComputeKernel<typeof sortScatter>;
+  readonly #passUniforms: readonly GPUBuffer[];
+
+  constructor(device: GPUDevice) {
+    this.#count = kernelOf(device, sortCount);
+    this.#scan = kernelOf(device, sortScan);
+    this.#scatter = kernelOf(device, sortScatter);
+    this.#passUniforms = perDevice(device, 'sort passes', () => makePassUniforms(device));
+  }
+
+  bind({ plan, keys, order, digitCounts, digitTotals }: SortBuffers): readonly SortPass[] {
+    return this.#passUniforms.map((uniform, index) => {
+      const [from, to] = index % 2 === 0 ? [0, 1] : [1, 0];
+      return {
+        count: this.#count.bind({ digit_pass: uniform, plan, keys: keys[from], counts: digitCounts }),
+        scan: this.#scan.bind({ plan, counts: digitCounts, digit_totals: digitTotals }),
+        scatter: this.#scatter.bind({
+          digit_pass: uniform,
+          plan,
+          keys_in: keys[from],
+          values_in: order[from],
+          block_offsets: digitCounts,
+          digit_totals: digitTotals,
+          keys_out: keys[to],
+          values_out: order[to],
+        }),
+      };
+    });
+  }
+
+  record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], plan: GPUBuffer): void {
+    for (const { count, scan, scatter } of bindings) {
+      this.#count.dispatchIndirect(pass, count, plan, planOffsets.sort);
+      this.#scan.dispatch(pass, scan, constants.DIGITS);
+      this.#scatter.dispatchIndirect(pass, scatter, plan, planOffsets.sort);
+    }
+  }
+}
+
+export type SortBindings = ReturnType<SortStage['bind']>;
+
+function makePassUniforms(device: GPUDevice): GPUBuffer[] {
+  return Array.from({ length: KEY_BITS / DIGIT_BITS }, (_, index) => {
+    const buffer = device.createBuffer({
+      label: `gs.sort.pass_${index}`,
+      size: 16,
+      usage: BUFFER_USAGE.uniform,
+      mappedAtCreation: true,
+    });
+    writeStruct(layouts.SortPass, { shift: index * DIGIT_BITS, first: index === 0 ? 1 : 0 }, buffer.getMappedRange());
+    buffer.unmap();
+    return buffer;
+  });
+}

@@ -1,0 +1,36 @@
+import { eyeOf, multiply, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { layouts } from './generated/shaders.js';
+import type { StructValues } from './gpu/struct.js';
+
+/** Part of the half field of view that the Jacobian's clamp allows beyond the image: INRIA's 1.3 is 1 + this. */
+const CLAMP_MARGIN = 0.3;
+
+type ViewValues = StructValues<typeof layouts.View>;
+
+/** The fields of the WGSL `View` that depend on the camera and on the origin of the Gaussians. */
+export type CameraValues = Omit<ViewValues, 'splat_count' | 'page' | 'first_group' | 'sh_degree' | 'antialiased'>;
+
+/**
+ * A camera as the shaders want it. The origin is folded into the matrix in float64, so that scenes a million units from
+ * the world's origin keep their float32 digits.
+ */
+export function cameraValues(camera: Camera, origin: Vector3): CameraValues {
+  const { width, height, fx, fy, cx, cy, near, far, worldToCamera } = camera;
+  const toOrigin = [1, 0, 0, origin[0], 0, 1, 0, origin[1], 0, 0, 1, origin[2], 0, 0, 0, 1];
+  const rows = multiply(worldToCamera, toOrigin);
+  const columns = Array.from({ length: 16 }, (_, i) => rows[4 * (i % 4) + Math.floor(i / 4)]);
+  // gsplat's form of the clamp: asymmetric for an off-centre principal point, INRIA's ±1.3 tan(fov/2) for a centred one.
+  const marginX = (CLAMP_MARGIN * 0.5 * width) / fx;
+  const marginY = (CLAMP_MARGIN * 0.5 * height) / fy;
+  return {
+    local_to_camera: columns,
+    eye: subtract(eyeOf(worldToCamera), origin),
+    focal: [fx, fy],
+    principal: [cx, cy],
+    viewport: [width, height],
+    jacobian_min: [-cx / fx - marginX, -cy / fy - marginY],
+    jacobian_max: [(width - cx) / fx + marginX, (height - cy) / fy + marginY],
+    near,
+    far,
+  };
+}

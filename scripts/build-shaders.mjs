@@ -1,0 +1,112 @@
+/**
+ * Turns shaders/*.wgsl into packages/renderer/src/generated/shaders.ts: code with its `#import`s resolved, and every
+ * binding number, struct layout, workgroup size and numeric constant reflected from the WGSL itself, so that nobody
+ * counts padding or repeats a number by hand.
+ */
+import { mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import { ResourceType, WgslReflect } from 'wgsl_reflect/wgsl_reflect.module.js';
+
+const shaderFolder = fileURLToPath(new URL('../shaders/', import.meta.url));
+const outputFolder = fileURLToPath(new URL('../packages/renderer/src/generated/', import.meta.url));
+
+/** The text of a shader with each `#import PATH` replaced, once, by the file it names. */
+function resolveImports(path, seen = new Set()) {
+  seen.add(path);
+  return readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8')
+    .split('\n')
+    .map((line) => {
+      const imported = /^#import (\S+)$/.exec(line)?.[1];
+      if (imported === undefined) return line;
+      return seen.has(imported) ? '' : resolveImports(imported, seen);
+    })
+    .join('\n');
+}
+
+/** Comments and indentation are for readers of shaders/, not for the bytes that a page loads. */
+function strip(code) {
+  return code
+    .split('\n')
+    .map((line) => line.replace(/\/\/.*$/, '').trim())
+    .filter((line) => line !== '')
+    .join('\n');
+}
+
+function reflect(stage, code) {
+  try {
+    return new WgslReflect(code);
+  } catch (error) {
+    // The parser's own stack trace prints its whole minified source.
+    const line = Number(/Line: (\d+)/.exec(error.message)?.[1]);
+    throw new Error(`shaders/${stage}.wgsl: ${error.message} near "${code.split('\n')[line - 1]}"`);
+  }
+}
+
+const bufferType = (variable) =>
+  variable.resourceType === ResourceType.Uniform ? 'uniform' : variable.access === 'read' ? 'read-only-storage' : 'storage';
+
+function reflectBindings(reflection) {
+  const variables = [...reflection.uniforms, ...reflection.storage, ...reflection.textures];
+  return Object.fromEntries(
+    variables
+      .sort((a, b) => a.binding - b.binding)
+      .map((variable) => {
+        if (variable.group !== 0) throw new Error(`${variable.name}: only @group(0) is used`);
+        const type = variable.resourceType === ResourceType.Texture ? 'texture' : bufferType(variable);
+        return [variable.name, { binding: variable.binding, type }];
+      }),
+  );
+}
+
+function reflectConstants(code) {
+  const constants = {};
+  for (const [, name, text] of code.matchAll(/^const (\w+) = ([^;]+);$/gm)) {
+    const expression = text
+      .replace(/(\d)[uif]\b/g, '$1')
+      .replace(/\b[A-Z][A-Z_0-9]*\b/g, (used) => constants[used] ?? used);
+    if (/^[\d\s+\-*/().e]+$/.test(expression)) constants[name] = Number(new Function(`return ${expression}`)());
+  }
+  return constants;
+}
+
+function reflectStruct(struct) {
+  const fields = struct.members.map((member) => [member.name, { offset: member.offset, type: member.type.getTypeName() }]);
+  return { size: struct.size, fields: Object.fromEntries(fields) };
+}
+
+const camelCase = (name) => name.replace(/_(\w)/g, (_, letter) => letter.toUpperCase());
+const literal = (value) => JSON.stringify(value, null, 2);
+
+const stages = readdirSync(shaderFolder)
+  .filter((file) => file.endsWith('.wgsl'))
+  .map((file) => file.slice(0, -5))
+  .sort();
+const structs = new Map();
+const constants = {};
+const sections = stages.map((stage) => {
+  const code = strip(resolveImports(stage));
+  const reflection = reflect(stage, code);
+  for (const struct of reflection.structs) structs.set(struct.name, reflectStruct(struct));
+  for (const [name, value] of Object.entries(reflectConstants(code))) {
+    if (constants[name] !== undefined && constants[name] !== value) throw new Error(`${stage}: ${name} has two values`);
+    constants[name] = value;
+  }
+  const description = { name: stage, bindings: reflectBindings(reflection), code };
+  return `export const ${camelCase(stage)} = ${literal(description)} as const;\n`;
+});
+
+const header = '/** Written by scripts/build-shaders.mjs from shaders/. Do not edit. */\n/* eslint-disable */\n';
+const layouts = Object.fromEntries([...structs].sort(([a], [b]) => (a < b ? -1 : 1)));
+mkdirSync(outputFolder, { recursive: true });
+writeFileSync(
+  `${outputFolder}shaders.ts`,
+  [
+    header,
+    ...sections,
+    '/** Byte sizes and offsets of the WGSL structs. */',
+    `export const layouts = ${literal(layouts)} as const;\n`,
+    '/** Numeric constants of the WGSL, by their names there. */',
+    `export const constants = ${literal(constants)} as const;\n`,
+  ].join('\n'),
+);
+console.log(`shaders: ${stages.length} stages, ${structs.size} structs`);

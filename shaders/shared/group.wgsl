@@ -1,0 +1,12 @@
+// Workgroup counts beyond 65,535 are dispatched in two dimensions.
+const MAX_GROUPS_X = 65535u;
+
+fn group_index(workgroup_id: vec3u) -> u32 {
+  return workgroup_id.x + workgroup_id.y * MAX_GROUPS_X;
+}
+
+// Splats of one workgroup of `cull` and `compact`, and the words of 32 bits that hold one bit for each.
+const CULL_GROUP = 256u;
+const WORDS_PER_GROUP = CULL_GROUP / 32u;
+// Splats of one workgroup of `project`.
+const PROJECT_GROUP = 256u;

@@ -1,0 +1,81 @@
+// 3D Gaussian to screen ellipse: EWA splatting (Zwicker et al. 2001) with the constants of 3D Gaussian Splatting
+// (Kerbl et al. 2023) and the asymmetric Jacobian clamp of gsplat.
+#import shared/view
+#import shared/gaussian
+#import shared/falloff
+
+// Variance in px² that the low-pass filter adds to both screen axes.
+const DILATION = 0.3;
+// Least opacity compensation of an antialiased scene.
+const COMPENSATION_MIN = 0.005;
+
+// The screen Gaussian in the form exp(-(u² + v²) / 2) with u = dx / sigma_x, v = (dy - slope dx) / sigma_v: the
+// Cholesky factor of its inverse covariance. It stays exact for needles, whose conic loses all digits in float32.
+struct Ellipse {
+  // Pixels.
+  center: vec2f,
+  // Camera z in world units.
+  depth: f32,
+  // Standard deviation along x, in pixels.
+  sigma_x: f32,
+  // dy/dx of the regression line of y on x.
+  slope: f32,
+  // Standard deviation of y about that line, in pixels.
+  sigma_v: f32,
+  // Opacity after compensation.
+  opacity: f32,
+}
+
+fn is_in_depth_range(view: View, depth: f32) -> bool {
+  return depth > view.near && depth < view.far;
+}
+
+fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
+  let p = (view.local_to_camera * vec4f(g.position, 1.0)).xyz;
+  let xy = p.xy / p.z;
+  let t = clamp(xy, view.jacobian_min, view.jacobian_max);
+
+  // Rows of J · W · R · S, a square root of the screen covariance; its products would lose digits too early.
+  let world_to_camera = mat3x3f(view.local_to_camera[0].xyz, view.local_to_camera[1].xyz, view.local_to_camera[2].xyz);
+  let axes = world_to_camera * rotation_matrix(g.rotation);
+  let a = transpose(mat3x3f(axes[0] * g.scale.x, axes[1] * g.scale.y, axes[2] * g.scale.z));
+  let row_x = (a[0] - t.x * a[2]) * (view.focal.x / p.z);
+  let row_y = (a[1] - t.y * a[2]) * (view.focal.y / p.z);
+
+  let xx = dot(row_x, row_x);
+  let yy = dot(row_y, row_y);
+  let variance_x = xx + DILATION;
+  let inverse_sigma_x = inverseSqrt(variance_x);
+  // By Cauchy-Binet the determinant before dilation is |row_x × row_y|², a sum of squares: no cancellation.
+  let minors = cross(row_x * inverse_sigma_x, row_y);
+  let own_variance_v = dot(minors, minors);
+  let variance_v = own_variance_v + DILATION * ((xx + DILATION) + yy) / variance_x;
+
+  var opacity = min(g.opacity, 1.0);
+  if (view.antialiased != 0u) {
+    opacity *= max(COMPENSATION_MIN, sqrt(own_variance_v / variance_v));
+  }
+  return Ellipse(
+    xy * view.focal + view.principal,
+    p.z,
+    sqrt(variance_x),
+    dot(row_x, row_y) / variance_x,
+    sqrt(variance_v),
+    opacity,
+  );
+}
+
+// Half width and half height, in pixels, of the box of all points with alpha >= ALPHA_MIN.
+fn half_extent(e: Ellipse) -> vec2f {
+  let radius = cutoff_radius(e.opacity);
+  let sheared = e.slope * e.sigma_x;
+  return radius * vec2f(e.sigma_x, sqrt(sheared * sheared + e.sigma_v * e.sigma_v));
+}
+
+// True if the box of the ellipse holds the centre of at least one pixel of the image.
+fn covers_a_pixel(view: View, e: Ellipse) -> bool {
+  let extent = half_extent(e);
+  let first = max(ceil(e.center - extent - 0.5), vec2f(0.0));
+  let last = min(floor(e.center + extent - 0.5), view.viewport - 1.0);
+  return e.opacity >= ALPHA_MIN && all(first <= last);
+}

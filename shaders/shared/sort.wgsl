@@ -1,0 +1,15 @@
+// What the three kernels of the radix sort share.
+struct SortPass {
+  // Lowest bit of the digit.
+  shift: u32,
+  // 1 in the first pass, whose values are the indices of its keys.
+  first: u32,
+}
+
+const SORT_THREADS = 256u;
+// One digit a thread.
+const DIGITS = 256u;
+
+fn digit_of(key: u32, shift: u32) -> u32 {
+  return (key >> shift) & (DIGITS - 1u);
+}

@@ -1,0 +1,22 @@
+// What the projection stages must know of the camera and of the page of Gaussians at hand.
+struct View {
+  // Page-local coordinates (relative to the cloud's float64 origin) to camera axes: x right, y down, z forward.
+  local_to_camera: mat4x4f,
+  // The camera's centre in page-local coordinates.
+  eye: vec3f,
+  splat_count: u32,
+  // Focal lengths, principal point and image size in pixels.
+  focal: vec2f,
+  principal: vec2f,
+  viewport: vec2f,
+  // Limits of x/z and y/z in the Jacobian: 1.3 tan(fov/2) on either side, asymmetric for an off-centre principal point.
+  jacobian_min: vec2f,
+  jacobian_max: vec2f,
+  near: f32,
+  far: f32,
+  // Place of this page among the pages of the frame, and of its first cull group among all groups.
+  page: u32,
+  first_group: u32,
+  sh_degree: u32,
+  antialiased: u32,
+}

@@ -1,0 +1,25 @@
+// First third of a stable radix sort pass: how often each 8-bit digit occurs in each block of keys.
+#import shared/plan
+#import shared/group
+#import shared/sort
+
+@group(0) @binding(0) var<uniform> digit_pass: SortPass;
+@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(2) var<storage, read> keys: array<u32>;
+// [digit][block]
+@group(0) @binding(3) var<storage, read_write> counts: array<u32>;
+
+var<workgroup> histogram: array<atomic<u32>, DIGITS>;
+
+@compute @workgroup_size(SORT_THREADS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let block_id = group_index(workgroup_id);
+  let end = min(block_id * SORT_BLOCK + SORT_BLOCK, plan.visible);
+  for (var i = block_id * SORT_BLOCK + lane; i < end; i += SORT_THREADS) {
+    atomicAdd(&histogram[digit_of(keys[i], digit_pass.shift)], 1u);
+  }
+  workgroupBarrier();
+  if (block_id < plan.sort_blocks) {
+    counts[lane * plan.sort_blocks + block_id] = atomicLoad(&histogram[lane]);
+  }
+}

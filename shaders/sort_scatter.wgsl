@@ -1,0 +1,75 @@
+// Last third: every key moves to its place. Within a block keys are ranked 256 at a time by a bitmap for each digit,
+// which needs no subgroups, keeps equal digits in order (stable), and waits for no other workgroup.
+#import shared/plan
+#import shared/group
+#import shared/sort
+
+@group(0) @binding(0) var<uniform> digit_pass: SortPass;
+@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(2) var<storage, read> keys_in: array<u32>;
+@group(0) @binding(3) var<storage, read> values_in: array<u32>;
+// Exclusive prefix sums over the blocks: [digit][block]
+@group(0) @binding(4) var<storage, read> block_offsets: array<u32>;
+@group(0) @binding(5) var<storage, read> digit_totals: array<u32>;
+@group(0) @binding(6) var<storage, read_write> keys_out: array<u32>;
+@group(0) @binding(7) var<storage, read_write> values_out: array<u32>;
+
+const WORDS = SORT_THREADS / 32u;
+
+// Where the next key with a digit goes.
+var<workgroup> next: array<u32, DIGITS>;
+// Bit t of [word][digit]: thread 32·word + t of this round has the digit. Threads that walk over digits side by side
+// then touch neighbouring words.
+var<workgroup> members: array<atomic<u32>, DIGITS * WORDS>;
+
+// next[digit] = keys with smaller digits + keys with this digit in earlier blocks.
+fn find_first_places(block_id: u32, lane: u32) {
+  let own = digit_totals[lane];
+  next[lane] = own;
+  for (var reach = 1u; reach < DIGITS; reach *= 2u) {
+    workgroupBarrier();
+    let left = select(0u, next[lane - min(reach, lane)], lane >= reach);
+    workgroupBarrier();
+    next[lane] += left;
+  }
+  next[lane] = next[lane] - own + block_offsets[lane * plan.sort_blocks + block_id];
+  workgroupBarrier();
+}
+
+@compute @workgroup_size(SORT_THREADS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let block_id = group_index(workgroup_id);
+  find_first_places(block_id, lane);
+  let word = lane / 32u;
+  let bit = 1u << (lane % 32u);
+  for (var start = 0u; start < SORT_BLOCK; start += SORT_THREADS) {
+    let i = block_id * SORT_BLOCK + start + lane;
+    let is_key = i < plan.visible;
+    var key = 0u;
+    var value = i;
+    if (is_key) {
+      key = keys_in[i];
+      // The first pass sorts the slots themselves: slot i holds value i.
+      if (digit_pass.first == 0u) { value = values_in[i]; }
+    }
+    let digit = digit_of(key, digit_pass.shift);
+    if (is_key) { atomicOr(&members[word * DIGITS + digit], bit); }
+    workgroupBarrier();
+
+    var place = next[digit] + countOneBits(atomicLoad(&members[word * DIGITS + digit]) & (bit - 1u));
+    for (var w = 0u; w < word; w++) { place += countOneBits(atomicLoad(&members[w * DIGITS + digit])); }
+    if (is_key && place < plan.visible) {
+      keys_out[place] = key;
+      values_out[place] = value;
+    }
+    workgroupBarrier();
+
+    var count = 0u;
+    for (var w = 0u; w < WORDS; w++) {
+      count += countOneBits(atomicLoad(&members[w * DIGITS + lane]));
+      atomicStore(&members[w * DIGITS + lane], 0u);
+    }
+    next[lane] += count;
+    workgroupBarrier();
+  }
+}
