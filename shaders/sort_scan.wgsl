@@ -1,36 +1,43 @@
-// Second third: for one digit a workgroup, the exclusive prefix sums of its counts over the blocks, and the total.
+// Second third: for each digit the exclusive prefix sums of its counts over the blocks, and the total. A workgroup
+// serves eight digits, one in each row of 32 threads.
 #import shared/plan
 #import shared/sort
+#import shared/prefix
 
 @group(0) @binding(0) var<storage, read> plan: PlanView;
 // [digit][block]
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> digit_totals: array<u32>;
 
-var<workgroup> sums: array<u32, SORT_THREADS>;
-var<workgroup> block_count: u32;
+const ROW_THREADS = 32u;
+const DIGITS_PER_GROUP = PREFIX_THREADS / ROW_THREADS;
+const BLOCKS_PER_THREAD = 4u;
 
-@compute @workgroup_size(SORT_THREADS)
+var<workgroup> row_totals: array<u32, DIGITS_PER_GROUP>;
+
+@compute @workgroup_size(PREFIX_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let digit = workgroup_id.x;
-  if (lane == 0u) { block_count = plan.sort_blocks; }
-  let blocks = workgroupUniformLoad(&block_count);
+  let row = lane / ROW_THREADS;
+  let digit = workgroup_id.x * DIGITS_PER_GROUP + row;
+  let blocks = plan.sort_blocks;
   var carry = 0u;
-  for (var start = 0u; start < blocks; start += SORT_THREADS) {
-    let block_id = start + lane;
-    var own = 0u;
-    if (block_id < blocks) { own = counts[digit * blocks + block_id]; }
-    sums[lane] = own;
-    for (var reach = 1u; reach < SORT_THREADS; reach *= 2u) {
-      workgroupBarrier();
-      let left = select(0u, sums[lane - min(reach, lane)], lane >= reach);
-      workgroupBarrier();
-      sums[lane] += left;
+  for (var start = 0u; start < blocks; start += ROW_THREADS * BLOCKS_PER_THREAD) {
+    let first = start + (lane % ROW_THREADS) * BLOCKS_PER_THREAD;
+    var own = vec4u(0u);
+    for (var k = 0u; k < BLOCKS_PER_THREAD; k++) {
+      if (first + k < blocks) { own[k] = counts[digit * blocks + first + k]; }
+    }
+    let sum = own.x + own.y + own.z + own.w;
+    let inclusive = inclusive_sum(sum, lane, ROW_THREADS);
+    if (lane % ROW_THREADS == ROW_THREADS - 1u) { row_totals[row] = inclusive; }
+    var running = carry + inclusive - sum;
+    for (var k = 0u; k < BLOCKS_PER_THREAD; k++) {
+      if (first + k < blocks) { counts[digit * blocks + first + k] = running; }
+      running += own[k];
     }
     workgroupBarrier();
-    if (block_id < blocks) { counts[digit * blocks + block_id] = carry + sums[lane] - own; }
-    carry += sums[SORT_THREADS - 1u];
+    carry += row_totals[row];
     workgroupBarrier();
   }
-  if (lane == 0u) { digit_totals[digit] = carry; }
+  if (lane % ROW_THREADS == 0u) { digit_totals[digit] = carry; }
 }

@@ -3,6 +3,7 @@
 #import shared/plan
 #import shared/group
 #import shared/sort
+#import shared/prefix
 
 @group(0) @binding(0) var<uniform> digit_pass: SortPass;
 @group(0) @binding(1) var<storage, read> plan: PlanView;
@@ -25,14 +26,7 @@ var<workgroup> members: array<atomic<u32>, DIGITS * WORDS>;
 // next[digit] = keys with smaller digits + keys with this digit in earlier blocks.
 fn find_first_places(block_id: u32, lane: u32) {
   let own = digit_totals[lane];
-  next[lane] = own;
-  for (var reach = 1u; reach < DIGITS; reach *= 2u) {
-    workgroupBarrier();
-    let left = select(0u, next[lane - min(reach, lane)], lane >= reach);
-    workgroupBarrier();
-    next[lane] += left;
-  }
-  next[lane] = next[lane] - own + block_offsets[lane * plan.sort_blocks + block_id];
+  next[lane] = inclusive_sum(own, lane, DIGITS) - own + block_offsets[lane * plan.sort_blocks + block_id];
   workgroupBarrier();
 }
 

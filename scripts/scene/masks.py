@@ -4,9 +4,9 @@ PHOTOS holds images/*.jpg and sparse/0 (COLMAP text). OUT receives, per view, NA
 red is the object's coverage in 0..255 and whose green is 255 where the pixel may teach the trainer anything, 0 where
 the post hides or touches the object.
 
-Colour alone cannot tell the pale object from the pale plate below it, and one photograph alone cannot tell it from a
-lamp behind it; all together can. So: GrabCut per photograph, a visual hull from all of them, and GrabCut again inside
-the hull's projection.
+Brightness alone cannot tell the pale object from the pale plate below it or a lamp behind it, nor a dark eye socket
+from the dark room; all photographs together can. So: a threshold per photograph, a visual hull from all of them, and
+the threshold again, trusted only near the hull's outline.
 """
 
 import shutil
@@ -20,9 +20,13 @@ from capture import Capture, View, read_colmap, to_upright
 
 # View 44 is left out everywhere: its pose or exposure disagrees with the others.
 LEFT_OUT = {"44"}
-VOXEL = 0.012
+VOXEL = 0.008
+# How much of the way from its surroundings' brightness to its own a pixel must have gone to count as lit.
+CONTRAST = 0.2
+# Pixels within which the hull's outline and a photograph's may differ; there the photograph decides.
+HULL_MARGIN = 4
 # Share of the views that must see a voxel as object. Below 1, because one faulty silhouette must not cut a hole.
-HULL_AGREEMENT = 0.95
+HULL_AGREEMENT = 0.93
 
 
 def project(points: np.ndarray, view: View, capture: Capture) -> tuple[np.ndarray, np.ndarray]:
@@ -60,24 +64,18 @@ def nearest_depth(points: np.ndarray, view: View, capture: Capture) -> np.ndarra
     return image
 
 
-def grab_cut(photograph: np.ndarray, sure: np.ndarray, possible: np.ndarray) -> np.ndarray:
-    """GrabCut at half size: `sure` is object, outside `possible` is not, between them colour decides."""
-    small = cv2.resize(photograph, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-    labels = np.where(possible, cv2.GC_PR_BGD, cv2.GC_BGD).astype(np.uint8)
-    bright = photograph.max(axis=2) > 90
-    labels[possible & bright] = cv2.GC_PR_FGD
-    labels[sure & possible] = cv2.GC_FGD
-    labels = np.ascontiguousarray(labels[::2, ::2])
-    cv2.setRNGSeed(1)
-    cv2.grabCut(small, labels, None, np.zeros((1, 65)), np.zeros((1, 65)), 4, cv2.GC_INIT_WITH_MASK)
-    found = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)).astype(np.float32)
-    size = (photograph.shape[1], photograph.shape[0])
-    return cv2.GaussianBlur(cv2.resize(found, size, interpolation=cv2.INTER_LINEAR), (0, 0), 1.5) > 0.5
+def bright_part(photograph: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """What the flash lit, inside the region `near`: brighter than that region's dark surroundings by CONTRAST."""
+    value = photograph.max(axis=2)
+    ring = (cv2.dilate(near.astype(np.uint8), np.ones((61, 61))) > 0) & ~near
+    dark, lit = np.median(value[ring]), np.median(value[near])
+    smooth = cv2.GaussianBlur(value, (0, 0), 1.0)
+    return largest_part(near & (smooth > dark + CONTRAST * (lit - dark)))
 
 
 def largest_part(mask: np.ndarray) -> np.ndarray:
-    """The largest connected part, small holes filled (no hole of this object shows the background)."""
-    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
+    """The largest connected part, holes filled (no hole of this object shows the background)."""
+    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(opened)
     if count < 2:
         return mask
@@ -111,32 +109,28 @@ def visual_hull(capture: Capture, masks: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def first_masks(capture: Capture, photographs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """From the sparse points alone: what lies close to them is object, what lies far from them is not."""
+    """From the sparse points alone: what lies far from all of them is not the object."""
     on_object = capture.points[np.linalg.norm(capture.points, axis=1) < 0.85]
-    masks = {}
-    for view in capture.views:
-        if view.name in photographs:
-            sure = cv2.erode(stamp(on_object, view, capture, 0.06).astype(np.uint8), np.ones((31, 31))) > 0
-            possible = stamp(on_object, view, capture, 0.09)
-            masks[view.name] = largest_part(grab_cut(photographs[view.name], sure, possible))
-    return masks
+    return {
+        view.name: bright_part(photographs[view.name], stamp(on_object, view, capture, 0.07))
+        for view in capture.views
+        if view.name in photographs
+    }
 
 
-def final_mask(view: View, capture: Capture, photograph: np.ndarray, hull: np.ndarray) -> np.ndarray:
+def final_mask(view: View, capture: Capture, first: np.ndarray, hull: np.ndarray) -> np.ndarray:
     """Coverage and validity, (height, width, 3) uint8 in OpenCV's channel order."""
     upper, lower = hull[hull[:, 1] < capture.cut_height], hull[hull[:, 1] >= capture.cut_height]
     above, below = nearest_depth(upper, view, capture), nearest_depth(lower, view, capture)
-    projected = np.isfinite(above) | np.isfinite(below)
-    sure = cv2.erode(projected.astype(np.uint8), np.ones((19, 19))) > 0
-    possible = cv2.dilate(projected.astype(np.uint8), np.ones((13, 13))) > 0
-    object_or_post = largest_part(grab_cut(photograph, sure, possible))
+    projected = (np.isfinite(above) | np.isfinite(below)).astype(np.uint8)
+    margin = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * HULL_MARGIN + 1, 2 * HULL_MARGIN + 1))
+    core, reach = cv2.erode(projected, margin) > 0, cv2.dilate(projected, margin) > 0
+    silhouette = largest_part((first & reach) | core)
     # The post hides the object where it is nearer. Its silhouette is not trusted to the pixel, hence the margin.
-    reach = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
-    post = cv2.dilate((below < above).astype(np.uint8), reach) > 0
-    inside = object_or_post & np.isfinite(cv2.erode(above, reach))
+    post = cv2.dilate((below < above).astype(np.uint8), margin) > 0
+    inside = silhouette & np.isfinite(cv2.erode(above, margin))
     coverage = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), 0.8)
-    valid = ~post
-    return np.dstack([np.zeros_like(coverage), valid * 255.0, coverage * 255.0]).round().astype(np.uint8)
+    return np.dstack([np.zeros_like(coverage), ~post * 255.0, coverage * 255.0]).round().astype(np.uint8)
 
 
 def main(photos: Path, out: Path) -> None:
@@ -150,7 +144,7 @@ def main(photos: Path, out: Path) -> None:
     np.save(out / "hull.npy", hull.astype(np.float32))
     for view in capture.views:
         if view.name in photographs:
-            mask = final_mask(view, capture, photographs[view.name], hull)
+            mask = final_mask(view, capture, masks[view.name], hull)
             cv2.imwrite(str(out / f"{view.name}.png"), mask)
             shutil.copyfile(photos / "images" / f"{view.name}.jpg", out / f"{view.name}.jpg")
 

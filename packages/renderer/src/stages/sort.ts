@@ -65,7 +65,7 @@ export class SortStage {
   record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], plan: GPUBuffer): void {
     for (const { count, scan, scatter } of bindings) {
       this.#count.dispatchIndirect(pass, count, plan, planOffsets.sort);
-      this.#scan.dispatch(pass, scan, constants.DIGITS);
+      this.#scan.dispatch(pass, scan, constants.DIGITS / constants.DIGITS_PER_GROUP);
       this.#scatter.dispatchIndirect(pass, scatter, plan, planOffsets.sort);
     }
   }

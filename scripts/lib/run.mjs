@@ -1,0 +1,21 @@
+/** Child processes of the scripts: output passes through, a failure ends the script. */
+import { spawnSync } from 'node:child_process';
+import { fileURLToPath } from 'node:url';
+
+export const root = fileURLToPath(new URL('../../', import.meta.url));
+
+/** Runs a command in the project's root and returns its exit status. */
+export function run(command, args, { env = {}, stdio = 'inherit' } = {}) {
+  const result = spawnSync(command, args, { cwd: root, stdio, env: { ...process.env, ...env } });
+  if (result.error) throw result.error;
+  return result.status ?? 1;
+}
+
+/** Runs a command and ends this process if it fails. */
+export function must(command, args, options) {
+  const status = run(command, args, options);
+  if (status !== 0) {
+    console.error(`failed with status ${status}: ${command} ${args.join(' ')}`);
+    process.exit(status);
+  }
+}

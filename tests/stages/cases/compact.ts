@@ -1,0 +1,113 @@
+import { CompactStage, constants, cullGroups, layouts, PlanStage, writeStruct } from '@gaussian-splat/renderer/stages';
+import { check, checkEqual, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
+
+const { CULL_GROUP, WORDS_PER_GROUP } = constants;
+
+/** Bits and exclusive group offsets as `cull` and `scan` leave them, for flags of one page after another. */
+function flagsToBits(pages: readonly boolean[][]): { bits: Uint32Array; offsets: Uint32Array; firstGroups: Uint32Array } {
+  const firstGroups = new Uint32Array(pages.length + 1);
+  pages.forEach((flags, p) => (firstGroups[p + 1] = firstGroups[p] + cullGroups(flags.length)));
+  const groups = firstGroups[pages.length];
+  const bits = new Uint32Array(groups * WORDS_PER_GROUP);
+  const offsets = new Uint32Array(groups + 1);
+  pages.forEach((flags, p) => {
+    flags.forEach((flag, i) => {
+      const group = firstGroups[p] + Math.floor(i / CULL_GROUP);
+      if (!flag) return;
+      bits[group * WORDS_PER_GROUP + Math.floor((i % CULL_GROUP) / 32)] |= 1 << i % 32;
+      offsets[group + 1]++;
+    });
+  });
+  for (let g = 0; g < groups; g++) offsets[g + 1] += offsets[g];
+  return { bits, offsets, firstGroups };
+}
+
+/** The twin: indices within their page of the flagged splats, in order. */
+const survivorsTwin = (pages: readonly boolean[][]): number[] =>
+  pages.flatMap((flags) => flags.flatMap((flag, i) => (flag ? [i] : [])));
+
+async function compactOnGpu(bench: Bench, pages: readonly boolean[][], capacity: number): Promise<Uint32Array> {
+  const { bits, offsets, firstGroups } = flagsToBits(pages);
+  const stage = new CompactStage(bench.device);
+  const survivors = bench.buffer(new Uint32Array(capacity).fill(0xffffffff));
+  const [bitBuffer, offsetBuffer] = [bench.buffer(bits), bench.buffer(offsets)];
+  pages.forEach((flags, page) => {
+    const bytes = new ArrayBuffer(layouts.View.size);
+    const zeros = { local_to_camera: new Array(16).fill(0), eye: [0, 0, 0], focal: [1, 1], principal: [0, 0] };
+    const rest = { viewport: [1, 1], jacobian_min: [0, 0], jacobian_max: [0, 0], near: 1, far: 2, sh_degree: 0 };
+    const place = { splat_count: flags.length, page, first_group: firstGroups[page], antialiased: 0 };
+    writeStruct(layouts.View, { ...zeros, ...rest, ...place }, bytes);
+    const view = bench.uniform(...new Uint32Array(bytes));
+    const bindings = stage.bind({ view, visible_bits: bitBuffer, group_offsets: offsetBuffer, survivors });
+    bench.compute((pass) => stage.record(pass, bindings, flags.length));
+  });
+  return bench.read(survivors, 4 * capacity);
+}
+
+function randomFlags(count: number, share: number, seed: number): boolean[] {
+  const random = randomSource(seed);
+  return Array.from({ length: count }, () => random() < share);
+}
+
+async function checkPlan(bench: Bench, pages: readonly boolean[][], capacity: number): Promise<void> {
+  const { offsets, firstGroups } = flagsToBits(pages);
+  const planSize = layouts.Plan.size + layouts.PagePlan.size * pages.length;
+  const plan = bench.buffer(planSize);
+  const stage = new PlanStage(bench.device);
+  const bindings = stage.bind({
+    limits: bench.uniform(pages.length, capacity),
+    group_offsets: bench.buffer(offsets),
+    page_groups: bench.buffer(firstGroups),
+    plan,
+  });
+  bench.compute((pass) => stage.record(pass, bindings));
+  const words = await bench.read(plan, planSize);
+  const total = survivorsTwin(pages).length;
+  const visible = Math.min(total, capacity);
+  const field = (name: keyof typeof layouts.Plan.fields): number => words[layouts.Plan.fields[name].offset / 4];
+  checkEqual([field('visible'), field('overflow')], [visible, total - visible], 'visible and overflow');
+  checkEqual([field('sort_x'), field('sort_y'), field('sort_z')], [Math.ceil(visible / constants.SORT_BLOCK), visible > 0 ? 1 : 0, 1], 'sort');
+  checkEqual([field('quad_instances')], [Math.ceil(visible / constants.QUAD_BATCH)], 'quad instances');
+  let first = 0;
+  pages.forEach((flags, page) => {
+    const own = Math.max(0, Math.min(flags.filter(Boolean).length, visible - first));
+    const at = (layouts.Plan.size + layouts.PagePlan.size * page) / 4;
+    checkEqual(words.subarray(at, at + 3), [first, own, Math.ceil(own / constants.PROJECT_GROUP)], `page ${page}`);
+    first += own;
+  });
+}
+
+const shares = [0, 0.01, 0.3, 1];
+
+export const compactCases: StageCase[] = [
+  ...shares.map((share) => ({
+    name: `compact: keeps the order of ${100 * share} % survivors over several pages`,
+    run: async (bench: Bench) => {
+      const pages = [1000, 1, 256, 40_000].map((count, i) => randomFlags(count, share, i + 1));
+      const expected = survivorsTwin(pages);
+      const survivors = await compactOnGpu(bench, pages, 50_000);
+      checkEqual(survivors, expected, 'survivors');
+      check(survivors.subarray(expected.length).every((word) => word === 0xffffffff), 'compact wrote beyond the survivors');
+    },
+  })),
+  {
+    name: 'compact: over capacity, the first survivors stay and nothing else is touched',
+    run: async (bench) => {
+      const pages = [randomFlags(5000, 0.5, 9), randomFlags(3000, 0.5, 10)];
+      const capacity = 1024;
+      checkEqual(await compactOnGpu(bench, pages, capacity), survivorsTwin(pages).slice(0, capacity), 'survivors');
+    },
+  },
+  {
+    name: 'plan: counts, indirect arguments and pages follow the survivors',
+    run: async (bench) => {
+      for (const share of shares) {
+        await checkPlan(bench, [1000, 1, 256, 40_000].map((count, i) => randomFlags(count, share, i + 1)), 50_000);
+      }
+    },
+  },
+  {
+    name: 'plan: over capacity the rest is counted as overflow',
+    run: (bench) => checkPlan(bench, [randomFlags(5000, 0.5, 9), randomFlags(3000, 0.5, 10)], 1024),
+  },
+];
