@@ -1,5 +1,5 @@
 import { eyeOf, multiply, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { layouts } from './generated/shaders.js';
+import type { layouts } from './generated/shaders.js';
 import type { StructValues } from './gpu/struct.js';
 
 /** Part of the half field of view that the Jacobian's clamp allows beyond the image: INRIA's 1.3 is 1 + this. */

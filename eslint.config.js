@@ -1,0 +1,61 @@
+import lit from 'eslint-plugin-lit';
+import wc from 'eslint-plugin-wc';
+import tseslint from 'typescript-eslint';
+
+/** Who may know whom (docs/architecture.md). A package may import the packages listed, and no other of ours. */
+const MAY_IMPORT = {
+  core: [],
+  formats: ['core'],
+  renderer: ['core'],
+  element: ['core', 'formats', 'renderer'],
+};
+
+const BROWSER_ONLY = ['document', 'window', 'customElements', 'HTMLElement', 'localStorage'];
+
+const directions = Object.entries(MAY_IMPORT).map(([name, allowed]) => ({
+  files: [`packages/${name}/src/**/*.ts`],
+  rules: {
+    'no-restricted-imports': [
+      'error',
+      {
+        patterns: [
+          ...Object.keys(MAY_IMPORT)
+            .filter((other) => other !== name && !allowed.includes(other))
+            .map((other) => ({
+              group: [`@gaussian-splat/${other}`, `@gaussian-splat/${other}/*`],
+              message: `${name} must not know ${other}: see docs/architecture.md.`,
+            })),
+          { group: ['../../*'], message: 'Import another package by its name.' },
+          { group: ['node:*', 'fs', 'path'], message: 'Packages run in browsers.' },
+          ...(name === 'element' ? [] : [{ group: ['lit', 'lit/*'], message: 'Only the element touches the DOM.' }]),
+        ],
+      },
+    ],
+    'no-restricted-globals':
+      name === 'element' ? 'off' : ['error', ...BROWSER_ONLY.map((global) => ({ name: global, message: 'Only the element touches the DOM.' }))],
+  },
+}));
+
+export default tseslint.config(
+  { ignores: ['**/dist/', '**/cdn/', '**/generated/', '**/node_modules/', '.cache/', 'test-output/', 'coverage/'] },
+  ...tseslint.configs.recommended,
+  {
+    files: ['**/*.ts'],
+    rules: {
+      '@typescript-eslint/no-explicit-any': 'error',
+      '@typescript-eslint/consistent-type-imports': ['error', { fixStyle: 'inline-type-imports' }],
+      'no-restricted-syntax': ['error', { selector: 'TSEnumDeclaration', message: 'Use a union of literals.' }],
+      eqeqeq: ['error', 'always'],
+      'no-eval': 'error',
+      'no-implied-eval': 'error',
+      'prefer-const': ['error', { destructuring: 'all' }],
+    },
+  },
+  { files: ['packages/*/src/**/*.ts'], rules: { '@typescript-eslint/explicit-module-boundary-types': 'error' } },
+  ...directions,
+  {
+    files: ['packages/element/src/**/*.ts'],
+    plugins: { lit, wc },
+    rules: { ...lit.configs.recommended.rules, ...wc.configs.recommended.rules, 'wc/guard-super-call': 'off' },
+  },
+);

@@ -1,0 +1,83 @@
+/** A static file server for the demo and the tests: right MIME types, byte ranges, no caching, nothing outside its root. */
+import { createReadStream, statSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { extname, join, normalize, sep } from 'node:path';
+
+const TYPES = {
+  '.html': 'text/html; charset=utf-8',
+  '.css': 'text/css; charset=utf-8',
+  '.js': 'text/javascript; charset=utf-8',
+  '.mjs': 'text/javascript; charset=utf-8',
+  '.json': 'application/json',
+  '.map': 'application/json',
+  '.svg': 'image/svg+xml',
+  '.png': 'image/png',
+  '.jpg': 'image/jpeg',
+  '.webp': 'image/webp',
+  '.wasm': 'application/wasm',
+  '.md': 'text/markdown; charset=utf-8',
+};
+
+/**
+ * Serves the folders of `mounts` (URL prefix to folder, the longest prefix wins).
+ * @returns the listening server; its address says which port was taken.
+ */
+export function serve(mounts, { port = 0, host = '127.0.0.1', headers = {} } = {}) {
+  const prefixes = Object.keys(mounts).sort((a, b) => b.length - a.length);
+  const server = createServer((request, response) => {
+    let path;
+    try {
+      path = decodeURIComponent(new URL(request.url, 'http://localhost').pathname);
+    } catch {
+      return send(response, 400, 'Bad request');
+    }
+    const prefix = prefixes.find((p) => path.startsWith(p));
+    const file = prefix && resolveInside(mounts[prefix], path.slice(prefix.length));
+    const found = file && findFile(file);
+    if (!found) return send(response, 404, `Not found: ${path}`);
+    sendFile(request, response, found, headers);
+  });
+  return new Promise((resolve, reject) => {
+    server.once('error', reject);
+    server.listen(port, host, () => resolve(server));
+  });
+}
+
+function resolveInside(folder, path) {
+  const file = normalize(join(folder, path));
+  return file === normalize(folder) || file.startsWith(normalize(folder + sep)) ? file : undefined;
+}
+
+function findFile(path) {
+  try {
+    const status = statSync(path);
+    if (status.isDirectory()) return findFile(join(path, 'index.html'));
+    return { path, size: status.size };
+  } catch {
+    return undefined;
+  }
+}
+
+function send(response, status, text) {
+  response.writeHead(status, { 'content-type': 'text/plain; charset=utf-8' }).end(text);
+}
+
+function sendFile(request, response, { path, size }, extraHeaders) {
+  const headers = {
+    'content-type': TYPES[extname(path)] ?? 'application/octet-stream',
+    'accept-ranges': 'bytes',
+    'cache-control': 'no-cache',
+    ...extraHeaders,
+  };
+  const range = /^bytes=(\d+)-(\d*)$/.exec(request.headers.range ?? '');
+  const start = range ? Number(range[1]) : 0;
+  const end = range && range[2] !== '' ? Math.min(Number(range[2]), size - 1) : size - 1;
+  if (range && start > end) {
+    response.writeHead(416, { 'content-range': `bytes */${size}` }).end();
+    return;
+  }
+  if (range) headers['content-range'] = `bytes ${start}-${end}/${size}`;
+  response.writeHead(range ? 206 : 200, { ...headers, 'content-length': end - start + 1 });
+  if (request.method === 'HEAD' || size === 0) response.end();
+  else createReadStream(path, { start, end }).pipe(response);
+}

@@ -1,0 +1,19 @@
+/** `npm start`: installs and builds what is missing, then serves the demo. PORT chooses the port (default 8080). */
+import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
+import { root } from './lib/run.mjs';
+import { serve } from './lib/server.mjs';
+
+ensureDependencies();
+ensureBuilt();
+
+const wanted = Number(process.env.PORT ?? 8080);
+const mounts = { '/': `${root}demo/dist` };
+let server;
+try {
+  server = await serve(mounts, { port: wanted });
+} catch (error) {
+  if (error.code !== 'EADDRINUSE') throw error;
+  console.log(`Port ${wanted} is taken; using a free one.`);
+  server = await serve(mounts);
+}
+console.log(`\nThe demo is at http://localhost:${server.address().port}/ (Ctrl+C ends it)\n`);

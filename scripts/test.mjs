@@ -1,0 +1,75 @@
+/**
+ * `npm test`: installs what is missing (Node packages, a Chromium), builds, and runs every test: lint and types, then
+ * everything that runs in Node (units, stages on Dawn, images against the oracle), then real Chromium with WebGPU.
+ * `npm test -- PATTERN` runs only the Node test files whose path contains PATTERN.
+ */
+import { spawnSync } from 'node:child_process';
+import { readdirSync } from 'node:fs';
+import { join, relative } from 'node:path';
+import { chromiumVersion, ensureChromium } from './lib/chromium.mjs';
+import { gpuEnvironment } from './lib/gpu-environment.mjs';
+import { build, ensureDependencies } from './lib/prepare.mjs';
+import { must, root } from './lib/run.mjs';
+
+ensureDependencies();
+const chromium = ensureChromium();
+console.log(`Chromium: ${chromiumVersion(chromium)} at ${chromium}`);
+build();
+
+const pattern = process.argv[2];
+const env = { ...gpuEnvironment(), CHROMIUM: chromium };
+const totals = { passed: 0, failed: 0, skipped: 0 };
+
+if (pattern === undefined) {
+  must(process.execPath, ['node_modules/typescript/bin/tsc', '--noEmit', '--project', 'tests']);
+  must(process.execPath, ['node_modules/eslint/bin/eslint.js', '.']);
+}
+runNodeTests();
+if (pattern === undefined) runBrowserTests();
+console.log(`\n${totals.passed} passed, ${totals.failed} failed, ${totals.skipped} skipped`);
+process.exit(totals.failed > 0 || totals.passed === 0 ? 1 : 0);
+
+/** Test files of Node: browser folders belong to the test runner in Chromium. */
+function testFiles(folder) {
+  return readdirSync(folder, { withFileTypes: true }).flatMap((entry) => {
+    const path = join(folder, entry.name);
+    if (entry.isDirectory()) return entry.name === 'browser' ? [] : testFiles(path);
+    return entry.name.endsWith('.test.ts') ? [relative(root, path)] : [];
+  });
+}
+
+function runNodeTests() {
+  const files = testFiles(join(root, 'tests')).filter((file) => pattern === undefined || file.includes(pattern));
+  const output = runAndCapture(process.execPath, [
+    ...['--import', 'tsx', '--test', '--test-reporter', 'spec', '--test-concurrency', '2'],
+    ...files,
+  ]);
+  const count = (name) => Number(new RegExp(`^. ${name} (\\d+)$`, 'm').exec(output.text)?.[1] ?? 0);
+  totals.passed += count('pass');
+  totals.failed += count('fail') + count('cancelled');
+  totals.skipped += count('skipped') + count('todo');
+  if (output.status !== 0 && totals.failed === 0) totals.failed++;
+}
+
+function runBrowserTests() {
+  const output = runAndCapture(process.execPath, ['node_modules/@web/test-runner/dist/bin.js', '--config', 'web-test-runner.config.mjs']);
+  const summary = [...output.text.matchAll(/(\d+) passed, (\d+) failed(?:, (\d+) skipped)?/g)].at(-1);
+  totals.passed += Number(summary?.[1] ?? 0);
+  totals.failed += Number(summary?.[2] ?? 0);
+  totals.skipped += Number(summary?.[3] ?? 0);
+  if (output.status !== 0 && Number(summary?.[2] ?? 0) === 0) totals.failed++;
+}
+
+/** Runs a command, shows its output, and returns it with the exit status. */
+function runAndCapture(command, args) {
+  const result = spawnSync(command, args, {
+    cwd: root,
+    env: { ...process.env, ...env, NODE_ENV: 'test' },
+    stdio: ['ignore', 'pipe', 'inherit'],
+    encoding: 'utf8',
+    maxBuffer: 1 << 28,
+  });
+  const text = result.stdout ?? '';
+  process.stdout.write(text);
+  return { text: text.replace(/\u001b\[[0-9;]*m/g, ''), status: result.status ?? 1 };
+}
