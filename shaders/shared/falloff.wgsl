@@ -2,8 +2,8 @@
 
 // A splat paints a pixel only with an alpha of at least this.
 const ALPHA_MIN = 1.0 / 255.0;
-// No splat is more opaque than this.
-const ALPHA_MAX = 0.99;
+// No splat is more opaque than this: gsplat's limit. INRIA's is 0.99, which the reference images refuse.
+const ALPHA_MAX = 0.999;
 
 // Distance from the centre, in standard deviations, at which alpha falls to ALPHA_MIN. 0 for opacity <= ALPHA_MIN.
 fn cutoff_radius(opacity: f32) -> f32 {

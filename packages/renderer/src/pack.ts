@@ -1,4 +1,12 @@
-import { shCoefficientCount, validateCloud, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import {
+  isUsable,
+  keepUsable,
+  shCoefficientCount,
+  validateCloud,
+  type GaussianCloud,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
 import { layouts } from './generated/shaders.js';
 import { halfBits } from './gpu/half.js';
 
@@ -27,13 +35,32 @@ export function shWords(degree: ShDegree): number {
 
 /**
  * Packs a cloud for {@link GaussianBuffers.upload}. Coefficients are rounded to float16 (98 dB on captured scenes),
- * everything else stays float32.
+ * everything else stays float32. Splats that core's `isUsable` refuses are left out and added to `droppedCount`.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packGaussians(cloud: GaussianCloud): PackedGaussians {
   validateCloud(cloud);
-  const { count, shDegree, antialiased, origin, droppedCount } = cloud;
-  return { count, shDegree, antialiased, origin, droppedCount, geometry: packGeometry(cloud), sh: packSh(cloud) };
+  const usable = isAllUsable(cloud) ? cloud : keepUsable(copyOf(cloud));
+  const { count, shDegree, antialiased, origin, droppedCount } = usable;
+  return { count, shDegree, antialiased, origin, droppedCount, geometry: packGeometry(usable), sh: packSh(usable) };
+}
+
+function isAllUsable(cloud: GaussianCloud): boolean {
+  for (let i = 0; i < cloud.count; i++) if (!isUsable(cloud, i)) return false;
+  return true;
+}
+
+/** `keepUsable` works in place, and the caller's cloud is the caller's. */
+function copyOf(cloud: GaussianCloud): GaussianCloud {
+  const { positions, scales, rotations, opacities, sh } = cloud;
+  return {
+    ...cloud,
+    positions: positions.slice(),
+    scales: scales.slice(),
+    rotations: rotations.slice(),
+    opacities: opacities.slice(),
+    sh: sh.slice(),
+  };
 }
 
 function packGeometry({ count, positions, opacities, rotations, scales }: GaussianCloud): Uint32Array {

@@ -1,6 +1,7 @@
 import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
+import { projectionCases } from './projection.js';
 import { scanCases } from './scan.js';
 import { sortCases } from './sort.js';
 
-export const stageCases: readonly StageCase[] = [...scanCases, ...compactCases, ...sortCases];
+export const stageCases: readonly StageCase[] = [...scanCases, ...projectionCases, ...compactCases, ...sortCases];

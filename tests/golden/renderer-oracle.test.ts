@@ -1,0 +1,53 @@
+/** The default image, in float before rounding, against the float64 oracle: real captures and procedural scenes. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { readScene } from '@gaussian-splat/formats';
+import type { Mode } from '../oracle/oracle.js';
+import { referenceViews } from '../support/cameras.js';
+import { compareWithOracle, describeCloseness, type Closeness } from '../support/compare.js';
+import { hasSharedData, needsSharedData, sharedFile } from '../support/data.js';
+import { nodeDevice } from '../support/node-device.js';
+import { proceduralScenes } from '../support/scenes.js';
+
+const MODES: readonly Mode[] = ['classic', 'antialiased'];
+/** dB that the default image must reach in its worst view. */
+const LIMIT_DB = 59;
+/** 99.9 % of the channels are at most this far off. */
+const LIMIT_P999 = 1 / 255;
+
+function assertClose(name: string, closeness: Closeness): void {
+  console.log(describeCloseness(name, closeness));
+  assert.ok(closeness.psnr >= LIMIT_DB, `${name}: ${closeness.psnr} dB`);
+  assert.ok(closeness.p999 <= LIMIT_P999, `${name}: 99.9th percentile ${255 * closeness.p999}/255`);
+}
+
+if (!hasSharedData) {
+  test('reference views', { skip: needsSharedData }, () => undefined);
+} else {
+  const clouds = new Map<string, ReturnType<typeof readScene>>();
+  for (const view of referenceViews()) {
+    for (const mode of MODES) {
+      test(`${view.name}, ${mode}`, async () => {
+        if (!clouds.has(view.file)) clouds.set(view.file, readScene(sharedFile(view.file), { name: view.file }));
+        const cloud = await clouds.get(view.file)!;
+        assertClose(`${view.name} ${mode}`, await compareWithOracle(await nodeDevice(), cloud, view.camera, mode));
+      });
+    }
+  }
+}
+
+for (const makeScene of proceduralScenes) {
+  for (const mode of MODES) {
+    test(`${makeScene.name}, ${mode}`, async () => {
+      const { name, cloud, cameras } = makeScene();
+      for (const [i, camera] of cameras.entries()) {
+        assertClose(`${name} ${i} ${mode}`, await compareWithOracle(await nodeDevice(), cloud, camera, mode));
+      }
+    });
+  }
+}
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});

@@ -1,0 +1,99 @@
+/** Front-to-back alpha compositing of ellipses into an image. */
+import type { Vector3 } from '@gaussian-splat/core';
+import type { PixelRect } from './footprint.js';
+import type { Ellipse } from './projection.js';
+import type { Rules } from './rules.js';
+
+/** A splat that is ready to be blended. */
+export interface ScreenSplat {
+  /** Its place in the cloud. */
+  readonly index: number;
+  /** Splats are blended by ascending key, equal keys by index. */
+  readonly key: number;
+  readonly ellipse: Ellipse;
+  readonly footprint: PixelRect;
+  /** After compensation, 0..1. */
+  readonly opacity: number;
+  /** Red, green, blue; 0 or more, may exceed 1. */
+  readonly color: Vector3;
+}
+
+/** What the oracle draws. Rows run from the top, pixels within a row from the left. */
+export interface OracleImage {
+  readonly width: number;
+  readonly height: number;
+  /** [height, width, 3] red, green, blue, weighted by alpha (premultiplied), background included; not clamped. */
+  readonly color: Float64Array;
+  /** [height, width] share of the background that is seen, 0..1. Alpha is 1 less this. */
+  readonly transmittance: Float64Array;
+  /** [height, width] number of splats that were added to the pixel. */
+  readonly contributors: Uint32Array;
+  /** [N] largest weight alpha·T that each splat of the cloud has in any pixel; 0 if it is not seen. */
+  readonly maxWeight: Float64Array;
+}
+
+export function emptyImage(width: number, height: number, splatCount: number): OracleImage {
+  return {
+    width,
+    height,
+    color: new Float64Array(3 * width * height),
+    transmittance: new Float64Array(width * height).fill(1),
+    contributors: new Uint32Array(width * height),
+    maxWeight: new Float64Array(splatCount),
+  };
+}
+
+/** The splats in the order in which they are blended: nearest first. Leaves the array it is given alone. */
+export function nearestFirst(splats: readonly ScreenSplat[]): ScreenSplat[] {
+  return [...splats].sort((a, b) => a.key - b.key || a.index - b.index);
+}
+
+/** Blends splats, nearest first, into the image, pixel by pixel: C += T·alpha·c, then T *= 1 - alpha. */
+export function blend(image: OracleImage, splats: readonly ScreenSplat[], rules: Rules): void {
+  const finished = new Uint8Array(image.width * image.height);
+  for (const splat of splats) blendSplat(image, finished, splat, rules);
+}
+
+function blendSplat(image: OracleImage, finished: Uint8Array, splat: ScreenSplat, rules: Rules): void {
+  const { width, color, transmittance, contributors, maxWeight } = image;
+  const { index, ellipse, footprint, opacity } = splat;
+  const { xx, xy, yy } = ellipse.conic;
+  const [red, green, blue] = splat.color;
+  // exp is the dear part: below this power alpha is surely under minAlpha. The margin leaves the decision to the test.
+  const hopeless = Math.log(rules.minAlpha / opacity) - 1e-6;
+
+  for (let row = footprint.top; row < footprint.bottom; row++) {
+    for (let column = footprint.left; column < footprint.right; column++) {
+      const pixel = row * width + column;
+      if (finished[pixel]) continue;
+
+      const dx = column + 0.5 - ellipse.x;
+      const dy = row + 0.5 - ellipse.y;
+      const power = -0.5 * (xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy);
+      if (power > 0 || power < hopeless) continue;
+      const alpha = Math.min(rules.maxAlpha, opacity * Math.exp(power));
+      if (alpha < rules.minAlpha) continue;
+
+      const before = transmittance[pixel];
+      const after = before * (1 - alpha);
+      if (after < rules.minTransmittance || (rules.stopsAtEquality && after === rules.minTransmittance)) {
+        finished[pixel] = 1;
+        continue;
+      }
+      const weight = before * alpha;
+      color[3 * pixel] += weight * red;
+      color[3 * pixel + 1] += weight * green;
+      color[3 * pixel + 2] += weight * blue;
+      transmittance[pixel] = after;
+      contributors[pixel]++;
+      if (weight > maxWeight[index]) maxWeight[index] = weight;
+    }
+  }
+}
+
+/** Adds what shines through: C += T·background. */
+export function addBackground(image: OracleImage, background: Vector3): void {
+  for (let i = 0; i < image.color.length; i++) {
+    image.color[i] += image.transmittance[Math.floor(i / 3)] * background[i % 3];
+  }
+}

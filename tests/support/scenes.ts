@@ -1,0 +1,24 @@
+/** Seeded procedural scenes: the same on every machine, each hard for renderers in one way. */
+import { room } from './scenes/room.js';
+import { type Scene } from './scenes/scene.js';
+import { edgeOnDiscs, hugeSplats, needles, pixelSplats } from './scenes/shapes.js';
+import { brightColors, equalDepthPlane, offCentre, opacityLadder } from './scenes/values.js';
+
+export { withHostileSplats, type HostileCloud } from './hostile.js';
+export { room } from './scenes/room.js';
+export { cameraAt, type Scene } from './scenes/scene.js';
+export { edgeOnDiscs, hugeSplats, needles, pixelSplats } from './scenes/shapes.js';
+export { brightColors, equalDepthPlane, movedBy, offCentre, OPACITY_STEPS, opacityLadder } from './scenes/values.js';
+
+/** Makers of all scenes; each makes its scene anew, in a fraction of a second. */
+export const proceduralScenes: readonly (() => Scene)[] = [
+  room,
+  needles,
+  hugeSplats,
+  pixelSplats,
+  opacityLadder,
+  brightColors,
+  edgeOnDiscs,
+  offCentre,
+  equalDepthPlane,
+];
