@@ -50,20 +50,26 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (is_key) { atomicOr(&members[word * DIGITS + digit], bit); }
     workgroupBarrier();
 
-    var place = next[digit] + countOneBits(atomicLoad(&members[word * DIGITS + digit]) & (bit - 1u));
-    for (var w = 0u; w < word; w++) { place += countOneBits(atomicLoad(&members[w * DIGITS + digit])); }
+    let first = next[digit];
+    var before = 0u;
+    var count = 0u;
+    for (var w = 0u; w < WORDS; w++) {
+      let mask = atomicLoad(&members[w * DIGITS + digit]);
+      count += countOneBits(mask);
+      before += select(0u, countOneBits(mask), w < word) + select(0u, countOneBits(mask & (bit - 1u)), w == word);
+    }
+    let place = first + before;
     if (is_key && place < plan.visible) {
       keys_out[place] = key;
       values_out[place] = value;
     }
     workgroupBarrier();
 
-    var count = 0u;
-    for (var w = 0u; w < WORDS; w++) {
-      count += countOneBits(atomicLoad(&members[w * DIGITS + lane]));
-      atomicStore(&members[w * DIGITS + lane], 0u);
+    // The last thread with a digit leaves the bitmap of that digit empty for the next round.
+    if (is_key && before == count - 1u) {
+      next[digit] = first + count;
+      for (var w = 0u; w < WORDS; w++) { atomicStore(&members[w * DIGITS + digit], 0u); }
     }
-    next[lane] += count;
     workgroupBarrier();
   }
 }

@@ -27,7 +27,7 @@ struct Ellipse {
 }
 
 fn is_in_depth_range(view: View, depth: f32) -> bool {
-  return depth > view.near && depth < view.far;
+  return depth >= view.near && depth <= view.far;
 }
 
 fn project_ellipse(view: View, g: Gaussian) -> Ellipse {

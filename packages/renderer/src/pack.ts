@@ -1,6 +1,5 @@
 import {
   isUsable,
-  keepUsable,
   shCoefficientCount,
   validateCloud,
   type GaussianCloud,
@@ -40,32 +39,24 @@ export function shWords(degree: ShDegree): number {
  */
 export function packGaussians(cloud: GaussianCloud): PackedGaussians {
   validateCloud(cloud);
-  const usable = isAllUsable(cloud) ? cloud : keepUsable(copyOf(cloud));
-  const { count, shDegree, antialiased, origin, droppedCount } = usable;
-  return { count, shDegree, antialiased, origin, droppedCount, geometry: packGeometry(usable), sh: packSh(usable) };
+  const { shDegree, antialiased, origin } = cloud;
+  const kept = usableIndices(cloud);
+  const droppedCount = cloud.droppedCount + cloud.count - kept.length;
+  const plain = { count: kept.length, shDegree, antialiased, origin, droppedCount };
+  return { ...plain, geometry: packGeometry(cloud, kept), sh: packSh(cloud, kept) };
 }
 
-function isAllUsable(cloud: GaussianCloud): boolean {
-  for (let i = 0; i < cloud.count; i++) if (!isUsable(cloud, i)) return false;
-  return true;
+function usableIndices(cloud: GaussianCloud): Uint32Array {
+  const indices = new Uint32Array(cloud.count);
+  let kept = 0;
+  for (let i = 0; i < cloud.count; i++) if (isUsable(cloud, i)) indices[kept++] = i;
+  return indices.subarray(0, kept);
 }
 
-/** `keepUsable` works in place, and the caller's cloud is the caller's. */
-function copyOf(cloud: GaussianCloud): GaussianCloud {
-  const { positions, scales, rotations, opacities, sh } = cloud;
-  return {
-    ...cloud,
-    positions: positions.slice(),
-    scales: scales.slice(),
-    rotations: rotations.slice(),
-    opacities: opacities.slice(),
-    sh: sh.slice(),
-  };
-}
-
-function packGeometry({ count, positions, opacities, rotations, scales }: GaussianCloud): Uint32Array {
-  const words = new Float32Array(count * GEOMETRY_WORDS);
-  for (let i = 0, at = 0; i < count; i++, at += GEOMETRY_WORDS) {
+function packGeometry({ positions, opacities, rotations, scales }: GaussianCloud, kept: Uint32Array): Uint32Array {
+  const words = new Float32Array(kept.length * GEOMETRY_WORDS);
+  let at = 0;
+  for (const i of kept) {
     words[at] = positions[3 * i];
     words[at + 1] = positions[3 * i + 1];
     words[at + 2] = positions[3 * i + 2];
@@ -77,16 +68,19 @@ function packGeometry({ count, positions, opacities, rotations, scales }: Gaussi
     words[at + 8] = scales[3 * i];
     words[at + 9] = scales[3 * i + 1];
     words[at + 10] = scales[3 * i + 2];
+    at += GEOMETRY_WORDS;
   }
   return new Uint32Array(words.buffer);
 }
 
-function packSh({ count, sh, shDegree }: GaussianCloud): Uint32Array {
+function packSh({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Array {
   const numbers = 3 * shCoefficientCount(shDegree);
   const stride = 2 * shWords(shDegree);
-  const halves = new Uint16Array(count * stride);
-  for (let i = 0; i < count; i++) {
-    for (let k = 0; k < numbers; k++) halves[i * stride + k] = halfBits(sh[i * numbers + k]);
+  const halves = new Uint16Array(kept.length * stride);
+  let at = 0;
+  for (const i of kept) {
+    for (let k = 0; k < numbers; k++) halves[at + k] = halfBits(sh[i * numbers + k]);
+    at += stride;
   }
   return new Uint32Array(halves.buffer);
 }

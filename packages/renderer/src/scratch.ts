@@ -55,7 +55,7 @@ export class Scratch {
     try {
       this.visibleBits = buffer('cull.visible_bits', 4 * constants.WORDS_PER_GROUP * groups);
       this.groupOffsets = buffer('scan.group_offsets', 4 * (groups + 1));
-      this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * pages, storage | indirect | copySource | copyDestination);
+      this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages), storage | indirect | copySource | copyDestination);
       this.pageGroups = buffer('plan.page_groups', 4 * (pages + 1));
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
       this.keys = [perSplat('sort.keys_a'), perSplat('sort.keys_b')];

@@ -1,5 +1,8 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 
+/** Bytes: a binding must hold one element of its array, even if the scene has none. */
+const SMALLEST_BUFFER = 64;
+
 /** GPU objects with one owner: counts their bytes, checks the device's limits, and destroys them together. */
 export class GpuMemory {
   readonly #device: GPUDevice;
@@ -17,11 +20,11 @@ export class GpuMemory {
   }
 
   /**
-   * Creates a buffer, its size rounded up to 4 bytes and at least 16.
+   * Creates a buffer, its size rounded up to 4 bytes and at least {@link SMALLEST_BUFFER}.
    * @throws GaussianSplatError `out-of-memory/buffer-limit` if the device does not allow a buffer of that size.
    */
   buffer(label: string, byteLength: number, usage: GPUBufferUsageFlags, content?: Uint32Array): GPUBuffer {
-    const size = Math.max(16, Math.ceil(byteLength / 4) * 4);
+    const size = Math.max(SMALLEST_BUFFER, Math.ceil(byteLength / 4) * 4);
     requireBufferSize(this.#device, label, size);
     const buffer = this.#device.createBuffer({ label, size, usage, mappedAtCreation: content !== undefined });
     if (content !== undefined) {

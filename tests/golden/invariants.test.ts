@@ -1,0 +1,206 @@
+/** What must hold for the renderer whatever the scene: repeatable, hostile-proof, free of steady-state allocation. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { capture, GaussianBuffers, packGaussians, Renderer, type PackedGaussians } from '@gaussian-splat/renderer';
+import { renderOracle } from '../oracle/oracle.js';
+import { cloudOf, repeat } from '../support/clouds.js';
+import { closeness, renderCloud } from '../support/compare.js';
+import { psnr } from '../support/metrics.js';
+import { nodeDevice } from '../support/node-device.js';
+import { randomSource } from '../support/gpu.js';
+import { cameraAt, equalDepthPlane, movedBy, offCentre, room, withHostileSplats } from '../support/scenes.js';
+
+const sameBytes = (a: Float32Array, b: Float32Array): boolean =>
+  Buffer.compare(Buffer.from(a.buffer, a.byteOffset, a.byteLength), Buffer.from(b.buffer, b.byteOffset, b.byteLength)) === 0;
+
+/** The same view at another image size. */
+function resized(camera: Camera, width: number): Camera {
+  const s = width / camera.width;
+  const height = Math.round(camera.height * s);
+  return { ...camera, width, height, fx: camera.fx * s, fy: camera.fy * s, cx: camera.cx * s, cy: camera.cy * s };
+}
+
+/** Part of a cloud, in its order. */
+function part(cloud: GaussianCloud, first: number, end: number): GaussianCloud {
+  const cut = (array: Float32Array): Float32Array => {
+    const size = array.length / cloud.count;
+    return array.slice(first * size, end * size);
+  };
+  const { positions, scales, rotations, opacities, sh } = cloud;
+  return {
+    ...cloud,
+    count: end - first,
+    positions: cut(positions),
+    scales: cut(scales),
+    rotations: cut(rotations),
+    opacities: cut(opacities),
+    sh: cut(sh),
+  };
+}
+
+for (const { make, frames } of [{ make: equalDepthPlane, frames: 200 }, { make: room, frames: 20 }]) {
+  test(`${frames} frames of one view of ${make.name} are the same bytes`, async () => {
+    const device = await nodeDevice();
+    const { cloud, cameras } = make();
+    const camera = resized(cameras[0], 120);
+    const renderer = new Renderer(device);
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+    const first = await capture(device, renderer, { gaussians, camera });
+    for (let frame = 1; frame < frames; frame++) {
+      const next = await capture(device, renderer, { gaussians, camera });
+      assert.ok(sameBytes(first, next), `frame ${frame} differs`);
+    }
+    assert.ok((await renderer.readStatistics()).visible > 1000, 'the scene is visible');
+    renderer.destroy();
+    gaussians.destroy();
+  });
+}
+
+test('hostile values in every attribute change nothing and are counted', async () => {
+  const device = await nodeDevice();
+  const { cloud, cameras } = room();
+  const hostile = withHostileSplats(cloud);
+  const packed = packGaussians(hostile.cloud);
+  assert.equal(packed.droppedCount, hostile.bad.length);
+  assert.equal(packed.count, cloud.count);
+  const clean = await renderCloud(device, cloud, cameras[0], 'classic');
+  assert.ok(sameBytes(clean, await renderCloud(device, hostile.cloud, cameras[0], 'classic')));
+});
+
+test('an image of no splats is the background', async () => {
+  const device = await nodeDevice();
+  const renderer = new Renderer(device);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloudOf([])));
+  const camera = cameraAt([0, 0, -3], [0, 0, 0], { width: 7, height: 5 });
+  const pixels = await capture(device, renderer, { gaussians, camera, background: [0.25, 0.5, 0.125, 0.75] });
+  for (let i = 0; i < pixels.length; i += 4) assert.deepEqual([...pixels.subarray(i, i + 4)], [0.25, 0.5, 0.125, 0.75]);
+  assert.deepEqual(await renderer.readStatistics(), { visible: 0, overflow: 0, unusable: 0 });
+});
+
+test('background shines through by transmittance, premultiplied', async () => {
+  const device = await nodeDevice();
+  const { cloud, cameras } = offCentre();
+  const renderer = new Renderer(device);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const clear = await capture(device, renderer, { gaussians, camera: cameras[0] });
+  const background = [0.2, 0.1, 0.4, 0.5] as const;
+  const over = await capture(device, renderer, { gaussians, camera: cameras[0], background });
+  for (let i = 0; i < clear.length; i++) {
+    const expected = clear[i] + (1 - clear[i - (i % 4) + 3]) * background[i % 4];
+    assert.ok(Math.abs(over[i] - expected) < 1e-5, `number ${i}: ${over[i]}, expected ${expected}`);
+  }
+});
+
+test('a scene in several buffers is the same image as in one', async () => {
+  const device = await nodeDevice();
+  const { cloud, cameras } = room();
+  const cuts = [0, 1000, 1257, 20_000, cloud.count];
+  const renderer = new Renderer(device);
+  const whole = await capture(device, renderer, {
+    gaussians: await GaussianBuffers.upload(device, packGaussians(cloud)),
+    camera: cameras[0],
+  });
+  const pieces: GaussianBuffers[] = [];
+  for (let i = 1; i < cuts.length; i++) {
+    pieces.push(await GaussianBuffers.upload(device, packGaussians(part(cloud, cuts[i - 1], cuts[i]))));
+  }
+  assert.ok(sameBytes(whole, await capture(device, renderer, { gaussians: pieces, camera: cameras[0] })));
+});
+
+test('a moving camera allocates nothing, compiles nothing and reads nothing back', async () => {
+  const device = await nodeDevice();
+  const { cloud, cameras } = offCentre();
+  const renderer = new Renderer(device);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const target = device.createTexture({ size: [64, 48], format: 'rgba8unorm', usage: 0x10 });
+  const view = target.createView();
+  const draw = (i: number): void => {
+    const camera = { ...resized(cameras[0], 64), height: 48, cx: 32 + i };
+    renderer.render({ gaussians, camera, target: view, targetFormat: 'rgba8unorm' });
+  };
+  draw(0);
+  const calls = spyOnAllocations(device);
+  for (let i = 1; i <= 10; i++) draw(i);
+  calls.stop();
+  assert.deepEqual(calls.names, []);
+  assert.equal(calls.submits, 10, 'one submit a frame');
+});
+
+/** Records every call of a device that allocates, compiles or waits. */
+function spyOnAllocations(device: GPUDevice): { names: string[]; submits: number; stop(): void } {
+  const record = { names: [] as string[], submits: 0, stop: () => restore.forEach((undo) => undo()) };
+  const restore: (() => void)[] = [];
+  const replace = (target: object, name: string, note: () => void): void => {
+    const original = Reflect.get(target, name) as (...args: unknown[]) => unknown;
+    Reflect.set(target, name, function (this: unknown, ...args: unknown[]) {
+      note();
+      return original.apply(target, args);
+    });
+    restore.push(() => Reflect.deleteProperty(target, name) || Reflect.set(target, name, original));
+  };
+  const creators = ['Buffer', 'Texture', 'BindGroup', 'BindGroupLayout', 'PipelineLayout', 'ShaderModule', 'Sampler', 'QuerySet'];
+  const pipelines = ['ComputePipeline', 'RenderPipeline', 'ComputePipelineAsync', 'RenderPipelineAsync'];
+  for (const name of [...creators, ...pipelines]) replace(device, `create${name}`, () => record.names.push(name));
+  replace(device.queue, 'onSubmittedWorkDone', () => record.names.push('onSubmittedWorkDone'));
+  replace(device.queue, 'submit', () => record.submits++);
+  return record;
+}
+
+test('a scene a million units from the origin looks as at the origin', async () => {
+  const device = await nodeDevice();
+  const { cloud, cameras } = offCentre();
+  const here = await renderCloud(device, cloud, cameras[0], 'classic');
+  // Powers of two, so that the camera's own float64 position loses nothing.
+  const moved = movedBy(offCentre(), [2 ** 20, -(2 ** 21), 2 ** 19]);
+  const there = await renderCloud(device, moved.cloud, moved.cameras[0], 'classic');
+  assert.ok(psnr(here, there, { channels: 4 }) > 75, `${psnr(here, there, { channels: 4 })} dB`);
+});
+
+test('1.5 million splats with SH3 span pages at default limits', async () => {
+  const device = await nodeDevice();
+  const count = 1_500_000;
+  const visible = 3000;
+  const random = randomSource(3);
+  const near = cloudOf(
+    repeat(visible, () => ({
+      position: [random() - 0.5, random() - 0.5, random() - 0.5],
+      scale: 0.01 + 0.02 * random(),
+      opacity: 0.2 + 0.7 * random(),
+      color: [random(), random(), random()],
+      sh: Array.from({ length: 45 }, () => 0.2 * (random() - 0.5)),
+    })),
+    3,
+  );
+  // The visible ones are spread over the whole file; the others lie behind the camera.
+  const packed = spread(packGaussians(near), count);
+  const gaussians = await GaussianBuffers.upload(device, packed);
+  assert.equal(gaussians.pages.length, 2, 'two pages');
+  const renderer = new Renderer(device);
+  const camera = cameraAt([0, 0, -2], [0, 0, 0], { width: 160, height: 120 });
+  const pixels = await capture(device, renderer, { gaussians, camera });
+  const close = closeness(pixels, renderOracle(near, camera, { rules: 'gsplat', mode: 'classic' }));
+  assert.ok(close.psnr >= 59, `${close.psnr} dB`);
+  renderer.destroy();
+  gaussians.destroy();
+});
+
+/** `packed` spread evenly over `count` splats, the rest far behind. */
+function spread(packed: PackedGaussians, count: number): PackedGaussians {
+  const [geometryWords, shWords] = [packed.geometry.length / packed.count, packed.sh.length / packed.count];
+  const geometry = new Uint32Array(geometryWords * count);
+  const sh = new Uint32Array(shWords * count);
+  const floats = new Float32Array(geometry.buffer);
+  const step = Math.floor(count / packed.count);
+  for (let i = 0; i < count; i++) floats.set([0, 0, -100, 1, 1, 0, 0, 0, 1, 1, 1], geometryWords * i);
+  for (let i = 0; i < packed.count; i++) {
+    geometry.set(packed.geometry.subarray(geometryWords * i, geometryWords * (i + 1)), geometryWords * i * step);
+    sh.set(packed.sh.subarray(shWords * i, shWords * (i + 1)), shWords * i * step);
+  }
+  return { ...packed, count, geometry, sh };
+}
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
