@@ -17,7 +17,8 @@ const USAGE = `usage: npm run render -- SCENE --camera CAMERA.json --out IMAGE.p
   --view NAME          the view of that name (or number) in a file of several
   --mode MODE          classic or antialiased; default: what the scene file says
   --raster NAME        auto (default) or quads
-  --accumulation NAME  rgba16float (default) or rgba32float
+  --accumulation NAME  precision in which splats are blended: rgba16float (what the element shows), rgba32float, or
+                       auto (default): rgba32float where the device can blend it, since no frame rate is at stake
   --background R,G,B   0..1; default: transparent
 `;
 
@@ -40,7 +41,7 @@ function parseOptions(args) {
         view: text,
         mode: text,
         raster: { ...text, default: 'auto' },
-        accumulation: { ...text, default: 'rgba16float' },
+        accumulation: { ...text, default: 'auto' },
         background: text,
         help: { type: 'boolean' },
       },
@@ -55,7 +56,7 @@ function parseOptions(args) {
   if (values.out === undefined && values.float === undefined) throw new UsageError('--out or --float is missing');
   oneOf('--mode', values.mode, [undefined, 'classic', 'antialiased']);
   oneOf('--raster', values.raster, ['auto', 'quads']);
-  oneOf('--accumulation', values.accumulation, ['rgba16float', 'rgba32float']);
+  oneOf('--accumulation', values.accumulation, ['auto', 'rgba16float', 'rgba32float']);
   return { ...values, scene: positionals[0], background: parseBackground(values.background) };
 }
 
@@ -101,6 +102,11 @@ function encodePng(pixels, width, height) {
   return PNG.sync.write(png);
 }
 
+function chooseAccumulation(asked, device) {
+  if (asked !== 'auto') return asked;
+  return device.features.has('float32-blendable') ? 'rgba32float' : 'rgba16float';
+}
+
 async function render(options) {
   const camera = readCamera(options.camera, options.view);
   const bytes = new Uint8Array(readFileSync(resolve(from, options.scene)));
@@ -111,7 +117,8 @@ async function render(options) {
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   const validationErrors = [];
   device.addEventListener('uncapturederror', ({ error }) => validationErrors.push(error.message));
-  const renderer = new Renderer(device, { rasterizer: options.raster, accumulation: options.accumulation });
+  const accumulation = chooseAccumulation(options.accumulation, device);
+  const renderer = new Renderer(device, { rasterizer: options.raster, accumulation });
   const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased }));
   const pixels = await capture(device, renderer, { gaussians, camera, background: options.background });
   const statistics = await renderer.readStatistics();
@@ -123,7 +130,7 @@ async function render(options) {
   console.log(
     `${options.scene}: ${cloud.count} splats, SH degree ${cloud.shDegree}, ${antialiased ? 'antialiased' : 'classic'}; ` +
       `${cloud.droppedCount} unusable splats left out; ${statistics.visible} visible; ` +
-      `${width}x${height} by ${renderer.rasterizer} in ${options.accumulation} on ${adapter.info.description || adapter.info.vendor}`,
+      `${width}x${height} by ${renderer.rasterizer} in ${accumulation} on ${adapter.info.description || adapter.info.vendor}`,
   );
 }
 

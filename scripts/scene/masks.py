@@ -1,8 +1,8 @@
 """Cuts the object out of its photographs: python masks.py PHOTOS OUT
 
-PHOTOS holds images/*.jpg and sparse/0 (COLMAP text). OUT receives, per view, NAME.jpg (unchanged) and NAME.png, whose
-red is the object's coverage in 0..255 and whose green is 255 where the pixel may teach the trainer anything, 0 where
-the post hides or touches the object.
+PHOTOS holds images/*.jpg and sparse/0 (COLMAP text). OUT receives, per view, NAME.jpg (unchanged) and NAME.png: red
+is the object's coverage in 0..255; green is 255 where the pixel may teach the trainer anything, 0 where the post hides
+or touches the object; blue is 255 where the photograph is dark and nobody can tell shaded object from dark room.
 
 Brightness alone cannot tell the pale object from the pale plate below it or a lamp behind it, nor a dark eye socket
 from the dark room; all photographs together can. So: a threshold per photograph, a visual hull from all of them, and
@@ -25,8 +25,26 @@ VOXEL = 0.008
 CONTRAST = 0.2
 # Pixels within which the hull's outline and a photograph's may differ; there the photograph decides.
 HULL_MARGIN = 4
+# A pixel this deep inside the hull is object, however dark.
+CORE_MARGIN = 10
 # Share of the views that must see a voxel as object. Below 1, because one faulty silhouette must not cut a hole.
-HULL_AGREEMENT = 0.93
+HULL_AGREEMENT = 0.96
+# From this height down (upright frame) the object shades itself; see visual_hull. What fewer views agree on may still
+# be object there.
+UNDERSIDE = 0.08
+STRICT_AGREEMENT = 0.9
+LOOSE_AGREEMENT = 0.75
+# Views from higher than this above the horizon see the underside in the flash's shadow, before plate and lamps.
+HIGH_VIEW_DEGREES = 25
+# Pixels within which the hull's outline and a photograph's may differ; there the photograph decides.
+HULL_MARGIN = 4
+# A pixel this deep inside the hull is object, however dark.
+CORE_MARGIN = 10
+# Share of the views that must see a voxel as object. Below 1, because one faulty silhouette must not cut a hole.
+HULL_AGREEMENT = 0.96
+# From this height down (upright frame) the object shades itself; see visual_hull.
+UNDERSIDE = 0.08
+UNDERSIDE_AGREEMENT = 0.7
 
 
 def project(points: np.ndarray, view: View, capture: Capture) -> tuple[np.ndarray, np.ndarray]:
@@ -55,12 +73,17 @@ def nearest_depth(points: np.ndarray, view: View, capture: Capture) -> np.ndarra
     pixels, depth = project(points, view, capture)
     half = int(np.ceil(VOXEL * k.fx / np.median(depth) / 2))
     image = np.full((k.height, k.width), np.inf, np.float32)
-    column, row = np.floor(pixels).astype(int).T
+    far_first = np.argsort(-depth)
+    depth = depth[far_first]
+    column, row = np.floor(pixels[far_first]).astype(int).T
     for down in range(-half, half + 1):
         for right in range(-half, half + 1):
             x, y = column + right, row + down
             seen = (x >= 0) & (x < k.width) & (y >= 0) & (y < k.height)
-            np.minimum.at(image, (y[seen], x[seen]), depth[seen])
+            # Of several writes to one pixel the last stays: the nearest. Between shifts the nearer of both.
+            shifted = np.full_like(image, np.inf)
+            shifted[y[seen], x[seen]] = depth[seen]
+            image = np.minimum(image, shifted)
     return image
 
 
@@ -84,6 +107,10 @@ def largest_part(mask: np.ndarray) -> np.ndarray:
     return cv2.drawContours(np.zeros_like(part), contours, -1, 1, cv2.FILLED) > 0
 
 
+def disc(radius: int) -> np.ndarray:
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+
+
 def voxels(capture: Capture) -> np.ndarray:
     """Centres of a grid round the object and the upper part of its post, (N,3)."""
     low = np.percentile(capture.points, 0.3, axis=0) - 0.08
@@ -92,20 +119,32 @@ def voxels(capture: Capture) -> np.ndarray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
 
 
-def visual_hull(capture: Capture, masks: dict[str, np.ndarray]) -> np.ndarray:
-    """Voxels that HULL_AGREEMENT of the views that see them call object. Outside a picture nothing is said."""
+def from_high(view: View) -> bool:
+    return -view.centre[1] > np.sin(np.radians(HIGH_VIEW_DEGREES)) * np.linalg.norm(view.centre)
+
+
+def visual_hull(capture: Capture, masks: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Voxels that the views that see them call object, each with whether enough of them agree to be sure of it.
+    Outside a picture nothing is said, and views from high above say nothing about the underside: it lies in the
+    flash's shadow there and looks like background."""
     grid = voxels(capture)
     said_yes, said = np.zeros(len(grid)), np.zeros(len(grid))
     k = capture.intrinsics
+    underside = grid[:, 1] > UNDERSIDE
     for view in capture.views:
         if view.name not in masks:
             continue
         pixels, _ = project(grid, view, capture)
         column, row = np.floor(pixels).astype(int).T
         seen = (column >= 0) & (column < k.width) & (row >= 0) & (row < k.height)
+        if from_high(view):
+            seen &= ~underside
         said += seen
         said_yes[seen] += masks[view.name][row[seen], column[seen]]
-    return grid[said_yes >= HULL_AGREEMENT * np.maximum(said, 20)]
+    share = said_yes / np.maximum(said, 12)
+    sure = share >= np.where(underside, STRICT_AGREEMENT, HULL_AGREEMENT)
+    possible = sure | (underside & (share >= LOOSE_AGREEMENT))
+    return grid[possible], sure[possible]
 
 
 def first_masks(capture: Capture, photographs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -118,19 +157,22 @@ def first_masks(capture: Capture, photographs: dict[str, np.ndarray]) -> dict[st
     }
 
 
-def final_mask(view: View, capture: Capture, first: np.ndarray, hull: np.ndarray) -> np.ndarray:
-    """Coverage and validity, (height, width, 3) uint8 in OpenCV's channel order."""
+def final_mask(view: View, capture: Capture, first: np.ndarray, hull: np.ndarray, sure: np.ndarray) -> np.ndarray:
+    """Doubt, validity and coverage, (height, width, 3) uint8: OpenCV's channel order."""
     upper, lower = hull[hull[:, 1] < capture.cut_height], hull[hull[:, 1] >= capture.cut_height]
     above, below = nearest_depth(upper, view, capture), nearest_depth(lower, view, capture)
-    projected = (np.isfinite(above) | np.isfinite(below)).astype(np.uint8)
-    margin = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * HULL_MARGIN + 1, 2 * HULL_MARGIN + 1))
-    core, reach = cv2.erode(projected, margin) > 0, cv2.dilate(projected, margin) > 0
-    silhouette = largest_part((first & reach) | core)
+    margin = disc(HULL_MARGIN)
+    possible = cv2.dilate((np.isfinite(above) | np.isfinite(below)).astype(np.uint8), margin) > 0
+    certain = np.isfinite(nearest_depth(hull[sure], view, capture)).astype(np.uint8)
+    core, reach = cv2.erode(certain, disc(CORE_MARGIN)) > 0, cv2.dilate(certain, margin) > 0
+    silhouette = largest_part((first & (reach if from_high(view) else possible)) | core)
+    doubtful = possible & ~silhouette & ~first
     # The post hides the object where it is nearer. Its silhouette is not trusted to the pixel, hence the margin.
     post = cv2.dilate((below < above).astype(np.uint8), margin) > 0
     inside = silhouette & np.isfinite(cv2.erode(above, margin))
     coverage = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), 0.8)
-    return np.dstack([np.zeros_like(coverage), ~post * 255.0, coverage * 255.0]).round().astype(np.uint8)
+    valid = ~post & ~(possible & first & ~silhouette)
+    return np.dstack([doubtful * 255.0, valid * 255.0, coverage * 255.0]).round().astype(np.uint8)
 
 
 def main(photos: Path, out: Path) -> None:
@@ -139,12 +181,12 @@ def main(photos: Path, out: Path) -> None:
     names = [view.name for view in capture.views if view.name not in LEFT_OUT]
     photographs = {name: cv2.imread(str(photos / "images" / f"{name}.jpg")) for name in names}
     masks = first_masks(capture, photographs)
-    hull = visual_hull(capture, masks)
-    print(f"visual hull: {len(hull)} voxels of {VOXEL}, {hull.min(0)} to {hull.max(0)}")
+    hull, sure = visual_hull(capture, masks)
+    print(f"visual hull: {len(hull)} voxels of {VOXEL}, {sure.sum()} sure, {hull.min(0)} to {hull.max(0)}")
     np.save(out / "hull.npy", hull.astype(np.float32))
     for view in capture.views:
         if view.name in photographs:
-            mask = final_mask(view, capture, masks[view.name], hull)
+            mask = final_mask(view, capture, masks[view.name], hull, sure)
             cv2.imwrite(str(out / f"{view.name}.png"), mask)
             shutil.copyfile(photos / "images" / f"{view.name}.jpg", out / f"{view.name}.jpg")
 

@@ -1,0 +1,84 @@
+"""Measures and shows a finished file: python evaluate.py SCENE.spz VIEWS SPARSE SHEET.png [CLOSE.png]
+
+Prints the PSNR inside the object's outline for every eighth view (kept from training with --hold-out) and for the
+others, after fitting one gain per channel, since the exposure of a photograph is not the scene's. Draws an orbit.
+"""
+
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+from capture import read_colmap, to_upright
+from dataset import Picture, load_pictures
+from model import Parameters, from_gaussians, render
+from spz import read_spz
+from train import HELD_OUT_EVERY
+
+AZIMUTHS = range(0, 360, 30)
+ORBIT_RADIUS = 2.6
+FIELD_OF_VIEW = 35.0
+
+
+def orbit_matrix(theta: float, phi: float, radius: float) -> np.ndarray:
+    """World to camera (4,4) looking at the origin. Degrees; theta 0 stands on -z, phi is measured from up (-y)."""
+    t, p = np.radians([theta, phi])
+    eye = radius * np.array([np.sin(t) * np.sin(p), -np.cos(p), -np.cos(t) * np.sin(p)])
+    forward = -eye / radius
+    right = np.array([np.cos(t), 0, np.sin(t)])
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([right, np.cross(forward, right), forward])
+    matrix[:3, 3] = -matrix[:3, :3] @ eye
+    return matrix
+
+
+def shot(parameters: Parameters, degree: int, matrix: np.ndarray, size: int, background: float) -> np.ndarray:
+    """A square picture, uint8 RGB, over a grey background."""
+    focal = size / 2 / np.tan(np.radians(FIELD_OF_VIEW) / 2)
+    intrinsics = torch.tensor([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]], dtype=torch.float32, device="cuda")
+    view = torch.tensor(matrix, dtype=torch.float32, device="cuda")
+    with torch.no_grad():
+        colour, alpha, _ = render(parameters, view, intrinsics, (size, size), degree)
+    picture = colour + background * (1 - alpha)
+    return (picture.clamp(0, 1).permute(1, 2, 0).cpu().numpy() * 255).round().astype(np.uint8)
+
+
+def masked_psnr(parameters: Parameters, degree: int, picture: Picture) -> tuple[float, float]:
+    """PSNR of the colour where the photograph shows the object, and the mean error of the coverage where it is known."""
+    with torch.no_grad():
+        colour, alpha, _ = render(parameters, picture.view_matrix, picture.intrinsics, picture.size, degree)
+    inside = ((picture.alpha > 0.99) & (picture.valid > 0) & (picture.doubtful == 0))[0]
+    got, wanted = colour[:, inside], picture.rgb[:, inside]
+    gain = (got * wanted).sum(1, keepdim=True) / (got * got).sum(1, keepdim=True)
+    error = (got * gain - wanted).square().mean().item()
+    known = picture.valid * (1 - picture.doubtful)
+    coverage = ((alpha - picture.alpha).abs() * known).sum() / known.sum()
+    return -10 * np.log10(error), coverage.item()
+
+
+def main() -> None:
+    scene, views, sparse = map(Path, sys.argv[1:4])
+    gaussians = read_spz(scene)
+    parameters, degree = from_gaussians(gaussians), gaussians.sh_degree
+    results: dict[bool, list[tuple[float, float]]] = {True: [], False: []}
+    for picture in load_pictures(views, to_upright(read_colmap(sparse))):
+        results[int(picture.name) % HELD_OUT_EVERY == 0].append(masked_psnr(parameters, degree, picture))
+    for every_eighth, figures in results.items():
+        psnr, coverage = np.mean(figures, axis=0)
+        worst = min(figures)[0]
+        name = "every eighth view" if every_eighth else "the other views"
+        print(f"{scene.name}: {name}: PSNR {psnr:.2f} dB (worst {worst:.2f}), coverage error {coverage:.4f}")
+    rows = []
+    for phi, background in ((90, 1.0), (62, 0.1), (112, 0.5)):
+        row = [shot(parameters, degree, orbit_matrix(theta, phi, ORBIT_RADIUS), 400, background) for theta in AZIMUTHS]
+        rows += [np.concatenate(row[:6], 1), np.concatenate(row[6:], 1)]
+    cv2.imwrite(sys.argv[4], cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))
+    if len(sys.argv) > 5:
+        close = [shot(parameters, degree, orbit_matrix(t, p, 2.4), 1000, b) for t, p, b in ((25, 78, 1.0), (-35, 80, 0.05))]
+        cv2.imwrite(sys.argv[5], cv2.cvtColor(np.concatenate(close, 1), cv2.COLOR_RGB2BGR))
+
+
+if __name__ == "__main__":
+    main()
