@@ -42,8 +42,13 @@ function reflect(stage, code) {
   }
 }
 
-const bufferType = (variable) =>
-  variable.resourceType === ResourceType.Uniform ? 'uniform' : variable.access === 'read' ? 'read-only-storage' : 'storage';
+/** What a binding holds, in the words of GPUBindGroupLayoutEntry. */
+function resourceOf({ resourceType, type, access }) {
+  if (resourceType === ResourceType.Texture) return { type: 'texture' };
+  if (resourceType === ResourceType.StorageTexture) return { type: 'storage-texture', format: type.format.name };
+  if (resourceType === ResourceType.Uniform) return { type: 'uniform' };
+  return { type: access === 'read' ? 'read-only-storage' : 'storage' };
+}
 
 function reflectBindings(reflection) {
   const variables = [...reflection.uniforms, ...reflection.storage, ...reflection.textures];
@@ -52,8 +57,7 @@ function reflectBindings(reflection) {
       .sort((a, b) => a.binding - b.binding)
       .map((variable) => {
         if (variable.group !== 0) throw new Error(`${variable.name}: only @group(0) is used`);
-        const type = variable.resourceType === ResourceType.Texture ? 'texture' : bufferType(variable);
-        return [variable.name, { binding: variable.binding, type }];
+        return [variable.name, { binding: variable.binding, ...resourceOf(variable) }];
       }),
   );
 }

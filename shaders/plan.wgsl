@@ -29,6 +29,11 @@ fn main() {
   plan.sort_y = (plan.sort_blocks + MAX_GROUPS_X - 1u) / MAX_GROUPS_X;
   plan.sort_z = 1u;
 
+  let groups = (visible + PROJECT_GROUP - 1u) / PROJECT_GROUP;
+  plan.visible_x = min(groups, MAX_GROUPS_X);
+  plan.visible_y = (groups + MAX_GROUPS_X - 1u) / MAX_GROUPS_X;
+  plan.visible_z = 1u;
+
   plan.quad_indices = QUAD_BATCH * INDICES_PER_QUAD;
   plan.quad_instances = (visible + QUAD_BATCH - 1u) / QUAD_BATCH;
   plan.quad_first_index = 0u;
@@ -38,9 +43,9 @@ fn main() {
   for (var page = 0u; page < limits.page_count; page++) {
     let first = min(group_offsets[page_groups[page]], visible);
     let end = min(group_offsets[page_groups[page + 1u]], visible);
-    let groups = (end - first + PROJECT_GROUP - 1u) / PROJECT_GROUP;
+    let own_groups = (end - first + PROJECT_GROUP - 1u) / PROJECT_GROUP;
     plan.pages[page] = PagePlan(
-      first, end - first, min(groups, MAX_GROUPS_X), (groups + MAX_GROUPS_X - 1u) / MAX_GROUPS_X, 1u,
+      first, end - first, min(own_groups, MAX_GROUPS_X), (own_groups + MAX_GROUPS_X - 1u) / MAX_GROUPS_X, 1u,
     );
   }
 }

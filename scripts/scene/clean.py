@@ -11,6 +11,8 @@ from model import Parameters, weights
 
 # A Gaussian that makes up less than this many pixels of every single photograph is never missed.
 LEAST_PIXELS = 0.1
+# Share of a Gaussian's visible weight, over all photographs, that must fall on the object.
+LEAST_ON_OBJECT = 0.6
 # Neighbours and distance, in units of the typical distance, beyond which a Gaussian counts as floating alone.
 NEIGHBOURS = 8
 LONELY = 6.0
@@ -18,12 +20,17 @@ LONELY = 6.0
 EXPOSURE_PERCENTILE = 85
 
 
-def visible(parameters: Parameters, pictures: list[Picture]) -> torch.Tensor:
-    """Which Gaussians make up LEAST_PIXELS of some photograph, (N,) booleans."""
-    most = torch.zeros(len(parameters["means"]), device="cuda")
+def visible_and_proper(parameters: Parameters, pictures: list[Picture]) -> tuple[torch.Tensor, torch.Tensor]:
+    """Which Gaussians make up LEAST_PIXELS of some photograph, and which of them show mostly where the photographs
+    show the object rather than background or darkness; (N,) booleans each."""
+    count = len(parameters["means"])
+    most, on, off = (torch.zeros(count, device="cuda") for _ in range(3))
     for picture in pictures:
-        most = torch.maximum(most, weights(parameters, picture.view_matrix, picture.intrinsics, picture.size))
-    return most > LEAST_PIXELS
+        known = picture.valid * (1 - picture.doubtful)
+        regions = [known * picture.alpha, picture.valid * (1 - known * picture.alpha), torch.ones_like(known)]
+        shown, spilled, whole = weights(parameters, picture.view_matrix, picture.intrinsics, picture.size, regions)
+        most, on, off = torch.maximum(most, whole), on + shown, off + spilled
+    return most > LEAST_PIXELS, on >= LEAST_ON_OBJECT * (on + off)
 
 
 def lonely(means: np.ndarray) -> np.ndarray:
@@ -33,16 +40,17 @@ def lonely(means: np.ndarray) -> np.ndarray:
 
 
 def cleaned(parameters: Parameters, bounds: Bounds, pictures: list[Picture]) -> Parameters:
-    """The Gaussians that are inside the bounds, seen by somebody and not alone."""
-    kept = visible(parameters, pictures)
-    unseen = int((~kept).sum())
+    """The Gaussians that are inside the bounds, seen on the object by somebody and not alone."""
+    kept, proper = visible_and_proper(parameters, pictures)
+    unseen, spilled = int((~kept).sum()), int((kept & ~proper).sum())
+    kept &= proper
     outside = bounds.outside(parameters["means"]) | (bounds.overhang(parameters) > 0.01)
     strayed = int((kept & outside).sum())
     kept &= ~outside
     index = torch.nonzero(kept)[:, 0]
     alone = torch.tensor(lonely(parameters["means"][index].detach().cpu().numpy()), device=index.device)
     index = index[~alone]
-    print(f"cleaned: {unseen} unseen, {strayed} outside the bounds, {int(alone.sum())} alone, {len(index)} left")
+    print(f"cleaned: {unseen} unseen, {spilled} beside the object, {strayed} outside the bounds, {int(alone.sum())} alone, {len(index)} left")
     return {key: torch.nn.Parameter(value.detach()[index]) for key, value in parameters.items()}
 
 

@@ -62,14 +62,16 @@ def main() -> None:
     scene, views, sparse = map(Path, sys.argv[1:4])
     gaussians = read_spz(scene)
     parameters, degree = from_gaussians(gaussians), gaussians.sh_degree
-    results: dict[bool, list[tuple[float, float]]] = {True: [], False: []}
+    results: dict[bool, list[tuple[float, float, str]]] = {True: [], False: []}
     for picture in load_pictures(views, to_upright(read_colmap(sparse))):
-        results[int(picture.name) % HELD_OUT_EVERY == 0].append(masked_psnr(parameters, degree, picture))
+        results[int(picture.name) % HELD_OUT_EVERY == 0].append(
+            (*masked_psnr(parameters, degree, picture), picture.name)
+        )
     for every_eighth, figures in results.items():
-        psnr, coverage = np.mean(figures, axis=0)
-        worst = min(figures)[0]
+        psnr, coverage = np.mean([figure[:2] for figure in figures], axis=0)
+        worst = ", ".join(f"{name} {value:.2f}" for value, _, name in sorted(figures)[:3])
         name = "every eighth view" if every_eighth else "the other views"
-        print(f"{scene.name}: {name}: PSNR {psnr:.2f} dB (worst {worst:.2f}), coverage error {coverage:.4f}")
+        print(f"{scene.name}: {name}: PSNR {psnr:.2f} dB (worst: {worst}), coverage error {coverage:.4f}")
     rows = []
     for phi, background in ((90, 1.0), (62, 0.1), (112, 0.5)):
         row = [shot(parameters, degree, orbit_matrix(theta, phi, ORBIT_RADIUS), 400, background) for theta in AZIMUTHS]

@@ -28,7 +28,7 @@ class Gaussians:
 
     @property
     def sh_degree(self) -> int:
-        return int(round(self.sh.shape[1] ** 0.5)) - 1
+        return round(self.sh.shape[1] ** 0.5) - 1
 
     def at(self, which: np.ndarray) -> "Gaussians":
         """The Gaussians a boolean mask or an index array picks, in its order."""

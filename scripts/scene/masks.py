@@ -162,11 +162,12 @@ def final_mask(view: View, capture: Capture, first: np.ndarray, hull: np.ndarray
     upper, lower = hull[hull[:, 1] < capture.cut_height], hull[hull[:, 1] >= capture.cut_height]
     above, below = nearest_depth(upper, view, capture), nearest_depth(lower, view, capture)
     margin = disc(HULL_MARGIN)
-    possible = cv2.dilate((np.isfinite(above) | np.isfinite(below)).astype(np.uint8), margin) > 0
+    projected = np.isfinite(above) | np.isfinite(below)
+    possible = cv2.dilate(projected.astype(np.uint8), margin) > 0
     certain = np.isfinite(nearest_depth(hull[sure], view, capture)).astype(np.uint8)
     core, reach = cv2.erode(certain, disc(CORE_MARGIN)) > 0, cv2.dilate(certain, margin) > 0
     silhouette = largest_part((first & (reach if from_high(view) else possible)) | core)
-    doubtful = possible & ~silhouette & ~first
+    doubtful = projected & ~silhouette & ~first
     # The post hides the object where it is nearer. Its silhouette is not trusted to the pixel, hence the margin.
     post = cv2.dilate((below < above).astype(np.uint8), margin) > 0
     inside = silhouette & np.isfinite(cv2.erode(above, margin))

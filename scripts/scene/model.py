@@ -50,8 +50,14 @@ def render(
     return colour[0].permute(2, 0, 1), alpha[0].permute(2, 0, 1), info
 
 
-def weights(parameters: Parameters, view_matrix: torch.Tensor, intrinsics: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
-    """How much of a picture each Gaussian makes up: its blending weights summed over the pixels, (N,)."""
+def weights(
+    parameters: Parameters,
+    view_matrix: torch.Tensor,
+    intrinsics: torch.Tensor,
+    size: tuple[int, int],
+    regions: list[torch.Tensor],
+) -> list[torch.Tensor]:
+    """How many pixels of each region (1,H,W) each Gaussian makes up: its blending weights summed, (N,) each."""
     # The derivative of the summed picture by a Gaussian's grey value is that sum; no second rasterizer needed.
     grey = torch.ones(len(parameters["means"]), 1, device=view_matrix.device, requires_grad=True)
     picture, _, _ = rasterization(
@@ -68,7 +74,8 @@ def weights(parameters: Parameters, view_matrix: torch.Tensor, intrinsics: torch
         packed=False,
         rasterize_mode=RASTERIZE_MODE,
     )
-    return torch.autograd.grad(picture.sum(), grey)[0][:, 0]
+    sums = [(picture[0, ..., 0] * region[0]).sum() for region in regions]
+    return [torch.autograd.grad(total, grey, retain_graph=True)[0][:, 0] for total in sums]
 
 
 def to_gaussians(parameters: Parameters) -> Gaussians:

@@ -1,7 +1,7 @@
 """Trains the scene: python train.py VIEWS SPARSE OUT [--degree 2] [--cap 80000] [--steps 20000] [--hold-out]
 
-VIEWS is what masks.py made, SPARSE the COLMAP text model. Writes OUT.ply, OUT.spz (what viewers get) and OUT.npz
-(exposures). With --hold-out every eighth view is kept from training, to measure.
+VIEWS is what masks.py made, SPARSE the COLMAP text model. Writes OUT.ply and OUT.spz, which viewers get. With
+--hold-out every eighth view is kept from training, to measure.
 """
 
 import argparse
@@ -31,6 +31,8 @@ SCALE_WEIGHT = 0.01
 CUT_WEIGHT = 2e-3
 WIDTH_WEIGHT = 1e-2
 SSIM_WEIGHT = 0.2
+# Coverage where nobody knows what is there: little enough to give way wherever another view knows.
+DOUBT_WEIGHT = 0.1
 
 
 def gaussian_window(width: int = 11, sigma: float = 1.5) -> torch.Tensor:
@@ -62,6 +64,25 @@ class Exposures:
         return torch.exp(self.log_gain[index] - self.log_gain.mean(0))[:, None, None]
 
 
+class Poses:
+    """A small motion of each camera, learned with the scene: a rotation vector and a shift in the camera's frame."""
+
+    def __init__(self, count: int, steps: int):
+        self.motion = torch.nn.Parameter(torch.zeros(count, 6, device="cuda"))
+        self.optimizer = torch.optim.Adam([self.motion], lr=5e-5)
+        self.decay = torch.optim.lr_scheduler.ExponentialLR(self.optimizer, 0.05 ** (1 / steps))
+
+    def moved(self, picture: Picture, index: int) -> torch.Tensor:
+        # All cameras together could carry the scene away; their mean motion is none.
+        x, y, z, *shift = (self.motion[index] - self.motion.mean(0)).unbind()
+        zero = torch.zeros_like(x)
+        turn = torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]).reshape(3, 3)
+        delta = torch.eye(4, device="cuda")
+        delta[:3, :3] = torch.linalg.matrix_exp(turn)
+        delta[:3, 3] = torch.stack(shift)
+        return delta @ picture.view_matrix
+
+
 def photometric_loss(picture: Picture, colour: torch.Tensor, alpha: torch.Tensor, window: torch.Tensor) -> torch.Tensor:
     """Over a random background, new each time: only coverage that is right looks right over all of them. Where the
     photograph is dark and the mask in doubt the background is black, and anything that is no brighter is right."""
@@ -70,7 +91,8 @@ def photometric_loss(picture: Picture, colour: torch.Tensor, alpha: torch.Tensor
     wanted = picture.rgb * picture.alpha + background * (1 - picture.alpha)
     wanted = torch.where(picture.doubtful > 0, torch.minimum(picture.rgb, got.detach()), wanted)
     got = got * picture.valid + wanted * (1 - picture.valid)
-    return (1 - SSIM_WEIGHT) * (got - wanted).abs().mean() + SSIM_WEIGHT * (1 - ssim(got, wanted, window))
+    doubt = DOUBT_WEIGHT * (alpha * picture.doubtful * picture.valid).mean()
+    return (1 - SSIM_WEIGHT) * (got - wanted).abs().mean() + SSIM_WEIGHT * (1 - ssim(got, wanted, window)) + doubt
 
 
 def regularization(parameters: Parameters, bounds: Bounds, progress: float) -> torch.Tensor:
@@ -90,7 +112,7 @@ def start_points(capture, hull: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return capture.points[kept], capture.colours[kept] / 255
 
 
-def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, options) -> Exposures:
+def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, options) -> tuple[Exposures, Poses]:
     optimizers = {
         key: torch.optim.Adam([{"params": value, "lr": RATES[key], "name": key}], eps=1e-15, fused=True)
         for key, value in parameters.items()
@@ -98,7 +120,8 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
     decay = torch.optim.lr_scheduler.ExponentialLR(optimizers["means"], 0.01 ** (1 / options.steps))
     strategy = MCMCStrategy(cap_max=options.cap, refine_start_iter=500, refine_stop_iter=int(0.75 * options.steps))
     strategy.check_sanity(parameters, optimizers)
-    state, exposures, window = strategy.initialize_state(), Exposures(len(pictures)), gaussian_window()
+    state, window = strategy.initialize_state(), gaussian_window()
+    exposures, poses = Exposures(len(pictures)), Poses(len(pictures), options.steps)
     order, started = [], time.time()
     for step in range(options.steps):
         if not order:
@@ -106,13 +129,16 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
         index = order.pop()
         picture = pictures[index]
         degree = min(options.degree, step // 1000)
-        colour, alpha, info = render(parameters, picture.view_matrix, picture.intrinsics, picture.size, degree)
+        refining = options.refine_poses and step >= 1000
+        matrix = poses.moved(picture, index) if refining else picture.view_matrix
+        colour, alpha, info = render(parameters, matrix, picture.intrinsics, picture.size, degree)
         loss = photometric_loss(picture, colour * exposures.gain(index), alpha, window)
         (loss + regularization(parameters, bounds, step / options.steps)).backward()
-        for optimizer in [*optimizers.values(), exposures.optimizer]:
+        for optimizer in [*optimizers.values(), exposures.optimizer, *([poses.optimizer] if refining else [])]:
             optimizer.step()
             optimizer.zero_grad(set_to_none=True)
         decay.step()
+        poses.decay.step()
         if step % 100 == 0:
             # Whatever left the hull counts as dead; the strategy puts it to better use on this very step.
             with torch.no_grad():
@@ -121,7 +147,7 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
             strategy.step_post_backward(parameters, optimizers, state, step, info, lr=decay.get_last_lr()[0])
         if step % 2000 == 0 or step == options.steps - 1:
             print(f"step {step}: loss {loss.item():.4f}, {len(parameters['means'])} Gaussians, {time.time() - started:.0f} s", flush=True)
-    return exposures
+    return exposures, poses
 
 
 def main() -> None:
@@ -133,6 +159,7 @@ def main() -> None:
     parser.add_argument("--cap", type=int, default=80_000)
     parser.add_argument("--steps", type=int, default=20_000)
     parser.add_argument("--hold-out", action="store_true")
+    parser.add_argument("--refine-poses", action="store_true")
     options = parser.parse_args()
     torch.manual_seed(0)
     np.random.seed(0)
@@ -142,10 +169,11 @@ def main() -> None:
     pictures = [p for p in every if not (options.hold_out and int(p.name) % HELD_OUT_EVERY == 0)]
     bounds = Bounds(hull, capture.cut_height)
     parameters = initial_parameters(*start_points(capture, hull), options.degree)
-    exposures = train(pictures, parameters, bounds, options)
+    exposures, poses = train(pictures, parameters, bounds, options)
     gains = torch.stack([exposures.gain(i)[:, 0, 0] for i in range(len(pictures))]).detach().cpu().numpy()
     gaussians = brightened(to_gaussians(cleaned(parameters, bounds, every)), gains)
-    np.savez(f"{options.out}.npz", names=[p.name for p in pictures], gains=gains)
+    motion = (poses.motion - poses.motion.mean(0)).detach().norm(dim=1)
+    print(f"poses moved by {motion.mean():.5f} on average, {motion.max():.5f} at most")
     write_ply(Path(f"{options.out}.ply"), gaussians)
     size = write_spz(Path(f"{options.out}.spz"), gaussians, antialiased=True)
     print(f"{options.out}: {len(gaussians)} Gaussians, degree {gaussians.sh_degree}, {size} bytes of SPZ")

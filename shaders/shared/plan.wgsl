@@ -10,6 +10,10 @@ struct Plan {
   sort_x: u32,
   sort_y: u32,
   sort_z: u32,
+  // Arguments of dispatchWorkgroupsIndirect for one thread a visible splat, 256 to a workgroup.
+  visible_x: u32,
+  visible_y: u32,
+  visible_z: u32,
   // Arguments of drawIndexedIndirect for the quads.
   quad_indices: u32,
   quad_instances: u32,
@@ -38,6 +42,9 @@ struct PlanView {
   sort_x: u32,
   sort_y: u32,
   sort_z: u32,
+  visible_x: u32,
+  visible_y: u32,
+  visible_z: u32,
   quad_indices: u32,
   quad_instances: u32,
   quad_first_index: u32,

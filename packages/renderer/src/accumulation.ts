@@ -19,7 +19,7 @@ export class AccumulationTexture implements Accumulation {
       label: 'gs.rasterize.accumulation',
       size: [width, height],
       format,
-      usage: TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.textureBinding,
+      usage: TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.textureBinding | TEXTURE_USAGE.storageBinding,
     });
     this.view = this.#texture.createView();
   }

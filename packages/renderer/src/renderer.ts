@@ -8,6 +8,7 @@ import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { PageTable } from './page-table.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
+import { TilesRasterizer } from './rasterizers/tiles.js';
 import type { AccumulationFormat, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
 import { Scratch } from './scratch.js';
 import { CompactStage } from './stages/compact.js';
@@ -20,7 +21,10 @@ import { SortStage, type SortBindings } from './stages/sort.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 
 export interface RendererOptions {
-  /** How splats become pixels. Default `auto`, which today is always `quads`. */
+  /**
+   * How splats become pixels: `quads` by the GPU's own rasterizer and blending, `tiles` by compute shaders, front to back
+   * in float32 and with an end where nothing behind can be seen. Default `auto`, which today is always `quads`.
+   */
   readonly rasterizer?: 'auto' | RasterizerName;
   /**
    * Precision in which splats are blended. Default `rgba16float`. `rgba32float` takes twice the memory and bandwidth
@@ -85,7 +89,6 @@ export class Renderer {
   constructor(device: GPUDevice, options: RendererOptions = {}) {
     this.#device = device;
     this.#format = options.accumulation ?? 'rgba16float';
-    requireBlendable(device, this.#format);
     this.#stages = {
       cull: new CullStage(device),
       scan: new ScanStage(device),
@@ -95,7 +98,7 @@ export class Renderer {
       sort: new SortStage(device),
       compose: new ComposeStage(device),
     };
-    this.#rasterizer = new QuadsRasterizer(device, this.#format);
+    this.#rasterizer = makeRasterizer(device, options.rasterizer ?? 'auto', this.#format);
     this.#memory = new GpuMemory(device);
     const uniform = (name: string): GPUBuffer =>
       this.#memory.buffer(`gs.${name}`, 16, BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination);
@@ -110,7 +113,7 @@ export class Renderer {
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
     const { scratch, table } = this.#resources ?? {};
-    const parts = [this.#memory, scratch, table, this.#surface?.accumulation];
+    const parts = [this.#memory, scratch, table, this.#rasterizer, this.#surface?.accumulation];
     return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
@@ -172,7 +175,7 @@ export class Renderer {
     const { scan, limits } = this.#uniforms;
     this.#device.queue.writeBuffer(scan, 0, Uint32Array.of(groups));
     this.#device.queue.writeBuffer(limits, 0, Uint32Array.of(pages.length, scratch.capacity));
-    this.#rasterizer.bind({ plan, splats: projected, order: order[0] });
+    this.#rasterizer.bind({ plan, splats: projected, order: order[0], capacity: scratch.capacity });
     this.#resources = {
       scratch,
       table: new PageTable(this.#device, [...scenes], scratch),
@@ -198,6 +201,12 @@ export class Renderer {
     this.#surface = { accumulation, compose };
     return this.#surface;
   }
+}
+
+function makeRasterizer(device: GPUDevice, name: 'auto' | RasterizerName, format: AccumulationFormat): Rasterizer {
+  if (name === 'tiles') return new TilesRasterizer(device, format);
+  requireBlendable(device, format);
+  return new QuadsRasterizer(device, format);
 }
 
 function requireBlendable(device: GPUDevice, format: AccumulationFormat): void {

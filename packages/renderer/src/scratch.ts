@@ -17,6 +17,8 @@ const { size: PAGE_PLAN_SIZE, fields: pagePlanFields } = layouts.PagePlan;
 /** Byte offsets of the indirect arguments within the plan. */
 export const planOffsets = {
   sort: layouts.Plan.fields.sort_x.offset,
+  /** One thread a visible splat, 256 to a workgroup. */
+  visible: layouts.Plan.fields.visible_x.offset,
   quads: layouts.Plan.fields.quad_indices.offset,
   unusable: layouts.Plan.fields.unusable.offset,
   project: (page: number): number => PLAN_SIZE + page * PAGE_PLAN_SIZE + pagePlanFields.project_x.offset,

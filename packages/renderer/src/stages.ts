@@ -10,5 +10,5 @@ export { cullGroups, CullStage } from './stages/cull.js';
 export { PlanStage } from './stages/plan.js';
 export { ProjectStage } from './stages/project.js';
 export { ScanStage } from './stages/scan.js';
-export { SortStage, type SortBuffers } from './stages/sort.js';
+export { sortedIn, SortStage, type SortBuffers } from './stages/sort.js';
 export { cameraValues } from './view.js';

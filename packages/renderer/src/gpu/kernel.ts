@@ -7,7 +7,9 @@ export interface ShaderDescription {
 
 interface ShaderBinding {
   readonly binding: number;
-  readonly type: 'uniform' | 'storage' | 'read-only-storage' | 'texture';
+  readonly type: 'uniform' | 'storage' | 'read-only-storage' | 'texture' | 'storage-texture';
+  /** Of a storage texture. */
+  readonly format?: GPUTextureFormat;
 }
 
 /** A resource for each binding of a shader, by its name in the WGSL. */
@@ -31,11 +33,7 @@ export class ShaderProgram<S extends ShaderDescription> {
     this.module = device.createShaderModule({ label, code: shader.code });
     this.#bindGroupLayout = device.createBindGroupLayout({
       label,
-      entries: Object.values(shader.bindings).map(({ binding, type }) => ({
-        binding,
-        visibility,
-        ...(type === 'texture' ? { texture: { sampleType: 'unfilterable-float' as const } } : { buffer: { type } }),
-      })),
+      entries: Object.values(shader.bindings).map((binding) => layoutEntry(binding, visibility)),
     });
     this.pipelineLayout = device.createPipelineLayout({ label, bindGroupLayouts: [this.#bindGroupLayout] });
   }
@@ -49,6 +47,17 @@ export class ShaderProgram<S extends ShaderDescription> {
         resource: asBindingResource(resources[name as keyof S['bindings']]),
       })),
     });
+  }
+}
+
+function layoutEntry({ binding, type, format }: ShaderBinding, visibility: GPUShaderStageFlags): GPUBindGroupLayoutEntry {
+  switch (type) {
+    case 'texture':
+      return { binding, visibility, texture: { sampleType: 'unfilterable-float' } };
+    case 'storage-texture':
+      return { binding, visibility, storageTexture: { format: format! } };
+    default:
+      return { binding, visibility, buffer: { type } };
   }
 }
 
@@ -73,6 +82,13 @@ export class ComputeKernel<S extends ShaderDescription> {
 
   bind(resources: Resources<S>): GPUBindGroup {
     return this.#program.bind(resources);
+  }
+
+  /** Dispatches a grid of workgroups, each side at most 65,535. */
+  dispatchGrid(pass: GPUComputePassEncoder, bindGroup: GPUBindGroup, columns: number, rows: number): void {
+    pass.setPipeline(this.#pipeline);
+    pass.setBindGroup(0, bindGroup);
+    pass.dispatchWorkgroups(columns, rows);
   }
 
   /** Dispatches a number of workgroups, in two dimensions beyond 65,535: the shader finds its number by `group_index`. */
@@ -106,7 +122,7 @@ export const BUFFER_USAGE = {
   storage: 0x80,
   indirect: 0x100,
 } as const;
-export const TEXTURE_USAGE = { copySource: 0x1, textureBinding: 0x4, renderAttachment: 0x10 } as const;
+export const TEXTURE_USAGE = { copySource: 0x1, textureBinding: 0x4, storageBinding: 0x8, renderAttachment: 0x10 } as const;
 
 const cache = new WeakMap<GPUDevice, Map<string, unknown>>();
 

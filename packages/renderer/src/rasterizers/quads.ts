@@ -34,6 +34,11 @@ export class QuadsRasterizer implements Rasterizer {
     });
   }
 
+  /** Next to nothing: quads need no memory of their own. */
+  get byteLength(): number {
+    return this.#uniform.size;
+  }
+
   bind({ plan, splats, order }: RasterizerInputs): void {
     this.#plan = plan;
     this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });

@@ -1,5 +1,5 @@
 /** Names of the rasterizers that a {@link Renderer} can be asked for. */
-export type RasterizerName = 'quads';
+export type RasterizerName = 'quads' | 'tiles';
 
 /** Formats of the accumulation texture. `rgba32float` needs the feature `float32-blendable`. */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
@@ -12,6 +12,8 @@ export interface RasterizerInputs {
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
   readonly order: GPUBuffer;
+  /** Most splats that can be visible. */
+  readonly capacity: number;
 }
 
 /** Where a rasterizer draws: colour, and transmittance in the alpha channel. */
@@ -28,6 +30,8 @@ export interface Accumulation {
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
+  /** Bytes of GPU memory held. */
+  readonly byteLength: number;
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Records the drawing of one frame. */

@@ -7,9 +7,9 @@ import { planOffsets } from '../scratch.js';
 export interface SortBuffers {
   /** `Plan`: how many keys there are, and the indirect arguments. */
   readonly plan: GPUBuffer;
-  /** The keys lie in the first and end, sorted, in the first. */
+  /** The keys lie in the first. Passes go back and forth between the two: see {@link sortedIn}. */
   readonly keys: readonly [GPUBuffer, GPUBuffer];
-  /** Ends, in the first, as the indices of the keys in ascending and stable order. */
+  /** Receives the indices of the keys in ascending and stable order, likewise. */
   readonly order: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
@@ -23,11 +23,17 @@ interface SortPass {
 }
 
 const DIGIT_BITS = Math.log2(constants.DIGITS);
-const KEY_BITS = 32;
+const MAX_KEY_BITS = 32;
+
+/** Passes that keys of so many bits take. */
+const passCount = (keyBits: number): number => Math.max(1, Math.ceil(keyBits / DIGIT_BITS));
+
+/** Which of the two key and order buffers holds the result for keys of so many bits: the first (0) or the second (1). */
+export const sortedIn = (keyBits: number): 0 | 1 => (passCount(keyBits) % 2 === 0 ? 0 : 1);
 
 /**
- * Stable least-significant-digit radix sort of 32-bit keys: four passes of count, scan, scatter. Counts are reduced and
- * scanned between dispatches, so no workgroup ever waits for another.
+ * Stable least-significant-digit radix sort of keys of up to 32 bits: for each 8 bits a pass of count, scan, scatter.
+ * Counts are reduced and scanned between dispatches, so no workgroup ever waits for another.
  */
 export class SortStage {
   readonly #count: ComputeKernel<typeof sortCount>;
@@ -42,8 +48,9 @@ export class SortStage {
     this.#passUniforms = perDevice(device, 'sort passes', () => makePassUniforms(device));
   }
 
-  bind({ plan, keys, order, digitCounts, digitTotals }: SortBuffers): readonly SortPass[] {
-    return this.#passUniforms.map((uniform, index) => {
+  /** @param keyBits how many of the lowest bits of a key count; the others must be 0 or are ignored. */
+  bind({ plan, keys, order, digitCounts, digitTotals }: SortBuffers, keyBits = MAX_KEY_BITS): readonly SortPass[] {
+    return this.#passUniforms.slice(0, passCount(keyBits)).map((uniform, index) => {
       const [from, to] = index % 2 === 0 ? [0, 1] : [1, 0];
       return {
         count: this.#count.bind({ digit_pass: uniform, plan, keys: keys[from], counts: digitCounts }),
@@ -74,7 +81,7 @@ export class SortStage {
 export type SortBindings = ReturnType<SortStage['bind']>;
 
 function makePassUniforms(device: GPUDevice): GPUBuffer[] {
-  return Array.from({ length: KEY_BITS / DIGIT_BITS }, (_, index) => {
+  return Array.from({ length: MAX_KEY_BITS / DIGIT_BITS }, (_, index) => {
     const buffer = device.createBuffer({
       label: `gs.sort.pass_${index}`,
       size: 16,

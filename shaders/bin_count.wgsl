@@ -1,0 +1,39 @@
+// How many bins each splat touches: one thread for each splat, in depth order; the sum of each group of 256.
+#import shared/bins
+#import shared/coverage
+#import shared/plan
+#import shared/group
+#import shared/prefix
+
+@group(0) @binding(0) var<uniform> view: BinView;
+@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(2) var<storage, read> splats: array<ProjectedSplat>;
+@group(0) @binding(3) var<storage, read> order: array<u32>;
+// Bins of each splat: first column, first row, columns, rows, a byte each.
+@group(0) @binding(4) var<storage, read_write> rects: array<u32>;
+@group(0) @binding(5) var<storage, read_write> group_pairs: array<u32>;
+
+fn bin_rect(s: ProjectedSplat) -> u32 {
+  let c = coverage_of(s);
+  let size = vec2f(f32(BIN_WIDTH), f32(BIN_HEIGHT));
+  // Pixel centres are what counts, half a pixel inside the edges.
+  let low = clamp(c.center - c.extent - 0.5, vec2f(0.0), view.viewport - 1.0);
+  let high = clamp(c.center + c.extent + 0.5, vec2f(0.0), view.viewport - 1.0);
+  let first = vec2u(low / size);
+  let count = vec2u(high / size) - first + 1u;
+  return first.x | (first.y << 8u) | (count.x << 16u) | (count.y << 24u);
+}
+
+@compute @workgroup_size(PREFIX_THREADS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let group = group_index(workgroup_id);
+  let rank = group * PREFIX_THREADS + lane;
+  var pairs = 0u;
+  if (rank < plan.visible) {
+    let rect = bin_rect(splats[order[rank]]);
+    rects[rank] = rect;
+    pairs = ((rect >> 16u) & 255u) * (rect >> 24u);
+  }
+  let sum = inclusive_sum(pairs, lane, PREFIX_THREADS);
+  if (lane == PREFIX_THREADS - 1u && group * PREFIX_THREADS < plan.visible) { group_pairs[group] = sum; }
+}

@@ -1,0 +1,78 @@
+// Writes the pairs of splat and bin, in depth order. The threads of a group share its pairs evenly, so that one huge splat
+// does not hold up the others.
+#import shared/bins
+#import shared/coverage
+#import shared/plan
+#import shared/group
+#import shared/prefix
+
+@group(0) @binding(0) var<uniform> view: BinView;
+@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(2) var<storage, read> splats: array<ProjectedSplat>;
+@group(0) @binding(3) var<storage, read> order: array<u32>;
+@group(0) @binding(4) var<storage, read> rects: array<u32>;
+// Exclusive prefix sums over the groups.
+@group(0) @binding(5) var<storage, read> group_pairs: array<u32>;
+// Bin of each pair: the key of the sort.
+@group(0) @binding(6) var<storage, read_write> bins: array<u32>;
+@group(0) @binding(7) var<storage, read_write> pairs: array<BinPair>;
+
+// Inclusive prefix sums of the pairs of each splat of the group.
+var<workgroup> ends: array<u32, PREFIX_THREADS>;
+
+// The splat of the group that pair number p belongs to: the first whose prefix sum exceeds p.
+fn owner_of(p: u32) -> u32 {
+  var low = 0u;
+  for (var step = PREFIX_THREADS / 2u; step > 0u; step /= 2u) {
+    if (ends[low + step - 1u] <= p) { low += step; }
+  }
+  return low;
+}
+
+// The tiles of a bin that a splat touches, a bit each, rows of eight.
+fn touched_tiles(c: Coverage, bin: vec2u) -> u32 {
+  let corner = vec2f(f32(bin.x * BIN_WIDTH), f32(bin.y * BIN_HEIGHT));
+  let tile = f32(TILE);
+  var mask = 0u;
+  for (var row = 0u; row < BIN_ROWS; row++) {
+    // From the first to the last row of pixel centres of the tiles.
+    let top = corner.y + f32(row) * tile + 0.5;
+    // 0.01 px more than exact: rounding must not lose a pixel on the rim.
+    let range = band_range(c, top - 0.01, top + tile - 1.0 + 0.01) + vec2f(-0.01, 0.01);
+    if (range.x > range.y) { continue; }
+    // Column k holds the pixel centres k·16 + 0.5 ... k·16 + 15.5.
+    let first = max(ceil((range.x - corner.x - (tile - 0.5)) / tile), 0.0);
+    let last = min(floor((range.y - corner.x - 0.5) / tile), f32(BIN_COLUMNS) - 1.0);
+    if (first > last) { continue; }
+    let upto = (2u << u32(last)) - 1u;
+    let below = (1u << u32(first)) - 1u;
+    mask |= (upto & ~below) << (row * BIN_COLUMNS);
+  }
+  return mask;
+}
+
+@compute @workgroup_size(PREFIX_THREADS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let group = group_index(workgroup_id);
+  let first_rank = group * PREFIX_THREADS;
+  var own = 0u;
+  if (first_rank + lane < plan.visible) {
+    let rect = rects[first_rank + lane];
+    own = ((rect >> 16u) & 255u) * (rect >> 24u);
+  }
+  ends[lane] = inclusive_sum(own, lane, PREFIX_THREADS);
+  workgroupBarrier();
+  if (first_rank >= plan.visible) { return; }
+  let base = group_pairs[group];
+  let total = min(ends[PREFIX_THREADS - 1u], view.pair_capacity - min(base, view.pair_capacity));
+  for (var p = lane; p < total; p += PREFIX_THREADS) {
+    let owner = owner_of(p);
+    let rect = rects[first_rank + owner];
+    let columns = (rect >> 16u) & 255u;
+    let nth = p - select(ends[max(owner, 1u) - 1u], 0u, owner == 0u);
+    let bin = vec2u((rect & 255u) + nth % columns, ((rect >> 8u) & 255u) + nth / columns);
+    let slot = order[first_rank + owner];
+    bins[base + p] = bin.y * view.bins.x + bin.x;
+    pairs[base + p] = BinPair(slot, touched_tiles(coverage_of(splats[slot]), bin));
+  }
+}

@@ -1,0 +1,47 @@
+// Which rectangles of pixels the visible part of a splat, the ellipse with alpha >= ALPHA_MIN, touches: exactly.
+#import shared/splat
+#import shared/falloff
+
+// The ellipse u² + v² <= radius², prepared for questions about horizontal bands.
+struct Coverage {
+  center: vec2f,
+  // Half width and half height in pixels.
+  extent: vec2f,
+  // dx/dy of the line through the middles of all horizontal chords.
+  lean: f32,
+  // Half length of the longest chord, the one through the centre.
+  half_chord: f32,
+}
+
+fn coverage_of(s: ProjectedSplat) -> Coverage {
+  let sigma_x = 1.0 / s.shape.z;
+  let slope = s.shape.w;
+  let sigma_v = 1.0 / bitcast<f32>(s.paint.x);
+  let radius = cutoff_radius(bitcast<f32>(s.paint.w));
+  let sheared = slope * sigma_x;
+  let sigma_y = sqrt(sheared * sheared + sigma_v * sigma_v);
+  return Coverage(
+    s.shape.xy,
+    radius * vec2f(sigma_x, sigma_y),
+    sheared * sigma_x / (sigma_y * sigma_y),
+    radius * sigma_x * sigma_v / sigma_y,
+  );
+}
+
+// Range of x, in pixels, of the part of the ellipse between y = top and y = bottom; empty (first > last) if there is none.
+fn band_range(c: Coverage, top: f32, bottom: f32) -> vec2f {
+  let from_y = max(top - c.center.y, -c.extent.y);
+  let to_y = min(bottom - c.center.y, c.extent.y);
+  if (from_y > to_y) { return vec2f(1.0, -1.0); }
+  // The outermost points of the whole ellipse lie at these heights; a band without them is widest at its nearest edge.
+  let rightmost_y = c.lean * c.extent.y * c.extent.y / max(c.extent.x, 1e-20);
+  let right = chord_end(c, clamp(rightmost_y, from_y, to_y), 1.0);
+  let left = chord_end(c, clamp(-rightmost_y, from_y, to_y), -1.0);
+  return c.center.x + vec2f(left, right);
+}
+
+// Right (side 1) or left (side -1) end of the chord at height y, relative to the centre.
+fn chord_end(c: Coverage, y: f32, side: f32) -> f32 {
+  let t = y / max(c.extent.y, 1e-20);
+  return c.lean * y + side * c.half_chord * sqrt(max(0.0, 1.0 - t * t));
+}
