@@ -1,0 +1,68 @@
+/** Small helpers on byte arrays that several readers share. */
+
+const latin1 = new TextDecoder('latin1');
+
+/** Bytes `start` to `end` as text, one character for each byte; only ASCII characters are meaningful. */
+export function asciiOf(bytes: Uint8Array, start = 0, end = bytes.length): string {
+  return latin1.decode(bytes.subarray(start, end));
+}
+
+/** True if the file begins with these bytes, or with these ASCII characters. */
+export function startsWith(bytes: Uint8Array, signature: readonly number[] | string, at = 0): boolean {
+  const expected = typeof signature === 'string' ? Array.from(signature, (c) => c.charCodeAt(0)) : signature;
+  return bytes.length >= at + expected.length && expected.every((byte, i) => bytes[at + i] === byte);
+}
+
+/** A view of the same bytes for reading numbers of any type and byte order. */
+export function viewOf(bytes: Uint8Array): DataView {
+  return new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+}
+
+/** The bytes at an address that is a multiple of 4, as typed-array views need: the same memory, or a copy. */
+export function alignedTo4(bytes: Uint8Array): Uint8Array {
+  return bytes.byteOffset % 4 === 0 ? bytes : bytes.slice();
+}
+
+/** True where typed arrays read little-endian files directly: on every platform with a browser today. */
+export const hostIsLittleEndian = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1;
+
+/** Text in quotes, cut to `limit` characters, with unprintable characters escaped, for error messages. */
+export function quote(text: string, limit = 60): string {
+  return JSON.stringify(text.length > limit ? `${text.slice(0, limit)}...` : text);
+}
+
+/** Digits grouped for people: 1,234,567. */
+export function grouped(value: number): string {
+  return String(value).replace(/\B(?=(\d{3})+$)/g, ',');
+}
+
+/** A byte buffer that grows as chunks arrive. */
+export class GrowingBytes {
+  #bytes: Uint8Array<ArrayBuffer>;
+  #length = 0;
+
+  /** @param capacity bytes to reserve at once; a guess that may be wrong either way. */
+  constructor(capacity: number) {
+    this.#bytes = new Uint8Array(capacity);
+  }
+
+  get length(): number {
+    return this.#length;
+  }
+
+  append(chunk: Uint8Array): void {
+    const needed = this.#length + chunk.length;
+    if (needed > this.#bytes.length) {
+      const larger = new Uint8Array(Math.max(needed, 2 * this.#bytes.length));
+      larger.set(this.#bytes.subarray(0, this.#length));
+      this.#bytes = larger;
+    }
+    this.#bytes.set(chunk, this.#length);
+    this.#length = needed;
+  }
+
+  /** What has arrived so far, without copying. */
+  view(): Uint8Array<ArrayBuffer> {
+    return this.#bytes.subarray(0, this.#length);
+  }
+}

@@ -1,0 +1,70 @@
+import {
+  GaussianSplatError,
+  shCoefficientCount,
+  type GaussianCloud,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
+import { grouped } from './bytes.js';
+
+/** Value of the constant spherical harmonic, 1/(2·sqrt(pi)): colour = 0.5 + SH_C0·f_dc. */
+export const SH_C0 = 0.28209479177387814;
+
+/** A cloud whose arrays a reader is filling. */
+export type DraftCloud = {
+  -readonly [K in keyof GaussianCloud]: GaussianCloud[K];
+};
+
+/** A cloud of zeros of the given size. Throws `out-of-memory/allocation` where the arrays do not fit into memory. */
+export function allocateCloud(count: number, shDegree: ShDegree, name: string): DraftCloud {
+  const shLength = 3 * shCoefficientCount(shDegree);
+  try {
+    return {
+      count,
+      origin: [0, 0, 0] satisfies Vector3,
+      positions: new Float32Array(3 * count),
+      scales: new Float32Array(3 * count),
+      rotations: new Float32Array(4 * count),
+      opacities: new Float32Array(count),
+      sh: new Float32Array(shLength * count),
+      shDegree,
+      antialiased: false,
+      droppedCount: 0,
+    };
+  } catch (cause) {
+    throw new GaussianSplatError('out-of-memory/allocation', {
+      where: name,
+      expected: `memory for ${grouped(count)} splats of ${4 * (11 + shLength)} bytes`,
+      found: 'an allocation that failed',
+      remedy: 'use a scene with fewer splats or a lower degree of spherical harmonics',
+      cause,
+    });
+  }
+}
+
+/** Replaces logits by opacities, 1/(1 + exp(-x)), in place. */
+export function sigmoidInPlace(values: Float32Array): void {
+  for (let i = 0; i < values.length; i++) values[i] = 1 / (1 + Math.exp(-values[i]));
+}
+
+/** Replaces logarithms of standard deviations by the standard deviations, in place. */
+export function expInPlace(values: Float32Array): void {
+  for (let i = 0; i < values.length; i++) values[i] = Math.exp(values[i]);
+}
+
+/** The degree of spherical harmonics with this many coefficients above the constant one, for each colour channel. */
+export const DEGREE_OF_REST_COUNT: ReadonlyMap<number, ShDegree | 4> = new Map([
+  [0, 0],
+  [3, 1],
+  [8, 2],
+  [15, 3],
+  [24, 4],
+]);
+
+/**
+ * Degree that is kept of a file's degree. Degree 4 is cut to 3, the highest a cloud holds: spherical harmonics are
+ * orthogonal, so leaving out the last band gives the nearest colours that degree 3 can.
+ */
+export function keptDegree(degree: ShDegree | 4): ShDegree {
+  return degree === 4 ? 3 : degree;
+}

@@ -1,0 +1,36 @@
+import { isForeign } from './diagnose.js';
+import { sceneFormats } from './formats.js';
+import type { SceneFormat, SceneFormatName } from './scene-format.js';
+import { looksLikeSplats } from './splat/plausible.js';
+
+/**
+ * Tells the format of a scene file: by its content first; by the extension of `name` second, for formats without a
+ * signature; by the media type third; and as a last resort by whether its numbers look like those of a `.splat` file.
+ *
+ * @param name file name or URL; a query and a fragment are ignored.
+ * @param contentType media type as a server sends it; parameters after a semicolon are ignored.
+ * @returns the name of the format, or undefined if the file is none that `readScene` reads.
+ */
+export function detectFormat(bytes: Uint8Array, name = '', contentType = ''): SceneFormatName | undefined {
+  return findFormat(bytes, name, contentType)?.name;
+}
+
+/** The format's entry in the registry; see {@link detectFormat}. */
+export function findFormat(bytes: Uint8Array, name: string, contentType: string): SceneFormat | undefined {
+  const signed = sceneFormats.find(({ hasSignature }) => hasSignature?.(bytes));
+  if (signed || bytes.length === 0 || isForeign(bytes)) return signed;
+  const unsigned = sceneFormats.filter(({ hasSignature }) => !hasSignature);
+  const extension = extensionOf(name);
+  const mimeType = contentType.split(';')[0].trim().toLowerCase();
+  return (
+    unsigned.find(({ extensions }) => extensions.includes(extension)) ??
+    unsigned.find(({ mimeTypes }) => mimeTypes.includes(mimeType)) ??
+    (bytes.length % 32 === 0 && looksLikeSplats(bytes, 'all') ? unsigned.find((f) => f.name === 'splat') : undefined)
+  );
+}
+
+/** Extension of a file name or URL in lower case, with its dot; empty if there is none. */
+export function extensionOf(name: string): string {
+  const path = name.split(/[?#]/)[0];
+  return /\.[a-z0-9]+$/i.exec(path)?.[0].toLowerCase() ?? '';
+}

@@ -1,0 +1,48 @@
+import { asciiOf, startsWith } from './bytes.js';
+import type { SceneFormat } from './scene-format.js';
+
+/** Text that tells a compressed PLY from a plain one; it stands within the first lines of every such header. */
+const COMPRESSED_PLY_MARK = /[\r\n]property[ \t]+\S+[ \t]+packed_position\s/;
+const HEADER_SAMPLE = 16_384;
+
+const isPly = (bytes: Uint8Array): boolean => /^ply[ \t]*[\r\n]/.test(asciiOf(bytes, 0, 16));
+const isCompressedPly = (bytes: Uint8Array): boolean =>
+  isPly(bytes) && COMPRESSED_PLY_MARK.test(asciiOf(bytes, 0, HEADER_SAMPLE));
+const isGzip = (bytes: Uint8Array): boolean => startsWith(bytes, [0x1f, 0x8b]);
+const isNgsp = (bytes: Uint8Array): boolean => startsWith(bytes, 'NGSP');
+
+/** All formats that `readScene` reads; the first whose signature fits wins. */
+export const sceneFormats: readonly SceneFormat[] = [
+  {
+    name: 'compressed-ply',
+    title: 'compressed PLY (PlayCanvas, SuperSplat)',
+    extensions: ['.compressed.ply', '.ply'],
+    mimeTypes: [],
+    hasSignature: isCompressedPly,
+    load: async () => (await import('./readers/compressed-ply.js')).readCompressedPly,
+  },
+  {
+    name: 'ply',
+    title: 'PLY (INRIA 3D Gaussian Splatting)',
+    extensions: ['.ply'],
+    mimeTypes: ['model/ply', 'application/ply', 'application/x-ply'],
+    hasSignature: isPly,
+    load: async () => (await import('./readers/ply.js')).readPly,
+  },
+  {
+    name: 'spz',
+    title: 'SPZ (Niantic)',
+    extensions: ['.spz'],
+    mimeTypes: ['model/spz', 'application/spz', 'application/x-spz'],
+    // Versions 1 to 3 are gzip files; what else may be inside is the reader's to say.
+    hasSignature: (bytes) => isNgsp(bytes) || isGzip(bytes),
+    load: async () => (await import('./readers/spz.js')).readSpz,
+  },
+  {
+    name: 'splat',
+    title: '.splat (antimatter15)',
+    extensions: ['.splat'],
+    mimeTypes: ['model/splat', 'application/x-splat'],
+    load: async () => (await import('./readers/splat.js')).readSplat,
+  },
+];

@@ -1,0 +1,5 @@
+export { detectFormat } from './detect.js';
+export { fetchScene, type FetchSceneOptions } from './fetch-scene.js';
+export { sceneFormats } from './formats.js';
+export { readScene, type ReadSceneOptions } from './read-scene.js';
+export type { SceneFormat, SceneFormatName, SceneReader, SceneSource } from './scene-format.js';

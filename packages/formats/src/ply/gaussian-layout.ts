@@ -1,0 +1,92 @@
+import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
+import { DEGREE_OF_REST_COUNT } from '../cloud.js';
+import type { SceneSource } from '../scene-format.js';
+import type { PlyElement, PlyHeader, PlyProperty } from './header.js';
+
+/** How the splats of a PLY file are laid out, as far as files differ. */
+export interface GaussianLayout {
+  readonly vertex: PlyElement;
+  /** Degree of the file's spherical harmonics. */
+  readonly degree: ShDegree | 4;
+  /** Properties of the constant colour: SH coefficients, or plain colours to convert. */
+  readonly colour: readonly PlyProperty[];
+  readonly colourIsSh: boolean;
+  /** False for 2D Gaussians (2DGS): discs without a third axis. */
+  readonly hasThirdScale: boolean;
+  readonly antialiased: boolean;
+}
+
+const REQUIRED = ['x', 'y', 'z', 'scale_0', 'scale_1', 'rot_0', 'rot_1', 'rot_2', 'rot_3', 'opacity'];
+const SH_COLOUR = ['f_dc_0', 'f_dc_1', 'f_dc_2'];
+const PLAIN_COLOUR = ['red', 'green', 'blue'];
+
+/** Finds the splats in a header. Throws `decode/not-splats` for meshes and point clouds, `decode/header` otherwise. */
+export function findGaussians(source: SceneSource, header: PlyHeader): GaussianLayout {
+  const vertex = header.elements.find((element) => element.name === 'vertex');
+  if (!vertex) throw notSplats(source, 'an element "vertex"', describeElements(header));
+  const scalar = (name: string): PlyProperty | undefined =>
+    vertex.properties.find((property) => property.name === name && !property.listCountType);
+  const missing = REQUIRED.filter((name) => !scalar(name));
+  const colourIsSh = SH_COLOUR.every(scalar);
+  const colour = (colourIsSh ? SH_COLOUR : PLAIN_COLOUR).map(scalar).filter((property) => property !== undefined);
+  if (colour.length < 3) missing.push(...SH_COLOUR);
+  if (missing.length > 0) {
+    const present = vertex.properties.map((property) => property.name).join(', ') || 'none';
+    throw notSplats(
+      source,
+      'the properties of Gaussian splats in element "vertex"',
+      `${describeElements(header)}; vertex lacks ${missing.join(', ')} and has ${clip(present)}`,
+    );
+  }
+  return {
+    vertex,
+    degree: shDegreeOf(source, vertex),
+    colour,
+    colourIsSh,
+    hasThirdScale: scalar('scale_2') !== undefined,
+    antialiased: isAntialiased(header.comments),
+  };
+}
+
+/**
+ * Degree of the spherical harmonics of an element with properties `f_rest_0`, `f_rest_1`, ...; their number is
+ * 3·((d + 1)² - 1). Throws `decode/header` for any other number or a gap in the numbering.
+ */
+export function shDegreeOf(source: SceneSource, element: PlyElement): ShDegree | 4 {
+  const rest = element.properties.filter((property) => /^f_rest_\d+$/.test(property.name));
+  const degree = DEGREE_OF_REST_COUNT.get(rest.length / 3);
+  const isComplete = rest.every((_, k) =>
+    rest.some((property) => property.name === `f_rest_${k}` && !property.listCountType),
+  );
+  if (degree !== undefined && isComplete) return degree;
+  throw new GaussianSplatError('decode/header', {
+    where: `${source.name}, PLY header, element "${element.name}"`,
+    expected: '0, 9, 24, 45 or 72 properties f_rest_0, f_rest_1, ... without gaps (SH degree 0 to 4)',
+    found: `${rest.length}${isComplete ? '' : ', with gaps in their numbers'}`,
+    remedy: 'export the file again with a whole degree of spherical harmonics',
+  });
+}
+
+/** Tags of trainers: brush writes `SplatRenderMode: mip`, Postshot `antialiased 1`. */
+function isAntialiased(comments: readonly string[]): boolean {
+  return comments.some((text) => /^(splatrendermode\s*:\s*mip|antialiased\s*[:=]?\s*1)\s*$/i.test(text.trim()));
+}
+
+function notSplats(source: SceneSource, expected: string, found: string): GaussianSplatError {
+  return new GaussianSplatError('decode/not-splats', {
+    where: `${source.name}, PLY header`,
+    expected,
+    found,
+    remedy: 'give a PLY of Gaussian splats, as trainers write it (point_cloud.ply), not a mesh or a point cloud',
+  });
+}
+
+function describeElements({ elements }: PlyHeader): string {
+  const isMesh = elements.some(({ name, count }) => name === 'face' && count > 0);
+  const list = elements.map(({ name, count }) => `${count} ${name}`).join(', ') || 'no elements';
+  return `${isMesh ? 'a mesh' : 'a PLY'} with ${clip(list)}`;
+}
+
+function clip(text: string): string {
+  return text.length > 160 ? `${text.slice(0, 160)}...` : text;
+}

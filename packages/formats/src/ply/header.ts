@@ -1,0 +1,139 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { asciiOf, grouped, quote } from '../bytes.js';
+import type { SceneSource } from '../scene-format.js';
+
+export type ScalarType = 'int8' | 'uint8' | 'int16' | 'uint16' | 'int32' | 'uint32' | 'float32' | 'float64';
+
+export interface PlyProperty {
+  readonly name: string;
+  /** Type of the value, or of each value of a list. */
+  readonly type: ScalarType;
+  /** Type of the number of values that precedes a list; absent for a scalar. */
+  readonly listCountType?: ScalarType;
+}
+
+export interface PlyElement {
+  readonly name: string;
+  /** Number of rows. */
+  readonly count: number;
+  readonly properties: readonly PlyProperty[];
+}
+
+export interface PlyHeader {
+  readonly encoding: 'ascii' | 'little-endian' | 'big-endian';
+  readonly elements: readonly PlyElement[];
+  /** Text after the word `comment` of every comment line. */
+  readonly comments: readonly string[];
+  /** Byte of the file where the data begins. */
+  readonly dataStart: number;
+}
+
+/** Both spellings of every type: that of the PLY specification and the one with sizes. */
+const TYPES: ReadonlyMap<string, ScalarType> = new Map([
+  ...(['int8', 'uint8', 'int16', 'uint16', 'int32', 'uint32', 'float32', 'float64'] as const).map(
+    (type): [string, ScalarType] => [type, type],
+  ),
+  ['char', 'int8'],
+  ['uchar', 'uint8'],
+  ['short', 'int16'],
+  ['ushort', 'uint16'],
+  ['int', 'int32'],
+  ['uint', 'uint32'],
+  ['float', 'float32'],
+  ['double', 'float64'],
+]);
+
+const ENCODINGS: ReadonlyMap<string, PlyHeader['encoding']> = new Map([
+  ['ascii', 'ascii'],
+  ['binary_little_endian', 'little-endian'],
+  ['binary_big_endian', 'big-endian'],
+]);
+
+/** Headers of splat files have 1 to 5 KB; a longer one than this is not searched for its end. */
+const MAX_HEADER_BYTES = 262_144;
+
+/** Size in bytes of one binary value. */
+export function sizeOf(type: ScalarType): number {
+  return Number(/\d+/.exec(type)) / 8;
+}
+
+/** Reads the header of a PLY file; line ends may be LF, CRLF or CR. Throws `decode/header` or `decode/truncated`. */
+export function parsePlyHeader(source: SceneSource): PlyHeader {
+  const { lines, dataStart } = splitHeader(source);
+  const elements: { name: string; count: number; properties: PlyProperty[] }[] = [];
+  const comments: string[] = [];
+  let encoding: PlyHeader['encoding'] | undefined;
+  lines.forEach((line, index) => {
+    const fail = headerFailure(source, line, index + 1);
+    const [keyword, ...words] = line.trim().split(/[ \t]+/);
+    if (keyword === 'format') {
+      encoding = ENCODINGS.get(words[0]);
+      if (!encoding || words[1] !== '1.0') fail('format ascii, binary_little_endian or binary_big_endian 1.0');
+    } else if (keyword === 'comment') {
+      comments.push(words.join(' '));
+    } else if (keyword === 'element') {
+      elements.push(parseElement(words, elements, fail));
+    } else if (keyword === 'property') {
+      const element = elements.at(-1) ?? fail('an element before its properties');
+      element.properties.push(parseProperty(words, element.properties, fail));
+    } else if (keyword !== '' && keyword !== 'obj_info' && index > 0) {
+      fail('format, comment, obj_info, element or property');
+    }
+  });
+  if (!encoding) return headerFailure(source, '', undefined)('a line that begins with "format"');
+  return { encoding, elements, comments, dataStart };
+}
+
+type Fail = (expected: string) => never;
+
+function parseElement(words: readonly string[], elements: readonly PlyElement[], fail: Fail) {
+  const [name, text] = words;
+  const count = Number(text);
+  if (words.length !== 2 || !/^\d+$/.test(text) || !Number.isSafeInteger(count)) fail('"element NAME COUNT"');
+  if (elements.some((element) => element.name === name)) fail(`one element named ${quote(name)}`);
+  return { name, count, properties: [] };
+}
+
+function parseProperty(words: readonly string[], properties: readonly PlyProperty[], fail: Fail): PlyProperty {
+  const isList = words[0] === 'list';
+  if (words.length !== (isList ? 4 : 2)) fail('"property TYPE NAME" or "property list COUNT_TYPE TYPE NAME"');
+  const name = words[words.length - 1];
+  const type = TYPES.get(words[words.length - 2]) ?? fail(`a type out of ${[...TYPES.keys()].join(', ')}`);
+  if (properties.some((property) => property.name === name)) fail(`one property named ${quote(name)} in the element`);
+  if (!isList) return { name, type };
+  const listCountType = TYPES.get(words[1]);
+  if (!listCountType || listCountType.startsWith('float')) return fail('an integer type for the length of a list');
+  return { name, type, listCountType };
+}
+
+/** Lines up to, not including, `end_header`, and the byte after that line. */
+function splitHeader(source: SceneSource): { lines: string[]; dataStart: number } {
+  const { bytes, name } = source;
+  const text = asciiOf(bytes, 0, MAX_HEADER_BYTES);
+  // With lone CRs a first data byte of 10 belongs to the data; otherwise LF ends every line and a CR before it is part
+  // of the line end.
+  const usesLoneCr = /^ply[ \t]*\r(?!\n)/.test(text);
+  const end = (usesLoneCr ? /\rend_header[ \t]*(\r|$)/ : /\nend_header[ \t]*\r?(\n|$)/).exec(text);
+  if (end) {
+    const lines = text.slice(0, end.index).split(usesLoneCr ? '\r' : /\r?\n/);
+    return { lines, dataStart: end.index + end[0].length };
+  }
+  const isCut = bytes.length < MAX_HEADER_BYTES;
+  throw new GaussianSplatError(isCut ? 'decode/truncated' : 'decode/header', {
+    where: `${name}, PLY header, byte ${grouped(Math.min(bytes.length, MAX_HEADER_BYTES))}`,
+    expected: 'a line "end_header"',
+    found: isCut ? 'the end of the file' : `none in the first ${grouped(MAX_HEADER_BYTES)} bytes`,
+    remedy: isCut ? 'download or export the file again; it is incomplete' : 'export the file again as a PLY of splats',
+  });
+}
+
+function headerFailure(source: SceneSource, line: string, lineNumber: number | undefined): Fail {
+  return (expected) => {
+    throw new GaussianSplatError('decode/header', {
+      where: `${source.name}, PLY header${lineNumber === undefined ? '' : `, line ${lineNumber}`}`,
+      expected,
+      found: line === '' ? 'none' : quote(line),
+      remedy: 'export the file again; the header breaks the PLY specification',
+    });
+  };
+}

@@ -1,0 +1,33 @@
+import type { Vector3 } from '@gaussian-splat/core';
+
+/** float64 [N, 3] positions split into a float64 origin and float32 positions relative to it. */
+export interface RelativePositions {
+  readonly origin: Vector3;
+  readonly positions: Float32Array;
+}
+
+/** Coordinates at most this many are sampled for the origin. */
+const SAMPLE_LIMIT = 16_384;
+
+/**
+ * Moves the origin into the middle of a scene that lies far from (0, 0, 0), as georeferenced ones do, so that float32
+ * keeps the detail that float64 has. The origin stays (0, 0, 0) where float32 holds every coordinate exactly.
+ */
+export function relativePositions(world: Float64Array): RelativePositions {
+  const isExact = world.every((value) => Math.fround(value) === value || !Number.isFinite(value));
+  const origin: Vector3 = isExact ? [0, 0, 0] : [medianOf(world, 0), medianOf(world, 1), medianOf(world, 2)];
+  const positions = new Float32Array(world.length);
+  for (let i = 0; i < world.length; i++) positions[i] = world[i] - origin[i % 3];
+  return { origin, positions };
+}
+
+/** Median of one axis: unlike a mean or a box it is not moved by outliers. */
+function medianOf(world: Float64Array, axis: number): number {
+  const step = 3 * Math.max(1, Math.ceil(world.length / 3 / SAMPLE_LIMIT));
+  const sample: number[] = [];
+  for (let i = axis; i < world.length; i += step) {
+    if (Number.isFinite(world[i])) sample.push(world[i]);
+  }
+  sample.sort((a, b) => a - b);
+  return sample[sample.length >> 1] ?? 0;
+}

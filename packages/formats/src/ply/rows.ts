@@ -1,0 +1,193 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { alignedTo4, grouped, hostIsLittleEndian, viewOf } from '../bytes.js';
+import type { SceneSource } from '../scene-format.js';
+import { AsciiCursor, BinaryCursor, scalarGetter, type ValueCursor } from './cursors.js';
+import { sizeOf, type PlyElement, type PlyHeader } from './header.js';
+
+/** Where the values of one property go: row i to `array[i·stride + offset]`. */
+export interface ColumnTarget {
+  readonly property: string;
+  readonly array: Float32Array | Float64Array | Uint32Array | Uint8Array;
+  readonly stride: number;
+  readonly offset: number;
+}
+
+/** One element of a PLY file and the byte where its first row begins. */
+export interface ElementData {
+  readonly source: SceneSource;
+  readonly encoding: PlyHeader['encoding'];
+  readonly element: PlyElement;
+  readonly start: number;
+  /** Bytes of every row; undefined for text and for rows with lists, which have no fixed size. */
+  readonly rowBytes: number | undefined;
+}
+
+/**
+ * Finds an element that the header lists, skipping those before it, and checks that the file can hold its rows, so
+ * that a caller may allocate for `element.count` rows. Throws `decode/truncated` if it cannot.
+ */
+export function openElement(source: SceneSource, header: PlyHeader, name: string): ElementData {
+  const { encoding } = header;
+  let start = header.dataStart;
+  for (const element of header.elements) {
+    const rowBytes = fixedRowBytes(element, encoding);
+    const data: ElementData = { source, encoding, element, start, rowBytes };
+    requireRoom(data);
+    if (element.name === name) return data;
+    start = endOf(data);
+  }
+  throw new Error(`no element ${name}: callers ask only for elements of the header`);
+}
+
+/** Copies properties of all rows into their targets. Throws `decode/truncated` or, for text, `decode/corrupt`. */
+export function readColumns(data: ElementData, targets: readonly ColumnTarget[]): void {
+  if (data.rowBytes === undefined) readSequentially(data, targets);
+  else if (canViewAsFloats(data, targets)) readFloats(data, targets);
+  else readFixedRows(data, targets);
+}
+
+function fixedRowBytes(element: PlyElement, encoding: PlyHeader['encoding']): number | undefined {
+  const { properties } = element;
+  if (properties.length > 0 && encoding === 'ascii') return undefined;
+  if (properties.some((property) => property.listCountType)) return undefined;
+  return properties.reduce((sum, property) => sum + sizeOf(property.type), 0);
+}
+
+/** Fewest bytes that a row can have; the number that bounds allocations before anything is read. */
+function minimumRowBytes({ element, encoding, rowBytes }: ElementData): number {
+  if (rowBytes !== undefined) return rowBytes;
+  // A digit and a separator for each value of a text file.
+  const sizes = element.properties.map(({ type, listCountType }) =>
+    encoding === 'ascii' ? 2 : sizeOf(listCountType ?? type),
+  );
+  return sizes.reduce((sum, size) => sum + size, 0);
+}
+
+function requireRoom(data: ElementData): void {
+  const { source, element, start, encoding } = data;
+  const minimum = minimumRowBytes(data);
+  // The separator after the last value of a text file may be missing.
+  const present = source.bytes.length - start + (encoding === 'ascii' ? 1 : 0);
+  if (element.count * minimum > present) throwTruncated(data, Math.floor(present / minimum));
+}
+
+function throwTruncated(data: ElementData, rows: number): never {
+  const { source, element, start, rowBytes } = data;
+  const what = element.name === 'vertex' ? 'splats' : `rows of element "${element.name}"`;
+  const size = rowBytes === undefined ? '' : ` of ${rowBytes} bytes`;
+  throw new GaussianSplatError('decode/truncated', {
+    where: `${source.name}, byte ${grouped(source.bytes.length)} (end of the file)`,
+    expected: `${grouped(element.count)} ${what}${size} from byte ${grouped(start)} on`,
+    found: `${rowBytes === undefined ? 'at most ' : ''}${grouped(rows)} of ${grouped(element.count)}`,
+    remedy: 'download or export the file again; it is incomplete',
+  });
+}
+
+function cursorAt({ source, encoding, start }: ElementData): ValueCursor {
+  return encoding === 'ascii'
+    ? new AsciiCursor(source, start)
+    : new BinaryCursor(source, start, encoding === 'little-endian');
+}
+
+function endOf(data: ElementData): number {
+  if (data.rowBytes !== undefined) return data.start + data.element.count * data.rowBytes;
+  return readSequentially(data, []);
+}
+
+/** Reads rows value by value; returns the byte after the last row. */
+function readSequentially(data: ElementData, targets: readonly ColumnTarget[]): number {
+  const { element } = data;
+  const cursor = cursorAt(data);
+  const columns = element.properties.map((property) => ({
+    ...property,
+    target: targets.find((target) => target.property === property.name),
+  }));
+  for (let row = 0; row < element.count; row++) {
+    for (const { name, type, listCountType, target } of columns) {
+      if (listCountType) skipList(data, cursor, name, listCountType, type);
+      else if (target) target.array[row * target.stride + target.offset] = cursor.next(type);
+      else cursor.skip(type, 1);
+      if (cursor.ended) throwTruncated(data, row);
+    }
+  }
+  return cursor.position;
+}
+
+function skipList(
+  data: ElementData,
+  cursor: ValueCursor,
+  property: string,
+  countType: Parameters<ValueCursor['next']>[0],
+  type: Parameters<ValueCursor['next']>[0],
+): void {
+  const at = cursor.position;
+  const length = cursor.next(countType);
+  if (cursor.ended) return;
+  if (!Number.isInteger(length) || length < 0) {
+    throw new GaussianSplatError('decode/corrupt', {
+      where: `${data.source.name}, byte ${grouped(at)}, element "${data.element.name}", property "${property}"`,
+      expected: 'the length of a list, 0 or more',
+      found: String(length),
+      remedy: 'export the file again; its data is damaged',
+    });
+  }
+  cursor.skip(type, length);
+}
+
+/** Byte of each target's property within a row, and how to read it. */
+function locateColumns({ element, encoding }: ElementData, targets: readonly ColumnTarget[]) {
+  let at = 0;
+  const columns = [];
+  for (const { name, type } of element.properties) {
+    const target = targets.find((candidate) => candidate.property === name);
+    if (target) columns.push({ target, at, type, get: scalarGetter(type, encoding === 'little-endian') });
+    at += sizeOf(type);
+  }
+  return columns;
+}
+
+/** Rows are visited in blocks of this many so that a block stays in the cache while its columns are copied. */
+const BLOCK_ROWS = 256;
+
+function readFixedRows(data: ElementData, targets: readonly ColumnTarget[]): void {
+  const { source, element, start } = data;
+  const rowBytes = data.rowBytes ?? 0;
+  const view = viewOf(source.bytes);
+  const columns = locateColumns(data, targets);
+  for (let first = 0; first < element.count; first += BLOCK_ROWS) {
+    const last = Math.min(first + BLOCK_ROWS, element.count);
+    for (const { target, at, get } of columns) {
+      const { array, stride, offset } = target;
+      for (let row = first; row < last; row++) {
+        array[row * stride + offset] = get(view, start + row * rowBytes + at);
+      }
+    }
+  }
+}
+
+/** The common case, float32 throughout in the host's byte order, is read without a DataView: three times as fast. */
+function canViewAsFloats(data: ElementData, targets: readonly ColumnTarget[]): boolean {
+  return (
+    hostIsLittleEndian &&
+    data.encoding === 'little-endian' &&
+    (data.rowBytes ?? 1) % 4 === 0 &&
+    locateColumns(data, targets).every(({ at, type }) => type === 'float32' && at % 4 === 0)
+  );
+}
+
+function readFloats(data: ElementData, targets: readonly ColumnTarget[]): void {
+  const { source, element, start } = data;
+  const rowBytes = data.rowBytes ?? 0;
+  const body = alignedTo4(source.bytes.subarray(start, start + element.count * rowBytes));
+  const floats = new Float32Array(body.buffer, body.byteOffset, body.length / 4);
+  const rowFloats = rowBytes / 4;
+  const columns = locateColumns(data, targets);
+  for (let first = 0; first < element.count; first += BLOCK_ROWS) {
+    const last = Math.min(first + BLOCK_ROWS, element.count);
+    for (const { target, at } of columns) {
+      const { array, stride, offset } = target;
+      const from = at / 4;
+      for (let row = first; row < last; row++) array[row * stride + offset] = floats[row * rowFloats + from];
+    }
+  }
+}

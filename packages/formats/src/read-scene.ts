@@ -1,0 +1,60 @@
+import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-splat/core';
+import { grouped } from './bytes.js';
+import { extensionOf, findFormat } from './detect.js';
+import { diagnoseExtension, diagnoseSigned, diagnoseUnknown } from './diagnose.js';
+
+export interface ReadSceneOptions {
+  /** File name or URL: what error messages call the file, and whose extension tells formats without a signature. */
+  readonly name?: string;
+  /** Media type that the server sent. */
+  readonly contentType?: string;
+  /** Aborts between the steps of reading; the promise then rejects with the signal's reason. */
+  readonly signal?: AbortSignal;
+}
+
+/**
+ * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4 or .splat; the format is told from the
+ * content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
+ *
+ * @param bytes the whole file. It is not changed, and the cloud does not refer to it.
+ * @returns the splats in the shape and frame that `GaussianCloud` documents. Splats with values that cannot be drawn
+ * are left out and counted in `droppedCount`.
+ * @throws GaussianSplatError with a `decode/...` code that says what was expected and found, where and what to do, or
+ * `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
+ */
+export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
+  const { name = 'scene', contentType = '', signal } = options;
+  signal?.throwIfAborted();
+  if (bytes.length === 0) throw emptyFile(name);
+  const format = findFormat(bytes, name, contentType);
+  if (!format) {
+    throw diagnoseSigned(bytes, name) ?? diagnoseExtension(name, extensionOf(name)) ?? diagnoseUnknown(bytes, name);
+  }
+  const read = await format.load();
+  signal?.throwIfAborted();
+  const cloud = keepUsable(await read({ bytes, name, signal }));
+  signal?.throwIfAborted();
+  if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
+  return cloud;
+}
+
+function emptyFile(name: string): GaussianSplatError {
+  return new GaussianSplatError('decode/empty', {
+    where: `${name}, byte 0`,
+    expected: 'a scene file',
+    found: '0 bytes',
+    remedy: 'check the address of the scene and the upload; the file is empty',
+  });
+}
+
+function noSplats(name: string, droppedCount: number): GaussianSplatError {
+  return new GaussianSplatError('decode/empty', {
+    where: name,
+    expected: '1 splat or more that can be drawn',
+    found:
+      droppedCount === 0
+        ? '0 splats'
+        : `${grouped(droppedCount)} splats, all with values that cannot be drawn (not finite, no rotation or no extent)`,
+    remedy: 'export the scene again; this file has nothing to show',
+  });
+}

@@ -1,0 +1,159 @@
+import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { grouped } from '../bytes.js';
+import { allocateCloud, expInPlace, keptDegree, SH_C0, type DraftCloud } from '../cloud.js';
+import { shDegreeOf } from '../ply/gaussian-layout.js';
+import { harmonicTargets } from '../ply/harmonics.js';
+import { parsePlyHeader, type PlyElement, type PlyHeader } from '../ply/header.js';
+import { openElement, readColumns } from '../ply/rows.js';
+import type { SceneSource } from '../scene-format.js';
+
+/** Splats that share one row of the element `chunk`. */
+const CHUNK_SPLATS = 256;
+const PACKED = ['packed_position', 'packed_rotation', 'packed_scale', 'packed_color'];
+const BOUNDS = ['min_', 'max_', 'min_scale_', 'max_scale_'].flatMap((bound) => ['x', 'y', 'z'].map((a) => bound + a));
+const COLOUR_BOUNDS = ['min_', 'max_'].flatMap((bound) => ['r', 'g', 'b'].map((channel) => bound + channel));
+
+/** Bounds of one chunk, in the order of {@link BOUNDS} and then {@link COLOUR_BOUNDS}. */
+const [MIN_POSITION, MAX_POSITION, MIN_SCALE, MAX_SCALE, MIN_COLOUR, MAX_COLOUR] = [0, 3, 6, 9, 12, 15];
+const CHUNK_FLOATS = 18;
+
+/**
+ * Reads the compressed PLY of PlayCanvas and SuperSplat: for each 256 splats their bounds, for each splat four
+ * 32-bit words relative to them, and optionally 8-bit spherical harmonics. The definition followed is the
+ * decompressor of splat-transform (`src/lib/readers/decompress-ply.ts`). Unlike there, opacities are kept as they are
+ * and never turned into logits, so that 255 is opacity 1 and not infinite. Files with 12 chunk properties (before
+ * 2024) store colours 0..1 without bounds.
+ */
+export function readCompressedPly(source: SceneSource): GaussianCloud {
+  const header = parsePlyHeader(source);
+  const { vertex, sh } = checkElements(source, header);
+  const degree = sh ? shDegreeOf(source, sh) : 0;
+  const chunkBounds = readChunkBounds(source, header);
+  const vertexData = openElement(source, header, 'vertex');
+  const words = new Uint32Array(4 * vertex.count);
+  readColumns(
+    vertexData,
+    PACKED.map((property, offset) => ({ property, array: words, stride: 4, offset })),
+  );
+  source.signal?.throwIfAborted();
+  const cloud = allocateCloud(vertex.count, keptDegree(degree), source.name);
+  unpackSplats(words, chunkBounds, cloud);
+  if (sh) readHarmonics(source, header, degree, cloud);
+  return cloud;
+}
+
+function checkElements(source: SceneSource, header: PlyHeader): { vertex: PlyElement; sh: PlyElement | undefined } {
+  const element = (name: string): PlyElement | undefined => header.elements.find((found) => found.name === name);
+  const fail = (where: string, expected: string, found: string): never => {
+    throw new GaussianSplatError('decode/header', {
+      where: `${source.name}, header of a compressed PLY${where}`,
+      expected,
+      found,
+      remedy: 'export the file again, for example with SuperSplat or splat-transform',
+    });
+  };
+  const require = (name: string, properties: readonly string[], type: string): PlyElement => {
+    const found = element(name) ?? fail('', `an element "${name}"`, header.elements.map((e) => e.name).join(', '));
+    const missing = properties.filter(
+      (property) => !found.properties.some((p) => p.name === property && p.type === type && !p.listCountType),
+    );
+    if (missing.length > 0)
+      fail(`, element "${name}"`, `properties of type ${type}`, `none named ${missing.join(', ')}`);
+    return found;
+  };
+  const vertex = require('vertex', PACKED, 'uint32');
+  const chunk = require('chunk', BOUNDS, 'float32');
+  if (chunk.properties.length > BOUNDS.length) require('chunk', COLOUR_BOUNDS, 'float32');
+  const chunkCount = Math.ceil(vertex.count / CHUNK_SPLATS);
+  if (chunk.count !== chunkCount) {
+    fail(', element "chunk"', `${grouped(chunkCount)} rows, one for each 256 splats`, grouped(chunk.count));
+  }
+  const sh = element('sh');
+  if (sh && sh.count !== vertex.count) {
+    fail(', element "sh"', `${grouped(vertex.count)} rows, one for each splat`, grouped(sh.count));
+  }
+  if (sh) require('sh', sh.properties.filter((p) => p.name.startsWith('f_rest_')).map((p) => p.name), 'uint8');
+  return { vertex, sh };
+}
+
+/** [chunks, 18] bounds; colours without bounds of their own span 0..1. */
+function readChunkBounds(source: SceneSource, header: PlyHeader): Float32Array {
+  const data = openElement(source, header, 'chunk');
+  const bounds = new Float32Array(CHUNK_FLOATS * data.element.count);
+  for (let at = MAX_COLOUR; at < bounds.length; at += CHUNK_FLOATS) bounds.fill(1, at, at + 3);
+  readColumns(
+    data,
+    [...BOUNDS, ...COLOUR_BOUNDS].map((property, offset) => ({
+      property,
+      array: bounds,
+      stride: CHUNK_FLOATS,
+      offset,
+    })),
+  );
+  return bounds;
+}
+
+function unpackSplats(words: Uint32Array, bounds: Float32Array, cloud: DraftCloud): void {
+  const { count, positions, scales, rotations, opacities, sh } = cloud;
+  const shStride = 3 * shCoefficientCount(cloud.shDegree);
+  for (let i = 0; i < count; i++) {
+    const chunk = CHUNK_FLOATS * Math.floor(i / CHUNK_SPLATS);
+    unpack111011(words[4 * i], bounds, chunk + MIN_POSITION, chunk + MAX_POSITION, positions, 3 * i);
+    unpackRotation(words[4 * i + 1], rotations, 4 * i);
+    unpack111011(words[4 * i + 2], bounds, chunk + MIN_SCALE, chunk + MAX_SCALE, scales, 3 * i);
+    const colour = words[4 * i + 3];
+    for (let channel = 0; channel < 3; channel++) {
+      const t = ((colour >>> (24 - 8 * channel)) & 255) / 255;
+      const value = mix(bounds[chunk + MIN_COLOUR + channel], bounds[chunk + MAX_COLOUR + channel], t);
+      sh[shStride * i + channel] = (value - 0.5) / SH_C0;
+    }
+    opacities[i] = (colour & 255) / 255;
+  }
+  expInPlace(scales);
+}
+
+function mix(a: number, b: number, t: number): number {
+  return a * (1 - t) + b * t;
+}
+
+/** Three fractions of 11, 10 and 11 bits, first axis highest, between the bounds of the chunk. */
+function unpack111011(
+  word: number,
+  bounds: Float32Array,
+  min: number,
+  max: number,
+  out: Float32Array,
+  at: number,
+): void {
+  out[at] = mix(bounds[min], bounds[max], (word >>> 21) / 2047);
+  out[at + 1] = mix(bounds[min + 1], bounds[max + 1], ((word >>> 11) & 1023) / 1023);
+  out[at + 2] = mix(bounds[min + 2], bounds[max + 2], (word & 2047) / 2047);
+}
+
+/** Two bits for the largest component of (w, x, y, z), which is left out, and 10 bits for each other, ±1/sqrt(2). */
+function unpackRotation(word: number, out: Float32Array, at: number): void {
+  const largest = word >>> 30;
+  let squares = 0;
+  for (let component = 3, shift = 0; component >= 0; component--) {
+    if (component === largest) continue;
+    const value = (((word >>> shift) & 1023) / 1023 - 0.5) * Math.SQRT2;
+    out[at + component] = value;
+    squares += value * value;
+    shift += 10;
+  }
+  out[at + largest] = Math.sqrt(Math.max(0, 1 - squares));
+}
+
+/** Coefficients -4..4 in 8 bits: bucket centres, save that 0 and 255 are the ends of the range themselves. */
+const HARMONIC_OF_BYTE = Float32Array.from({ length: 256 }, (_, byte) => {
+  const fraction = byte === 0 ? 0 : byte === 255 ? 1 : (byte + 0.5) / 256;
+  return (fraction - 0.5) * 8;
+});
+
+function readHarmonics(source: SceneSource, header: PlyHeader, degree: number, cloud: DraftCloud): void {
+  const kept = shCoefficientCount(cloud.shDegree);
+  readColumns(openElement(source, header, 'sh'), harmonicTargets(degree, cloud));
+  for (let i = 0; i < cloud.count; i++) {
+    for (let k = 3; k < 3 * kept; k++) cloud.sh[3 * kept * i + k] = HARMONIC_OF_BYTE[cloud.sh[3 * kept * i + k]];
+  }
+}

@@ -1,0 +1,75 @@
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { allocateCloud, expInPlace, keptDegree, SH_C0, sigmoidInPlace, type DraftCloud } from '../cloud.js';
+import { findGaussians, type GaussianLayout } from '../ply/gaussian-layout.js';
+import { harmonicTargets } from '../ply/harmonics.js';
+import { parsePlyHeader, type PlyProperty } from '../ply/header.js';
+import { relativePositions } from '../ply/positions.js';
+import { openElement, readColumns, type ColumnTarget, type ElementData } from '../ply/rows.js';
+import type { SceneSource } from '../scene-format.js';
+
+/**
+ * Reads the PLY files of 3D Gaussian Splatting trainers (`save_ply` in INRIA's `scene/gaussian_model.py`): opacities
+ * are logits, scales logarithms, rotations (w, x, y, z), and `f_rest_*` holds all red coefficients of spherical
+ * harmonics, then all green, then all blue.
+ */
+export function readPly(source: SceneSource): GaussianCloud {
+  const header = parsePlyHeader(source);
+  const layout = findGaussians(source, header);
+  const data = openElement(source, header, 'vertex');
+  const cloud = allocateCloud(layout.vertex.count, keptDegree(layout.degree), source.name);
+  cloud.antialiased = layout.antialiased;
+  source.signal?.throwIfAborted();
+  readAttributes(data, layout, cloud);
+  source.signal?.throwIfAborted();
+  expInPlace(cloud.scales);
+  if (!layout.hasThirdScale) flatten(cloud);
+  sigmoidInPlace(cloud.opacities);
+  if (!layout.colourIsSh) convertPlainColours(cloud, layout.colour);
+  return cloud;
+}
+
+function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftCloud): void {
+  const scales = ['scale_0', 'scale_1', 'scale_2'].slice(0, layout.hasThirdScale ? 3 : 2);
+  const targets = [
+    ...interleaved(scales, cloud.scales, 3),
+    ...interleaved(['rot_0', 'rot_1', 'rot_2', 'rot_3'], cloud.rotations, 4),
+    ...interleaved(['opacity'], cloud.opacities, 1),
+    ...interleaved(
+      layout.colour.map(({ name }) => name),
+      cloud.sh,
+      3 * shCoefficientCount(cloud.shDegree),
+    ),
+    ...harmonicTargets(layout.degree, cloud),
+  ];
+  const coordinates = ['x', 'y', 'z'];
+  if (layout.vertex.properties.some(({ name, type }) => coordinates.includes(name) && needsFloat64(type))) {
+    const world = new Float64Array(3 * cloud.count);
+    readColumns(data, [...targets, ...interleaved(coordinates, world, 3)]);
+    Object.assign(cloud, relativePositions(world));
+  } else {
+    readColumns(data, [...targets, ...interleaved(coordinates, cloud.positions, 3)]);
+  }
+}
+
+function needsFloat64(type: PlyProperty['type']): boolean {
+  return type === 'float64' || type === 'int32' || type === 'uint32';
+}
+
+/** Targets of properties that stand side by side in every row of an array. */
+function interleaved(names: readonly string[], array: ColumnTarget['array'], stride: number): ColumnTarget[] {
+  return names.map((property, offset) => ({ property, array, stride, offset }));
+}
+
+/** A 2D Gaussian has no extent along its third axis. */
+function flatten(cloud: DraftCloud): void {
+  for (let i = 0; i < cloud.count; i++) cloud.scales[3 * i + 2] = 0;
+}
+
+/** Turns colours 0..255 (integers; 16-bit ones 0..65535) or 0..1 (floats) into the constant SH coefficient. */
+function convertPlainColours(cloud: DraftCloud, colour: readonly PlyProperty[]): void {
+  const stride = 3 * shCoefficientCount(cloud.shDegree);
+  colour.forEach(({ type }, channel) => {
+    const white = type.startsWith('float') ? 1 : type === 'uint16' ? 65_535 : 255;
+    for (let at = channel; at < cloud.sh.length; at += stride) cloud.sh[at] = (cloud.sh[at] / white - 0.5) / SH_C0;
+  });
+}

@@ -1,0 +1,76 @@
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { startsWith } from '../bytes.js';
+import { describeContent } from '../diagnose.js';
+import type { SceneSource } from '../scene-format.js';
+import { Gunzip } from '../spz/gunzip.js';
+import {
+  parseSpzHeader,
+  requirePlausibleCount,
+  SPZ_HEADER_BYTES,
+  truncatedHeader,
+  type SpzHeader,
+} from '../spz/header.js';
+import { longestBody, readLegacyBody } from '../spz/legacy.js';
+import { readStreams, type PackedScene } from '../spz/streams.js';
+import { unpackSplats } from '../spz/unpack.js';
+
+/**
+ * Reads Niantic's SPZ: versions 1 to 3, which are gzip files (or their inflated content), and version 4, whose
+ * attributes are zstd streams. Degree 4 of the spherical harmonics is left out. Extensions are skipped, save the one
+ * that names the coordinate system; without it a file is in right-up-back and is turned into a cloud's frame.
+ */
+export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
+  const { header, scene } = startsWith(source.bytes, 'NGSP') ? readPlain(source) : await readGzip(source);
+  source.signal?.throwIfAborted();
+  return unpackSplats(header, scene, source.name);
+}
+
+interface SpzParts {
+  readonly header: SpzHeader;
+  readonly scene: PackedScene;
+}
+
+function readPlain(source: SceneSource): SpzParts {
+  const { bytes, name } = source;
+  const header = parseSpzHeader(bytes, name);
+  requirePlausibleCount(header, bytes.length, name);
+  const scene = header.version === 4 ? readStreams(source, header) : readLegacyBody(bytes, header, name);
+  return { header, scene };
+}
+
+async function readGzip(source: SceneSource): Promise<SpzParts> {
+  const { bytes, name } = source;
+  const gunzip = new Gunzip(source);
+  try {
+    const start = await gunzip.upTo(SPZ_HEADER_BYTES);
+    if (start.length < SPZ_HEADER_BYTES && startsWith(start, 'NGSP')) {
+      throw truncatedHeader(name, start.length, SPZ_HEADER_BYTES);
+    }
+    if (!startsWith(start, 'NGSP')) throw otherGzip(start, name);
+    const header = parseSpzHeader(start, name);
+    if (header.version === 4) throw gzippedVersion4(name);
+    requirePlausibleCount(header, bytes.length, name);
+    const file = await gunzip.upTo(SPZ_HEADER_BYTES + longestBody(header));
+    return { header, scene: readLegacyBody(file, header, name) };
+  } finally {
+    gunzip.close();
+  }
+}
+
+function otherGzip(start: Uint8Array, name: string): GaussianSplatError {
+  return new GaussianSplatError('decode/unknown-format', {
+    where: `${name}, byte 0 inside the gzip file`,
+    expected: 'an SPZ scene (the letters NGSP)',
+    found: describeContent(start),
+    remedy: 'decompress the file first, or have the server send it with "Content-Encoding: gzip"',
+  });
+}
+
+function gzippedVersion4(name: string): GaussianSplatError {
+  return new GaussianSplatError('decode/unsupported', {
+    where: `${name}, byte 4 of the SPZ header`,
+    expected: 'version 1, 2 or 3 inside a gzip file',
+    found: 'version 4, which is not compressed as a whole',
+    remedy: 'decompress the file first, or have the server send it with "Content-Encoding: gzip"',
+  });
+}

@@ -1,0 +1,35 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+
+/** One scene file in memory, as readers get it. */
+export interface SceneSource {
+  /** The whole file, as the server or disk gave it. */
+  readonly bytes: Uint8Array;
+  /** What error messages call the file: its name or URL. */
+  readonly name: string;
+  /** Readers that wait or work long call `throwIfAborted()` between steps. */
+  readonly signal?: AbortSignal;
+}
+
+/**
+ * Reads one file format into a cloud. A reader checks every size against the bytes present before it allocates, throws
+ * `GaussianSplatError` with a code of the `decode` family (or `out-of-memory/allocation`), and leaves it to `readScene`
+ * to drop unusable splats.
+ */
+export type SceneReader = (source: SceneSource) => GaussianCloud | Promise<GaussianCloud>;
+
+export type SceneFormatName = 'ply' | 'compressed-ply' | 'spz' | 'splat';
+
+/** A file format that `readScene` reads: what it is called, how it is recognised, and where its reader is. */
+export interface SceneFormat {
+  readonly name: SceneFormatName;
+  /** Name for people. */
+  readonly title: string;
+  /** File extensions in lower case, with the dot. A format may share an extension with another. */
+  readonly extensions: readonly string[];
+  /** Media types seen in use; none of them is registered with IANA. */
+  readonly mimeTypes: readonly string[];
+  /** True if the first bytes of the file prove this format. Absent where the format has no signature. */
+  readonly hasSignature?: (bytes: Uint8Array) => boolean;
+  /** Loads the reader; a dynamic import, so that a page fetches only the readers it needs. */
+  readonly load: () => Promise<SceneReader>;
+}

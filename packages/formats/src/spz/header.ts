@@ -1,0 +1,107 @@
+import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
+import { grouped, startsWith, viewOf } from '../bytes.js';
+
+/** What the headers of all versions of SPZ say. */
+export interface SpzHeader {
+  readonly version: 1 | 2 | 3 | 4;
+  /** Number of splats. */
+  readonly count: number;
+  readonly degree: ShDegree | 4;
+  /** Bits after the point of the 24-bit coordinates. */
+  readonly fractionalBits: number;
+  readonly antialiased: boolean;
+  readonly hasExtensions: boolean;
+}
+
+/** The attributes in the order of the file. */
+export const SPZ_ATTRIBUTES = ['positions', 'opacities', 'colours', 'scales', 'rotations', 'harmonics'] as const;
+export type SpzAttribute = (typeof SPZ_ATTRIBUTES)[number];
+
+/** Bytes of the header of versions 1 to 3, and of the part that version 4 shares with them. */
+export const SPZ_HEADER_BYTES = 16;
+
+const FLAG_ANTIALIASED = 1;
+const FLAG_EXTENSIONS = 2;
+/** Spark's marker of a tree of levels of detail: the splats of all levels follow, and drawing all would be wrong. */
+const FLAG_LEVEL_OF_DETAIL = 0x80;
+
+/** Deflate cannot compress better than this, and no real scene of zstd streams does. */
+const MAX_COMPRESSION_RATIO = 1032;
+
+/** Reads and checks the first 16 bytes of an SPZ file (after decompression, for gzip files). */
+export function parseSpzHeader(bytes: Uint8Array, name: string): SpzHeader {
+  const fail = (code: 'decode/header' | 'decode/unsupported', byte: number, expected: string, found: string): never => {
+    throw new GaussianSplatError(code, {
+      where: `${name}, byte ${byte} of the SPZ header`,
+      expected,
+      found,
+      remedy: 'export the file again as SPZ version 2, 3 or 4, or as PLY',
+    });
+  };
+  if (!startsWith(bytes, 'NGSP')) fail('decode/header', 0, 'the letters NGSP', 'other bytes');
+  if (bytes.length < SPZ_HEADER_BYTES) throw truncatedHeader(name, bytes.length, SPZ_HEADER_BYTES);
+  const view = viewOf(bytes);
+  const version = view.getUint32(4, true);
+  const [degree, fractionalBits, flags] = [bytes[12], bytes[13], bytes[14]];
+  if (version === 0) fail('decode/header', 4, 'a version from 1 to 4', '0');
+  if (version > 4) fail('decode/unsupported', 4, 'a version from 1 to 4', grouped(version));
+  if (degree > 4) fail('decode/header', 12, 'a degree of spherical harmonics from 0 to 4', String(degree));
+  if (fractionalBits > 24) fail('decode/header', 13, 'at most 24 fractional bits', String(fractionalBits));
+  if ((flags & FLAG_LEVEL_OF_DETAIL) !== 0) {
+    fail('decode/unsupported', 14, 'a scene without levels of detail', "flag 0x80, Spark's tree of levels of detail");
+  }
+  return {
+    version: version as SpzHeader['version'],
+    count: view.getUint32(8, true),
+    degree: degree as SpzHeader['degree'],
+    fractionalBits,
+    antialiased: (flags & FLAG_ANTIALIASED) !== 0,
+    hasExtensions: (flags & FLAG_EXTENSIONS) !== 0,
+  };
+}
+
+/** Bytes of each attribute of one splat in the given version. */
+export function bytesPerSplat(version: number, degree: number): Readonly<Record<SpzAttribute, number>> {
+  return {
+    positions: version === 1 ? 6 : 9,
+    opacities: 1,
+    colours: 3,
+    scales: 3,
+    rotations: version >= 3 ? 4 : 3,
+    harmonics: 3 * ((degree + 1) ** 2 - 1),
+  };
+}
+
+/** Bytes of all attributes of all splats, uncompressed. */
+export function bodyBytes({ count, degree }: SpzHeader, version: number): number {
+  return count * Object.values(bytesPerSplat(version, degree)).reduce((sum, size) => sum + size, 0);
+}
+
+/** Refuses headers that announce more splats than a file of this size can hold, before anything is allocated. */
+export function requirePlausibleCount(header: SpzHeader, fileBytes: number, name: string): void {
+  if (header.count === 0) {
+    throw new GaussianSplatError('decode/empty', {
+      where: `${name}, byte 8 of the SPZ header`,
+      expected: '1 splat or more',
+      found: '0',
+      remedy: 'export the scene again; this file is empty',
+    });
+  }
+  const needed = Math.ceil(bodyBytes(header, header.version) / MAX_COMPRESSION_RATIO);
+  if (fileBytes >= needed) return;
+  throw new GaussianSplatError('decode/truncated', {
+    where: `${name}, byte ${grouped(fileBytes)} (end of the file)`,
+    expected: `${grouped(header.count)} splats, which take ${grouped(needed)} bytes or more`,
+    found: `${grouped(fileBytes)} bytes`,
+    remedy: 'download or export the file again; it is incomplete or its header is damaged',
+  });
+}
+
+export function truncatedHeader(name: string, present: number, needed: number): GaussianSplatError {
+  return new GaussianSplatError('decode/truncated', {
+    where: `${name}, byte ${present} (end of the file)`,
+    expected: `an SPZ header of ${needed} bytes`,
+    found: `${present} bytes`,
+    remedy: 'download or export the file again; it is incomplete',
+  });
+}

@@ -1,0 +1,106 @@
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { viewOf } from '../bytes.js';
+import { allocateCloud, expInPlace, keptDegree } from '../cloud.js';
+import { harmonicSigns, quaternionSigns, type AxisSigns } from './axes.js';
+import { bytesPerSplat, type SpzHeader } from './header.js';
+import type { PackedScene } from './streams.js';
+
+/** Colours are stored as 0.5 + 0.15·f_dc, which leaves room for constant terms outside 0..1. */
+const COLOUR_SCALE = 0.15;
+
+/** Unpacks all attributes into a cloud (the definition is `unpackGaussians` in SPZ's `src/cc/load-spz.cc`). */
+export function unpackSplats(header: SpzHeader, { attributes, axes }: PackedScene, name: string): GaussianCloud {
+  const cloud = allocateCloud(header.count, keptDegree(header.degree), name);
+  cloud.antialiased = header.antialiased;
+  if (header.version === 1) unpackHalfPositions(attributes.positions, axes, cloud.positions);
+  else unpackFixedPositions(attributes.positions, header.fractionalBits, axes, cloud.positions);
+  for (let i = 0; i < cloud.scales.length; i++) cloud.scales[i] = attributes.scales[i] / 16 - 10;
+  expInPlace(cloud.scales);
+  if (header.version >= 3) unpackSmallestThree(attributes.rotations, axes, cloud.rotations);
+  else unpackFirstThree(attributes.rotations, axes, cloud.rotations);
+  for (let i = 0; i < header.count; i++) cloud.opacities[i] = attributes.opacities[i] / 255;
+  const shStride = 3 * shCoefficientCount(cloud.shDegree);
+  for (let i = 0; i < 3 * header.count; i++) {
+    cloud.sh[shStride * Math.floor(i / 3) + (i % 3)] = (attributes.colours[i] / 255 - 0.5) / COLOUR_SCALE;
+  }
+  unpackHarmonics(attributes.harmonics, header, axes, cloud.sh, shStride);
+  return cloud;
+}
+
+/** 24-bit signed fixed-point coordinates. */
+function unpackFixedPositions(packed: Uint8Array, fractionalBits: number, axes: AxisSigns, out: Float32Array): void {
+  const unit = 2 ** -fractionalBits;
+  for (let i = 0; i < out.length; i++) {
+    const high = (packed[3 * i] << 8) | (packed[3 * i + 1] << 16) | (packed[3 * i + 2] << 24);
+    out[i] = axes[i % 3] * (high >> 8) * unit;
+  }
+}
+
+function unpackHalfPositions(packed: Uint8Array, axes: AxisSigns, out: Float32Array): void {
+  const view = viewOf(packed);
+  for (let i = 0; i < out.length; i++) out[i] = axes[i % 3] * float16(view.getUint16(2 * i, true));
+}
+
+/** Value of an IEEE 754 half-precision number. */
+function float16(bits: number): number {
+  const sign = bits & 0x8000 ? -1 : 1;
+  const exponent = (bits >> 10) & 31;
+  const fraction = bits & 1023;
+  if (exponent === 31) return fraction ? NaN : sign * Infinity;
+  return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1024 + fraction) * 2 ** (exponent - 25);
+}
+
+/** Versions 1 and 2: x, y and z in bytes, -1..1; w is not negative and follows from the unit length. */
+function unpackFirstThree(packed: Uint8Array, axes: AxisSigns, out: Float32Array): void {
+  const signs = quaternionSigns(axes);
+  for (let i = 0; 4 * i < out.length; i++) {
+    let squares = 0;
+    for (let k = 0; k < 3; k++) {
+      const value = packed[3 * i + k] / 127.5 - 1;
+      out[4 * i + 1 + k] = signs[k] * value;
+      squares += value * value;
+    }
+    out[4 * i] = Math.sqrt(Math.max(0, 1 - squares));
+  }
+}
+
+/**
+ * Versions 3 and 4: two bits for the largest component of (x, y, z, w), which is left out, then a sign bit and 9 bits
+ * of magnitude up to 1/sqrt(2) for each other.
+ */
+function unpackSmallestThree(packed: Uint8Array, axes: AxisSigns, out: Float32Array): void {
+  const signs = [...quaternionSigns(axes), 1];
+  const view = viewOf(packed);
+  for (let i = 0; 4 * i < out.length; i++) {
+    const word = view.getUint32(4 * i, true);
+    const largest = word >>> 30;
+    let squares = 0;
+    for (let component = 3, shift = 0; component >= 0; component--) {
+      if (component === largest) continue;
+      const magnitude = (((word >>> shift) & 511) / 511) * Math.SQRT1_2;
+      const isNegative = ((word >>> (shift + 9)) & 1) === 1;
+      out[4 * i + ((component + 1) & 3)] = signs[component] * (isNegative ? -magnitude : magnitude);
+      squares += magnitude * magnitude;
+      shift += 10;
+    }
+    out[4 * i + ((largest + 1) & 3)] = signs[largest] * Math.sqrt(Math.max(0, 1 - squares));
+  }
+}
+
+/** Coefficients -1..1 in bytes, channels side by side as in a cloud. */
+function unpackHarmonics(
+  packed: Uint8Array,
+  { version, degree, count }: SpzHeader,
+  axes: AxisSigns,
+  sh: Float32Array,
+  shStride: number,
+): void {
+  const signs = harmonicSigns(axes);
+  const stored = bytesPerSplat(version, degree).harmonics;
+  const kept = shStride - 3;
+  for (let i = 0; i < count; i++) {
+    for (let k = 0; k < kept; k++) {
+      sh[shStride * i + 3 + k] = (signs[Math.floor(k / 3)] * (packed[stored * i + k] - 128)) / 128;
+    }
+  }
+}

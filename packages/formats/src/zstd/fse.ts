@@ -1,0 +1,92 @@
+import { highestBit } from './bits.js';
+import { ZstdError } from './zstd-error.js';
+
+/** Decoding table of a finite-state entropy code (RFC 8878, 4.1): state to symbol and to the next state. */
+export interface FseTable {
+  /** log2 of the number of states. */
+  readonly accuracyLog: number;
+  readonly symbols: Uint8Array;
+  /** Bits to read for the next state, and what to add to them. */
+  readonly bits: Uint8Array;
+  readonly baselines: Uint16Array;
+}
+
+/** Table of a code with one symbol only, which takes no bits. */
+export function singleSymbolTable(symbol: number): FseTable {
+  return { accuracyLog: 0, symbols: Uint8Array.of(symbol), bits: new Uint8Array(1), baselines: new Uint16Array(1) };
+}
+
+/**
+ * Table of a distribution over 2^accuracyLog states; probability -1 stands for "less than 1", which takes one state.
+ * The probabilities must add up to the number of states.
+ */
+export function buildFseTable(probabilities: readonly number[], accuracyLog: number): FseTable {
+  const size = 1 << accuracyLog;
+  const symbols = new Uint8Array(size);
+  let rareStart = size;
+  probabilities.forEach((probability, symbol) => {
+    if (probability === -1) symbols[--rareStart] = symbol;
+  });
+  const step = (size >> 1) + (size >> 3) + 3;
+  let position = 0;
+  probabilities.forEach((probability, symbol) => {
+    for (let i = 0; i < probability; i++) {
+      symbols[position] = symbol;
+      do position = (position + step) & (size - 1);
+      while (position >= rareStart);
+    }
+  });
+  const bits = new Uint8Array(size);
+  const baselines = new Uint16Array(size);
+  const nextOf = probabilities.map((probability) => Math.abs(probability));
+  for (let state = 0; state < size; state++) {
+    const next = nextOf[symbols[state]]++;
+    bits[state] = accuracyLog - highestBit(next);
+    baselines[state] = (next << bits[state]) - size;
+  }
+  return { accuracyLog, symbols, bits, baselines };
+}
+
+/** Reads a table description at byte `start` of a block that ends at `end`; `next` is the byte after it. */
+export function readFseTable(
+  bytes: Uint8Array,
+  start: number,
+  end: number,
+  limits: { readonly maxAccuracyLog: number; readonly maxSymbol: number },
+): { table: FseTable; next: number } {
+  const accuracyLog = (bytes[start] & 15) + 5;
+  if (start >= end || accuracyLog > limits.maxAccuracyLog) throw new ZstdError('a table of too many states', start);
+  const probabilities: number[] = [];
+  let bit = 4;
+  const peek = (count: number): number => {
+    const at = start + (bit >>> 3);
+    const word = (bytes[at] ?? 0) | ((bytes[at + 1] ?? 0) << 8) | ((bytes[at + 2] ?? 0) << 16);
+    return (word >>> (bit & 7)) & ((1 << count) - 1);
+  };
+  let remaining = 1 << accuracyLog;
+  while (remaining > 0 && probabilities.length <= limits.maxSymbol) {
+    // Values that cannot occur any more make room for a code one bit shorter.
+    const count = highestBit(remaining + 1) + 1;
+    const short = peek(count - 1);
+    const shortValues = (1 << count) - 2 - remaining;
+    const isShort = short < shortValues;
+    const long = peek(count);
+    const value = isShort ? short : long >= 1 << (count - 1) ? long - shortValues : long;
+    bit += isShort ? count - 1 : count;
+    const probability = value - 1;
+    probabilities.push(probability);
+    remaining -= Math.abs(probability);
+    if (probability !== 0) continue;
+    let zeros: number;
+    do {
+      zeros = peek(2);
+      bit += 2;
+      for (let i = 0; i < zeros; i++) probabilities.push(0);
+    } while (zeros === 3 && probabilities.length <= limits.maxSymbol);
+  }
+  const next = start + Math.ceil(bit / 8);
+  if (remaining !== 0 || probabilities.length > limits.maxSymbol + 1 || next > end) {
+    throw new ZstdError('a table whose probabilities do not add up', start);
+  }
+  return { table: buildFseTable(probabilities, accuracyLog), next };
+}

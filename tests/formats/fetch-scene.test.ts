@@ -1,0 +1,151 @@
+import assert from 'node:assert/strict';
+import { createServer, type RequestListener, type Server } from 'node:http';
+import type { AddressInfo } from 'node:net';
+import { gzipSync } from 'node:zlib';
+import { after, before, test } from 'node:test';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { fetchScene } from '@gaussian-splat/formats';
+import { assertSameNumbers } from './support/expect.js';
+
+const CONTENT = Uint8Array.from({ length: 300_000 }, (_, i) => (i * i) >> 7);
+
+const ROUTES: Readonly<Record<string, RequestListener>> = {
+  '/whole': (_, response) => response.writeHead(200, { 'Content-Length': CONTENT.length }).end(CONTENT),
+  '/chunked': (_, response) => {
+    response.writeHead(200);
+    response.write(CONTENT.subarray(0, 1000));
+    setTimeout(() => response.end(CONTENT.subarray(1000)), 20);
+  },
+  '/gzip': (_, response) => {
+    const body = gzipSync(CONTENT);
+    response.writeHead(200, { 'Content-Encoding': 'gzip', 'Content-Length': body.length }).end(body);
+  },
+  '/empty': (_, response) => response.writeHead(200, { 'Content-Length': 0 }).end(),
+  '/broken': (_, response) => {
+    response.writeHead(200, { 'Content-Length': CONTENT.length });
+    response.write(CONTENT.subarray(0, 100_000), () => setTimeout(() => response.destroy(), 20));
+  },
+  '/endless': (_, response) => {
+    response.writeHead(200, { 'Content-Length': CONTENT.length });
+    response.write(CONTENT.subarray(0, 100_000));
+  },
+  '/private': (_, response) => response.writeHead(403).end('no'),
+  '/failing': (_, response) => response.writeHead(503).end(),
+};
+
+let server: Server;
+let base: string;
+
+before(async () => {
+  server = createServer((request, response) => {
+    const route = ROUTES[request.url ?? ''] ?? ((_, response) => response.writeHead(404).end('not here'));
+    route(request, response);
+  });
+  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
+  base = `http://127.0.0.1:${(server.address() as AddressInfo).port}`;
+});
+
+after(() => {
+  server.closeAllConnections();
+  server.close();
+});
+
+/** Downloads and returns the content with the progress that was reported. */
+async function download(url: string): Promise<{ bytes: Uint8Array; progress: [number, number | undefined][] }> {
+  const progress: [number, number | undefined][] = [];
+  const bytes = await fetchScene(url, { onProgress: (loaded, total) => progress.push([loaded, total]) });
+  return { bytes, progress };
+}
+
+async function expectFailure(url: string, code: string, message: RegExp): Promise<void> {
+  await assert.rejects(fetchScene(url), (error: unknown) => {
+    assert.ok(error instanceof GaussianSplatError, String(error));
+    assert.equal(error.code, code);
+    assert.match(error.message, message);
+    return true;
+  });
+}
+
+test('a file of known length: progress ends at the total', async () => {
+  const { bytes, progress } = await download(`${base}/whole`);
+  assertSameNumbers(bytes, CONTENT);
+  assert.deepEqual(progress.at(-1), [CONTENT.length, CONTENT.length]);
+  progress.forEach(([loaded, total], k) => {
+    assert.equal(total, CONTENT.length);
+    assert.ok(loaded > (progress[k - 1]?.[0] ?? 0), `${loaded} is progress`);
+  });
+});
+
+test('without a length, or with that of a compressed transfer, the total is unknown', async () => {
+  for (const path of ['/chunked', '/gzip']) {
+    const { bytes, progress } = await download(`${base}${path}`);
+    assertSameNumbers(bytes, CONTENT, path);
+    assert.equal(progress.at(-1)?.[0], CONTENT.length);
+    for (const [, total] of progress) assert.equal(total, undefined, path);
+  }
+});
+
+test('an empty file, a URL object and a data: URL', async () => {
+  assert.equal((await fetchScene(`${base}/empty`)).length, 0);
+  assert.equal((await fetchScene(new URL(`${base}/whole`))).length, CONTENT.length);
+  assert.deepEqual(await fetchScene('data:;base64,AQID'), Uint8Array.of(1, 2, 3));
+});
+
+test('HTTP errors say the status, the address and what to do', async () => {
+  await expectFailure(`${base}/missing.ply`, 'network/status', /missing\.ply: .*404 \(Not Found\)\. Check the path/);
+  await expectFailure(`${base}/private`, 'network/status', /403 .*public read access/);
+  await expectFailure(`${base}/failing`, 'network/status', /503 .*Try again later/);
+});
+
+test('no server, and text that is no URL', async () => {
+  await expectFailure(
+    'http://127.0.0.1:1/scene.ply',
+    'network/unreachable',
+    /127\.0\.0\.1:1.*Access-Control-Allow-Origin/,
+  );
+  await expectFailure('http://[', 'network/url', /address "http:\/\/\[".*absolute URL/);
+  await expectFailure('scene.ply', 'network/url', /expected an absolute URL/);
+});
+
+test('a connection that breaks says how much came', async () => {
+  await expectFailure(`${base}/broken`, 'network/interrupted', /byte 100,000: expected 300,000 bytes/);
+});
+
+test('where the HTTP stack hides a break, the length tells', async (context) => {
+  const short = () => new Response(CONTENT.slice(0, 10), { headers: { 'Content-Length': '20' } });
+  context.mock.method(globalThis, 'fetch', async () => short());
+  await expectFailure(
+    'http://host/a.ply',
+    'network/interrupted',
+    /byte 10: expected 20 bytes, found the end .* after 10/,
+  );
+});
+
+test('a body longer than announced has an unknown total from there on', async (context) => {
+  const long = () => new Response(CONTENT.slice(0, 30), { headers: { 'Content-Length': '20' } });
+  context.mock.method(globalThis, 'fetch', async () => long());
+  const { bytes, progress } = await download('http://host/a.ply');
+  assert.deepEqual([bytes.length, progress.at(-1)], [30, [30, undefined]]);
+});
+
+test('addresses with a password are refused without repeating it', async () => {
+  await assert.rejects(fetchScene('http://me:secret@127.0.0.1:1/a.ply'), (error: unknown) => {
+    assert.ok(error instanceof GaussianSplatError);
+    assert.equal(error.code, 'network/url');
+    assert.match(error.message, /127\.0\.0\.1:1\/a\.ply.*user name or password/);
+    assert.ok(!error.message.includes('secret'), 'no password in the message');
+    return true;
+  });
+});
+
+test('aborting before, while waiting and while reading rejects with AbortError', async () => {
+  await assert.rejects(fetchScene(`${base}/whole`, { signal: AbortSignal.abort() }), { name: 'AbortError' });
+  const controller = new AbortController();
+  const reading = fetchScene(`${base}/endless`, { signal: controller.signal, onProgress: () => controller.abort() });
+  await assert.rejects(reading, (error: unknown) => error instanceof DOMException && error.name === 'AbortError');
+});
+
+test('a reason of the caller passes through', async () => {
+  const reason = new Error('the element was removed');
+  await assert.rejects(fetchScene(`${base}/whole`, { signal: AbortSignal.abort(reason) }), reason);
+});

@@ -1,0 +1,96 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { detectFormat, readScene, sceneFormats } from '@gaussian-splat/formats';
+import { needsSharedData, sharedFile } from '../support/data.js';
+import { expectRefusal } from './support/expect.js';
+
+const text = (content: string): Uint8Array => new TextEncoder().encode(content);
+
+const KINDS: readonly (readonly [what: string, bytes: Uint8Array, code: string, message: RegExp, name?: string])[] = [
+  ['nothing', new Uint8Array(0), 'decode/empty', /found 0 bytes/],
+  ['a page', text('<!DOCTYPE html>\n<title>Not found</title>'), 'decode/html', /web page.*DOCTYPE.*Check the address/],
+  ['a page after a mark', text('\ufeff  <!-- x -->\n<html lang="en">'), 'decode/html', /web page/],
+  ['a page named .ply', text('<html></html>'), 'decode/html', /web page/, 'scene.ply'],
+  ['XML', text('<?xml version="1.0"?><Error><Code>AccessDenied</Code></Error>'), 'decode/unknown-format', /XML/],
+  [
+    'a pointer',
+    text('version https://git-lfs.github.com/spec/v1\noid sha256:0\n'),
+    'decode/lfs-pointer',
+    /git lfs pull/,
+  ],
+  ['JSON', text('{"error": "not found"}'), 'decode/unknown-format', /JSON text: "\{/],
+  ['a SOG description', text('{"version": 2, "means": {}}'), 'decode/unsupported', /SOG/],
+  ['a streamed SOG description', text('{"lodLevels": 7}'), 'decode/unsupported', /streamed SOG/],
+  ['glTF', text('{"asset": {"version": "2.0"}}'), 'decode/unsupported', /glTF/],
+  ['GLB', text('glTF\x02\0\0\0'), 'decode/unsupported', /GLB.*Convert it to SPZ or PLY/],
+  ['ZIP', text('PK\x03\x04 readme.txt'), 'decode/unknown-format', /ZIP archive/],
+  ['a SOG bundle', text('PK\x03\x04 means_l.webp'), 'decode/unsupported', /SOG bundle/],
+  ['PNG', Uint8Array.of(0x89, 0x50, 0x4e, 0x47), 'decode/unknown-format', /PNG/],
+  ['JPEG', Uint8Array.of(0xff, 0xd8, 0xff, 0xe0), 'decode/unknown-format', /JPEG/],
+  ['text', text('Hello, world\n'), 'decode/unknown-format', /a text: "Hello/],
+  ['ksplat', new Uint8Array(100), 'decode/unsupported', /\.ksplat/, 'a/scene.ksplat?x'],
+  ['bytes', Uint8Array.of(7, 7, 7), 'decode/unknown-format', /bytes that begin with 07 07 07/],
+  ['a PLY that is no PLY', text('plyers of the game'), 'decode/unknown-format', /a text/, 'x.ply'],
+];
+
+for (const [what, bytes, code, message, name = 'file'] of KINDS) {
+  test(`${what} is refused by name`, async () => {
+    await expectRefusal(bytes, code, message, { name });
+  });
+}
+
+test('real files of other kinds are refused by name', { skip: needsSharedData }, async () => {
+  const files: [string, string, RegExp][] = [
+    ['cases/metalsplatter/beetle.ascii.ply', 'decode/not-splats', /a mesh with 1148 vertex, 2053 face.*lacks scale_0/],
+    ['cases/metalsplatter/beetle.binary.ply', 'decode/not-splats', /a mesh.*and has x, y, z, nx, ny, nz, flags/],
+    ['photos/skull/points3D.ply', 'decode/not-splats', /lacks scale_0, scale_1, rot_0.*has x, y, z, nx, ny, nz, red/],
+    ['cases/malformed/lfs-pointer_point_cloud.ply', 'decode/lfs-pointer', /git-LFS pointer/],
+    ['cases/malformed/lfs-pointer_cameras.json', 'decode/lfs-pointer', /git-LFS pointer/],
+    [
+      'cases/malformed/playbot3.MISLABELLED-v1.spz',
+      'decode/corrupt',
+      /1,240,000 .* version 1, found 1,333,000, the length of version 2/,
+    ],
+    ['formats/playbot3.glb', 'decode/unsupported', /GLB/],
+    ['formats/playbot3.c1.sh2.ksplat', 'decode/unsupported', /ksplat/],
+    ['scenes/massa.sog', 'decode/unsupported', /SOG bundle/],
+    ['scenes/logo-sog-v1/meta.json', 'decode/unsupported', /SOG/],
+    ['scenes/playbot-streamed/lod-meta.json', 'decode/unsupported', /streamed SOG/],
+    ['generators/octree-gs/color_mlp.onnx', 'decode/unsupported', /ONNX model/],
+    ['reference/skull_01_classic.png', 'decode/unknown-format', /PNG/],
+    ['photos/skull/images/01.jpg', 'decode/unknown-format', /JPEG/],
+    ['scenes/logo-sog-v1/quats.webp', 'decode/unknown-format', /WebP/],
+    ['generators/octree-gs/anchor_positions.bin', 'decode/unknown-format', /bytes that begin with/],
+  ];
+  for (const [name, code, message] of files) {
+    await expectRefusal(sharedFile(name), code, message, { name });
+    const unnamed = await expectRefusal(sharedFile(name), code, message, { name: 'unnamed' });
+    assert.equal(unnamed.family, 'decode');
+  }
+});
+
+test('content speaks before the name', { skip: needsSharedData }, async () => {
+  const files = [
+    ['formats/playbot3.ply', 'ply'],
+    ['formats/playbot3.compressed.ply', 'compressed-ply'],
+    ['formats/playbot3.niantic-v2.spz', 'spz'],
+    ['formats/playbot3.pc-v4.spz', 'spz'],
+    ['scenes/plant.splat', 'splat'],
+  ];
+  for (const [file, format] of files) {
+    for (const name of [file, 'scene', 'scene.ply', 'scene.spz', 'scene.png']) {
+      assert.equal(detectFormat(sharedFile(file), name), format, `${file} as ${name}`);
+    }
+  }
+  const cloud = await readScene(sharedFile('formats/playbot3.ply'), { name: 'wrong.splat' });
+  assert.equal(cloud.count, 31_000);
+});
+
+test('the registry names every format once and its loaders give readers', async () => {
+  assert.deepEqual(sceneFormats.map(({ name }) => name).sort(), ['compressed-ply', 'ply', 'splat', 'spz']);
+  for (const { extensions, mimeTypes, load } of sceneFormats) {
+    for (const extension of extensions) assert.match(extension, /^(\.[a-z]+)+$/);
+    for (const type of mimeTypes) assert.match(type, /^[a-z]+\/[a-z-]+$/);
+    assert.equal(typeof (await load()), 'function');
+  }
+});

@@ -1,0 +1,187 @@
+import assert from 'node:assert/strict';
+import { gzipSync } from 'node:zlib';
+import { test } from 'node:test';
+import { readScene } from '@gaussian-splat/formats';
+import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
+import { assertAtMost, expectRefusal, largestDifference } from './support/expect.js';
+import { extensionRecord, spzBody, writeSpz, type SpzWriterOptions } from './support/spz-writer.js';
+import { activated, rawSplats, type RawSplats } from './support/splats.js';
+
+const VERSIONS = [1, 2, 3, 4] as const;
+/** 1 - |dot| that the quantisation of rotations costs at most: 8 bits, or 9 bits of magnitude. */
+const ROTATION_BOUND = { 1: 1e-2, 2: 1e-2, 3: 4e-6, 4: 4e-6 };
+
+function assertHolds(cloud: GaussianCloud, splats: RawSplats, version: 1 | 2 | 3 | 4): void {
+  const degree = Math.min(3, splats.degree) as ShDegree;
+  const expected = activated(splats, degree);
+  assert.equal(cloud.count, splats.count);
+  assert.equal(cloud.shDegree, degree);
+  // Half floats keep 11 bits of numbers up to 8, fixed-point ones 12 bits after the point.
+  const positionBound = version === 1 ? 2 ** -9 : 2 ** -13;
+  assertAtMost(largestDifference(cloud.positions, expected.positions), positionBound, 'positions');
+  assertAtMost(largestDifference(cloud.opacities, expected.opacities), 0.5 / 255 + 1e-6, 'opacities');
+  const logScales = Array.from(cloud.scales, Math.log);
+  assertAtMost(largestDifference(logScales, splats.logScales.flat()), 1 / 32 + 1e-5, 'scales');
+  // Half a step of the constant term is larger than half a step of the rest.
+  assertAtMost(largestDifference(cloud.sh, expected.sh), 0.5 / 255 / 0.15 + 1e-6, 'sh');
+  for (let i = 0; i < splats.count; i++) {
+    const dot = splats.rotations[i].reduce((sum, value, k) => sum + value * cloud.rotations[4 * i + k], 0);
+    assert.ok(1 - Math.abs(dot) <= ROTATION_BOUND[version], `rotation ${i}: ${1 - Math.abs(dot)}`);
+  }
+}
+
+for (const version of VERSIONS) {
+  for (const degree of [0, 1, 2, 3, 4]) {
+    test(`version ${version}, degree ${degree}: every value arrives`, async () => {
+      const splats = rawSplats(301, degree);
+      for (const antialiased of [false, true]) {
+        const cloud = await readScene(writeSpz(splats, { version, antialiased }));
+        assertHolds(cloud, splats, version);
+        assert.equal(cloud.antialiased, antialiased);
+      }
+    });
+  }
+}
+
+test('versions 1 to 3 are also read without their gzip', async () => {
+  const splats = rawSplats(20, 1);
+  for (const version of [1, 2, 3] as const) assertHolds(await readScene(spzBody(splats, { version })), splats, version);
+});
+
+test('the number of fractional bits scales the positions', async () => {
+  const splats = rawSplats(20, 0);
+  const { positions } = await readScene(writeSpz(splats, { version: 3, fractionalBits: 18 }));
+  assertAtMost(largestDifference(positions, splats.positions.flat()), 2 ** -19, 'positions');
+});
+
+test('extensions are skipped, save the one that names the coordinate system', async () => {
+  const splats = rawSplats(20, 3);
+  const other = extensionRecord(0xadbe0002, new Uint8Array(12));
+  const system = (value: number) => extensionRecord(0xadbe0003, Uint8Array.of(value, 0, 0, 0));
+  const both = (value: number) => new Uint8Array(Buffer.concat([other, system(value)]));
+  // Right-down-front is system 6, left-up-front 7, left-down-back 1: see CoordinateSystem in SPZ's splat-types.h.
+  const cases: [Uint8Array, SpzWriterOptions['axes']][] = [
+    [other, [1, -1, -1]],
+    [both(0), [1, -1, -1]],
+    [both(4), [1, -1, -1]],
+    [both(6), [1, 1, 1]],
+    [both(7), [-1, -1, 1]],
+    [both(1), [-1, 1, -1]],
+  ];
+  for (const version of [2, 3, 4] as const) {
+    for (const [extensions, axes] of cases) {
+      assertHolds(await readScene(writeSpz(splats, { version, extensions, axes })), splats, version);
+    }
+  }
+  const swapped = writeSpz(splats, { version: 4, extensions: both(12) });
+  await expectRefusal(swapped, 'decode/unsupported', /extension 0xADBE0003.*found 12/);
+});
+
+test('a header that names another version than the body has is refused', async () => {
+  const splats = rawSplats(50, 2);
+  for (const actual of [1, 2, 3] as const) {
+    for (const named of [1, 2, 3] as const) {
+      if (actual === named) continue;
+      const body = spzBody(splats, { version: actual });
+      body[4] = named;
+      const message = new RegExp(`splats of version ${named}.*the length of version ${actual}`);
+      await expectRefusal(body, 'decode/corrupt', message);
+      await expectRefusal(new Uint8Array(gzipSync(body)), 'decode/corrupt', message);
+    }
+  }
+});
+
+test('bodies that are too long or too short by a byte are refused', async () => {
+  for (const [version, size] of [
+    [1, 800],
+    [2, 950],
+    [3, 1000],
+  ] as const) {
+    const body = spzBody(rawSplats(50, 0), { version });
+    const longer = new Uint8Array(body.length + 1);
+    longer.set(body);
+    const shorter = body.subarray(0, -1);
+    const expected = `expected ${size === 1000 ? '1,000' : size} bytes.*found`;
+    for (const pack of [(bytes: Uint8Array) => bytes, (bytes: Uint8Array) => new Uint8Array(gzipSync(bytes))]) {
+      const tooLong = new RegExp(`${expected} (more|${size + 1})`);
+      await expectRefusal(pack(longer), 'decode/corrupt', tooLong);
+      await expectRefusal(pack(shorter), 'decode/truncated', new RegExp(`${expected} ${size - 1}`));
+    }
+  }
+});
+
+test('headers out of range are refused', async () => {
+  const splats = rawSplats(4, 0);
+  const changed = (byte: number, value: number, version: 2 | 4 = 2) => {
+    const file = version === 4 ? writeSpz(splats, { version }) : spzBody(splats, { version });
+    file[byte] = value;
+    return file;
+  };
+  await expectRefusal(changed(4, 0), 'decode/header', /byte 4 .*version from 1 to 4, found 0/);
+  await expectRefusal(changed(4, 5), 'decode/unsupported', /byte 4 .*found 5/);
+  await expectRefusal(changed(12, 5), 'decode/header', /byte 12 .*found 5/);
+  await expectRefusal(changed(13, 25), 'decode/header', /byte 13 .*found 25/);
+  await expectRefusal(changed(14, 0x80), 'decode/unsupported', /byte 14 .*levels of detail/);
+  await expectRefusal(changed(8, 0), 'decode/empty', /1 splat or more, found 0/);
+  await expectRefusal(changed(15, 9, 4), 'decode/header', /byte 15 .*5 streams/);
+  await expectRefusal(changed(16, 31, 4), 'decode/header', /byte 16 .*byte 31/);
+  await expectRefusal(changed(17, 255, 4), 'decode/truncated', /SPZ header of/);
+  await expectRefusal(changed(40, 7, 4), 'decode/header', /byte 40 .*36 bytes of positions, found 7/);
+  await expectRefusal(changed(33, 7, 4), 'decode/truncated', /bytes of positions from byte/);
+  const nested = new Uint8Array(gzipSync(writeSpz(splats, { version: 4 })));
+  await expectRefusal(nested, 'decode/unsupported', /version 4, which is not compressed as a whole/);
+});
+
+test('4,294,967,295 splats in a small file are refused at once', async () => {
+  for (const version of VERSIONS) {
+    const splats = rawSplats(4, 0);
+    const file = version === 4 ? writeSpz(splats, { version }) : spzBody(splats, { version });
+    file.fill(0xff, 8, 12);
+    await expectRefusal(file, 'decode/truncated', /4,294,967,295 splats/);
+    if (version < 4) await expectRefusal(new Uint8Array(gzipSync(file)), 'decode/truncated', /4,294,967,295 splats/);
+  }
+});
+
+test('a gzip bomb behind a small header is not inflated', async () => {
+  const body = spzBody(rawSplats(4, 0), { version: 2 });
+  const bomb = new Uint8Array(gzipSync(Buffer.concat([body, Buffer.alloc(200_000_000)])));
+  const before = process.memoryUsage().arrayBuffers;
+  await expectRefusal(bomb, 'decode/corrupt', /expected 76 bytes.*found more/);
+  assert.ok(process.memoryUsage().arrayBuffers - before < 50_000_000, 'memory stays small');
+});
+
+test('gzip of something else is named', async () => {
+  const gzip = (text: string) => new Uint8Array(gzipSync(Buffer.from(text)));
+  await expectRefusal(gzip('ply\nformat ascii 1.0\n'), 'decode/unknown-format', /inside the gzip file.*a PLY file/);
+  await expectRefusal(gzip('<!doctype html><p>no</p>'), 'decode/unknown-format', /a web page/);
+  await expectRefusal(gzip(''), 'decode/unknown-format', /inside the gzip file/);
+  await expectRefusal(gzip('NGSP'), 'decode/truncated', /SPZ header of 16 bytes, found 4/);
+});
+
+test('damaged gzip streams are told from cut ones', async () => {
+  const file = writeSpz(rawSplats(2000, 1), { version: 3 });
+  await expectRefusal(file.subarray(0, file.length >> 1), 'decode/truncated', /cut after/);
+  const damaged = Uint8Array.from(file);
+  damaged[damaged.length - 6] ^= 1;
+  await expectRefusal(damaged, 'decode/corrupt', /gzip stream.*damaged/);
+});
+
+test('a gzip stream is read to its checksum even where the body ends with a block of the inflater', async () => {
+  // 16 + 3276·20 bytes are 65,536, a multiple of the sizes in which inflaters hand out their output.
+  const body = spzBody(rawSplats(3276, 0), { version: 3 });
+  assert.equal(body.length, 65_536);
+  const damaged = new Uint8Array(gzipSync(body));
+  damaged[damaged.length - 6] ^= 1;
+  await expectRefusal(damaged, 'decode/corrupt', /gzip stream.*damaged/);
+  const longer = new Uint8Array(gzipSync(Buffer.concat([body, Buffer.alloc(1)])));
+  await expectRefusal(longer, 'decode/corrupt', /65,520 bytes.*found more/);
+});
+
+test('an aborted signal rejects with its reason', async () => {
+  const file = writeSpz(rawSplats(2000, 1), { version: 3 });
+  const controller = new AbortController();
+  const reading = readScene(file, { signal: controller.signal });
+  controller.abort();
+  await assert.rejects(reading, { name: 'AbortError' });
+  await assert.rejects(readScene(file, { signal: AbortSignal.abort() }), { name: 'AbortError' });
+});
