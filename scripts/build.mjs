@@ -1,5 +1,5 @@
 /** `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, and the demo as a static site. */
-import { cpSync, existsSync, mkdirSync, rmSync } from 'node:fs';
+import { cpSync, existsSync, mkdirSync, readdirSync, rmSync } from 'node:fs';
 import { join } from 'node:path';
 import { ensureDependencies } from './lib/prepare.mjs';
 import { must, root } from './lib/run.mjs';
@@ -8,19 +8,30 @@ ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, ['node_modules/typescript/bin/tsc', '--build', ...projects()]);
 must(process.execPath, ['node_modules/rollup/dist/bin/rollup', '--config', 'packages/element/rollup.config.mjs', '--silent']);
-buildDemo();
+await buildDemo();
 
 function projects() {
   return ['core', 'formats', 'renderer', 'element'].map((name) => `packages/${name}`);
 }
 
 /** demo/dist is the whole site: any static host can serve it. */
-function buildDemo() {
+async function buildDemo() {
   const from = join(root, 'demo');
   const to = join(root, 'demo/dist');
   rmSync(to, { recursive: true, force: true });
   mkdirSync(to, { recursive: true });
-  cpSync(from, to, { recursive: true, filter: (path) => path !== to && !path.startsWith(`${to}/`) });
+  for (const name of readdirSync(from)) if (name !== 'dist') cpSync(join(from, name), join(to, name), { recursive: true });
   cpSync(join(root, 'packages/element/cdn'), join(to, 'cdn'), { recursive: true });
+  // The packages were not there when this script started on a fresh clone.
+  const { build } = await import('esbuild');
+  await build({
+    entryPoints: [join(from, 'bench/bench.js')],
+    outfile: join(to, 'bench/bench.js'),
+    allowOverwrite: true,
+    bundle: true,
+    format: 'esm',
+    minify: true,
+    logLevel: 'warning',
+  });
   if (!existsSync(join(to, 'index.html'))) throw new Error('demo/index.html is missing');
 }

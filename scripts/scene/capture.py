@@ -73,7 +73,9 @@ def matrix_of_quaternion(wxyz: np.ndarray) -> np.ndarray:
 
 def read_colmap(sparse: Path) -> Capture:
     """Reads COLMAP's text model: cameras.txt (one PINHOLE), images.txt, points3D.txt."""
-    fields = next(line for line in (sparse / "cameras.txt").read_text().splitlines() if not line.startswith("#")).split()
+    fields = next(
+        line for line in (sparse / "cameras.txt").read_text().splitlines() if not line.startswith("#")
+    ).split()
     if fields[1] != "PINHOLE":
         raise ValueError(f"{sparse}/cameras.txt: expected PINHOLE, found {fields[1]}; undistort the images first")
     intrinsics = Intrinsics(int(fields[2]), int(fields[3]), *map(float, fields[4:8]))
@@ -149,5 +151,7 @@ def to_upright(capture: Capture) -> Capture:
         for view in capture.views
     ]
     moved = scale * (turned - middle)
-    print(f"upright: yaw {np.degrees(yaw):.2f}, roll {np.degrees(roll):.2f} degrees, asymmetry {found.fun:.4f}, scale {scale:.4f}")
+    print(
+        f"upright: yaw {np.degrees(yaw):.2f}, roll {np.degrees(roll):.2f} degrees, asymmetry {found.fun:.4f}, scale {scale:.4f}"
+    )
     return Capture(capture.intrinsics, views, moved, capture.colours, float(scale * (CUT_HEIGHT - middle[1])))

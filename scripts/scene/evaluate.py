@@ -37,7 +37,9 @@ def orbit_matrix(theta: float, phi: float, radius: float) -> np.ndarray:
 def shot(parameters: Parameters, degree: int, matrix: np.ndarray, size: int, background: float) -> np.ndarray:
     """A square picture, uint8 RGB, over a grey background."""
     focal = size / 2 / np.tan(np.radians(FIELD_OF_VIEW) / 2)
-    intrinsics = torch.tensor([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]], dtype=torch.float32, device="cuda")
+    intrinsics = torch.tensor(
+        [[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]], dtype=torch.float32, device="cuda"
+    )
     view = torch.tensor(matrix, dtype=torch.float32, device="cuda")
     with torch.no_grad():
         colour, alpha, _ = render(parameters, view, intrinsics, (size, size), degree)
@@ -78,7 +80,9 @@ def main() -> None:
         rows += [np.concatenate(row[:6], 1), np.concatenate(row[6:], 1)]
     cv2.imwrite(sys.argv[4], cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))
     if len(sys.argv) > 5:
-        close = [shot(parameters, degree, orbit_matrix(t, p, 2.4), 1000, b) for t, p, b in ((25, 78, 1.0), (-35, 80, 0.05))]
+        close = [
+            shot(parameters, degree, orbit_matrix(t, p, 2.4), 1000, b) for t, p, b in ((25, 78, 1.0), (-35, 80, 0.05))
+        ]
         cv2.imwrite(sys.argv[5], cv2.cvtColor(np.concatenate(close, 1), cv2.COLOR_RGB2BGR))
 
 

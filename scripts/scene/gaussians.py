@@ -33,7 +33,11 @@ class Gaussians:
     def at(self, which: np.ndarray) -> "Gaussians":
         """The Gaussians a boolean mask or an index array picks, in its order."""
         return Gaussians(
-            self.positions[which], self.log_scales[which], self.rotations[which], self.opacity_logits[which], self.sh[which]
+            self.positions[which],
+            self.log_scales[which],
+            self.rotations[which],
+            self.opacity_logits[which],
+            self.sh[which],
         )
 
 
@@ -48,3 +52,22 @@ def write_ply(path: Path, gaussians: Gaussians) -> None:
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(gaussians)}"]
     header += [f"property float {name}" for name in names] + ["end_header", ""]
     path.write_bytes("\n".join(header).encode("ascii") + np.hstack(columns).astype("<f4").tobytes())
+
+
+def read_ply(path: Path) -> Gaussians:
+    """Reads what write_ply wrote: little-endian floats only, in any order."""
+    head, _, body = path.read_bytes().partition(b"end_header\n")
+    lines = head.decode("ascii").splitlines()
+    names = [line.split()[2] for line in lines if line.startswith("property float ")]
+    count = next(int(line.split()[2]) for line in lines if line.startswith("element vertex "))
+    if len(body) != count * len(names) * 4:
+        raise ValueError(f"{path}: expected {count * len(names) * 4} bytes of floats, found {len(body)}")
+    column = dict(zip(names, np.frombuffer(body, "<f4").reshape(count, -1).T))
+
+    def columns(prefix: str, total: int) -> np.ndarray:
+        return np.stack([column[f"{prefix}{i}"] for i in range(total)], 1)
+
+    rest = columns("f_rest_", sum(name.startswith("f_rest_") for name in names)).reshape(count, 3, -1)
+    sh = np.concatenate([columns("f_dc_", 3)[:, None], rest.transpose(0, 2, 1)], 1)
+    positions = np.stack([column["x"], column["y"], column["z"]], 1)
+    return Gaussians(positions, columns("scale_", 3), columns("rot_", 4), column["opacity"], sh)

@@ -25,7 +25,10 @@ def initial_parameters(points: np.ndarray, colours: np.ndarray, sh_degree: int, 
         "sh0": ((colours - 0.5) / SH_C0)[:, None],
         "shN": np.zeros((len(points), (sh_degree + 1) ** 2 - 1, 3)),
     }
-    return {key: torch.nn.Parameter(torch.tensor(value, dtype=torch.float32, device=device)) for key, value in values.items()}
+    return {
+        key: torch.nn.Parameter(torch.tensor(value, dtype=torch.float32, device=device))
+        for key, value in values.items()
+    }
 
 
 def render(
@@ -94,4 +97,7 @@ def from_gaussians(gaussians: Gaussians, device: str = "cuda") -> Parameters:
         "sh0": gaussians.sh[:, :1],
         "shN": gaussians.sh[:, 1:],
     }
-    return {key: torch.nn.Parameter(torch.tensor(value, dtype=torch.float32, device=device)) for key, value in values.items()}
+    return {
+        key: torch.nn.Parameter(torch.tensor(value, dtype=torch.float32, device=device))
+        for key, value in values.items()
+    }

@@ -14,13 +14,14 @@ one() { # NAME, then train.py's options
   local name=$1
   shift
   python3 "$here/train.py" "$views" "$sparse" "$work/$name" "$@" 2>&1 | sed "s/^/$name: /"
-  python3 "$here/evaluate.py" "$work/$name.spz" "$views" "$sparse" "$work/$name-orbit.png" "$work/$name-close.png" \
+  python3 "$here/trim.py" "$work/$name.ply" "$views" "$sparse" "$work/$name-trimmed.spz" 2>&1 | sed "s/^/$name: /"
+  python3 "$here/evaluate.py" "$work/$name-trimmed.spz" "$views" "$sparse" "$work/$name-orbit.png" "$work/$name-close.png" \
     2>&1 | sed "s/^/$name: /"
 }
 
 # The scene itself learns from all photographs; its twin leaves every eighth one out, to be measured on them.
 # RUNS="NAME:OPTION,OPTION ..." tries something else.
-runs=${RUNS:-"skull:--degree=2,--cap=80000 held-out:--degree=2,--cap=80000,--hold-out"}
+runs=${RUNS:-"skull:--degree=2 held-out:--degree=2,--hold-out"}
 for run in $runs; do
   IFS=, read -ra options <<< "${run#*:}"
   one "${run%%:*}" "${options[@]}" &

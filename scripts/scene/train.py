@@ -1,6 +1,6 @@
-"""Trains the scene: python train.py VIEWS SPARSE OUT [--degree 2] [--cap 80000] [--steps 20000] [--hold-out]
+"""Trains the scene: python train.py VIEWS SPARSE OUT [--degree 2] [--cap 90000] [--steps 15000] [--hold-out]
 
-VIEWS is what masks.py made, SPARSE the COLMAP text model. Writes OUT.ply and OUT.spz, which viewers get. With
+VIEWS is what masks.py made, SPARSE the COLMAP text model. Writes OUT.ply and OUT.spz, before trimming. With
 --hold-out every eighth view is kept from training, to measure.
 """
 
@@ -33,6 +33,8 @@ WIDTH_WEIGHT = 1e-2
 SSIM_WEIGHT = 0.2
 # Coverage where nobody knows what is there: little enough to give way wherever another view knows.
 DOUBT_WEIGHT = 0.1
+# Steps after which the scene is good enough to correct the cameras by.
+POSES_FROM = 1000
 
 
 def gaussian_window(width: int = 11, sigma: float = 1.5) -> torch.Tensor:
@@ -129,7 +131,7 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
         index = order.pop()
         picture = pictures[index]
         degree = min(options.degree, step // 1000)
-        refining = options.refine_poses and step >= 1000
+        refining = step >= POSES_FROM
         matrix = poses.moved(picture, index) if refining else picture.view_matrix
         colour, alpha, info = render(parameters, matrix, picture.intrinsics, picture.size, degree)
         loss = photometric_loss(picture, colour * exposures.gain(index), alpha, window)
@@ -138,7 +140,8 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
             optimizer.step()
             optimizer.zero_grad(set_to_none=True)
         decay.step()
-        poses.decay.step()
+        if refining:
+            poses.decay.step()
         if step % 100 == 0:
             # Whatever left the hull counts as dead; the strategy puts it to better use on this very step.
             with torch.no_grad():
@@ -146,7 +149,10 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
         if step < strategy.refine_stop_iter:
             strategy.step_post_backward(parameters, optimizers, state, step, info, lr=decay.get_last_lr()[0])
         if step % 2000 == 0 or step == options.steps - 1:
-            print(f"step {step}: loss {loss.item():.4f}, {len(parameters['means'])} Gaussians, {time.time() - started:.0f} s", flush=True)
+            print(
+                f"step {step}: loss {loss.item():.4f}, {len(parameters['means'])} Gaussians, {time.time() - started:.0f} s",
+                flush=True,
+            )
     return exposures, poses
 
 
@@ -156,10 +162,9 @@ def main() -> None:
     parser.add_argument("sparse", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--degree", type=int, default=2)
-    parser.add_argument("--cap", type=int, default=80_000)
-    parser.add_argument("--steps", type=int, default=20_000)
+    parser.add_argument("--cap", type=int, default=90_000)
+    parser.add_argument("--steps", type=int, default=15_000)
     parser.add_argument("--hold-out", action="store_true")
-    parser.add_argument("--refine-poses", action="store_true")
     options = parser.parse_args()
     torch.manual_seed(0)
     np.random.seed(0)

@@ -1,3 +1,4 @@
+import type { PassTimer } from './gpu/pass-timer.js';
 import type { FramePage } from './page-table.js';
 import type { Accumulation, Rasterizer } from './rasterizers/rasterizer.js';
 import { planOffsets } from './scratch.js';
@@ -33,20 +34,23 @@ export interface Frame {
   readonly compose: GPUBindGroup;
   readonly target: GPUTextureView;
   readonly targetFormat: GPUTextureFormat;
+  readonly timer?: PassTimer;
 }
 
 /** Records a frame: project, sort, rasterize, compose. Counts travel in `plan`; nothing comes back to the CPU. */
 export function recordFrame(encoder: GPUCommandEncoder, frame: Frame): void {
+  const { rasterizer, accumulation, stages, compose, target, targetFormat, timer } = frame;
+  timer?.startFrame();
   project(encoder, frame);
   sort(encoder, frame);
-  frame.rasterizer.record(encoder, frame.accumulation);
-  frame.stages.compose.record(encoder, frame.compose, frame.target, frame.targetFormat);
+  rasterizer.record(encoder, accumulation, timer);
+  stages.compose.record(encoder, compose, target, targetFormat, timer);
 }
 
 /** Finds the visible splats, lists them in the file's order, and projects those alone. */
-function project(encoder: GPUCommandEncoder, { stages, pages, plan, scan, makePlan }: Frame): void {
+function project(encoder: GPUCommandEncoder, { stages, pages, plan, scan, makePlan, timer }: Frame): void {
   encoder.clearBuffer(plan, planOffsets.unusable, 4);
-  const pass = encoder.beginComputePass({ label: 'gs.project' });
+  const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
   for (const { page, cull } of pages) stages.cull.record(pass, cull, page.count);
   stages.scan.record(pass, scan);
   stages.plan.record(pass, makePlan);
@@ -56,8 +60,8 @@ function project(encoder: GPUCommandEncoder, { stages, pages, plan, scan, makePl
 }
 
 /** Orders the projected splats from near to far, equal depths in the file's order. */
-function sort(encoder: GPUCommandEncoder, { stages, plan, sort: bindings }: Frame): void {
-  const pass = encoder.beginComputePass({ label: 'gs.sort' });
+function sort(encoder: GPUCommandEncoder, { stages, plan, sort: bindings, timer }: Frame): void {
+  const pass = encoder.beginComputePass({ label: 'gs.sort', timestampWrites: timer?.timestampWrites('sort') });
   stages.sort.record(pass, bindings, plan);
   pass.end();
 }

@@ -4,6 +4,7 @@ import { recordFrame, type Stages } from './frame.js';
 import type { GaussianBuffers } from './gaussian-buffers.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
+import type { PassTimer } from './gpu/pass-timer.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { PageTable } from './page-table.js';
@@ -44,6 +45,8 @@ export interface FrameRequest {
   readonly targetFormat: GPUTextureFormat;
   /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
   readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
+  /** Notes when each pass ran. */
+  readonly timer?: PassTimer;
 }
 
 /** What a set of scenes needs on the GPU between the stages. */
@@ -123,7 +126,7 @@ export class Renderer {
    * need a larger buffer than the device allows.
    */
   render(request: FrameRequest): void {
-    const { camera, target, targetFormat, background = TRANSPARENT } = request;
+    const { camera, target, targetFormat, background = TRANSPARENT, timer } = request;
     validateCamera(camera);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianBuffers];
     const { scratch, table, scan, makePlan, sort } = this.#resourcesFor(scenes);
@@ -145,6 +148,7 @@ export class Renderer {
       compose,
       target,
       targetFormat,
+      timer,
     });
     this.#device.queue.submit([encoder.finish()]);
   }

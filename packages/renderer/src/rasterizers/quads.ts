@@ -1,5 +1,6 @@
 import { constants, layouts, rasterizeQuads } from '../generated/shaders.js';
 import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/kernel.js';
+import type { PassTimer } from '../gpu/pass-timer.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import type { Accumulation, AccumulationFormat, Rasterizer, RasterizerInputs } from './rasterizer.js';
@@ -44,13 +45,14 @@ export class QuadsRasterizer implements Rasterizer {
     this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });
   }
 
-  record(encoder: GPUCommandEncoder, { view, width, height }: Accumulation): void {
+  record(encoder: GPUCommandEncoder, { view, width, height }: Accumulation, timer?: PassTimer): void {
     writeStruct(layouts.RasterView, { viewport: [width, height] }, this.#uniformBytes);
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
     const pass = encoder.beginRenderPass({
       label: 'gs.rasterize',
       // Nothing painted yet: black, and all light still to come from behind.
       colorAttachments: [{ view, clearValue: { r: 0, g: 0, b: 0, a: 1 }, loadOp: 'clear', storeOp: 'store' }],
+      timestampWrites: timer?.timestampWrites('rasterize'),
     });
     if (this.#plan !== undefined) {
       pass.setPipeline(this.#pipeline);

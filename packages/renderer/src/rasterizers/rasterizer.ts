@@ -1,3 +1,5 @@
+import type { PassTimer } from '../gpu/pass-timer.js';
+
 /** Names of the rasterizers that a {@link Renderer} can be asked for. */
 export type RasterizerName = 'quads' | 'tiles';
 
@@ -35,6 +37,6 @@ export interface Rasterizer {
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Records the drawing of one frame. */
-  record(encoder: GPUCommandEncoder, accumulation: Accumulation): void;
+  record(encoder: GPUCommandEncoder, accumulation: Accumulation, timer?: PassTimer): void;
   destroy(): void;
 }

@@ -10,6 +10,7 @@ import {
 } from '../generated/shaders.js';
 import { BUFFER_USAGE, ComputeKernel, kernelOf, perDevice } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
+import type { PassTimer } from '../gpu/pass-timer.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
@@ -96,7 +97,7 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = this.#allocate(inputs.capacity);
   }
 
-  record(encoder: GPUCommandEncoder, accumulation: Accumulation): void {
+  record(encoder: GPUCommandEncoder, accumulation: Accumulation, timer?: PassTimer): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const { plan } = this.#inputs;
     const buffers = this.#buffers;
@@ -106,7 +107,7 @@ export class TilesRasterizer implements Rasterizer {
     encoder.clearBuffer(bound.ranges);
 
     const { count, scan: scanKernel, plan: planKernel, emit, gather, rasterize } = this.#kernels;
-    const bin = encoder.beginComputePass({ label: 'gs.bin' });
+    const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
     count.dispatchIndirect(bin, bound.count, plan, planOffsets.visible);
     scanKernel.dispatch(bin, bound.scan, 1);
     planKernel.dispatch(bin, bound.plan, 1);
@@ -114,7 +115,7 @@ export class TilesRasterizer implements Rasterizer {
     this.#sort.record(bin, bound.sort, buffers.plan);
     gather.dispatchIndirect(bin, bound.gather, buffers.plan, planOffsets.visible);
     bin.end();
-    const paint = encoder.beginComputePass({ label: 'gs.rasterize' });
+    const paint = encoder.beginComputePass({ label: 'gs.rasterize', timestampWrites: timer?.timestampWrites('rasterize') });
     const { width, height } = accumulation;
     rasterize.dispatchGrid(paint, bound.rasterize, Math.ceil(width / TILE), Math.ceil(height / TILE));
     paint.end();

@@ -1,4 +1,5 @@
 import { compose } from '../generated/shaders.js';
+import type { PassTimer } from '../gpu/pass-timer.js';
 import { perDevice, SHADER_STAGE, ShaderProgram, type Resources } from '../gpu/kernel.js';
 
 /** Lays the accumulated splats over the background, into a view of any renderable colour format. */
@@ -19,10 +20,17 @@ export class ComposeStage {
     return this.#program.bind(resources);
   }
 
-  record(encoder: GPUCommandEncoder, bindings: GPUBindGroup, target: GPUTextureView, format: GPUTextureFormat): void {
+  record(
+    encoder: GPUCommandEncoder,
+    bindings: GPUBindGroup,
+    target: GPUTextureView,
+    format: GPUTextureFormat,
+    timer?: PassTimer,
+  ): void {
     const pass = encoder.beginRenderPass({
       label: 'gs.compose',
       colorAttachments: [{ view: target, loadOp: 'clear', storeOp: 'store' }],
+      timestampWrites: timer?.timestampWrites('compose'),
     });
     pass.setPipeline(this.#pipeline(format));
     pass.setBindGroup(0, bindings);

@@ -1,0 +1,81 @@
+import { BUFFER_USAGE } from './kernel.js';
+
+/** When one pass of one frame ran, in milliseconds on the GPU's own clock. */
+export interface PassTime {
+  /** `project`, `sort`, `bin`, `rasterize` or `compose`. */
+  readonly label: string;
+  readonly begin: number;
+  readonly end: number;
+}
+
+/** Timestamps that one query set holds: WebGPU's limit. */
+const MAX_QUERIES = 4096;
+const QUERY_RESOLVE = 0x200;
+
+/**
+ * Timestamps around the passes of many frames, read back together afterwards so that measuring never waits between
+ * frames. Browsers round timestamps to 100 µs unless told otherwise.
+ */
+export class PassTimer {
+  readonly #device: GPUDevice;
+  readonly #queries: GPUQuerySet;
+  readonly #frames: string[][] = [];
+  #used = 0;
+
+  /** The device must have the feature `timestamp-query`. */
+  constructor(device: GPUDevice) {
+    this.#device = device;
+    this.#queries = device.createQuerySet({ label: 'gs.timer', type: 'timestamp', count: MAX_QUERIES });
+  }
+
+  /** Starts the next frame. The renderer calls this. */
+  startFrame(): void {
+    this.#frames.push([]);
+  }
+
+  /** What a pass descriptor needs to be timed; undefined once the room for timestamps is used up. */
+  timestampWrites(label: string): GPUComputePassTimestampWrites | undefined {
+    if (this.#used + 2 > MAX_QUERIES) return undefined;
+    this.#frames.at(-1)?.push(label);
+    const at = this.#used;
+    this.#used += 2;
+    return { querySet: this.#queries, beginningOfPassWriteIndex: at, endOfPassWriteIndex: at + 1 };
+  }
+
+  /** Waits for the GPU and returns the passes of each frame since the last call. */
+  async read(): Promise<PassTime[][]> {
+    const [frames, count] = [this.#frames.splice(0), this.#used];
+    this.#used = 0;
+    if (count === 0) return [];
+    const stamps = await this.#readStamps(count);
+    const origin = stamps[0];
+    const milliseconds = (i: number): number => Number(stamps[i] - origin) / 1e6;
+    let at = 0;
+    return frames.map((labels) =>
+      labels.map((label) => {
+        at += 2;
+        return { label, begin: milliseconds(at - 2), end: milliseconds(at - 1) };
+      }),
+    );
+  }
+
+  destroy(): void {
+    this.#queries.destroy();
+  }
+
+  async #readStamps(count: number): Promise<BigUint64Array> {
+    const { copySource, copyDestination, mapRead } = BUFFER_USAGE;
+    const size = 8 * count;
+    const resolved = this.#device.createBuffer({ label: 'gs.timer.resolved', size, usage: QUERY_RESOLVE | copySource });
+    const staging = this.#device.createBuffer({ label: 'gs.timer.staging', size, usage: mapRead | copyDestination });
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.timer' });
+    encoder.resolveQuerySet(this.#queries, 0, count, resolved, 0);
+    encoder.copyBufferToBuffer(resolved, 0, staging, 0, size);
+    this.#device.queue.submit([encoder.finish()]);
+    await staging.mapAsync(0x1);
+    const stamps = new BigUint64Array(staging.getMappedRange().slice(0));
+    resolved.destroy();
+    staging.destroy();
+    return stamps;
+  }
+}
