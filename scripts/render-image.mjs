@@ -16,7 +16,7 @@ const USAGE = `usage: npm run render -- SCENE --camera CAMERA.json --out IMAGE.p
   --float FILE         width*height*4 little-endian float32, premultiplied RGBA, row by row from the top
   --view NAME          the view of that name (or number) in a file of several
   --mode MODE          classic or antialiased; default: what the scene file says
-  --raster NAME        auto (default) or quads
+  --raster NAME        auto (default), quads or tiles
   --accumulation NAME  precision in which splats are blended: rgba16float (what the element shows), rgba32float, or
                        auto (default): rgba32float where the device can blend it, since no frame rate is at stake
   --background R,G,B   0..1; default: transparent
@@ -55,7 +55,7 @@ function parseOptions(args) {
   if (values.camera === undefined) throw new UsageError('--camera is missing');
   if (values.out === undefined && values.float === undefined) throw new UsageError('--out or --float is missing');
   oneOf('--mode', values.mode, [undefined, 'classic', 'antialiased']);
-  oneOf('--raster', values.raster, ['auto', 'quads']);
+  oneOf('--raster', values.raster, ['auto', 'quads', 'tiles']);
   oneOf('--accumulation', values.accumulation, ['auto', 'rgba16float', 'rgba32float']);
   return { ...values, scene: positionals[0], background: parseBackground(values.background) };
 }

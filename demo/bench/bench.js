@@ -1,10 +1,11 @@
 /**
  * The benchmark page: one scene, tiled to N splats, along a camera path, with per-pass GPU timestamps, the span from the
- * first pass's begin to the last one's end, wall time with the queue drained, and CPU time.
+ * first pass's begin to the last one's end, wall time with the queue drained, and CPU time. `report=URL` POSTs the result,
+ * `image=URL` the first view in float32, to hold it against other renderers.
  */
 import { lookAt } from '@gaussian-splat/core';
 import { fetchScene, readScene } from '@gaussian-splat/formats';
-import { deviceDescriptor, GaussianBuffers, packGaussians, PassTimer, Renderer } from '@gaussian-splat/renderer';
+import { capture, deviceDescriptor, GaussianBuffers, packGaussians, PassTimer, Renderer } from '@gaussian-splat/renderer';
 import { tilePacked } from './tile.js';
 
 const query = new URLSearchParams(location.search);
@@ -97,6 +98,11 @@ async function measure() {
   const wall = (performance.now() - start) / options.frames;
   const gpu = timer ? summarizePasses(await timer.read()) : {};
   const statistics = await renderer.readStatistics();
+  const image = query.get('image');
+  if (image) {
+    const pixels = await capture(device, renderer, { gaussians, camera: cameraAt(0, radius) });
+    await fetch(image, { method: 'POST', body: pixels });
+  }
   const total = gaussians.byteLength + renderer.byteLength;
   const { vendor, architecture, description } = adapter.info;
   return {

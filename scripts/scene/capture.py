@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 # The object stands on a post. Everything lower than this height (upright frame, in units of COLMAP's world, measured
 # downwards from the point the cameras look at) is post, plate and table, and is not part of the scene.
 CUT_HEIGHT = 0.42
-# Longest half diagonal of the finished object. Trainers cull nearer than 0.2 units, so an orbit of 2 to 3 units is safe.
+# Longest half diagonal of the finished object. Renderers cull nearer than 0.2 units: orbit at 2 to 3.
 OBJECT_RADIUS = 0.8
 # The photograph taken most nearly from the front; only a start for the search for the plane of symmetry.
 FRONT_VIEW = "17"

@@ -14,24 +14,13 @@ import torch
 from capture import read_colmap, to_upright
 from dataset import Picture, load_pictures
 from model import Parameters, from_gaussians, render
+from orbit import orbit_matrix
 from spz import read_spz
 from train import HELD_OUT_EVERY
 
 AZIMUTHS = range(0, 360, 30)
 ORBIT_RADIUS = 2.6
 FIELD_OF_VIEW = 35.0
-
-
-def orbit_matrix(theta: float, phi: float, radius: float) -> np.ndarray:
-    """World to camera (4,4) looking at the origin. Degrees; theta 0 stands on -z, phi is measured from up (-y)."""
-    t, p = np.radians([theta, phi])
-    eye = radius * np.array([np.sin(t) * np.sin(p), -np.cos(p), -np.cos(t) * np.sin(p)])
-    forward = -eye / radius
-    right = np.array([np.cos(t), 0, np.sin(t)])
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.stack([right, np.cross(forward, right), forward])
-    matrix[:3, 3] = -matrix[:3, :3] @ eye
-    return matrix
 
 
 def shot(parameters: Parameters, degree: int, matrix: np.ndarray, size: int, background: float) -> np.ndarray:
@@ -48,7 +37,7 @@ def shot(parameters: Parameters, degree: int, matrix: np.ndarray, size: int, bac
 
 
 def masked_psnr(parameters: Parameters, degree: int, picture: Picture) -> tuple[float, float]:
-    """PSNR of the colour where the photograph shows the object, and the mean error of the coverage where it is known."""
+    """PSNR of the colour where the photograph shows the object, and the coverage's mean error where that is known."""
     with torch.no_grad():
         colour, alpha, _ = render(parameters, picture.view_matrix, picture.intrinsics, picture.size, degree)
     inside = ((picture.alpha > 0.99) & (picture.valid > 0) & (picture.doubtful == 0))[0]
@@ -80,7 +69,8 @@ def main() -> None:
         rows += [np.concatenate(row[:6], 1), np.concatenate(row[6:], 1)]
     cv2.imwrite(sys.argv[4], cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))
     if len(sys.argv) > 5:
-        close = [
+        views = ((25, 78, 1.0), (-35, 80, 0.05))
+        close = [shot(parameters, degree, orbit_matrix(t, p, 2.4), 1000, background) for t, p, background in views]
             shot(parameters, degree, orbit_matrix(t, p, 2.4), 1000, b) for t, p, b in ((25, 78, 1.0), (-35, 80, 0.05))
         ]
         cv2.imwrite(sys.argv[5], cv2.cvtColor(np.concatenate(close, 1), cv2.COLOR_RGB2BGR))

@@ -1,31 +1,34 @@
-"""Trims a trained scene by the photographs' outlines: python trim.py TRAINED.ply VIEWS SPARSE OUT.spz
+"""Trims a trained scene: python trim.py TRAINED.ply HULL.npy SPARSE OUT.spz (and OUT.ply beside it)
 
-Shade that lies in the air below the object costs training little, because the photographs are as dark there; over a
-white page it shows. But a Gaussian on the object projects inside the object's outline in every photograph, whatever
-hides it. So what is dark and projects outside in several goes, and the post is cut off level. Needs no GPU.
+Shade that hangs in the air by the object costs training little, because the photographs are as dark there; over a
+white page it shows. It gives itself away without any photograph: looked at from all round, haze lies mostly where the
+picture stays translucent, while whatever lies on a surface has, from most sides, more surface behind it. So haze goes,
+and the post is cut off level. Needs no GPU; takes some minutes.
 """
 
 import sys
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from capture import Capture, View, read_colmap, to_upright
-from gaussians import SH_C0, Gaussians, read_ply, write_ply
-from masks import project
+from capture import read_colmap, to_upright
+from gaussians import Gaussians, read_ply, write_ply
+from orbit import orbit_matrix
+from rasterize import axes, project_ellipses, thin_and_solid
 from spz import write_spz
 
-# Pixels by which a point must miss an outline: cameras moved about that much when they were refined.
-OUTLINE_MARGIN = 2
-# Photographs in which a Gaussian must miss the outline before it goes. Where a mask is in doubt, it says half.
-MISSES = 2
-# Half the length, in standard deviations along its longest axis, with which a Gaussian is held against the outlines.
-REACH_SIGMAS = 1.5
-# Brightest channel, seen from nowhere in particular, below which a Gaussian is shade. Nothing bright hangs in the air.
-DARK = 0.3
-# The post is dark itself and its outline is not known: nothing is trimmed from here down, this near to its axis.
+# Rounds of looking from all round; what haze hid is haze in the next one.
+ROUNDS = 2
+POLAR_ANGLES = (45, 65, 80, 92, 104, 116)
+AZIMUTHS = range(0, 360, 18)
+PICTURE = (420, 380)
+FIELD_OF_VIEW = 24.0
+ORBIT_RADIUS = 2.9
+# A pixel covered less than this is translucent, and a Gaussian with more than this share of its weight there is haze.
+MOST_THIN = 0.9
+MOST_HAZE = 0.4
+# The end of the post is open, its rim thin from everywhere: nothing is haze from here down, this near to its axis.
 POST_TOP = 0.2
 POST_SLACK = 1.1
 # Nearest to the mask of the post the outline is blurred; the object ends this much higher.
@@ -36,59 +39,17 @@ CUT_SIGMAS = 2.0
 LEAST_SHRINK = 0.15
 
 
-def rotation_matrices(wxyz: np.ndarray) -> np.ndarray:
-    """Rotation matrices (N,3,3) of unit quaternions (N,4)."""
-    w, x, y, z = wxyz.T
-    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]
-    rows += [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]
-    rows += [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]
-    return np.stack(rows, 1).reshape(-1, 3, 3)
-
-
-def axes(gaussians: Gaussians) -> np.ndarray:
-    """The three half axes of one standard deviation as columns, (N,3,3)."""
-    return rotation_matrices(gaussians.rotations) * np.exp(gaussians.log_scales)[:, None]
-
-
-def witnesses(gaussians: Gaussians) -> np.ndarray:
-    """Each Gaussian's centre and both ends of its longest axis, (3,N,3)."""
-    half = axes(gaussians)
-    longest = np.argmax(gaussians.log_scales, axis=1)
-    end = REACH_SIGMAS * np.take_along_axis(half, longest[:, None, None], 2)[..., 0]
-    return np.stack([gaussians.positions, gaussians.positions + end, gaussians.positions - end])
-
-
-def charges(mask: np.ndarray) -> np.ndarray:
-    """What a point at each pixel counts as a miss: 1 well outside the outline, 0.5 where the mask is in doubt."""
-    doubtful, valid, coverage = (mask[..., channel] > 127 for channel in range(3))
-    covered = (coverage | ~valid).astype(np.uint8)
-    near = cv2.dilate(covered, np.ones((2 * OUTLINE_MARGIN + 1, 2 * OUTLINE_MARGIN + 1))) > 0
-    return np.where(near, 0, np.where(doubtful, 0.5, 1)).astype(np.float32)
-
-
-def misses(points: np.ndarray, view: View, capture: Capture, charge: np.ndarray) -> np.ndarray:
-    pixels, _ = project(points, view, capture)
-    column, row = np.floor(pixels).astype(int).T
-    seen = (column >= 0) & (column < charge.shape[1]) & (row >= 0) & (row < charge.shape[0])
-    found = np.zeros(len(points), np.float32)
-    found[seen] = charge[row[seen], column[seen]]
-    return found
-
-
-def beside_object(gaussians: Gaussians, views: Path, capture: Capture) -> np.ndarray:
-    """Which Gaussians reach outside the object's outline in too many photographs, (N,) booleans."""
-    total = np.zeros(len(gaussians), np.float32)
-    points = witnesses(gaussians)
-    for view in capture.views:
-        path = views / f"{view.name}.png"
-        if path.exists():
-            charge = charges(cv2.imread(str(path)))
-            total += np.max([misses(end, view, capture, charge) for end in points], axis=0)
-    return total > MISSES
-
-
-def is_dark(gaussians: Gaussians) -> np.ndarray:
-    return (0.5 + SH_C0 * gaussians.sh[:, 0]).max(1) < DARK
+def haze(gaussians: Gaussians) -> np.ndarray:
+    """Share of each Gaussian's visible weight, from all round, that falls on translucent pixels, (N,)."""
+    focal = PICTURE[0] / 2 / np.tan(np.radians(FIELD_OF_VIEW) / 2)
+    thin, solid = np.zeros(len(gaussians)), np.full(len(gaussians), 1e-9)
+    for ring, phi in enumerate(POLAR_ANGLES):
+        for theta in AZIMUTHS:
+            # Rings are turned against each other, so that no side is looked at from one column of cameras only.
+            matrix = orbit_matrix(theta + 3 * ring, phi, ORBIT_RADIUS)
+            seen = thin_and_solid(project_ellipses(gaussians, matrix, focal, PICTURE), PICTURE, MOST_THIN)
+            thin, solid = thin + seen[0], solid + seen[1]
+    return thin / (thin + solid)
 
 
 def near_post(gaussians: Gaussians, hull: np.ndarray, cut_height: float) -> np.ndarray:
@@ -109,17 +70,17 @@ def cut_level(gaussians: Gaussians, height: float) -> Gaussians:
 
 
 def main() -> None:
-    trained, views, sparse, out = map(Path, sys.argv[1:5])
-    gaussians = read_ply(trained)
-    capture = to_upright(read_colmap(sparse))
-    post = near_post(gaussians, np.load(views / "hull.npy"), capture.cut_height)
-    shade = beside_object(gaussians, views, capture) & is_dark(gaussians) & ~post
-    kept = cut_level(gaussians.at(~shade), capture.cut_height - CUT_MARGIN)
+    trained, hull_path, sparse, out = map(Path, sys.argv[1:5])
+    capture, hull = to_upright(read_colmap(sparse)), np.load(hull_path)
+    whole = read_ply(trained)
+    kept = cut_level(whole, capture.cut_height - CUT_MARGIN)
+    print(f"{len(whole) - len(kept)} below the cut left out of {len(whole)}", flush=True)
+    for _ in range(ROUNDS):
+        hazy = (haze(kept) > MOST_HAZE) & ~near_post(kept, hull, capture.cut_height)
+        kept = kept.at(~hazy)
+        print(f"{hazy.sum()} of haze left out, {len(kept)} kept", flush=True)
     write_ply(out.with_suffix(".ply"), kept)
-    size = write_spz(out, kept, antialiased=True)
-    print(
-        f"{out}: {shade.sum()} of shade beside the object left out of {len(gaussians)}, {len(kept)} kept, {size} bytes"
-    )
+    print(f"{out}: {len(kept)} Gaussians, {write_spz(out, kept, antialiased=True)} bytes")
 
 
 if __name__ == "__main__":
