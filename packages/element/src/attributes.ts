@@ -1,0 +1,82 @@
+/** Attributes of `<gaussian-splat>` that carry more than a word: their grammars and defaults, in one place. */
+import {
+  fieldOfViewGrammar,
+  keywordGrammar,
+  numberGrammar,
+  orbitGrammar,
+  readAttribute,
+  targetGrammar,
+  upGrammar,
+  type AttributeGrammar,
+} from './camera/grammar.js';
+import type { CameraSettings } from './camera/settings.js';
+
+/** When loading starts: once the element is in sight, or as soon as it is in the page. */
+export type Loading = 'lazy' | 'eager';
+
+/** One-finger moves that stay the page's. */
+export type TouchAction = 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation';
+
+/** An attribute's raw value: text, or what a property was given instead. */
+export type Raw = string | number | null | undefined;
+
+/** The properties read here, by their attributes' camel-case names. */
+export interface RawAttributes {
+  readonly crossorigin: Raw;
+  readonly loading: Raw;
+  readonly cameraOrbit: Raw;
+  readonly cameraTarget: Raw;
+  readonly fieldOfView: Raw;
+  readonly minCameraOrbit: Raw;
+  readonly maxCameraOrbit: Raw;
+  readonly minFieldOfView: Raw;
+  readonly maxFieldOfView: Raw;
+  readonly interpolationDecay: Raw;
+  readonly touchAction: Raw;
+  readonly up: Raw;
+  readonly maxPixelRatio: Raw;
+}
+
+/** All of them, read. */
+export interface Attributes {
+  readonly credentials: RequestCredentials;
+  readonly loading: Loading;
+  readonly camera: CameraSettings;
+  /** Time constant of the camera's motion, ms. */
+  readonly interpolationDecay: number;
+  readonly touchAction: TouchAction;
+  /** Most drawn pixels for one CSS pixel. */
+  readonly maxPixelRatio: number;
+}
+
+const orbit = orbitGrammar('0deg 75deg auto');
+const orbitLimit = orbitGrammar('auto');
+const crossorigin = keywordGrammar(['anonymous', 'use-credentials']);
+const loading = keywordGrammar<Loading>(['lazy', 'eager']);
+const touchAction = keywordGrammar<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']);
+const interpolationDecay = numberGrammar(50, 0, 'milliseconds, 0 or more');
+// Far below any ratio in use, so that 0 is refused but thumbnails of pixels are not.
+const maxPixelRatio = numberGrammar(Infinity, 1 / 64, 'drawn pixels for each CSS pixel, above 0');
+
+/** Reads all attributes; `warn` gets one sentence for each malformed one. */
+export function readAttributes(raw: RawAttributes, warn: (sentence: string) => void): Attributes {
+  const read = <T>(name: string, text: Raw, grammar: AttributeGrammar<T>): T =>
+    readAttribute(name, text, grammar, warn);
+  return {
+    credentials: read('crossorigin', raw.crossorigin, crossorigin) === 'use-credentials' ? 'include' : 'same-origin',
+    loading: read('loading', raw.loading, loading),
+    interpolationDecay: read('interpolation-decay', raw.interpolationDecay, interpolationDecay),
+    touchAction: read('touch-action', raw.touchAction, touchAction),
+    maxPixelRatio: read('max-pixel-ratio', raw.maxPixelRatio, maxPixelRatio),
+    camera: {
+      orbit: read('camera-orbit', raw.cameraOrbit, orbit),
+      target: read('camera-target', raw.cameraTarget, targetGrammar),
+      fieldOfView: read('field-of-view', raw.fieldOfView, fieldOfViewGrammar),
+      minOrbit: read('min-camera-orbit', raw.minCameraOrbit, orbitLimit),
+      maxOrbit: read('max-camera-orbit', raw.maxCameraOrbit, orbitLimit),
+      minFieldOfView: read('min-field-of-view', raw.minFieldOfView, fieldOfViewGrammar),
+      maxFieldOfView: read('max-field-of-view', raw.maxFieldOfView, fieldOfViewGrammar),
+      up: read('up', raw.up, upGrammar),
+    },
+  };
+}

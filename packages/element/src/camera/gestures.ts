@@ -1,0 +1,92 @@
+/** What pointers, wheel and keys mean for a camera. Pure: knows positions and key names, no page. */
+
+/** What a gesture does: angles in radians, a factor of the distance, shares of the picture's height. */
+export type CameraAction =
+  | { readonly type: 'orbit'; readonly theta: number; readonly phi: number }
+  | { readonly type: 'zoom'; readonly factor: number }
+  | { readonly type: 'pan'; readonly right: number; readonly up: number }
+  | { readonly type: 'reset' };
+
+/** A point in CSS pixels. */
+export interface Point {
+  readonly x: number;
+  readonly y: number;
+}
+
+const KEY_ANGLE = Math.PI / 8;
+const KEY_ZOOM = 1.2;
+const KEY_PAN = 0.1;
+/** Wheel pixels that change the distance by a factor of e. */
+const WHEEL_PIXELS = 500;
+/** A touchpad's pinch arrives as a wheel with Ctrl, in much smaller steps. */
+const PINCH_GAIN = 5;
+/** CSS pixels of WheelEvent's other units: a line, a page. */
+const WHEEL_UNIT_PIXELS = [1, 18, 400];
+/** Most that one wheel event may count for, in pixels: some mice jump. */
+const MAX_WHEEL_PIXELS = 200;
+
+/** Dragging across the element's height turns the camera once around. */
+export function orbitOf(from: Point, to: Point, height: number): CameraAction {
+  const turn = (2 * Math.PI) / height;
+  return { type: 'orbit', theta: -(to.x - from.x) * turn, phi: -(to.y - from.y) * turn };
+}
+
+/** The target stays under the pointer: the camera moves against the drag. */
+export function panOf(from: Point, to: Point, height: number): CameraAction {
+  return { type: 'pan', right: -(to.x - from.x) / height, up: (to.y - from.y) / height };
+}
+
+/** CSS pixels that one finger must move before it is known where it goes. */
+export const TOUCH_SLOP = 4;
+
+/**
+ * Whether a one-finger drag is the camera's, by the CSS `touch-action` of the picture and the way the drag sets out.
+ * The browser decides likewise for its own scrolling, but only after the first moves have been told to the page.
+ */
+export function isCameraDrag(touchAction: string, from: Point, to: Point): boolean {
+  const isHorizontal = Math.abs(to.x - from.x) >= Math.abs(to.y - from.y);
+  return touchAction === 'none' || (touchAction === 'pan-y' && isHorizontal) || (touchAction === 'pan-x' && !isHorizontal);
+}
+
+/** Two fingers: what lies between them stays there. */
+export function pinchOf(from: readonly [Point, Point], to: readonly [Point, Point], height: number): CameraAction[] {
+  const [before, after] = [distance(from), distance(to)];
+  const pan = panOf(middle(from), middle(to), height);
+  return before > 0 && after > 0 ? [pan, { type: 'zoom', factor: before / after }] : [pan];
+}
+
+/** A turn of the wheel; scrolling down goes away from the target. */
+export function wheelOf(event: { deltaY: number; deltaMode: number; ctrlKey: boolean }): CameraAction {
+  const pixels = event.deltaY * (WHEEL_UNIT_PIXELS[event.deltaMode] ?? 1) * (event.ctrlKey ? PINCH_GAIN : 1);
+  const bounded = Math.min(MAX_WHEEL_PIXELS, Math.max(-MAX_WHEEL_PIXELS, pixels));
+  return { type: 'zoom', factor: Math.exp(bounded / WHEEL_PIXELS) };
+}
+
+/** A key, named as in KeyboardEvent.key; null if it means nothing here. Arrows move the camera their way. */
+export function keyOf(key: string, shift: boolean): CameraAction | null {
+  switch (key) {
+    case 'ArrowLeft':
+      return shift ? { type: 'pan', right: -KEY_PAN, up: 0 } : { type: 'orbit', theta: -KEY_ANGLE, phi: 0 };
+    case 'ArrowRight':
+      return shift ? { type: 'pan', right: KEY_PAN, up: 0 } : { type: 'orbit', theta: KEY_ANGLE, phi: 0 };
+    case 'ArrowUp':
+      return shift ? { type: 'pan', right: 0, up: KEY_PAN } : { type: 'orbit', theta: 0, phi: -KEY_ANGLE };
+    case 'ArrowDown':
+      return shift ? { type: 'pan', right: 0, up: -KEY_PAN } : { type: 'orbit', theta: 0, phi: KEY_ANGLE };
+    case 'PageUp':
+    case '+':
+    case '=':
+      return { type: 'zoom', factor: 1 / KEY_ZOOM };
+    case 'PageDown':
+    case '-':
+    case '_':
+      return { type: 'zoom', factor: KEY_ZOOM };
+    case 'Home':
+      return { type: 'reset' };
+    default:
+      return null;
+  }
+}
+
+const distance = ([a, b]: readonly [Point, Point]): number => Math.hypot(a.x - b.x, a.y - b.y);
+const middle = ([a, b]: readonly [Point, Point]): Point => ({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 });

@@ -1,0 +1,168 @@
+/**
+ * Grammar of the camera attributes: tuples of numbers with CSS-like units, as `<model-viewer>` has them, without
+ * `calc()` and `env()`. An attribute that is absent takes its default; a malformed one takes it too, with a warning.
+ */
+
+/** A length in metres (one world unit is one metre) or a multiple of the radius that frames the scene. */
+export type RadiusSetting = { readonly metres: number } | { readonly framings: number } | 'auto';
+/** Radians. */
+export type AngleSetting = number | 'auto';
+
+/** What `camera-orbit` and its limits say. Angles in radians. */
+export interface OrbitSetting {
+  readonly theta: AngleSetting;
+  readonly phi: AngleSetting;
+  readonly radius: RadiusSetting;
+}
+
+/** What `camera-target` says: metres in viewer space. */
+export type TargetSetting = readonly [x: number | 'auto', y: number | 'auto', z: number | 'auto'];
+
+/** Axis of the scene's frame that points up. */
+export type UpAxis = 'x' | '-x' | 'y' | '-y' | 'z' | '-z';
+
+/** One attribute: how its text is read, and what is meant where it is absent or malformed. */
+export interface AttributeGrammar<T> {
+  /** What the attribute should look like, for warnings. */
+  readonly expected: string;
+  /** Text that an absent attribute stands for. */
+  readonly fallback: string;
+  /** The value, or null if the text is malformed. */
+  parse(text: string): T | null;
+}
+
+const NUMBER_WITH_UNIT = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)([a-z%]*)$/i;
+const METRES_PER_UNIT: Readonly<Record<string, number>> = { '': 1, m: 1, cm: 1e-2, mm: 1e-3 };
+const RADIANS_PER_UNIT: Readonly<Record<string, number>> = { deg: Math.PI / 180, rad: 1 };
+const UP_AXES: readonly UpAxis[] = ['x', '-x', 'y', '-y', 'z', '-z'];
+
+interface Quantity {
+  readonly value: number;
+  readonly unit: string;
+}
+
+function parseQuantity(term: string): Quantity | null {
+  const match = NUMBER_WITH_UNIT.exec(term);
+  const value = match ? Number(match[1]) : NaN;
+  return match && Number.isFinite(value) ? { value, unit: match[2].toLowerCase() } : null;
+}
+
+function parseAngle(term: string): AngleSetting | null {
+  if (term === 'auto') return 'auto';
+  const quantity = parseQuantity(term);
+  if (quantity === null) return null;
+  // As in CSS, only zero may go without a unit: degrees and radians are too easily confused.
+  if (quantity.unit === '') return quantity.value === 0 ? 0 : null;
+  const radians = RADIANS_PER_UNIT[quantity.unit];
+  return radians === undefined ? null : quantity.value * radians;
+}
+
+function parseLength(term: string): number | 'auto' | null {
+  if (term === 'auto') return 'auto';
+  const quantity = parseQuantity(term);
+  const metres = quantity === null ? undefined : METRES_PER_UNIT[quantity.unit];
+  return quantity === null || metres === undefined ? null : quantity.value * metres;
+}
+
+function parseRadius(term: string): RadiusSetting | null {
+  const quantity = parseQuantity(term);
+  if (quantity?.unit === '%') return quantity.value > 0 ? { framings: quantity.value / 100 } : null;
+  const metres = parseLength(term);
+  if (metres === null || metres === 'auto') return metres;
+  return metres > 0 ? { metres } : null;
+}
+
+const terms = (text: string): string[] => text.trim().toLowerCase().split(/\s+/);
+
+function parseOrbit(text: string): OrbitSetting | null {
+  const parts = terms(text);
+  if (parts.length === 1 && parts[0] === 'auto') return { theta: 'auto', phi: 'auto', radius: 'auto' };
+  if (parts.length !== 3) return null;
+  const [theta, phi, radius] = [parseAngle(parts[0]), parseAngle(parts[1]), parseRadius(parts[2])];
+  return theta === null || phi === null || radius === null ? null : { theta, phi, radius };
+}
+
+function parseTarget(text: string): TargetSetting | null {
+  const parts = terms(text);
+  if (parts.length === 1 && parts[0] === 'auto') return ['auto', 'auto', 'auto'];
+  const [x, y, z] = parts.map(parseLength);
+  return parts.length !== 3 || x === null || y === null || z === null ? null : [x, y, z];
+}
+
+function parseFieldOfView(text: string): AngleSetting | null {
+  const angle = parseAngle(text.trim().toLowerCase());
+  return angle === 'auto' || (angle !== null && angle > 0 && angle < Math.PI) ? angle : null;
+}
+
+const ORBIT_FORM = '"theta phi radius" with deg or rad, deg or rad, m, cm, mm or %, each or all "auto"';
+const FIELD_OF_VIEW_FORM = 'an angle above 0deg and below 180deg with deg or rad, or "auto"';
+
+/** `camera-orbit`, `min-camera-orbit` and `max-camera-orbit`. */
+export const orbitGrammar = (fallback: string): AttributeGrammar<OrbitSetting> => ({
+  expected: ORBIT_FORM,
+  fallback,
+  parse: parseOrbit,
+});
+
+/** `field-of-view`, `min-field-of-view` and `max-field-of-view`: vertical, radians. */
+export const fieldOfViewGrammar: AttributeGrammar<AngleSetting> = {
+  expected: FIELD_OF_VIEW_FORM,
+  fallback: 'auto',
+  parse: parseFieldOfView,
+};
+
+/** `camera-target`. */
+export const targetGrammar: AttributeGrammar<TargetSetting> = {
+  expected: '"x y z" in metres (or with m, cm or mm), each or all "auto"',
+  fallback: 'auto',
+  parse: parseTarget,
+};
+
+/** `up`. */
+export const upGrammar: AttributeGrammar<UpAxis> = {
+  expected: `one of ${UP_AXES.join(', ')}`,
+  fallback: '-y',
+  parse: (text) => UP_AXES.find((axis) => axis === text.trim().toLowerCase()) ?? null,
+};
+
+/** A number within a range, such as `interpolation-decay` (milliseconds) and `max-pixel-ratio`. */
+export const numberGrammar = (fallback: number, min: number, expected: string): AttributeGrammar<number> => ({
+  expected,
+  fallback: String(fallback),
+  parse: (text) => {
+    const value = text.trim() === '' ? NaN : Number(text);
+    return value >= min ? value : null;
+  },
+});
+
+/** A keyword out of a closed list, such as `touch-action`. The first is the default. */
+export const keywordGrammar = <T extends string>(keywords: readonly T[]): AttributeGrammar<T> => ({
+  expected: `one of ${keywords.join(', ')}`,
+  fallback: keywords[0],
+  parse: (text) => keywords.find((keyword) => keyword === text.trim().toLowerCase()) ?? null,
+});
+
+/**
+ * Value of an attribute: absent or empty takes the default; malformed takes it too and tells `warn` what was expected.
+ * `warn` gets one sentence.
+ */
+export function readAttribute<T>(
+  name: string,
+  text: string | number | null | undefined,
+  grammar: AttributeGrammar<T>,
+  warn: (sentence: string) => void,
+): T {
+  const fallback = (): T => {
+    const value = grammar.parse(grammar.fallback);
+    if (value === null)
+      throw new TypeError(`the default "${grammar.fallback}" of ${name} does not fit its own grammar`);
+    return value;
+  };
+  if (text === null || text === undefined || text === '') return fallback();
+  const value = grammar.parse(String(text));
+  if (value !== null) return value;
+  warn(
+    `<gaussian-splat> ${name}: expected ${grammar.expected}, found "${text}"; the default "${grammar.fallback}" is used.`,
+  );
+  return fallback();
+}

@@ -1,0 +1,82 @@
+/** What the camera attributes mean for a given scene and picture: settings with `auto` and `%` become a pose. */
+import type { Bounds } from '@gaussian-splat/core';
+import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting, UpAxis } from './grammar.js';
+import { framingDistance, toViewer, viewerFrame, type Pose } from './orbit.js';
+import type { PoseLimits } from './orbit-camera.js';
+
+/** All camera attributes, read. */
+export interface CameraSettings {
+  readonly orbit: OrbitSetting;
+  readonly minOrbit: OrbitSetting;
+  readonly maxOrbit: OrbitSetting;
+  readonly target: TargetSetting;
+  readonly fieldOfView: AngleSetting;
+  readonly minFieldOfView: AngleSetting;
+  readonly maxFieldOfView: AngleSetting;
+  readonly up: UpAxis;
+}
+
+const DEGREE = Math.PI / 180;
+/** What `auto` stands for. */
+const AUTO = {
+  theta: 0,
+  phi: 75 * DEGREE,
+  fieldOfView: 45 * DEGREE,
+  minFieldOfView: 1 * DEGREE,
+  maxFieldOfView: 160 * DEGREE,
+  minPhi: 22.5 * DEGREE,
+  maxPhi: 157.5 * DEGREE,
+  /** Closest and farthest distance, as multiples of the framing distance. */
+  minFramings: 0.02,
+  maxFramings: 5,
+};
+
+const angle = (setting: AngleSetting, auto: number): number => (setting === 'auto' ? auto : setting);
+
+function distance(setting: RadiusSetting, auto: number, framing: number): number {
+  if (setting === 'auto') return auto;
+  return 'metres' in setting ? setting.metres : setting.framings * framing;
+}
+
+/** The pose that the attributes ask for. `aspect` is width / height of the picture. */
+export function poseOf(settings: CameraSettings, bounds: Bounds, aspect: number): Pose {
+  const fieldOfView = angle(settings.fieldOfView, AUTO.fieldOfView);
+  const framing = framingDistance(bounds.radius, fieldOfView, aspect);
+  const center = toViewer(viewerFrame(settings.up), bounds.center);
+  const [x, y, z] = settings.target.map((setting, axis) => (setting === 'auto' ? center[axis] : setting));
+  return {
+    theta: angle(settings.orbit.theta, AUTO.theta),
+    phi: angle(settings.orbit.phi, AUTO.phi),
+    radius: distance(settings.orbit.radius, framing, framing),
+    x,
+    y,
+    z,
+    fieldOfView,
+  };
+}
+
+/** The limits that the attributes ask for. An automatic limit gives way to a pose that was asked for outright. */
+export function limitsOf(settings: CameraSettings, bounds: Bounds, aspect: number): PoseLimits {
+  const { minOrbit, maxOrbit } = settings;
+  const pose = poseOf(settings, bounds, aspect);
+  const framing = framingDistance(bounds.radius, pose.fieldOfView, aspect);
+  const free = { x: Infinity, y: Infinity, z: Infinity };
+  return {
+    min: {
+      theta: angle(minOrbit.theta, -Infinity),
+      phi: Math.max(0, angle(minOrbit.phi, Math.min(AUTO.minPhi, pose.phi))),
+      radius: distance(minOrbit.radius, Math.min(AUTO.minFramings * framing, pose.radius), framing),
+      x: -free.x,
+      y: -free.y,
+      z: -free.z,
+      fieldOfView: angle(settings.minFieldOfView, Math.min(AUTO.minFieldOfView, pose.fieldOfView)),
+    },
+    max: {
+      theta: angle(maxOrbit.theta, Infinity),
+      phi: Math.min(Math.PI, angle(maxOrbit.phi, Math.max(AUTO.maxPhi, pose.phi))),
+      radius: distance(maxOrbit.radius, Math.max(AUTO.maxFramings * framing, pose.radius), framing),
+      ...free,
+      fieldOfView: angle(settings.maxFieldOfView, Math.max(AUTO.maxFieldOfView, pose.fieldOfView)),
+    },
+  };
+}

@@ -1,0 +1,55 @@
+/** Present camera values that people read, store and write back: each `toString()` is a valid attribute. */
+
+/** Where the camera is, around its target. */
+export class CameraOrbit {
+  constructor(theta: number, phi: number, radius: number) {
+    this.theta = theta;
+    this.phi = phi;
+    this.radius = radius;
+  }
+  /** Azimuth in radians: 0 on the +z side of viewer space, growing towards +x. */
+  readonly theta: number;
+  /** Polar angle in radians: 0 straight above the target, π straight below. */
+  readonly phi: number;
+  /** Distance to the target in metres (world units). */
+  readonly radius: number;
+
+  /** A value for `camera-orbit`. Radians and metres, since only they survive the way there and back unrounded. */
+  toString(): string {
+    return `${this.theta}rad ${this.phi}rad ${this.radius}m`;
+  }
+}
+
+/** The point that the camera looks at and turns around: metres in viewer space (y up, right-handed). */
+export class CameraTarget {
+  constructor(x: number, y: number, z: number) {
+    this.x = x;
+    this.y = y;
+    this.z = z;
+  }
+  readonly x: number;
+  readonly y: number;
+  readonly z: number;
+
+  /** A value for `camera-target`. */
+  toString(): string {
+    return `${this.x}m ${this.y}m ${this.z}m`;
+  }
+}
+
+/** Vertical field of view. */
+export class FieldOfView {
+  constructor(radians: number) {
+    this.radians = radians;
+  }
+  readonly radians: number;
+
+  get degrees(): number {
+    return (this.radians * 180) / Math.PI;
+  }
+
+  /** A value for `field-of-view`. */
+  toString(): string {
+    return `${this.radians}rad`;
+  }
+}

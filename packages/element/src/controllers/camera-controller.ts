@@ -1,0 +1,161 @@
+import type { Bounds, Camera } from '@gaussian-splat/core';
+import { cameraOfPose, nearPlane, viewerFrame } from '../camera/orbit.js';
+import { OrbitCamera } from '../camera/orbit-camera.js';
+import { limitsOf, poseOf, type CameraSettings } from '../camera/settings.js';
+import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
+import type { CameraChangeSource } from '../events.js';
+
+/** What is framed before any scene is known. */
+const UNKNOWN_BOUNDS: Bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
+/** Longest step of the damped motion, ms: after a pause the camera goes on from where it was. */
+const MAX_STEP_MS = 100;
+/** Length of the first step after a standstill, ms. */
+const FIRST_STEP_MS = 1000 / 60;
+
+/**
+ * The element's camera: brings together the attributes, the scene's bounds and the picture's aspect, and says where the
+ * camera is at a given time.
+ */
+export class CameraController {
+  readonly #camera: OrbitCamera;
+  readonly #onChange: () => void;
+  #settings: CameraSettings;
+  #bounds = UNKNOWN_BOUNDS;
+  #aspect = 1;
+  #source: CameraChangeSource = 'none';
+  /** A person has zoomed since the attributes last set the distance; then a new aspect leaves it alone. */
+  #userDistance = false;
+  #jumped = false;
+  #lastStep: number | undefined;
+
+  /** @param onChange the camera is no longer where it was drawn. */
+  constructor(settings: CameraSettings, onChange: () => void) {
+    this.#settings = settings;
+    this.#onChange = onChange;
+    this.#camera = new OrbitCamera(poseOf(settings, UNKNOWN_BOUNDS, 1));
+    this.#camera.limits = limitsOf(settings, UNKNOWN_BOUNDS, 1);
+  }
+
+  get orbit(): CameraOrbit {
+    const { theta, phi, radius } = this.#camera.now;
+    return new CameraOrbit(theta, phi, radius);
+  }
+
+  get target(): CameraTarget {
+    const { x, y, z } = this.#camera.now;
+    return new CameraTarget(x, y, z);
+  }
+
+  get fieldOfView(): FieldOfView {
+    return new FieldOfView(this.#camera.now.fieldOfView);
+  }
+
+  get isMoving(): boolean {
+    return this.#camera.moving;
+  }
+
+  /** The pinhole camera of this moment for a picture of width x height pixels. */
+  view(width: number, height: number): Camera {
+    return cameraOfPose(this.#camera.now, viewerFrame(this.#settings.up), width, height, nearPlane(this.#bounds));
+  }
+
+  /** New attributes. What did not change keeps the place that a person may have given it. */
+  applySettings(settings: CameraSettings): void {
+    const old = this.#settings;
+    this.#settings = settings;
+    this.#camera.limits = limitsOf(settings, this.#bounds, this.#aspect);
+    const { theta, phi, radius, x, y, z, fieldOfView } = poseOf(settings, this.#bounds, this.#aspect);
+    const changed = (key: keyof CameraSettings): boolean => JSON.stringify(old[key]) !== JSON.stringify(settings[key]);
+    this.#source = 'none';
+    if (changed('up')) return this.#reframe('none');
+    if (changed('fieldOfView')) this.#camera.setGoal({ fieldOfView });
+    if (changed('target')) this.#camera.setGoal({ x, y, z });
+    if (changed('orbit')) {
+      this.#userDistance = false;
+      this.#camera.setGoal({ theta, phi, radius });
+      this.#camera.unwind();
+    } else if (changed('fieldOfView') && !this.#userDistance) {
+      this.#camera.setGoal({ radius });
+    }
+    this.#onChange();
+  }
+
+  /** A new scene: the camera stands where the attributes ask, at once. */
+  frame(bounds: Bounds): void {
+    this.#bounds = bounds;
+    this.#reframe('automatic');
+  }
+
+  /** A new shape of the picture: an automatic distance follows, at once. */
+  setAspect(aspect: number): void {
+    if (aspect === this.#aspect) return;
+    this.#aspect = aspect;
+    this.#camera.limits = limitsOf(this.#settings, this.#bounds, aspect);
+    if (this.#userDistance) return;
+    this.#camera.setGoal({ radius: poseOf(this.#settings, this.#bounds, aspect).radius });
+    if (!this.#camera.moving) return;
+    this.#source = 'automatic';
+    this.jumpToGoal();
+  }
+
+  /** Where the attributes put the camera, whatever a person did since. */
+  reset(source: CameraChangeSource): void {
+    this.#source = source;
+    this.#userDistance = false;
+    this.#camera.setGoal(poseOf(this.#settings, this.#bounds, this.#aspect));
+    this.#camera.unwind();
+    this.#onChange();
+  }
+
+  jumpToGoal(): void {
+    this.#jumped ||= this.#camera.moving;
+    this.#camera.jumpToGoal();
+    this.#onChange();
+  }
+
+  /** A person turns the camera, angles in radians. */
+  orbitBy(theta: number, phi: number): void {
+    this.#camera.orbitBy(theta, phi);
+    this.#moveByUser();
+  }
+
+  /** A person changes the distance by a factor. */
+  zoomBy(factor: number): void {
+    this.#userDistance = true;
+    this.#camera.zoomBy(factor);
+    this.#moveByUser();
+  }
+
+  /** A person moves the camera sideways, in shares of the picture's height. */
+  panBy(right: number, up: number): void {
+    this.#camera.panBy(right, up);
+    this.#moveByUser();
+  }
+
+  /**
+   * Moves on to the time `now`.
+   * @param now requestAnimationFrame's clock, ms.
+   * @param decayMs time constant of the motion; 0 jumps.
+   * @returns who moved the camera since the last step, or null if nothing did.
+   */
+  step(now: number, decayMs: number): CameraChangeSource | null {
+    const stepMs = this.#lastStep === undefined ? FIRST_STEP_MS : Math.min(MAX_STEP_MS, now - this.#lastStep);
+    const moved = this.#camera.step(stepMs, decayMs);
+    this.#lastStep = this.#camera.moving ? now : undefined;
+    const changed = moved || this.#jumped;
+    this.#jumped = false;
+    return changed ? this.#source : null;
+  }
+
+  #moveByUser(): void {
+    this.#source = 'user-interaction';
+    this.#onChange();
+  }
+
+  #reframe(source: CameraChangeSource): void {
+    this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect);
+    this.reset(source);
+    this.#jumped = true;
+    this.jumpToGoal();
+  }
+}

@@ -1,0 +1,189 @@
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import {
+  isCameraDrag,
+  keyOf,
+  orbitOf,
+  panOf,
+  pinchOf,
+  TOUCH_SLOP,
+  wheelOf,
+  type CameraAction,
+  type Point,
+} from '../camera/gestures.js';
+
+/** What people may do. */
+export interface InputOptions {
+  readonly enabled: boolean;
+  readonly zoom: boolean;
+  readonly pan: boolean;
+  /** CSS touch-action of the picture: which one-finger moves stay the page's. */
+  readonly touchAction: string;
+}
+
+const LEFT_BUTTON = 0;
+const RIGHT_BUTTON = 2;
+
+/** A pointer that is down on the picture. */
+interface Pointer extends Point {
+  readonly pans: boolean;
+  /** Whose its moves are: of one finger this is known only once it has set out. */
+  readonly owner: 'camera' | 'page' | 'undecided';
+}
+
+/** Listens to mouse, pen, touch, wheel and keys on the picture, and turns them into camera actions. */
+export class InputController implements ReactiveController {
+  readonly #act: (action: CameraAction) => void;
+  readonly #options: () => InputOptions;
+  readonly #surfaceOf: () => HTMLElement | null;
+  readonly #pointers = new Map<number, Pointer>();
+  #surface: HTMLElement | null = null;
+  #listening: AbortController | undefined;
+  #wheel: AbortController | undefined;
+
+  /**
+   * @param surfaceOf the element that is dragged and focused, once it is rendered.
+   * @param options read after every update of the host.
+   */
+  constructor(
+    host: ReactiveControllerHost,
+    surfaceOf: () => HTMLElement | null,
+    options: () => InputOptions,
+    act: (action: CameraAction) => void,
+  ) {
+    this.#surfaceOf = surfaceOf;
+    this.#options = options;
+    this.#act = act;
+    host.addController(this);
+  }
+
+  hostConnected(): void {
+    this.#sync();
+  }
+
+  hostUpdated(): void {
+    this.#sync();
+  }
+
+  hostDisconnected(): void {
+    this.#stop();
+  }
+
+  #sync(): void {
+    this.#surface = this.#surfaceOf();
+    if (this.#surface === null) return;
+    const { enabled, zoom, touchAction } = this.#options();
+    this.#surface.style.touchAction = enabled ? touchAction : '';
+    if (!enabled) return this.#stop();
+    this.#listening ??= this.#listen(this.#surface);
+    // A wheel listener that may prevent scrolling costs the page; it exists only where the wheel zooms.
+    if (zoom) this.#wheel ??= this.#listenToWheel(this.#surface);
+    else this.#stopWheel();
+  }
+
+  #listen(surface: HTMLElement): AbortController {
+    const listening = new AbortController();
+    const { signal } = listening;
+    surface.addEventListener('pointerdown', this.#onDown, { signal });
+    surface.addEventListener('pointermove', this.#onMove, { signal });
+    for (const type of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
+      surface.addEventListener(type, this.#onUp, { signal });
+    }
+    surface.addEventListener('keydown', this.#onKey, { signal });
+    surface.addEventListener('contextmenu', this.#onContextMenu, { signal });
+    surface.addEventListener('touchmove', this.#onTouchMove, { signal, passive: false });
+    return listening;
+  }
+
+  #listenToWheel(surface: HTMLElement): AbortController {
+    const listening = new AbortController();
+    surface.addEventListener('wheel', this.#onWheel, { signal: listening.signal, passive: false });
+    return listening;
+  }
+
+  #stop(): void {
+    this.#listening?.abort();
+    this.#listening = undefined;
+    this.#stopWheel();
+    this.#pointers.clear();
+  }
+
+  #stopWheel(): void {
+    this.#wheel?.abort();
+    this.#wheel = undefined;
+  }
+
+  readonly #onDown = (event: PointerEvent): void => {
+    if (event.button !== LEFT_BUTTON && event.button !== RIGHT_BUTTON) return;
+    const pans = event.button === RIGHT_BUTTON || event.shiftKey || event.ctrlKey || event.metaKey;
+    const owner = event.pointerType === 'touch' ? 'undecided' : 'camera';
+    this.#pointers.set(event.pointerId, { ...positionOf(event), pans, owner });
+    this.#capture(event.pointerId);
+  };
+
+  /** Keeps a drag going outside of the element. */
+  #capture(pointerId: number): void {
+    try {
+      this.#surface?.setPointerCapture(pointerId);
+    } catch {
+      // The pointer is gone already, or was made by a script; then moves arrive only over the element.
+    }
+  }
+
+  readonly #onMove = (event: PointerEvent): void => {
+    const from = this.#pointers.get(event.pointerId);
+    const height = this.#surface?.clientHeight ?? 0;
+    if (from === undefined || height === 0) return;
+    const to = positionOf(event);
+    const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
+    if (!other && from.owner === 'undecided') return this.#decide(event.pointerId, from, to);
+    this.#pointers.set(event.pointerId, { ...from, ...to });
+    if (other) this.#performAll(pinchOf([from, other], [to, other], height));
+    else if (from.owner === 'camera') this.#perform(from.pans ? panOf(from, to, height) : orbitOf(from, to, height));
+  };
+
+  /** Finds out whose a finger is; its drag counts from here on, so that the camera does not jump. */
+  #decide(pointerId: number, from: Pointer, to: Point): void {
+    if (Math.hypot(to.x - from.x, to.y - from.y) < TOUCH_SLOP) return;
+    const owner = isCameraDrag(this.#options().touchAction, from, to) ? 'camera' : 'page';
+    this.#pointers.set(pointerId, { ...from, ...to, owner });
+  }
+
+  readonly #onUp = (event: PointerEvent): void => {
+    this.#pointers.delete(event.pointerId);
+  };
+
+  readonly #onKey = (event: KeyboardEvent): void => {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const action = keyOf(event.key, event.shiftKey);
+    if (action !== null && this.#perform(action)) event.preventDefault();
+  };
+
+  readonly #onWheel = (event: WheelEvent): void => {
+    event.preventDefault();
+    this.#perform(wheelOf(event));
+  };
+
+  /** The right button pans, so it opens no menu. */
+  readonly #onContextMenu = (event: Event): void => {
+    if (this.#options().pan) event.preventDefault();
+  };
+
+  /** Two fingers move the camera, also where one finger scrolls the page. */
+  readonly #onTouchMove = (event: TouchEvent): void => {
+    if (event.touches.length > 1 && event.cancelable) event.preventDefault();
+  };
+
+  #performAll(actions: readonly CameraAction[]): void {
+    for (const action of actions) this.#perform(action);
+  }
+
+  /** Passes an action on; false if the page does not allow it. */
+  #perform(action: CameraAction): boolean {
+    const { zoom, pan } = this.#options();
+    if ((action.type === 'zoom' && !zoom) || (action.type === 'pan' && !pan)) return false;
+    this.#act(action);
+    return true;
+  }
+}
+
+const positionOf = (event: PointerEvent): Point => ({ x: event.clientX, y: event.clientY });

@@ -1,0 +1,240 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import { toElementError, type ElementError } from '../errors.js';
+import { openGpuScene, type GpuScene } from '../gpu/gpu-scene.js';
+import type { SharedDevice } from '../gpu/shared-device.js';
+import type { SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+
+/** `waiting`: there is a scene to load, but the element is not in sight yet. */
+export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';
+
+/** What the controller needs of its element, and what it tells it. */
+export interface SceneOptions {
+  readonly device: () => SharedDevice;
+  readonly loader: () => SceneLoader;
+  /** How long a removed element keeps its scene, ms: moving it within the page costs nothing. */
+  readonly releaseDelayMs: () => number;
+  /** Shows a scene; fulfils once its first frame is drawn. `isNew` is false when a lost one comes back. */
+  readonly show: (scene: GpuScene, isNew: boolean) => Promise<void>;
+  /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
+  readonly hide: (clear: boolean) => void;
+  readonly onProgress: (loaded: number, total: number | undefined) => void;
+  readonly onLoad: (url: string) => void;
+  readonly onError: (error: ElementError) => void;
+  readonly onContext: (event: 'contextlost' | 'contextrestored') => void;
+}
+
+/** So many failures in a row to bring a lost device back are final. */
+const MAX_FAILURES = 2;
+/** Pause before the second try, ms: a GPU process that has just crashed needs a moment. */
+const RETRY_DELAY_MS = 1_000;
+
+/**
+ * Life of the element's scene: load, replace (the latest request wins), recover after the loss of the device, release.
+ * Every request has its own AbortController; what still runs for an older one finds it aborted and does nothing.
+ */
+export class SceneController implements ReactiveController {
+  readonly #host: ReactiveControllerHost;
+  readonly #options: SceneOptions;
+  #state: SceneState = 'empty';
+  #error: ElementError | null = null;
+  #scene: GpuScene | null = null;
+  #request: SceneRequest | null = null;
+  #running = new AbortController();
+  #releaseTimer: ReturnType<typeof setTimeout> | undefined;
+  #waiters: (() => void)[] = [];
+
+  constructor(host: ReactiveControllerHost, options: SceneOptions) {
+    this.#host = host;
+    this.#options = options;
+    host.addController(this);
+  }
+
+  get state(): SceneState {
+    return this.#state;
+  }
+
+  get error(): ElementError | null {
+    return this.#error;
+  }
+
+  /** The scene on show. */
+  get scene(): GpuScene | null {
+    return this.#scene;
+  }
+
+  /** Fulfils, and never rejects, once nothing is left to wait for: shown, failed or given up. */
+  get settled(): Promise<void> {
+    if (this.#state !== 'waiting' && this.#state !== 'loading') return Promise.resolve();
+    return new Promise((resolve) => this.#waiters.push(resolve));
+  }
+
+  /**
+   * The scene that ought to be shown, or null for none. Safe to call as often as one likes: only a real change acts.
+   * @param mayStart false while a lazy element is out of sight.
+   */
+  want(request: SceneRequest | null, mayStart: boolean): void {
+    if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
+    if (!isSame(request, this.#request)) {
+      this.#abort();
+      this.#request = request;
+      this.#setState('waiting');
+    }
+    if (this.#state === 'waiting' && mayStart) void this.#load(request);
+  }
+
+  /** Gives up: the scene cannot be drawn. */
+  fail(error: unknown): void {
+    this.#abort();
+    this.#drop(true);
+    this.#error = toElementError(error);
+    this.#setState('failed');
+    this.#options.onError(this.#error);
+  }
+
+  hostConnected(): void {
+    clearTimeout(this.#releaseTimer);
+  }
+
+  hostDisconnected(): void {
+    this.#releaseTimer = setTimeout(() => this.#clear(), this.#options.releaseDelayMs());
+  }
+
+  async #load(request: SceneRequest): Promise<void> {
+    this.#error = null;
+    const { signal } = this.#running;
+    this.#setState('loading');
+    let loaded = 0;
+    let total: number | undefined;
+    const report = (nextLoaded: number, nextTotal: number | undefined): void => {
+      [loaded, total] = [nextLoaded, nextTotal];
+      if (!signal.aborted) this.#options.onProgress(loaded, total);
+    };
+    report(0, undefined);
+    await this.#attempt(request, signal, true, report);
+    if (signal.aborted || this.#scene === null) return;
+    if (loaded !== total) report(loaded, loaded);
+    this.#setState('ready');
+    this.#options.onLoad(request.url);
+  }
+
+  /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
+  async #restore(request: SceneRequest): Promise<void> {
+    this.#abort();
+    const { signal } = this.#running;
+    this.#drop(false);
+    this.#options.onContext('contextlost');
+    await pageVisible(signal);
+    if (!signal.aborted) await this.#attempt(request, signal, false, () => undefined);
+    if (!signal.aborted && this.#scene !== null) this.#options.onContext('contextrestored');
+  }
+
+  /** Opens and shows a scene, again if the device is lost meanwhile. Afterwards there is a scene, or an error. */
+  async #attempt(
+    request: SceneRequest,
+    signal: AbortSignal,
+    isNew: boolean,
+    onProgress: (loaded: number, total: number | undefined) => void,
+  ): Promise<void> {
+    for (let failures = 0; ;) {
+      try {
+        return await this.#open(request, signal, isNew, onProgress);
+      } catch (error) {
+        if (signal.aborted) return;
+        if (!isDeviceFailure(error, isNew)) return this.fail(error);
+        this.#drop(false);
+        if (++failures >= MAX_FAILURES) return this.fail(unrecoverable(error));
+        await delay(RETRY_DELAY_MS);
+        if (signal.aborted) return;
+      }
+    }
+  }
+
+  async #open(
+    request: SceneRequest,
+    signal: AbortSignal,
+    isNew: boolean,
+    onProgress: (loaded: number, total: number | undefined) => void,
+  ): Promise<void> {
+    const { device, loader, show } = this.#options;
+    const beforeUpload = (): void => this.#drop(false);
+    const scene = await openGpuScene(request, { device: device(), loader: loader(), signal, onProgress, beforeUpload });
+    if (signal.aborted) return scene.destroy();
+    this.#scene = scene;
+    await Promise.race([show(scene, isNew), scene.lost]);
+    if (signal.aborted) return;
+    if (scene.isLost) throw new DeviceLostError((await scene.lost).message);
+    void scene.lost.then(() => {
+      if (this.#scene === scene) void this.#restore(request);
+    });
+  }
+
+  /** Ends what runs, and leaves the picture alone. */
+  #abort(): void {
+    this.#running.abort();
+    this.#running = new AbortController();
+  }
+
+  #clear(): void {
+    this.#abort();
+    this.#request = null;
+    this.#drop(true);
+    this.#error = null;
+    this.#setState('empty');
+  }
+
+  #drop(clear: boolean): void {
+    if (this.#scene !== null || clear) this.#options.hide(clear);
+    this.#scene?.destroy();
+    this.#scene = null;
+  }
+
+  #setState(state: SceneState): void {
+    this.#state = state;
+    this.#host.requestUpdate();
+    if (state === 'waiting' || state === 'loading') return;
+    const waiters = this.#waiters;
+    this.#waiters = [];
+    for (const resolve of waiters) resolve();
+  }
+}
+
+/** The device went away before the scene was seen. */
+class DeviceLostError extends Error {}
+
+/** A device that does not come at all is final at first, but after a loss it may only need a moment. */
+function isDeviceFailure(error: unknown, isNew: boolean): boolean {
+  if (error instanceof DeviceLostError) return true;
+  return !isNew && error instanceof GaussianSplatError && error.family === 'unsupported';
+}
+
+function unrecoverable(cause: unknown): GaussianSplatError {
+  return new GaussianSplatError('device-lost/unrecoverable', {
+    where: 'GPU device',
+    expected: 'a device that stays long enough to draw the scene',
+    found: cause instanceof Error ? cause.message || 'a device that was lost' : String(cause),
+    remedy: 'reload the page; if it happens again, use a smaller scene or update the graphics driver',
+    cause,
+  });
+}
+
+const isSame = (a: SceneRequest, b: SceneRequest | null): boolean =>
+  a.url === b?.url && a.credentials === b.credentials;
+
+const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** Fulfils when the page can be seen, or the wait is aborted: a hidden page would only lose its device again. */
+function pageVisible(signal: AbortSignal): Promise<void> {
+  return new Promise((resolve) => {
+    const check = (): void => {
+      if (document.visibilityState === 'hidden' && !signal.aborted) return;
+      document.removeEventListener('visibilitychange', check);
+      signal.removeEventListener('abort', check);
+      resolve();
+    };
+    document.addEventListener('visibilitychange', check);
+    signal.addEventListener('abort', check);
+    check();
+  });
+}

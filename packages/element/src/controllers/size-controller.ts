@@ -1,0 +1,107 @@
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+
+/** A size in whole device pixels. */
+export interface PixelSize {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** Knows how many device pixels the picture covers, through resizes, zoom and moves between screens. */
+export class SizeController implements ReactiveController {
+  readonly #canvasOf: () => HTMLCanvasElement | null;
+  readonly #onChange: () => void;
+  #canvas: HTMLCanvasElement | null = null;
+  #observer: ResizeObserver | undefined;
+  #resolution: MediaQueryList | undefined;
+  #deviceSize: PixelSize | undefined;
+
+  /** @param canvasOf the canvas, once it is rendered. */
+  constructor(host: ReactiveControllerHost, canvasOf: () => HTMLCanvasElement | null, onChange: () => void) {
+    this.#canvasOf = canvasOf;
+    this.#onChange = onChange;
+    host.addController(this);
+  }
+
+  /**
+   * Size to draw at; null while there is no pixel to draw, or the size is not known yet.
+   * @param maxPixelRatio most drawn pixels for one CSS pixel.
+   * @param maxSide longest side that the device's textures may have, in pixels.
+   */
+  pixelSize(maxPixelRatio: number, maxSide: number): PixelSize | null {
+    const { width, height } = this.#deviceSize ?? { width: 0, height: 0 };
+    if (width === 0 || height === 0) return null;
+    const shrink = Math.min(1, maxPixelRatio / devicePixelRatio, maxSide / Math.max(width, height));
+    return { width: Math.max(1, Math.round(width * shrink)), height: Math.max(1, Math.round(height * shrink)) };
+  }
+
+  /** Width / height; 1 while there is none. */
+  get aspect(): number {
+    const { width, height } = this.#deviceSize ?? { width: 0, height: 0 };
+    return width > 0 && height > 0 ? width / height : 1;
+  }
+
+  /** True where there is surely no pixel to draw, as with `display: none`. */
+  get isEmpty(): boolean {
+    if (this.#canvas === null) return false;
+    const { width, height } = this.#deviceSize ?? {
+      width: this.#canvas.clientWidth,
+      height: this.#canvas.clientHeight,
+    };
+    return width === 0 || height === 0;
+  }
+
+  hostConnected(): void {
+    this.#observe();
+  }
+
+  hostUpdated(): void {
+    this.#observe();
+  }
+
+  hostDisconnected(): void {
+    this.#observer?.disconnect();
+    this.#observer = undefined;
+    this.#resolution?.removeEventListener('change', this.#onResolution);
+    this.#resolution = undefined;
+  }
+
+  #observe(): void {
+    this.#canvas = this.#canvasOf();
+    if (this.#canvas === null || this.#observer !== undefined) return;
+    this.#observer = new ResizeObserver((entries) => this.#update(entries[entries.length - 1]));
+    try {
+      // Exact device pixels, also where the element's edges lie between them.
+      this.#observer.observe(this.#canvas, { box: 'device-pixel-content-box' });
+    } catch {
+      // Safari knows no device-pixel box: it gets CSS pixels, and a look-out for changes of the ratio.
+      this.#observer.observe(this.#canvas);
+      this.#watchResolution();
+    }
+  }
+
+  #update(entry: ResizeObserverEntry): void {
+    const exact = entry.devicePixelContentBoxSize?.[0];
+    if (exact) this.#set({ width: exact.inlineSize, height: exact.blockSize });
+    else this.#setFromCss(entry.contentRect.width, entry.contentRect.height);
+  }
+
+  #setFromCss(width: number, height: number): void {
+    this.#set({ width: Math.round(width * devicePixelRatio), height: Math.round(height * devicePixelRatio) });
+  }
+
+  #set(size: PixelSize): void {
+    if (size.width === this.#deviceSize?.width && size.height === this.#deviceSize.height) return;
+    this.#deviceSize = size;
+    this.#onChange();
+  }
+
+  #watchResolution(): void {
+    this.#resolution = matchMedia(`(resolution: ${devicePixelRatio}dppx)`);
+    this.#resolution.addEventListener('change', this.#onResolution, { once: true });
+  }
+
+  readonly #onResolution = (): void => {
+    this.#watchResolution();
+    if (this.#canvas !== null) this.#setFromCss(this.#canvas.clientWidth, this.#canvas.clientHeight);
+  };
+}

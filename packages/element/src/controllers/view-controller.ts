@@ -1,0 +1,139 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { FrameRequest } from '@gaussian-splat/renderer';
+import type { CameraChangeSource } from '../events.js';
+import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
+import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { CameraController } from './camera-controller.js';
+import type { PixelSize, SizeController } from './size-controller.js';
+
+/** What the view needs to know of its element. */
+export interface ViewOptions {
+  readonly scheduler: () => FrameScheduler;
+  readonly camera: CameraController;
+  readonly size: SizeController;
+  readonly canvasOf: () => HTMLCanvasElement | null;
+  /** False where nobody would see a frame. */
+  readonly isVisible: () => boolean;
+  readonly maxPixelRatio: () => number;
+  /** Time constant of the camera's motion, ms. */
+  readonly decayMs: () => number;
+  readonly onCameraChange: (source: CameraChangeSource) => void;
+  /** Drawing has failed for good. */
+  readonly onError: (error: unknown) => void;
+}
+
+interface Settle {
+  readonly resolve: () => void;
+  readonly reject: (reason: unknown) => void;
+}
+
+/** Draws the scene into the element's canvas, a frame at a time and only when asked. */
+export class ViewController implements FrameClient {
+  readonly #options: ViewOptions;
+  #scene: GpuScene | null = null;
+  #context: GPUCanvasContext | null = null;
+  #configured: GPUDevice | null = null;
+  /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
+  #first: Settle | undefined;
+
+  constructor(options: ViewOptions) {
+    this.#options = options;
+  }
+
+  /** Asks for a frame, if one would be seen. Free to call often. */
+  requestFrame(): void {
+    if (this.#scene === null || this.#scene.isLost) return;
+    if (this.#first === undefined && !this.#options.isVisible()) return;
+    this.#options.scheduler().request(this);
+  }
+
+  /**
+   * Takes a scene over. Fulfils once its first frame is drawn, or at once where there is no pixel to draw; rejects with
+   * GaussianSplatError `out-of-memory/*`.
+   */
+  show(scene: GpuScene): Promise<void> {
+    this.#scene = scene;
+    return new Promise((resolve, reject) => {
+      this.#first = { resolve, reject };
+      this.requestFrame();
+    });
+  }
+
+  /** Stops drawing. The last picture stays, so that the next scene can replace it without a gap. */
+  pause(): void {
+    this.#scene = null;
+    this.#first = undefined;
+    this.#options.scheduler().cancel(this);
+  }
+
+  /** Stops drawing and clears the canvas. */
+  clear(): void {
+    this.pause();
+    this.#context?.unconfigure();
+    this.#configured = null;
+  }
+
+  drawFrame(now: number): void {
+    const scene = this.#scene;
+    if (scene === null || scene.isLost) return;
+    const { size, camera, maxPixelRatio, decayMs, onCameraChange, onError } = this.#options;
+    const pixels = size.pixelSize(maxPixelRatio(), scene.device.limits.maxTextureDimension2D);
+    // Without a size nothing is drawn; the observer of the size asks again when there is one.
+    if (pixels === null) return this.#finishUnseen();
+    const source = camera.step(now, decayMs());
+    try {
+      this.#render(scene, this.#frameRequest(scene, pixels));
+    } catch (error) {
+      return onError(error);
+    }
+    if (camera.isMoving) this.requestFrame();
+    if (source !== null) onCameraChange(source);
+  }
+
+  #render(scene: GpuScene, request: Omit<FrameRequest, 'gaussians'>): void {
+    const first = this.#first;
+    this.#first = undefined;
+    if (first === undefined) scene.render(request);
+    else scene.renderFirst(request).then(first.resolve, first.reject);
+  }
+
+  #finishUnseen(): void {
+    if (!this.#options.size.isEmpty) return;
+    this.#first?.resolve();
+    this.#first = undefined;
+  }
+
+  #frameRequest(scene: GpuScene, { width, height }: PixelSize): Omit<FrameRequest, 'gaussians'> {
+    const context = this.#contextFor(scene.device);
+    const canvas = context.canvas;
+    // Setting a canvas's size clears it, even to the same size; here a frame follows at once.
+    if (canvas.width !== width) canvas.width = width;
+    if (canvas.height !== height) canvas.height = height;
+    const texture = context.getCurrentTexture();
+    return {
+      camera: this.#options.camera.view(width, height),
+      target: texture.createView(),
+      targetFormat: texture.format,
+    };
+  }
+
+  /** The canvas's context, set up for the device. Premultiplied alpha lets the page show through. */
+  #contextFor(device: GPUDevice): GPUCanvasContext {
+    const context = (this.#context ??= this.#options.canvasOf()?.getContext('webgpu') ?? null);
+    if (context === null) throw noContext();
+    if (this.#configured !== device) {
+      context.configure({ device, format: navigator.gpu.getPreferredCanvasFormat(), alphaMode: 'premultiplied' });
+      this.#configured = device;
+    }
+    return context;
+  }
+}
+
+function noContext(): GaussianSplatError {
+  return new GaussianSplatError('unsupported/no-webgpu', {
+    where: 'canvas',
+    expected: 'a WebGPU canvas context',
+    found: 'none',
+    remedy: 'use a browser that shows WebGPU on a canvas',
+  });
+}

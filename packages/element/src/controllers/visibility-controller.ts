@@ -1,0 +1,42 @@
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+
+/**
+ * More than nothing must be visible: with a threshold of 0 an element that only touches the viewport's edge would
+ * count, and with a margin elements off screen would take frame time from those on it.
+ */
+const THRESHOLD = 1e-5;
+
+/** Knows whether any part of the element is in the viewport. */
+export class VisibilityController implements ReactiveController {
+  readonly #element: HTMLElement;
+  readonly #onChange: () => void;
+  #observer: IntersectionObserver | undefined;
+  #isVisible = false;
+
+  constructor(host: ReactiveControllerHost & HTMLElement, onChange: () => void) {
+    this.#element = host;
+    this.#onChange = onChange;
+    host.addController(this);
+  }
+
+  get isVisible(): boolean {
+    return this.#isVisible;
+  }
+
+  hostConnected(): void {
+    this.#observer = new IntersectionObserver((entries) => this.#update(entries), { threshold: THRESHOLD });
+    this.#observer.observe(this.#element);
+  }
+
+  hostDisconnected(): void {
+    this.#observer?.disconnect();
+    this.#isVisible = false;
+  }
+
+  #update(entries: IntersectionObserverEntry[]): void {
+    const isVisible = entries[entries.length - 1].isIntersecting;
+    if (isVisible === this.#isVisible) return;
+    this.#isVisible = isVisible;
+    this.#onChange();
+  }
+}

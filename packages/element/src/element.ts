@@ -1,0 +1,305 @@
+import { isServer, LitElement, type PropertyDeclarations, type TemplateResult } from 'lit';
+import { readAttributes, type Attributes, type Loading, type TouchAction } from './attributes.js';
+import type { CameraOrbit, CameraTarget, FieldOfView } from './camera/values.js';
+import type { ElementError } from './errors.js';
+import type { GaussianSplatEventMap } from './events.js';
+import { FrameScheduler } from './gpu/frame-scheduler.js';
+import { SharedDevice } from './gpu/shared-device.js';
+import { SceneLoader } from './loading/scene-loader.js';
+import { Stage } from './stage.js';
+import { styles } from './styles.js';
+import { DEFAULT_LABEL, template } from './template.js';
+
+/** Size of the scene on show. */
+export interface SceneStatistics {
+  /** Splats on the GPU. */
+  readonly splats: number;
+  /** Splats of the file that were left out because a value was not usable. */
+  readonly dropped: number;
+  /** Bytes of GPU memory that the splats take. */
+  readonly bytes: number;
+}
+
+/** Names of the custom states, for `gaussian-splat:state(ready)` in CSS. */
+const STATES = ['loading', 'ready', 'error', 'unsupported'] as const;
+
+/**
+ * Shows a Gaussian splat scene.
+ *
+ * ```html
+ * <gaussian-splat src="scene.ply" alt="A skull on a table" camera-controls></gaussian-splat>
+ * ```
+ *
+ * @slot poster - Shown until the scene is.
+ * @slot progress-bar - Shown while the scene loads.
+ * @slot fallback - Shown where the browser has no WebGPU.
+ * @slot error - Shown if the scene cannot be.
+ * @csspart canvas - The picture.
+ * @csspart poster - The image of the `poster` attribute.
+ * @csspart progress-track - The progress bar's ground.
+ * @csspart progress-bar - The progress bar.
+ * @csspart fallback - The default text where there is no WebGPU.
+ * @csspart error - The default text after an error.
+ * @cssproperty --poster-fit - `object-fit` of the poster; default `cover`.
+ * @cssproperty --poster-transition - How long the poster fades; default 0.3s.
+ * @cssproperty --progress-bar-color - Colour of the progress bar.
+ * @cssproperty --progress-track-color - Colour behind it.
+ * @cssproperty --progress-bar-height - Its height; default 4px.
+ * @cssproperty --message-background - Ground of the default texts.
+ * @cssproperty --message-color - Their colour.
+ * @cssproperty --message-font - Their font.
+ * @cssstate loading - Bytes are on their way.
+ * @cssstate ready - The scene is on show.
+ * @cssstate error - It cannot be shown.
+ * @cssstate unsupported - It cannot be shown because there is no WebGPU.
+ * @fires load - The first frame is drawn.
+ * @fires progress - Bytes have arrived.
+ * @fires error - The scene cannot be shown; `detail` is the same object as the property `error`.
+ * @fires camera-change - The camera has moved; `detail.source` says who moved it.
+ * @fires contextlost - The GPU device was lost; the element recovers by itself.
+ * @fires contextrestored - The picture is back.
+ */
+export class GaussianSplatElement extends LitElement {
+  /** The GPU device of all elements. A page with a device of its own may put `new SharedDevice(...)` here beforehand. */
+  static sharedDevice = new SharedDevice();
+  /** Loads the scenes of all elements. */
+  static sceneLoader = new SceneLoader();
+  /** Draws the frames of all elements. */
+  static frameScheduler = new FrameScheduler();
+  /** How long a removed element keeps its scene, in milliseconds: moving it within the page costs nothing. */
+  static releaseDelay = 1_000;
+
+  static override styles = styles;
+  static override properties: PropertyDeclarations = {
+    src: {},
+    crossorigin: {},
+    poster: {},
+    alt: {},
+    loading: {},
+    cameraControls: { type: Boolean, attribute: 'camera-controls' },
+    cameraOrbit: { attribute: 'camera-orbit' },
+    cameraTarget: { attribute: 'camera-target' },
+    fieldOfView: { attribute: 'field-of-view' },
+    minCameraOrbit: { attribute: 'min-camera-orbit' },
+    maxCameraOrbit: { attribute: 'max-camera-orbit' },
+    minFieldOfView: { attribute: 'min-field-of-view' },
+    maxFieldOfView: { attribute: 'max-field-of-view' },
+    interpolationDecay: { attribute: 'interpolation-decay' },
+    touchAction: { attribute: 'touch-action' },
+    disableZoom: { type: Boolean, attribute: 'disable-zoom' },
+    disablePan: { type: Boolean, attribute: 'disable-pan' },
+    up: {},
+    maxPixelRatio: { attribute: 'max-pixel-ratio' },
+  };
+
+  /** URL of the scene file. */
+  declare src: string | null;
+  /** As of `<img>`: `use-credentials` sends cookies to other origins. */
+  declare crossorigin: 'anonymous' | 'use-credentials' | '' | null;
+  /** URL of an image shown until the scene is. */
+  declare poster: string | null;
+  /** Text alternative. Absent: the host's `aria-label`, else "3D scene". Empty: the scene is decorative. */
+  declare alt: string | null;
+  /** `lazy`, the default, loads once the element is in sight; `eager` at once. */
+  declare loading: Loading | null;
+  /** Lets people orbit, pan and zoom with mouse, touch and keyboard. */
+  declare cameraControls: boolean;
+  /** `"theta phi radius"`; default `0deg 75deg auto`. Where the camera goes: see {@link getCameraOrbit}. */
+  declare cameraOrbit: string | null;
+  /** `"x y z"` in metres of viewer space (y up, right-handed); default `auto`, the middle of the scene. */
+  declare cameraTarget: string | null;
+  /** Vertical field of view, such as `45deg`; default `auto`. */
+  declare fieldOfView: string | null;
+  /** Least `camera-orbit`. */
+  declare minCameraOrbit: string | null;
+  /** Greatest `camera-orbit`. */
+  declare maxCameraOrbit: string | null;
+  /** Least `field-of-view`. */
+  declare minFieldOfView: string | null;
+  /** Greatest `field-of-view`. */
+  declare maxFieldOfView: string | null;
+  /** Time constant of the camera's motion in milliseconds; default 50. 0, or a wish for less motion, jumps. */
+  declare interpolationDecay: number | string | null;
+  /** One-finger moves that stay the page's; default `pan-y`, so that pages scroll. */
+  declare touchAction: TouchAction | null;
+  /** Leaves wheel and pinch to the page. */
+  declare disableZoom: boolean;
+  /** Keeps the camera's target where it is. */
+  declare disablePan: boolean;
+  /** Axis of the scene's frame that points up; default `-y`, as trainers write it. */
+  declare up: 'x' | '-x' | 'y' | '-y' | 'z' | '-z' | null;
+  /** Most drawn pixels for one CSS pixel; default no limit. */
+  declare maxPixelRatio: number | string | null;
+
+  #attributes: Attributes;
+  readonly #stage: Stage;
+  readonly #internals: ElementInternals | null;
+  readonly #warned = new Set<string>();
+
+  constructor() {
+    super();
+    // Boolean properties start as booleans: frameworks look at them to decide what a bare attribute means.
+    this.cameraControls = false;
+    this.disableZoom = false;
+    this.disablePan = false;
+    this.#attributes = this.#readAttributes();
+    this.#internals = isServer ? null : this.attachInternals();
+    this.#stage = new Stage(this, {
+      attributes: () => this.#attributes,
+      input: () => ({
+        enabled: this.cameraControls,
+        zoom: !this.disableZoom,
+        pan: !this.disablePan,
+        touchAction: this.#attributes.touchAction,
+      }),
+      services: () => this.constructor as typeof GaussianSplatElement,
+      canvas: () => this.renderRoot?.querySelector('canvas') ?? null,
+      surface: () => this.renderRoot?.querySelector<HTMLElement>('#view') ?? null,
+    });
+  }
+
+  /** True while the scene is on show. */
+  get loaded(): boolean {
+    return this.#stage.scene.state === 'ready';
+  }
+
+  /**
+   * Fulfils, and never rejects, when there is nothing left to wait for: the scene is on show ({@link loaded}), it cannot
+   * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
+   */
+  get ready(): Promise<void> {
+    return this.updateComplete.then(() => this.#stage.scene.settled);
+  }
+
+  /** Why no scene is shown, or null. */
+  get error(): ElementError | null {
+    return this.#stage.scene.error;
+  }
+
+  /** Size of the scene on show, or null. */
+  get statistics(): SceneStatistics | null {
+    const gaussians = this.#stage.scene.scene?.gaussians;
+    if (!gaussians) return null;
+    return { splats: gaussians.count, dropped: gaussians.droppedCount, bytes: gaussians.byteLength };
+  }
+
+  /** Where the camera is now; as a string, a value for `camera-orbit`. */
+  getCameraOrbit(): CameraOrbit {
+    return this.#stage.camera.orbit;
+  }
+
+  /** What the camera looks at now; as a string, a value for `camera-target`. */
+  getCameraTarget(): CameraTarget {
+    return this.#stage.camera.target;
+  }
+
+  /** Vertical field of view now; as a string, a value for `field-of-view`. */
+  getFieldOfView(): FieldOfView {
+    return this.#stage.camera.fieldOfView;
+  }
+
+  /** Ends the camera's motion where it was going. */
+  jumpCameraToGoal(): void {
+    this.#applyAttributes();
+    this.#stage.camera.jumpToGoal();
+  }
+
+  /** Brings the camera back to where the attributes put it. */
+  resetCamera(): void {
+    this.#applyAttributes();
+    this.#stage.camera.reset('none');
+  }
+
+  override focus(options?: FocusOptions): void {
+    const surface = this.renderRoot?.querySelector<HTMLElement>('#view[tabindex]');
+    if (surface) surface.focus(options);
+    else super.focus(options);
+  }
+
+  protected override willUpdate(): void {
+    this.#applyAttributes();
+  }
+
+  protected override updated(): void {
+    this.#stage.setSource(this.src);
+    this.#showStates();
+    const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
+    // Through the style object, which a strict Content-Security-Policy allows, and not the attribute, which it refuses.
+    if (bar) bar.style.transform = `scaleX(${this.#stage.progress ?? 0})`;
+  }
+
+  protected override render(): TemplateResult {
+    const { state, error } = this.#stage.scene;
+    return template({
+      label: this.alt ?? this.getAttribute?.('aria-label') ?? DEFAULT_LABEL,
+      controls: this.cameraControls,
+      poster: this.poster,
+      posterLoading: this.#attributes.loading,
+      showPoster: state !== 'ready',
+      isLoading: state === 'loading',
+      progress: this.#stage.progress,
+      error,
+    });
+  }
+
+  /** Attributes count at once for those who call a method right after setting one. */
+  #applyAttributes(): void {
+    const before = this.#attributes;
+    this.#attributes = this.#readAttributes();
+    if (JSON.stringify(before.camera) !== JSON.stringify(this.#attributes.camera)) {
+      this.#stage.camera.applySettings(this.#attributes.camera);
+    }
+  }
+
+  #readAttributes(): Attributes {
+    return readAttributes(this, (sentence) => {
+      if (this.#warned.has(sentence)) return;
+      this.#warned.add(sentence);
+      console.warn(sentence);
+    });
+  }
+
+  #showStates(): void {
+    const { state, error } = this.#stage.scene;
+    const active: Record<(typeof STATES)[number], boolean> = {
+      loading: state === 'loading',
+      ready: state === 'ready',
+      error: error !== null,
+      unsupported: error?.code === 'unsupported',
+    };
+    try {
+      for (const name of STATES) this.#internals?.states[active[name] ? 'add' : 'delete'](name);
+    } catch {
+      // Browsers before :state() accept no plain names; only styling is lost.
+    }
+  }
+}
+
+export interface GaussianSplatElement {
+  addEventListener<K extends keyof GaussianSplatEventMap>(
+    type: K,
+    listener: (this: GaussianSplatElement, event: GaussianSplatEventMap[K]) => unknown,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  removeEventListener<K extends keyof GaussianSplatEventMap>(
+    type: K,
+    listener: (this: GaussianSplatElement, event: GaussianSplatEventMap[K]) => unknown,
+    options?: boolean | EventListenerOptions,
+  ): void;
+  removeEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject,
+    options?: boolean | EventListenerOptions,
+  ): void;
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'gaussian-splat': GaussianSplatElement;
+  }
+}

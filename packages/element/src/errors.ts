@@ -1,0 +1,51 @@
+import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
+
+/** Families of failure, as `element.error.code` gives them. */
+export type ElementErrorCode = 'unsupported' | 'network' | 'decode' | 'device-lost' | 'out-of-memory';
+
+/** Why an element shows no scene. */
+export interface ElementError {
+  /** Family of the failure: what a page decides by. */
+  readonly code: ElementErrorCode;
+  /** The full, stable code, for example `network/status`. */
+  readonly reason: ErrorCode;
+  /** What was expected, what was found, where, and what to do: for the person who made the page. */
+  readonly message: string;
+  readonly cause: unknown;
+}
+
+const FAMILIES: readonly ElementErrorCode[] = ['unsupported', 'network', 'decode', 'device-lost', 'out-of-memory'];
+
+/** Any failure in the element's own terms. */
+export function toElementError(error: unknown): ElementError {
+  if (error instanceof GaussianSplatError) {
+    // The families are the element's codes; an `argument/*` error means that a scene passed its reader but not the renderer.
+    const code = FAMILIES.find((family) => family === error.family) ?? 'decode';
+    return { code, reason: error.code, message: error.message, cause: error };
+  }
+  const message = error instanceof Error ? `${error.name}: ${error.message}` : String(error);
+  return { code: 'decode', reason: 'decode/corrupt', message, cause: error };
+}
+
+/** One sentence for visitors of the page, who can mend little, by what went wrong. */
+export function visitorMessage({ code, reason }: ElementError): string {
+  switch (reason) {
+    case 'unsupported/insecure-context':
+      return 'This 3D scene needs WebGPU, which browsers offer only on secure pages: open this page over https.';
+    case 'unsupported/no-webgpu':
+      return 'This 3D scene needs WebGPU, which this browser does not have: open the page in a current Chrome, Edge, Safari or Firefox.';
+    case 'unsupported/no-adapter':
+    case 'unsupported/limits':
+      return 'This 3D scene needs WebGPU, and this browser found no graphics adapter for it: switch on hardware acceleration or update the graphics driver.';
+    default:
+      return VISITOR_MESSAGES[code];
+  }
+}
+
+const VISITOR_MESSAGES: Readonly<Record<ElementErrorCode, string>> = {
+  unsupported: 'This 3D scene needs WebGPU, which is not available here.',
+  network: 'The 3D scene could not be downloaded.',
+  decode: 'The 3D scene could not be read.',
+  'device-lost': 'The graphics device was lost. Reload the page to see the 3D scene.',
+  'out-of-memory': 'The 3D scene needs more memory than this device has.',
+};

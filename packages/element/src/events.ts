@@ -1,0 +1,32 @@
+import type { ElementError } from './errors.js';
+
+/**
+ * Who moved the camera: a person, the element itself (framing a scene or a new size), or the page's own code
+ * (attributes and methods).
+ */
+export type CameraChangeSource = 'user-interaction' | 'automatic' | 'none';
+
+export interface CameraChangeDetail {
+  readonly source: CameraChangeSource;
+}
+
+export interface LoadDetail {
+  /** Absolute URL of the scene. */
+  readonly url: string;
+}
+
+/** Events of `<gaussian-splat>`. None of them bubbles. */
+export interface GaussianSplatEventMap {
+  /** The scene's first frame is on the screen. */
+  load: CustomEvent<LoadDetail>;
+  /** Bytes have arrived. The first and the last event of a load always fire. */
+  progress: ProgressEvent;
+  /** The scene cannot be shown; the same object as `element.error`. */
+  error: CustomEvent<ElementError>;
+  /** The camera has moved; at most once a frame. */
+  'camera-change': CustomEvent<CameraChangeDetail>;
+  /** The GPU device was lost. The element recovers by itself. */
+  contextlost: Event;
+  /** The picture is back after a loss. */
+  contextrestored: Event;
+}

@@ -1,0 +1,63 @@
+/** Something that draws. */
+export interface FrameClient {
+  /** Draws one frame. Asks the scheduler again if there is to be another. `now` is requestAnimationFrame's clock, ms. */
+  drawFrame(now: number): void;
+}
+
+/** One requestAnimationFrame loop for all elements of a page; it runs only while one of them has asked for a frame. */
+export class FrameScheduler {
+  #due = new Set<FrameClient>();
+  #drawing = new Set<FrameClient>();
+  #handle = 0;
+  #waitsForPage = false;
+
+  /** Asks for one frame; asking twice is asking once. */
+  request(client: FrameClient): void {
+    this.#due.add(client);
+    this.#schedule();
+  }
+
+  /** Takes back what was asked for. */
+  cancel(client: FrameClient): void {
+    this.#due.delete(client);
+    this.#drawing.delete(client);
+    if (this.#due.size > 0 || this.#handle === 0) return;
+    cancelAnimationFrame(this.#handle);
+    this.#handle = 0;
+  }
+
+  #schedule(): void {
+    if (this.#handle !== 0 || this.#due.size === 0) return;
+    if (document.visibilityState === 'hidden') this.#waitForPage();
+    else this.#handle = requestAnimationFrame(this.#tick);
+  }
+
+  #waitForPage(): void {
+    if (this.#waitsForPage) return;
+    this.#waitsForPage = true;
+    const resume = (): void => {
+      this.#waitsForPage = false;
+      this.#schedule();
+    };
+    document.addEventListener('visibilitychange', resume, { once: true });
+  }
+
+  readonly #tick = (now: number): void => {
+    this.#handle = 0;
+    if (document.visibilityState !== 'hidden') this.#drawAll(now);
+    this.#schedule();
+  };
+
+  #drawAll(now: number): void {
+    [this.#due, this.#drawing] = [this.#drawing, this.#due];
+    for (const client of this.#drawing) {
+      try {
+        client.drawFrame(now);
+      } catch (error) {
+        // One element's fault must not stop the others.
+        reportError(error);
+      }
+    }
+    this.#drawing.clear();
+  }
+}

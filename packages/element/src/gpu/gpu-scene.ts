@@ -1,0 +1,130 @@
+import { GaussianSplatError, type Bounds } from '@gaussian-splat/core';
+import { GaussianBuffers, Renderer, type FrameRequest } from '@gaussian-splat/renderer';
+import type { LoadedScene, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+import { assertWebGpu } from './request-device.js';
+import type { DeviceLease, SharedDevice } from './shared-device.js';
+
+/**
+ * A scene on the GPU: its splats, the renderer that draws them (whose buffers fit this scene and this picture size,
+ * and so cannot be shared), and the lease that keeps the device.
+ */
+export class GpuScene {
+  readonly bounds: Bounds;
+  readonly gaussians: GaussianBuffers;
+  readonly #renderer: Renderer;
+  readonly #lease: DeviceLease;
+  #destroyed = false;
+
+  constructor(lease: DeviceLease, gaussians: GaussianBuffers, bounds: Bounds) {
+    this.#lease = lease;
+    this.gaussians = gaussians;
+    this.bounds = bounds;
+    this.#renderer = new Renderer(lease.device);
+  }
+
+  get device(): GPUDevice {
+    return this.#lease.device;
+  }
+
+  get isLost(): boolean {
+    return this.#lease.isLost;
+  }
+
+  /** Fulfils when the device is lost. */
+  get lost(): Promise<GPUDeviceLostInfo> {
+    return this.#lease.lost;
+  }
+
+  get isDestroyed(): boolean {
+    return this.#destroyed;
+  }
+
+  /** Encodes and submits one frame. */
+  render(frame: Omit<FrameRequest, 'gaussians'>): void {
+    this.#renderer.render({ ...frame, gaussians: this.gaussians });
+  }
+
+  /**
+   * Renders the first frame, for which the renderer allocates its buffers, and waits until the GPU has finished it.
+   * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU tells of a failed allocation only through a scope.
+   */
+  async renderFirst(frame: Omit<FrameRequest, 'gaussians'>): Promise<void> {
+    const { device } = this;
+    device.pushErrorScope('out-of-memory');
+    let refusal: Promise<GPUError | null>;
+    try {
+      this.render(frame);
+    } finally {
+      // A lost device closes no scopes; its loss is reported elsewhere.
+      refusal = device.popErrorScope().catch(() => null);
+    }
+    const error = await refusal;
+    if (error !== null) throw outOfMemory(error);
+    await device.queue.onSubmittedWorkDone().catch(() => undefined);
+  }
+
+  /** Frees the GPU memory and lets go of the device. */
+  destroy(): void {
+    if (this.#destroyed) return;
+    this.#destroyed = true;
+    this.#renderer.destroy();
+    this.gaussians.destroy();
+    this.#lease.release();
+  }
+}
+
+export interface OpenOptions {
+  readonly device: SharedDevice;
+  readonly loader: SceneLoader;
+  readonly signal: AbortSignal;
+  readonly onProgress: ProgressListener;
+  /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. */
+  readonly beforeUpload: () => void;
+}
+
+/** Device and file at the same time, then the upload. Rejects with GaussianSplatError or the signal's reason. */
+export async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+  // Known at once, and then not a byte is fetched.
+  assertWebGpu();
+  // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
+  const abort = new AbortController();
+  const giveUp = (): void => abort.abort(options.signal.reason);
+  options.signal.addEventListener('abort', giveUp, { once: true });
+  const acquiring = options.device.acquire();
+  const loading = options.loader.load(request, abort.signal, options.onProgress);
+  try {
+    const [lease, scene] = await Promise.all([acquiring, loading]);
+    options.signal.throwIfAborted();
+    options.beforeUpload();
+    return await upload(lease, scene, options.signal);
+  } catch (error) {
+    abort.abort(error);
+    acquiring.then((lease) => lease.release(), ignore);
+    loading.catch(ignore);
+    throw error;
+  } finally {
+    options.signal.removeEventListener('abort', giveUp);
+  }
+}
+
+async function upload(lease: DeviceLease, { packed, bounds }: LoadedScene, signal: AbortSignal): Promise<GpuScene> {
+  const gaussians = await GaussianBuffers.upload(lease.device, packed);
+  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds);
+  gaussians.destroy();
+  throw signal.reason;
+}
+
+function outOfMemory(cause: GPUError): GaussianSplatError {
+  return new GaussianSplatError('out-of-memory/allocation', {
+    where: 'first frame',
+    expected: 'enough free GPU memory',
+    found: cause.message || 'an allocation that failed',
+    remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
+    cause,
+  });
+}
+
+function ignore(): void {
+  // The failure that matters has been thrown already.
+}

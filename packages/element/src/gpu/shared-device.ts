@@ -1,0 +1,105 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { requestGpuDevice } from './request-device.js';
+
+/** A share in the page's GPU device. */
+export interface DeviceLease {
+  readonly device: GPUDevice;
+  /** Fulfils when the device is lost, for whatever reason other than its last lease having been released. */
+  readonly lost: Promise<GPUDeviceLostInfo>;
+  /** True once the device is lost. */
+  readonly isLost: boolean;
+  /** Gives the share back; the last one destroys the device. Further calls do nothing. */
+  release(): void;
+}
+
+/** One device, and the number of leases that keep it. */
+class DeviceSession {
+  users = 0;
+  isLost = false;
+  isClosed = false;
+  readonly device: GPUDevice;
+  readonly lost: Promise<GPUDeviceLostInfo>;
+
+  constructor(device: GPUDevice) {
+    this.device = device;
+    this.lost = new Promise((resolve) => {
+      void device.lost.then((info) => {
+        this.isLost = true;
+        if (!this.isClosed) resolve(info);
+      });
+    });
+  }
+
+  close(): void {
+    this.isClosed = true;
+    this.device.destroy();
+  }
+}
+
+/**
+ * One GPU device for all elements of a page: requested when the first of them needs it, destroyed when the last has
+ * let go, requested anew after a loss.
+ */
+export class SharedDevice {
+  readonly #request: () => Promise<GPUDevice>;
+  #session: Promise<DeviceSession> | null = null;
+
+  /** @param request where devices come from; a page with a device of its own, or a test, passes another source. */
+  constructor(request: () => Promise<GPUDevice> = requestGpuDevice) {
+    this.#request = request;
+  }
+
+  /** A share in the device. Rejects with GaussianSplatError `unsupported/*` where there is none to be had. */
+  async acquire(): Promise<DeviceLease> {
+    const opening = (this.#session ??= this.#open());
+    let session: DeviceSession;
+    try {
+      session = await opening;
+    } catch (error) {
+      throw error instanceof GaussianSplatError ? error : noDevice(error);
+    }
+    // Its last user may have closed it while we waited.
+    if (session.isClosed) return this.acquire();
+    session.users++;
+    return this.#lease(session, opening);
+  }
+
+  #open(): Promise<DeviceSession> {
+    const opening = this.#request().then((device) => new DeviceSession(device));
+    const forget = (): void => this.#forget(opening);
+    opening.then((session) => session.device.lost.then(forget), forget);
+    return opening;
+  }
+
+  #forget(opening: Promise<DeviceSession>): void {
+    if (this.#session === opening) this.#session = null;
+  }
+
+  #lease(session: DeviceSession, opening: Promise<DeviceSession>): DeviceLease {
+    let released = false;
+    return {
+      device: session.device,
+      lost: session.lost,
+      get isLost() {
+        return session.isLost;
+      },
+      release: () => {
+        if (released) return;
+        released = true;
+        if (--session.users > 0) return;
+        this.#forget(opening);
+        session.close();
+      },
+    };
+  }
+}
+
+function noDevice(cause: unknown): GaussianSplatError {
+  return new GaussianSplatError('unsupported/no-adapter', {
+    where: 'the graphics adapter',
+    expected: 'a WebGPU device',
+    found: cause instanceof Error ? cause.message : String(cause),
+    remedy: 'reload the page, or update the graphics driver',
+    cause,
+  });
+}

@@ -1,0 +1,75 @@
+/** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
+import { boundsOf, GaussianSplatError } from '@gaussian-splat/core';
+import { fetchScene, readScene } from '@gaussian-splat/formats';
+import { packGaussians } from '@gaussian-splat/renderer';
+import type { LoadedScene, ProgressListener, SceneRequest } from './protocol.js';
+
+/** Milliseconds between two progress reports: chunks may arrive by the thousand. */
+const PROGRESS_INTERVAL_MS = 50;
+
+/**
+ * Loads one scene. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's
+ * reason once that is aborted.
+ */
+export async function loadScene(
+  request: SceneRequest,
+  signal: AbortSignal,
+  onProgress: ProgressListener,
+): Promise<LoadedScene> {
+  try {
+    const { url, credentials } = request;
+    const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress: throttled(onProgress) });
+    const cloud = await readScene(bytes, { name: fileName(url), signal });
+    signal.throwIfAborted();
+    return { packed: packGaussians(cloud), bounds: boundsOf(cloud) };
+  } catch (error) {
+    signal.throwIfAborted();
+    throw named(error, fileName(request.url));
+  }
+}
+
+/** Last part of the URL's path: what people call the file, and whose extension tells formats without a signature. */
+function fileName(url: string): string {
+  if (!URL.canParse(url) || url.startsWith('data:')) return url.slice(0, 80);
+  return decodeURIComponentSafely(new URL(url).pathname.split('/').pop() ?? '') || url;
+}
+
+function decodeURIComponentSafely(text: string): string {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
+
+/** Lets the first and the last report through and few of those between. */
+function throttled(onProgress: ProgressListener): ProgressListener {
+  let last = -Infinity;
+  return (loaded, total) => {
+    const now = performance.now();
+    if (loaded !== total && now - last < PROGRESS_INTERVAL_MS) return;
+    last = now;
+    onProgress(loaded, total);
+  };
+}
+
+/** Errors that no reader named: memory that was not to be had, or a fault of ours that the file brought to light. */
+function named(error: unknown, where: string): GaussianSplatError {
+  if (error instanceof GaussianSplatError) return error;
+  if (error instanceof RangeError) {
+    return new GaussianSplatError('out-of-memory/allocation', {
+      where,
+      expected: 'memory enough to unpack the scene',
+      found: error.message,
+      remedy: 'use a smaller scene, or close other pages',
+      cause: error,
+    });
+  }
+  return new GaussianSplatError('decode/corrupt', {
+    where,
+    expected: 'a scene that can be read',
+    found: error instanceof Error ? `${error.name}: ${error.message}` : String(error),
+    remedy: 'check the file in another viewer; if it opens there, report it with this message',
+    cause: error,
+  });
+}

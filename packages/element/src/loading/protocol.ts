@@ -1,0 +1,29 @@
+/** What the page and the scene worker say to each other. */
+import type { Bounds, ErrorData } from '@gaussian-splat/core';
+import type { PackedGaussians } from '@gaussian-splat/renderer';
+
+/** A scene to fetch. */
+export interface SceneRequest {
+  /** Absolute URL: a worker's own base URL is not the page's. */
+  readonly url: string;
+  /** Fetch's credentials mode, from the `crossorigin` attribute. */
+  readonly credentials: RequestCredentials;
+}
+
+/** A scene, fetched and packed, ready for upload. */
+export interface LoadedScene {
+  readonly packed: PackedGaussians;
+  readonly bounds: Bounds;
+}
+
+export type ProgressListener = (loaded: number, total: number | undefined) => void;
+
+export type PageMessage =
+  | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest }
+  | { readonly type: 'cancel'; readonly id: number };
+
+export type WorkerMessage =
+  | { readonly type: 'ready' }
+  | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }
+  | { readonly type: 'scene'; readonly id: number; readonly scene: LoadedScene }
+  | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };

@@ -1,0 +1,107 @@
+import { css } from 'lit';
+
+/** Size and containment as an image has them; everything that a page may want to change is a custom property or a part. */
+export const styles = css`
+  :host {
+    display: block;
+    position: relative;
+    width: 300px;
+    height: 150px;
+    contain: strict;
+  }
+  :host([hidden]) {
+    display: none;
+  }
+  .view,
+  .layer {
+    position: absolute;
+    inset: 0;
+  }
+  .view:focus-visible {
+    outline: auto;
+    outline-offset: -2px;
+  }
+  .interactive {
+    cursor: grab;
+    user-select: none;
+    -webkit-user-select: none;
+  }
+  .interactive:active {
+    cursor: grabbing;
+  }
+  canvas {
+    display: block;
+    width: 100%;
+    height: 100%;
+  }
+  .layer {
+    pointer-events: none;
+  }
+  .poster {
+    transition:
+      opacity var(--poster-transition, 0.3s),
+      visibility var(--poster-transition, 0.3s);
+  }
+  .poster img,
+  .poster ::slotted(*) {
+    display: block;
+    width: 100%;
+    height: 100%;
+    object-fit: var(--poster-fit, cover);
+  }
+  .gone {
+    opacity: 0;
+    visibility: hidden;
+  }
+  .progress {
+    inset: auto 0 0;
+  }
+  [part='progress-track'] {
+    height: var(--progress-bar-height, 4px);
+    overflow: hidden;
+    background: var(--progress-track-color, rgb(128 128 128 / 0.3));
+  }
+  [part='progress-bar'] {
+    height: 100%;
+    width: 100%;
+    transform-origin: 0 0;
+    background: var(--progress-bar-color, rgb(0 110 220));
+  }
+  .message {
+    display: flex;
+    align-items: center;
+    justify-content: center;
+    padding: 1em;
+    overflow: auto;
+    pointer-events: auto;
+  }
+  [part='fallback'],
+  [part='error'] {
+    max-width: 40em;
+    padding: 0.75em 1em;
+    border-radius: 6px;
+    background: var(--message-background, rgb(255 255 255 / 0.92));
+    color: var(--message-color, rgb(30 30 30));
+    font: var(--message-font, 0.875rem/1.4 system-ui, sans-serif);
+    overflow-wrap: anywhere;
+  }
+  p {
+    margin: 0;
+  }
+  p + details {
+    margin-top: 0.5em;
+  }
+  .for-screen-readers {
+    position: absolute;
+    width: 1px;
+    height: 1px;
+    overflow: hidden;
+    clip-path: inset(50%);
+    white-space: nowrap;
+  }
+  @media (prefers-reduced-motion: reduce) {
+    .poster {
+      transition: none;
+    }
+  }
+`;

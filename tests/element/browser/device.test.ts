@@ -1,0 +1,211 @@
+import '@gaussian-splat/element';
+import { GaussianSplatElement, SharedDevice } from '@gaussian-splat/element';
+import { assert, assertEqual, COMPASS, delay, devices, FIXTURES, frames, nextEvent, show, showLoaded, until } from './support/harness.js';
+import { isGreen, isRed, screenOf } from './support/screen.js';
+
+/** Runs work with another answer of the browser to the question for a GPU. */
+async function withGpu(gpu: unknown, work: () => Promise<void>): Promise<void> {
+  const sharedDevice = GaussianSplatElement.sharedDevice;
+  GaussianSplatElement.sharedDevice = new SharedDevice();
+  Object.defineProperty(navigator, 'gpu', { configurable: true, get: () => gpu });
+  try {
+    await work();
+  } finally {
+    Reflect.deleteProperty(navigator, 'gpu');
+    GaussianSplatElement.sharedDevice = sharedDevice;
+  }
+}
+
+describe('one device', () => {
+  it('serves all elements of the page', async () => {
+    const before = devices.length;
+    const elements = Array.from({ length: 12 }, (_, i) =>
+      show({ src: i % 2 ? `${FIXTURES}green.splat` : COMPASS }, 'display: inline-block; width: 60px; height: 50px'),
+    );
+    await Promise.all(elements.map((element) => element.ready));
+    assert(elements.every((element) => element.loaded), 'all loaded');
+    assert(devices.length - before <= 1, `${devices.length - before} new devices`);
+    for (const [i, element] of elements.entries()) {
+      const screen = await screenOf(element);
+      assert(screen.middleOf(i % 2 ? isGreen : isRed), `element ${i} is seen`);
+    }
+  });
+
+  it('may be the page\'s own', async () => {
+    const original = GaussianSplatElement.sharedDevice;
+    const adapter = await navigator.gpu.requestAdapter();
+    assert(adapter, 'an adapter');
+    const own = await adapter.requestDevice();
+    GaussianSplatElement.sharedDevice = new SharedDevice(async () => own);
+    try {
+      const before = devices.length;
+      await showLoaded();
+      assertEqual(devices.length - before, 0, 'new devices');
+    } finally {
+      GaussianSplatElement.sharedDevice = original;
+    }
+  });
+});
+
+describe('the loss of the device', () => {
+  it('is recovered from in silence: the same picture, one pair of events', async () => {
+    const element = await showLoaded({ 'camera-orbit': '20deg 60deg 80%' });
+    const before = await screenOf(element);
+    const seen: string[] = [];
+    for (const type of ['contextlost', 'contextrestored', 'load', 'error', 'progress']) {
+      element.addEventListener(type, () => seen.push(type));
+    }
+    devices[devices.length - 1].destroy();
+    await nextEvent(element, 'contextrestored');
+    assertEqual(seen, ['contextlost', 'contextrestored'], 'events');
+    assertEqual((await screenOf(element)).differences(before), 0, 'differing colour values');
+    assert(element.loaded && element.error === null, 'loaded');
+  });
+
+  it('leaves the camera where a person has put it', async () => {
+    const element = await showLoaded({ 'camera-controls': '' });
+    element.shadowRoot?.querySelector('#view')?.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight' }));
+    element.jumpCameraToGoal();
+    const before = String(element.getCameraOrbit());
+    devices[devices.length - 1].destroy();
+    await nextEvent(element, 'contextrestored');
+    assertEqual(String(element.getCameraOrbit()), before);
+  });
+
+  it('ten times, every other time again in the middle of the recovery, ends with the same picture', async () => {
+    const element = await showLoaded();
+    const before = await screenOf(element);
+    const seen: string[] = [];
+    for (const type of ['contextlost', 'contextrestored', 'error']) element.addEventListener(type, () => seen.push(type));
+    for (let i = 0; i < 10; i++) {
+      const restored = nextEvent(element, 'contextrestored');
+      const count = devices.length;
+      devices[count - 1].destroy();
+      if (i % 2) {
+        await until(() => devices.length > count, 'a new device');
+        await delay(5 * i);
+        devices[devices.length - 1].destroy();
+      }
+      await restored;
+      await frames(2);
+      // The second loss may have come after the recovery; then another pair follows.
+      await until(() => seen[seen.length - 1] === 'contextrestored', 'the last recovery');
+      assertEqual((await screenOf(element)).differences(before), 0, `differing colour values after loss ${i}`);
+    }
+    assert(seen.length >= 20 && seen.every((type, i) => type === ['contextlost', 'contextrestored'][i % 2]), seen.join());
+  });
+
+  it('of several elements brings all of them back on one new device', async () => {
+    const elements = await Promise.all([showLoaded(), showLoaded(), showLoaded({ src: `${FIXTURES}green.splat` })]);
+    const before = devices.length;
+    devices[before - 1].destroy();
+    await Promise.all(elements.map((element) => nextEvent(element, 'contextrestored')));
+    assertEqual(devices.length - before, 1, 'new devices');
+  });
+
+  it('that lasts is an error after two tries: device-lost', async () => {
+    const original = GaussianSplatElement.sharedDevice;
+    let requests = 0;
+    const { gpu } = navigator;
+    GaussianSplatElement.sharedDevice = new SharedDevice(async () => {
+      if (requests++ > 0) throw new Error('the GPU process does not answer');
+      const adapter = await gpu.requestAdapter();
+      assert(adapter, 'an adapter');
+      return adapter.requestDevice();
+    });
+    try {
+      const element = await showLoaded();
+      devices[devices.length - 1].destroy();
+      await nextEvent(element, 'error');
+      assertEqual([element.error?.code, element.error?.reason], ['device-lost', 'device-lost/unrecoverable'], 'codes');
+      assertEqual(requests, 3, 'requests for a device');
+      assertEqual(element.loaded, false, 'loaded');
+    } finally {
+      GaussianSplatElement.sharedDevice = original;
+    }
+  });
+
+  it('that comes with every first frame is an error too, not a loop', async () => {
+    const original = GaussianSplatElement.sharedDevice;
+    let requests = 0;
+    GaussianSplatElement.sharedDevice = new SharedDevice(async () => {
+      requests++;
+      const device = await (await navigator.gpu.requestAdapter())?.requestDevice();
+      assert(device, 'a device');
+      device.destroy();
+      return device;
+    });
+    try {
+      const element = show({ src: COMPASS });
+      await nextEvent(element, 'error');
+      assertEqual([element.error?.reason, requests], ['device-lost/unrecoverable', 2], 'reason and requests');
+    } finally {
+      GaussianSplatElement.sharedDevice = original;
+    }
+  });
+});
+
+describe('without WebGPU', () => {
+  const cases: Readonly<Record<string, readonly [gpu: unknown, reason: string, text: RegExp]>> = {
+    'no API': [undefined, 'unsupported/no-webgpu', /current Chrome/],
+    'no adapter': [{ requestAdapter: async () => null }, 'unsupported/no-adapter', /hardware acceleration/],
+    'no device': [
+      { requestAdapter: async () => ({ features: new Set(), limits: {}, requestDevice: () => Promise.reject(new Error('busy')) }) },
+      'unsupported/limits',
+      /graphics driver/,
+    ],
+  };
+  for (const [name, [gpu, reason, text]] of Object.entries(cases)) {
+    it(`${name}: the fallback says why, the poster stays, the page lives on`, async () => {
+      await withGpu(gpu, async () => {
+        const element = show({ src: COMPASS, poster: 'data:image/gif;base64,R0lGODlhAQABAAAAACw=' });
+        await nextEvent(element, 'error');
+        await element.ready;
+        await element.updateComplete;
+        assertEqual([element.error?.code, element.error?.reason], ['unsupported', reason], 'codes');
+        assert(element.matches(':state(unsupported)') && element.matches(':state(error)'), 'states');
+        const fallback = element.shadowRoot?.querySelector('slot[name=fallback] [part=fallback]')?.textContent ?? '';
+        assert(text.test(fallback), fallback);
+        assert(element.shadowRoot?.querySelector('.poster:not(.gone) img'), 'the poster is there');
+      });
+    });
+  }
+
+  it('not a byte of the scene is fetched', async () => {
+    await withGpu(undefined, async () => {
+      const src = `${COMPASS}?unfetched`;
+      const element = show({ src });
+      await nextEvent(element, 'error');
+      await delay(200);
+      const fetched = performance.getEntriesByType('resource').filter(({ name }) => name.includes('unfetched'));
+      assertEqual(fetched.length, 0, 'requests');
+    });
+  });
+
+  it('the page\'s own fallback takes the place of the default', async () => {
+    await withGpu(undefined, async () => {
+      const element = show({ src: COMPASS });
+      const own = document.createElement('p');
+      own.slot = 'fallback';
+      own.textContent = 'A picture instead';
+      element.append(own);
+      await nextEvent(element, 'error');
+      await element.updateComplete;
+      const slot = element.shadowRoot?.querySelector<HTMLSlotElement>('slot[name=fallback]');
+      assertEqual(slot?.assignedElements().length, 1, 'slotted elements');
+    });
+  });
+
+  it('an insecure page is told to use https', async () => {
+    Object.defineProperty(window, 'isSecureContext', { configurable: true, get: () => false });
+    try {
+      await withGpu(undefined, async () => {
+        const element = show({ src: COMPASS });
+        await nextEvent(element, 'error');
+        assertEqual(element.error?.reason, 'unsupported/insecure-context');
+      });
+    } finally {
+      Reflect.deleteProperty(window, 'isSecureContext');
+    }
+  });
+});

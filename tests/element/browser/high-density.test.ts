@@ -1,0 +1,48 @@
+/** Runs in a browser whose screen has two device pixels for each CSS pixel: see web-test-runner.config.mjs. */
+import '@gaussian-splat/element';
+import { assert, assertEqual, showLoaded, until } from './support/harness.js';
+
+const canvasOf = (element: Element): HTMLCanvasElement | null | undefined => element.shadowRoot?.querySelector('canvas');
+
+describe('on a dense screen', () => {
+  it('the screen is one', () => {
+    assertEqual(devicePixelRatio, 2);
+  });
+
+  it('every device pixel is drawn, up to max-pixel-ratio', async () => {
+    const element = await showLoaded();
+    assertEqual([canvasOf(element)?.width, canvasOf(element)?.height], [240, 200], 'canvas');
+    element.maxPixelRatio = 1.5;
+    await until(() => canvasOf(element)?.width === 180, 'one and a half pixels for each');
+    assertEqual(canvasOf(element)?.height, 150, 'height');
+    element.maxPixelRatio = 8;
+    await until(() => canvasOf(element)?.width === 240, 'no more than there are');
+  });
+
+  it('also in a browser that does not tell device pixels, and when the ratio changes there', async () => {
+    const observe = ResizeObserver.prototype.observe;
+    const matchMediaBefore = window.matchMedia;
+    const queries: MediaQueryList[] = [];
+    ResizeObserver.prototype.observe = function observeAsSafari(target, options) {
+      if (options?.box === 'device-pixel-content-box') throw new TypeError('unknown box');
+      observe.call(this, target, options);
+    };
+    window.matchMedia = (query) => {
+      const list = matchMediaBefore.call(window, query);
+      if (query.includes('resolution')) queries.push(list);
+      return list;
+    };
+    try {
+      const element = await showLoaded();
+      assertEqual(canvasOf(element)?.width, 240, 'width');
+      assert(queries.length === 1 && queries[0].matches, 'it watches the ratio of this screen');
+      Object.defineProperty(window, 'devicePixelRatio', { configurable: true, get: () => 3 });
+      queries[0].dispatchEvent(new Event('change'));
+      await until(() => canvasOf(element)?.width === 360, 'three times the pixels');
+    } finally {
+      Reflect.deleteProperty(window, 'devicePixelRatio');
+      ResizeObserver.prototype.observe = observe;
+      window.matchMedia = matchMediaBefore;
+    }
+  });
+});

@@ -1,0 +1,214 @@
+import '@gaussian-splat/element';
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import { assert, assertEqual, COMPASS, delay, devices, FIXTURES, frames, nextEvent, show, showLoaded, submits, until } from './support/harness.js';
+import { isGreen, isRed, screenOf } from './support/screen.js';
+
+const canvasOf = (element: GaussianSplatElement): HTMLCanvasElement => {
+  const canvas = element.shadowRoot?.querySelector('canvas');
+  assert(canvas, 'a canvas');
+  return canvas;
+};
+const canvasSize = (element: GaussianSplatElement): [number, number] => [canvasOf(element).width, canvasOf(element).height];
+
+/** Runs work with the page hidden, as far as scripts can tell. */
+async function whileHidden(work: () => Promise<void>): Promise<void> {
+  Object.defineProperty(document, 'visibilityState', { configurable: true, get: () => 'hidden' });
+  document.dispatchEvent(new Event('visibilitychange'));
+  try {
+    await work();
+  } finally {
+    Reflect.deleteProperty(document, 'visibilityState');
+    document.dispatchEvent(new Event('visibilitychange'));
+  }
+}
+
+describe('power', () => {
+  it('an idle page submits nothing to the GPU for 3 s', async () => {
+    await showLoaded({ 'camera-controls': '' });
+    await showLoaded({ src: `${FIXTURES}green.splat` });
+    await frames(5);
+    const before = submits;
+    assert(before > 0, 'the counter counts');
+    await delay(3_000);
+    assertEqual(submits - before, 0, 'submits');
+  });
+
+  it('a motion draws until it has come to rest, then stops', async () => {
+    const element = await showLoaded();
+    let changes = 0;
+    element.addEventListener('camera-change', () => changes++);
+    const before = submits;
+    element.cameraOrbit = '40deg 75deg auto';
+    await until(() => Math.abs(element.getCameraOrbit().theta - (40 * Math.PI) / 180) < 1e-12, 'the goal');
+    await frames(3);
+    assert(changes > 5, `${changes} camera-change events`);
+    assertEqual(submits - before, changes, 'one submit for each change');
+    const after = submits;
+    await delay(500);
+    assertEqual(submits - after, 0, 'submits at rest');
+  });
+
+  it('a hidden page draws nothing, and catches up when it is seen again', async () => {
+    const element = await showLoaded({ 'interpolation-decay': '0' });
+    await frames(3);
+    let before = submits;
+    await whileHidden(async () => {
+      element.cameraOrbit = '40deg 75deg auto';
+      await delay(300);
+      assertEqual(submits - before, 0, 'submits while hidden');
+      before = submits;
+    });
+    await until(() => submits > before, 'a frame');
+    assert(Math.abs(element.getCameraOrbit().theta - (40 * Math.PI) / 180) < 1e-12, 'at the new place');
+  });
+
+  it('off screen nothing is drawn', async () => {
+    const element = await showLoaded({ 'interpolation-decay': '0' });
+    element.style.marginTop = '5000px';
+    await delay(200);
+    const before = submits;
+    element.cameraOrbit = '40deg 75deg auto';
+    await delay(300);
+    assertEqual(submits - before, 0, 'submits');
+    element.style.marginTop = '';
+    await until(() => submits > before, 'a frame once it is back');
+  });
+
+  it('a lazy element off screen fetches nothing; an eager one is ready before it is seen', async () => {
+    let progress = 0;
+    const below = 'width: 100px; height: 100px; margin-top: 5000px';
+    const lazy = show({ src: COMPASS }, below);
+    lazy.addEventListener('progress', () => progress++);
+    const eager = show({ src: COMPASS, loading: 'eager' }, below);
+    await eager.ready;
+    assert(eager.loaded, 'the eager one is loaded');
+    assertEqual(progress, 0, 'progress of the lazy one');
+    lazy.style.marginTop = '0';
+    await lazy.ready;
+    assert(lazy.loaded, 'the lazy one loads in sight');
+  });
+});
+
+describe('size', () => {
+  it('follows the element, and the picture with it', async () => {
+    const element = await showLoaded();
+    assertEqual(canvasSize(element), [120, 100], 'at first');
+    element.style.width = '200px';
+    await until(() => canvasOf(element).width === 200, 'a wider canvas');
+    const screen = await screenOf(element);
+    const red = screen.middleOf(isRed);
+    assert(red && red.x > 110, `red at ${red?.x}`);
+    assertEqual(screen.differences(await screenOf(element)), 0, 'differences of two pictures');
+  });
+
+  it('without size draws nothing, yet is loaded, and draws when it gets one', async () => {
+    const before = submits;
+    const element = show({ src: COMPASS, loading: 'eager' }, 'display: none');
+    await element.ready;
+    assert(element.loaded, 'loaded');
+    assertEqual(submits - before, 0, 'submits');
+    element.style.cssText = 'width: 80px; height: 60px';
+    await until(() => submits > before, 'a frame');
+    assertEqual(canvasSize(element), [80, 60], 'canvas');
+    element.style.width = '0';
+    await delay(200);
+    const zero = submits;
+    element.cameraOrbit = '90deg auto auto';
+    await delay(200);
+    assertEqual(submits - zero, 0, 'submits at width 0');
+  });
+
+  it('follows the zoom of the page', async () => {
+    const element = await showLoaded();
+    document.body.style.zoom = '1.5';
+    try {
+      await until(() => canvasOf(element).width === 180, 'one and a half times the pixels');
+      assertEqual([element.clientWidth, ...canvasSize(element)], [120, 180, 150], 'CSS width and canvas');
+    } finally {
+      document.body.style.zoom = '';
+    }
+    await until(() => canvasOf(element).width === 120, 'the old size');
+  });
+
+  it('is 300 x 150 without a style, as other embedded content', async () => {
+    const element = show({}, '');
+    assertEqual([element.clientWidth, element.clientHeight], [300, 150]);
+  });
+});
+
+describe('moves and removals', () => {
+  const alive = (): number => devices.length;
+
+  it('a move within the page costs nothing', async () => {
+    const element = await showLoaded();
+    let progress = 0;
+    element.addEventListener('progress', () => progress++);
+    const before = alive();
+    const box = document.createElement('div');
+    document.body.append(box);
+    box.append(element);
+    await delay(300);
+    assert(element.loaded, 'still loaded');
+    assertEqual([progress, alive() - before], [0, 0], 'progress events and new devices');
+    assert((await screenOf(element)).middleOf(isRed), 'still seen');
+  });
+
+  it('a removed element frees its GPU memory, and loads anew when it is put back', async () => {
+    const delayBefore = GaussianSplatElement.releaseDelay;
+    GaussianSplatElement.releaseDelay = 50;
+    try {
+      const element = await showLoaded({ src: `${FIXTURES}green.splat` });
+      const device = devices[devices.length - 1];
+      let isLost = false;
+      void device.lost.then(({ reason }) => (isLost = reason === 'destroyed'));
+      element.remove();
+      await element.updateComplete;
+      await until(() => isLost, 'the last user to have destroyed the device');
+      assertEqual([element.loaded, element.statistics], [false, null], 'after the delay');
+      document.body.append(element);
+      await nextEvent(element, 'load');
+      assert(isGreen((await screenOf(element)).at(60, 50)), 'seen again');
+    } finally {
+      GaussianSplatElement.releaseDelay = delayBefore;
+    }
+  });
+
+  it('a removal in the middle of loading ends it, and ready still settles', async () => {
+    const delayBefore = GaussianSplatElement.releaseDelay;
+    GaussianSplatElement.releaseDelay = 0;
+    try {
+      const element = show({ src: '/net/slow/compass.ply?ms=1500' });
+      let events = 0;
+      await nextEvent(element, 'progress');
+      for (const type of ['progress', 'load', 'error']) element.addEventListener(type, () => events++);
+      element.remove();
+      await element.ready;
+      events = 0;
+      await delay(1_800);
+      assertEqual([element.loaded, events], [false, 0], 'loaded, events');
+    } finally {
+      GaussianSplatElement.releaseDelay = delayBefore;
+    }
+  });
+
+  it('40 rounds of putting in and taking out leave one device, or none', async () => {
+    const delayBefore = GaussianSplatElement.releaseDelay;
+    GaussianSplatElement.releaseDelay = 0;
+    const lost = new Set<GPUDevice>();
+    const first = devices.length;
+    try {
+      for (let round = 0; round < 40; round++) {
+        const element = show({ src: COMPASS, loading: 'eager' });
+        if (round % 4 === 0) await element.ready;
+        else await delay(round);
+        element.remove();
+      }
+      for (const device of devices) void device.lost.then(() => lost.add(device));
+      await until(() => devices.every((device) => lost.has(device)), 'all devices to be destroyed');
+    } finally {
+      GaussianSplatElement.releaseDelay = delayBefore;
+    }
+    assert(devices.length > first, 'there were devices');
+    await showLoaded();
+  });
+});

@@ -1,0 +1,213 @@
+import '@gaussian-splat/element';
+import type { ElementError, GaussianSplatElement } from '@gaussian-splat/element';
+import { assert, assertEqual, COMPASS, delay, FIXTURES, frames, nextEvent, show, showLoaded, until } from './support/harness.js';
+import { isBlue, isGreen, isRed, screenOf } from './support/screen.js';
+
+const states = (element: GaussianSplatElement): string[] =>
+  ['loading', 'ready', 'error', 'unsupported'].filter((state) => element.matches(`:state(${state})`));
+
+describe('a scene', () => {
+  it('is drawn the right way round, on the page\'s own background', async () => {
+    const element = await showLoaded({}, 'width: 120px; height: 120px; background: rgb(200, 100, 220)');
+    const screen = await screenOf(element);
+    const [red, blue, green] = [isRed, isBlue, isGreen].map((rule) => screen.middleOf(rule));
+    assert(red && blue && green, 'three balls are seen');
+    // The camera looks along +z of the file, from above: +x is right, -y is up.
+    assert(red.x > 70 && blue.x < 50, `red ${red.x}, blue ${blue.x}`);
+    assert(green.y < 50 && Math.abs(green.x - 60) < 3, `green ${green.x}, ${green.y}`);
+    assertEqual(screen.at(2, 2), [200, 100, 220], 'background in the corner');
+    const between = screen.at(60, 45);
+    assert(Math.abs(between[0] - between[2]) < 60, `no colour fringe at a half-transparent pixel: ${between.join()}`);
+  });
+
+  it('fires first and last progress, then load, none of which bubbles', async () => {
+    const seen: string[] = [];
+    const onBody = (event: Event): void => void seen.push(`bubbled ${event.type}`);
+    for (const type of ['load', 'progress', 'error', 'camera-change']) document.body.addEventListener(type, onBody);
+    const element = show({ src: '/net/slow/compass.ply?ms=400' });
+    const progress: ProgressEvent[] = [];
+    element.addEventListener('progress', (event) => progress.push(event));
+    element.addEventListener('load', (event) => seen.push(`load ${new URL(event.detail.url).pathname}`));
+    await until(() => states(element).includes('loading'), 'the state loading');
+    await element.ready;
+    await frames();
+    assertEqual(seen, ['load /net/slow/compass.ply']);
+    assertEqual(states(element), ['ready']);
+    assert(progress.every((event) => event instanceof ProgressEvent), 'ProgressEvents');
+    const [first, last] = [progress[0], progress[progress.length - 1]];
+    assertEqual([first.loaded, first.lengthComputable], [0, false], 'first');
+    assertEqual([last.loaded, last.total, last.lengthComputable], [693, 693, true], 'last');
+    assert(progress.length >= 4, `several between, found ${progress.length}`);
+    assertEqual(element.statistics?.splats, 6, 'splats');
+    assertEqual(element.statistics?.dropped, 0, 'dropped');
+    assert(element.loaded && element.error === null, 'loaded');
+    for (const type of ['load', 'progress', 'error', 'camera-change']) document.body.removeEventListener(type, onBody);
+  });
+
+  it('ends its progress also where the server does not tell the length', async () => {
+    const element = show({ src: '/net/unsized/compass.ply' });
+    const progress: ProgressEvent[] = [];
+    element.addEventListener('progress', (event) => progress.push(event));
+    await element.ready;
+    const last = progress[progress.length - 1];
+    assertEqual([last.loaded, last.total, last.lengthComputable], [693, 693, true], 'last');
+  });
+
+  it('fires load once its pixels are on the screen', async () => {
+    const element = show({ src: `${FIXTURES}green.splat`, poster: '' });
+    await nextEvent(element, 'load');
+    const screen = await screenOf(element);
+    assert(isGreen(screen.at(60, 50)), `green in the middle, found ${screen.at(60, 50).join()}`);
+  });
+
+  it('shows a poster and a progress bar until then', async () => {
+    const image = document.createElement('canvas');
+    image.width = image.height = 4;
+    const context = image.getContext('2d');
+    assert(context, 'a 2D canvas');
+    context.fillStyle = 'rgb(255, 0, 0)';
+    context.fillRect(0, 0, 4, 4);
+    const element = show({ src: '/net/slow/green.splat?ms=1500', poster: image.toDataURL() }, 'width: 120px; height: 100px; --poster-transition: 0s');
+    await until(() => states(element).includes('loading'), 'the state loading');
+    const bar = element.shadowRoot?.querySelector('[role=progressbar]');
+    assert(bar && !bar.hasAttribute('aria-valuenow'), 'a progress bar without a value');
+    await delay(300);
+    assert(isRed((await screenOf(element)).at(60, 50)), 'the poster is seen');
+    await until(() => Number(bar.getAttribute('aria-valuenow')) > 0, 'a value in the progress bar');
+    await element.ready;
+    await element.updateComplete;
+    assert(isGreen((await screenOf(element)).at(60, 50)), 'the scene is seen');
+    assertEqual(element.shadowRoot?.querySelector('[role=progressbar]'), null, 'progress bar');
+  });
+
+  it('keeps properties that were set before the element was defined', async () => {
+    // A second name for the same class is defined after its element was made.
+    const early = document.createElement('early-splat') as GaussianSplatElement;
+    early.src = COMPASS;
+    early.cameraOrbit = '30deg 60deg 9m';
+    early.cameraControls = true;
+    early.style.cssText = 'width: 120px; height: 100px';
+    document.body.append(early);
+    const { GaussianSplatElement: Base } = await import('@gaussian-splat/element/element.js');
+    customElements.define('early-splat', class extends Base {});
+    await early.ready;
+    assert(early.loaded && early.cameraControls, 'loaded with its properties');
+    assert(Math.abs(early.getCameraOrbit().radius - 9) < 1e-9, String(early.getCameraOrbit()));
+  });
+});
+
+describe('src', () => {
+  it('the latest wins, whatever answers first', async () => {
+    const element = show({ src: '/net/slow/compass.splat?ms=1200' });
+    const urls: string[] = [];
+    element.addEventListener('load', (event) => urls.push(new URL(event.detail.url).pathname));
+    await until(() => states(element).includes('loading'), 'the state loading');
+    element.src = '/net/slow/compass.ply?ms=300';
+    await element.updateComplete;
+    element.src = `${FIXTURES}green.splat`;
+    await element.ready;
+    await delay(1500);
+    assertEqual(urls, [`${FIXTURES}green.splat`], 'loads');
+    assertEqual(element.statistics?.splats, 1, 'splats');
+    assert(isGreen((await screenOf(element)).at(60, 50)), 'the last scene is seen');
+  });
+
+  it('a flip there and back loads nothing anew', async () => {
+    const element = await showLoaded();
+    let loads = 0;
+    element.addEventListener('progress', () => loads++);
+    element.src = `${FIXTURES}green.splat`;
+    element.src = COMPASS;
+    await element.updateComplete;
+    await delay(100);
+    assertEqual(loads, 0, 'progress events');
+    assert(element.loaded, 'still loaded');
+  });
+
+  it('keeps the old picture until the new one is there', async () => {
+    const element = await showLoaded({ src: `${FIXTURES}green.splat` }, 'width: 120px; height: 100px; --poster-transition: 0s');
+    element.src = '/net/slow/compass.ply?ms=800';
+    await until(() => states(element).includes('loading'), 'the state loading');
+    assert(isGreen((await screenOf(element)).at(60, 50)), 'the old scene is seen');
+    await element.ready;
+    assertEqual(element.statistics?.splats, 6, 'splats');
+  });
+
+  it('removed, clears the element', async () => {
+    const element = await showLoaded({ src: `${FIXTURES}green.splat` }, 'width: 120px; height: 100px; background: white');
+    element.removeAttribute('src');
+    await element.ready;
+    await element.updateComplete;
+    assertEqual([element.loaded, element.statistics, states(element)], [false, null, []], 'after removal');
+    assertEqual((await screenOf(element)).at(60, 50), [255, 255, 255], 'middle');
+  });
+
+  it('after an error, a good one recovers', async () => {
+    const element = show({ src: '/net/status/404' });
+    await nextEvent(element, 'error');
+    element.src = COMPASS;
+    await element.ready;
+    await element.updateComplete;
+    assert(element.loaded && element.error === null, 'loaded');
+    assertEqual(element.shadowRoot?.querySelector('slot[name=error]'), null, 'error slot');
+  });
+});
+
+describe('a bad source', () => {
+  const cases: Readonly<Record<string, readonly [src: string, reason: string]>> = {
+    'a missing file': ['/net/status/404', 'network/status'],
+    'a server fault': ['/net/status/500', 'network/status'],
+    'a web page instead of a scene': ['/net/html/scene.ply', 'decode/html'],
+    'a git-LFS pointer': [`${FIXTURES}lfs-pointer.ply`, 'decode/lfs-pointer'],
+    'a truncated file': [`${FIXTURES}truncated.ply`, 'decode/truncated'],
+    'a broken connection': ['/net/cut/compass.ply', 'network/interrupted'],
+    'no server': ['http://127.0.0.1:1/scene.ply', 'network/unreachable'],
+    'no URL': ['http://', 'network/url'],
+    'a script': ['/tests/element/browser/fixtures/make.mjs', 'decode/unknown-format'],
+  };
+  for (const [name, [src, reason]] of Object.entries(cases)) {
+    it(`${name}: ${reason}, and the page lives on`, async () => {
+      const element = show({ src });
+      const { detail } = await nextEvent<CustomEvent<ElementError>>(element, 'error');
+      assertEqual([detail.reason, detail.code], [reason, reason.split('/')[0]], 'codes');
+      assert(detail === element.error, 'the property holds the same object');
+      assert(/expected .*, found .*\..*\[.*\]/.test(detail.message), detail.message);
+      await element.ready;
+      await element.updateComplete;
+      assertEqual([element.loaded, states(element)], [false, ['error']], 'state');
+      const text = element.shadowRoot?.querySelector('[part=error]')?.textContent ?? '';
+      assert(text.includes(detail.message) && /3D scene could not be/.test(text), text);
+      element.src = COMPASS;
+      await element.ready;
+      assert(element.loaded, 'a good scene loads afterwards');
+    });
+  }
+
+  it('another origin without permission: network/unreachable; with it, the scene', async () => {
+    const origin = await (await fetch('/net/other-origin')).text();
+    const closed = show({ src: `${origin}/closed/compass.ply` });
+    await nextEvent(closed, 'error');
+    assertEqual(closed.error?.reason, 'network/unreachable');
+    await showLoaded({ src: `${origin}/fixtures/compass.ply` });
+  });
+
+  it('markup in a message stays text', async () => {
+    const element = show({ src: '/net/status/404?<img src=x onerror=alert(1)>' });
+    await nextEvent(element, 'error');
+    await element.updateComplete;
+    assertEqual(element.shadowRoot?.querySelectorAll('[part=error] img').length, 0, 'images in the message');
+  });
+});
+
+describe('real scenes', () => {
+  for (const name of ['scenes/plant.splat', 'scenes/angel.compressed.ply', 'formats/playbot3.niantic-v4.spz']) {
+    it(name, async function () {
+      const src = `/net/shared/${name}`;
+      if (!(await fetch(src, { method: 'HEAD' })).ok) this.skip();
+      const element = await showLoaded({ src });
+      assert((element.statistics?.splats ?? 0) > 10_000, JSON.stringify(element.statistics));
+      const { count } = (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 600) ?? { count: 0 };
+      assert(count > 500, `${count} pixels are covered`);
+    });
+  }
+});

@@ -1,0 +1,32 @@
+/** What tests ask of the browser and cannot do from within a page: real touches, a real wheel, pictures of the screen. */
+export function pageCommands() {
+  return {
+    name: 'page-commands',
+    executeCommand: async ({ command, payload, session }) => {
+      const action = ACTIONS[command];
+      if (action === undefined) return undefined;
+      return (await action(session.browser.getPage(session.id), payload)) ?? true;
+    },
+  };
+}
+
+const ACTIONS = {
+  /** Touch points of one event: [] lifts all fingers. */
+  'send-touch': (page, { type, points }) => devtools(page, 'Input.dispatchTouchEvent', { type, touchPoints: points }),
+
+  'turn-wheel': async (page, { x, y, deltaY }) => {
+    await page.mouse.move(x, y);
+    await page.mouse.wheel(0, deltaY);
+  },
+
+  /** The picture that the browser composes for a rectangle in CSS pixels: a PNG as base64. */
+  screenshot: async (page, clip) => (await page.screenshot({ clip })).toString('base64'),
+};
+
+/** One DevTools session for each page. */
+const sessions = new WeakMap();
+
+async function devtools(page, method, parameters) {
+  if (!sessions.has(page)) sessions.set(page, await page.context().newCDPSession(page));
+  await sessions.get(page).send(method, parameters);
+}

@@ -1,0 +1,101 @@
+/** What every browser test needs: elements, events, pictures, and a watch over the console and the GPU. */
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+
+export const FIXTURES = '/tests/element/browser/fixtures/';
+/** The scene that most tests show. */
+export const COMPASS = `${FIXTURES}compass.splat`;
+
+export function assert(condition: unknown, message: string): asserts condition {
+  if (!condition) throw new Error(message);
+}
+
+export function assertEqual<T>(actual: T, expected: T, what = 'value'): void {
+  const [a, e] = [JSON.stringify(actual), JSON.stringify(expected)];
+  assert(a === e, `${what}: expected ${e}, found ${a}`);
+}
+
+export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** Fulfils two frames later: by then everything that a frame brings about has happened. */
+export async function frames(count = 2): Promise<void> {
+  for (let i = 0; i < count; i++) await new Promise(requestAnimationFrame);
+}
+
+/** Waits until a condition holds. */
+export async function until(condition: () => boolean, what: string, limitMs = 20_000): Promise<void> {
+  const end = performance.now() + limitMs;
+  while (!condition()) {
+    assert(performance.now() < end, `waited ${limitMs} ms for ${what}`);
+    await delay(10);
+  }
+}
+
+/** The next event of a type, or a failure after a while. */
+export function nextEvent<T extends Event>(target: EventTarget, type: string, limitMs = 20_000): Promise<T> {
+  return new Promise((resolve, reject) => {
+    const timer = setTimeout(() => reject(new Error(`no event ${type} within ${limitMs} ms`)), limitMs);
+    target.addEventListener(
+      type,
+      (event) => {
+        clearTimeout(timer);
+        resolve(event as T);
+      },
+      { once: true },
+    );
+  });
+}
+
+/** An element of 120 x 100 CSS pixels in the page. Every test's elements are removed after it. */
+export function show(attributes: Readonly<Record<string, string>>, style = 'width: 120px; height: 100px'): GaussianSplatElement {
+  const element = document.createElement('gaussian-splat');
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.style.cssText = style;
+  document.body.append(element);
+  return element;
+}
+
+/** The same, once its scene is on show. */
+export async function showLoaded(attributes: Readonly<Record<string, string>> = {}, style?: string): Promise<GaussianSplatElement> {
+  const element = show({ src: COMPASS, ...attributes }, style);
+  await element.ready;
+  assert(element.loaded, `not loaded: ${element.error?.message ?? 'no error either'}`);
+  return element;
+}
+
+/** All calls of GPUQueue.submit since the page was opened. */
+export let submits = 0;
+const submit = GPUQueue.prototype.submit;
+GPUQueue.prototype.submit = function countingSubmit(this: GPUQueue, commands) {
+  submits++;
+  return submit.call(this, commands);
+};
+
+/** Every device that was handed out, for tests that lose or count them. */
+export const devices: GPUDevice[] = [];
+const faults: string[] = [];
+const requestDevice = GPUAdapter.prototype.requestDevice;
+GPUAdapter.prototype.requestDevice = async function watchingRequestDevice(this: GPUAdapter, descriptor) {
+  const device = await requestDevice.call(this, descriptor);
+  devices.push(device);
+  device.addEventListener('uncapturederror', (event) => faults.push(`GPU: ${event.error.message}`));
+  return device;
+};
+
+for (const level of ['warn', 'error'] as const) {
+  console[level] = (...words: unknown[]) => void faults.push(`console.${level}: ${words.join(' ')}`);
+}
+addEventListener('error', (event) => faults.push(`uncaught: ${event.message}`));
+addEventListener('unhandledrejection', (event) => faults.push(`unhandled: ${String(event.reason)}`));
+
+/** Takes the one fault that matches out of the record; fails if there is not exactly one. */
+export function claimFault(pattern: RegExp): void {
+  const matches = faults.filter((fault) => pattern.test(fault));
+  assertEqual(matches.length, 1, `faults like ${pattern} among ${JSON.stringify(faults)}`);
+  faults.splice(faults.indexOf(matches[0]), 1);
+}
+
+afterEach(() => {
+  document.body.replaceChildren();
+  const unclaimed = faults.splice(0);
+  assert(unclaimed.length === 0, `warnings or errors that no test expected:\n${unclaimed.join('\n')}`);
+});

@@ -1,0 +1,11 @@
+/** The part of Mocha's global interface that the browser tests use. */
+interface MochaContext {
+  /** Marks the running test as skipped and leaves it. */
+  skip(): never;
+}
+type MochaBody = (this: MochaContext) => void | Promise<void>;
+declare function describe(title: string, body: () => void): void;
+declare function it(title: string, body: MochaBody): void;
+declare function before(body: MochaBody): void;
+declare function beforeEach(body: MochaBody): void;
+declare function afterEach(body: MochaBody): void;

@@ -1,0 +1,71 @@
+/** Pictures of what the browser really shows, compositing included, and input as a person gives it. */
+import { executeServerCommand } from '@web/test-runner-commands';
+import { frames } from './harness.js';
+
+export type Rgb = readonly [red: number, green: number, blue: number];
+
+/** The colours that an element shows. */
+export class Screen {
+  readonly #data: ImageData;
+  readonly #scale: number;
+
+  constructor(data: ImageData, cssWidth: number) {
+    this.#data = data;
+    this.#scale = data.width / cssWidth;
+  }
+
+  /** Colour at a point in the element's CSS pixels. */
+  at(x: number, y: number): Rgb {
+    const i = 4 * (Math.floor(y * this.#scale) * this.#data.width + Math.floor(x * this.#scale));
+    const [red, green, blue] = this.#data.data.subarray(i, i + 3);
+    return [red, green, blue];
+  }
+
+  /** Middle of all pixels that a rule picks, in CSS pixels; null if there is none. */
+  middleOf(isPicked: (color: Rgb) => boolean): { x: number; y: number; count: number } | null {
+    const { width, height, data } = this.#data;
+    let [count, x, y] = [0, 0, 0];
+    for (let i = 0; i < width * height; i++) {
+      if (!isPicked([data[4 * i], data[4 * i + 1], data[4 * i + 2]])) continue;
+      count++;
+      x += (i % width) + 0.5;
+      y += Math.floor(i / width) + 0.5;
+    }
+    return count === 0 ? null : { x: x / count / this.#scale, y: y / count / this.#scale, count };
+  }
+
+  /** Number of colour values, 0..255, that differ from another picture of the same size by more than a tolerance. */
+  differences(other: Screen, tolerance = 0): number {
+    const [a, b] = [this.#data.data, other.#data.data];
+    return a.length !== b.length ? Infinity : a.reduce((sum, v, i) => sum + (Math.abs(v - b[i]) > tolerance ? 1 : 0), 0);
+  }
+}
+
+export async function screenOf(element: Element): Promise<Screen> {
+  await frames();
+  const { x, y, width, height } = element.getBoundingClientRect();
+  const png = await executeServerCommand<string, object>('screenshot', { x, y, width, height });
+  const bytes = Uint8Array.from(atob(png), (c) => c.charCodeAt(0));
+  const image = await createImageBitmap(new Blob([bytes]));
+  const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+  if (context === null) throw new Error('no 2D canvas');
+  context.drawImage(image, 0, 0);
+  return new Screen(context.getImageData(0, 0, image.width, image.height), width);
+}
+
+export const isRed = ([r, g, b]: Rgb): boolean => r > 150 && g < 110 && b < 110;
+export const isGreen = ([r, g, b]: Rgb): boolean => g > 150 && r < 110 && b < 110;
+export const isBlue = ([r, g, b]: Rgb): boolean => b > 150 && r < 110 && g < 110;
+
+export interface Finger {
+  readonly x: number;
+  readonly y: number;
+  readonly id?: number;
+}
+
+/** One touch event with the fingers that are down. */
+export const sendTouch = (type: 'touchStart' | 'touchMove' | 'touchEnd', points: readonly Finger[]): Promise<unknown> =>
+  executeServerCommand('send-touch', { type, points });
+
+export const turnWheel = (x: number, y: number, deltaY: number): Promise<unknown> =>
+  executeServerCommand('turn-wheel', { x, y, deltaY });

@@ -1,0 +1,118 @@
+/** Servers as the web has them: slow, broken, lying, strict, and elsewhere. */
+import { createReadStream, existsSync, readFileSync, statSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { extname, join, normalize } from 'node:path';
+import { Readable } from 'node:stream';
+import { setTimeout as delay } from 'node:timers/promises';
+import { fileURLToPath } from 'node:url';
+
+const root = fileURLToPath(new URL('../../../../', import.meta.url));
+const fixtures = fileURLToPath(new URL('../fixtures/', import.meta.url));
+const sharedData = join(root, '../shared/data');
+
+/** Answers under /net/; everything else is left to the test runner's own server. */
+export function hostileServer(otherOrigin) {
+  return async (context, next) => {
+    const [, net, kind, ...rest] = context.path.split('/');
+    if (net !== 'net' || !(kind in ANSWERS)) return next();
+    context.set('Cache-Control', 'no-store');
+    return ANSWERS[kind](context, rest.join('/'), otherOrigin);
+  };
+}
+
+const ANSWERS = {
+  status(context, code) {
+    context.status = Number(code);
+    context.body = 'no';
+  },
+
+  html(context) {
+    context.type = 'text/html';
+    context.body = '<!doctype html><title>Log in</title><p>Please log in.</p>';
+  },
+
+  /** The file in eight pieces over `ms` milliseconds. */
+  slow(context, name) {
+    const bytes = readFileSync(join(fixtures, name));
+    const pause = Number(context.query.ms ?? 800) / 8;
+    context.set('Content-Length', String(bytes.length));
+    context.body = Readable.from(
+      (async function* pieces() {
+        const size = Math.ceil(bytes.length / 8);
+        for (let at = 0; at < bytes.length; at += size) {
+          await delay(pause);
+          yield bytes.subarray(at, at + size);
+        }
+      })(),
+    );
+  },
+
+  /** Half of the file, then the connection breaks. */
+  cut(context, name) {
+    const bytes = readFileSync(join(fixtures, name));
+    context.respond = false;
+    const { res } = context;
+    res.writeHead(200, { 'Content-Length': bytes.length, 'Cache-Control': 'no-store' });
+    res.write(bytes.subarray(0, bytes.length / 2));
+    setTimeout(() => res.destroy(), 100);
+  },
+
+  /** Without Content-Length. */
+  unsized(context, name) {
+    context.body = createReadStream(join(fixtures, name));
+  },
+
+  /** The scenes beside the checkout, where there are any. */
+  shared(context, name) {
+    const path = join(sharedData, normalize(`/${name}`));
+    context.status = existsSync(path) && statSync(path).isFile() ? 200 : 404;
+    context.body = context.status === 200 ? createReadStream(path) : 'absent';
+  },
+
+  'other-origin'(context, _rest, otherOrigin) {
+    context.body = otherOrigin;
+  },
+
+  /** A page under a strict policy that allows no worker, no inline style and no inline script. */
+  'strict-page'(context) {
+    context.set('Content-Security-Policy', "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'self'; worker-src 'none'");
+    context.type = 'text/html';
+    context.body = `<!doctype html><title>Strict</title>
+      <script src="/net/strict-script" type="module"></script>
+      <gaussian-splat src="/tests/element/browser/fixtures/compass.ply" loading="eager" camera-controls></gaussian-splat>`;
+  },
+
+  'strict-script'(context) {
+    context.type = 'text/javascript';
+    context.body = `const seen = { warnings: [], violations: [] };
+      console.warn = (...words) => seen.warnings.push(words.join(' '));
+      addEventListener('securitypolicyviolation', (event) => seen.violations.push(event.effectiveDirective));
+      await import('/packages/element/cdn/gaussian-splat.min.js');
+      const element = document.querySelector('gaussian-splat');
+      await element.ready;
+      parent.postMessage({ ...seen, loaded: element.loaded, error: element.error?.message }, '*');`;
+  },
+};
+
+const TYPES = { '.js': 'text/javascript', '.ply': 'application/octet-stream' };
+
+/**
+ * A server of another origin, as a CDN is: /cdn/ and /fixtures/ with permission to be read, /closed/ without.
+ * @returns its origin.
+ */
+export async function startOtherOrigin() {
+  const folders = { cdn: join(root, 'packages/element/cdn'), fixtures, closed: fixtures };
+  const server = createServer((request, response) => {
+    const [, folder, ...rest] = new URL(request.url, 'http://x').pathname.split('/');
+    const path = join(folders[folder] ?? '', normalize(`/${rest.join('/')}`));
+    if (!(folder in folders) || !existsSync(path)) return response.writeHead(404).end();
+    const headers = { 'Content-Type': TYPES[extname(path)] ?? 'application/octet-stream' };
+    if (folder !== 'closed') headers['Access-Control-Allow-Origin'] = '*';
+    response.writeHead(200, headers);
+    return createReadStream(path).pipe(response);
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  // The test runner ends when its own work is done; this server must not keep it.
+  server.unref();
+  return `http://127.0.0.1:${server.address().port}`;
+}

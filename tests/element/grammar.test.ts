@@ -1,0 +1,150 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import fc from 'fast-check';
+import { readAttributes, type RawAttributes } from '../../packages/element/src/attributes.js';
+import {
+  fieldOfViewGrammar,
+  numberGrammar,
+  orbitGrammar,
+  targetGrammar,
+  upGrammar,
+} from '../../packages/element/src/camera/grammar.js';
+import { CameraOrbit, CameraTarget, FieldOfView } from '../../packages/element/src/camera/values.js';
+
+const orbit = orbitGrammar('0deg 75deg auto');
+const DEGREE = Math.PI / 180;
+
+const ABSENT: RawAttributes = {
+  crossorigin: null,
+  loading: null,
+  cameraOrbit: null,
+  cameraTarget: null,
+  fieldOfView: null,
+  minCameraOrbit: null,
+  maxCameraOrbit: null,
+  minFieldOfView: null,
+  maxFieldOfView: null,
+  interpolationDecay: null,
+  touchAction: null,
+  up: null,
+  maxPixelRatio: null,
+};
+
+test('orbits', () => {
+  assert.deepEqual(orbit.parse('90deg 1rad 2m'), { theta: 90 * DEGREE, phi: 1, radius: { metres: 2 } });
+  assert.deepEqual(orbit.parse('  -10.5deg\t0   150cm '), { theta: -10.5 * DEGREE, phi: 0, radius: { metres: 1.5 } });
+  assert.deepEqual(orbit.parse('auto auto 105%'), { theta: 'auto', phi: 'auto', radius: { framings: 1.05 } });
+  assert.deepEqual(orbit.parse('auto'), { theta: 'auto', phi: 'auto', radius: 'auto' });
+  assert.deepEqual(orbit.parse('1E1DEG .5rad 20MM'), { theta: 10 * DEGREE, phi: 0.5, radius: { metres: 0.02 } });
+});
+
+test('malformed orbits', () => {
+  const malformed = [
+    '1deg',
+    '1deg 2deg',
+    '1deg 2deg 3m 4m',
+    '1 2 3',
+    '1deg 2deg 3deg',
+    '1m 2deg 3m',
+    '1deg 2deg -1m',
+    '1deg 2deg 0m',
+    '1deg 2deg 0%',
+    'NaNdeg 0 1m',
+    '1e999deg 0 1m',
+    'calc(1deg) 0 1m',
+    '1deg,2deg,3m',
+    '1degg 0 1m',
+  ];
+  for (const text of malformed) assert.equal(orbit.parse(text), null, text);
+});
+
+test('targets, fields of view, axes and numbers', () => {
+  assert.deepEqual(targetGrammar.parse('1 -2 3cm'), [1, -2, 0.03]);
+  assert.deepEqual(targetGrammar.parse('auto 0 auto'), ['auto', 0, 'auto']);
+  assert.deepEqual(targetGrammar.parse('auto'), ['auto', 'auto', 'auto']);
+  for (const text of ['1 2', '1deg 2 3', '1 2 3 4', 'x']) assert.equal(targetGrammar.parse(text), null, text);
+  assert.equal(fieldOfViewGrammar.parse('45deg'), 45 * DEGREE);
+  assert.equal(fieldOfViewGrammar.parse('auto'), 'auto');
+  for (const text of ['0deg', '180deg', '-5deg', '45', '45m', '']) assert.equal(fieldOfViewGrammar.parse(text), null, text);
+  assert.equal(upGrammar.parse(' -Z '), '-z');
+  assert.equal(upGrammar.parse('down'), null);
+  const decay = numberGrammar(50, 0, 'milliseconds');
+  assert.equal(decay.parse('0'), 0);
+  for (const text of ['-1', 'fast', '', ' ', 'NaN']) assert.equal(decay.parse(text), null, text);
+});
+
+test('what the getters print, the attributes read back to the last bit', () => {
+  const number = fc.double({ min: -1e9, max: 1e9, noNaN: true });
+  const positive = fc.double({ min: 1e-9, max: 1e9, noNaN: true });
+  fc.assert(
+    fc.property(number, number, positive, (theta, phi, radius) => {
+      const parsed = orbit.parse(new CameraOrbit(theta, phi, radius).toString());
+      // Printing loses the sign of zero, which means nothing here.
+      assert.deepEqual(parsed, { theta: theta + 0, phi: phi + 0, radius: { metres: radius } });
+    }),
+  );
+  fc.assert(
+    fc.property(number, number, number, (x, y, z) => {
+      assert.deepEqual(targetGrammar.parse(new CameraTarget(x, y, z).toString()), [x + 0, y + 0, z + 0]);
+    }),
+  );
+  fc.assert(
+    fc.property(fc.double({ min: 1e-6, max: 3.14, noNaN: true }), (radians) => {
+      assert.equal(fieldOfViewGrammar.parse(new FieldOfView(radians).toString()), radians);
+    }),
+  );
+});
+
+test('no text makes a grammar throw or yield a number that is not finite', () => {
+  const text = fc.oneof(fc.string(), fc.array(fc.constantFrom('1', 'e', '-', '.', 'deg', 'm', '%', ' ', 'auto')).map((a) => a.join('')));
+  const isSound = (value: unknown): boolean =>
+    typeof value === 'number' ? Number.isFinite(value) : Object(value) !== value || Object.values(value as object).every(isSound);
+  fc.assert(
+    fc.property(text, (attribute) => {
+      for (const grammar of [orbit, targetGrammar, fieldOfViewGrammar]) assert.ok(isSound(grammar.parse(attribute)));
+    }),
+  );
+});
+
+test('an absent attribute takes its default in silence', () => {
+  const warnings: string[] = [];
+  const read = readAttributes(ABSENT, (sentence) => warnings.push(sentence));
+  assert.deepEqual(warnings, []);
+  assert.equal(read.loading, 'lazy');
+  assert.equal(read.credentials, 'same-origin');
+  assert.equal(read.touchAction, 'pan-y');
+  assert.equal(read.interpolationDecay, 50);
+  assert.equal(read.maxPixelRatio, Infinity);
+  assert.equal(read.camera.up, '-y');
+  assert.deepEqual(read.camera.orbit, { theta: 0, phi: 75 * DEGREE, radius: 'auto' });
+});
+
+test('a malformed attribute takes its default with one warning that says what was expected and found', () => {
+  for (const [name, key] of Object.entries({
+    'camera-orbit': 'cameraOrbit',
+    'camera-target': 'cameraTarget',
+    'field-of-view': 'fieldOfView',
+    loading: 'loading',
+    'touch-action': 'touchAction',
+    up: 'up',
+    'interpolation-decay': 'interpolationDecay',
+    'max-pixel-ratio': 'maxPixelRatio',
+  })) {
+    const warnings: string[] = [];
+    const read = readAttributes({ ...ABSENT, [key]: 'nonsense' }, (sentence) => warnings.push(sentence));
+    assert.equal(warnings.length, 1, name);
+    assert.match(warnings[0], new RegExp(`<gaussian-splat> ${name}: expected .*, found "nonsense"; the default`));
+    assert.deepEqual(read, readAttributes(ABSENT, () => undefined));
+  }
+});
+
+test('properties may hold numbers where attributes hold text', () => {
+  const read = readAttributes({ ...ABSENT, interpolationDecay: 120, maxPixelRatio: 1.5 }, assert.fail);
+  assert.equal(read.interpolationDecay, 120);
+  assert.equal(read.maxPixelRatio, 1.5);
+});
+
+test('crossorigin as of <img>', () => {
+  assert.equal(readAttributes({ ...ABSENT, crossorigin: '' }, assert.fail).credentials, 'same-origin');
+  assert.equal(readAttributes({ ...ABSENT, crossorigin: 'use-credentials' }, assert.fail).credentials, 'include');
+});

@@ -1,0 +1,260 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { cross, dot, eyeOf, lookAt, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import fc from 'fast-check';
+import { readAttributes } from '../../packages/element/src/attributes.js';
+import { keyOf, orbitOf, panOf, pinchOf, wheelOf } from '../../packages/element/src/camera/gestures.js';
+import type { UpAxis } from '../../packages/element/src/camera/grammar.js';
+import {
+  cameraOfPose,
+  framingDistance,
+  nearPlane,
+  orbitAxes,
+  toScene,
+  toViewer,
+  viewerFrame,
+  type Pose,
+} from '../../packages/element/src/camera/orbit.js';
+import { OrbitCamera } from '../../packages/element/src/camera/orbit-camera.js';
+import { limitsOf, poseOf, type CameraSettings } from '../../packages/element/src/camera/settings.js';
+import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
+
+const UPS: readonly UpAxis[] = ['x', '-x', 'y', '-y', 'z', '-z'];
+const AXES: Readonly<Record<UpAxis, Vector3>> = {
+  x: [1, 0, 0],
+  '-x': [-1, 0, 0],
+  y: [0, 1, 0],
+  '-y': [0, -1, 0],
+  z: [0, 0, 1],
+  '-z': [0, 0, -1],
+};
+const BOUNDS: Bounds = { min: [0, 1, 2], max: [2, 5, 4], center: [1, 3, 3], radius: 2 };
+
+const near = (actual: ArrayLike<number>, expected: ArrayLike<number>, tolerance = 1e-9): void => {
+  assert.equal(actual.length, expected.length);
+  for (let i = 0; i < actual.length; i++) {
+    assert.ok(Math.abs(actual[i] - expected[i]) <= tolerance, `[${i}] ${actual[i]} is not ${expected[i]}`);
+  }
+};
+
+const pixelOf = (camera: { fx: number; fy: number; cx: number; cy: number; worldToCamera: Matrix4 }, p: Vector3): number[] => {
+  const m = camera.worldToCamera;
+  const [x, y, z] = [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]);
+  return [(camera.fx * x) / z + camera.cx, (camera.fy * y) / z + camera.cy, z];
+};
+
+const settings = (changes: Record<string, string> = {}): CameraSettings =>
+  readAttributes(
+    {
+      crossorigin: null,
+      loading: null,
+      cameraOrbit: null,
+      cameraTarget: null,
+      fieldOfView: null,
+      minCameraOrbit: null,
+      maxCameraOrbit: null,
+      minFieldOfView: null,
+      maxFieldOfView: null,
+      interpolationDecay: null,
+      touchAction: null,
+      up: null,
+      maxPixelRatio: null,
+      ...changes,
+    },
+    assert.fail,
+  ).camera;
+
+test('viewer frames are rotations that bring the up axis to +y', () => {
+  for (const up of UPS) {
+    const frame = viewerFrame(up);
+    near(toViewer(frame, AXES[up]), [0, 1, 0]);
+    near(cross(frame[0], frame[1]), frame[2]);
+    near(toScene(frame, toViewer(frame, [1, 2, 3])), [1, 2, 3]);
+  }
+  assert.deepEqual(viewerFrame('-y'), [[1, 0, 0], [0, -1, 0], [0, 0, -1]]);
+});
+
+test('the camera of a pose is core\'s lookAt from the same eye, for every up axis', () => {
+  const angle = fc.double({ min: -7, max: 7, noNaN: true });
+  const phi = fc.double({ min: 0.01, max: 3.13, noNaN: true });
+  const length = fc.double({ min: -100, max: 100, noNaN: true });
+  fc.assert(
+    fc.property(fc.constantFrom(...UPS), angle, phi, length, length, length, (up, theta, phi, x, y, z) => {
+      const frame = viewerFrame(up);
+      const pose: Pose = { theta, phi, radius: 3, x, y, z, fieldOfView: 1 };
+      const camera = cameraOfPose(pose, frame, 640, 480, 0.2);
+      // Spherical coordinates as the attributes define them, from the formula and not from the code.
+      const eye = toScene(frame, [
+        x + 3 * Math.sin(theta) * Math.sin(phi),
+        y + 3 * Math.cos(phi),
+        z + 3 * Math.cos(theta) * Math.sin(phi),
+      ]);
+      near(eyeOf(camera.worldToCamera), eye, 1e-7);
+      near(camera.worldToCamera, lookAt(eye, toScene(frame, [x, y, z]), AXES[up]), 1e-6);
+    }),
+  );
+});
+
+test('theta 0 looks from the +z side of viewer space, theta 90 from the +x side, phi 0 from above', () => {
+  near(orbitAxes(0, Math.PI / 2).backward, [0, 0, 1]);
+  near(orbitAxes(Math.PI / 2, Math.PI / 2).backward, [1, 0, 0]);
+  near(orbitAxes(0, 0).backward, [0, 1, 0]);
+  const { right, up, backward } = orbitAxes(1, 0);
+  near(cross(right, up), backward);
+});
+
+test('the target lands in the middle and what is up in the scene is up in the picture', () => {
+  for (const up of UPS) {
+    const frame = viewerFrame(up);
+    const camera = cameraOfPose({ theta: 1, phi: 1.2, radius: 5, x: 1, y: 2, z: 3, fieldOfView: 0.8 }, frame, 320, 200, 0.1);
+    const target = toScene(frame, [1, 2, 3]);
+    near(pixelOf(camera, target), [160, 100, 5]);
+    const above: Vector3 = [target[0] + AXES[up][0], target[1] + AXES[up][1], target[2] + AXES[up][2]];
+    assert.ok(pixelOf(camera, above)[1] < 100);
+  }
+});
+
+test('the framing distance makes a ball touch the picture\'s nearer edge', () => {
+  for (const aspect of [0.3, 1, 2.5]) {
+    const distance = framingDistance(2, 0.9, aspect);
+    const half = Math.min(0.45, Math.atan(Math.tan(0.45) * aspect));
+    // The tangent from the eye to the ball makes exactly the half angle with the line of sight.
+    assert.ok(Math.abs(Math.asin(2 / distance) - half) < 1e-12);
+  }
+});
+
+test('the near plane is the trainers\' except in small scenes', () => {
+  assert.equal(nearPlane({ ...BOUNDS, radius: 100 }), 0.2);
+  assert.equal(nearPlane({ ...BOUNDS, radius: 0.5 }), 0.005);
+});
+
+test('automatic settings frame the middle of the scene in viewer space', () => {
+  const pose = poseOf(settings(), BOUNDS, 1.5);
+  near([pose.x, pose.y, pose.z], [1, -3, -3]);
+  assert.equal(pose.radius, framingDistance(2, pose.fieldOfView, 1.5));
+  const half = poseOf(settings({ cameraOrbit: '0deg 75deg 50%' }), BOUNDS, 1.5);
+  assert.ok(Math.abs(half.radius - pose.radius / 2) < 1e-12);
+  const given = poseOf(settings({ cameraTarget: 'auto 7 auto', up: 'y' }), BOUNDS, 1.5);
+  near([given.x, given.y, given.z], [1, 7, 3]);
+});
+
+test('automatic limits give way to what the attributes ask for outright', () => {
+  const above = settings({ cameraOrbit: '0deg 0deg 1000m' });
+  const camera = new OrbitCamera(poseOf(above, BOUNDS, 1));
+  camera.limits = limitsOf(above, BOUNDS, 1);
+  assert.deepEqual([camera.goal.phi, camera.goal.radius], [0, 1000]);
+});
+
+test('limits hold for gestures', () => {
+  const limited = settings({
+    minCameraOrbit: '-10deg 60deg 1m',
+    maxCameraOrbit: '10deg 80deg 9m',
+    cameraOrbit: '0deg 70deg 5m',
+  });
+  const camera = new OrbitCamera(poseOf(limited, BOUNDS, 1));
+  camera.limits = limitsOf(limited, BOUNDS, 1);
+  camera.orbitBy(5, 5);
+  camera.zoomBy(100);
+  const degrees = (angle: number): number => (angle * 180) / Math.PI;
+  near([degrees(camera.goal.theta), degrees(camera.goal.phi), camera.goal.radius], [10, 80, 9]);
+  camera.orbitBy(-50, -50);
+  camera.zoomBy(1e-6);
+  near([degrees(camera.goal.theta), degrees(camera.goal.phi), camera.goal.radius], [-10, 60, 1]);
+});
+
+test('a pan moves the target with the pointer: its point stays under it', () => {
+  const pose: Pose = { theta: 0.7, phi: 1.1, radius: 4, x: 0, y: 0, z: 0, fieldOfView: 0.9 };
+  const camera = new OrbitCamera(pose);
+  const drag = panOf({ x: 10, y: 10 }, { x: 60, y: -20 }, 300);
+  assert.equal(drag.type, 'pan');
+  if (drag.type === 'pan') camera.panBy(drag.right, drag.up);
+  camera.jumpToGoal();
+  const frame = viewerFrame('y');
+  near(pixelOf(cameraOfPose(camera.now, frame, 400, 300, 0.1), [0, 0, 0]).slice(0, 2), [200 + 50, 150 - 30], 1e-9);
+});
+
+test('gestures', () => {
+  const turn = orbitOf({ x: 0, y: 0 }, { x: 128, y: -64 }, 128);
+  assert.deepEqual(turn, { type: 'orbit', theta: -2 * Math.PI, phi: Math.PI });
+  const [, zoom] = pinchOf([{ x: 0, y: 0 }, { x: 10, y: 0 }], [{ x: -5, y: 0 }, { x: 15, y: 0 }], 100);
+  assert.deepEqual(zoom, { type: 'zoom', factor: 0.5 });
+  const factor = (deltaY: number, deltaMode = 0, ctrlKey = false): number => {
+    const action = wheelOf({ deltaY, deltaMode, ctrlKey });
+    return action.type === 'zoom' ? action.factor : NaN;
+  };
+  assert.ok(factor(100) > 1 && factor(-100) < 1);
+  assert.ok(Math.abs(factor(100) * factor(-100) - 1) < 1e-12);
+  assert.equal(factor(1, 1), factor(18));
+  assert.ok(factor(1, 0, true) > factor(1));
+  assert.equal(factor(1e9), factor(1e6));
+  assert.deepEqual(keyOf('ArrowRight', false), { type: 'orbit', theta: Math.PI / 8, phi: 0 });
+  assert.deepEqual(keyOf('Home', false), { type: 'reset' });
+  assert.equal(keyOf('Tab', false), null);
+});
+
+test('a camera that stands still takes no steps', () => {
+  const camera = new OrbitCamera(poseOf(settings(), BOUNDS, 1));
+  assert.equal(camera.step(16, 50), false);
+  camera.orbitBy(1, 0);
+  assert.equal(camera.step(16, 50), true);
+  let steps = 0;
+  while (camera.moving && steps < 1000) {
+    camera.step(16, 50);
+    steps++;
+  }
+  assert.ok(steps > 10 && steps < 100, `settled after ${steps} steps`);
+  assert.deepEqual(camera.now, camera.goal);
+});
+
+test('a new azimuth is reached the short way round', () => {
+  const controller = new CameraController(settings({ cameraOrbit: '350deg 75deg auto' }), () => undefined);
+  controller.applySettings(settings({ cameraOrbit: '10deg 75deg auto' }));
+  controller.step(0, 50);
+  for (let now = 16; controller.isMoving; now += 16) {
+    controller.step(now, 50);
+    const degrees = (controller.orbit.theta * 180) / Math.PI;
+    assert.ok(degrees > -11 && degrees < 10.001, `went over ${degrees}`);
+  }
+  assert.ok(Math.abs((controller.orbit.theta * 180) / Math.PI - 10) < 1e-9);
+});
+
+test('who moved the camera', () => {
+  const controller = new CameraController(settings(), () => undefined);
+  assert.equal(controller.step(0, 0), null);
+  controller.frame(BOUNDS);
+  assert.equal(controller.step(0, 0), 'automatic');
+  assert.equal(controller.step(0, 0), null);
+  controller.orbitBy(1, 0);
+  assert.equal(controller.step(0, 0), 'user-interaction');
+  controller.applySettings(settings({ cameraOrbit: '45deg 75deg auto' }));
+  assert.equal(controller.step(0, 0), 'none');
+});
+
+test('a new aspect reframes, unless a person has chosen the distance', () => {
+  const controller = new CameraController(settings(), () => undefined);
+  controller.frame(BOUNDS);
+  const { radius } = controller.orbit;
+  controller.setAspect(0.5);
+  assert.ok(controller.orbit.radius > 1.5 * radius);
+  controller.zoomBy(0.9);
+  controller.jumpToGoal();
+  const chosen = controller.orbit.radius;
+  controller.setAspect(2);
+  assert.equal(controller.orbit.radius, chosen);
+  controller.reset('none');
+  controller.jumpToGoal();
+  assert.equal(controller.orbit.radius, framingDistance(2, controller.fieldOfView.radians, 2));
+});
+
+test('a changed target leaves the orbit where a person has put it', () => {
+  const controller = new CameraController(settings(), () => undefined);
+  controller.frame(BOUNDS);
+  controller.orbitBy(0.5, 0.1);
+  controller.jumpToGoal();
+  const before = String(controller.orbit);
+  controller.applySettings(settings({ cameraTarget: '1 2 3' }));
+  controller.jumpToGoal();
+  assert.equal(String(controller.orbit), before);
+  assert.equal(String(controller.target), '1m 2m 3m');
+  assert.ok(dot([1, 0, 0], [controller.target.x, 0, 0]) === 1);
+});

@@ -1,0 +1,45 @@
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { existsSync } from 'node:fs';
+import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+
+const root = fileURLToPath(new URL('../../', import.meta.url));
+const isBuilt = existsSync(`${root}packages/element/cdn/gaussian-splat.min.js`);
+
+interface SizeModule {
+  readonly BUDGET: number;
+  readonly plyPageSize: () => number;
+  readonly scriptsForPly: () => string[];
+}
+
+test('what a page with a PLY scene fetches stays within 100 KB of gzip', { skip: isBuilt ? false : 'no CDN build: npm run build' }, async (t) => {
+  const sizes = (await import(`${root}packages/element/scripts/size.mjs`)) as SizeModule;
+  const files = sizes.scriptsForPly();
+  assert.ok(files.includes('gaussian-splat.min.js') && files.includes('scene-worker.js'), files.join());
+  assert.ok(files.length >= 3, 'the PLY reader is among them');
+  assert.ok(!files.some((file) => file.includes('spz')), 'and no other reader');
+  const bytes = sizes.plyPageSize();
+  t.diagnostic(`${bytes} bytes of gzip in ${files.length} files`);
+  assert.ok(bytes < sizes.BUDGET, `${bytes} bytes`);
+});
+
+/** A process of its own: here tsx and the test runner have long touched the global scope. */
+function importInNode(specifier: string): { status: number | null; output: string } {
+  const code = `const before = new Set(Reflect.ownKeys(globalThis));
+    const module = await import('${specifier}');
+    const added = Reflect.ownKeys(globalThis).filter((key) => !before.has(key)).map(String);
+    console.log(JSON.stringify({ names: Object.keys(module), added }));`;
+  const { status, stdout, stderr } = spawnSync(process.execPath, ['--input-type=module', '-e', code], { cwd: root, encoding: 'utf8' });
+  return { status, output: stdout + stderr };
+}
+
+for (const specifier of ['@gaussian-splat/element', '@gaussian-splat/element/element.js']) {
+  test(`${specifier} can be imported on a server`, () => {
+    const { status, output } = importInNode(specifier);
+    assert.equal(status, 0, output);
+    assert.match(output, /"GaussianSplatElement"/);
+    // Lit itself adds its version list, and stand-ins for two classes of the DOM.
+    assert.doesNotMatch(output, /"(document|window|navigator|Worker)"/);
+  });
+}
