@@ -65,7 +65,8 @@ test('targets, fields of view, axes and numbers', () => {
   for (const text of ['1 2', '1deg 2 3', '1 2 3 4', 'x']) assert.equal(targetGrammar.parse(text), null, text);
   assert.equal(fieldOfViewGrammar.parse('45deg'), 45 * DEGREE);
   assert.equal(fieldOfViewGrammar.parse('auto'), 'auto');
-  for (const text of ['0deg', '180deg', '-5deg', '45', '45m', '']) assert.equal(fieldOfViewGrammar.parse(text), null, text);
+  for (const text of ['0deg', '180deg', '-5deg', '45', '45m', ''])
+    assert.equal(fieldOfViewGrammar.parse(text), null, text);
   assert.equal(upGrammar.parse(' -Z '), '-z');
   assert.equal(upGrammar.parse('down'), null);
   const decay = numberGrammar(50, 0, 'milliseconds');
@@ -96,9 +97,14 @@ test('what the getters print, the attributes read back to the last bit', () => {
 });
 
 test('no text makes a grammar throw or yield a number that is not finite', () => {
-  const text = fc.oneof(fc.string(), fc.array(fc.constantFrom('1', 'e', '-', '.', 'deg', 'm', '%', ' ', 'auto')).map((a) => a.join('')));
+  const text = fc.oneof(
+    fc.string(),
+    fc.array(fc.constantFrom('1', 'e', '-', '.', 'deg', 'm', '%', ' ', 'auto')).map((a) => a.join('')),
+  );
   const isSound = (value: unknown): boolean =>
-    typeof value === 'number' ? Number.isFinite(value) : Object(value) !== value || Object.values(value as object).every(isSound);
+    typeof value === 'number'
+      ? Number.isFinite(value)
+      : Object(value) !== value || Object.values(value as object).every(isSound);
   fc.assert(
     fc.property(text, (attribute) => {
       for (const grammar of [orbit, targetGrammar, fieldOfViewGrammar]) assert.ok(isSound(grammar.parse(attribute)));
@@ -134,7 +140,10 @@ test('a malformed attribute takes its default with one warning that says what wa
     const read = readAttributes({ ...ABSENT, [key]: 'nonsense' }, (sentence) => warnings.push(sentence));
     assert.equal(warnings.length, 1, name);
     assert.match(warnings[0], new RegExp(`<gaussian-splat> ${name}: expected .*, found "nonsense"; the default`));
-    assert.deepEqual(read, readAttributes(ABSENT, () => undefined));
+    assert.deepEqual(
+      read,
+      readAttributes(ABSENT, () => undefined),
+    );
   }
 });
 

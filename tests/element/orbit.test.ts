@@ -37,7 +37,10 @@ const near = (actual: ArrayLike<number>, expected: ArrayLike<number>, tolerance 
   }
 };
 
-const pixelOf = (camera: { fx: number; fy: number; cx: number; cy: number; worldToCamera: Matrix4 }, p: Vector3): number[] => {
+const pixelOf = (
+  camera: { fx: number; fy: number; cx: number; cy: number; worldToCamera: Matrix4 },
+  p: Vector3,
+): number[] => {
   const m = camera.worldToCamera;
   const [x, y, z] = [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]);
   return [(camera.fx * x) / z + camera.cx, (camera.fy * y) / z + camera.cy, z];
@@ -71,10 +74,14 @@ test('viewer frames are rotations that bring the up axis to +y', () => {
     near(cross(frame[0], frame[1]), frame[2]);
     near(toScene(frame, toViewer(frame, [1, 2, 3])), [1, 2, 3]);
   }
-  assert.deepEqual(viewerFrame('-y'), [[1, 0, 0], [0, -1, 0], [0, 0, -1]]);
+  assert.deepEqual(viewerFrame('-y'), [
+    [1, 0, 0],
+    [0, -1, 0],
+    [0, 0, -1],
+  ]);
 });
 
-test('the camera of a pose is core\'s lookAt from the same eye, for every up axis', () => {
+test("the camera of a pose is core's lookAt from the same eye, for every up axis", () => {
   const angle = fc.double({ min: -7, max: 7, noNaN: true });
   const phi = fc.double({ min: 0.01, max: 3.13, noNaN: true });
   const length = fc.double({ min: -100, max: 100, noNaN: true });
@@ -106,7 +113,13 @@ test('theta 0 looks from the +z side of viewer space, theta 90 from the +x side,
 test('the target lands in the middle and what is up in the scene is up in the picture', () => {
   for (const up of UPS) {
     const frame = viewerFrame(up);
-    const camera = cameraOfPose({ theta: 1, phi: 1.2, radius: 5, x: 1, y: 2, z: 3, fieldOfView: 0.8 }, frame, 320, 200, 0.1);
+    const camera = cameraOfPose(
+      { theta: 1, phi: 1.2, radius: 5, x: 1, y: 2, z: 3, fieldOfView: 0.8 },
+      frame,
+      320,
+      200,
+      0.1,
+    );
     const target = toScene(frame, [1, 2, 3]);
     near(pixelOf(camera, target), [160, 100, 5]);
     const above: Vector3 = [target[0] + AXES[up][0], target[1] + AXES[up][1], target[2] + AXES[up][2]];
@@ -114,7 +127,7 @@ test('the target lands in the middle and what is up in the scene is up in the pi
   }
 });
 
-test('the framing distance makes a ball touch the picture\'s nearer edge', () => {
+test("the framing distance makes a ball touch the picture's nearer edge", () => {
   for (const aspect of [0.3, 1, 2.5]) {
     const distance = framingDistance(2, 0.9, aspect);
     const half = Math.min(0.45, Math.atan(Math.tan(0.45) * aspect));
@@ -123,7 +136,7 @@ test('the framing distance makes a ball touch the picture\'s nearer edge', () =>
   }
 });
 
-test('the near plane is the trainers\' except in small scenes', () => {
+test("the near plane is the trainers' except in small scenes", () => {
   assert.equal(nearPlane({ ...BOUNDS, radius: 100 }), 0.2);
   assert.equal(nearPlane({ ...BOUNDS, radius: 0.5 }), 0.005);
 });
@@ -176,7 +189,17 @@ test('a pan moves the target with the pointer: its point stays under it', () => 
 test('gestures', () => {
   const turn = orbitOf({ x: 0, y: 0 }, { x: 128, y: -64 }, 128);
   assert.deepEqual(turn, { type: 'orbit', theta: -2 * Math.PI, phi: Math.PI });
-  const [, zoom] = pinchOf([{ x: 0, y: 0 }, { x: 10, y: 0 }], [{ x: -5, y: 0 }, { x: 15, y: 0 }], 100);
+  const [, zoom] = pinchOf(
+    [
+      { x: 0, y: 0 },
+      { x: 10, y: 0 },
+    ],
+    [
+      { x: -5, y: 0 },
+      { x: 15, y: 0 },
+    ],
+    100,
+  );
   assert.deepEqual(zoom, { type: 'zoom', factor: 0.5 });
   const factor = (deltaY: number, deltaMode = 0, ctrlKey = false): number => {
     const action = wheelOf({ deltaY, deltaMode, ctrlKey });

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
-import { existsSync } from 'node:fs';
+import { existsSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 
@@ -13,16 +13,20 @@ interface SizeModule {
   readonly scriptsForPly: () => string[];
 }
 
-test('what a page with a PLY scene fetches stays within 100 KB of gzip', { skip: isBuilt ? false : 'no CDN build: npm run build' }, async (t) => {
-  const sizes = (await import(`${root}packages/element/scripts/size.mjs`)) as SizeModule;
-  const files = sizes.scriptsForPly();
-  assert.ok(files.includes('gaussian-splat.min.js') && files.includes('scene-worker.js'), files.join());
-  assert.ok(files.length >= 3, 'the PLY reader is among them');
-  assert.ok(!files.some((file) => file.includes('spz')), 'and no other reader');
-  const bytes = sizes.plyPageSize();
-  t.diagnostic(`${bytes} bytes of gzip in ${files.length} files`);
-  assert.ok(bytes < sizes.BUDGET, `${bytes} bytes`);
-});
+test(
+  'what a page with a PLY scene fetches stays within 100 KB of gzip',
+  { skip: isBuilt ? false : 'no CDN build: npm run build' },
+  async (t) => {
+    const sizes = (await import(`${root}packages/element/scripts/size.mjs`)) as SizeModule;
+    const files = sizes.scriptsForPly();
+    assert.ok(files.includes('gaussian-splat.min.js') && files.includes('scene-worker.js'), files.join());
+    assert.ok(files.length >= 3, 'the PLY reader is among them');
+    assert.ok(!files.some((file) => file.includes('spz')), 'and no other reader');
+    const bytes = sizes.plyPageSize();
+    t.diagnostic(`${bytes} bytes of gzip in ${files.length} files`);
+    assert.ok(bytes < sizes.BUDGET, `${bytes} bytes`);
+  },
+);
 
 /** A process of its own: here tsx and the test runner have long touched the global scope. */
 function importInNode(specifier: string): { status: number | null; output: string } {
@@ -30,7 +34,10 @@ function importInNode(specifier: string): { status: number | null; output: strin
     const module = await import('${specifier}');
     const added = Reflect.ownKeys(globalThis).filter((key) => !before.has(key)).map(String);
     console.log(JSON.stringify({ names: Object.keys(module), added }));`;
-  const { status, stdout, stderr } = spawnSync(process.execPath, ['--input-type=module', '-e', code], { cwd: root, encoding: 'utf8' });
+  const { status, stdout, stderr } = spawnSync(process.execPath, ['--input-type=module', '-e', code], {
+    cwd: root,
+    encoding: 'utf8',
+  });
   return { status, output: stdout + stderr };
 }
 
@@ -43,3 +50,13 @@ for (const specifier of ['@gaussian-splat/element', '@gaussian-splat/element/ele
     assert.doesNotMatch(output, /"(document|window|navigator|Worker)"/);
   });
 }
+
+test('the README names every attribute, and no other', async () => {
+  const { GaussianSplatElement } = await import('@gaussian-splat/element/element.js');
+  const readme = readFileSync(`${root}packages/element/README.md`, 'utf8');
+  const [, table] = /## Attributes([^]*?)\n## /.exec(readme) ?? [];
+  const named = [...table.matchAll(/^\|([^|]*)\|/gm)].flatMap(([, cell]) =>
+    [...cell.matchAll(/`([a-z-]+)`/g)].map(([, name]) => name),
+  );
+  assert.deepEqual(named.sort(), [...GaussianSplatElement.observedAttributes].sort());
+});

@@ -17,7 +17,7 @@ describe('the CDN build', () => {
     const { GaussianSplatElement: Class } = (await import(`${origin}/cdn/gaussian-splat.min.js`)) as {
       GaussianSplatElement: typeof GaussianSplatElement;
     };
-    assert(customElements.get('gaussian-splat') === Class, 'the element is the build\'s');
+    assert(customElements.get('gaussian-splat') === Class, "the element is the build's");
     for (const src of [COMPASS, COMPASS.replace('.splat', '.ply')]) {
       const element = show({ src });
       await element.ready;

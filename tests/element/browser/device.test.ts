@@ -1,6 +1,18 @@
 import '@gaussian-splat/element';
 import { GaussianSplatElement, SharedDevice } from '@gaussian-splat/element';
-import { assert, assertEqual, COMPASS, delay, devices, FIXTURES, frames, nextEvent, show, showLoaded, until } from './support/harness.js';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  devices,
+  FIXTURES,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
 import { isGreen, isRed, screenOf } from './support/screen.js';
 
 /** Runs work with another answer of the browser to the question for a GPU. */
@@ -23,7 +35,10 @@ describe('one device', () => {
       show({ src: i % 2 ? `${FIXTURES}green.splat` : COMPASS }, 'display: inline-block; width: 60px; height: 50px'),
     );
     await Promise.all(elements.map((element) => element.ready));
-    assert(elements.every((element) => element.loaded), 'all loaded');
+    assert(
+      elements.every((element) => element.loaded),
+      'all loaded',
+    );
     assert(devices.length - before <= 1, `${devices.length - before} new devices`);
     for (const [i, element] of elements.entries()) {
       const screen = await screenOf(element);
@@ -31,18 +46,28 @@ describe('one device', () => {
     }
   });
 
-  it('may be the page\'s own', async () => {
+  it("may be the page's own", async () => {
     const original = GaussianSplatElement.sharedDevice;
     const adapter = await navigator.gpu.requestAdapter();
     assert(adapter, 'an adapter');
     const own = await adapter.requestDevice();
-    GaussianSplatElement.sharedDevice = new SharedDevice(async () => own);
+    GaussianSplatElement.sharedDevice = new SharedDevice(async () => own, { keepDevice: true });
+    const delayBefore = GaussianSplatElement.releaseDelay;
+    GaussianSplatElement.releaseDelay = 0;
     try {
       const before = devices.length;
-      await showLoaded();
+      const element = await showLoaded();
       assertEqual(devices.length - before, 0, 'new devices');
+      element.remove();
+      await until(() => !element.loaded, 'the release');
+      let isLost = false;
+      void own.lost.then(() => (isLost = true));
+      await delay(200);
+      assertEqual(isLost, false, "the page's device is destroyed");
+      own.destroy();
     } finally {
       GaussianSplatElement.sharedDevice = original;
+      GaussianSplatElement.releaseDelay = delayBefore;
     }
   });
 });
@@ -76,7 +101,8 @@ describe('the loss of the device', () => {
     const element = await showLoaded();
     const before = await screenOf(element);
     const seen: string[] = [];
-    for (const type of ['contextlost', 'contextrestored', 'error']) element.addEventListener(type, () => seen.push(type));
+    for (const type of ['contextlost', 'contextrestored', 'error'])
+      element.addEventListener(type, () => seen.push(type));
     for (let i = 0; i < 10; i++) {
       const restored = nextEvent(element, 'contextrestored');
       const count = devices.length;
@@ -92,7 +118,10 @@ describe('the loss of the device', () => {
       await until(() => seen[seen.length - 1] === 'contextrestored', 'the last recovery');
       assertEqual((await screenOf(element)).differences(before), 0, `differing colour values after loss ${i}`);
     }
-    assert(seen.length >= 20 && seen.every((type, i) => type === ['contextlost', 'contextrestored'][i % 2]), seen.join());
+    assert(
+      seen.length >= 20 && seen.every((type, i) => type === ['contextlost', 'contextrestored'][i % 2]),
+      seen.join(),
+    );
   });
 
   it('of several elements brings all of them back on one new device', async () => {
@@ -150,7 +179,13 @@ describe('without WebGPU', () => {
     'no API': [undefined, 'unsupported/no-webgpu', /current Chrome/],
     'no adapter': [{ requestAdapter: async () => null }, 'unsupported/no-adapter', /hardware acceleration/],
     'no device': [
-      { requestAdapter: async () => ({ features: new Set(), limits: {}, requestDevice: () => Promise.reject(new Error('busy')) }) },
+      {
+        requestAdapter: async () => ({
+          features: new Set(),
+          limits: {},
+          requestDevice: () => Promise.reject(new Error('busy')),
+        }),
+      },
       'unsupported/limits',
       /graphics driver/,
     ],
@@ -182,7 +217,7 @@ describe('without WebGPU', () => {
     });
   });
 
-  it('the page\'s own fallback takes the place of the default', async () => {
+  it("the page's own fallback takes the place of the default", async () => {
     await withGpu(undefined, async () => {
       const element = show({ src: COMPASS });
       const own = document.createElement('p');

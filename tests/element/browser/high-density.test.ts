@@ -2,7 +2,8 @@
 import '@gaussian-splat/element';
 import { assert, assertEqual, showLoaded, until } from './support/harness.js';
 
-const canvasOf = (element: Element): HTMLCanvasElement | null | undefined => element.shadowRoot?.querySelector('canvas');
+const canvasOf = (element: Element): HTMLCanvasElement | null | undefined =>
+  element.shadowRoot?.querySelector('canvas');
 
 describe('on a dense screen', () => {
   it('the screen is one', () => {

@@ -36,7 +36,11 @@ async function settled(element: GaussianSplatElement): Promise<Place> {
 const close = (actual: number, expected: number, what: string, tolerance = 1e-6): void =>
   assert(Math.abs(actual - expected) <= tolerance, `${what}: expected ${expected}, found ${actual}`);
 
-async function drag(from: readonly [number, number], to: readonly [number, number], button: 'left' | 'right' = 'left'): Promise<void> {
+async function drag(
+  from: readonly [number, number],
+  to: readonly [number, number],
+  button: 'left' | 'right' = 'left',
+): Promise<void> {
   await sendMouse({ type: 'move', position: [...from] });
   await sendMouse({ type: 'down', button });
   await sendMouse({ type: 'move', position: [Math.round((from[0] + to[0]) / 2), Math.round((from[1] + to[1]) / 2)] });
@@ -59,7 +63,9 @@ describe('mouse', () => {
   it('a drag orbits, outside of the element too, and tells who did it', async () => {
     const element = await controlled();
     const sources = new Set<string>();
-    element.addEventListener('camera-change', (event: CustomEvent<CameraChangeDetail>) => sources.add(event.detail.source));
+    element.addEventListener('camera-change', (event: CustomEvent<CameraChangeDetail>) =>
+      sources.add(event.detail.source),
+    );
     await drag([60, 50], [35, 40]);
     const place = await settled(element);
     close(place.theta, 90, 'theta: 25 of 100 pixels are a quarter turn');
@@ -93,9 +99,11 @@ describe('mouse', () => {
     document.body.style.height = '';
   });
 
-  it('without camera-controls, or with disable-zoom, the wheel is the page\'s', async () => {
+  it("without camera-controls, or with disable-zoom, the wheel is the page's", async () => {
     for (const attributes of [{ 'disable-zoom': '' }, null]) {
-      const element = attributes ? await controlled(attributes) : await showLoaded({ 'camera-orbit': '0deg 75deg 10m' });
+      const element = attributes
+        ? await controlled(attributes)
+        : await showLoaded({ 'camera-orbit': '0deg 75deg 10m' });
       document.body.style.height = '5000px';
       await turnWheel(60, 50, 100);
       await until(() => scrollY > 0, 'the page to scroll');
@@ -157,7 +165,7 @@ describe('keyboard', () => {
     close(Math.hypot(...home.target), 0, 'target at home');
   });
 
-  it('other keys stay the page\'s', async () => {
+  it("other keys stay the page's", async () => {
     const element = await controlled();
     const input = document.createElement('input');
     document.body.append(input);
@@ -232,7 +240,10 @@ describe('motion', () => {
     element.addEventListener('camera-change', () => seen.push(placeOf(element).theta));
     await sendKeys({ press: 'ArrowRight' });
     await until(() => seen.length > 5, 'some frames');
-    assert(seen.every((theta, i) => i === 0 || theta >= seen[i - 1]), `rising: ${seen.join()}`);
+    assert(
+      seen.every((theta, i) => i === 0 || theta >= seen[i - 1]),
+      `rising: ${seen.join()}`,
+    );
     assert(seen[0] < 20, `no jump: ${seen[0]}`);
   });
 
@@ -288,7 +299,10 @@ describe('accessibility', () => {
   it('an image without controls, an application with, named by alt, aria-label or a default', async () => {
     const element = await showLoaded();
     const view = element.shadowRoot?.querySelector('#view');
-    const described = (): (string | null | undefined)[] => [view?.getAttribute('role'), view?.getAttribute('aria-label')];
+    const described = (): (string | null | undefined)[] => [
+      view?.getAttribute('role'),
+      view?.getAttribute('aria-label'),
+    ];
     assertEqual(described(), ['img', '3D scene'], 'default');
     element.alt = 'A skull';
     await element.updateComplete;
@@ -296,7 +310,7 @@ describe('accessibility', () => {
     element.cameraControls = true;
     await element.updateComplete;
     assertEqual(described(), ['application', 'A skull'], 'controls');
-    assert(view?.hasAttribute('aria-roledescription'), 'a role description');
+    assert(view && view.hasAttribute('aria-roledescription'), 'a role description');
     const help = element.shadowRoot?.getElementById(view.getAttribute('aria-describedby') ?? '');
     assert(/Arrow keys/.test(help?.textContent ?? ''), 'the keys are described');
     element.cameraControls = false;

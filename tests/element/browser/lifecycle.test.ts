@@ -1,6 +1,19 @@
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, COMPASS, delay, devices, FIXTURES, frames, nextEvent, show, showLoaded, submits, until } from './support/harness.js';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  devices,
+  FIXTURES,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  submits,
+  until,
+} from './support/harness.js';
 import { isGreen, isRed, screenOf } from './support/screen.js';
 
 const canvasOf = (element: GaussianSplatElement): HTMLCanvasElement => {
@@ -8,7 +21,10 @@ const canvasOf = (element: GaussianSplatElement): HTMLCanvasElement => {
   assert(canvas, 'a canvas');
   return canvas;
 };
-const canvasSize = (element: GaussianSplatElement): [number, number] => [canvasOf(element).width, canvasOf(element).height];
+const canvasSize = (element: GaussianSplatElement): [number, number] => [
+  canvasOf(element).width,
+  canvasOf(element).height,
+];
 
 /** Runs work with the page hidden, as far as scripts can tell. */
 async function whileHidden(work: () => Promise<void>): Promise<void> {
@@ -168,6 +184,20 @@ describe('moves and removals', () => {
       document.body.append(element);
       await nextEvent(element, 'load');
       assert(isGreen((await screenOf(element)).at(60, 50)), 'seen again');
+    } finally {
+      GaussianSplatElement.releaseDelay = delayBefore;
+    }
+  });
+
+  it('an eager element off screen loads anew as well', async () => {
+    const delayBefore = GaussianSplatElement.releaseDelay;
+    GaussianSplatElement.releaseDelay = 0;
+    try {
+      const element = await showLoaded({ loading: 'eager' }, 'width: 100px; height: 100px; margin-top: 5000px');
+      element.remove();
+      await until(() => !element.loaded, 'the release');
+      document.body.append(element);
+      await nextEvent(element, 'load');
     } finally {
       GaussianSplatElement.releaseDelay = delayBefore;
     }

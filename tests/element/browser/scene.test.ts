@@ -1,13 +1,24 @@
 import '@gaussian-splat/element';
 import type { ElementError, GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, COMPASS, delay, FIXTURES, frames, nextEvent, show, showLoaded, until } from './support/harness.js';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  FIXTURES,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
 import { isBlue, isGreen, isRed, screenOf } from './support/screen.js';
 
 const states = (element: GaussianSplatElement): string[] =>
   ['loading', 'ready', 'error', 'unsupported'].filter((state) => element.matches(`:state(${state})`));
 
 describe('a scene', () => {
-  it('is drawn the right way round, on the page\'s own background', async () => {
+  it("is drawn the right way round, on the page's own background", async () => {
     const element = await showLoaded({}, 'width: 120px; height: 120px; background: rgb(200, 100, 220)');
     const screen = await screenOf(element);
     const [red, blue, green] = [isRed, isBlue, isGreen].map((rule) => screen.middleOf(rule));
@@ -33,7 +44,10 @@ describe('a scene', () => {
     await frames();
     assertEqual(seen, ['load /net/slow/compass.ply']);
     assertEqual(states(element), ['ready']);
-    assert(progress.every((event) => event instanceof ProgressEvent), 'ProgressEvents');
+    assert(
+      progress.every((event) => event instanceof ProgressEvent),
+      'ProgressEvents',
+    );
     const [first, last] = [progress[0], progress[progress.length - 1]];
     assertEqual([first.loaded, first.lengthComputable], [0, false], 'first');
     assertEqual([last.loaded, last.total, last.lengthComputable], [693, 693, true], 'last');
@@ -67,7 +81,10 @@ describe('a scene', () => {
     assert(context, 'a 2D canvas');
     context.fillStyle = 'rgb(255, 0, 0)';
     context.fillRect(0, 0, 4, 4);
-    const element = show({ src: '/net/slow/green.splat?ms=1500', poster: image.toDataURL() }, 'width: 120px; height: 100px; --poster-transition: 0s');
+    const element = show(
+      { src: '/net/slow/green.splat?ms=1500', poster: image.toDataURL() },
+      'width: 120px; height: 100px; --poster-transition: 0s',
+    );
     await until(() => states(element).includes('loading'), 'the state loading');
     const bar = element.shadowRoot?.querySelector('[role=progressbar]');
     assert(bar && !bar.hasAttribute('aria-valuenow'), 'a progress bar without a value');
@@ -125,7 +142,10 @@ describe('src', () => {
   });
 
   it('keeps the old picture until the new one is there', async () => {
-    const element = await showLoaded({ src: `${FIXTURES}green.splat` }, 'width: 120px; height: 100px; --poster-transition: 0s');
+    const element = await showLoaded(
+      { src: `${FIXTURES}green.splat` },
+      'width: 120px; height: 100px; --poster-transition: 0s',
+    );
     element.src = '/net/slow/compass.ply?ms=800';
     await until(() => states(element).includes('loading'), 'the state loading');
     assert(isGreen((await screenOf(element)).at(60, 50)), 'the old scene is seen');
@@ -134,7 +154,10 @@ describe('src', () => {
   });
 
   it('removed, clears the element', async () => {
-    const element = await showLoaded({ src: `${FIXTURES}green.splat` }, 'width: 120px; height: 100px; background: white');
+    const element = await showLoaded(
+      { src: `${FIXTURES}green.splat` },
+      'width: 120px; height: 100px; background: white',
+    );
     element.removeAttribute('src');
     await element.ready;
     await element.updateComplete;

@@ -26,23 +26,31 @@ function flagsToBits(pages: readonly boolean[][]): { bits: Uint32Array; offsets:
 const survivorsTwin = (pages: readonly boolean[][]): number[] =>
   pages.flatMap((flags) => flags.flatMap((flag, i) => (flag ? [i] : [])));
 
-async function compactOnGpu(bench: Bench, pages: readonly boolean[][], capacity: number): Promise<Uint32Array> {
-  const { bits, offsets, firstGroups } = flagsToBits(pages);
+/** Lists the survivors of pages of the given sizes whose bits and offsets are known. */
+async function compactBits(
+  bench: Bench,
+  { bits, offsets, firstGroups }: ReturnType<typeof flagsToBits>,
+  counts: readonly number[],
+  capacity: number,
+): Promise<Uint32Array> {
   const stage = new CompactStage(bench.device);
   const survivors = bench.buffer(new Uint32Array(capacity).fill(0xffffffff));
   const [bitBuffer, offsetBuffer] = [bench.buffer(bits), bench.buffer(offsets)];
-  pages.forEach((flags, page) => {
+  counts.forEach((count, page) => {
     const bytes = new ArrayBuffer(layouts.View.size);
     const zeros = { local_to_camera: new Array(16).fill(0), eye: [0, 0, 0], focal: [1, 1], principal: [0, 0] };
     const rest = { viewport: [1, 1], jacobian_min: [0, 0], jacobian_max: [0, 0], near: 1, far: 2, sh_degree: 0 };
-    const place = { splat_count: flags.length, page, first_group: firstGroups[page], antialiased: 0 };
+    const place = { splat_count: count, page, first_group: firstGroups[page], antialiased: 0 };
     writeStruct(layouts.View, { ...zeros, ...rest, ...place }, bytes);
     const view = bench.uniform(...new Uint32Array(bytes));
     const bindings = stage.bind({ view, visible_bits: bitBuffer, group_offsets: offsetBuffer, survivors });
-    bench.compute((pass) => stage.record(pass, bindings, flags.length));
+    bench.compute((pass) => stage.record(pass, bindings, count));
   });
   return bench.read(survivors, 4 * capacity);
 }
+
+const compactOnGpu = (bench: Bench, pages: readonly boolean[][], capacity: number): Promise<Uint32Array> =>
+  compactBits(bench, flagsToBits(pages), pages.map((flags) => flags.length), capacity);
 
 function randomFlags(count: number, share: number, seed: number): boolean[] {
   const random = randomSource(seed);
@@ -96,6 +104,21 @@ export const compactCases: StageCase[] = [
       const pages = [randomFlags(5000, 0.5, 9), randomFlags(3000, 0.5, 10)];
       const capacity = 1024;
       checkEqual(await compactOnGpu(bench, pages, capacity), survivorsTwin(pages).slice(0, capacity), 'survivors');
+    },
+  },
+  {
+    name: 'compact: beyond 65,535 workgroups a second row of them does the rest',
+    run: async (bench) => {
+      const groups = constants.MAX_GROUPS_X + 5;
+      const bits = new Uint32Array(groups * WORDS_PER_GROUP);
+      const offsets = new Uint32Array(groups + 1);
+      // One survivor in each of the groups around the end of the first row, and one at the very end.
+      const chosen = [0, constants.MAX_GROUPS_X - 1, constants.MAX_GROUPS_X, groups - 1];
+      for (const group of chosen) bits[group * WORDS_PER_GROUP + 3] = 1 << 7;
+      for (let g = 0; g < groups; g++) offsets[g + 1] = offsets[g] + (chosen.includes(g) ? 1 : 0);
+      const layout = { bits, offsets, firstGroups: Uint32Array.of(0, groups) };
+      const survivors = await compactBits(bench, layout, [groups * CULL_GROUP], 16);
+      checkEqual(survivors, chosen.map((group) => group * CULL_GROUP + 3 * 32 + 7), 'survivors');
     },
   },
   {

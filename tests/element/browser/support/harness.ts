@@ -46,7 +46,10 @@ export function nextEvent<T extends Event>(target: EventTarget, type: string, li
 }
 
 /** An element of 120 x 100 CSS pixels in the page. Every test's elements are removed after it. */
-export function show(attributes: Readonly<Record<string, string>>, style = 'width: 120px; height: 100px'): GaussianSplatElement {
+export function show(
+  attributes: Readonly<Record<string, string>>,
+  style = 'width: 120px; height: 100px',
+): GaussianSplatElement {
   const element = document.createElement('gaussian-splat');
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   element.style.cssText = style;
@@ -55,7 +58,10 @@ export function show(attributes: Readonly<Record<string, string>>, style = 'widt
 }
 
 /** The same, once its scene is on show. */
-export async function showLoaded(attributes: Readonly<Record<string, string>> = {}, style?: string): Promise<GaussianSplatElement> {
+export async function showLoaded(
+  attributes: Readonly<Record<string, string>> = {},
+  style?: string,
+): Promise<GaussianSplatElement> {
   const element = show({ src: COMPASS, ...attributes }, style);
   await element.ready;
   assert(element.loaded, `not loaded: ${element.error?.message ?? 'no error either'}`);

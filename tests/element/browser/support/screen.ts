@@ -37,7 +37,9 @@ export class Screen {
   /** Number of colour values, 0..255, that differ from another picture of the same size by more than a tolerance. */
   differences(other: Screen, tolerance = 0): number {
     const [a, b] = [this.#data.data, other.#data.data];
-    return a.length !== b.length ? Infinity : a.reduce((sum, v, i) => sum + (Math.abs(v - b[i]) > tolerance ? 1 : 0), 0);
+    return a.length !== b.length
+      ? Infinity
+      : a.reduce((sum, v, i) => sum + (Math.abs(v - b[i]) > tolerance ? 1 : 0), 0);
   }
 }
 

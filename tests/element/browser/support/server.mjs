@@ -75,7 +75,10 @@ const ANSWERS = {
 
   /** A page under a strict policy that allows no worker, no inline style and no inline script. */
   'strict-page'(context) {
-    context.set('Content-Security-Policy', "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'self'; worker-src 'none'");
+    context.set(
+      'Content-Security-Policy',
+      "default-src 'none'; script-src 'self'; connect-src 'self'; style-src 'self'; worker-src 'none'",
+    );
     context.type = 'text/html';
     context.body = `<!doctype html><title>Strict</title>
       <script src="/net/strict-script" type="module"></script>

@@ -10,7 +10,12 @@ export function typescript() {
       context.path.endsWith('.ts') && /^\.{1,2}\/.*\.js$/.test(source) ? source.replace(/\.js$/, '.ts') : undefined,
     transform: async ({ path, body }) => {
       if (!path.endsWith('.ts')) return undefined;
-      const { code } = await transform(String(body), { loader: 'ts', target: 'es2022', sourcemap: 'inline', sourcefile: path });
+      const { code } = await transform(String(body), {
+        loader: 'ts',
+        target: 'es2022',
+        sourcemap: 'inline',
+        sourcefile: path,
+      });
       return code;
     },
   };

@@ -1,0 +1,68 @@
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import {
+  assert,
+  assertEqual,
+  claimFault,
+  COMPASS,
+  delay,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
+
+/** All workers that the page has started, and whether they were ended. */
+const workers: { worker: Worker; isEnded: boolean }[] = [];
+window.Worker = class extends Worker {
+  readonly #record = { worker: this as Worker, isEnded: false };
+  constructor(script: string | URL, options?: WorkerOptions) {
+    super(script, options);
+    workers.push(this.#record);
+  }
+  override terminate(): void {
+    this.#record.isEnded = true;
+    super.terminate();
+  }
+};
+
+describe('the scene worker', () => {
+  it('is one for all elements, ends when idle, and starts again', async () => {
+    const elements = [show({ src: COMPASS }), show({ src: COMPASS }), show({ src: COMPASS })];
+    await Promise.all(elements.map((element) => element.ready));
+    assert(
+      elements.every((element) => element.loaded),
+      'all loaded',
+    );
+    assertEqual(workers.length, 1, 'workers');
+    await until(() => workers[0].isEnded, 'the end of an idle worker');
+    await showLoaded();
+    assertEqual(workers.length, 2, 'workers after another load');
+  });
+
+  it('that dies is an error of the elements it worked for, and the next load starts another', async () => {
+    const element = show({ src: '/net/slow/compass.ply?ms=3000' });
+    await until(() => workers.some(({ isEnded }) => !isEnded), 'a worker');
+    await nextEvent(element, 'progress');
+    await delay(600);
+    const { worker } = workers[workers.length - 1];
+    worker.dispatchEvent(new ErrorEvent('error', { message: 'out of memory', cancelable: true }));
+    await element.ready;
+    assertEqual(element.error?.reason, 'out-of-memory/allocation');
+    await showLoaded();
+    assertEqual(workers.length, 3, 'workers');
+  });
+
+  it("that is refused gives way to the page's own thread, with one warning for all elements", async () => {
+    type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
+    const original = GaussianSplatElement.sceneLoader;
+    const Loader = original.constructor as new (spawn: () => Worker) => SceneLoader;
+    GaussianSplatElement.sceneLoader = new Loader(() => new Worker('/net/status/404', { type: 'module' }));
+    try {
+      await Promise.all([showLoaded(), showLoaded()]);
+      await showLoaded();
+    } finally {
+      GaussianSplatElement.sceneLoader = original;
+    }
+    claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
+  });
+});
