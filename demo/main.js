@@ -5,7 +5,7 @@ const byId = (id) => document.getElementById(id);
 byId('copy-view').addEventListener('click', async () => {
   const hero = byId('hero');
   const html =
-    `<gaussian-splat src="skull.spz" alt="A fossil skull" camera-controls\n` +
+    `<gaussian-splat src="skull.spz" alt="A skull" camera-controls\n` +
     `  camera-orbit="${hero.getCameraOrbit()}" camera-target="${hero.getCameraTarget()}"\n` +
     `  field-of-view="${hero.getFieldOfView()}"></gaussian-splat>`;
   byId('snippet').textContent = `<script type="module" src="gaussian-splat.min.js"></script>\n${html}`;
@@ -64,6 +64,7 @@ report(byId('faulty'), byId('faulty-status'));
 
 for (const button of document.querySelectorAll('button[data-source]')) {
   button.addEventListener('click', () => {
+    byId('faulty').hidden = false;
     byId('faulty').src = button.dataset.source;
   });
 }

@@ -53,11 +53,14 @@ function runNodeTests() {
 
 function runBrowserTests() {
   const output = runAndCapture(process.execPath, ['node_modules/@web/test-runner/dist/bin.js', '--config', 'web-test-runner.config.mjs']);
-  const summary = [...output.text.matchAll(/(\d+) passed, (\d+) failed(?:, (\d+) skipped)?/g)].at(-1);
-  totals.passed += Number(summary?.[1] ?? 0);
-  totals.failed += Number(summary?.[2] ?? 0);
-  totals.skipped += Number(summary?.[3] ?? 0);
-  if (output.status !== 0 && Number(summary?.[2] ?? 0) === 0) totals.failed++;
+  // The runner closes with one line for each of its groups; groups that run files again repeat their line when done.
+  const lines = [...output.text.matchAll(/^.*?(\d+) passed, (\d+) failed(?:, (\d+) skipped)?.*$/gm)];
+  const sum = (index) => lines.reduce((total, line) => total + Number(line[index] ?? 0), 0);
+  const failed = sum(2);
+  totals.passed += sum(1);
+  totals.failed += failed;
+  totals.skipped += sum(3);
+  if (output.status !== 0 && failed === 0) totals.failed++;
 }
 
 /** Runs a command, shows its output, and returns it with the exit status. */

@@ -12,13 +12,16 @@
 @group(0) @binding(4) var<storage, read_write> plan: Plan;
 
 var<workgroup> bits: array<atomic<u32>, WORDS_PER_GROUP>;
+var<workgroup> nearest_inverted: atomic<u32>;
+var<workgroup> farthest: atomic<u32>;
 
-fn is_visible(packed: PackedGaussian) -> bool {
+// Camera depth of a splat that paints something, 0 of any other.
+fn visible_depth(packed: PackedGaussian) -> f32 {
   let g = unpack_gaussian(packed);
   // The cheap tests first: most splats of a scene fail one of them.
   let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
-  if (g.opacity < ALPHA_MIN || !is_in_depth_range(view, depth)) { return false; }
-  return covers_a_pixel(view, project_ellipse(view, g));
+  if (g.opacity < ALPHA_MIN || !is_in_depth_range(view, depth)) { return 0.0; }
+  return select(0.0, depth, covers_a_pixel(view, project_ellipse(view, g)));
 }
 
 @compute @workgroup_size(CULL_GROUP)
@@ -29,8 +32,13 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let packed = gaussians[i];
     if (!is_usable(packed)) {
       atomicAdd(&plan.unusable, 1u);
-    } else if (is_visible(packed)) {
-      atomicOr(&bits[lane / 32u], 1u << (lane % 32u));
+    } else {
+      let depth = visible_depth(packed);
+      if (depth > 0.0) {
+        atomicOr(&bits[lane / 32u], 1u << (lane % 32u));
+        atomicMax(&nearest_inverted, ~bitcast<u32>(depth));
+        atomicMax(&farthest, bitcast<u32>(depth));
+      }
     }
   }
   workgroupBarrier();
@@ -43,5 +51,9 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     var count = 0u;
     for (var w = 0u; w < WORDS_PER_GROUP; w++) { count += countOneBits(atomicLoad(&bits[w])); }
     group_counts[view.first_group + group] = count;
+    if (count > 0u) {
+      atomicMax(&plan.nearest_inverted, atomicLoad(&nearest_inverted));
+      atomicMax(&plan.farthest, atomicLoad(&farthest));
+    }
   }
 }

@@ -50,6 +50,18 @@ fn splat_sh_color(i: u32, degree: u32, d: vec3f) -> vec3f {
   return max(color, vec3f(0.0));
 }
 
+// Orders as the depth does. The bits of a positive float32, read as a number, grow like its logarithm: a share of the
+// visible range of that number is a logarithmic key that needs no logarithm.
+fn depth_key(depth: f32) -> u32 {
+  let depth_bits = bitcast<u32>(depth);
+  if (view.key_bits == 32u) { return depth_bits; }
+  let nearest = ~plan.nearest_inverted;
+  let range = f32(max(plan.farthest - nearest, 1u));
+  // A depth computed anew may lie a rounding before the nearest one.
+  let share = f32(max(depth_bits, nearest) - nearest) / range;
+  return u32(min(share, 1.0) * f32((1u << view.key_bits) - 1u));
+}
+
 @compute @workgroup_size(PROJECT_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let page = plan.pages[view.page];
@@ -61,6 +73,5 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let e = project_ellipse(view, g);
   let color = splat_sh_color(i, view.sh_degree, normalize(g.position - view.eye));
   splats[slot] = pack_splat(e.center, e.sigma_x, e.slope, e.sigma_v, color, e.opacity);
-  // The bits of a positive float32 order as the number does.
-  keys[slot] = bitcast<u32>(e.depth);
+  keys[slot] = depth_key(e.depth);
 }

@@ -151,7 +151,6 @@ def to_upright(capture: Capture) -> Capture:
         for view in capture.views
     ]
     moved = scale * (turned - middle)
-    print(
-        f"upright: yaw {np.degrees(yaw):.2f}, roll {np.degrees(roll):.2f} degrees, asymmetry {found.fun:.4f}, scale {scale:.4f}"
-    )
+    turned_by = f"yaw {np.degrees(yaw):.2f}, roll {np.degrees(roll):.2f} degrees"
+    print(f"upright: {turned_by}, asymmetry {found.fun:.4f}, scale {scale:.4f}")
     return Capture(capture.intrinsics, views, moved, capture.colours, float(scale * (CUT_HEIGHT - middle[1])))

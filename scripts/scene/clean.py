@@ -50,9 +50,8 @@ def cleaned(parameters: Parameters, bounds: Bounds, pictures: list[Picture]) -> 
     index = torch.nonzero(kept)[:, 0]
     alone = torch.tensor(lonely(parameters["means"][index].detach().cpu().numpy()), device=index.device)
     index = index[~alone]
-    print(
-        f"cleaned: {unseen} unseen, {spilled} beside the object, {strayed} outside the bounds, {int(alone.sum())} alone, {len(index)} left"
-    )
+    gone = f"{unseen} unseen, {spilled} beside the object, {strayed} outside the bounds, {int(alone.sum())} alone"
+    print(f"cleaned: {gone}, {len(index)} left")
     return {key: torch.nn.Parameter(value.detach()[index]) for key, value in parameters.items()}
 
 

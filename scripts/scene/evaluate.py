@@ -71,8 +71,6 @@ def main() -> None:
     if len(sys.argv) > 5:
         views = ((25, 78, 1.0), (-35, 80, 0.05))
         close = [shot(parameters, degree, orbit_matrix(t, p, 2.4), 1000, background) for t, p, background in views]
-            shot(parameters, degree, orbit_matrix(t, p, 2.4), 1000, b) for t, p, b in ((25, 78, 1.0), (-35, 80, 0.05))
-        ]
         cv2.imwrite(sys.argv[5], cv2.cvtColor(np.concatenate(close, 1), cv2.COLOR_RGB2BGR))
 
 

@@ -32,13 +32,8 @@ class Gaussians:
 
     def at(self, which: np.ndarray) -> "Gaussians":
         """The Gaussians a boolean mask or an index array picks, in its order."""
-        return Gaussians(
-            self.positions[which],
-            self.log_scales[which],
-            self.rotations[which],
-            self.opacity_logits[which],
-            self.sh[which],
-        )
+        arrays = (self.positions, self.log_scales, self.rotations, self.opacity_logits, self.sh)
+        return Gaussians(*(array[which] for array in arrays))
 
 
 def write_ply(path: Path, gaussians: Gaussians) -> None:

@@ -14,6 +14,13 @@ NEAR_PLANE = 0.2
 Parameters = dict[str, torch.nn.Parameter]
 
 
+def as_parameters(values: dict[str, np.ndarray], device: str) -> Parameters:
+    return {
+        key: torch.nn.Parameter(torch.tensor(value, dtype=torch.float32, device=device))
+        for key, value in values.items()
+    }
+
+
 def initial_parameters(points: np.ndarray, colours: np.ndarray, sh_degree: int, device: str = "cuda") -> Parameters:
     """Round Gaussians at `points` (N,3), as wide as the distance to their neighbours; colours (N,3) in 0..1."""
     distance = cKDTree(points).query(points, 4)[0][:, 1:].mean(1)
@@ -25,10 +32,7 @@ def initial_parameters(points: np.ndarray, colours: np.ndarray, sh_degree: int, 
         "sh0": ((colours - 0.5) / SH_C0)[:, None],
         "shN": np.zeros((len(points), (sh_degree + 1) ** 2 - 1, 3)),
     }
-    return {
-        key: torch.nn.Parameter(torch.tensor(value, dtype=torch.float32, device=device))
-        for key, value in values.items()
-    }
+    return as_parameters(values, device)
 
 
 def render(
@@ -97,7 +101,4 @@ def from_gaussians(gaussians: Gaussians, device: str = "cuda") -> Parameters:
         "sh0": gaussians.sh[:, :1],
         "shN": gaussians.sh[:, 1:],
     }
-    return {
-        key: torch.nn.Parameter(torch.tensor(value, dtype=torch.float32, device=device))
-        for key, value in values.items()
-    }
+    return as_parameters(values, device)

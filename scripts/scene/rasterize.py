@@ -43,7 +43,7 @@ def axes(gaussians: Gaussians) -> np.ndarray:
 
 
 def project_ellipses(gaussians: Gaussians, matrix: np.ndarray, focal: float, size: tuple[int, int]) -> Ellipses:
-    """EWA splatting (Zwicker et al. 2002). `matrix` is world to camera (4,4); all Gaussians must lie before the camera."""
+    """EWA splatting (Zwicker et al. 2002). `matrix`: world to camera (4,4). Every Gaussian must lie in front of it."""
     camera = gaussians.positions @ matrix[:3, :3].T + matrix[:3, 3]
     x, y, depth = camera.T
     zero = np.zeros_like(depth)

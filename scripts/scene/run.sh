@@ -14,7 +14,7 @@ one() { # NAME, then train.py's options
   local name=$1
   shift
   python3 "$here/train.py" "$views" "$sparse" "$work/$name" "$@" 2>&1 | sed "s/^/$name: /"
-  python3 "$here/trim.py" "$work/$name.ply" "$views" "$sparse" "$work/$name-trimmed.spz" 2>&1 | sed "s/^/$name: /"
+  python3 "$here/trim.py" "$work/$name.ply" "$views/hull.npy" "$sparse" "$work/$name-trimmed.spz" 2>&1 | sed "s/^/$name: /"
   python3 "$here/evaluate.py" "$work/$name-trimmed.spz" "$views" "$sparse" "$work/$name-orbit.png" "$work/$name-close.png" \
     2>&1 | sed "s/^/$name: /"
 }

@@ -19,7 +19,8 @@ ANTIALIASED = 1
 FRACTIONAL_BITS = 16
 # The constant harmonic as a byte: 0.15 of a unit a full range, so colours may pass 0 and 1 a little.
 COLOUR_SCALE = 0.15
-# Bits kept of each harmonic's byte, first order and above; gzip gains from the zeros. One more than the reference writer keeps.
+# Bits kept of each harmonic's byte, first order and above; gzip gains from the zeros. The reference writer keeps one
+# less of each.
 SH_BITS = (6, 5)
 # Sign of each harmonic after the first when y and z change sign, in the order of the usual real basis.
 SH_FLIP = np.array([-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1], np.float32)

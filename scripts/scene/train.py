@@ -149,10 +149,8 @@ def train(pictures: list[Picture], parameters: Parameters, bounds: Bounds, optio
         if step < strategy.refine_stop_iter:
             strategy.step_post_backward(parameters, optimizers, state, step, info, lr=decay.get_last_lr()[0])
         if step % 2000 == 0 or step == options.steps - 1:
-            print(
-                f"step {step}: loss {loss.item():.4f}, {len(parameters['means'])} Gaussians, {time.time() - started:.0f} s",
-                flush=True,
-            )
+            state_of_training = f"loss {loss.item():.4f}, {len(parameters['means'])} Gaussians"
+            print(f"step {step}: {state_of_training}, {time.time() - started:.0f} s", flush=True)
     return exposures, poses
 
 

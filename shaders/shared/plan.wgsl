@@ -20,8 +20,11 @@ struct Plan {
   quad_first_index: u32,
   quad_base_vertex: u32,
   quad_first_instance: u32,
-  // Splats that were refused because a value was not usable (added up by `cull`).
+  // Written by `cull`, cleared before every frame: splats that were refused because a value was not usable, and the bits
+  // of the least (inverted, so that 0 means none) and greatest depth of the visible ones.
   unusable: atomic<u32>,
+  nearest_inverted: atomic<u32>,
+  farthest: atomic<u32>,
   // For each page: slot of its first survivor, survivors, and dispatch arguments of `project`.
   pages: array<PagePlan>,
 }
@@ -51,6 +54,8 @@ struct PlanView {
   quad_base_vertex: u32,
   quad_first_instance: u32,
   unusable: u32,
+  nearest_inverted: u32,
+  farthest: u32,
   pages: array<PagePlan>,
 }
 

@@ -19,4 +19,6 @@ struct View {
   first_group: u32,
   sh_degree: u32,
   antialiased: u32,
+  // Bits of a depth key: 32 for those of the float32 depth itself, fewer for a share of the visible range.
+  key_bits: u32,
 }

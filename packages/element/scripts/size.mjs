@@ -25,7 +25,8 @@ export function scriptsForPly() {
   const reader = readdirSync(join(CDN, 'readers')).find((file) => /^ply-[^.]+\.js$/.test(file));
   if (reader === undefined) throw new Error(`no PLY reader found in ${CDN}readers`);
   const needed = new Set();
-  for (const entry of ['gaussian-splat.min.js', 'scene-worker.js', join('readers', reader)]) addWithImports(entry, needed);
+  for (const entry of ['gaussian-splat.min.js', 'scene-worker.js', join('readers', reader)])
+    addWithImports(entry, needed);
   return [...needed];
 }
 

@@ -59,6 +59,8 @@ const STATES = ['loading', 'ready', 'error', 'unsupported'] as const;
  * @fires contextlost - The GPU device was lost; the element recovers by itself.
  * @fires contextrestored - The picture is back.
  */
+// The interface below only gives inherited methods their types: nothing in it could be missing at run time.
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class GaussianSplatElement extends LitElement {
   /** The GPU device of all elements. A page with a device of its own may put `new SharedDevice(...)` here beforehand. */
   static sharedDevice = new SharedDevice();
@@ -275,6 +277,7 @@ export class GaussianSplatElement extends LitElement {
   }
 }
 
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export interface GaussianSplatElement {
   addEventListener<K extends keyof GaussianSplatEventMap>(
     type: K,

@@ -57,6 +57,8 @@ export class Stage {
     this.#view = this.#createView();
     this.scene = this.#createScene();
     new InputController(host, options.surface, options.input, (action) => this.#act(action));
+    // Put back after a while, an eager element loads again though nothing has come into sight.
+    host.addController({ hostConnected: () => this.#requestScene() });
   }
 
   /** The scene to show, as the `src` attribute has it. Called after every update; only changes act. */

@@ -49,7 +49,7 @@ export function recordFrame(encoder: GPUCommandEncoder, frame: Frame): void {
 
 /** Finds the visible splats, lists them in the file's order, and projects those alone. */
 function project(encoder: GPUCommandEncoder, { stages, pages, plan, scan, makePlan, timer }: Frame): void {
-  encoder.clearBuffer(plan, planOffsets.unusable, 4);
+  encoder.clearBuffer(plan, planOffsets.gathered.offset, planOffsets.gathered.size);
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
   for (const { page, cull } of pages) stages.cull.record(pass, cull, page.count);
   stages.scan.record(pass, scan);

@@ -29,8 +29,10 @@ export class PageTable {
   readonly #uniforms: GPUBuffer;
   readonly #uniformBytes: ArrayBuffer;
   readonly #scenes: readonly GaussianBuffers[];
+  readonly #keyBits: number;
 
-  constructor(device: GPUDevice, scenes: readonly GaussianBuffers[], scratch: Scratch) {
+  constructor(device: GPUDevice, scenes: readonly GaussianBuffers[], scratch: Scratch, keyBits: number) {
+    this.#keyBits = keyBits;
     this.#device = device;
     this.#scenes = scenes;
     this.#memory = new GpuMemory(device);
@@ -59,7 +61,7 @@ export class PageTable {
       const values = cameraValues(camera, scene.origin);
       for (const { count } of scene.pages) {
         const perPage = { splat_count: count, page, first_group: firstGroup, sh_degree: scene.shDegree };
-        const view = { ...values, ...perPage, antialiased: scene.antialiased ? 1 : 0 };
+        const view = { ...values, ...perPage, antialiased: scene.antialiased ? 1 : 0, key_bits: this.#keyBits };
         writeStruct(layouts.View, view, this.#uniformBytes, VIEW_STRIDE * page);
         firstGroup += cullGroups(count);
         page++;

@@ -18,7 +18,7 @@ import { cullGroups, CullStage } from './stages/cull.js';
 import { PlanStage } from './stages/plan.js';
 import { ProjectStage } from './stages/project.js';
 import { ScanStage } from './stages/scan.js';
-import { SortStage, type SortBindings } from './stages/sort.js';
+import { sortedIn, SortStage, type SortBindings } from './stages/sort.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 
 export interface RendererOptions {
@@ -32,6 +32,12 @@ export interface RendererOptions {
    * and needs the feature `float32-blendable`.
    */
   readonly accumulation?: AccumulationFormat;
+  /**
+   * Bits of the keys that splats are sorted by. 32 are those of the float32 depth and sort exactly; fewer are spread over
+   * the logarithm of the visible depths. Default 24, which no image was seen to tell from 32; 16 cost
+   * up to 13 dB on captured scenes (down to 58.9 dB).
+   */
+  readonly depthKeyBits?: 16 | 24 | 32;
 }
 
 /** One image to draw. */
@@ -65,6 +71,7 @@ interface Surface {
 }
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
+const DEFAULT_KEY_BITS = 24;
 
 /**
  * Draws Gaussians into a texture view, on a device of yours.
@@ -80,6 +87,7 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
 export class Renderer {
   readonly #device: GPUDevice;
   readonly #format: AccumulationFormat;
+  readonly #keyBits: number;
   readonly #stages: Stages;
   readonly #rasterizer: Rasterizer;
   readonly #memory: GpuMemory;
@@ -92,6 +100,7 @@ export class Renderer {
   constructor(device: GPUDevice, options: RendererOptions = {}) {
     this.#device = device;
     this.#format = options.accumulation ?? 'rgba16float';
+    this.#keyBits = options.depthKeyBits ?? DEFAULT_KEY_BITS;
     this.#stages = {
       cull: new CullStage(device),
       scan: new ScanStage(device),
@@ -179,13 +188,13 @@ export class Renderer {
     const { scan, limits } = this.#uniforms;
     this.#device.queue.writeBuffer(scan, 0, Uint32Array.of(groups));
     this.#device.queue.writeBuffer(limits, 0, Uint32Array.of(pages.length, scratch.capacity));
-    this.#rasterizer.bind({ plan, splats: projected, order: order[0], capacity: scratch.capacity });
+    this.#rasterizer.bind({ plan, splats: projected, order: order[sortedIn(this.#keyBits)], capacity: scratch.capacity });
     this.#resources = {
       scratch,
-      table: new PageTable(this.#device, [...scenes], scratch),
+      table: new PageTable(this.#device, [...scenes], scratch, this.#keyBits),
       scan: this.#stages.scan.bind({ values: groupOffsets, scan }),
       makePlan: this.#stages.plan.bind({ limits, group_offsets: groupOffsets, page_groups: pageGroups, plan }),
-      sort: this.#stages.sort.bind(scratch),
+      sort: this.#stages.sort.bind(scratch, this.#keyBits),
     };
     return this.#resources;
   }

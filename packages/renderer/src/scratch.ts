@@ -20,7 +20,8 @@ export const planOffsets = {
   /** One thread a visible splat, 256 to a workgroup. */
   visible: layouts.Plan.fields.visible_x.offset,
   quads: layouts.Plan.fields.quad_indices.offset,
-  unusable: layouts.Plan.fields.unusable.offset,
+  /** What `cull` adds up, from `unusable` on. */
+  gathered: { offset: layouts.Plan.fields.unusable.offset, size: PLAN_SIZE - layouts.Plan.fields.unusable.offset },
   project: (page: number): number => PLAN_SIZE + page * PAGE_PLAN_SIZE + pagePlanFields.project_x.offset,
 };
 
@@ -37,7 +38,7 @@ export class Scratch {
   readonly pageGroups: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
-  /** Depth keys; the sort goes back and forth between two, and ends in the first. */
+  /** Depth keys; the sort goes back and forth between the two. */
   readonly keys: readonly [GPUBuffer, GPUBuffer];
   /** Slots in the order of their keys, likewise. Before the sort the first lists the survivors. */
   readonly order: readonly [GPUBuffer, GPUBuffer];

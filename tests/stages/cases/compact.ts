@@ -40,7 +40,7 @@ async function compactBits(
     const bytes = new ArrayBuffer(layouts.View.size);
     const zeros = { local_to_camera: new Array(16).fill(0), eye: [0, 0, 0], focal: [1, 1], principal: [0, 0] };
     const rest = { viewport: [1, 1], jacobian_min: [0, 0], jacobian_max: [0, 0], near: 1, far: 2, sh_degree: 0 };
-    const place = { splat_count: count, page, first_group: firstGroups[page], antialiased: 0 };
+    const place = { splat_count: count, page, first_group: firstGroups[page], antialiased: 0, key_bits: 32 };
     writeStruct(layouts.View, { ...zeros, ...rest, ...place }, bytes);
     const view = bench.uniform(...new Uint32Array(bytes));
     const bindings = stage.bind({ view, visible_bits: bitBuffer, group_offsets: offsetBuffer, survivors });

@@ -14,7 +14,7 @@ const { CULL_GROUP, WORDS_PER_GROUP, PROJECT_GROUP } = constants;
 function uploadScene(bench: Bench, packed: PackedGaussians, camera: Camera): { view: GPUBuffer; gaussians: GPUBuffer; sh: GPUBuffer } {
   const bytes = new ArrayBuffer(layouts.View.size);
   const page = { splat_count: packed.count, page: 0, first_group: 0 };
-  const flags = { sh_degree: packed.shDegree, antialiased: packed.antialiased ? 1 : 0 };
+  const flags = { sh_degree: packed.shDegree, antialiased: packed.antialiased ? 1 : 0, key_bits: 32 };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...flags }, bytes);
   return { view: bench.uniform(...new Uint32Array(bytes)), gaussians: bench.buffer(packed.geometry), sh: bench.buffer(packed.sh) };
 }

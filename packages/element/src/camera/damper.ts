@@ -1,5 +1,7 @@
 /** Below this share of the normalising length a difference cannot be seen, and the value snaps to its goal. */
 const SETTLED = 2e-5;
+/** Share of the goal below which steps get lost in float64: 2⁻⁵³, times the some 10⁵ steps that a slow motion has. */
+const ROUNDING = 1e-10;
 
 /**
  * Moves a number towards a goal as a critically damped spring does: as fast as possible without overshoot.
@@ -29,8 +31,8 @@ export class Damper {
     const decay = Math.exp(-frequency * stepMs);
     const nextDistance = (distance + slope * stepMs) * decay;
     this.#velocity = (this.#velocity - frequency * slope * stepMs) * decay;
-    // Nor can it fall below the rounding of the goal itself, where a motion would never end.
-    const close = Math.max(SETTLED * scale, 4 * Number.EPSILON * Math.abs(goal));
+    // Next to a large goal the last, tiny steps would be lost in rounding, and the motion would never end.
+    const close = Math.max(SETTLED * scale, ROUNDING * Math.abs(goal));
     const settled = Math.abs(nextDistance) < close && Math.abs(this.#velocity) < close * frequency;
     return settled ? this.#rest(goal) : goal + nextDistance;
   }

@@ -45,7 +45,9 @@ export const TOUCH_SLOP = 4;
  */
 export function isCameraDrag(touchAction: string, from: Point, to: Point): boolean {
   const isHorizontal = Math.abs(to.x - from.x) >= Math.abs(to.y - from.y);
-  return touchAction === 'none' || (touchAction === 'pan-y' && isHorizontal) || (touchAction === 'pan-x' && !isHorizontal);
+  return (
+    touchAction === 'none' || (touchAction === 'pan-y' && isHorizontal) || (touchAction === 'pan-x' && !isHorizontal)
+  );
 }
 
 /** Two fingers: what lies between them stays there. */

@@ -20,8 +20,11 @@ class DeviceSession {
   readonly device: GPUDevice;
   readonly lost: Promise<GPUDeviceLostInfo>;
 
-  constructor(device: GPUDevice) {
+  readonly #isKept: boolean;
+
+  constructor(device: GPUDevice, isKept: boolean) {
     this.device = device;
+    this.#isKept = isKept;
     this.lost = new Promise((resolve) => {
       void device.lost.then((info) => {
         this.isLost = true;
@@ -32,7 +35,7 @@ class DeviceSession {
 
   close(): void {
     this.isClosed = true;
-    this.device.destroy();
+    if (!this.#isKept) this.device.destroy();
   }
 }
 
@@ -42,11 +45,16 @@ class DeviceSession {
  */
 export class SharedDevice {
   readonly #request: () => Promise<GPUDevice>;
+  readonly #keepDevice: boolean;
   #session: Promise<DeviceSession> | null = null;
 
-  /** @param request where devices come from; a page with a device of its own, or a test, passes another source. */
-  constructor(request: () => Promise<GPUDevice> = requestGpuDevice) {
+  /**
+   * @param request where devices come from; asked again after a loss.
+   * @param options.keepDevice leaves the device alone when the last user has let go: for a page that has its own.
+   */
+  constructor(request: () => Promise<GPUDevice> = requestGpuDevice, options: { readonly keepDevice?: boolean } = {}) {
     this.#request = request;
+    this.#keepDevice = options.keepDevice ?? false;
   }
 
   /** A share in the device. Rejects with GaussianSplatError `unsupported/*` where there is none to be had. */
@@ -65,7 +73,7 @@ export class SharedDevice {
   }
 
   #open(): Promise<DeviceSession> {
-    const opening = this.#request().then((device) => new DeviceSession(device));
+    const opening = this.#request().then((device) => new DeviceSession(device, this.#keepDevice));
     const forget = (): void => this.#forget(opening);
     opening.then((session) => session.device.lost.then(forget), forget);
     return opening;

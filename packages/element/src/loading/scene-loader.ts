@@ -16,6 +16,8 @@ export class SceneLoader {
   readonly #spawn: () => Worker;
   readonly #pending = new Map<number, Pending>();
   #worker: Promise<Worker | null> | null = null;
+  /** What {@link #worker} came to, while it runs. */
+  #running: Worker | null = null;
   #nextId = 0;
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
   #refused = false;
@@ -60,7 +62,7 @@ export class SceneLoader {
     } finally {
       signal.removeEventListener('abort', cancel);
       this.#pending.delete(id);
-      if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => void this.#end(worker), IDLE_MS);
+      if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#end(worker), IDLE_MS);
     }
   }
 
@@ -78,6 +80,7 @@ export class SceneLoader {
       await firstMessage(worker);
       worker.addEventListener('message', ({ data }: MessageEvent<WorkerMessage>) => this.#receive(data));
       worker.addEventListener('error', (event) => this.#crash(worker, event));
+      this.#running = worker;
       return worker;
     } catch (error) {
       this.#refused = true;
@@ -101,7 +104,7 @@ export class SceneLoader {
   /** A worker that dies after it had started was most likely denied memory; the next load starts a new one. */
   #crash(worker: Worker, event: ErrorEvent): void {
     event.preventDefault();
-    void this.#end(worker);
+    this.#end(worker);
     for (const { reject } of this.#pending.values()) {
       reject(
         new GaussianSplatError('out-of-memory/allocation', {
@@ -114,10 +117,13 @@ export class SceneLoader {
     }
   }
 
-  async #end(worker: Worker): Promise<void> {
-    clearTimeout(this.#idleTimer);
+  /** Ends a worker; the next load starts another. */
+  #end(worker: Worker): void {
     worker.terminate();
-    if (this.#worker !== null && (await this.#worker) === worker) this.#worker = null;
+    if (this.#running !== worker) return;
+    clearTimeout(this.#idleTimer);
+    this.#running = null;
+    this.#worker = null;
   }
 }
 
