@@ -2,6 +2,7 @@
  * Tests in real Chromium with WebGPU, on SwiftShader where there is no GPU: `npm test`, or after `npm run build`
  * `npx web-test-runner [--files tests/element/browser/idle.test.ts]`. The environment variable CHROMIUM names the browser.
  */
+import { defaultReporter } from '@web/test-runner';
 import { playwrightLauncher } from '@web/test-runner-playwright';
 import { findChromium } from './scripts/lib/chromium.mjs';
 import { pageCommands } from './tests/element/browser/support/commands.mjs';
@@ -13,6 +14,7 @@ const otherOrigin = await startOtherOrigin();
 const HIGH_DENSITY = 'tests/element/browser/high-density.test.ts';
 
 export default {
+  reporters: [defaultReporter({ reportTestResults: true, reportTestProgress: process.stdout.isTTY }), countReporter()],
   files: ['tests/**/browser/**/*.test.ts', `!${HIGH_DENSITY}`],
   groups: [{ name: 'high-density', files: HIGH_DENSITY, browsers: [chromium(2)] }],
   rootDir: '.',
@@ -28,6 +30,24 @@ export default {
   middleware: [hostileServer(otherOrigin)],
   plugins: [typescript(), pageCommands()],
 };
+
+/** One closing line that counts every test of every group, in the words that `npm test` reads. */
+function countReporter() {
+  const countOf = (suite) => {
+    const own = { passed: 0, failed: 0, skipped: 0 };
+    for (const { skipped, passed } of suite?.tests ?? []) own[skipped ? 'skipped' : passed ? 'passed' : 'failed']++;
+    return (suite?.suites ?? []).map(countOf).reduce(add, own);
+  };
+  const add = (a, b) => ({ passed: a.passed + b.passed, failed: a.failed + b.failed, skipped: a.skipped + b.skipped });
+  return {
+    onTestRunFinished({ sessions }) {
+      const { passed, failed, skipped } = sessions.map(({ testResults }) => countOf(testResults)).reduce(add);
+      // A file that never ran has no results, only errors.
+      const broken = sessions.filter(({ passed: fine, testResults }) => !fine && countOf(testResults).failed === 0).length;
+      console.log(`Chromium: ${passed} passed, ${failed + broken} failed, ${skipped} skipped`);
+    },
+  };
+}
 
 /** WebGPU on a canvas without a GPU needs all of these switches; where there is one they do no harm. */
 function chromium(pixelRatio) {

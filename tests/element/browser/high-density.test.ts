@@ -36,9 +36,13 @@ describe('on a dense screen', () => {
     try {
       const element = await showLoaded();
       assertEqual(canvasOf(element)?.width, 240, 'width');
-      assert(queries.length === 1 && queries[0].matches, 'it watches the ratio of this screen');
+      // A freshly opened page may tell its ratio a moment late.
+      const ofThisScreen = (): MediaQueryList | undefined =>
+        queries.find(({ media, matches }) => matches && media.includes('2dppx'));
+      await until(() => ofThisScreen() !== undefined, 'a watch for the ratio of this screen');
+      assertEqual(queries.length, 1, 'watches');
       Object.defineProperty(window, 'devicePixelRatio', { configurable: true, get: () => 3 });
-      queries[0].dispatchEvent(new Event('change'));
+      ofThisScreen()?.dispatchEvent(new Event('change'));
       await until(() => canvasOf(element)?.width === 360, 'three times the pixels');
     } finally {
       Reflect.deleteProperty(window, 'devicePixelRatio');

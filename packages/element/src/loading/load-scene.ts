@@ -28,10 +28,15 @@ export async function loadScene(
   }
 }
 
-/** Last part of the URL's path: what people call the file, and whose extension tells formats without a signature. */
+/**
+ * Last part of the URL's path: what people call the file, and whose extension tells formats without a signature. A `blob:`
+ * URL has no name of its own; there the fragment is taken, so that a page can say `${objectUrl}#plant.splat`.
+ */
 function fileName(url: string): string {
   if (!URL.canParse(url) || url.startsWith('data:')) return url.slice(0, 80);
-  return decodeURIComponentSafely(new URL(url).pathname.split('/').pop() ?? '') || url;
+  const { protocol, pathname, hash } = new URL(url);
+  const name = protocol === 'blob:' && hash !== '' ? hash.slice(1) : (pathname.split('/').pop() ?? '');
+  return decodeURIComponentSafely(name) || url;
 }
 
 function decodeURIComponentSafely(text: string): string {

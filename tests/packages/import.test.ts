@@ -1,0 +1,32 @@
+/** Importing a package on a server: in plain Node, without a browser global, and with its exports where they should be. */
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { readdirSync, readFileSync } from 'node:fs';
+import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+
+const root = fileURLToPath(new URL('../../', import.meta.url));
+
+/** Every entry of every package's `exports` that is a module. */
+function entries(): string[] {
+  return readdirSync(`${root}packages`).flatMap((folder) => {
+    const { name, exports } = JSON.parse(readFileSync(`${root}packages/${folder}/package.json`, 'utf8')) as {
+      name: string;
+      exports: Record<string, unknown>;
+    };
+    const modules = Object.entries(exports).filter(([, target]) => typeof target === 'object');
+    return modules.map(([path]) => name + path.slice(1));
+  });
+}
+
+test('there are entries to import', () => assert.ok(entries().length >= 6, entries().join(', ')));
+
+for (const entry of entries()) {
+  test(`import('${entry}') works in Node`, () => {
+    const script = `import('${entry}').then((module) => console.log(Object.keys(module).length))`;
+    const result = spawnSync(process.execPath, ['-e', script], { cwd: root, encoding: 'utf8' });
+    assert.equal(result.status, 0, result.stderr);
+    assert.equal(result.stderr, '', 'nothing is printed to stderr');
+    assert.ok(Number(result.stdout) > 0, `${entry} exports something`);
+  });
+}
