@@ -1,6 +1,6 @@
 /** Runs in a browser whose screen has two device pixels for each CSS pixel: see web-test-runner.config.mjs. */
 import '@gaussian-splat/element';
-import { assert, assertEqual, showLoaded, until } from './support/harness.js';
+import { assertEqual, showLoaded, until } from './support/harness.js';
 
 const canvasOf = (element: Element): HTMLCanvasElement | null | undefined =>
   element.shadowRoot?.querySelector('canvas');
