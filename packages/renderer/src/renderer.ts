@@ -137,6 +137,7 @@ export class Renderer {
   render(request: FrameRequest): void {
     const { camera, target, targetFormat, background = TRANSPARENT, timer } = request;
     validateCamera(camera);
+    requireTextureSize(this.#device, camera);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianBuffers];
     const { scratch, table, scan, makePlan, sort } = this.#resourcesFor(scenes);
     const { accumulation, compose } = this.#surfaceOf(camera.width, camera.height);
@@ -214,6 +215,17 @@ export class Renderer {
     this.#surface = { accumulation, compose };
     return this.#surface;
   }
+}
+
+function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
+  const limit = device.limits.maxTextureDimension2D;
+  if (Math.max(width, height) <= limit) return;
+  throw new GaussianSplatError('argument/camera', {
+    where: 'camera.width and camera.height',
+    expected: `at most ${limit} pixels each (maxTextureDimension2D of the device)`,
+    found: `${width}x${height}`,
+    remedy: 'draw a smaller image, or several parts of it by moving cx and cy',
+  });
 }
 
 function makeRasterizer(device: GPUDevice, name: 'auto' | RasterizerName, format: AccumulationFormat): Rasterizer {
