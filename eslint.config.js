@@ -32,7 +32,9 @@ const directions = Object.entries(MAY_IMPORT).map(([name, allowed]) => ({
       },
     ],
     'no-restricted-globals':
-      name === 'element' ? 'off' : ['error', ...BROWSER_ONLY.map((global) => ({ name: global, message: 'Only the element touches the DOM.' }))],
+      name === 'element'
+        ? 'off'
+        : ['error', ...BROWSER_ONLY.map((global) => ({ name: global, message: 'Only the element touches the DOM.' }))],
   },
 }));
 

@@ -43,7 +43,9 @@ function countReporter() {
     onTestRunFinished({ sessions }) {
       const { passed, failed, skipped } = sessions.map(({ testResults }) => countOf(testResults)).reduce(add);
       // A file that never ran has no results, only errors.
-      const broken = sessions.filter(({ passed: fine, testResults }) => !fine && countOf(testResults).failed === 0).length;
+      const broken = sessions.filter(
+        ({ passed: fine, testResults }) => !fine && countOf(testResults).failed === 0,
+      ).length;
       console.log(`Chromium: ${passed} passed, ${failed + broken} failed, ${skipped} skipped`);
     },
   };

@@ -74,7 +74,10 @@ function reflectConstants(code) {
 }
 
 function reflectStruct(struct) {
-  const fields = struct.members.map((member) => [member.name, { offset: member.offset, type: member.type.getTypeName() }]);
+  const fields = struct.members.map((member) => [
+    member.name,
+    { offset: member.offset, type: member.type.getTypeName() },
+  ]);
   return { size: struct.size, fields: Object.fromEntries(fields) };
 }
 

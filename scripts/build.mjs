@@ -7,7 +7,12 @@ import { must, root } from './lib/run.mjs';
 ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, ['node_modules/typescript/bin/tsc', '--build', ...projects()]);
-must(process.execPath, ['node_modules/rollup/dist/bin/rollup', '--config', 'packages/element/rollup.config.mjs', '--silent']);
+must(process.execPath, [
+  'node_modules/rollup/dist/bin/rollup',
+  '--config',
+  'packages/element/rollup.config.mjs',
+  '--silent',
+]);
 await buildDemo();
 
 function projects() {
@@ -20,7 +25,8 @@ async function buildDemo() {
   const to = join(root, 'demo/dist');
   rmSync(to, { recursive: true, force: true });
   mkdirSync(to, { recursive: true });
-  for (const name of readdirSync(from)) if (name !== 'dist') cpSync(join(from, name), join(to, name), { recursive: true });
+  for (const name of readdirSync(from))
+    if (name !== 'dist') cpSync(join(from, name), join(to, name), { recursive: true });
   cpSync(join(root, 'packages/element/cdn'), join(to, 'cdn'), { recursive: true });
   // The packages were not there when this script started on a fresh clone.
   const { build } = await import('esbuild');

@@ -52,7 +52,11 @@ function runNodeTests() {
 }
 
 function runBrowserTests() {
-  const output = runAndCapture(process.execPath, ['node_modules/@web/test-runner/dist/bin.js', '--config', 'web-test-runner.config.mjs']);
+  const output = runAndCapture(process.execPath, [
+    'node_modules/@web/test-runner/dist/bin.js',
+    '--config',
+    'web-test-runner.config.mjs',
+  ]);
   const [, passed = 0, failed = 0, skipped = 0] =
     /^Chromium: (\d+) passed, (\d+) failed, (\d+) skipped$/m.exec(output.text)?.map(Number) ?? [];
   totals.passed += passed;

@@ -5,7 +5,14 @@
  */
 import { lookAt } from '@gaussian-splat/core';
 import { fetchScene, readScene } from '@gaussian-splat/formats';
-import { capture, deviceDescriptor, GaussianBuffers, packGaussians, PassTimer, Renderer } from '@gaussian-splat/renderer';
+import {
+  capture,
+  deviceDescriptor,
+  GaussianBuffers,
+  packGaussians,
+  PassTimer,
+  Renderer,
+} from '@gaussian-splat/renderer';
 import { tilePacked } from './tile.js';
 
 const query = new URLSearchParams(location.search);

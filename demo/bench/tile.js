@@ -13,7 +13,8 @@ export function tilePacked(packed, count) {
   const copies = Math.ceil(count / packed.count);
   const side = Math.ceil(Math.sqrt(copies));
   const cells = [];
-  for (let i = 0; i < side * side; i++) cells.push([(i % side) - (side - 1) / 2, Math.floor(i / side) - (side - 1) / 2]);
+  for (let i = 0; i < side * side; i++)
+    cells.push([(i % side) - (side - 1) / 2, Math.floor(i / side) - (side - 1) / 2]);
   cells.sort((a, b) => Math.hypot(...a) - Math.hypot(...b));
 
   const shWords = packed.sh.length / packed.count;

@@ -12,7 +12,10 @@ import { randomSource } from '../support/gpu.js';
 import { cameraAt, equalDepthPlane, movedBy, offCentre, room, withHostileSplats } from '../support/scenes.js';
 
 const sameBytes = (a: Float32Array, b: Float32Array): boolean =>
-  Buffer.compare(Buffer.from(a.buffer, a.byteOffset, a.byteLength), Buffer.from(b.buffer, b.byteOffset, b.byteLength)) === 0;
+  Buffer.compare(
+    Buffer.from(a.buffer, a.byteOffset, a.byteLength),
+    Buffer.from(b.buffer, b.byteOffset, b.byteLength),
+  ) === 0;
 
 /** The same view at another image size. */
 function resized(camera: Camera, width: number): Camera {
@@ -39,7 +42,10 @@ function part(cloud: GaussianCloud, first: number, end: number): GaussianCloud {
   };
 }
 
-for (const { make, frames } of [{ make: equalDepthPlane, frames: 200 }, { make: room, frames: 20 }]) {
+for (const { make, frames } of [
+  { make: equalDepthPlane, frames: 200 },
+  { make: room, frames: 20 },
+]) {
   test(`${frames} frames of one view of ${make.name} are the same bytes`, async () => {
     const device = await nodeDevice();
     const { cloud, cameras } = make();
@@ -139,7 +145,16 @@ function spyOnAllocations(device: GPUDevice): { names: string[]; submits: number
     });
     restore.push(() => Reflect.deleteProperty(target, name) || Reflect.set(target, name, original));
   };
-  const creators = ['Buffer', 'Texture', 'BindGroup', 'BindGroupLayout', 'PipelineLayout', 'ShaderModule', 'Sampler', 'QuerySet'];
+  const creators = [
+    'Buffer',
+    'Texture',
+    'BindGroup',
+    'BindGroupLayout',
+    'PipelineLayout',
+    'ShaderModule',
+    'Sampler',
+    'QuerySet',
+  ];
   const pipelines = ['ComputePipeline', 'RenderPipeline', 'ComputePipelineAsync', 'RenderPipelineAsync'];
   for (const name of [...creators, ...pipelines]) replace(device, `create${name}`, () => record.names.push(name));
   replace(device.queue, 'onSubmittedWorkDone', () => record.names.push('onSubmittedWorkDone'));

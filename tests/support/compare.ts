@@ -24,7 +24,10 @@ export async function renderCloud(
   options?: RendererOptions,
 ): Promise<Float32Array> {
   const renderer = new Renderer(device, options);
-  const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased: mode === 'antialiased' }));
+  const gaussians = await GaussianBuffers.upload(
+    device,
+    packGaussians({ ...cloud, antialiased: mode === 'antialiased' }),
+  );
   try {
     return await capture(device, renderer, { gaussians, camera });
   } finally {
@@ -64,6 +67,11 @@ export async function compareWithOracle(
 
 /** A line of a table: name, dB over covered and over all pixels, 99.9th percentile and worst in 1/255. */
 export function describeCloseness(name: string, { psnr, psnrAll, p999, max }: Closeness): string {
-  const numbers = [`${psnr.toFixed(2)} dB`, `${psnrAll.toFixed(2)} dB all`, `p99.9 ${(255 * p999).toFixed(3)}`, `max ${(255 * max).toFixed(2)}`];
+  const numbers = [
+    `${psnr.toFixed(2)} dB`,
+    `${psnrAll.toFixed(2)} dB all`,
+    `p99.9 ${(255 * p999).toFixed(3)}`,
+    `max ${(255 * max).toFixed(2)}`,
+  ];
   return `${name.padEnd(40)} ${numbers.map((n) => n.padStart(14)).join(' ')}`;
 }

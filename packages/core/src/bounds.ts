@@ -27,7 +27,12 @@ export function boundsOf(cloud: GaussianCloud): Bounds {
     if (positions[i] > max[axis]) max[axis] = positions[i];
   }
   const indices = sampleOpaque(opacities, count);
-  const center = [0, 1, 2].map((axis) => quantile(indices.map((i) => positions[3 * i + axis]), 0.5));
+  const center = [0, 1, 2].map((axis) =>
+    quantile(
+      indices.map((i) => positions[3 * i + axis]),
+      0.5,
+    ),
+  );
   const distances = indices.map((i) =>
     Math.hypot(positions[3 * i] - center[0], positions[3 * i + 1] - center[1], positions[3 * i + 2] - center[2]),
   );

@@ -70,10 +70,12 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
 export function validateCamera(camera: Camera, where = 'camera'): void {
   const { width, height, fx, fy, cx, cy, worldToCamera, near, far } = camera;
   for (const [name, value] of Object.entries({ width, height })) {
-    if (!Number.isInteger(value) || value < 1) fail(`${where}.${name}`, 'a whole number of pixels, 1 or more', describe(value));
+    if (!Number.isInteger(value) || value < 1)
+      fail(`${where}.${name}`, 'a whole number of pixels, 1 or more', describe(value));
   }
   for (const [name, value] of Object.entries({ fx, fy })) {
-    if (!(Number.isFinite(value) && value > 0)) fail(`${where}.${name}`, 'a focal length in pixels above 0', describe(value));
+    if (!(Number.isFinite(value) && value > 0))
+      fail(`${where}.${name}`, 'a focal length in pixels above 0', describe(value));
   }
   for (const [name, value] of Object.entries({ cx, cy })) {
     if (!Number.isFinite(value)) fail(`${where}.${name}`, 'a finite number of pixels', describe(value));

@@ -114,7 +114,11 @@ export class Renderer {
     this.#memory = new GpuMemory(device);
     const uniform = (name: string): GPUBuffer =>
       this.#memory.buffer(`gs.${name}`, 16, BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination);
-    this.#uniforms = { scan: uniform('scan.uniform'), limits: uniform('plan.limits'), compose: uniform('compose.uniform') };
+    this.#uniforms = {
+      scan: uniform('scan.uniform'),
+      limits: uniform('plan.limits'),
+      compose: uniform('compose.uniform'),
+    };
   }
 
   /** Name of the rasterizer in use. */
@@ -189,7 +193,12 @@ export class Renderer {
     const { scan, limits } = this.#uniforms;
     this.#device.queue.writeBuffer(scan, 0, Uint32Array.of(groups));
     this.#device.queue.writeBuffer(limits, 0, Uint32Array.of(pages.length, scratch.capacity));
-    this.#rasterizer.bind({ plan, splats: projected, order: order[sortedIn(this.#keyBits)], capacity: scratch.capacity });
+    this.#rasterizer.bind({
+      plan,
+      splats: projected,
+      order: order[sortedIn(this.#keyBits)],
+      capacity: scratch.capacity,
+    });
     this.#resources = {
       scratch,
       table: new PageTable(this.#device, [...scenes], scratch, this.#keyBits),

@@ -58,12 +58,19 @@ export class Scratch {
     try {
       this.visibleBits = buffer('cull.visible_bits', 4 * constants.WORDS_PER_GROUP * groups);
       this.groupOffsets = buffer('scan.group_offsets', 4 * (groups + 1));
-      this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages), storage | indirect | copySource | copyDestination);
+      this.plan = buffer(
+        'plan.plan',
+        PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages),
+        storage | indirect | copySource | copyDestination,
+      );
       this.pageGroups = buffer('plan.page_groups', 4 * (pages + 1));
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
       this.keys = [perSplat('sort.keys_a'), perSplat('sort.keys_b')];
       this.order = [perSplat('sort.order_a'), perSplat('sort.order_b')];
-      this.digitCounts = buffer('sort.digit_counts', 4 * constants.DIGITS * Math.ceil(this.capacity / constants.SORT_BLOCK));
+      this.digitCounts = buffer(
+        'sort.digit_counts',
+        4 * constants.DIGITS * Math.ceil(this.capacity / constants.SORT_BLOCK),
+      );
       this.digitTotals = buffer('sort.digit_totals', 4 * constants.DIGITS);
     } catch (error) {
       memory.destroy();

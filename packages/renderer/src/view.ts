@@ -8,7 +8,10 @@ const CLAMP_MARGIN = 0.3;
 type ViewValues = StructValues<typeof layouts.View>;
 
 /** The fields of the WGSL `View` that depend on the camera and on the origin of the Gaussians. */
-export type CameraValues = Omit<ViewValues, 'splat_count' | 'page' | 'first_group' | 'sh_degree' | 'antialiased' | 'key_bits'>;
+export type CameraValues = Omit<
+  ViewValues,
+  'splat_count' | 'page' | 'first_group' | 'sh_degree' | 'antialiased' | 'key_bits'
+>;
 
 /**
  * A camera as the shaders want it. The origin is folded into the matrix in float64, so that scenes a million units from

@@ -4,7 +4,11 @@ import { check, checkEqual, randomSource, type Bench, type StageCase } from '../
 const { CULL_GROUP, WORDS_PER_GROUP } = constants;
 
 /** Bits and exclusive group offsets as `cull` and `scan` leave them, for flags of one page after another. */
-function flagsToBits(pages: readonly boolean[][]): { bits: Uint32Array; offsets: Uint32Array; firstGroups: Uint32Array } {
+function flagsToBits(pages: readonly boolean[][]): {
+  bits: Uint32Array;
+  offsets: Uint32Array;
+  firstGroups: Uint32Array;
+} {
   const firstGroups = new Uint32Array(pages.length + 1);
   pages.forEach((flags, p) => (firstGroups[p + 1] = firstGroups[p] + cullGroups(flags.length)));
   const groups = firstGroups[pages.length];
@@ -14,7 +18,7 @@ function flagsToBits(pages: readonly boolean[][]): { bits: Uint32Array; offsets:
     flags.forEach((flag, i) => {
       const group = firstGroups[p] + Math.floor(i / CULL_GROUP);
       if (!flag) return;
-      bits[group * WORDS_PER_GROUP + Math.floor((i % CULL_GROUP) / 32)] |= 1 << i % 32;
+      bits[group * WORDS_PER_GROUP + Math.floor((i % CULL_GROUP) / 32)] |= 1 << (i % 32);
       offsets[group + 1]++;
     });
   });
@@ -50,7 +54,12 @@ async function compactBits(
 }
 
 const compactOnGpu = (bench: Bench, pages: readonly boolean[][], capacity: number): Promise<Uint32Array> =>
-  compactBits(bench, flagsToBits(pages), pages.map((flags) => flags.length), capacity);
+  compactBits(
+    bench,
+    flagsToBits(pages),
+    pages.map((flags) => flags.length),
+    capacity,
+  );
 
 function randomFlags(count: number, share: number, seed: number): boolean[] {
   const random = randomSource(seed);
@@ -74,7 +83,11 @@ async function checkPlan(bench: Bench, pages: readonly boolean[][], capacity: nu
   const visible = Math.min(total, capacity);
   const field = (name: keyof typeof layouts.Plan.fields): number => words[layouts.Plan.fields[name].offset / 4];
   checkEqual([field('visible'), field('overflow')], [visible, total - visible], 'visible and overflow');
-  checkEqual([field('sort_x'), field('sort_y'), field('sort_z')], [Math.ceil(visible / constants.SORT_BLOCK), visible > 0 ? 1 : 0, 1], 'sort');
+  checkEqual(
+    [field('sort_x'), field('sort_y'), field('sort_z')],
+    [Math.ceil(visible / constants.SORT_BLOCK), visible > 0 ? 1 : 0, 1],
+    'sort',
+  );
   checkEqual([field('quad_instances')], [Math.ceil(visible / constants.QUAD_BATCH)], 'quad instances');
   let first = 0;
   pages.forEach((flags, page) => {
@@ -95,7 +108,10 @@ export const compactCases: StageCase[] = [
       const expected = survivorsTwin(pages);
       const survivors = await compactOnGpu(bench, pages, 50_000);
       checkEqual(survivors, expected, 'survivors');
-      check(survivors.subarray(expected.length).every((word) => word === 0xffffffff), 'compact wrote beyond the survivors');
+      check(
+        survivors.subarray(expected.length).every((word) => word === 0xffffffff),
+        'compact wrote beyond the survivors',
+      );
     },
   })),
   {
@@ -118,14 +134,22 @@ export const compactCases: StageCase[] = [
       for (let g = 0; g < groups; g++) offsets[g + 1] = offsets[g] + (chosen.includes(g) ? 1 : 0);
       const layout = { bits, offsets, firstGroups: Uint32Array.of(0, groups) };
       const survivors = await compactBits(bench, layout, [groups * CULL_GROUP], 16);
-      checkEqual(survivors, chosen.map((group) => group * CULL_GROUP + 3 * 32 + 7), 'survivors');
+      checkEqual(
+        survivors,
+        chosen.map((group) => group * CULL_GROUP + 3 * 32 + 7),
+        'survivors',
+      );
     },
   },
   {
     name: 'plan: counts, indirect arguments and pages follow the survivors',
     run: async (bench) => {
       for (const share of shares) {
-        await checkPlan(bench, [1000, 1, 256, 40_000].map((count, i) => randomFlags(count, share, i + 1)), 50_000);
+        await checkPlan(
+          bench,
+          [1000, 1, 256, 40_000].map((count, i) => randomFlags(count, share, i + 1)),
+          50_000,
+        );
       }
     },
   },

@@ -1,6 +1,14 @@
 import { normalize, subtract, eyeOf, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
-import { cameraValues, constants, cullGroups, CullStage, layouts, ProjectStage, writeStruct } from '@gaussian-splat/renderer/stages';
+import {
+  cameraValues,
+  constants,
+  cullGroups,
+  CullStage,
+  layouts,
+  ProjectStage,
+  writeStruct,
+} from '@gaussian-splat/renderer/stages';
 import { projectEllipse, toCamera, worldPosition } from '../../oracle/projection.js';
 import { RULES } from '../../oracle/rules.js';
 import { splatColor } from '../../oracle/sh.js';
@@ -11,16 +19,28 @@ import { edgeOnDiscs, hugeSplats, needles, offCentre, pixelSplats, room, type Sc
 const { CULL_GROUP, WORDS_PER_GROUP, PROJECT_GROUP } = constants;
 
 /** Everything that `cull` and `project` read, on the GPU. */
-function uploadScene(bench: Bench, packed: PackedGaussians, camera: Camera): { view: GPUBuffer; gaussians: GPUBuffer; sh: GPUBuffer } {
+function uploadScene(
+  bench: Bench,
+  packed: PackedGaussians,
+  camera: Camera,
+): { view: GPUBuffer; gaussians: GPUBuffer; sh: GPUBuffer } {
   const bytes = new ArrayBuffer(layouts.View.size);
   const page = { splat_count: packed.count, page: 0, first_group: 0 };
   const flags = { sh_degree: packed.shDegree, antialiased: packed.antialiased ? 1 : 0, key_bits: 32 };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...flags }, bytes);
-  return { view: bench.uniform(...new Uint32Array(bytes)), gaussians: bench.buffer(packed.geometry), sh: bench.buffer(packed.sh) };
+  return {
+    view: bench.uniform(...new Uint32Array(bytes)),
+    gaussians: bench.buffer(packed.geometry),
+    sh: bench.buffer(packed.sh),
+  };
 }
 
 /** Visibility flags of all splats, and how many were refused as unusable. */
-async function cullOnGpu(bench: Bench, packed: PackedGaussians, camera: Camera): Promise<{ visible: boolean[]; unusable: number }> {
+async function cullOnGpu(
+  bench: Bench,
+  packed: PackedGaussians,
+  camera: Camera,
+): Promise<{ visible: boolean[]; unusable: number }> {
   const { view, gaussians } = uploadScene(bench, packed, camera);
   const groups = cullGroups(packed.count);
   const bits = bench.buffer(4 * WORDS_PER_GROUP * groups);
@@ -30,7 +50,7 @@ async function cullOnGpu(bench: Bench, packed: PackedGaussians, camera: Camera):
   const bindings = stage.bind({ view, gaussians, visible_bits: bits, group_counts: counts, plan });
   bench.compute((pass) => stage.record(pass, bindings, packed.count));
   const [words, groupCounts, planWords] = [await bench.read(bits), await bench.read(counts), await bench.read(plan)];
-  const visible = Array.from({ length: packed.count }, (_, i) => ((words[Math.floor(i / 32)] >>> i % 32) & 1) === 1);
+  const visible = Array.from({ length: packed.count }, (_, i) => ((words[Math.floor(i / 32)] >>> (i % 32)) & 1) === 1);
   const expected = new Uint32Array(groups);
   visible.forEach((flag, i) => (expected[Math.floor(i / CULL_GROUP)] += flag ? 1 : 0));
   checkEqual(groupCounts, expected, 'group counts');
@@ -52,7 +72,9 @@ function isVisibleTwin(cloud: GaussianCloud, i: number, camera: Camera, margin: 
     const reach = radius * Math.sqrt(variance) * (1 + 1e-5 * Math.sign(margin)) + margin;
     return Math.max(0, Math.ceil(at - reach - 0.5)) <= Math.min(size - 1, Math.floor(at + reach - 0.5));
   };
-  return covers(ellipse.x, ellipse.covariance.xx, camera.width) && covers(ellipse.y, ellipse.covariance.yy, camera.height);
+  return (
+    covers(ellipse.x, ellipse.covariance.xx, camera.width) && covers(ellipse.y, ellipse.covariance.yy, camera.height)
+  );
 }
 
 async function checkCull(bench: Bench, cloud: GaussianCloud, camera: Camera): Promise<void> {
@@ -75,7 +97,11 @@ function halfToNumber(half: number): number {
   return sign * (exponent === 0 ? mantissa * 2 ** -24 : (1024 + mantissa) * 2 ** (exponent - 25));
 }
 
-async function projectOnGpu(bench: Bench, packed: PackedGaussians, camera: Camera): Promise<{ splats: Uint32Array; keys: Uint32Array }> {
+async function projectOnGpu(
+  bench: Bench,
+  packed: PackedGaussians,
+  camera: Camera,
+): Promise<{ splats: Uint32Array; keys: Uint32Array }> {
   const { view, gaussians, sh } = uploadScene(bench, packed, camera);
   const { count } = packed;
   const plan = new Uint32Array((layouts.Plan.size + layouts.PagePlan.size) / 4);
@@ -107,23 +133,46 @@ async function checkProject(bench: Bench, cloud: GaussianCloud, camera: Camera):
     // A point left by cancellation has the rounding of its largest term: pixels per 2^-22 of the coordinates.
     const scale = Math.hypot(...subtract(position, eye)) + Math.hypot(...position);
     const pixelError = 4 * camera.fx * (scale / center[2]) * 2 ** -22 + 1e-6 * (Math.abs(e.x) + Math.abs(e.y));
-    check(Math.abs(x - e.x) <= pixelError && Math.abs(y - e.y) <= pixelError, `splat ${i}: centre ${x}, ${y}, expected ${e.x}, ${e.y}`);
+    check(
+      Math.abs(x - e.x) <= pixelError && Math.abs(y - e.y) <= pixelError,
+      `splat ${i}: centre ${x}, ${y}, expected ${e.x}, ${e.y}`,
+    );
     const sigmaX = 1 / inverseSigmaX;
     const { xx, xy, yy } = e.covariance;
     const depthError = (8 * scale * 2 ** -23) / center[2];
-    check(relative(sigmaX * sigmaX, xx) <= 1e-4 + 4 * depthError, `splat ${i}: variance of x ${sigmaX ** 2}, expected ${xx}`);
-    check(relative(slope * sigmaX * sigmaX, xy, Math.sqrt(xx * yy)) <= 1e-4 + 4 * depthError, `splat ${i}: covariance ${slope * sigmaX ** 2}, expected ${xy}`);
+    check(
+      relative(sigmaX * sigmaX, xx) <= 1e-4 + 4 * depthError,
+      `splat ${i}: variance of x ${sigmaX ** 2}, expected ${xx}`,
+    );
+    check(
+      relative(slope * sigmaX * sigmaX, xy, Math.sqrt(xx * yy)) <= 1e-4 + 4 * depthError,
+      `splat ${i}: covariance ${slope * sigmaX ** 2}, expected ${xy}`,
+    );
     const conditional = 1 / e.conic.yy;
-    check(relative(1 / inverseSigmaV ** 2, conditional) <= 2e-3 + 100 * depthError, `splat ${i}: variance about the line ${1 / inverseSigmaV ** 2}, expected ${conditional}`);
+    check(
+      relative(1 / inverseSigmaV ** 2, conditional) <= 2e-3 + 100 * depthError,
+      `splat ${i}: variance about the line ${1 / inverseSigmaV ** 2}, expected ${conditional}`,
+    );
     const color = [words[5] & 0xffff, words[5] >>> 16, words[6] & 0xffff].map(halfToNumber);
     const expected = splatColor(cloud, i, normalize(subtract(position, eye)));
-    const coefficients = cloud.sh.subarray((i * cloud.sh.length) / cloud.count, ((i + 1) * cloud.sh.length) / cloud.count);
+    const coefficients = cloud.sh.subarray(
+      (i * cloud.sh.length) / cloud.count,
+      ((i + 1) * cloud.sh.length) / cloud.count,
+    );
     // Coefficients are float16: half a unit in the last place of each.
     const shError = coefficients.reduce((sum, c) => sum + Math.abs(c), 0) * 2 ** -11 + 1e-5;
-    expected.forEach((c, k) => check(Math.abs(color[k] - c) <= shError + c * 2 ** -11, `splat ${i}: colour ${color}, expected ${expected}`));
+    expected.forEach((c, k) =>
+      check(Math.abs(color[k] - c) <= shError + c * 2 ** -11, `splat ${i}: colour ${color}, expected ${expected}`),
+    );
     const opacity = cloud.opacities[i] * (cloud.antialiased ? e.compensation : 1);
-    check(relative(asFloat(words[7]), opacity) <= 2e-3 + 100 * depthError, `splat ${i}: opacity ${asFloat(words[7])}, expected ${opacity}`);
-    check(relative(asFloat(keys[i]), center[2]) <= 1e-6 + depthError, `splat ${i}: depth ${asFloat(keys[i])}, expected ${center[2]}`);
+    check(
+      relative(asFloat(words[7]), opacity) <= 2e-3 + 100 * depthError,
+      `splat ${i}: opacity ${asFloat(words[7])}, expected ${opacity}`,
+    );
+    check(
+      relative(asFloat(keys[i]), center[2]) <= 1e-6 + depthError,
+      `splat ${i}: depth ${asFloat(keys[i])}, expected ${center[2]}`,
+    );
     compared++;
   }
   check(compared > 0, 'no splat was compared');
@@ -148,7 +197,12 @@ const geometryCases = scenes.flatMap((make) =>
 /** Packs without the check that `packGaussians` does, as a buffer that no CPU has seen. */
 function packUnchecked(cloud: GaussianCloud): PackedGaussians {
   const harmless = { ...cloud, positions: cloud.positions.map(() => 0), scales: cloud.scales.map(() => 1) };
-  const blank = { ...harmless, rotations: cloud.rotations.map(() => 1), opacities: cloud.opacities.map(() => 1), sh: cloud.sh.map(() => 0) };
+  const blank = {
+    ...harmless,
+    rotations: cloud.rotations.map(() => 1),
+    opacities: cloud.opacities.map(() => 1),
+    sh: cloud.sh.map(() => 0),
+  };
   const packed = packGaussians(blank);
   const geometry = new Float32Array(packed.geometry.buffer);
   const stride = layouts.PackedGaussian.size / 4;

@@ -23,7 +23,10 @@ export const scanCases: StageCase[] = [
     name: `scan: ${size} random counts`,
     run: (bench: Bench) => {
       const random = randomSource(size + 3);
-      return checkScan(bench, Uint32Array.from({ length: size }, () => Math.floor(random() * 257)));
+      return checkScan(
+        bench,
+        Uint32Array.from({ length: size }, () => Math.floor(random() * 257)),
+      );
     },
   })),
   {
@@ -31,7 +34,10 @@ export const scanCases: StageCase[] = [
     run: async (bench) => {
       await checkScan(bench, new Uint32Array(step + 5).fill(256));
       await checkScan(bench, new Uint32Array(step + 5));
-      await checkScan(bench, Uint32Array.from({ length: step + 5 }, (_, i) => (i === step + 4 ? 256 : 0)));
+      await checkScan(
+        bench,
+        Uint32Array.from({ length: step + 5 }, (_, i) => (i === step + 4 ? 256 : 0)),
+      );
     },
   },
 ];

@@ -42,7 +42,10 @@ async function sortOnGpu(bench: Bench, keys: Uint32Array): Promise<{ keys: Uint3
   bench.compute((pass) => stage.record(pass, bindings, plan));
   const result = { keys: await bench.read(keyBuffers[0]), order: await bench.read(order[0]) };
   const rest = result.order.subarray(keys.length);
-  check(rest.every((word) => word === 0xdeadbeef), 'the sort wrote beyond its keys');
+  check(
+    rest.every((word) => word === 0xdeadbeef),
+    'the sort wrote beyond its keys',
+  );
   return result;
 }
 
@@ -50,10 +53,15 @@ async function checkSort(bench: Bench, keys: Uint32Array): Promise<void> {
   const expected = sortTwin(keys);
   const sorted = await sortOnGpu(bench, keys);
   checkEqual(sorted.order, expected, 'order');
-  checkEqual(sorted.keys, Uint32Array.from(expected, (i) => keys[i]), 'keys');
+  checkEqual(
+    sorted.keys,
+    Uint32Array.from(expected, (i) => keys[i]),
+    'keys',
+  );
 }
 
-const fill = (count: number, value: (i: number) => number): Uint32Array => Uint32Array.from({ length: count }, (_, i) => value(i));
+const fill = (count: number, value: (i: number) => number): Uint32Array =>
+  Uint32Array.from({ length: count }, (_, i) => value(i));
 
 const block = constants.SORT_BLOCK;
 const sizes = [0, 1, 2, 255, 256, 257, block - 1, block, block + 1, 3 * block + 17, 300 * block + 5];
@@ -63,26 +71,45 @@ export const sortCases: StageCase[] = [
     name: `sort: ${size} random 32-bit keys`,
     run: (bench: Bench) => {
       const random = randomSource(size + 1);
-      return checkSort(bench, fill(size, () => Math.floor(random() * 0x1_0000_0000)));
+      return checkSort(
+        bench,
+        fill(size, () => Math.floor(random() * 0x1_0000_0000)),
+      );
     },
   })),
   {
     name: 'sort: is stable on equal keys',
-    run: (bench) => checkSort(bench, fill(5 * block + 3, () => 0x3f800000)),
+    run: (bench) =>
+      checkSort(
+        bench,
+        fill(5 * block + 3, () => 0x3f800000),
+      ),
   },
   {
     name: 'sort: is stable on few distinct keys',
     run: (bench) => {
       const random = randomSource(5);
-      return checkSort(bench, fill(4 * block + 100, () => Math.floor(random() * 5) * 0x01010101));
+      return checkSort(
+        bench,
+        fill(4 * block + 100, () => Math.floor(random() * 5) * 0x01010101),
+      );
     },
   },
   {
     name: 'sort: extremes 0 and 0xffffffff, ascending and descending runs',
     run: async (bench) => {
-      await checkSort(bench, fill(2 * block + 1, (i) => (i % 2 === 0 ? 0xffffffff : 0)));
-      await checkSort(bench, fill(2 * block + 1, (i) => i));
-      await checkSort(bench, fill(2 * block + 1, (i) => 0xffffffff - i));
+      await checkSort(
+        bench,
+        fill(2 * block + 1, (i) => (i % 2 === 0 ? 0xffffffff : 0)),
+      );
+      await checkSort(
+        bench,
+        fill(2 * block + 1, (i) => i),
+      );
+      await checkSort(
+        bench,
+        fill(2 * block + 1, (i) => 0xffffffff - i),
+      );
     },
   },
   {
@@ -90,7 +117,10 @@ export const sortCases: StageCase[] = [
     run: async (bench) => {
       for (const shift of [0, 8, 16, 24]) {
         const random = randomSource(shift);
-        await checkSort(bench, fill(block + 77, () => (Math.floor(random() * 256) << shift) >>> 0));
+        await checkSort(
+          bench,
+          fill(block + 77, () => (Math.floor(random() * 256) << shift) >>> 0),
+        );
       }
     },
   },
@@ -100,7 +130,8 @@ export const sortCases: StageCase[] = [
       const random = randomSource(11);
       const depths = Float32Array.from({ length: 3 * block }, () => Math.exp(40 * random() - 20));
       const { order } = await sortOnGpu(bench, new Uint32Array(depths.buffer));
-      for (let i = 1; i < depths.length; i++) check(depths[order[i - 1]] <= depths[order[i]], `depths at ${i} are out of order`);
+      for (let i = 1; i < depths.length; i++)
+        check(depths[order[i - 1]] <= depths[order[i]], `depths at ${i} are out of order`);
     },
   },
 ];

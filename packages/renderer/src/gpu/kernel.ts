@@ -50,7 +50,10 @@ export class ShaderProgram<S extends ShaderDescription> {
   }
 }
 
-function layoutEntry({ binding, type, format }: ShaderBinding, visibility: GPUShaderStageFlags): GPUBindGroupLayoutEntry {
+function layoutEntry(
+  { binding, type, format }: ShaderBinding,
+  visibility: GPUShaderStageFlags,
+): GPUBindGroupLayoutEntry {
   switch (type) {
     case 'texture':
       return { binding, visibility, texture: { sampleType: 'unfilterable-float' } };
@@ -122,7 +125,12 @@ export const BUFFER_USAGE = {
   storage: 0x80,
   indirect: 0x100,
 } as const;
-export const TEXTURE_USAGE = { copySource: 0x1, textureBinding: 0x4, storageBinding: 0x8, renderAttachment: 0x10 } as const;
+export const TEXTURE_USAGE = {
+  copySource: 0x1,
+  textureBinding: 0x4,
+  storageBinding: 0x8,
+  renderAttachment: 0x10,
+} as const;
 
 const cache = new WeakMap<GPUDevice, Map<string, unknown>>();
 

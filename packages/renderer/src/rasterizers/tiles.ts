@@ -115,7 +115,10 @@ export class TilesRasterizer implements Rasterizer {
     this.#sort.record(bin, bound.sort, buffers.plan);
     gather.dispatchIndirect(bin, bound.gather, buffers.plan, planOffsets.visible);
     bin.end();
-    const paint = encoder.beginComputePass({ label: 'gs.rasterize', timestampWrites: timer?.timestampWrites('rasterize') });
+    const paint = encoder.beginComputePass({
+      label: 'gs.rasterize',
+      timestampWrites: timer?.timestampWrites('rasterize'),
+    });
     const { width, height } = accumulation;
     rasterize.dispatchGrid(paint, bound.rasterize, Math.ceil(width / TILE), Math.ceil(height / TILE));
     paint.end();
@@ -141,7 +144,10 @@ export class TilesRasterizer implements Rasterizer {
     const groups = Math.ceil(splats / PREFIX_THREADS);
     const buffer = (name: string, bytes: number): GPUBuffer =>
       this.#memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination | indirect);
-    const pair = (name: string): [GPUBuffer, GPUBuffer] => [buffer(`${name}_a`, 4 * capacity), buffer(`${name}_b`, 4 * capacity)];
+    const pair = (name: string): [GPUBuffer, GPUBuffer] => [
+      buffer(`${name}_a`, 4 * capacity),
+      buffer(`${name}_b`, 4 * capacity),
+    ];
     const groupPairs = buffer('group_pairs', 4 * (groups + 1));
     this.#device.queue.writeBuffer(this.#scanLength, 0, Uint32Array.of(groupPairs.size / 4 - 1));
     return {
@@ -166,11 +172,22 @@ export class TilesRasterizer implements Rasterizer {
     const bits = Math.ceil(Math.log2(columns * rows));
     const { storage, copyDestination } = BUFFER_USAGE;
     const ranges = this.#memory.buffer('gs.bin.ranges', 8 * columns * rows, storage | copyDestination);
-    this.#bound = { accumulation, grid: { columns, rows, bits }, ranges, ...this.#bindings(inputs, buffers, bits, ranges, accumulation) };
+    this.#bound = {
+      accumulation,
+      grid: { columns, rows, bits },
+      ranges,
+      ...this.#bindings(inputs, buffers, bits, ranges, accumulation),
+    };
     return this.#bound;
   }
 
-  #bindings(inputs: RasterizerInputs, buffers: PairBuffers, bits: number, ranges: GPUBuffer, accumulation: Accumulation): Omit<Bound, 'accumulation' | 'grid' | 'ranges'> {
+  #bindings(
+    inputs: RasterizerInputs,
+    buffers: PairBuffers,
+    bits: number,
+    ranges: GPUBuffer,
+    accumulation: Accumulation,
+  ): Omit<Bound, 'accumulation' | 'grid' | 'ranges'> {
     const { plan, splats, order } = inputs;
     const { rects, groupPairs, plan: pairPlan, bins, places, pairs, sortedPairs, digitCounts, digitTotals } = buffers;
     const view = this.#view;
@@ -182,7 +199,14 @@ export class TilesRasterizer implements Rasterizer {
       plan: planKernel.bind({ view, group_pairs: groupPairs, pair_plan: pairPlan }),
       emit: emit.bind({ view, plan, splats, order, rects, group_pairs: groupPairs, bins: bins[0], pairs }),
       sort: this.#sort.bind({ plan: pairPlan, keys: bins, order: places, digitCounts, digitTotals }, bits),
-      gather: gather.bind({ pair_plan: pairPlan, bins: bins[result], places: places[result], pairs, sorted_pairs: sortedPairs, ranges }),
+      gather: gather.bind({
+        pair_plan: pairPlan,
+        bins: bins[result],
+        places: places[result],
+        pairs,
+        sorted_pairs: sortedPairs,
+        ranges,
+      }),
       rasterize: rasterize.bind({ view, splats, sorted_pairs: sortedPairs, ranges, accumulated: accumulation.view }),
     };
   }
