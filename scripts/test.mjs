@@ -76,5 +76,5 @@ function runAndCapture(command, args) {
   });
   const text = result.stdout ?? '';
   process.stdout.write(text);
-  return { text: text.replace(/\u001b\[[0-9;]*m/g, ''), status: result.status ?? 1 };
+  return { text: text.replace(/\u001b\[[0-9;]*[A-Za-z]/g, ''), status: result.status ?? 1 };
 }
