@@ -15,11 +15,12 @@ fn main() {
   pair_plan.visible = pairs;
   pair_plan.overflow = total - pairs;
   pair_plan.sort_blocks = (pairs + SORT_BLOCK - 1u) / SORT_BLOCK;
-  pair_plan.sort_x = min(pair_plan.sort_blocks, MAX_GROUPS_X);
-  pair_plan.sort_y = (pair_plan.sort_blocks + MAX_GROUPS_X - 1u) / MAX_GROUPS_X;
+  let sort_grid = dispatch_grid(pairs, SORT_BLOCK);
+  pair_plan.sort_x = sort_grid.x;
+  pair_plan.sort_y = sort_grid.y;
   pair_plan.sort_z = 1u;
-  let groups = (pairs + PROJECT_GROUP - 1u) / PROJECT_GROUP;
-  pair_plan.visible_x = min(groups, MAX_GROUPS_X);
-  pair_plan.visible_y = (groups + MAX_GROUPS_X - 1u) / MAX_GROUPS_X;
+  let pair_grid = dispatch_grid(pairs, PROJECT_GROUP);
+  pair_plan.visible_x = pair_grid.x;
+  pair_plan.visible_y = pair_grid.y;
   pair_plan.visible_z = 1u;
 }

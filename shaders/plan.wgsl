@@ -25,13 +25,14 @@ fn main() {
   plan.overflow = total - visible;
 
   plan.sort_blocks = (visible + SORT_BLOCK - 1u) / SORT_BLOCK;
-  plan.sort_x = min(plan.sort_blocks, MAX_GROUPS_X);
-  plan.sort_y = (plan.sort_blocks + MAX_GROUPS_X - 1u) / MAX_GROUPS_X;
+  let sort_grid = dispatch_grid(visible, SORT_BLOCK);
+  plan.sort_x = sort_grid.x;
+  plan.sort_y = sort_grid.y;
   plan.sort_z = 1u;
 
-  let groups = (visible + PROJECT_GROUP - 1u) / PROJECT_GROUP;
-  plan.visible_x = min(groups, MAX_GROUPS_X);
-  plan.visible_y = (groups + MAX_GROUPS_X - 1u) / MAX_GROUPS_X;
+  let visible_grid = dispatch_grid(visible, PROJECT_GROUP);
+  plan.visible_x = visible_grid.x;
+  plan.visible_y = visible_grid.y;
   plan.visible_z = 1u;
 
   plan.quad_indices = QUAD_BATCH * INDICES_PER_QUAD;
@@ -43,9 +44,7 @@ fn main() {
   for (var page = 0u; page < limits.page_count; page++) {
     let first = min(group_offsets[page_groups[page]], visible);
     let end = min(group_offsets[page_groups[page + 1u]], visible);
-    let own_groups = (end - first + PROJECT_GROUP - 1u) / PROJECT_GROUP;
-    plan.pages[page] = PagePlan(
-      first, end - first, min(own_groups, MAX_GROUPS_X), (own_groups + MAX_GROUPS_X - 1u) / MAX_GROUPS_X, 1u,
-    );
+    let project_grid = dispatch_grid(end - first, PROJECT_GROUP);
+    plan.pages[page] = PagePlan(first, end - first, project_grid.x, project_grid.y, 1u);
   }
 }
