@@ -6,7 +6,7 @@
 #import shared/prefix
 
 @group(0) @binding(0) var<uniform> view: BinView;
-@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> splats: array<ProjectedSplat>;
 @group(0) @binding(3) var<storage, read> order: array<u32>;
 // Bins of each splat: first column, first row, columns, rows, a byte each.

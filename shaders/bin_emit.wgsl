@@ -7,7 +7,7 @@
 #import shared/prefix
 
 @group(0) @binding(0) var<uniform> view: BinView;
-@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> splats: array<ProjectedSplat>;
 @group(0) @binding(3) var<storage, read> order: array<u32>;
 @group(0) @binding(4) var<storage, read> rects: array<u32>;
@@ -15,7 +15,8 @@
 @group(0) @binding(5) var<storage, read> group_pairs: array<u32>;
 // Bin of each pair: the key of the sort.
 @group(0) @binding(6) var<storage, read_write> bins: array<u32>;
-@group(0) @binding(7) var<storage, read_write> pairs: array<BinPair>;
+// Slot, and the tiles of the bin that the splat touches.
+@group(0) @binding(7) var<storage, read_write> pairs: array<vec2u>;
 
 // Inclusive prefix sums of the pairs of each splat of the group.
 var<workgroup> ends: array<u32, PREFIX_THREADS>;
@@ -73,6 +74,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let bin = vec2u((rect & 255u) + nth % columns, ((rect >> 8u) & 255u) + nth / columns);
     let slot = order[first_rank + owner];
     bins[base + p] = bin.y * view.bins.x + bin.x;
-    pairs[base + p] = BinPair(slot, touched_tiles(coverage_of(splats[slot]), bin));
+    pairs[base + p] = vec2u(slot, touched_tiles(coverage_of(splats[slot]), bin));
   }
 }

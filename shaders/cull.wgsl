@@ -1,15 +1,21 @@
-// Which splats of a page paint anything: one thread per splat, one bit of `visible_bits` per splat, and the number of
-// visible splats of each group of 256. Bits and counts, not atomic slots, so that compaction keeps the file's order and
+// Which splats of the chunks at hand paint anything: one thread per splat, one bit of `visible_bits` per splat, and the number
+// of visible splats of each group of 256. Bits and counts, not atomic slots, so that compaction keeps the file's order and
 // equal depths never flicker.
 #import shared/projection
 #import shared/group
-#import shared/plan
+#import shared/gathered
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
-@group(0) @binding(2) var<storage, read_write> visible_bits: array<u32>;
-@group(0) @binding(3) var<storage, read_write> group_counts: array<u32>;
-@group(0) @binding(4) var<storage, read_write> plan: Plan;
+@group(0) @binding(2) var<storage, read> chunk_list: array<u32>;
+@group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
+@group(0) @binding(4) var<storage, read_write> group_counts: array<u32>;
+@group(0) @binding(5) var<storage, read_write> gathered: array<atomic<u32>>;
+
+// Splats with less than this opacity times their area in px² are left out. A lever: 0 leaves out none.
+override min_contribution: f32 = 0.0;
+
+const TWO_PI = 6.283185307179586;
 
 var<workgroup> bits: array<atomic<u32>, WORDS_PER_GROUP>;
 var<workgroup> nearest_inverted: atomic<u32>;
@@ -20,18 +26,20 @@ fn visible_depth(packed: PackedGaussian) -> f32 {
   let g = unpack_gaussian(packed);
   // The cheap tests first: most splats of a scene fail one of them.
   let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
-  if (g.opacity < ALPHA_MIN || !is_in_depth_range(view, depth)) { return 0.0; }
-  return select(0.0, depth, covers_a_pixel(view, project_ellipse(view, g)));
+  if (g.opacity < alpha_min || !is_in_depth_range(view, depth)) { return 0.0; }
+  let e = project_ellipse(view, g);
+  let contributes = e.opacity * TWO_PI * e.sigma_x * e.sigma_v >= min_contribution;
+  return select(0.0, depth, contributes && covers_a_pixel(view, e));
 }
 
 @compute @workgroup_size(CULL_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let group = group_index(workgroup_id);
-  let i = group * CULL_GROUP + lane;
+  let chunk = chunk_list[view.first_group + workgroup_id.x];
+  let i = chunk * CULL_GROUP + lane;
   if (i < view.splat_count) {
     let packed = gaussians[i];
     if (!is_usable(packed)) {
-      atomicAdd(&plan.unusable, 1u);
+      atomicAdd(&gathered[UNUSABLE], 1u);
     } else {
       let depth = visible_depth(packed);
       if (depth > 0.0) {
@@ -42,18 +50,15 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     }
   }
   workgroupBarrier();
-  let words = (view.splat_count + CULL_GROUP - 1u) / CULL_GROUP;
-  if (group >= words) { return; }
-  if (lane < WORDS_PER_GROUP) {
-    visible_bits[(view.first_group + group) * WORDS_PER_GROUP + lane] = atomicLoad(&bits[lane]);
-  }
+  let group = view.first_group + chunk;
+  if (lane < WORDS_PER_GROUP) { visible_bits[group * WORDS_PER_GROUP + lane] = atomicLoad(&bits[lane]); }
   if (lane == 0u) {
     var count = 0u;
     for (var w = 0u; w < WORDS_PER_GROUP; w++) { count += countOneBits(atomicLoad(&bits[w])); }
-    group_counts[view.first_group + group] = count;
+    group_counts[group] = count;
     if (count > 0u) {
-      atomicMax(&plan.nearest_inverted, atomicLoad(&nearest_inverted));
-      atomicMax(&plan.farthest, atomicLoad(&farthest));
+      atomicMax(&gathered[NEAREST_INVERTED], atomicLoad(&nearest_inverted));
+      atomicMax(&gathered[FARTHEST], atomicLoad(&farthest));
     }
   }
 }

@@ -3,23 +3,25 @@
 #import shared/group
 
 @group(0) @binding(0) var<uniform> limits: PlanLimits;
-// Exclusive prefix sums of the survivors of each cull group, and behind the last group the total.
-@group(0) @binding(1) var<storage, read> group_offsets: array<u32>;
-// First cull group of each page; one more entry than there are pages.
-@group(0) @binding(2) var<storage, read> page_groups: array<u32>;
+// Exclusive prefix sums of the survivors of each group, or of each block of an order, and behind the last the total.
+@group(0) @binding(1) var<storage, read> offsets: array<u32>;
+// For each page the first of its offsets and the one behind its last.
+@group(0) @binding(2) var<storage, read> page_ranges: array<vec2u>;
 @group(0) @binding(3) var<storage, read_write> plan: Plan;
 
 struct PlanLimits {
   page_count: u32,
   // Splats that the renderer's buffers have room for.
   capacity: u32,
+  // Where in `offsets` the total lies.
+  total_at: u32,
 }
 
 const INDICES_PER_QUAD = 6u;
 
 @compute @workgroup_size(1)
 fn main() {
-  let total = group_offsets[page_groups[limits.page_count]];
+  let total = offsets[limits.total_at];
   let visible = min(total, limits.capacity);
   plan.visible = visible;
   plan.overflow = total - visible;
@@ -42,8 +44,8 @@ fn main() {
   plan.quad_first_instance = 0u;
 
   for (var page = 0u; page < limits.page_count; page++) {
-    let first = min(group_offsets[page_groups[page]], visible);
-    let end = min(group_offsets[page_groups[page + 1u]], visible);
+    let first = min(offsets[page_ranges[page].x], visible);
+    let end = min(offsets[page_ranges[page].y], visible);
     let project_grid = dispatch_grid(end - first, PROJECT_GROUP);
     plan.pages[page] = PagePlan(first, end - first, project_grid.x, project_grid.y, 1u);
   }

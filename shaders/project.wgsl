@@ -2,17 +2,20 @@
 #import shared/projection
 #import shared/sh
 #import shared/splat
+#import shared/gathered
 #import shared/plan
 #import shared/group
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
-// float16 coefficients, [splat][coefficient][channel], each splat padded to whole words
+// Coefficients as pack/sh.ts of the renderer packs them.
 @group(0) @binding(2) var<storage, read> sh: array<vec2u>;
 @group(0) @binding(3) var<storage, read> survivors: array<u32>;
-@group(0) @binding(4) var<storage, read> plan: PlanView;
-@group(0) @binding(5) var<storage, read_write> splats: array<ProjectedSplat>;
-@group(0) @binding(6) var<storage, read_write> keys: array<u32>;
+@group(0) @binding(4) var<storage, read> plan: Plan;
+@group(0) @binding(5) var<storage, read> gathered: array<u32>;
+@group(0) @binding(6) var<storage, read_write> splats: array<ProjectedSplat>;
+// Depth keys; or, where the survivors are in depth order already, the slots themselves.
+@group(0) @binding(7) var<storage, read_write> keys: array<u32>;
 
 // Colour that four coefficients in three words add, or one coefficient in the last word of degrees 0 and 2.
 fn quartet_color(first_word: u32, basis: vec4f) -> vec3f {
@@ -32,22 +35,69 @@ fn single_color(word: u32, basis: f32) -> vec3f {
   return basis * vec3f(unpack2x16float(w.x), unpack2x16float(w.y).x);
 }
 
-// sRGB-encoded colour of splat i seen along the unit direction d; may exceed 1.
-fn splat_sh_color(i: u32, degree: u32, d: vec3f) -> vec3f {
-  let first = i * sh_stride(degree);
-  var color = vec3f(0.5);
+fn half_color(first: u32, degree: u32, d: vec3f) -> vec3f {
   switch degree {
-    case 0u: { color += single_color(first, SH_C0); }
-    case 1u: { color += quartet_color(first, sh_basis(0u, d)); }
+    case 0u: { return single_color(first, SH_C0); }
+    case 1u: { return quartet_color(first, sh_basis(0u, d)); }
     case 2u: {
-      color += quartet_color(first, sh_basis(0u, d)) + quartet_color(first + 3u, sh_basis(1u, d));
-      color += single_color(first + 6u, sh_basis(2u, d).x);
+      return quartet_color(first, sh_basis(0u, d)) + quartet_color(first + 3u, sh_basis(1u, d))
+        + single_color(first + 6u, sh_basis(2u, d).x);
     }
     default: {
+      var color = vec3f(0.0);
       for (var q = 0u; q < 4u; q++) { color += quartet_color(first + 3u * q, sh_basis(q, d)); }
+      return color;
     }
   }
-  return max(color, vec3f(0.0));
+}
+
+// The 12 codes, four coefficients of three channels, from `word` and the two halves that follow it.
+fn codes_color(a: u32, b: u32, c: u32, weights: vec4f) -> vec3f {
+  let p = unpack4x8snorm(a);
+  let q = unpack4x8snorm(b);
+  let r = unpack4x8snorm(c);
+  return weights.x * p.xyz + weights.y * vec3f(p.w, q.xy) + weights.z * vec3f(q.zw, r.x) + weights.w * r.yzw;
+}
+
+// Degree 0 in float16, then codes of 8 bits in the order [coefficient][channel] with a scale for each band.
+fn int8_color(first: u32, degree: u32, d: vec3f) -> vec3f {
+  let head = sh[first];
+  var color = SH_C0 * vec3f(unpack2x16float(head.x), unpack2x16float(head.y).x);
+  if (degree == 0u) { return color; }
+  let scale_1 = sh_scale((head.y >> 16u) & 255u);
+  let scale_2 = sh_scale(head.y >> 24u);
+  let low = sh_basis(0u, d);
+  let middle = sh_basis(1u, d);
+  let a = sh[first + 1u];
+  if (degree == 1u) {
+    // Nine codes, the last of them where other degrees have the scale of band 2.
+    let rest = unpack4x8snorm(a.y);
+    let p = unpack4x8snorm(a.x);
+    let last = unpack4x8snorm(head.y).w;
+    return color + scale_1 * (low.y * p.xyz + low.z * vec3f(p.w, rest.xy) + low.w * vec3f(rest.zw, last));
+  }
+  let b = sh[first + 2u];
+  let c = sh[first + 3u];
+  color += codes_color(a.x, a.y, b.x, vec4f(scale_1 * low.yzw, scale_2 * middle.x));
+  color += codes_color(b.y, c.x, c.y, scale_2 * vec4f(middle.yzw, sh_basis(2u, d).x));
+  if (degree == 2u) { return color; }
+  let e = sh[first + 4u];
+  let f = sh[first + 5u];
+  let g = sh[first + 6u];
+  let scale_3 = sh_scale((g.y >> 8u) & 255u);
+  let high = sh_basis(2u, d);
+  let top = sh_basis(3u, d);
+  color += codes_color(e.x, e.y, f.x, scale_3 * vec4f(high.yzw, top.x));
+  return color + codes_color(f.y, g.x, g.y, scale_3 * vec4f(top.yzw, 0.0));
+}
+
+// sRGB-encoded colour of splat i seen along the unit direction d; may exceed 1.
+fn splat_sh_color(i: u32, d: vec3f) -> vec3f {
+  let first = i * sh_stride(view.sh_degree, view.sh_encoding);
+  let degree = min(view.sh_degree, view.sh_cap);
+  var color: vec3f;
+  if (view.sh_encoding == SH_FLOAT16) { color = half_color(first, degree, d); } else { color = int8_color(first, degree, d); }
+  return max(color + 0.5, vec3f(0.0));
 }
 
 // Orders as the depth does. The bits of a positive float32, read as a number, grow like its logarithm: a share of the
@@ -55,8 +105,8 @@ fn splat_sh_color(i: u32, degree: u32, d: vec3f) -> vec3f {
 fn depth_key(depth: f32) -> u32 {
   let depth_bits = bitcast<u32>(depth);
   if (view.key_bits == 32u) { return depth_bits; }
-  let nearest = ~plan.nearest_inverted;
-  let range = f32(max(plan.farthest - nearest, 1u));
+  let nearest = ~gathered[NEAREST_INVERTED];
+  let range = f32(max(gathered[FARTHEST] - nearest, 1u));
   // A depth computed anew may lie a rounding before the nearest one.
   let share = f32(max(depth_bits, nearest) - nearest) / range;
   return u32(min(share, 1.0) * f32((1u << view.key_bits) - 1u));
@@ -68,10 +118,12 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let rank = group_index(workgroup_id) * PROJECT_GROUP + lane;
   if (rank >= page.survivors) { return; }
   let slot = page.first_slot + rank;
-  let i = survivors[slot];
+  // In depth order the survivors of all pages are mixed: those of others wrap around to huge numbers.
+  let i = survivors[slot] - view.first_group * CULL_GROUP;
+  if (i >= view.splat_count) { return; }
   let g = unpack_gaussian(gaussians[i]);
   let e = project_ellipse(view, g);
-  let color = splat_sh_color(i, view.sh_degree, normalize(g.position - view.eye));
-  splats[slot] = pack_splat(e.center, e.sigma_x, e.slope, e.sigma_v, color, e.opacity);
-  keys[slot] = depth_key(e.depth);
+  let color = splat_sh_color(i, normalize(g.position - view.eye));
+  splats[slot] = pack_splat(e, color);
+  keys[slot] = select(depth_key(e.depth), slot, view.is_ordered != 0u);
 }

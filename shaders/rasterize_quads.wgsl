@@ -5,7 +5,7 @@
 #import shared/plan
 
 @group(0) @binding(0) var<uniform> raster: RasterView;
-@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> splats: array<ProjectedSplat>;
 // Slots from near to far.
 @group(0) @binding(3) var<storage, read> order: array<u32>;
@@ -62,7 +62,7 @@ fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) ins
 fn fragment(quad: Quad) -> @location(0) vec4f {
   let offset = quad.position.xy - quad.shape.xy;
   let alpha = alpha_at(offset, quad.shape.z, quad.shape.w, quad.inverse_sigma_v, quad.color.a);
-  if (alpha < ALPHA_MIN) { discard; }
+  if (alpha < alpha_min) { discard; }
   // Blended as colour = alpha · color + (1 - alpha) · colour and transmittance = (1 - alpha) · transmittance.
   return vec4f(quad.color.rgb * alpha, alpha);
 }

@@ -5,41 +5,103 @@
 
 @group(0) @binding(0) var<uniform> view: BinView;
 @group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
-@group(0) @binding(2) var<storage, read> sorted_pairs: array<BinPair>;
+// Slot, and the tiles of the bin that the splat touches: bin by bin, in depth order.
+@group(0) @binding(2) var<storage, read> pairs: array<vec2u>;
 @group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
-@group(0) @binding(4) var accumulated: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(4) var image: texture_storage_2d<rgba16float, write>;
+// Notes: a bit for each slot whose splat gave at least 1/255 of its colour to a pixel, and for each pixel the sum of
+// weight times depth in world units.
+@group(0) @binding(5) var<storage, read_write> contributed: array<atomic<u32>>;
+@group(0) @binding(6) var<storage, read_write> depths: array<f32>;
+
+// A pixel is finished before a splat that would take its transmittance to this or below.
+override transmittance_min: f32 = 1e-4;
+// True to write premultiplied colour over the background, false for colour and transmittance.
+override is_final: bool = false;
+// True to note depths, and which splats contributed.
+override takes_notes: bool = false;
 
 const TILE_THREADS = TILE * TILE;
-const HIT_WORDS = TILE_THREADS / 32u;
-// A pixel is finished before a splat that would take its transmittance to this or below.
-const TRANSMITTANCE_MIN = 1e-4;
+// Pairs that a thread looks at in one go, and words with a bit for each pair of all threads.
+const PAIRS_PER_THREAD = 4u;
+const HIT_WORDS = PAIRS_PER_THREAD * TILE_THREADS / 32u;
+// Splats that wait to be painted: those just found and, at most a batch, those left over from before.
+const QUEUE = (PAIRS_PER_THREAD + 1u) * TILE_THREADS;
+// sqrt(log2(e) / 2): in axes stretched by it a Gaussian is 2^-(u² + v²).
+const BASE_2_AXIS = 0.8493218002880191;
 
-// Of the batch of pairs at hand: a bit for each that touches the tile, and the splats of those, front to back.
+// A bit for each pair just looked at that touches the tile.
 var<workgroup> hits: array<atomic<u32>, HIT_WORDS>;
+// Slots of the splats to paint, front to back.
+var<workgroup> queue: array<u32, QUEUE>;
+var<workgroup> queued: u32;
+// The splats at hand, a batch of the queue: centre, 1 / sigma_x in those axes, slope;
 var<workgroup> shapes: array<vec4f, TILE_THREADS>;
+// 1 / sigma_v in those axes, red and green, blue and depth, log2 of the opacity;
 var<workgroup> paints: array<vec4u, TILE_THREADS>;
-// A bit for each quarter (8 x 8 pixels) of the tile that the splat touches.
-var<workgroup> quarters: array<u32, TILE_THREADS>;
+// a bit for each block of 8 x 4 pixels of the tile that the splat touches.
+var<workgroup> blocks: array<u32, TILE_THREADS>;
+// Of the batch, a bit for each splat that contributed.
+var<workgroup> contributors: array<atomic<u32>, TILE_THREADS / 32u>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
 
-// Threads 0 to 63 paint the upper left quarter, and so on: neighbouring threads skip a splat together.
+// 32 neighbouring threads paint a block of 8 x 4 pixels, so that they skip a splat together.
 fn pixel_in_tile(lane: u32) -> vec2u {
-  let quarter = lane / 64u;
-  return vec2u((quarter % 2u) * 8u + lane % 8u, (quarter / 2u) * 8u + (lane / 8u) % 8u);
+  let own = lane / 32u;
+  return vec2u((own % 2u) * 8u + lane % 8u, (own / 2u) * 4u + (lane / 8u) % 4u);
 }
 
-fn touched_quarters(s: ProjectedSplat, tile_corner: vec2f) -> u32 {
+fn touched_blocks(s: ProjectedSplat, tile_corner: vec2f) -> u32 {
   let c = coverage_of(s);
   var mask = 0u;
-  for (var row = 0u; row < 2u; row++) {
-    let top = tile_corner.y + f32(row) * 8.0 + 0.5;
-    let range = band_range(c, top - 0.01, top + 7.01) + vec2f(-0.01, 0.01) - tile_corner.x;
-    if (range.x > range.y) { continue; }
-    if (range.x <= 7.5 && range.y >= 0.5) { mask |= 1u << (2u * row); }
-    if (range.x <= 15.5 && range.y >= 8.5) { mask |= 2u << (2u * row); }
+  for (var row = 0u; row < 4u; row++) {
+    let top = tile_corner.y + f32(row) * 4.0 + 0.5;
+    let range = band_range(c, top - 0.01, top + 3.01) + vec2f(-0.01, 0.01) - tile_corner.x;
+    let touches = vec2<bool>(range.x <= 7.5 && range.y >= 0.5, range.x <= 15.5 && range.y >= 8.5);
+    mask |= select(0u, select(0u, 1u, touches.x) | select(0u, 2u, touches.y), range.x <= range.y) << (2u * row);
   }
   return mask;
+}
+
+// Adds the pairs from `start` on that touch the tile to the queue, in their order. Ends with a barrier.
+fn find_splats(start: u32, end: u32, tile_bit: u32, lane: u32) {
+  if (lane < HIT_WORDS) { atomicStore(&hits[lane], 0u); }
+  workgroupBarrier();
+  var slots: array<u32, PAIRS_PER_THREAD>;
+  var is_hit: array<bool, PAIRS_PER_THREAD>;
+  for (var j = 0u; j < PAIRS_PER_THREAD; j++) {
+    let i = start + j * TILE_THREADS + lane;
+    is_hit[j] = false;
+    if (i < end) {
+      let pair = pairs[i];
+      slots[j] = pair.x;
+      is_hit[j] = (pair.y & tile_bit) != 0u;
+      if (is_hit[j]) { atomicOr(&hits[(j * TILE_THREADS + lane) / 32u], 1u << (lane % 32u)); }
+    }
+  }
+  workgroupBarrier();
+  let own_word = lane / 32u;
+  var place = queued;
+  for (var w = 0u; w < HIT_WORDS; w++) {
+    let word = atomicLoad(&hits[w]);
+    let j = w / (TILE_THREADS / 32u);
+    if (w % (TILE_THREADS / 32u) == own_word && is_hit[j]) {
+      queue[place + countOneBits(word & ((1u << (lane % 32u)) - 1u))] = slots[j];
+    }
+    place += countOneBits(word);
+  }
+  workgroupBarrier();
+  if (lane == 0u) { queued = place; }
+}
+
+fn load_splat(k: u32, tile_corner: vec2f) {
+  let s = splats[queue[k]];
+  blocks[k] = touched_blocks(s, tile_corner);
+  shapes[k] = s.shape * vec4f(1.0, 1.0, BASE_2_AXIS, 1.0);
+  let inverse_sigma_v = bitcast<f32>(s.paint.x) * BASE_2_AXIS;
+  let power = log2(bitcast<f32>(s.paint.w));
+  paints[k] = vec4u(bitcast<u32>(inverse_sigma_v), s.paint.yz, bitcast<u32>(power));
 }
 
 @compute @workgroup_size(TILE_THREADS)
@@ -47,62 +109,82 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
   let corner = tile.xy * TILE;
   let pixel = corner + pixel_in_tile(lane);
   let center = vec2f(pixel) + 0.5;
-  let own_quarter = 1u << (lane / 64u);
+  let own_block = 1u << (lane / 32u);
   let bin = tile.xy / vec2u(BIN_COLUMNS, BIN_ROWS);
   let in_bin = tile.xy % vec2u(BIN_COLUMNS, BIN_ROWS);
   let tile_bit = 1u << (in_bin.y * BIN_COLUMNS + in_bin.x);
   let range = ranges[bin.y * view.bins.x + bin.x];
+  let power_min = log2(alpha_min);
 
   var color = vec3f(0.0);
+  var depth = 0.0;
   var transmittance = 1.0;
   var finished = any(center > view.viewport);
-  for (var start = range.x; start < range.y; start += TILE_THREADS) {
-    // Which pairs of the batch touch the tile, and where their splats go: the order of the pairs is kept.
-    if (lane < HIT_WORDS) { atomicStore(&hits[lane], 0u); }
+  var start = range.x;
+  loop {
+    var waiting = workgroupUniformLoad(&queued);
+    while (waiting < TILE_THREADS && start < range.y) {
+      find_splats(start, range.y, tile_bit, lane);
+      start += PAIRS_PER_THREAD * TILE_THREADS;
+      waiting = workgroupUniformLoad(&queued);
+    }
+    let count = min(waiting, TILE_THREADS);
+    if (count == 0u) { break; }
+    if (lane < count) { load_splat(lane, vec2f(corner)); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
+    if (takes_notes && lane < TILE_THREADS / 32u) { atomicStore(&contributors[lane], 0u); }
     workgroupBarrier();
-    var slot = 0u;
-    var is_hit = false;
-    if (start + lane < range.y) {
-      let pair = sorted_pairs[start + lane];
-      slot = pair.slot;
-      is_hit = (pair.tiles & tile_bit) != 0u;
-    }
-    if (is_hit) { atomicOr(&hits[lane / 32u], 1u << (lane % 32u)); }
-    if (!finished) { atomicOr(&unfinished, 1u); }
-    workgroupBarrier();
-    var place = countOneBits(atomicLoad(&hits[lane / 32u]) & ((1u << (lane % 32u)) - 1u));
-    var count = 0u;
-    for (var w = 0u; w < HIT_WORDS; w++) {
-      let here = countOneBits(atomicLoad(&hits[w]));
-      place += select(0u, here, w < lane / 32u);
-      count += here;
-    }
-    if (lane == 0u) { is_open = atomicLoad(&unfinished); }
-    if (is_hit) {
-      let s = splats[slot];
-      shapes[place] = s.shape;
-      paints[place] = s.paint;
-      quarters[place] = touched_quarters(s, vec2f(corner));
-    }
-    // Also the barrier between filling the lists and reading them.
-    if (workgroupUniformLoad(&is_open) == 0u) { break; }
 
     for (var k = 0u; k < count && !finished; k++) {
-      if ((quarters[k] & own_quarter) == 0u) { continue; }
+      if ((blocks[k] & own_block) == 0u) { continue; }
       let shape = shapes[k];
       let paint = paints[k];
-      let alpha = alpha_at(center - shape.xy, shape.z, shape.w, bitcast<f32>(paint.x), bitcast<f32>(paint.w));
-      if (alpha < ALPHA_MIN) { continue; }
+      let offset = center - shape.xy;
+      let u = offset.x * shape.z;
+      let v = (offset.y - shape.w * offset.x) * bitcast<f32>(paint.x);
+      let power = bitcast<f32>(paint.w) - u * u - v * v;
+      if (power < power_min) { continue; }
+      let alpha = min(ALPHA_MAX, exp2(power));
       let remaining = transmittance * (1.0 - alpha);
-      if (remaining <= TRANSMITTANCE_MIN) {
+      if (remaining <= transmittance_min) {
         finished = true;
         break;
       }
-      color += (transmittance * alpha) * splat_color(ProjectedSplat(shape, paint));
+      let weight = transmittance * alpha;
+      let blue_depth = unpack2x16float(paint.z);
+      color += weight * vec3f(unpack2x16float(paint.y), blue_depth.x);
       transmittance = remaining;
+      if (takes_notes) {
+        depth += weight * blue_depth.y;
+        if (weight >= ALPHA_MIN) { atomicOr(&contributors[k / 32u], 1u << (k % 32u)); }
+      }
     }
+    if (!finished) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
+
+    if (takes_notes && lane < count && (atomicLoad(&contributors[lane / 32u]) & (1u << (lane % 32u))) != 0u) {
+      let slot = queue[lane];
+      atomicOr(&contributed[slot / 32u], 1u << (slot % 32u));
+    }
+    // What is left over moves up: read by all before it is overwritten.
+    let left = waiting - count;
+    var moved: array<u32, PAIRS_PER_THREAD>;
+    for (var j = 0u; j < PAIRS_PER_THREAD; j++) {
+      moved[j] = 0u;
+      if (j * TILE_THREADS + lane < left) { moved[j] = queue[count + j * TILE_THREADS + lane]; }
+    }
+    if (lane == 0u) {
+      is_open = atomicLoad(&unfinished);
+      queued = left;
+    }
+    if (workgroupUniformLoad(&is_open) == 0u) { break; }
+    for (var j = 0u; j < PAIRS_PER_THREAD; j++) {
+      if (j * TILE_THREADS + lane < left) { queue[j * TILE_THREADS + lane] = moved[j]; }
+    }
   }
-  if (all(center < view.viewport)) { textureStore(accumulated, pixel, vec4f(color, transmittance)); }
+  if (any(center > view.viewport)) { return; }
+  if (takes_notes) { depths[pixel.y * u32(view.viewport.x) + pixel.x] = depth; }
+  var result = vec4f(color, transmittance);
+  if (is_final) { result = vec4f(color, 1.0 - transmittance) + transmittance * view.background; }
+  textureStore(image, pixel, result);
 }

@@ -4,7 +4,7 @@
 #import shared/sort
 
 @group(0) @binding(0) var<uniform> digit_pass: SortPass;
-@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> keys: array<u32>;
 // [digit][block]
 @group(0) @binding(3) var<storage, read_write> counts: array<u32>;

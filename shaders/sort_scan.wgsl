@@ -4,7 +4,7 @@
 #import shared/sort
 #import shared/prefix
 
-@group(0) @binding(0) var<storage, read> plan: PlanView;
+@group(0) @binding(0) var<storage, read> plan: Plan;
 // [digit][block]
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> digit_totals: array<u32>;

@@ -6,14 +6,17 @@
 #import shared/prefix
 
 @group(0) @binding(0) var<uniform> digit_pass: SortPass;
-@group(0) @binding(1) var<storage, read> plan: PlanView;
+@group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> keys_in: array<u32>;
-@group(0) @binding(3) var<storage, read> values_in: array<u32>;
+@group(0) @binding(3) var<storage, read> values_in: array<Value>;
 // Exclusive prefix sums over the blocks: [digit][block]
 @group(0) @binding(4) var<storage, read> block_offsets: array<u32>;
 @group(0) @binding(5) var<storage, read> digit_totals: array<u32>;
 @group(0) @binding(6) var<storage, read_write> keys_out: array<u32>;
-@group(0) @binding(7) var<storage, read_write> values_out: array<u32>;
+@group(0) @binding(7) var<storage, read_write> values_out: array<Value>;
+
+// What moves along with a key.
+alias Value = u32;
 
 const WORDS = SORT_THREADS / 32u;
 
@@ -40,11 +43,10 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let i = block_id * SORT_BLOCK + start + lane;
     let is_key = i < plan.visible;
     var key = 0u;
-    var value = i;
+    var value = Value(i);
     if (is_key) {
       key = keys_in[i];
-      // The first pass sorts the slots themselves: slot i holds value i.
-      if (digit_pass.first == 0u) { value = values_in[i]; }
+      if (digit_pass.makes_indices == 0u) { value = values_in[i]; }
     }
     let digit = digit_of(key, digit_pass.shift);
     if (is_key) { atomicOr(&members[word * DIGITS + digit], bit); }

@@ -12,12 +12,8 @@ struct BinView {
   viewport: vec2f,
   // Bins across and down.
   bins: vec2u,
+  // Premultiplied red, green, blue and alpha behind the splats.
+  background: vec4f,
   // Pairs of splat and bin that the buffers have room for. Pairs beyond it, the farthest, are left out.
   pair_capacity: u32,
-}
-
-// A splat in a bin: its slot, and the tiles of the bin that it touches.
-struct BinPair {
-  slot: u32,
-  tiles: u32,
 }

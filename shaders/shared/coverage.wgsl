@@ -1,4 +1,4 @@
-// Which rectangles of pixels the visible part of a splat, the ellipse with alpha >= ALPHA_MIN, touches: exactly.
+// Which rectangles of pixels the visible part of a splat, the ellipse with alpha >= alpha_min, touches: exactly.
 #import shared/splat
 #import shared/falloff
 

@@ -1,61 +1,62 @@
-// A Gaussian as it lies in memory: three words of 16 bytes. Loaded as integers, because only integer bits can tell a
-// NaN or an infinity: WGSL lets compilers assume that floating-point maths never meets one.
+// A Gaussian as it lies in memory: 32 bytes. Loaded as integers, because only integer bits can tell a NaN or an infinity:
+// WGSL lets compilers assume that floating-point maths never meets one.
 struct PackedGaussian {
-  // x, y, z (float32, page-local), opacity (float32, linear)
-  position_opacity: vec4u,
-  // quaternion w, x, y, z (float32, local axes to world)
-  rotation: vec4u,
-  // standard deviations along the local axes (float32, linear), unused
-  scale: vec4u,
+  // x, y, z (float32, page-local); in the upper 22 bits of the last word the upper 22 of a float32, factor xx, and so on
+  // for yx, yy, zx, zy in `tail`. The lower 10 bits of these five words hold, in turn, the upper 22 bits of factor zz and
+  // the upper 28 of the opacity.
+  head: vec4u,
+  tail: vec4u,
 }
 
 struct Gaussian {
   position: vec3f,
   opacity: f32,
-  // w, x, y, z
-  rotation: vec4f,
-  scale: vec3f,
+  // Columns of the lower triangular root L of the covariance, Σ = L Lᵀ: xx, yx, zx; yy, zy; zz.
+  factor_x: vec3f,
+  factor_y: vec2f,
+  factor_z: f32,
 }
 
-const EXPONENT_BITS = vec4u(0x7f800000u);
+const EXPONENT_BITS = 0x7f800000u;
+const HIGH_22 = 0xfffffc00u;
 // Longest standard deviation of a splat that can be drawn: MIN_LONGEST_SCALE and MAX_SCALE of core.
 const MIN_LONGEST_SCALE = 1e-12;
 const MAX_SCALE = 1e12;
 
+// The float32 words of factor xx, yx, yy, zx and of factor zy, zz and the opacity.
+fn shape_words(g: PackedGaussian) -> array<vec4u, 2> {
+  let own = vec4u(g.head.w, g.tail.xyz) & vec4u(HIGH_22);
+  let last = (g.head.w << 22u) | ((g.tail.x & 0x3ffu) << 12u) | ((g.tail.y & 0x300u) << 2u);
+  let opacity = (g.tail.y << 24u) | ((g.tail.z & 0x3ffu) << 14u) | ((g.tail.w & 0x3ffu) << 4u);
+  return array<vec4u, 2>(own, vec4u(g.tail.w & HIGH_22, last, opacity, 0u));
+}
+
 fn unpack_gaussian(g: PackedGaussian) -> Gaussian {
+  let words = shape_words(g);
+  let own = bitcast<vec4f>(words[0]);
+  let rest = bitcast<vec4f>(words[1]);
   return Gaussian(
-    bitcast<vec3f>(g.position_opacity.xyz),
-    bitcast<f32>(g.position_opacity.w),
-    bitcast<vec4f>(g.rotation),
-    bitcast<vec3f>(g.scale.xyz),
+    bitcast<vec3f>(g.head.xyz),
+    rest.z,
+    vec3f(own.x, own.y, own.w),
+    vec2f(own.z, rest.x),
+    rest.y,
   );
 }
 
 // Four float32 with an exponent other than that of NaN and infinity.
 fn has_finite_bits(words: vec4u) -> bool {
-  let exponents = words & EXPONENT_BITS;
-  return all(exponents != EXPONENT_BITS);
+  let exponents = words & vec4u(EXPONENT_BITS);
+  return all(exponents != vec4u(EXPONENT_BITS));
 }
 
-// True if every attribute is finite, the rotation is not zero and the scale is drawable (isUsable in core).
+// True if every number is finite and the factor is neither nothing nor beyond all bounds.
 fn is_usable(g: PackedGaussian) -> bool {
-  let finite = has_finite_bits(g.position_opacity) && has_finite_bits(g.rotation)
-    && has_finite_bits(vec4u(g.scale.xyz, 0u));
-  let scale = bitcast<vec3f>(g.scale.xyz);
-  let longest = max(scale.x, max(scale.y, scale.z));
-  let rotation = abs(bitcast<vec4f>(g.rotation));
-  let rotates = max(max(rotation.x, rotation.y), max(rotation.z, rotation.w)) > 0.0;
-  return finite && rotates && all(scale >= vec3f(0.0)) && longest >= MIN_LONGEST_SCALE && longest <= MAX_SCALE;
-}
-
-// Rotation matrix of a quaternion (w, x, y, z) that is brought to unit length here.
-fn rotation_matrix(q_any: vec4f) -> mat3x3f {
-  let largest = max(max(abs(q_any.x), abs(q_any.y)), max(abs(q_any.z), abs(q_any.w)));
-  let q = normalize(q_any / largest);
-  let w = q.x; let x = q.y; let y = q.z; let z = q.w;
-  return mat3x3f(
-    1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
-    2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
-    2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y),
-  );
+  let words = shape_words(g);
+  let finite = has_finite_bits(vec4u(g.head.xyz, 0u)) && has_finite_bits(words[0]) && has_finite_bits(words[1]);
+  let own = abs(bitcast<vec4f>(words[0]));
+  let rest = abs(bitcast<vec4f>(words[1]));
+  let largest = max(max(max(own.x, own.y), max(own.z, own.w)), max(rest.x, rest.y));
+  // No number of the factor is longer than the longest axis, and the largest is at least 1/√3 of it.
+  return finite && largest >= 0.5 * MIN_LONGEST_SCALE && largest <= 1.001 * MAX_SCALE;
 }

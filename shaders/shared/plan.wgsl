@@ -20,12 +20,8 @@ struct Plan {
   quad_first_index: u32,
   quad_base_vertex: u32,
   quad_first_instance: u32,
-  // Written by `cull`, cleared before every frame: splats that were refused because a value was not usable, and the bits
-  // of the least (inverted, so that 0 means none) and greatest depth of the visible ones.
-  unusable: atomic<u32>,
-  nearest_inverted: atomic<u32>,
-  farthest: atomic<u32>,
   // For each page: slot of its first survivor, survivors, and dispatch arguments of `project`.
+  // In depth order the survivors of all pages are mixed, and each page is given all of them.
   pages: array<PagePlan>,
 }
 
@@ -35,28 +31,6 @@ struct PagePlan {
   project_x: u32,
   project_y: u32,
   project_z: u32,
-}
-
-// The same for stages that only read it: an atomic needs read-write access.
-struct PlanView {
-  visible: u32,
-  overflow: u32,
-  sort_blocks: u32,
-  sort_x: u32,
-  sort_y: u32,
-  sort_z: u32,
-  visible_x: u32,
-  visible_y: u32,
-  visible_z: u32,
-  quad_indices: u32,
-  quad_instances: u32,
-  quad_first_index: u32,
-  quad_base_vertex: u32,
-  quad_first_instance: u32,
-  unusable: u32,
-  nearest_inverted: u32,
-  farthest: u32,
-  pages: array<PagePlan>,
 }
 
 // Keys of one workgroup of the sort.

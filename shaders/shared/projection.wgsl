@@ -3,28 +3,12 @@
 #import shared/view
 #import shared/gaussian
 #import shared/falloff
+#import shared/ellipse
 
 // Variance in px² that the low-pass filter adds to both screen axes.
 const DILATION = 0.3;
 // Least opacity compensation of an antialiased scene.
 const COMPENSATION_MIN = 0.005;
-
-// The screen Gaussian in the form exp(-(u² + v²) / 2) with u = dx / sigma_x, v = (dy - slope dx) / sigma_v: the
-// Cholesky factor of its inverse covariance. It stays exact for needles, whose conic loses all digits in float32.
-struct Ellipse {
-  // Pixels.
-  center: vec2f,
-  // Camera z in world units.
-  depth: f32,
-  // Standard deviation along x, in pixels.
-  sigma_x: f32,
-  // dy/dx of the regression line of y on x.
-  slope: f32,
-  // Standard deviation of y about that line, in pixels.
-  sigma_v: f32,
-  // Opacity after compensation.
-  opacity: f32,
-}
 
 fn is_in_depth_range(view: View, depth: f32) -> bool {
   return depth >= view.near && depth <= view.far;
@@ -35,10 +19,14 @@ fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
   let xy = p.xy / p.z;
   let t = clamp(xy, view.jacobian_min, view.jacobian_max);
 
-  // Rows of J · W · R · S, a square root of the screen covariance; its products would lose digits too early.
-  let world_to_camera = mat3x3f(view.local_to_camera[0].xyz, view.local_to_camera[1].xyz, view.local_to_camera[2].xyz);
-  let axes = world_to_camera * rotation_matrix(g.rotation);
-  let a = transpose(mat3x3f(axes[0] * g.scale.x, axes[1] * g.scale.y, axes[2] * g.scale.z));
+  // Rows of J · W · L, a square root of the screen covariance; its products would lose digits too early.
+  let to_camera = mat3x3f(view.local_to_camera[0].xyz, view.local_to_camera[1].xyz, view.local_to_camera[2].xyz);
+  let axes = mat3x3f(
+    to_camera * g.factor_x,
+    to_camera[1] * g.factor_y.x + to_camera[2] * g.factor_y.y,
+    to_camera[2] * g.factor_z,
+  );
+  let a = transpose(axes);
   let row_x = (a[0] - t.x * a[2]) * (view.focal.x / p.z);
   let row_y = (a[1] - t.y * a[2]) * (view.focal.y / p.z);
 
@@ -51,7 +39,7 @@ fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
   let own_variance_v = dot(minors, minors);
   let variance_v = own_variance_v + DILATION * ((xx + DILATION) + yy) / variance_x;
 
-  var opacity = min(g.opacity, 1.0);
+  var opacity = g.opacity;
   if (view.antialiased != 0u) {
     opacity *= max(COMPENSATION_MIN, sqrt(own_variance_v / variance_v));
   }
@@ -77,5 +65,5 @@ fn covers_a_pixel(view: View, e: Ellipse) -> bool {
   let extent = half_extent(e);
   let first = max(ceil(e.center - extent - 0.5), vec2f(0.0));
   let last = min(floor(e.center + extent - 0.5), view.viewport - 1.0);
-  return e.opacity >= ALPHA_MIN && all(first <= last);
+  return e.opacity >= alpha_min && all(first <= last);
 }

@@ -26,7 +26,17 @@ fn sh_basis(quartet: u32, d: vec3f) -> vec4f {
   }
 }
 
-// Number of 8-byte words that hold the coefficients of one splat: four float16 to a word.
-fn sh_stride(degree: u32) -> u32 {
-  return (3u * (degree + 1u) * (degree + 1u) + 3u) / 4u;
+// How coefficients are stored: SH_PRECISION of the renderer's pack/sh.ts.
+const SH_FLOAT16 = 1u;
+
+// Number of 8-byte words that hold the coefficients of one splat.
+fn sh_stride(degree: u32, encoding: u32) -> u32 {
+  if (encoding == SH_FLOAT16) { return (3u * (degree + 1u) * (degree + 1u) + 3u) / 4u; }
+  // 1, 2, 4, 7 for degree 0 to 3.
+  return 1u + degree * (degree + 1u) / 2u;
+}
+
+// Factor of the codes of a band of int8 coefficients.
+fn sh_scale(code: u32) -> f32 {
+  return select(0.0, exp2(f32(code) / 8.0 - 16.0), code != 0u);
 }

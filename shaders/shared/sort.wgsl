@@ -2,8 +2,8 @@
 struct SortPass {
   // Lowest bit of the digit.
   shift: u32,
-  // 1 in the first pass, whose values are the indices of its keys.
-  first: u32,
+  // 1 if the values of this pass are the indices of its keys.
+  makes_indices: u32,
 }
 
 const SORT_THREADS = 256u;

@@ -18,7 +18,14 @@ struct View {
   page: u32,
   first_group: u32,
   sh_degree: u32,
+  // Degree up to which coefficients are used, and how they are stored.
+  sh_cap: u32,
+  sh_encoding: u32,
   antialiased: u32,
   // Bits of a depth key: 32 for those of the float32 depth itself, fewer for a share of the visible range.
   key_bits: u32,
+  // 1 if the survivors are listed in depth order already, so that they need no keys.
+  is_ordered: u32,
+  // Most that the camera's matrix stretches a vector: 1 unless it is more than a rotation and a translation.
+  stretch: f32,
 }

@@ -1,8 +1,10 @@
 /** The compute rasterizer against the oracle. It blends in float32 and stops as the reference does, so it is held tighter. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
+import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
-import { compareWithOracle, describeCloseness } from '../support/compare.js';
+import { renderOracle } from '../oracle/oracle.js';
+import { closeness, compareWithOracle, describeCloseness } from '../support/compare.js';
 import { nodeDevice } from '../support/node-device.js';
 import {
   brightColors,
@@ -15,7 +17,13 @@ import {
 } from '../support/scenes.js';
 
 /** Colours around 4 cost more in a float16 target than those around 1. */
-const LIMITS = { psnr: 69, p999: 0.5 / 255, max: 1 / 255 };
+const LIMITS = { psnr: 69, p999: 0.5 / 255 };
+
+/**
+ * The worst pixel: a splat more or less at its rim, where alpha is 1/255 and float32 decides otherwise than float64, is 1/255 of its
+ * colour, and colours reach 4 in one scene.
+ */
+const worstOf = (scene: string): number => (scene === 'brightColors' ? 4.3 : 1.1) / 255;
 
 for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDiscs, offCentre]) {
   test(`tiles: ${make.name}`, async () => {
@@ -25,25 +33,41 @@ for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDisc
       console.log(describeCloseness(`tiles ${name} ${i}`, close));
       assert.ok(close.psnr >= LIMITS.psnr, `${name}: ${close.psnr} dB`);
       assert.ok(close.p999 <= LIMITS.p999, `${name}: 99.9th percentile ${255 * close.p999}/255`);
-      assert.ok(close.max <= LIMITS.max, `${name}: worst ${255 * close.max}/255`);
+      assert.ok(close.max <= worstOf(name), `${name}: worst ${255 * close.max}/255`);
     }
   });
 }
 
-test('tiles: with more pairs than there is room for, the farthest are left out and nothing else', async () => {
-  // 300 splats over all 255 bins of the image: 76,500 pairs, and room for 65,536. The nearest few hide all others.
-  const cloud = cloudOf(
-    repeat(300, (i) => ({
-      position: [0, 0, 0.01 * i],
-      scale: [40, 40, 0.001],
-      opacity: 0.9,
-      color: [(i % 7) / 7, (i % 5) / 5, (i % 3) / 3],
-    })),
+/** 300 splats over all 255 bins of the image: 76,500 pairs, and room for 65,536. The nearest few hide all others. */
+const crowd = cloudOf(
+  repeat(300, (i) => ({
+    position: [0, 0, 0.01 * i],
+    scale: [40, 40, 0.001],
+    opacity: 0.995,
+    color: [(i % 7) / 7, (i % 5) / 5, (i % 3) / 3],
+  })),
+);
+const crowdCamera = cameraAt([0, 0, -3], [0, 0, 0], { width: 1920, height: 1080 });
+
+test('tiles: over capacity the farthest pairs are left out, the frame says so, and the next one has room', async () => {
+  const device = await nodeDevice();
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(crowd));
+  let told: () => void = () => undefined;
+  const incomplete = new Promise<void>((resolve) => (told = resolve));
+  const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => told() });
+  const request = { gaussians, camera: crowdCamera };
+  const close = closeness(
+    await capture(device, renderer, request),
+    renderOracle(crowd, crowdCamera, { rules: 'gsplat', mode: 'classic' }),
   );
-  const camera = cameraAt([0, 0, -3], [0, 0, 0], { width: 1920, height: 1080 });
-  const close = await compareWithOracle(await nodeDevice(), cloud, camera, 'classic', { rasterizer: 'tiles' });
   console.log(describeCloseness('tiles over capacity', close));
-  assert.ok(close.psnr >= LIMITS.psnr && close.max <= LIMITS.max, `${close.psnr} dB, worst ${255 * close.max}/255`);
+  assert.ok(close.psnr >= LIMITS.psnr && close.max <= worstOf(''), `${close.psnr} dB, worst ${255 * close.max}/255`);
+  const first = await renderer.readStatistics();
+  assert.deepEqual([first.pairs, first.pairOverflow], [65_536, 76_500 - 65_536]);
+  await incomplete;
+  await capture(device, renderer, request);
+  const second = await renderer.readStatistics();
+  assert.deepEqual([second.pairs, second.pairOverflow], [76_500, 0]);
 });
 
 // Dawn keeps Node alive.

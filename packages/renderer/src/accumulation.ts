@@ -1,12 +1,13 @@
 import { TEXTURE_USAGE } from './gpu/kernel.js';
-import type { Accumulation, AccumulationFormat } from './rasterizers/rasterizer.js';
+import type { AccumulationFormat, Surface } from './rasterizers/rasterizer.js';
 
 const BYTES_PER_PIXEL: Record<AccumulationFormat, number> = { rgba16float: 8, rgba32float: 16 };
 
-/** The float texture that splats are blended into, of the size of the image. */
-export class AccumulationTexture implements Accumulation {
+/** The float texture that splats are painted into: colour, and transmittance in the alpha channel. */
+export class AccumulationTexture implements Surface {
   readonly width: number;
   readonly height: number;
+  readonly format: AccumulationFormat;
   readonly view: GPUTextureView;
   readonly byteLength: number;
   readonly #texture: GPUTexture;
@@ -14,6 +15,7 @@ export class AccumulationTexture implements Accumulation {
   constructor(device: GPUDevice, format: AccumulationFormat, width: number, height: number) {
     this.width = width;
     this.height = height;
+    this.format = format;
     this.byteLength = width * height * BYTES_PER_PIXEL[format];
     this.#texture = device.createTexture({
       label: 'gs.rasterize.accumulation',

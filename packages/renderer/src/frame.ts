@@ -1,67 +1,57 @@
+import type { FrameBindings, Stages } from './bindings.js';
+import type { DepthOrder } from './depth-order.js';
 import type { PassTimer } from './gpu/pass-timer.js';
-import type { FramePage } from './page-table.js';
-import type { Accumulation, Rasterizer } from './rasterizers/rasterizer.js';
-import { planOffsets } from './scratch.js';
-import type { CompactStage } from './stages/compact.js';
-import type { ComposeStage } from './stages/compose.js';
-import type { CullStage } from './stages/cull.js';
-import type { PlanStage } from './stages/plan.js';
-import type { ProjectStage } from './stages/project.js';
-import type { ScanStage } from './stages/scan.js';
-import type { SortBindings, SortStage } from './stages/sort.js';
+import type { Scratch } from './scratch.js';
 
-/** The stages of the renderer; each is a shader of the same name. */
-export interface Stages {
-  readonly cull: CullStage;
-  readonly scan: ScanStage;
-  readonly plan: PlanStage;
-  readonly compact: CompactStage;
-  readonly project: ProjectStage;
-  readonly sort: SortStage;
-  readonly compose: ComposeStage;
-}
-
-/** Everything that one frame needs, bound and allocated beforehand. */
+/** What the stages before the rasterizer need, bound and allocated beforehand. */
 export interface Frame {
   readonly stages: Stages;
-  readonly pages: readonly FramePage[];
-  readonly plan: GPUBuffer;
-  readonly scan: GPUBindGroup;
-  readonly makePlan: GPUBindGroup;
-  readonly sort: SortBindings;
-  readonly rasterizer: Rasterizer;
-  readonly accumulation: Accumulation;
-  readonly compose: GPUBindGroup;
-  readonly target: GPUTextureView;
-  readonly targetFormat: GPUTextureFormat;
+  readonly bindings: FrameBindings;
+  readonly scratch: Scratch;
+  /** An order of all splats that serves the camera; without it the visible splats are sorted. */
+  readonly depthOrder?: DepthOrder;
   readonly timer?: PassTimer;
 }
 
-/** Records a frame: project, sort, rasterize, compose. Counts travel in `plan`; nothing comes back to the CPU. */
-export function recordFrame(encoder: GPUCommandEncoder, frame: Frame): void {
-  const { rasterizer, accumulation, stages, compose, target, targetFormat, timer } = frame;
-  timer?.startFrame();
-  project(encoder, frame);
-  sort(encoder, frame);
-  rasterizer.record(encoder, accumulation, timer);
-  stages.compose.record(encoder, compose, target, targetFormat, timer);
+/**
+ * Records what turns Gaussians into projected splats from near to far: cull and project, then sort; or, with an order that
+ * serves, thin that order and project. Counts travel in `plan`; nothing comes back to the CPU.
+ */
+export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): void {
+  const { scratch, bindings, timer } = frame;
+  bindings.reset();
+  encoder.clearBuffer(scratch.gathered);
+  const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
+  cull(pass, frame);
+  if (frame.depthOrder) listInDepthOrder(pass, frame, frame.depthOrder);
+  else listInFileOrder(pass, frame);
+  bindings.pages.forEach(({ project }, page) => frame.stages.project.record(pass, project, scratch.plan, page));
+  pass.end();
+  if (!frame.depthOrder) sort(encoder, frame);
 }
 
-/** Finds the visible splats, lists them in the file's order, and projects those alone. */
-function project(encoder: GPUCommandEncoder, { stages, pages, plan, scan, makePlan, timer }: Frame): void {
-  encoder.clearBuffer(plan, planOffsets.gathered.offset, planOffsets.gathered.size);
-  const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
-  for (const { page, cull } of pages) stages.cull.record(pass, cull, page.count);
-  stages.scan.record(pass, scan);
-  stages.plan.record(pass, makePlan);
-  for (const { page, compact } of pages) stages.compact.record(pass, compact, page.count);
-  pages.forEach(({ project }, i) => stages.project.record(pass, project, plan, i));
-  pass.end();
+/** Finds the visible splats: whole chunks first, then one by one. */
+function cull(pass: GPUComputePassEncoder, { stages, bindings, scratch }: Frame): void {
+  for (const { cullChunks, splatCount } of bindings.pages) stages.cullChunks.record(pass, cullChunks, splatCount);
+  bindings.pages.forEach((page, i) => stages.cull.record(pass, page.cull, scratch.chunkArgs, i));
+}
+
+function listInFileOrder(pass: GPUComputePassEncoder, { stages, bindings, scratch }: Frame): void {
+  stages.scan.record(pass, bindings.scan);
+  stages.plan.record(pass, bindings.plan);
+  bindings.pages.forEach(({ compact }, page) => stages.compact.record(pass, compact, scratch.chunkArgs, page));
+}
+
+function listInDepthOrder(pass: GPUComputePassEncoder, { stages, bindings }: Frame, depthOrder: DepthOrder): void {
+  const { thin, plan } = bindings.thinned(depthOrder);
+  stages.thin.recordCount(pass, thin, depthOrder.length);
+  stages.plan.record(pass, plan);
+  stages.thin.recordWrite(pass, thin, depthOrder.length);
 }
 
 /** Orders the projected splats from near to far, equal depths in the file's order. */
-function sort(encoder: GPUCommandEncoder, { stages, plan, sort: bindings, timer }: Frame): void {
+function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, timer }: Frame): void {
   const pass = encoder.beginComputePass({ label: 'gs.sort', timestampWrites: timer?.timestampWrites('sort') });
-  stages.sort.record(pass, bindings, plan);
+  stages.sort.record(pass, bindings.sort, scratch.plan);
   pass.end();
 }

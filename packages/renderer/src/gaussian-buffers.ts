@@ -2,21 +2,26 @@ import type { ShDegree, Vector3 } from '@gaussian-splat/core';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
-import { GEOMETRY_WORDS, shWords, type PackedGaussians } from './pack.js';
+import { CHUNK_NUMBERS } from './pack/chunks.js';
+import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
+import { shWords, type ShPrecision } from './pack/sh.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
 export interface GaussianPage {
   readonly count: number;
   /** array<PackedGaussian> */
   readonly geometry: GPUBuffer;
-  /** array<vec2u>: float16 spherical harmonics */
+  /** array<vec2u>: spherical harmonics, see pack/sh.ts */
   readonly sh: GPUBuffer;
+  /** array<Chunk>: bounds of each 256 splats */
+  readonly chunks: GPUBuffer;
 }
 
 /** Gaussians on the GPU, ready for any {@link Renderer} of the same device. */
 export class GaussianBuffers {
   readonly count: number;
   readonly shDegree: ShDegree;
+  readonly shPrecision: ShPrecision;
   /** True if the scene was trained with opacity compensation; the renderer follows. */
   readonly antialiased: boolean;
   /** World position, in float64, that the positions on the GPU are relative to. */
@@ -30,6 +35,7 @@ export class GaussianBuffers {
     ({
       count: this.count,
       shDegree: this.shDegree,
+      shPrecision: this.shPrecision,
       antialiased: this.antialiased,
       origin: this.origin,
       droppedCount: this.droppedCount,
@@ -62,26 +68,29 @@ export class GaussianBuffers {
 }
 
 function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemory): GaussianPage[] {
-  const shStride = shWords(packed.shDegree);
+  const shStride = shWords(packed.shDegree, packed.shPrecision);
+  const chunks = new Uint32Array(packed.chunks.buffer, packed.chunks.byteOffset, packed.chunks.length);
   const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination;
   const pages: GaussianPage[] = [];
   for (let first = 0; first < packed.count; first += capacity) {
     const end = Math.min(first + capacity, packed.count);
-    const part = (label: string, words: Uint32Array, stride: number): GPUBuffer =>
-      memory.buffer(label, 4 * stride * (end - first), usage, words.subarray(stride * first, stride * end));
+    const part = (label: string, words: Uint32Array, stride: number, from = first, to = end): GPUBuffer =>
+      memory.buffer(label, 4 * stride * (to - from), usage, words.subarray(stride * from, stride * to));
+    const [firstChunk, endChunk] = [first / constants.CULL_GROUP, Math.ceil(end / constants.CULL_GROUP)];
     pages.push({
       count: end - first,
       geometry: part('gs.gaussians.geometry', packed.geometry, GEOMETRY_WORDS),
       sh: part('gs.gaussians.sh', packed.sh, shStride),
+      chunks: part('gs.gaussians.chunks', chunks, CHUNK_NUMBERS, firstChunk, endChunk),
     });
   }
   return pages;
 }
 
-/** Splats in a page: what the limits allow, in whole workgroups of `cull`. */
+/** Splats in a page: what the limits allow, in whole chunks, of which one dispatch takes a row. */
 function pageCapacity(device: GPUDevice, bytesPerSplat: number): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   const splats = Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / bytesPerSplat);
-  return Math.floor(splats / constants.CULL_GROUP) * constants.CULL_GROUP;
+  return Math.min(Math.floor(splats / constants.CULL_GROUP), constants.MAX_GROUPS_X) * constants.CULL_GROUP;
 }

@@ -4,48 +4,53 @@ import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import type { Scratch } from './scratch.js';
-import { CompactStage } from './stages/compact.js';
-import { cullGroups, CullStage } from './stages/cull.js';
-import { ProjectStage } from './stages/project.js';
+import type { Levers } from './levers.js';
+import { SH_PRECISION } from './pack/sh.js';
+import { cullGroups } from './stages/cull.js';
 import { cameraValues } from './view.js';
-
-/** A page as one frame draws it. */
-export interface FramePage {
-  readonly page: GaussianPage;
-  readonly cull: GPUBindGroup;
-  readonly compact: GPUBindGroup;
-  readonly project: GPUBindGroup;
-}
 
 /** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;
 
-/** The pages that are drawn together, with a `View` uniform and bind groups for each. */
+/** The pages that are drawn together, with a `View` uniform for each. */
 export class PageTable {
-  readonly pages: readonly FramePage[];
+  readonly pages: readonly GaussianPage[];
+  /** First group (chunk) of each page, and behind the last the number of all groups. */
+  readonly firstGroups: Uint32Array;
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
   readonly #uniforms: GPUBuffer;
   readonly #uniformBytes: ArrayBuffer;
   readonly #scenes: readonly GaussianBuffers[];
-  readonly #keyBits: number;
 
-  constructor(device: GPUDevice, scenes: readonly GaussianBuffers[], scratch: Scratch, keyBits: number) {
-    this.#keyBits = keyBits;
+  constructor(device: GPUDevice, scenes: readonly GaussianBuffers[]) {
     this.#device = device;
     this.#scenes = scenes;
     this.#memory = new GpuMemory(device);
-    const pages = scenes.flatMap((scene) => scene.pages);
-    this.#uniformBytes = new ArrayBuffer(VIEW_STRIDE * Math.max(1, pages.length));
+    this.pages = scenes.flatMap((scene) => scene.pages);
+    this.firstGroups = firstGroups(this.pages);
+    this.#uniformBytes = new ArrayBuffer(VIEW_STRIDE * Math.max(1, this.pages.length));
     const { uniform, copyDestination } = BUFFER_USAGE;
     this.#uniforms = this.#memory.buffer('gs.views', this.#uniformBytes.byteLength, uniform | copyDestination);
-    this.pages = bindPages(device, pages, this.#uniforms, scratch);
-    device.queue.writeBuffer(scratch.pageGroups, 0, firstGroups(pages));
+  }
+
+  /** Groups of all pages. */
+  get groups(): number {
+    return this.firstGroups[this.pages.length];
+  }
+
+  /** Splats of all pages. */
+  get splats(): number {
+    return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
 
   get byteLength(): number {
     return this.#memory.byteLength;
+  }
+
+  /** The `View` of a page. */
+  view(page: number): GPUBufferBinding {
+    return { buffer: this.#uniforms, offset: VIEW_STRIDE * page, size: layouts.View.size };
   }
 
   /** True if the table was made for exactly these scenes. */
@@ -54,16 +59,19 @@ export class PageTable {
   }
 
   /** Points every page at a camera, for the commands that are submitted next. */
-  look(camera: Camera): void {
+  look(camera: Camera, { shDegree, depthKeyBits }: Levers, isOrdered: boolean): void {
+    const shared = { sh_cap: shDegree, key_bits: depthKeyBits, is_ordered: isOrdered ? 1 : 0 };
     let page = 0;
-    let firstGroup = 0;
     for (const scene of this.#scenes) {
       const values = cameraValues(camera, scene.origin);
+      const own = {
+        sh_degree: scene.shDegree,
+        sh_encoding: SH_PRECISION[scene.shPrecision],
+        antialiased: scene.antialiased ? 1 : 0,
+      };
       for (const { count } of scene.pages) {
-        const perPage = { splat_count: count, page, first_group: firstGroup, sh_degree: scene.shDegree };
-        const view = { ...values, ...perPage, antialiased: scene.antialiased ? 1 : 0, key_bits: this.#keyBits };
-        writeStruct(layouts.View, view, this.#uniformBytes, VIEW_STRIDE * page);
-        firstGroup += cullGroups(count);
+        const place = { splat_count: count, page, first_group: this.firstGroups[page] };
+        writeStruct(layouts.View, { ...values, ...shared, ...own, ...place }, this.#uniformBytes, VIEW_STRIDE * page);
         page++;
       }
     }
@@ -75,30 +83,8 @@ export class PageTable {
   }
 }
 
-/** First cull group of each page, and behind the last the number of all groups. */
-function firstGroups(pages: readonly GaussianPage[]): Uint32Array<ArrayBuffer> {
+function firstGroups(pages: readonly GaussianPage[]): Uint32Array {
   const first = new Uint32Array(pages.length + 1);
   pages.forEach(({ count }, i) => (first[i + 1] = first[i] + cullGroups(count)));
   return first;
-}
-
-function bindPages(
-  device: GPUDevice,
-  pages: readonly GaussianPage[],
-  uniforms: GPUBuffer,
-  { visibleBits, groupOffsets, plan, splats, keys, order }: Scratch,
-): FramePage[] {
-  const [cull, compact, project] = [new CullStage(device), new CompactStage(device), new ProjectStage(device)];
-  // The sort needs its first order buffer only after `project` has read the survivors from it.
-  const survivors = order[0];
-  return pages.map((page, i) => {
-    const view = { buffer: uniforms, offset: VIEW_STRIDE * i, size: layouts.View.size };
-    const gaussians = page.geometry;
-    return {
-      page,
-      cull: cull.bind({ view, gaussians, visible_bits: visibleBits, group_counts: groupOffsets, plan }),
-      compact: compact.bind({ view, visible_bits: visibleBits, group_offsets: groupOffsets, survivors }),
-      project: project.bind({ view, gaussians, sh: page.sh, survivors, plan, splats, keys: keys[0] }),
-    };
-  });
 }

@@ -1,43 +1,33 @@
-import { GaussianSplatError, validateCamera, type Camera } from '@gaussian-splat/core';
+import { GaussianSplatError, validateCamera, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { AccumulationTexture } from './accumulation.js';
-import { recordFrame, type Stages } from './frame.js';
+import { FrameBindings, makeStages, type Stages } from './bindings.js';
+import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
+import { angleBetween, axisOf, DepthOrder } from './depth-order.js';
+import { recordProjection } from './frame.js';
 import type { GaussianBuffers } from './gaussian-buffers.js';
 import { layouts } from './generated/shaders.js';
-import { BUFFER_USAGE } from './gpu/kernel.js';
-import type { PassTimer } from './gpu/pass-timer.js';
+import { BUFFER_USAGE, TEXTURE_USAGE, type Overrides } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import type { PassTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
+import { leversOf, type Levers, type Quality } from './levers.js';
 import { PageTable } from './page-table.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
-import { TilesRasterizer } from './rasterizers/tiles.js';
-import type { AccumulationFormat, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
-import { Scratch } from './scratch.js';
-import { CompactStage } from './stages/compact.js';
+import type { Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import { maxPairs, TilesRasterizer } from './rasterizers/tiles.js';
+import { maxVisible, Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
-import { cullGroups, CullStage } from './stages/cull.js';
-import { PlanStage } from './stages/plan.js';
-import { ProjectStage } from './stages/project.js';
-import { ScanStage } from './stages/scan.js';
-import { sortedIn, SortStage, type SortBindings } from './stages/sort.js';
+import { sortedIn } from './stages/sort.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 
-export interface RendererOptions {
+/** A quality, and single levers that differ from it. */
+export interface RendererOptions extends Partial<Levers> {
+  /** Default: `default`. */
+  readonly quality?: Quality;
   /**
-   * How splats become pixels: `quads` by the GPU's own rasterizer and blending, `tiles` by compute shaders, front to back
-   * in float32 and with an end where nothing behind can be seen. Default `auto`, which today is always `quads`.
+   * Called when a frame that was drawn lacked splats for want of room in the renderer's buffers. The next frame has the room: draw it.
    */
-  readonly rasterizer?: 'auto' | RasterizerName;
-  /**
-   * Precision in which splats are blended. Default `rgba16float`. `rgba32float` takes twice the memory and bandwidth
-   * and needs the feature `float32-blendable`.
-   */
-  readonly accumulation?: AccumulationFormat;
-  /**
-   * Bits of the keys that splats are sorted by. 32 are those of the float32 depth and sort exactly; fewer are spread over
-   * the logarithm of the visible depths. Default 24, which no image was seen to tell from 32; 16 cost
-   * up to 13 dB on captured scenes (down to 58.9 dB).
-   */
-  readonly depthKeyBits?: 16 | 24 | 32;
+  readonly onIncomplete?: () => void;
 }
 
 /** One image to draw. */
@@ -46,9 +36,10 @@ export interface FrameRequest {
   readonly gaussians: GaussianBuffers | readonly GaussianBuffers[];
   /** Its width and height must be those of the target. */
   readonly camera: Camera;
-  readonly target: GPUTextureView;
-  /** Format of the target: any colour format that WebGPU can render to. */
-  readonly targetFormat: GPUTextureFormat;
+  /** A texture with the usage STORAGE_BINDING saves `tiles` a pass. */
+  readonly target: GPUTexture | GPUTextureView;
+  /** Format of a target that is a view: any colour format that WebGPU can render to. */
+  readonly targetFormat?: GPUTextureFormat;
   /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
   readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
   /** Notes when each pass ran. */
@@ -57,68 +48,71 @@ export interface FrameRequest {
 
 /** What a set of scenes needs on the GPU between the stages. */
 interface Resources {
-  readonly scratch: Scratch;
   readonly table: PageTable;
-  readonly scan: GPUBindGroup;
-  readonly makePlan: GPUBindGroup;
-  readonly sort: SortBindings;
+  readonly scratch: Scratch;
+  readonly bindings: FrameBindings;
+  readonly depthOrder: DepthOrder;
+  readonly monitor: CapacityMonitor;
 }
 
-/** What an image size needs. */
-interface Surface {
-  readonly accumulation: AccumulationTexture;
+/** What an image size needs where the rasterizer cannot write the target. */
+interface Accumulation {
+  readonly texture: AccumulationTexture;
   readonly compose: GPUBindGroup;
 }
 
+/** A target, and whether a compute shader may write it. */
+interface Target extends Surface {
+  readonly isStorable: boolean;
+}
+
 const TRANSPARENT = [0, 0, 0, 0] as const;
-const DEFAULT_KEY_BITS = 24;
+/** Radians under which a camera counts as not having turned. */
+const STILL = 2e-5;
+/** Frames of a turning camera after which the order of all splats, useless meanwhile, is given up. */
+const TURNING_FRAMES = 64;
 
 /**
- * Draws Gaussians into a texture view, on a device of yours.
+ * Draws Gaussians into a texture, on a device of yours.
  *
  * ```ts
  * const renderer = new Renderer(device);
  * const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
- * renderer.render({ gaussians, camera, target: texture.createView(), targetFormat: texture.format });
+ * renderer.render({ gaussians, camera, target: texture });
  * ```
  *
- * Memory is allocated when the scenes or the image size change, never while only the camera moves; nothing is read back.
+ * Memory is allocated when the scenes, the image size or the share of visible splats change, never while only the camera moves; no frame waits
+ * for a read-back. Splats are sorted while the camera turns; a camera that moves without turning sorts nothing.
  */
 export class Renderer {
+  readonly levers: Levers;
   readonly #device: GPUDevice;
-  readonly #format: AccumulationFormat;
-  readonly #keyBits: number;
   readonly #stages: Stages;
+  readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
+  readonly #onIncomplete: () => void;
   readonly #memory: GpuMemory;
-  readonly #uniforms: { readonly scan: GPUBuffer; readonly limits: GPUBuffer; readonly compose: GPUBuffer };
+  readonly #composeUniform: GPUBuffer;
   readonly #composeBytes = new ArrayBuffer(layouts.Compose.size);
+  readonly #views = new WeakMap<GPUTexture, GPUTextureView>();
   #resources: Resources | undefined;
-  #surface: Surface | undefined;
+  #capacity: Capacity | undefined;
+  #accumulation: Accumulation | undefined;
+  #lastAxis: Vector3 | undefined;
+  #turningFrames = 0;
 
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
     this.#device = device;
-    this.#format = options.accumulation ?? 'rgba16float';
-    this.#keyBits = options.depthKeyBits ?? DEFAULT_KEY_BITS;
-    this.#stages = {
-      cull: new CullStage(device),
-      scan: new ScanStage(device),
-      plan: new PlanStage(device),
-      compact: new CompactStage(device),
-      project: new ProjectStage(device),
-      sort: new SortStage(device),
-      compose: new ComposeStage(device),
-    };
-    this.#rasterizer = makeRasterizer(device, options.rasterizer ?? 'auto', this.#format);
+    this.levers = leversOf(options);
+    this.#onIncomplete = options.onIncomplete ?? (() => undefined);
+    const overrides = overridesOf(this.levers);
+    this.#stages = makeStages(device, overrides);
+    this.#compose = new ComposeStage(device);
+    this.#rasterizer = makeRasterizer(device, this.levers, overrides);
     this.#memory = new GpuMemory(device);
-    const uniform = (name: string): GPUBuffer =>
-      this.#memory.buffer(`gs.${name}`, 16, BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination);
-    this.#uniforms = {
-      scan: uniform('scan.uniform'),
-      limits: uniform('plan.limits'),
-      compose: uniform('compose.uniform'),
-    };
+    const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
+    this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
   }
 
   /** Name of the rasterizer in use. */
@@ -128,8 +122,8 @@ export class Renderer {
 
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
-    const { scratch, table } = this.#resources ?? {};
-    const parts = [this.#memory, scratch, table, this.#rasterizer, this.#surface?.accumulation];
+    const { table, scratch, bindings, depthOrder } = this.#resources ?? {};
+    const parts = [this.#memory, table, scratch, bindings, depthOrder, this.#rasterizer, this.#accumulation?.texture];
     return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
@@ -139,91 +133,202 @@ export class Renderer {
    * need a larger buffer than the device allows.
    */
   render(request: FrameRequest): void {
-    const { camera, target, targetFormat, background = TRANSPARENT, timer } = request;
+    const { camera, background = TRANSPARENT, timer } = request;
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
+    const target = this.#targetOf(request);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianBuffers];
-    const { scratch, table, scan, makePlan, sort } = this.#resourcesFor(scenes);
-    const { accumulation, compose } = this.#surfaceOf(camera.width, camera.height);
-    table.look(camera);
-    writeStruct(layouts.Compose, { background }, this.#composeBytes);
-    this.#device.queue.writeBuffer(this.#uniforms.compose, 0, this.#composeBytes);
-
+    const resources = this.#resourcesFor(scenes);
+    const { table, scratch, bindings, depthOrder, monitor } = resources;
+    const drawn = scaled(camera, this.levers.resolutionScale);
+    timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    recordFrame(encoder, {
-      stages: this.#stages,
-      pages: table.pages,
-      plan: scratch.plan,
-      scan,
-      makePlan,
-      sort,
-      rasterizer: this.#rasterizer,
-      accumulation,
-      compose,
-      target,
-      targetFormat,
-      timer,
-    });
+    const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer);
+    table.look(drawn, this.levers, isOrdered);
+    const serving = isOrdered ? depthOrder : undefined;
+    recordProjection(encoder, { stages: this.#stages, bindings, scratch, depthOrder: serving, timer });
+    this.#paint(encoder, target, drawn, isOrdered, background, timer);
+    const isWatched = monitor.record(encoder, scratch.plan, this.#rasterizer.pairPlan);
     this.#device.queue.submit([encoder.finish()]);
+    if (isWatched) monitor.read();
+    // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
+    if (this.levers.sortAngle <= STILL) depthOrder.settle();
   }
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
   async readStatistics(): Promise<FrameStatistics> {
-    if (this.#resources === undefined) return { visible: 0, overflow: 0, unusable: 0 };
-    return readStatistics(this.#device, this.#resources.scratch.plan);
+    if (this.#resources === undefined) return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0 };
+    const { plan, gathered } = this.#resources.scratch;
+    return readStatistics(this.#device, { plan, gathered, pairPlan: this.#rasterizer.pairPlan });
   }
 
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
   destroy(): void {
     this.#releaseResources();
-    this.#surface?.accumulation.destroy();
-    this.#surface = undefined;
+    this.#accumulation?.texture.destroy();
+    this.#accumulation = undefined;
     this.#rasterizer.destroy();
     this.#memory.destroy();
   }
 
+  /**
+   * Sees to an order of all splats where one is of use: for the first frame, and for the first of those between which the camera
+   * does not turn. While it turns, only the visible splats are sorted.
+   * @returns whether the order serves this frame
+   */
+  #prepareOrder(
+    encoder: GPUCommandEncoder,
+    { depthOrder }: Resources,
+    camera: Camera,
+    timer: PassTimer | undefined,
+  ): boolean {
+    const { sortAngle } = this.levers;
+    const axis = axisOf(camera);
+    const turned = this.#lastAxis === undefined ? 0 : angleBetween(this.#lastAxis, axis);
+    this.#lastAxis = axis;
+    if (depthOrder.serves(camera, sortAngle)) {
+      this.#turningFrames = 0;
+      return true;
+    }
+    if (depthOrder.isPossible && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL)) {
+      depthOrder.record(encoder, camera, timer);
+      return true;
+    }
+    if (++this.#turningFrames === TURNING_FRAMES) depthOrder.release();
+    return false;
+  }
+
+  #paint(
+    encoder: GPUCommandEncoder,
+    target: Target,
+    camera: Camera,
+    isOrdered: boolean,
+    background: readonly [number, number, number, number],
+    timer: PassTimer | undefined,
+  ): void {
+    const order = isOrdered ? 'identity' : 'sorted';
+    const isFullSize = camera.width === target.width && camera.height === target.height;
+    if (isFullSize && target.isStorable && this.#rasterizer.finishes(target.format)) {
+      this.#rasterizer.record(encoder, { surface: target, order, background, timer });
+      return;
+    }
+    const { texture, compose } = this.#accumulationOf(camera.width, camera.height);
+    const scale = [camera.width / target.width, camera.height / target.height];
+    writeStruct(layouts.Compose, { background, scale }, this.#composeBytes);
+    this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
+    this.#rasterizer.record(encoder, { surface: texture, order, timer });
+    this.#compose.record(encoder, compose, target.view, target.format, timer);
+  }
+
+  #targetOf({ target, targetFormat, camera }: FrameRequest): Target {
+    const { width, height } = camera;
+    if (!isTexture(target)) {
+      if (targetFormat === undefined) throw missingFormat();
+      return { view: target, format: targetFormat, isStorable: false, width, height };
+    }
+    let view = this.#views.get(target);
+    if (view === undefined) this.#views.set(target, (view = target.createView()));
+    const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;
+    return { view, format: target.format, isStorable, width, height };
+  }
+
   #resourcesFor(scenes: readonly GaussianBuffers[]): Resources {
-    if (this.#resources?.table.holds(scenes)) return this.#resources;
+    const current = this.#resources;
+    if (current?.table.holds(scenes)) {
+      // The monitor has asked for other room.
+      if (current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs) this.#rebind(current.table);
+      return this.#resources!;
+    }
     this.#releaseResources();
-    const pages = scenes.flatMap((scene) => scene.pages);
-    const groups = pages.reduce((sum, { count }) => sum + cullGroups(count), 0);
-    const splats = pages.reduce((sum, { count }) => sum + count, 0);
-    const scratch = new Scratch(this.#device, { splats, groups, pages: pages.length });
-    const { groupOffsets, pageGroups, plan, order, splats: projected } = scratch;
-    const { scan, limits } = this.#uniforms;
-    this.#device.queue.writeBuffer(scan, 0, Uint32Array.of(groups));
-    this.#device.queue.writeBuffer(limits, 0, Uint32Array.of(pages.length, scratch.capacity));
+    const table = new PageTable(this.#device, [...scenes]);
+    this.#capacity = initialCapacity(table.splats, this.#mostFor(table));
+    this.#rebind(table);
+    return this.#resources!;
+  }
+
+  #hasOtherPairs = false;
+
+  #mostFor(table: PageTable): Capacity {
+    return { visible: Math.min(table.splats, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
+  }
+
+  /** Allocates and binds what lies between the stages, for the capacity at hand. */
+  #rebind(table: PageTable): void {
+    const capacity = this.#capacity!;
+    const depthOrder = this.#resources?.depthOrder ?? new DepthOrder(this.#device, table);
+    this.#resources?.scratch.destroy();
+    this.#resources?.bindings.destroy();
+    this.#resources?.monitor.destroy();
+    const pages = table.pages.length;
+    const scratch = new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
+    const { depthKeyBits } = this.levers;
+    const { plan, splats, order, keys } = scratch;
     this.#rasterizer.bind({
       plan,
-      splats: projected,
-      order: order[sortedIn(this.#keyBits)],
-      capacity: scratch.capacity,
+      splats,
+      orders: { sorted: order[sortedIn(depthKeyBits)], identity: keys[0] },
+      capacity: capacity.visible,
+      pairCapacity: capacity.pairs,
+    });
+    this.#hasOtherPairs = false;
+    const monitor = new CapacityMonitor(this.#device, capacity, this.#mostFor(table), (wished, overflowed) => {
+      this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
+      this.#capacity = wished;
+      if (overflowed) this.#onIncomplete();
     });
     this.#resources = {
+      table,
       scratch,
-      table: new PageTable(this.#device, [...scenes], scratch, this.#keyBits),
-      scan: this.#stages.scan.bind({ values: groupOffsets, scan }),
-      makePlan: this.#stages.plan.bind({ limits, group_offsets: groupOffsets, page_groups: pageGroups, plan }),
-      sort: this.#stages.sort.bind(scratch, this.#keyBits),
+      bindings: new FrameBindings(this.#device, this.#stages, table, scratch, depthKeyBits),
+      depthOrder,
+      monitor,
     };
-    return this.#resources;
   }
 
   #releaseResources(): void {
-    this.#resources?.table.destroy();
-    this.#resources?.scratch.destroy();
+    const { table, scratch, bindings, depthOrder, monitor } = this.#resources ?? {};
+    table?.destroy();
+    scratch?.destroy();
+    bindings?.destroy();
+    depthOrder?.release();
+    monitor?.destroy();
     this.#resources = undefined;
+    this.#lastAxis = undefined;
   }
 
-  #surfaceOf(width: number, height: number): Surface {
-    const current = this.#surface;
-    if (current?.accumulation.width === width && current.accumulation.height === height) return current;
-    current?.accumulation.destroy();
-    const accumulation = new AccumulationTexture(this.#device, this.#format, width, height);
-    const compose = this.#stages.compose.bind({ compose: this.#uniforms.compose, accumulated: accumulation.view });
-    this.#surface = { accumulation, compose };
-    return this.#surface;
+  #accumulationOf(width: number, height: number): Accumulation {
+    const current = this.#accumulation;
+    if (current?.texture.width === width && current.texture.height === height) return current;
+    current?.texture.destroy();
+    const texture = new AccumulationTexture(this.#device, this.levers.accumulation, width, height);
+    const compose = this.#compose.bind({ compose: this.#composeUniform, accumulated: texture.view });
+    this.#accumulation = { texture, compose };
+    return this.#accumulation;
   }
+}
+
+const isTexture = (target: GPUTexture | GPUTextureView): target is GPUTexture => 'createView' in target;
+
+function overridesOf({ alphaMin, minContribution, transmittanceMin }: Levers): Overrides {
+  return { alpha_min: alphaMin, min_contribution: minContribution, transmittance_min: transmittanceMin };
+}
+
+/** The same view with fewer pixels. */
+function scaled(camera: Camera, scale: number): Camera {
+  if (scale === 1) return camera;
+  const width = Math.max(1, Math.round(camera.width * scale));
+  const height = Math.max(1, Math.round(camera.height * scale));
+  const [x, y] = [width / camera.width, height / camera.height];
+  return { ...camera, width, height, fx: camera.fx * x, fy: camera.fy * y, cx: camera.cx * x, cy: camera.cy * y };
+}
+
+function missingFormat(): GaussianSplatError {
+  return new GaussianSplatError('argument/value', {
+    where: 'FrameRequest.targetFormat',
+    expected: 'the format of the target, which is a texture view',
+    found: 'undefined',
+    remedy: 'name the format, or give the texture itself',
+  });
 }
 
 function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
@@ -237,13 +342,13 @@ function requireTextureSize(device: GPUDevice, { width, height }: Camera): void 
   });
 }
 
-function makeRasterizer(device: GPUDevice, name: 'auto' | RasterizerName, format: AccumulationFormat): Rasterizer {
-  if (name === 'tiles') return new TilesRasterizer(device, format);
-  requireBlendable(device, format);
-  return new QuadsRasterizer(device, format);
+function makeRasterizer(device: GPUDevice, { rasterizer, accumulation }: Levers, overrides: Overrides): Rasterizer {
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides);
+  requireBlendable(device, accumulation);
+  return new QuadsRasterizer(device, accumulation, overrides);
 }
 
-function requireBlendable(device: GPUDevice, format: AccumulationFormat): void {
+function requireBlendable(device: GPUDevice, format: Levers['accumulation']): void {
   if (format !== 'rgba32float' || device.features.has('float32-blendable')) return;
   throw new GaussianSplatError('unsupported/limits', {
     where: 'RendererOptions.accumulation',

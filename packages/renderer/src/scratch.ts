@@ -4,8 +4,8 @@ import { GpuMemory } from './gpu/memory.js';
 
 /** How much the buffers between the stages must hold. */
 export interface ScratchSize {
-  /** Splats of all pages. */
-  readonly splats: number;
+  /** Splats that may be visible at once. */
+  readonly visible: number;
   /** Cull groups of all pages. */
   readonly groups: number;
   readonly pages: number;
@@ -20,8 +20,6 @@ export const planOffsets = {
   /** One thread a visible splat, 256 to a workgroup. */
   visible: layouts.Plan.fields.visible_x.offset,
   quads: layouts.Plan.fields.quad_indices.offset,
-  /** What `cull` adds up, from `unusable` on. */
-  gathered: { offset: layouts.Plan.fields.unusable.offset, size: PLAN_SIZE - layouts.Plan.fields.unusable.offset },
   project: (page: number): number => PLAN_SIZE + page * PAGE_PLAN_SIZE + pagePlanFields.project_x.offset,
 };
 
@@ -29,13 +27,17 @@ export const planOffsets = {
 export class Scratch {
   /** Splats that may be visible at once. Survivors beyond it are not drawn, and counted in `Plan.overflow`. */
   readonly capacity: number;
+  /** Chunks that may be visible, page by page. */
+  readonly chunkList: GPUBuffer;
+  /** Indirect arguments of `cull` and `compact`, three words a page. */
+  readonly chunkArgs: GPUBuffer;
   /** One bit for each splat. */
   readonly visibleBits: GPUBuffer;
   /** Survivors of each cull group, then their exclusive prefix sums and the total. */
   readonly groupOffsets: GPUBuffer;
+  /** See shaders/shared/gathered.wgsl. */
+  readonly gathered: GPUBuffer;
   readonly plan: GPUBuffer;
-  /** First cull group of each page, and the number of all groups. */
-  readonly pageGroups: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Depth keys; the sort goes back and forth between the two. */
@@ -47,23 +49,22 @@ export class Scratch {
   readonly digitTotals: GPUBuffer;
   readonly #memory: GpuMemory;
 
-  constructor(device: GPUDevice, { splats, groups, pages }: ScratchSize) {
+  constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize) {
     const memory = new GpuMemory(device);
     this.#memory = memory;
     const { storage, copyDestination, copySource, indirect } = BUFFER_USAGE;
-    this.capacity = Math.min(splats, maxVisible(device));
+    this.capacity = visible;
     const buffer = (name: string, bytes: number, usage = storage | copySource | copyDestination): GPUBuffer =>
       memory.buffer(`gs.${name}`, bytes, usage);
     const perSplat = (name: string): GPUBuffer => buffer(name, 4 * this.capacity);
+    const planUsage = storage | indirect | copySource | copyDestination;
     try {
+      this.chunkList = buffer('cull_chunks.chunk_list', 4 * groups);
+      this.chunkArgs = buffer('cull_chunks.args', 12 * pages, planUsage);
       this.visibleBits = buffer('cull.visible_bits', 4 * constants.WORDS_PER_GROUP * groups);
       this.groupOffsets = buffer('scan.group_offsets', 4 * (groups + 1));
-      this.plan = buffer(
-        'plan.plan',
-        PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages),
-        storage | indirect | copySource | copyDestination,
-      );
-      this.pageGroups = buffer('plan.page_groups', 4 * (pages + 1));
+      this.gathered = buffer('cull.gathered', 4 * constants.GATHERED_WORDS);
+      this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages), planUsage);
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
       this.keys = [perSplat('sort.keys_a'), perSplat('sort.keys_b')];
       this.order = [perSplat('sort.order_a'), perSplat('sort.order_b')];
@@ -88,7 +89,7 @@ export class Scratch {
 }
 
 /** Most projected splats that one storage buffer of the device can hold. */
-function maxVisible(device: GPUDevice): number {
+export function maxVisible(device: GPUDevice): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / layouts.ProjectedSplat.size);
 }

@@ -1,30 +1,49 @@
-import { layouts } from './generated/shaders.js';
+import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 
 /** Counts of one frame. */
 export interface FrameStatistics {
   /** Splats drawn: in front of the camera, opaque enough, and over at least one pixel. */
   readonly visible: number;
-  /** Visible splats that found no room in the renderer's buffers and were left out. */
+  /** Visible splats that found no room in the renderer's buffers and were left out; the next frames have room. */
   readonly overflow: number;
-  /** Splats on the GPU that were refused because a value was not usable. */
+  /** Pairs of splat and bin that tiles painted; 0 with quads. */
+  readonly pairs: number;
+  /** Pairs, of the farthest splats, that found no room and were left out; the next frames have room. */
+  readonly pairOverflow: number;
+  /** Splats on the GPU that were refused because a value was not usable, in the chunks that may be visible. */
   readonly unusable: number;
 }
 
-/** Reads the counts out of a `Plan` buffer. */
-export async function readStatistics(device: GPUDevice, plan: GPUBuffer): Promise<FrameStatistics> {
-  const { size, fields } = layouts.Plan;
+/** The buffers that hold the counts. */
+export interface Counters {
+  /** `Plan` of the splats and, with tiles, of the pairs. */
+  readonly plan: GPUBuffer;
+  readonly pairPlan?: GPUBuffer;
+  /** See shaders/shared/gathered.wgsl. */
+  readonly gathered: GPUBuffer;
+}
+
+/** Reads the counts back. */
+export async function readStatistics(device: GPUDevice, counters: Counters): Promise<FrameStatistics> {
+  const { visible, overflow } = layouts.Plan.fields;
+  const sources: [GPUBuffer | undefined, number][] = [
+    [counters.plan, visible.offset],
+    [counters.plan, overflow.offset],
+    [counters.pairPlan, visible.offset],
+    [counters.pairPlan, overflow.offset],
+    [counters.gathered, 4 * constants.UNUSABLE],
+  ];
   const staging = device.createBuffer({
     label: 'gs.statistics',
-    size,
+    size: 4 * sources.length,
     usage: BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination,
   });
   const encoder = device.createCommandEncoder();
-  encoder.copyBufferToBuffer(plan, 0, staging, 0, size);
+  sources.forEach(([buffer, offset], i) => buffer && encoder.copyBufferToBuffer(buffer, offset, staging, 4 * i, 4));
   device.queue.submit([encoder.finish()]);
   await staging.mapAsync(0x1);
   const words = new Uint32Array(staging.getMappedRange().slice(0));
   staging.destroy();
-  const read = (name: 'visible' | 'overflow' | 'unusable'): number => words[fields[name].offset / 4];
-  return { visible: read('visible'), overflow: read('overflow'), unusable: read('unusable') };
+  return { visible: words[0], overflow: words[1], pairs: words[2], pairOverflow: words[3], unusable: words[4] };
 }

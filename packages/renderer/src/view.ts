@@ -10,7 +10,15 @@ type ViewValues = StructValues<typeof layouts.View>;
 /** The fields of the WGSL `View` that depend on the camera and on the origin of the Gaussians. */
 export type CameraValues = Omit<
   ViewValues,
-  'splat_count' | 'page' | 'first_group' | 'sh_degree' | 'antialiased' | 'key_bits'
+  | 'splat_count'
+  | 'page'
+  | 'first_group'
+  | 'sh_degree'
+  | 'sh_cap'
+  | 'sh_encoding'
+  | 'antialiased'
+  | 'key_bits'
+  | 'is_ordered'
 >;
 
 /**
@@ -35,5 +43,16 @@ export function cameraValues(camera: Camera, origin: Vector3): CameraValues {
     jacobian_max: [(width - cx) / fx + marginX, (height - cy) / fy + marginY],
     near,
     far,
+    stretch: stretchOf(worldToCamera),
   };
+}
+
+/** A bound of how much longer the matrix can make a vector: the square root of the largest row sum of |W Wᵀ|. */
+function stretchOf(worldToCamera: ArrayLike<number>): number {
+  const dot = (a: number, b: number): number =>
+    worldToCamera[4 * a] * worldToCamera[4 * b] +
+    worldToCamera[4 * a + 1] * worldToCamera[4 * b + 1] +
+    worldToCamera[4 * a + 2] * worldToCamera[4 * b + 2];
+  const rowSum = (a: number): number => Math.abs(dot(a, 0)) + Math.abs(dot(a, 1)) + Math.abs(dot(a, 2));
+  return Math.sqrt(Math.max(rowSum(0), rowSum(1), rowSum(2)));
 }

@@ -26,9 +26,11 @@ function flagsToBits(pages: readonly boolean[][]): {
   return { bits, offsets, firstGroups };
 }
 
-/** The twin: indices within their page of the flagged splats, in order. */
-const survivorsTwin = (pages: readonly boolean[][]): number[] =>
-  pages.flatMap((flags) => flags.flatMap((flag, i) => (flag ? [i] : [])));
+/** The twin: numbers of the flagged splats, pages counted as whole chunks, in order. */
+function survivorsTwin(pages: readonly boolean[][]): number[] {
+  const { firstGroups } = flagsToBits(pages);
+  return pages.flatMap((flags, p) => flags.flatMap((flag, i) => (flag ? [firstGroups[p] * CULL_GROUP + i] : [])));
+}
 
 /** Lists the survivors of pages of the given sizes whose bits and offsets are known. */
 async function compactBits(
@@ -42,13 +44,24 @@ async function compactBits(
   const [bitBuffer, offsetBuffer] = [bench.buffer(bits), bench.buffer(offsets)];
   counts.forEach((count, page) => {
     const bytes = new ArrayBuffer(layouts.View.size);
-    const zeros = { local_to_camera: new Array(16).fill(0), eye: [0, 0, 0], focal: [1, 1], principal: [0, 0] };
-    const rest = { viewport: [1, 1], jacobian_min: [0, 0], jacobian_max: [0, 0], near: 1, far: 2, sh_degree: 0 };
-    const place = { splat_count: count, page, first_group: firstGroups[page], antialiased: 0, key_bits: 32 };
-    writeStruct(layouts.View, { ...zeros, ...rest, ...place }, bytes);
+    const names = Object.keys(layouts.View.fields) as (keyof typeof layouts.View.fields)[];
+    const zeros = Object.fromEntries(names.map((name) => [name, 0])) as Record<(typeof names)[number], number>;
+    const place = { splat_count: count, page, first_group: firstGroups[page] };
+    writeStruct(layouts.View, { ...zeros, ...place }, bytes);
     const view = bench.uniform(...new Uint32Array(bytes));
-    const bindings = stage.bind({ view, visible_bits: bitBuffer, group_offsets: offsetBuffer, survivors });
-    bench.compute((pass) => stage.record(pass, bindings, count));
+    // All chunks of the page, listed backwards: their order must not matter.
+    const groups = cullGroups(count);
+    const list = new Uint32Array(firstGroups[page] + groups);
+    for (let chunk = 0; chunk < groups; chunk++) list[firstGroups[page] + chunk] = groups - 1 - chunk;
+    const args = bench.buffer(Uint32Array.of(...new Array<number>(3 * page).fill(0), groups, 1, 1));
+    const bindings = stage.bind({
+      view,
+      chunk_list: bench.buffer(list),
+      visible_bits: bitBuffer,
+      group_offsets: offsetBuffer,
+      survivors,
+    });
+    bench.compute((pass) => stage.record(pass, bindings, args, page));
   });
   return bench.read(survivors, 4 * capacity);
 }
@@ -72,9 +85,9 @@ async function checkPlan(bench: Bench, pages: readonly boolean[][], capacity: nu
   const plan = bench.buffer(planSize);
   const stage = new PlanStage(bench.device);
   const bindings = stage.bind({
-    limits: bench.uniform(pages.length, capacity),
-    group_offsets: bench.buffer(offsets),
-    page_groups: bench.buffer(firstGroups),
+    limits: bench.uniform(pages.length, capacity, firstGroups[pages.length]),
+    offsets: bench.buffer(offsets),
+    page_ranges: bench.buffer(Uint32Array.from(pages.flatMap((_, p) => [firstGroups[p], firstGroups[p + 1]]))),
     plan,
   });
   bench.compute((pass) => stage.record(pass, bindings));
@@ -120,25 +133,6 @@ export const compactCases: StageCase[] = [
       const pages = [randomFlags(5000, 0.5, 9), randomFlags(3000, 0.5, 10)];
       const capacity = 1024;
       checkEqual(await compactOnGpu(bench, pages, capacity), survivorsTwin(pages).slice(0, capacity), 'survivors');
-    },
-  },
-  {
-    name: 'compact: beyond 65,535 workgroups a second row of them does the rest',
-    run: async (bench) => {
-      const groups = constants.MAX_GROUPS_X + 5;
-      const bits = new Uint32Array(groups * WORDS_PER_GROUP);
-      const offsets = new Uint32Array(groups + 1);
-      // One survivor in each of the groups around the end of the first row, and one at the very end.
-      const chosen = [0, constants.MAX_GROUPS_X - 1, constants.MAX_GROUPS_X, groups - 1];
-      for (const group of chosen) bits[group * WORDS_PER_GROUP + 3] = 1 << 7;
-      for (let g = 0; g < groups; g++) offsets[g + 1] = offsets[g] + (chosen.includes(g) ? 1 : 0);
-      const layout = { bits, offsets, firstGroups: Uint32Array.of(0, groups) };
-      const survivors = await compactBits(bench, layout, [groups * CULL_GROUP], 16);
-      checkEqual(
-        survivors,
-        chosen.map((group) => group * CULL_GROUP + 3 * 32 + 7),
-        'survivors',
-      );
     },
   },
   {

@@ -1,7 +1,14 @@
 import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
+import { orderCases } from './order.js';
 import { projectionCases } from './projection.js';
 import { scanCases } from './scan.js';
 import { sortCases } from './sort.js';
 
-export const stageCases: readonly StageCase[] = [...scanCases, ...projectionCases, ...compactCases, ...sortCases];
+export const stageCases: readonly StageCase[] = [
+  ...scanCases,
+  ...projectionCases,
+  ...compactCases,
+  ...orderCases,
+  ...sortCases,
+];

@@ -35,7 +35,7 @@ async function sortOnGpu(bench: Bench, keys: Uint32Array): Promise<{ keys: Uint3
   const bindings = stage.bind({
     plan,
     keys: keyBuffers,
-    order,
+    values: order,
     digitCounts: bench.buffer(4 * constants.DIGITS * Math.max(1, Math.ceil(keys.length / constants.SORT_BLOCK))),
     digitTotals: bench.buffer(4 * constants.DIGITS),
   });

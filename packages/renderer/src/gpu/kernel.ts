@@ -69,17 +69,20 @@ function asBindingResource(resource: Resource): GPUBindingResource {
   return 'mapState' in resource ? { buffer: resource } : resource;
 }
 
+/** Values for `override`s of a shader, by their names there. */
+export type Overrides = Readonly<Record<string, number>>;
+
 /** A compute shader ready to be dispatched. Its entry point is `main`. */
 export class ComputeKernel<S extends ShaderDescription> {
   readonly #program: ShaderProgram<S>;
   readonly #pipeline: GPUComputePipeline;
 
-  constructor(device: GPUDevice, shader: S) {
+  constructor(device: GPUDevice, shader: S, overrides: Overrides = {}) {
     this.#program = new ShaderProgram(device, shader, SHADER_STAGE.compute);
     this.#pipeline = device.createComputePipeline({
       label: `gs.${shader.name}`,
       layout: this.#program.pipelineLayout,
-      compute: { module: this.#program.module, entryPoint: 'main' },
+      compute: { module: this.#program.module, entryPoint: 'main', constants: overrides },
     });
   }
 
@@ -99,7 +102,7 @@ export class ComputeKernel<S extends ShaderDescription> {
     if (groups === 0) return;
     pass.setPipeline(this.#pipeline);
     pass.setBindGroup(0, bindGroup);
-    pass.dispatchWorkgroups(Math.min(groups, MAX_GROUPS), Math.ceil(groups / MAX_GROUPS));
+    pass.dispatchWorkgroups(...dispatchGrid(groups));
   }
 
   dispatchIndirect(pass: GPUComputePassEncoder, bindGroup: GPUBindGroup, buffer: GPUBuffer, offset: number): void {
@@ -111,6 +114,11 @@ export class ComputeKernel<S extends ShaderDescription> {
 
 /** WebGPU's default limit of workgroups in one dimension (`MAX_GROUPS_X` in the shaders). */
 const MAX_GROUPS = 65535;
+
+/** Workgroups across and down for a number of them: `dispatch_grid` of shaders/shared/group.wgsl. */
+export function dispatchGrid(groups: number): [columns: number, rows: number] {
+  return [Math.min(groups, MAX_GROUPS), Math.ceil(groups / MAX_GROUPS)];
+}
 
 /** `GPUShaderStage`, which does not exist where a module is merely imported. */
 export const SHADER_STAGE = { vertex: 1, fragment: 2, compute: 4 } as const;
@@ -142,7 +150,22 @@ export function perDevice<T>(device: GPUDevice, key: string, make: () => T): T {
   return made.get(key) as T;
 }
 
-/** The kernel of a compute shader, made once for a device. */
-export function kernelOf<S extends ShaderDescription>(device: GPUDevice, shader: S): ComputeKernel<S> {
-  return perDevice(device, shader.name, () => new ComputeKernel(device, shader));
+/** The kernel of a compute shader with the given overrides, made once for a device. */
+export function kernelOf<S extends ShaderDescription>(
+  device: GPUDevice,
+  shader: S,
+  overrides: Overrides = {},
+): ComputeKernel<S> {
+  const key = `${shader.name} ${JSON.stringify(overrides)}`;
+  return perDevice(device, key, () => new ComputeKernel(device, shader, overrides));
+}
+
+/**
+ * A shader with a piece of its text replaced, for what WGSL has no way to leave open: the format of a storage texture, the type of an
+ * array's elements.
+ * @param variant tells it from the original among the things made once for a device
+ */
+export function specialise<S extends ShaderDescription>(shader: S, variant: string, from: string, to: string): S {
+  if (!shader.code.includes(from)) throw new Error(`shader ${shader.name} has no "${from}"`);
+  return { ...shader, name: `${shader.name}.${variant}`, code: shader.code.replace(from, to) };
 }

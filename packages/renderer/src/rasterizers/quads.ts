@@ -1,9 +1,8 @@
-import { constants, layouts, rasterizeQuads } from '../generated/shaders.js';
-import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/kernel.js';
-import type { PassTimer } from '../gpu/pass-timer.js';
+import { constants as shaderConstants, layouts, rasterizeQuads } from '../generated/shaders.js';
+import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram, type Overrides } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
-import type { Accumulation, AccumulationFormat, Rasterizer, RasterizerInputs } from './rasterizer.js';
+import type { AccumulationFormat, OrderKind, Painting, Rasterizer, RasterizerInputs } from './rasterizer.js';
 
 type Program = ShaderProgram<typeof rasterizeQuads>;
 
@@ -16,17 +15,19 @@ export class QuadsRasterizer implements Rasterizer {
   readonly #indices: GPUBuffer;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.RasterView.size);
-  #bindings: GPUBindGroup | undefined;
+  #bindings: Readonly<Record<OrderKind, GPUBindGroup>> | undefined;
   #plan: GPUBuffer | undefined;
 
-  constructor(device: GPUDevice, format: AccumulationFormat) {
+  constructor(device: GPUDevice, format: AccumulationFormat, { alpha_min }: Overrides) {
     this.#device = device;
     this.#program = perDevice(
       device,
       'quads',
       () => new ShaderProgram(device, rasterizeQuads, SHADER_STAGE.vertex | SHADER_STAGE.fragment),
     );
-    this.#pipeline = perDevice(device, `quads ${format}`, () => makePipeline(device, this.#program, format));
+    this.#pipeline = perDevice(device, `quads ${format} ${alpha_min}`, () =>
+      makePipeline(device, this.#program, format, { alpha_min }),
+    );
     this.#indices = perDevice(device, 'quads indices', () => makeIndices(device));
     this.#uniform = device.createBuffer({
       label: 'gs.rasterize.view',
@@ -40,12 +41,20 @@ export class QuadsRasterizer implements Rasterizer {
     return this.#uniform.size;
   }
 
-  bind({ plan, splats, order }: RasterizerInputs): void {
-    this.#plan = plan;
-    this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });
+  /** Blending needs a texture that it can read back. */
+  finishes(): boolean {
+    return false;
   }
 
-  record(encoder: GPUCommandEncoder, { view, width, height }: Accumulation, timer?: PassTimer): void {
+  bind({ plan, splats, orders }: RasterizerInputs): void {
+    this.#plan = plan;
+    const bindTo = (order: GPUBuffer): GPUBindGroup =>
+      this.#program.bind({ raster: this.#uniform, plan, splats, order });
+    this.#bindings = { sorted: bindTo(orders.sorted), identity: bindTo(orders.identity) };
+  }
+
+  record(encoder: GPUCommandEncoder, { surface, order, timer }: Painting): void {
+    const { view, width, height } = surface;
     writeStruct(layouts.RasterView, { viewport: [width, height] }, this.#uniformBytes);
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
     const pass = encoder.beginRenderPass({
@@ -54,9 +63,9 @@ export class QuadsRasterizer implements Rasterizer {
       colorAttachments: [{ view, clearValue: { r: 0, g: 0, b: 0, a: 1 }, loadOp: 'clear', storeOp: 'store' }],
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    if (this.#plan !== undefined) {
+    if (this.#plan !== undefined && this.#bindings !== undefined) {
       pass.setPipeline(this.#pipeline);
-      pass.setBindGroup(0, this.#bindings);
+      pass.setBindGroup(0, this.#bindings[order]);
       pass.setIndexBuffer(this.#indices, 'uint16');
       pass.drawIndexedIndirect(this.#plan, planOffsets.quads);
     }
@@ -68,7 +77,12 @@ export class QuadsRasterizer implements Rasterizer {
   }
 }
 
-function makePipeline(device: GPUDevice, program: Program, format: AccumulationFormat): GPURenderPipeline {
+function makePipeline(
+  device: GPUDevice,
+  program: Program,
+  format: AccumulationFormat,
+  constants: Overrides,
+): GPURenderPipeline {
   const { module, pipelineLayout } = program;
   const blend: GPUBlendState = {
     color: { srcFactor: 'one', dstFactor: 'one-minus-src-alpha', operation: 'add' },
@@ -78,18 +92,21 @@ function makePipeline(device: GPUDevice, program: Program, format: AccumulationF
   return device.createRenderPipeline({
     label: `gs.rasterize.quads.${format}`,
     layout: pipelineLayout,
-    vertex: { module, entryPoint: 'vertex' },
-    fragment: { module, entryPoint: 'fragment', targets: [{ format, blend }] },
+    vertex: { module, entryPoint: 'vertex', constants },
+    fragment: { module, entryPoint: 'fragment', targets: [{ format, blend }], constants },
     primitive: { topology: 'triangle-list', cullMode: 'none' },
   });
 }
 
 /** Two triangles for each quad of a batch: corners 0, 1, 2 and 2, 1, 3. */
 function makeIndices(device: GPUDevice): GPUBuffer {
-  const indices = Uint16Array.from({ length: constants.QUAD_BATCH * constants.INDICES_PER_QUAD }, (_, i) => {
-    const quad = Math.floor(i / constants.INDICES_PER_QUAD);
-    return 4 * quad + [0, 1, 2, 2, 1, 3][i % constants.INDICES_PER_QUAD];
-  });
+  const indices = Uint16Array.from(
+    { length: shaderConstants.QUAD_BATCH * shaderConstants.INDICES_PER_QUAD },
+    (_, i) => {
+      const quad = Math.floor(i / shaderConstants.INDICES_PER_QUAD);
+      return 4 * quad + [0, 1, 2, 2, 1, 3][i % shaderConstants.INDICES_PER_QUAD];
+    },
+  );
   const buffer = device.createBuffer({
     label: 'gs.rasterize.indices',
     size: indices.byteLength,

@@ -1,10 +1,13 @@
 import type { PassTimer } from '../gpu/pass-timer.js';
 
-/** Names of the rasterizers that a {@link Renderer} can be asked for. */
+/** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
 
-/** Formats of the accumulation texture. `rgba32float` needs the feature `float32-blendable`. */
+/** Formats of the accumulation texture. Quads blend into `rgba32float` only with the feature `float32-blendable`. */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
+
+/** Buffers that list slots from near to far: after a sort, or when slots are in that order themselves. */
+export type OrderKind = 'sorted' | 'identity';
 
 /** What every rasterizer reads. */
 export interface RasterizerInputs {
@@ -13,17 +16,32 @@ export interface RasterizerInputs {
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
-  readonly order: GPUBuffer;
+  readonly orders: Readonly<Record<OrderKind, GPUBuffer>>;
   /** Most splats that can be visible. */
   readonly capacity: number;
+  /** Pairs of splat and bin for which there shall be room. */
+  readonly pairCapacity: number;
 }
 
-/** Where a rasterizer draws: colour, and transmittance in the alpha channel. */
-export interface Accumulation {
+/** Where a rasterizer draws. */
+export interface Surface {
   readonly view: GPUTextureView;
+  readonly format: GPUTextureFormat;
   /** Pixels. */
   readonly width: number;
   readonly height: number;
+}
+
+/** One frame to draw. */
+export interface Painting {
+  readonly surface: Surface;
+  readonly order: OrderKind;
+  /**
+   * Premultiplied colour to lay the splats over; the surface is then the final image. Without it the surface receives colour, and
+   * transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
+   */
+  readonly background?: readonly [number, number, number, number];
+  readonly timer?: PassTimer;
 }
 
 /**
@@ -34,9 +52,13 @@ export interface Rasterizer {
   readonly name: RasterizerName;
   /** Bytes of GPU memory held. */
   readonly byteLength: number;
+  /** `Plan` of the pairs of splat and bin, where there are pairs. */
+  readonly pairPlan?: GPUBuffer;
+  /** True if the rasterizer can write a final image of this format by itself. */
+  finishes(format: GPUTextureFormat): boolean;
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Records the drawing of one frame. */
-  record(encoder: GPUCommandEncoder, accumulation: Accumulation, timer?: PassTimer): void;
+  record(encoder: GPUCommandEncoder, painting: Painting): void;
   destroy(): void;
 }

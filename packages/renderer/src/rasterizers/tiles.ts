@@ -1,26 +1,23 @@
 import {
   binCount,
   binEmit,
-  binGather,
   binPlan,
+  binRanges,
   constants,
   layouts,
   rasterizeTiles,
   scan,
 } from '../generated/shaders.js';
-import { BUFFER_USAGE, ComputeKernel, kernelOf, perDevice } from '../gpu/kernel.js';
+import { BUFFER_USAGE, ComputeKernel, kernelOf, perDevice, specialise, type Overrides } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
-import type { PassTimer } from '../gpu/pass-timer.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
-import type { Accumulation, AccumulationFormat, Rasterizer, RasterizerInputs } from './rasterizer.js';
+import type { OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
 
 const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, SORT_BLOCK, DIGITS } = constants;
-
-/** Pairs of splat and bin for which there is room, for each splat that may be visible, and at least. */
-const PAIRS_PER_SPLAT = 2;
-const LEAST_PAIRS = 1 << 16;
+/** A slot, and a mask of tiles. */
+const PAIR_BYTES = 8;
 
 /** Bins across and down of an image, and the bits of a bin's number. */
 interface Grid {
@@ -31,31 +28,33 @@ interface Grid {
 
 /** Buffers whose size follows the scene. */
 interface PairBuffers {
-  readonly capacity: number;
   readonly rects: GPUBuffer;
   readonly groupPairs: GPUBuffer;
   readonly plan: GPUBuffer;
   readonly bins: readonly [GPUBuffer, GPUBuffer];
-  readonly places: readonly [GPUBuffer, GPUBuffer];
-  readonly pairs: GPUBuffer;
-  readonly sortedPairs: GPUBuffer;
+  readonly pairs: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
 }
 
-/** Everything that is bound for one scene and one image size. */
-interface Bound {
-  readonly accumulation: Accumulation;
+/** What is bound for one scene and one number of bins. */
+interface GridBindings {
   readonly grid: Grid;
   readonly ranges: GPUBuffer;
-  readonly count: GPUBindGroup;
+  readonly listing: Readonly<Record<OrderKind, { readonly count: GPUBindGroup; readonly emit: GPUBindGroup }>>;
   readonly scan: GPUBindGroup;
   readonly plan: GPUBindGroup;
-  readonly emit: GPUBindGroup;
   readonly sort: SortBindings;
-  readonly gather: GPUBindGroup;
-  readonly rasterize: GPUBindGroup;
+  readonly findRanges: GPUBindGroup;
+  /** By the view of the image. */
+  readonly rasterize: WeakMap<GPUTextureView, GPUBindGroup>;
 }
+
+/** Formats of images that a compute shader may write without an optional feature, and the one that asks for one. */
+const STORABLE: readonly GPUTextureFormat[] = ['rgba8unorm', 'rgba16float', 'rgba32float'];
+const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
+
+const TRANSPARENT = [0, 0, 0, 0] as const;
 
 /**
  * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 128 x 64 pixels: counted,
@@ -67,60 +66,78 @@ interface Bound {
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
   readonly #device: GPUDevice;
+  readonly #overrides: Overrides;
   readonly #memory: GpuMemory;
   readonly #kernels: ReturnType<typeof makeKernels>;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
   readonly #scanLength: GPUBuffer;
+  /** Bound where notes would go; none are taken. */
+  readonly #noNotes: readonly [GPUBuffer, GPUBuffer];
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
-  #bound: Bound | undefined;
+  #bound: GridBindings | undefined;
 
-  constructor(device: GPUDevice, format: AccumulationFormat) {
+  constructor(device: GPUDevice, overrides: Overrides) {
     this.#device = device;
+    this.#overrides = overrides;
     this.#memory = new GpuMemory(device);
-    this.#kernels = perDevice(device, `tiles ${format}`, () => makeKernels(device, format));
-    this.#sort = new SortStage(device);
+    this.#kernels = makeKernels(device, overrides);
+    this.#sort = new SortStage(device, 'pairs');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
     this.#scanLength = this.#memory.buffer('gs.rasterize.scan_length', 16, usage);
+    const nothing = (name: string): GPUBuffer => this.#memory.buffer(`gs.rasterize.${name}`, 4, BUFFER_USAGE.storage);
+    this.#noNotes = [nothing('contributed'), nothing('depths')];
   }
 
   get byteLength(): number {
     return this.#memory.byteLength;
   }
 
-  bind(inputs: RasterizerInputs): void {
-    this.#inputs = inputs;
-    this.#release();
-    this.#buffers = this.#allocate(inputs.capacity);
+  get pairPlan(): GPUBuffer | undefined {
+    return this.#buffers?.plan;
   }
 
-  record(encoder: GPUCommandEncoder, accumulation: Accumulation, timer?: PassTimer): void {
+  finishes(format: GPUTextureFormat): boolean {
+    const needsFeature = format === STORABLE_WITH_FEATURE;
+    return STORABLE.includes(format) || (needsFeature && this.#device.features.has('bgra8unorm-storage'));
+  }
+
+  bind(inputs: RasterizerInputs): void {
+    this.#release();
+    this.#inputs = inputs;
+    this.#buffers = this.#allocate(inputs);
+  }
+
+  record(encoder: GPUCommandEncoder, { surface, order, background, timer }: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const { plan } = this.#inputs;
     const buffers = this.#buffers;
-    const bound = this.#boundTo(accumulation, this.#inputs, buffers);
-    this.#writeView(accumulation, bound.grid, buffers.capacity);
+    const bound = this.#gridFor(surface, this.#inputs, buffers);
+    this.#writeView(surface, bound.grid, this.#inputs.pairCapacity, background ?? TRANSPARENT);
     encoder.clearBuffer(buffers.groupPairs);
     encoder.clearBuffer(bound.ranges);
 
-    const { count, scan: scanKernel, plan: planKernel, emit, gather, rasterize } = this.#kernels;
+    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = this.#kernels;
+    const listing = bound.listing[order];
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
-    count.dispatchIndirect(bin, bound.count, plan, planOffsets.visible);
+    count.dispatchIndirect(bin, listing.count, plan, planOffsets.visible);
     scanKernel.dispatch(bin, bound.scan, 1);
     planKernel.dispatch(bin, bound.plan, 1);
-    emit.dispatchIndirect(bin, bound.emit, plan, planOffsets.visible);
+    emit.dispatchIndirect(bin, listing.emit, plan, planOffsets.visible);
     this.#sort.record(bin, bound.sort, buffers.plan);
-    gather.dispatchIndirect(bin, bound.gather, buffers.plan, planOffsets.visible);
+    findRanges.dispatchIndirect(bin, bound.findRanges, buffers.plan, planOffsets.visible);
     bin.end();
     const paint = encoder.beginComputePass({
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    const { width, height } = accumulation;
-    rasterize.dispatchGrid(paint, bound.rasterize, Math.ceil(width / TILE), Math.ceil(height / TILE));
+    const { format, width, height } = surface;
+    const kernel = rasterizeKernel(this.#device, format, this.#overrides, background !== undefined);
+    const image = this.#imageBindings(kernel, bound, surface.view);
+    kernel.dispatchGrid(paint, image, Math.ceil(width / TILE), Math.ceil(height / TILE));
     paint.end();
   }
 
@@ -129,112 +146,132 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #release(): void {
-    for (const buffer of Object.values(this.#buffers ?? {}).flat()) {
-      if (typeof buffer !== 'number') this.#memory.free(buffer);
-    }
+    for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.#memory.free(buffer as GPUBuffer);
     if (this.#bound) this.#memory.free(this.#bound.ranges);
     this.#buffers = undefined;
     this.#bound = undefined;
   }
 
-  #allocate(splats: number): PairBuffers {
+  #allocate({ capacity, pairCapacity }: RasterizerInputs): PairBuffers {
     const { storage, copyDestination, copySource, indirect } = BUFFER_USAGE;
-    const limit = Math.floor(this.#device.limits.maxStorageBufferBindingSize / layouts.BinPair.size);
-    const capacity = Math.min(limit, Math.max(LEAST_PAIRS, PAIRS_PER_SPLAT * splats));
-    const groups = Math.ceil(splats / PREFIX_THREADS);
+    const groups = Math.ceil(capacity / PREFIX_THREADS);
     const buffer = (name: string, bytes: number): GPUBuffer =>
       this.#memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination | indirect);
-    const pair = (name: string): [GPUBuffer, GPUBuffer] => [
-      buffer(`${name}_a`, 4 * capacity),
-      buffer(`${name}_b`, 4 * capacity),
+    const two = (name: string, bytes: number): [GPUBuffer, GPUBuffer] => [
+      buffer(`${name}_a`, bytes * pairCapacity),
+      buffer(`${name}_b`, bytes * pairCapacity),
     ];
     const groupPairs = buffer('group_pairs', 4 * (groups + 1));
     this.#device.queue.writeBuffer(this.#scanLength, 0, Uint32Array.of(groupPairs.size / 4 - 1));
     return {
-      capacity,
-      rects: buffer('rects', 4 * splats),
+      rects: buffer('rects', 4 * capacity),
       groupPairs,
       plan: buffer('plan', layouts.Plan.size + layouts.PagePlan.size),
-      bins: pair('bins'),
-      places: pair('places'),
-      pairs: buffer('pairs', layouts.BinPair.size * capacity),
-      sortedPairs: buffer('sorted_pairs', layouts.BinPair.size * capacity),
-      digitCounts: buffer('digit_counts', 4 * DIGITS * Math.ceil(capacity / SORT_BLOCK)),
+      bins: two('bins', 4),
+      pairs: two('pairs', PAIR_BYTES),
+      digitCounts: buffer('digit_counts', 4 * DIGITS * Math.ceil(pairCapacity / SORT_BLOCK)),
       digitTotals: buffer('digit_totals', 4 * DIGITS),
     };
   }
 
-  #boundTo(accumulation: Accumulation, inputs: RasterizerInputs, buffers: PairBuffers): Bound {
-    if (this.#bound?.accumulation === accumulation) return this.#bound;
-    if (this.#bound) this.#memory.free(this.#bound.ranges);
-    const columns = Math.ceil(accumulation.width / BIN_WIDTH);
-    const rows = Math.ceil(accumulation.height / BIN_HEIGHT);
+  #gridFor({ width, height }: Surface, inputs: RasterizerInputs, buffers: PairBuffers): GridBindings {
+    const columns = Math.ceil(width / BIN_WIDTH);
+    const rows = Math.ceil(height / BIN_HEIGHT);
+    const current = this.#bound;
+    if (current?.grid.columns === columns && current.grid.rows === rows) return current;
+    if (current) this.#memory.free(current.ranges);
     const bits = Math.ceil(Math.log2(columns * rows));
     const { storage, copyDestination } = BUFFER_USAGE;
     const ranges = this.#memory.buffer('gs.bin.ranges', 8 * columns * rows, storage | copyDestination);
-    this.#bound = {
-      accumulation,
-      grid: { columns, rows, bits },
-      ranges,
-      ...this.#bindings(inputs, buffers, bits, ranges, accumulation),
-    };
+    this.#bound = { grid: { columns, rows, bits }, ranges, ...this.#bindings(inputs, buffers, bits, ranges) };
     return this.#bound;
   }
 
   #bindings(
-    inputs: RasterizerInputs,
-    buffers: PairBuffers,
+    { plan, splats, orders }: RasterizerInputs,
+    { rects, groupPairs, plan: pairPlan, bins, pairs, digitCounts, digitTotals }: PairBuffers,
     bits: number,
     ranges: GPUBuffer,
-    accumulation: Accumulation,
-  ): Omit<Bound, 'accumulation' | 'grid' | 'ranges'> {
-    const { plan, splats, order } = inputs;
-    const { rects, groupPairs, plan: pairPlan, bins, places, pairs, sortedPairs, digitCounts, digitTotals } = buffers;
+  ): Omit<GridBindings, 'grid' | 'ranges'> {
     const view = this.#view;
-    const result = sortedIn(bits);
-    const { count, scan: scanKernel, plan: planKernel, emit, gather, rasterize } = this.#kernels;
+    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = this.#kernels;
+    const listing = (order: GPUBuffer): GridBindings['listing'][OrderKind] => {
+      const shared = { view, plan, splats, order, rects, group_pairs: groupPairs };
+      return { count: count.bind(shared), emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }) };
+    };
     return {
-      count: count.bind({ view, plan, splats, order, rects, group_pairs: groupPairs }),
+      listing: { sorted: listing(orders.sorted), identity: listing(orders.identity) },
       scan: scanKernel.bind({ values: groupPairs, scan: this.#scanLength }),
       plan: planKernel.bind({ view, group_pairs: groupPairs, pair_plan: pairPlan }),
-      emit: emit.bind({ view, plan, splats, order, rects, group_pairs: groupPairs, bins: bins[0], pairs }),
-      sort: this.#sort.bind({ plan: pairPlan, keys: bins, order: places, digitCounts, digitTotals }, bits),
-      gather: gather.bind({
-        pair_plan: pairPlan,
-        bins: bins[result],
-        places: places[result],
-        pairs,
-        sorted_pairs: sortedPairs,
-        ranges,
-      }),
-      rasterize: rasterize.bind({ view, splats, sorted_pairs: sortedPairs, ranges, accumulated: accumulation.view }),
+      sort: this.#sort.bind({ plan: pairPlan, keys: bins, values: pairs, digitCounts, digitTotals }, bits),
+      findRanges: findRanges.bind({ pair_plan: pairPlan, bins: bins[sortedIn(bits)], ranges }),
+      rasterize: new WeakMap(),
     };
   }
 
-  #writeView({ width, height }: Accumulation, { columns, rows }: Grid, capacity: number): void {
-    const values = { viewport: [width, height], bins: [columns, rows], pair_capacity: capacity };
+  #imageBindings(kernel: RasterizeKernel, bound: GridBindings, image: GPUTextureView): GPUBindGroup {
+    const known = bound.rasterize.get(image);
+    if (known) return known;
+    const [contributed, depths] = this.#noNotes;
+    const made = kernel.bind({
+      view: this.#view,
+      splats: this.#inputs!.splats,
+      pairs: this.#buffers!.pairs[sortedIn(bound.grid.bits)],
+      ranges: bound.ranges,
+      image,
+      contributed,
+      depths,
+    });
+    bound.rasterize.set(image, made);
+    return made;
+  }
+
+  #writeView(
+    { width, height }: Surface,
+    { columns, rows }: Grid,
+    pair_capacity: number,
+    background: readonly number[],
+  ): void {
+    const values = { viewport: [width, height], bins: [columns, rows], pair_capacity, background };
     writeStruct(layouts.BinView, values, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
 }
 
-function makeKernels(device: GPUDevice, format: AccumulationFormat) {
+/** Most pairs for which the device's buffers can have room. */
+export function maxPairs(device: GPUDevice): number {
+  const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
+  return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / PAIR_BYTES);
+}
+
+function makeKernels(device: GPUDevice, { alpha_min }: Overrides) {
   return {
-    count: kernelOf(device, binCount),
+    count: kernelOf(device, binCount, { alpha_min }),
     scan: kernelOf(device, scan),
     plan: kernelOf(device, binPlan),
-    emit: kernelOf(device, binEmit),
-    gather: kernelOf(device, binGather),
-    rasterize: new ComputeKernel(device, writingTo(format)),
+    emit: kernelOf(device, binEmit, { alpha_min }),
+    findRanges: kernelOf(device, binRanges),
   };
 }
 
-/** WGSL has no way to leave the format of a storage texture open. */
-function writingTo(format: AccumulationFormat): typeof rasterizeTiles {
-  const { accumulated } = rasterizeTiles.bindings;
-  return {
-    ...rasterizeTiles,
-    bindings: { ...rasterizeTiles.bindings, accumulated: { ...accumulated, format } },
-    code: rasterizeTiles.code.replace(accumulated.format, format),
-  } as unknown as typeof rasterizeTiles;
+type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
+
+function rasterizeKernel(
+  device: GPUDevice,
+  format: GPUTextureFormat,
+  { alpha_min, transmittance_min }: Overrides,
+  isFinal: boolean,
+): RasterizeKernel {
+  const overrides = { alpha_min, transmittance_min, is_final: isFinal ? 1 : 0 };
+  return perDevice(device, `rasterize tiles ${format} ${JSON.stringify(overrides)}`, () => {
+    const { image } = rasterizeTiles.bindings;
+    const writing = specialise(
+      rasterizeTiles,
+      format,
+      `texture_storage_2d<${image.format}`,
+      `texture_storage_2d<${format}`,
+    );
+    const bindings = { ...rasterizeTiles.bindings, image: { ...image, format } };
+    return new ComputeKernel(device, { ...writing, bindings } as unknown as typeof rasterizeTiles, overrides);
+  });
 }

@@ -1,24 +1,42 @@
-import { constants, cull } from '../generated/shaders.js';
-import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
+import { constants, cull, cullChunks } from '../generated/shaders.js';
+import { kernelOf, type ComputeKernel, type Overrides, type Resources } from '../gpu/kernel.js';
 
-/** Which splats of a page paint anything, and how many of each group of 256. */
+/** Which chunks of a page may hold visible splats. */
+export class CullChunksStage {
+  readonly #kernel: ComputeKernel<typeof cullChunks>;
+
+  constructor(device: GPUDevice) {
+    this.#kernel = kernelOf(device, cullChunks);
+  }
+
+  bind(resources: Resources<typeof cullChunks>): GPUBindGroup {
+    return this.#kernel.bind(resources);
+  }
+
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
+    this.#kernel.dispatch(pass, bindings, Math.ceil(cullGroups(splatCount) / constants.CHUNK_THREADS));
+  }
+}
+
+/** Which splats of the listed chunks paint anything, and how many of each group of 256. */
 export class CullStage {
   readonly #kernel: ComputeKernel<typeof cull>;
 
-  constructor(device: GPUDevice) {
-    this.#kernel = kernelOf(device, cull);
+  constructor(device: GPUDevice, overrides: Overrides = {}) {
+    this.#kernel = kernelOf(device, cull, overrides);
   }
 
   bind(resources: Resources<typeof cull>): GPUBindGroup {
     return this.#kernel.bind(resources);
   }
 
-  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
-    this.#kernel.dispatch(pass, bindings, cullGroups(splatCount));
+  /** @param chunkArgs indirect arguments as {@link CullChunksStage} leaves them, three words a page */
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, chunkArgs: GPUBuffer, page: number): void {
+    this.#kernel.dispatchIndirect(pass, bindings, chunkArgs, 12 * page);
   }
 }
 
-/** Workgroups that a page of `splatCount` splats takes. */
+/** Chunks of a page of `splatCount` splats; each is one workgroup of `cull`. */
 export function cullGroups(splatCount: number): number {
   return Math.ceil(splatCount / constants.CULL_GROUP);
 }

@@ -1,5 +1,5 @@
 import { constants, layouts, sortCount, sortScan, sortScatter } from '../generated/shaders.js';
-import { BUFFER_USAGE, kernelOf, perDevice, type ComputeKernel } from '../gpu/kernel.js';
+import { BUFFER_USAGE, kernelOf, perDevice, specialise, type ComputeKernel } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 
@@ -9,8 +9,8 @@ export interface SortBuffers {
   readonly plan: GPUBuffer;
   /** The keys lie in the first. Passes go back and forth between the two: see {@link sortedIn}. */
   readonly keys: readonly [GPUBuffer, GPUBuffer];
-  /** Receives the indices of the keys in ascending and stable order, likewise. */
-  readonly order: readonly [GPUBuffer, GPUBuffer];
+  /** What moves along with the keys, likewise. Indices need not be there at first: the first pass makes them. */
+  readonly values: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
 }
@@ -28,7 +28,10 @@ const MAX_KEY_BITS = 32;
 /** Passes that keys of so many bits take. */
 const passCount = (keyBits: number): number => Math.max(1, Math.ceil(keyBits / DIGIT_BITS));
 
-/** Which of the two key and order buffers holds the result for keys of so many bits: the first (0) or the second (1). */
+/** What moves along with a key: its index, or two words of the caller's. */
+export type SortValues = 'indices' | 'pairs';
+
+/** Which of the two key and value buffers holds the result for keys of so many bits: the first (0) or the second (1). */
 export const sortedIn = (keyBits: number): 0 | 1 => (passCount(keyBits) % 2 === 0 ? 0 : 1);
 
 /**
@@ -41,15 +44,17 @@ export class SortStage {
   readonly #scatter: ComputeKernel<typeof sortScatter>;
   readonly #passUniforms: readonly GPUBuffer[];
 
-  constructor(device: GPUDevice) {
+  constructor(device: GPUDevice, moving: SortValues = 'indices') {
+    const scatter =
+      moving === 'indices' ? sortScatter : specialise(sortScatter, 'pairs', 'alias Value = u32', 'alias Value = vec2u');
     this.#count = kernelOf(device, sortCount);
     this.#scan = kernelOf(device, sortScan);
-    this.#scatter = kernelOf(device, sortScatter);
-    this.#passUniforms = perDevice(device, 'sort passes', () => makePassUniforms(device));
+    this.#scatter = kernelOf(device, scatter);
+    this.#passUniforms = perDevice(device, `sort passes ${moving}`, () => makePassUniforms(device, moving));
   }
 
   /** @param keyBits how many of the lowest bits of a key count; the others must be 0 or are ignored. */
-  bind({ plan, keys, order, digitCounts, digitTotals }: SortBuffers, keyBits = MAX_KEY_BITS): readonly SortPass[] {
+  bind({ plan, keys, values, digitCounts, digitTotals }: SortBuffers, keyBits = MAX_KEY_BITS): readonly SortPass[] {
     return this.#passUniforms.slice(0, passCount(keyBits)).map((uniform, index) => {
       const [from, to] = index % 2 === 0 ? [0, 1] : [1, 0];
       return {
@@ -59,11 +64,11 @@ export class SortStage {
           digit_pass: uniform,
           plan,
           keys_in: keys[from],
-          values_in: order[from],
+          values_in: values[from],
           block_offsets: digitCounts,
           digit_totals: digitTotals,
           keys_out: keys[to],
-          values_out: order[to],
+          values_out: values[to],
         }),
       };
     });
@@ -80,7 +85,7 @@ export class SortStage {
 
 export type SortBindings = ReturnType<SortStage['bind']>;
 
-function makePassUniforms(device: GPUDevice): GPUBuffer[] {
+function makePassUniforms(device: GPUDevice, moving: SortValues): GPUBuffer[] {
   return Array.from({ length: MAX_KEY_BITS / DIGIT_BITS }, (_, index) => {
     const buffer = device.createBuffer({
       label: `gs.sort.pass_${index}`,
@@ -88,7 +93,9 @@ function makePassUniforms(device: GPUDevice): GPUBuffer[] {
       usage: BUFFER_USAGE.uniform,
       mappedAtCreation: true,
     });
-    writeStruct(layouts.SortPass, { shift: index * DIGIT_BITS, first: index === 0 ? 1 : 0 }, buffer.getMappedRange());
+    const makesIndices = index === 0 && moving === 'indices';
+    const values = { shift: index * DIGIT_BITS, makes_indices: makesIndices ? 1 : 0 };
+    writeStruct(layouts.SortPass, values, buffer.getMappedRange());
     buffer.unmap();
     return buffer;
   });

@@ -1,0 +1,161 @@
+import type { DepthOrder } from './depth-order.js';
+import { BUFFER_USAGE, type Overrides } from './gpu/kernel.js';
+import { GpuMemory } from './gpu/memory.js';
+import type { PageTable } from './page-table.js';
+import type { Scratch } from './scratch.js';
+import { CompactStage } from './stages/compact.js';
+import { CullChunksStage, CullStage } from './stages/cull.js';
+import { PlanStage } from './stages/plan.js';
+import { ProjectStage } from './stages/project.js';
+import { ScanStage } from './stages/scan.js';
+import { SortStage } from './stages/sort.js';
+import { thinBlocks, ThinStage } from './stages/thin.js';
+import { constants } from './generated/shaders.js';
+
+/** The stages before the rasterizer; each is a shader of the same name. */
+export interface Stages {
+  readonly cullChunks: CullChunksStage;
+  readonly cull: CullStage;
+  readonly scan: ScanStage;
+  readonly plan: PlanStage;
+  readonly compact: CompactStage;
+  readonly thin: ThinStage;
+  readonly project: ProjectStage;
+  readonly sort: SortStage;
+}
+
+export function makeStages(device: GPUDevice, { alpha_min, min_contribution }: Overrides): Stages {
+  return {
+    cullChunks: new CullChunksStage(device),
+    cull: new CullStage(device, { alpha_min, min_contribution }),
+    scan: new ScanStage(device),
+    plan: new PlanStage(device),
+    compact: new CompactStage(device),
+    thin: new ThinStage(device),
+    project: new ProjectStage(device),
+    sort: new SortStage(device),
+  };
+}
+
+/** Bind groups of one page. */
+interface PageBindings {
+  readonly splatCount: number;
+  readonly cullChunks: GPUBindGroup;
+  readonly cull: GPUBindGroup;
+  readonly compact: GPUBindGroup;
+  readonly project: GPUBindGroup;
+}
+
+/** Everything that the stages before the rasterizer are bound to, for one page table and one capacity. */
+export class FrameBindings {
+  readonly pages: readonly PageBindings[];
+  /** Of the survivors in the file's order. */
+  readonly scan: GPUBindGroup;
+  readonly plan: GPUBindGroup;
+  readonly sort: ReturnType<SortStage['bind']>;
+  readonly #device: GPUDevice;
+  readonly #stages: Stages;
+  readonly #table: PageTable;
+  readonly #scratch: Scratch;
+  readonly #memory: GpuMemory;
+  readonly #ordered: {
+    blockOffsets: GPUBuffer;
+    thin: GPUBuffer;
+    scan: GPUBuffer;
+    limits: GPUBuffer;
+    ranges: GPUBuffer;
+  };
+  #thinned: { order: GPUBuffer; thin: ReturnType<ThinStage['bind']>; plan: GPUBindGroup } | undefined;
+
+  constructor(device: GPUDevice, stages: Stages, table: PageTable, scratch: Scratch, keyBits: number) {
+    this.#device = device;
+    this.#stages = stages;
+    this.#table = table;
+    this.#scratch = scratch;
+    const memory = (this.#memory = new GpuMemory(device));
+    this.pages = bindPages(stages, table, scratch);
+    const { groupOffsets, plan, keys, order, digitCounts, digitTotals } = scratch;
+    const count = table.pages.length;
+    const { storage, uniform } = BUFFER_USAGE;
+    const constant = (name: string, ...words: number[]): GPUBuffer =>
+      memory.buffer(`gs.${name}`, 16, uniform, Uint32Array.from(words));
+    const ranges = (name: string, words: number[]): GPUBuffer =>
+      memory.buffer(`gs.${name}`, 8 * Math.max(1, count), storage, Uint32Array.from(words));
+    const { firstGroups, groups } = table;
+    this.scan = stages.scan.bind({ values: groupOffsets, scan: constant('scan.length', groups) });
+    this.plan = stages.plan.bind({
+      limits: constant('plan.limits', count, scratch.capacity, groups),
+      offsets: groupOffsets,
+      page_ranges: ranges(
+        'plan.page_groups',
+        table.pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]),
+      ),
+      plan,
+    });
+    this.sort = stages.sort.bind({ plan, keys, values: order, digitCounts, digitTotals }, keyBits);
+    const length = constants.CULL_GROUP * table.groups;
+    const blocks = thinBlocks(length);
+    this.#ordered = {
+      blockOffsets: memory.buffer('gs.thin.block_offsets', 4 * (blocks + 1), storage),
+      thin: constant('thin.length', length),
+      scan: constant('thin.blocks', blocks),
+      limits: constant('thin.limits', count, scratch.capacity, blocks),
+      ranges: ranges(
+        'thin.page_ranges',
+        table.pages.flatMap(() => [0, blocks]),
+      ),
+    };
+  }
+
+  get byteLength(): number {
+    return this.#memory.byteLength;
+  }
+
+  /** What thinning an order needs. */
+  thinned(depthOrder: DepthOrder): { thin: ReturnType<ThinStage['bind']>; plan: GPUBindGroup } {
+    const { order } = depthOrder;
+    if (order === undefined) throw new Error('the order must be recorded first');
+    if (this.#thinned?.order === order) return this.#thinned;
+    const { visibleBits, order: buffers, plan } = this.#scratch;
+    const { blockOffsets, thin, scan, limits, ranges } = this.#ordered;
+    this.#thinned = {
+      order,
+      thin: this.#stages.thin.bind({ thin, scan, order, visibleBits, blockOffsets, survivors: buffers[0] }),
+      plan: this.#stages.plan.bind({ limits, offsets: blockOffsets, page_ranges: ranges, plan }),
+    };
+    return this.#thinned;
+  }
+
+  /** Resets what the first stage counts up. */
+  reset(): void {
+    const args = Uint32Array.from({ length: 3 * this.#table.pages.length }, (_, i) => (i % 3 === 0 ? 0 : 1));
+    this.#device.queue.writeBuffer(this.#scratch.chunkArgs, 0, args);
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+  }
+}
+
+function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBindings[] {
+  const { chunkList, chunkArgs, visibleBits, groupOffsets, gathered, plan, splats, keys, order } = scratch;
+  // The sort needs its first order buffer only after `project` has read the survivors from it.
+  const survivors = order[0];
+  return table.pages.map((page, i) => {
+    const view = table.view(i);
+    const gaussians = page.geometry;
+    const chunk = { view, chunk_list: chunkList, visible_bits: visibleBits };
+    return {
+      splatCount: page.count,
+      cullChunks: stages.cullChunks.bind({
+        ...chunk,
+        chunks: page.chunks,
+        chunk_args: chunkArgs,
+        group_counts: groupOffsets,
+      }),
+      cull: stages.cull.bind({ ...chunk, gaussians, group_counts: groupOffsets, gathered }),
+      compact: stages.compact.bind({ ...chunk, group_offsets: groupOffsets, survivors }),
+      project: stages.project.bind({ view, gaussians, sh: page.sh, survivors, plan, gathered, splats, keys: keys[0] }),
+    };
+  });
+}

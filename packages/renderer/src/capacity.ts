@@ -1,0 +1,133 @@
+import { layouts } from './generated/shaders.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
+
+/** For how much the buffers between the stages have room. */
+export interface Capacity {
+  /** Splats that are visible at once. */
+  readonly visible: number;
+  /** Pairs of splat and bin of the tiles. */
+  readonly pairs: number;
+}
+
+/** Scenes up to this size get room for all their splats at once: 64 MB. */
+const SMALL_SCENE = 1_300_000;
+const LEAST_PAIRS = 1 << 16;
+/** More room than was needed. */
+const HEADROOM = 1.25;
+/** Share of the room that must be in use before there is more, or less. */
+const FULL = 0.92;
+const SLACK = 0.6;
+/** Bytes that giving up room must free. */
+const LEAST_SAVING = 32 << 20;
+const BYTES_PER_VISIBLE = 52;
+const BYTES_PER_PAIR = 24;
+/** Frames between two looks once the first frames have been looked at. */
+const INTERVAL = 16;
+/** Looks at nearly empty buffers before they shrink. */
+const PATIENCE = 4;
+
+/** Room to begin with. */
+export function initialCapacity(splats: number, most: Capacity): Capacity {
+  const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
+  return { visible, pairs: Math.min(most.pairs, Math.max(LEAST_PAIRS, Math.ceil(1.5 * visible))) };
+}
+
+/**
+ * Watches how full the buffers are and says when they should be larger or smaller. Counts come back from the GPU a frame or more
+ * later, and nothing waits for them; where there is room for everything that can happen, nothing is read at all.
+ */
+export class CapacityMonitor {
+  readonly #staging: GPUBuffer;
+  readonly #most: Capacity;
+  readonly #onWish: (capacity: Capacity, overflowed: boolean) => void;
+  #capacity: Capacity;
+  #frame = 0;
+  #isReading = false;
+  #isDestroyed = false;
+  #idleLooks = 0;
+  #recent: Capacity = { visible: 0, pairs: 0 };
+
+  /** @param onWish called with the room that the next frame should have */
+  constructor(
+    device: GPUDevice,
+    capacity: Capacity,
+    most: Capacity,
+    onWish: (capacity: Capacity, overflowed: boolean) => void,
+  ) {
+    this.#capacity = capacity;
+    this.#most = most;
+    this.#onWish = onWish;
+    const { mapRead, copyDestination } = BUFFER_USAGE;
+    this.#staging = device.createBuffer({ label: 'gs.capacity', size: 16, usage: mapRead | copyDestination });
+  }
+
+  /** Records the copy of the counts if this frame is one to look at; then {@link read} must follow the submit. */
+  record(encoder: GPUCommandEncoder, plan: GPUBuffer, pairPlan: GPUBuffer | undefined): boolean {
+    const hasRoom = this.#capacity.visible >= this.#most.visible && pairPlan === undefined;
+    this.#frame++;
+    const isDue = this.#frame % INTERVAL === 0 || (this.#frame < INTERVAL && Number.isInteger(Math.log2(this.#frame)));
+    if (hasRoom || !isDue || this.#isReading) return false;
+    const { visible, overflow } = layouts.Plan.fields;
+    if (overflow.offset !== visible.offset + 4) throw new Error('Plan: overflow must follow visible');
+    encoder.copyBufferToBuffer(plan, visible.offset, this.#staging, 0, 8);
+    if (pairPlan) encoder.copyBufferToBuffer(pairPlan, visible.offset, this.#staging, 8, 8);
+    this.#isReading = true;
+    return true;
+  }
+
+  /** Looks at the counts once they are there. */
+  read(): void {
+    void this.#staging.mapAsync(0x1).then(
+      () => {
+        if (this.#isDestroyed) return;
+        const [visible, hidden, pairs, lostPairs] = new Uint32Array(this.#staging.getMappedRange().slice(0));
+        this.#staging.unmap();
+        this.#isReading = false;
+        this.#judge({ visible: visible + hidden, pairs: pairs + lostPairs }, hidden + lostPairs > 0);
+      },
+      // The device is lost, or this monitor was destroyed meanwhile.
+      () => undefined,
+    );
+  }
+
+  destroy(): void {
+    this.#isDestroyed = true;
+    this.#staging.destroy();
+  }
+
+  #judge(used: Capacity, overflowed: boolean): void {
+    const grown = {
+      visible: grow(used.visible, this.#capacity.visible, this.#most.visible),
+      pairs: grow(used.pairs, this.#capacity.pairs, this.#most.pairs),
+    };
+    if (grown.visible > this.#capacity.visible || grown.pairs > this.#capacity.pairs) {
+      this.#wish(grown, overflowed);
+      return;
+    }
+    this.#recent = {
+      visible: Math.max(this.#recent.visible, used.visible),
+      pairs: Math.max(this.#recent.pairs, used.pairs),
+    };
+    if (++this.#idleLooks < PATIENCE) return;
+    const shrunk = {
+      visible: shrink(this.#recent.visible, this.#capacity.visible, 1),
+      pairs: shrink(this.#recent.pairs, this.#capacity.pairs, LEAST_PAIRS),
+    };
+    if (bytesOf(this.#capacity) - bytesOf(shrunk) >= LEAST_SAVING) this.#wish(shrunk, false);
+    this.#idleLooks = 0;
+    this.#recent = { visible: 0, pairs: 0 };
+  }
+
+  #wish(capacity: Capacity, overflowed: boolean): void {
+    this.#capacity = capacity;
+    this.#onWish(capacity, overflowed);
+  }
+}
+
+const grow = (used: number, room: number, most: number): number =>
+  used > FULL * room ? Math.max(room, Math.min(most, Math.ceil(used * HEADROOM))) : room;
+
+const shrink = (used: number, room: number, least: number): number =>
+  used < SLACK * room ? Math.max(least, Math.ceil(used * HEADROOM)) : room;
+
+const bytesOf = ({ visible, pairs }: Capacity): number => BYTES_PER_VISIBLE * visible + BYTES_PER_PAIR * pairs;

@@ -1,0 +1,132 @@
+import { dot, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { constants, layouts } from './generated/shaders.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
+import { GpuMemory } from './gpu/memory.js';
+import type { PassTimer } from './gpu/pass-timer.js';
+import { writeStruct } from './gpu/struct.js';
+import type { PageTable } from './page-table.js';
+import { OrderKeysStage } from './stages/order-keys.js';
+import { SortStage } from './stages/sort.js';
+import { dispatchGrid } from './gpu/kernel.js';
+
+const KEY_BITS = 32;
+const { SORT_BLOCK, DIGITS, CULL_GROUP } = constants;
+
+/**
+ * All splats of a page table from near to far. Depth along the camera's axis changes by the same amount for all splats when the
+ * camera moves without turning, so the order stays right: such frames only thin it to the visible splats.
+ *
+ * A splat's number counts pages as whole chunks; what fills up a page's last chunk stands at the end of the order.
+ */
+export class DepthOrder {
+  /** Splats in the order. */
+  readonly length: number;
+  readonly #device: GPUDevice;
+  readonly #table: PageTable;
+  readonly #keys: OrderKeysStage;
+  readonly #sort: SortStage;
+  readonly #memory: GpuMemory;
+  #order: GPUBuffer | undefined;
+  #axis: Vector3 | undefined;
+  /** Needed while sorting only. */
+  #working: GpuMemory | undefined;
+
+  constructor(device: GPUDevice, table: PageTable) {
+    this.#device = device;
+    this.#table = table;
+    this.#keys = new OrderKeysStage(device);
+    this.#sort = new SortStage(device);
+    this.#memory = new GpuMemory(device);
+    this.length = CULL_GROUP * table.groups;
+  }
+
+  /** False if the device has no buffers large enough. */
+  get isPossible(): boolean {
+    const { maxBufferSize, maxStorageBufferBindingSize } = this.#device.limits;
+    return this.length > 0 && 4 * this.length <= Math.min(maxBufferSize, maxStorageBufferBindingSize);
+  }
+
+  /** The numbers of the splats, from near to far; undefined before the first {@link record} and after {@link release}. */
+  get order(): GPUBuffer | undefined {
+    return this.#order;
+  }
+
+  get byteLength(): number {
+    return this.#memory.byteLength + (this.#working?.byteLength ?? 0);
+  }
+
+  /** True if the order serves a camera, whose axis may have turned by an angle in radians. */
+  serves(camera: Camera, angle: number): boolean {
+    return this.#axis !== undefined && angleBetween(this.#axis, axisOf(camera)) <= angle;
+  }
+
+  /** Records the sorting of all splats for the camera that the table looks through. Call {@link settle} after submitting. */
+  record(encoder: GPUCommandEncoder, camera: Camera, timer?: PassTimer): void {
+    const { storage, copyDestination, indirect } = BUFFER_USAGE;
+    const memory = (this.#working ??= new GpuMemory(this.#device));
+    const buffer = (name: string, bytes: number): GPUBuffer =>
+      memory.buffer(`gs.order.${name}`, bytes, storage | copyDestination | indirect);
+    this.#order ??= this.#memory.buffer('gs.order', 4 * this.length, storage);
+    const blocks = Math.ceil(this.length / SORT_BLOCK);
+    const keys = [buffer('keys_a', 4 * this.length), buffer('keys_b', 4 * this.length)] as const;
+    const plan = buffer('plan', layouts.Plan.size + layouts.PagePlan.size);
+    this.#writePlan(plan, blocks);
+    const bindings = this.#sort.bind(
+      {
+        plan,
+        keys,
+        values: [this.#order, buffer('values_b', 4 * this.length)],
+        digitCounts: buffer('digit_counts', 4 * DIGITS * blocks),
+        digitTotals: buffer('digit_totals', 4 * DIGITS),
+      },
+      KEY_BITS,
+    );
+    const pass = encoder.beginComputePass({ label: 'gs.order', timestampWrites: timer?.timestampWrites('order') });
+    this.#table.pages.forEach(({ geometry, count }, page) => {
+      const view = this.#table.view(page);
+      this.#keys.record(pass, this.#keys.bind({ view, gaussians: geometry, keys: keys[0] }), count);
+    });
+    this.#sort.record(pass, bindings, plan);
+    pass.end();
+    this.#axis = axisOf(camera);
+  }
+
+  /** Frees what only the sorting needed. */
+  settle(): void {
+    this.#working?.destroy();
+    this.#working = undefined;
+  }
+
+  /** Gives the order up. */
+  release(): void {
+    this.settle();
+    this.#memory.destroy();
+    this.#order = undefined;
+    this.#axis = undefined;
+  }
+
+  #writePlan(plan: GPUBuffer, blocks: number): void {
+    const bytes = new ArrayBuffer(layouts.Plan.size);
+    const [sort_x, sort_y] = dispatchGrid(blocks);
+    const zeros = Object.fromEntries(Object.keys(layouts.Plan.fields).map((name) => [name, 0])) as PlanNumbers;
+    const { pages: _, ...fields } = layouts.Plan.fields;
+    const values = { ...zeros, visible: this.length, sort_blocks: blocks, sort_x, sort_y, sort_z: 1 };
+    writeStruct({ size: layouts.Plan.size, fields }, values, bytes);
+    this.#device.queue.writeBuffer(plan, 0, bytes);
+  }
+}
+
+type PlanNumbers = Record<keyof typeof layouts.Plan.fields, number>;
+
+/** Unit vector along which a camera measures depth, in world coordinates. */
+export function axisOf({ worldToCamera }: Camera): Vector3 {
+  const [x, y, z] = [worldToCamera[8], worldToCamera[9], worldToCamera[10]];
+  const length = Math.hypot(x, y, z);
+  return [x / length, y / length, z / length];
+}
+
+/** Angle between two unit vectors, in radians; exact for tiny angles too. */
+export function angleBetween(a: Vector3, b: Vector3): number {
+  const chord = Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+  return dot(a, b) < 0 ? Math.PI : 2 * Math.asin(Math.min(1, chord / 2));
+}

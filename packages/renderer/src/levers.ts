@@ -1,0 +1,97 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
+
+/**
+ * Everything that trades accuracy for speed, one lever each. docs/frontier has what each costs and saves.
+ */
+export interface Levers {
+  /**
+   * How splats become pixels: `quads` by the GPU's own rasterizer and blending, `tiles` by compute shaders, front to back
+   * in float32 and with an end where nothing behind can be seen. `auto`: see {@link Renderer.create}.
+   */
+  readonly rasterizer: 'auto' | RasterizerName;
+  /**
+   * Precision in which quads are blended and images kept. `rgba32float` takes twice the memory and bandwidth, and quads then need the
+   * feature `float32-blendable`.
+   */
+  readonly accumulation: AccumulationFormat;
+  /**
+   * Bits of the keys that splats are sorted by while the camera turns. 32 are those of the float32 depth and sort exactly; fewer
+   * are spread over the logarithm of the visible depths.
+   */
+  readonly depthKeyBits: 16 | 24 | 32;
+  /** Radians that the camera may turn before an order of all splats is made anew. */
+  readonly sortAngle: number;
+  /** Tiles finish a pixel before the splat that would leave it this transmittance or less. */
+  readonly transmittanceMin: number;
+  /** A splat paints a pixel only with at least this alpha. */
+  readonly alphaMin: number;
+  /** Least opacity times area, in px², of a splat that is drawn. */
+  readonly minContribution: number;
+  /** Spherical harmonics above this degree are ignored. */
+  readonly shDegree: 0 | 1 | 2 | 3;
+  /** Share of the target's width and height that is really drawn; the rest is interpolated. Above 0, at most 1. */
+  readonly resolutionScale: number;
+}
+
+/** The levers that leave nothing out: what scenes were trained with. */
+const EXACT: Levers = {
+  rasterizer: 'auto',
+  accumulation: 'rgba16float',
+  depthKeyBits: 24,
+  sortAngle: 2e-5,
+  transmittanceMin: 1e-4,
+  alphaMin: 1 / 255,
+  minContribution: 0,
+  shDegree: 3,
+  resolutionScale: 1,
+};
+
+/** A named mix of levers: see {@link QUALITIES}. */
+export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
+
+/**
+ * What each quality means. The figures are the least PSNR against the float64 reference image that each is held to:
+ * `reference` 75 dB, `default` 59 dB (no error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB.
+ */
+export const QUALITIES: Readonly<Record<Quality, Levers>> = {
+  reference: { ...EXACT, rasterizer: 'tiles', accumulation: 'rgba32float', depthKeyBits: 32, sortAngle: 0 },
+  default: EXACT,
+  balanced: { ...EXACT, transmittanceMin: 1 / 255, alphaMin: 2 / 255, minContribution: 1, depthKeyBits: 16 },
+  fast: { ...EXACT, transmittanceMin: 1 / 64, alphaMin: 3 / 255, minContribution: 3, depthKeyBits: 16 },
+};
+
+const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
+  sortAngle: [0, Math.PI],
+  transmittanceMin: [0, 1],
+  alphaMin: [1 / 255, 1],
+  minContribution: [0, Infinity],
+  shDegree: [0, 3],
+  resolutionScale: [1 / 64, 1],
+};
+
+/**
+ * The levers of a quality, with those that differ from it.
+ * @throws GaussianSplatError `argument/value` for a number out of range or an unknown quality.
+ */
+export function leversOf({ quality = 'default', ...own }: Partial<Levers> & { readonly quality?: Quality }): Levers {
+  if (!Object.hasOwn(QUALITIES, quality)) throw invalid('quality', Object.keys(QUALITIES).join(', '), quality);
+  const base = QUALITIES[quality];
+  const names = Object.keys(base) as (keyof Levers)[];
+  const given = Object.fromEntries(names.filter((name) => own[name] !== undefined).map((name) => [name, own[name]]));
+  const levers = { ...base, ...given };
+  for (const [name, [least, most]] of Object.entries(RANGES) as [keyof Levers, [number, number]][]) {
+    const value = Number(levers[name]);
+    if (!(value >= least && value <= most)) throw invalid(name, `a number from ${least} to ${most}`, levers[name]);
+  }
+  return levers;
+}
+
+function invalid(name: string, expected: string, found: unknown): GaussianSplatError {
+  return new GaussianSplatError('argument/value', {
+    where: `RendererOptions.${name}`,
+    expected,
+    found: String(found),
+    remedy: 'leave the option out for the default, or choose a value in the range',
+  });
+}

@@ -1,0 +1,105 @@
+/**
+ * An order in which neighbours in space are mostly neighbours: along the Z-order curve (Morton 1966), so that blocks of
+ * consecutive splats are compact and can be culled as a whole.
+ */
+
+/** Bits of each axis in a 32-bit code. */
+const AXIS_BITS = [11, 11, 10] as const;
+const SAMPLE = 4096;
+/** Share of splats with the very same coordinate from which a scene counts as made of planes or layers. */
+const FLAT_SHARE = 0.01;
+/** Splats that a scene needs before an order pays. */
+const LEAST_COUNT = 1024;
+
+/**
+ * The given splats along the curve. A scene of planes keeps its order: its splats may have equal depths, and those are blended in the
+ * file's order.
+ * @param positions [3 N] world units
+ * @param kept indices of splats; not changed
+ */
+export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32Array {
+  if (kept.length < LEAST_COUNT) return kept;
+  const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis));
+  if (axes.some(({ largestTie }) => largestTie > FLAT_SHARE)) return kept;
+  const codes = new Uint32Array(kept.length);
+  for (let k = 0; k < kept.length; k++) codes[k] = mortonCode(positions, 3 * kept[k], axes);
+  return sortByCode(kept, codes);
+}
+
+interface Axis {
+  readonly median: number;
+  /** Median distance from the median. */
+  readonly spread: number;
+  /** Share of the sample that has one and the same coordinate. */
+  readonly largestTie: number;
+}
+
+function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
+  const count = Math.min(SAMPLE, kept.length);
+  const sample = Float32Array.from({ length: count }, (_, k) => {
+    const i = kept[Math.floor((k * kept.length) / count)];
+    return positions[3 * i + axis];
+  }).sort();
+  const median = sample[count >> 1];
+  const distances = sample.map((x) => Math.abs(x - median)).sort();
+  let tie = 1;
+  let largestTie = 1;
+  for (let k = 1; k < count; k++) {
+    tie = sample[k] === sample[k - 1] ? tie + 1 : 1;
+    largestTie = Math.max(largestTie, tie);
+  }
+  return { median, spread: distances[count >> 1] || 1, largestTie: largestTie / count };
+}
+
+/**
+ * Coordinates are squeezed by asinh first: nearly linear where most splats are, logarithmic far out, so that a few distant
+ * splats do not take the resolution from all others.
+ */
+function mortonCode(positions: Float32Array, at: number, axes: readonly Axis[]): number {
+  let code = 0;
+  for (let axis = 0; axis < 3; axis++) {
+    const { median, spread } = axes[axis];
+    const steps = 2 ** AXIS_BITS[axis];
+    const squeezed = Math.asinh((positions[at + axis] - median) / (2 * spread)) / 4;
+    const cell = Math.min(steps - 1, Math.max(0, Math.floor((squeezed + 1) * 0.5 * steps)));
+    code |= spreadBits(cell) << axis;
+  }
+  return code >>> 0;
+}
+
+/** The lowest 11 bits of a number, two zeros after each. */
+function spreadBits(cell: number): number {
+  let x = cell & 0x7ff;
+  x = (x | (x << 16)) & 0x070000ff;
+  x = (x | (x << 8)) & 0x0700f00f;
+  x = (x | (x << 4)) & 0x430c30c3;
+  return (x | (x << 2)) & 0x49249249;
+}
+
+interface Coded {
+  readonly values: Uint32Array;
+  readonly codes: Uint32Array;
+}
+
+/** `values` in ascending order of their codes, equal codes in their order: radix sort, 11 bits a pass. */
+function sortByCode(values: Uint32Array, codes: Uint32Array): Uint32Array {
+  const digitBits = 11;
+  const counts = new Uint32Array(2 ** digitBits);
+  let from: Coded = { values, codes };
+  let to: Coded = { values: new Uint32Array(values.length), codes: new Uint32Array(values.length) };
+  let spare: Coded = { values: new Uint32Array(values.length), codes: new Uint32Array(values.length) };
+  for (let shift = 0; shift < 32; shift += digitBits) {
+    counts.fill(0);
+    for (const code of from.codes) counts[(code >>> shift) & (counts.length - 1)]++;
+    let sum = 0;
+    for (let digit = 0; digit < counts.length; digit++) [counts[digit], sum] = [sum, sum + counts[digit]];
+    for (let k = 0; k < values.length; k++) {
+      const place = counts[(from.codes[k] >>> shift) & (counts.length - 1)]++;
+      to.codes[place] = from.codes[k];
+      to.values[place] = from.values[k];
+    }
+    // The caller's own arrays are only read.
+    [from, to, spare] = [to, shift === 0 ? spare : from, spare];
+  }
+  return from.values;
+}

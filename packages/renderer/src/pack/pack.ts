@@ -1,0 +1,112 @@
+import { isUsable, validateCloud, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { constants, layouts } from '../generated/shaders.js';
+import { boundChunks } from './chunks.js';
+import { scaleRotationFactor } from './factor.js';
+import { mortonOrder } from './morton.js';
+import { choosePrecision, packSh, type ShPrecision } from './sh.js';
+
+/** How {@link packGaussians} lays out a cloud. */
+export interface PackOptions {
+  /**
+   * Precision of the spherical harmonics. `int8` keeps eight bits and a scale for each band of each splat, and float16 for the
+   * mean colour; `float16` takes nearly twice the memory. `auto`, the default, is `int8` wherever its rounding, over all splats, stays
+   * 62 dB below white a splat, 75 dB and more in images. docs/decisions/0007 has the figures.
+   */
+  readonly sh?: ShPrecision | 'auto';
+}
+
+/**
+ * A cloud in the exact bytes that the GPU reads. Plain data with transferable buffers, so that a worker can make it.
+ */
+export interface PackedGaussians {
+  readonly count: number;
+  readonly shDegree: ShDegree;
+  readonly shPrecision: ShPrecision;
+  readonly antialiased: boolean;
+  readonly origin: Vector3;
+  readonly droppedCount: number;
+  /** [N, 8] words: `PackedGaussian` of shaders/shared/gaussian.wgsl. */
+  readonly geometry: Uint32Array;
+  /** [N, {@link shWords}] words: see shaders/shared/sh.wgsl. */
+  readonly sh: Uint32Array;
+  /** [ceil(N / 256), 8] numbers: `Chunk` of shaders/cull_chunks.wgsl. */
+  readonly chunks: Float32Array;
+}
+
+/** 32-bit words of one splat's geometry. */
+export const GEOMETRY_WORDS = layouts.PackedGaussian.size / 4;
+
+const { ALPHA_MIN } = constants;
+
+const float = new Float32Array(1);
+const bits = new Uint32Array(float.buffer);
+float[0] = ALPHA_MIN;
+/** The least 28 bits of a float32 that stand for at least 1/255. */
+const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
+
+/**
+ * Packs a cloud for {@link GaussianBuffers.upload}: neighbours in space become neighbours in memory, 32 bytes of geometry a
+ * splat (positions in float32, the covariance's root to 14 significant bits, opacities to 20) and its spherical
+ * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`.
+ * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
+ */
+export function packGaussians(cloud: GaussianCloud, options: PackOptions = {}): PackedGaussians {
+  validateCloud(cloud);
+  const { shDegree, antialiased, origin } = cloud;
+  const kept = mortonOrder(cloud.positions, usableIndices(cloud));
+  const droppedCount = cloud.droppedCount + cloud.count - kept.length;
+  const asked = options.sh ?? 'auto';
+  const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
+  return {
+    ...{ count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount },
+    geometry: packGeometry(cloud, kept),
+    sh: packSh(cloud, kept, shPrecision),
+    chunks: boundChunks(cloud, kept),
+  };
+}
+
+function usableIndices(cloud: GaussianCloud): Uint32Array {
+  const indices = new Uint32Array(cloud.count);
+  let kept = 0;
+  for (let i = 0; i < cloud.count; i++) if (isUsable(cloud, i)) indices[kept++] = i;
+  return indices.subarray(0, kept);
+}
+
+function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Array {
+  const words = new Uint32Array(kept.length * GEOMETRY_WORDS);
+  const floats = new Float32Array(words.buffer);
+  const factor = new Float64Array(6);
+  let at = 0;
+  for (const i of kept) {
+    floats[at] = cloud.positions[3 * i];
+    floats[at + 1] = cloud.positions[3 * i + 1];
+    floats[at + 2] = cloud.positions[3 * i + 2];
+    scaleRotationFactor(cloud, i, factor);
+    packShape(words, at + 3, factor, cloud.opacities[i]);
+    at += GEOMETRY_WORDS;
+  }
+  return words;
+}
+
+/** The highest bits of the float32 of a number, to the nearest; the rest is cut off. */
+function highBits(value: number, count: number): number {
+  float[0] = value;
+  return (bits[0] + (1 << (31 - count))) >>> (32 - count);
+}
+
+/** The 28 highest bits of an opacity, on the same side of 1/255 as the opacity: splats below it are not drawn. */
+function opacityBits(opacity: number): number {
+  const nearest = highBits(Math.min(1, Math.max(0, opacity)), 28);
+  return opacity >= ALPHA_MIN ? Math.max(nearest, FIRST_VISIBLE) : Math.min(nearest, FIRST_VISIBLE - 1);
+}
+
+/** Five words: in the upper 22 bits of each a number of the factor, in the lower 10 a part of the sixth and of the opacity. */
+function packShape(words: Uint32Array, at: number, factor: Float64Array, opacity: number): void {
+  const last = highBits(factor[5], 22);
+  const visible = opacityBits(opacity);
+  words[at] = (highBits(factor[0], 22) << 10) | (last >>> 12);
+  words[at + 1] = (highBits(factor[1], 22) << 10) | ((last >>> 2) & 0x3ff);
+  words[at + 2] = (highBits(factor[2], 22) << 10) | ((last & 3) << 8) | (visible >>> 20);
+  words[at + 3] = (highBits(factor[3], 22) << 10) | ((visible >>> 10) & 0x3ff);
+  words[at + 4] = (highBits(factor[4], 22) << 10) | (visible & 0x3ff);
+}

@@ -1,0 +1,117 @@
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { halfBits } from './half.js';
+
+/** How spherical harmonics are stored: see {@link packSh}. */
+export type ShPrecision = 'int8' | 'float16';
+
+/** The number by which `View.sh_encoding` tells them apart. */
+export const SH_PRECISION: Record<ShPrecision, number> = { int8: 0, float16: 1 };
+
+/** Coefficients, three channels each, of bands 1, 2 and 3. */
+const BAND_SIZES = [3, 5, 7] as const;
+/** Where the scale of each band lies, in bytes from the start of a splat. */
+const SCALE_BYTES = [6, 7, 53] as const;
+const FIRST_CODE_BYTE = 8;
+/** A scale of code k is 2^(k / 8 - 16). */
+const SCALE_STEPS = 8;
+const SCALE_BIAS = 16;
+const MAX_CODE = 255;
+
+/** PSNR of a single splat, rounded as `int8`, that {@link choosePrecision} asks for on average: images then lose no more than 75 dB of noise. */
+const INT8_NOISE_DB = 62;
+/** Splats that are looked at for that. */
+const SAMPLE = 20_000;
+
+/**
+ * `int8` where it is precise enough: coefficients are rounded to within s / 254, s the scale of their band, evenly spread; seen from a
+ * random direction, band b adds up to a variance of (s / 127)² / 12 · (2b + 1) / 4π.
+ */
+export function choosePrecision({ sh, shDegree }: GaussianCloud, kept: Uint32Array): ShPrecision {
+  const numbers = 3 * shCoefficientCount(shDegree);
+  const step = Math.max(1, Math.floor(kept.length / SAMPLE));
+  let variance = 0;
+  let samples = 0;
+  for (let k = 0; k < kept.length; k += step, samples++) {
+    let at = kept[k] * numbers + 3;
+    for (let band = 1; band <= shDegree; band++) {
+      const scale = 2 ** (Math.ceil(SCALE_STEPS * Math.log2(largestOf(sh, at, 3 * (2 * band + 1)))) / SCALE_STEPS);
+      variance += ((scale / 127) ** 2 / 12) * ((2 * band + 1) / (4 * Math.PI));
+      at += 3 * (2 * band + 1);
+    }
+  }
+  return variance / Math.max(1, samples) <= 10 ** (-INT8_NOISE_DB / 10) ? 'int8' : 'float16';
+}
+
+function largestOf(sh: Float32Array, first: number, count: number): number {
+  let largest = 0;
+  for (let k = 0; k < count; k++) largest = Math.max(largest, Math.abs(sh[first + k]));
+  return largest;
+}
+
+/** 32-bit words of one splat's spherical harmonics: 2, 4, 8, 14 as `int8`, 2, 6, 14, 24 as `float16` for degree 0 to 3. */
+export function shWords(degree: ShDegree, precision: ShPrecision): number {
+  if (precision === 'float16') return 2 * Math.ceil((3 * shCoefficientCount(degree)) / 4);
+  return [2, 4, 8, 14][degree];
+}
+
+/**
+ * The coefficients of the splats `kept`, in the order [coefficient][channel], padded to 8 bytes a splat.
+ *
+ * `float16`: all of them. `int8`: the three of degree 0 in float16, then for each band a scale (the largest magnitude of the
+ * band, rounded up to an eighth of an octave) and its coefficients as shares of that scale in 1/127.
+ */
+export function packSh(cloud: GaussianCloud, kept: Uint32Array, precision: ShPrecision): Uint32Array {
+  return precision === 'float16' ? packHalf(cloud, kept) : packInt8(cloud, kept);
+}
+
+function packHalf({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Array {
+  const numbers = 3 * shCoefficientCount(shDegree);
+  const stride = 2 * shWords(shDegree, 'float16');
+  const halves = new Uint16Array(kept.length * stride);
+  let at = 0;
+  for (const i of kept) {
+    for (let k = 0; k < numbers; k++) halves[at + k] = halfBits(sh[i * numbers + k]);
+    at += stride;
+  }
+  return new Uint32Array(halves.buffer);
+}
+
+function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Array {
+  const numbers = 3 * shCoefficientCount(shDegree);
+  const words = new Uint32Array(kept.length * shWords(shDegree, 'int8'));
+  const bytes = new Uint8Array(words.buffer);
+  const halves = new Uint16Array(words.buffer);
+  const stride = 4 * shWords(shDegree, 'int8');
+  const codes = new Uint8Array(3 * BAND_SIZES[2]);
+  let at = 0;
+  for (const i of kept) {
+    for (let channel = 0; channel < 3; channel++) halves[at / 2 + channel] = halfBits(sh[i * numbers + channel]);
+    let first = i * numbers + 3;
+    let code = at + FIRST_CODE_BYTE;
+    for (let band = 0; band < shDegree; band++) {
+      const size = 3 * BAND_SIZES[band];
+      bytes[at + SCALE_BYTES[band]] = packBand(sh, first, size, codes);
+      // Degree 1 has nine codes and room for eight: the last takes the place of the scale of band 2.
+      const behind = Math.min(size, stride - (code - at));
+      bytes.set(codes.subarray(0, behind), code);
+      if (behind < size) bytes[at + SCALE_BYTES[1]] = codes[behind];
+      first += size;
+      code += size;
+    }
+    at += stride;
+  }
+  return words;
+}
+
+/** Makes the codes of the `size` coefficients from `first` on and returns the code of their scale; 0 means all zeros. */
+function packBand(sh: Float32Array, first: number, size: number, codes: Uint8Array): number {
+  const largest = largestOf(sh, first, size);
+  // The small number: a magnitude that is a step itself must not be lifted to the next by a rounding of the logarithm.
+  const steps = largest > 0 ? Math.ceil(SCALE_STEPS * (Math.log2(largest) + SCALE_BIAS) - 1e-6) : 0;
+  const scaleCode = Math.min(MAX_CODE, Math.max(0, steps));
+  const perUnit = scaleCode === 0 ? 0 : 127 / 2 ** (scaleCode / SCALE_STEPS - SCALE_BIAS);
+  for (let k = 0; k < size; k++) {
+    codes[k] = Math.round(Math.min(127, Math.max(-127, sh[first + k] * perUnit)));
+  }
+  return scaleCode;
+}

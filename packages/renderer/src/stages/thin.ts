@@ -1,0 +1,60 @@
+import { constants, thinCount, thinWrite } from '../generated/shaders.js';
+import { kernelOf, type ComputeKernel } from '../gpu/kernel.js';
+import { ScanStage } from './scan.js';
+
+/** What {@link ThinStage} works on. */
+export interface ThinBuffers {
+  /** Uniform: length of the order, a multiple of four. */
+  readonly thin: GPUBuffer;
+  /** Uniform: blocks of the order, see {@link thinBlocks}. */
+  readonly scan: GPUBuffer;
+  /** Numbers of splats. */
+  readonly order: GPUBuffer;
+  /** One bit for each splat. */
+  readonly visibleBits: GPUBuffer;
+  /** Receives, for each block of the order, how many visible splats come before it, and behind the last how many there are. */
+  readonly blockOffsets: GPUBuffer;
+  /** Receives the numbers of the visible splats, in the order. */
+  readonly survivors: GPUBuffer;
+}
+
+interface ThinBindings {
+  readonly count: GPUBindGroup;
+  readonly scan: GPUBindGroup;
+  readonly write: GPUBindGroup;
+}
+
+/** Thins an order of all splats to the visible ones. */
+export class ThinStage {
+  readonly #count: ComputeKernel<typeof thinCount>;
+  readonly #scan: ScanStage;
+  readonly #write: ComputeKernel<typeof thinWrite>;
+
+  constructor(device: GPUDevice) {
+    this.#count = kernelOf(device, thinCount);
+    this.#scan = new ScanStage(device);
+    this.#write = kernelOf(device, thinWrite);
+  }
+
+  bind({ thin, scan, order, visibleBits, blockOffsets, survivors }: ThinBuffers): ThinBindings {
+    return {
+      count: this.#count.bind({ thin, order, visible_bits: visibleBits, block_counts: blockOffsets }),
+      scan: this.#scan.bind({ values: blockOffsets, scan }),
+      write: this.#write.bind({ thin, order, visible_bits: visibleBits, block_offsets: blockOffsets, survivors }),
+    };
+  }
+
+  recordCount(pass: GPUComputePassEncoder, bindings: ThinBindings, length: number): void {
+    this.#count.dispatch(pass, bindings.count, thinBlocks(length));
+    this.#scan.record(pass, bindings.scan);
+  }
+
+  recordWrite(pass: GPUComputePassEncoder, bindings: ThinBindings, length: number): void {
+    this.#write.dispatch(pass, bindings.write, thinBlocks(length));
+  }
+}
+
+/** Blocks that an order of so many splats is thinned in. */
+export function thinBlocks(length: number): number {
+  return Math.ceil(length / constants.THIN_BLOCK);
+}

@@ -1,0 +1,106 @@
+/** A camera that moves without turning: the order of depths stays, so nothing is sorted, and the image is still exact. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import type { Camera } from '@gaussian-splat/core';
+import { capture, GaussianBuffers, packGaussians, Renderer, type RendererOptions } from '@gaussian-splat/renderer';
+import { renderOracle } from '../oracle/oracle.js';
+import { closeness, describeCloseness } from '../support/compare.js';
+import { nodeDevice } from '../support/node-device.js';
+import { notePasses } from '../support/passes.js';
+import { offCentre, room } from '../support/scenes.js';
+
+/** The camera moved along its own axes (right, down, forward) and then turned to the right by an angle in radians. */
+function moved({ worldToCamera: m, ...camera }: Camera, [x, y, z]: readonly number[], angle = 0): Camera {
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  const rows = [0, 1, 2, 3].map((k) =>
+    [m[k], m[4 + k], m[8 + k]].map((v, axis) => v - (k === 3 ? [x, y, z][axis] : 0)),
+  );
+  const turned = rows.map(([a, b, d]) => [c * a - s * d, b, s * a + c * d]);
+  return { ...camera, worldToCamera: [0, 1, 2].flatMap((r) => turned.map((v) => v[r])).concat(0, 0, 0, 1) };
+}
+
+const steps = [
+  [0, 0, 0],
+  [0.4, 0, 0],
+  [0.4, -0.3, 0.5],
+  [-0.6, 0.2, 1.2],
+  [0.1, 0.1, -2],
+];
+
+for (const make of [room, offCentre]) {
+  for (const rasterizer of ['quads', 'tiles'] as const) {
+    test(`${make.name}, ${rasterizer}: no sort while the camera only moves, and the image is that of the oracle`, async () => {
+      const device = await nodeDevice();
+      const { cloud, cameras } = make();
+      const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+      const renderer = new Renderer(device, { rasterizer });
+      for (const [i, step] of steps.entries()) {
+        const camera = moved(
+          { ...cameras[0], fx: cameras[0].fx * (1 + 0.1 * i), fy: cameras[0].fy * (1 + 0.1 * i) },
+          step,
+        );
+        const passes = notePasses(device);
+        const pixels = await capture(device, renderer, { gaussians, camera });
+        passes.stop();
+        const sorting = passes.labels.filter((label) => label === 'gs.sort' || label === 'gs.order');
+        assert.deepEqual(sorting, i === 0 ? ['gs.order'] : [], `frame ${i}`);
+        const close = closeness(pixels, renderOracle(cloud, camera, { rules: 'gsplat', mode: 'classic' }));
+        console.log(describeCloseness(`${make.name} ${rasterizer}, moved ${step.join(' ')}`, close));
+        assert.ok(close.psnr >= 59, `${close.psnr} dB`);
+      }
+      renderer.destroy();
+      gaussians.destroy();
+    });
+  }
+}
+
+/** Labels of the sorting passes of frames with the given turns, in radians. */
+async function sortingPasses(options: RendererOptions, angles: readonly number[]): Promise<string[]> {
+  const device = await nodeDevice();
+  const { cloud, cameras } = offCentre();
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device, options);
+  const labels: string[] = [];
+  for (const angle of angles) {
+    const passes = notePasses(device);
+    await capture(device, renderer, { gaussians, camera: moved(cameras[0], [0, 0, 0], angle) });
+    passes.stop();
+    labels.push(passes.labels.find((label) => label === 'gs.sort' || label === 'gs.order') ?? '');
+  }
+  renderer.destroy();
+  gaussians.destroy();
+  return labels;
+}
+
+test('a turning camera sorts what is visible; the first frame at rest orders everything once', async () => {
+  const labels = await sortingPasses({}, [0, 0.1, 0.2, 0.2, 0.2]);
+  assert.deepEqual(labels, ['gs.order', 'gs.sort', 'gs.sort', 'gs.order', '']);
+});
+
+test('sortAngle lets a camera turn that far before it sorts again', async () => {
+  const labels = await sortingPasses({ sortAngle: 0.05 }, [0, 0.02, 0.04, 0.06, 0.08, 0.12]);
+  assert.deepEqual(labels, ['gs.order', '', '', 'gs.order', '', 'gs.order']);
+});
+
+test('several scenes keep their common order while the camera moves', async () => {
+  const device = await nodeDevice();
+  const { cloud, cameras } = room();
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const other = offCentre();
+  const second = await GaussianBuffers.upload(device, packGaussians(other.cloud));
+  const [moving, fresh] = [new Renderer(device), new Renderer(device)];
+  const scenes = [gaussians, second];
+  await capture(device, moving, { gaussians: scenes, camera: cameras[0] });
+  const camera = moved(cameras[0], [0.3, -0.2, 0.6]);
+  const expected = await capture(device, fresh, { gaussians: scenes, camera });
+  const found = await capture(device, moving, { gaussians: scenes, camera });
+  let worst = 0;
+  for (let i = 0; i < found.length; i++) worst = Math.max(worst, Math.abs(found[i] - expected[i]));
+  assert.ok(worst < 0.01, `worst difference ${worst}`);
+  assert.ok((await moving.readStatistics()).visible > 1000);
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
