@@ -23,7 +23,8 @@ const STYLE = `
   @media (prefers-color-scheme: dark) {
     svg { --ink: #ece7df; --quiet: #a59d92; --ground: #14120f; --line: #3a332a; --own: #f0a35c; --peer: #7db8ea; }
   }
-  text { font: ${FONT}px system-ui, sans-serif; fill: var(--ink); }
+  svg { font: ${FONT}px system-ui, sans-serif; }
+  text { fill: var(--ink); }
   .quiet { fill: var(--quiet); }
   .grid { stroke: var(--line); }
   .own { fill: var(--own); } .peer { fill: var(--peer); }

@@ -15,7 +15,7 @@ const USAGE = `usage: npm run frontier -- [options]
   --path NAME       camera path (default orbit)
   --distance F      of the path from the scene; default 0.5, where it fills the image's height
   --views N         views that are compared with the reference (default 4)
-  --frames N        frames of each visit (default 8)
+  --frames N        frames of each visit (default 5)
   --rounds N        visits to each configuration, in alternating order (default 2)
   --only REGEX      only configurations whose name matches
   --scene FILE      a scene of yours instead of the one that ships
@@ -37,7 +37,7 @@ function readOptions() {
       path: text('orbit'),
       distance: text('0.5'),
       views: text('4'),
-      frames: text('8'),
+      frames: text('5'),
       rounds: text('2'),
       only: text(''),
       scene: { type: 'string' },

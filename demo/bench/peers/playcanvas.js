@@ -7,8 +7,10 @@ import { hookWebGPU } from './webgpu-hooks.js';
 const runFrame = holdAnimationFrames();
 const { state, timer } = hookWebGPU();
 
-/** Frames drawn before an image is taken: the work buffer and the colours follow the camera over a few frames. */
+/** Frames drawn before an image is taken. */
 const SETTLING_FRAMES = 4;
+/** How far aside the camera steps before an image is taken, in world units. */
+const STEP_ASIDE = 10;
 
 window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
   const app = await startApp(width, height);
@@ -35,7 +37,10 @@ window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
       timer.recording = false;
     },
     finish: () => state.device.queue.onSubmittedWorkDone(),
+    /** Colours are only evaluated anew when the camera has moved far enough: it gets every chance to do so. */
     async capture(view) {
+      subject.draw(movedAside(view), false);
+      await subject.finish();
       for (let i = 0; i < SETTLING_FRAMES; i++) {
         subject.draw(view, false);
         await subject.finish();
@@ -105,6 +110,12 @@ function addCamera(app) {
   });
   app.root.addChild(camera);
   return camera;
+}
+
+function movedAside(view) {
+  const worldToCamera = Array.from(view.worldToCamera);
+  worldToCamera[3] += STEP_ASIDE;
+  return { ...view, worldToCamera };
 }
 
 function place(camera, view) {
