@@ -3,7 +3,10 @@ import { ssim } from 'ssim.js';
 import { maxAbs, percentile, psnr } from '../../../tests/support/metrics.ts';
 
 const clamped = (value) => Math.min(1, Math.max(0, value));
-const round = (value, digits) => (Number.isFinite(value) ? Number(value.toFixed(digits)) : value);
+const round = (value, digits) => Number(value.toFixed(digits));
+/** dB that stand for equal images: JSON has no infinity. */
+const EQUAL_DB = 150;
+const decibels = (value) => round(Math.min(EQUAL_DB, value), 3);
 
 /**
  * Compares [height, width, 4] premultiplied pixels over black with a reference. Both are clamped to 0..1 first: what is
@@ -17,9 +20,9 @@ export function compareImages(pixels, reference, { width, height }) {
   const options = { mask: reference.covered, clamp: true };
   const shown = color.map((value) => Math.round(255 * clamped(value)) / 255);
   return {
-    psnr: round(psnr(color, reference.color, options), 3),
-    psnrAll: round(psnr(color, reference.color, { clamp: true }), 3),
-    psnrShown: round(psnr(shown, reference.color, options), 3),
+    psnr: decibels(psnr(color, reference.color, options)),
+    psnrAll: decibels(psnr(color, reference.color, { clamp: true })),
+    psnrShown: decibels(psnr(shown, reference.color, options)),
     p999: round(255 * percentile(color, reference.color, 0.999, options), 3),
     worst: round(255 * maxAbs(color, reference.color, { clamp: true }), 2),
     ssim: round(ssimOfCovered(shown, reference, width, height), 6),
