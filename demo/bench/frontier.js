@@ -32,6 +32,9 @@ async function chosen() {
   return { common, entries };
 }
 
+/** Frames of the path over which the compared views are spread: ten seconds. The measured frames are its first ones. */
+const PATH_FRAMES = 600;
+
 /** `count` of the path's cameras, evenly spaced. */
 const spread = (cameras, count) =>
   Array.from({ length: count }, (_, i) => cameras[Math.floor((i * cameras.length) / count)]);
@@ -62,8 +65,9 @@ async function collect(run) {
   showProgress('loading the scene');
   const scene = await BenchScene.load(gpu.device, common);
   const subjects = new Subjects(gpu.device, scene);
-  const cameras = camerasAlong({ ...common, frames: run.frames, radius: scene.radius * common.distance });
-  const views = spread(cameras, Math.min(cameras.length, Number(query.get('views') ?? 4)));
+  const along = (frames) => camerasAlong({ ...common, frames, radius: scene.radius * common.distance });
+  const cameras = along(run.frames);
+  const views = spread(along(PATH_FRAMES), Number(query.get('views') ?? 4));
   const kind = query.get('reference') ?? 'auto';
   const references = await makeReferences({
     device: gpu.device,

@@ -10,10 +10,10 @@ const USAGE = `usage: npm run bench -- [options]
   --splats N        splats; the scene is repeated up to that number (default 100000)
   --size WxH        image size (default 960x540)
   --path NAME       orbit (default), dolly, yaw, snap, zoom or strafe
-  --frames N        frames of each visit (default 10)
+  --frames N        frames of each visit (default 5)
   --rounds N        visits to each configuration, in alternating order (default 3)
   --scene FILE      a scene of yours instead of the one that ships
-  --list FILE       JSON array of configurations to compare; default: ours by each rasterizer, PlayCanvas and Spark
+  --list FILE       JSON array of configurations to compare; default: ours, PlayCanvas and Spark
   --no-peers        ours alone
   --query TEXT      anything else for the page's address, for example "layout=overhead&phases=wall"
   --out FILE        where to write everything as JSON
@@ -22,7 +22,7 @@ SwiftShader draws, on the CPU; GAUSSIAN_SPLAT_GPU=system takes the GPU of this m
 `;
 
 /** What is compared unless a list is given. */
-const OURS = [{ name: 'ours' }, { name: 'ours, tiles', options: { rasterizer: 'tiles' } }];
+const OURS = [{ name: 'ours' }];
 const PEERS = [
   { name: 'PlayCanvas', peer: 'playcanvas' },
   { name: 'PlayCanvas, parity', peer: 'playcanvas', parity: true },
@@ -40,7 +40,7 @@ function readOptions() {
       splats: text('100000'),
       size: text('960x540'),
       path: text('orbit'),
-      frames: text('10'),
+      frames: text('5'),
       rounds: text('3'),
       scene: { type: 'string' },
       list: { type: 'string' },

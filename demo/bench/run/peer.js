@@ -1,4 +1,4 @@
-/** Another renderer as a subject (see measure.js): it runs in a frame of its own, where its page exposes `window.peer`. */
+/** Another renderer as a subject (see measure.js): it runs in a frame of its own, where its page has a function `openSubject`. */
 
 const TITLES = { playcanvas: 'PlayCanvas', spark: 'Spark' };
 export const PEERS = Object.keys(TITLES);

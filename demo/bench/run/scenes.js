@@ -47,9 +47,15 @@ export class BenchScene {
     this.count = copies.reduce((sum, { length }) => sum + length, 0);
   }
 
-  /** The scene as one cloud: needs 240 bytes of memory for each splat with harmonics of degree 3. */
-  cloud() {
-    return tileCloud(this.#cloud, this.#copies);
+  /** The scene's first `most` splats as one cloud: 240 bytes of memory for each with harmonics of degree 3. */
+  cloud(most = this.count) {
+    const copies = [];
+    for (let left = most, i = 0; left > 0 && i < this.#copies.length; i++) {
+      const { offset, length } = this.#copies[i];
+      copies.push({ offset, length: Math.min(length, left) });
+      left -= length;
+    }
+    return tileCloud(this.#cloud, copies);
   }
 
   /**

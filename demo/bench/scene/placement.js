@@ -33,16 +33,16 @@ export function placeCopies({ base, count, layout = 'ground', visible = count })
     throw new RangeError(`layout: expected ground or overhead, found "${layout}"`);
   }
   const onGround = layout === 'ground' ? count : Math.min(count, visible);
-  const ground = rows(base, onGround, 0);
+  const ground = layOut(base, onGround, 0);
   const radius = ground.side === 1 ? LONE_RADIUS : RADIUS_PER_SIDE * ground.side * STEP;
   const above = count - onGround;
   if (above === 0) return { radius, copies: ground.copies };
   // Seen from anywhere on a path, the lowest and farthest of them stands more than 45 degrees up.
   const extent = Math.ceil(Math.sqrt(Math.ceil(above / base))) * STEP;
-  return { radius, copies: [...ground.copies, ...rows(base, above, -(2 * radius + extent)).copies] };
+  return { radius, copies: [...ground.copies, ...layOut(base, above, -(2 * radius + extent)).copies] };
 }
 
-function rows(base, count, height) {
+function layOut(base, count, height) {
   const { side, cells } = grid(Math.ceil(count / base), height);
   const copies = cells.map((offset, i) => ({ offset, length: Math.min(base, count - i * base) }));
   return { side, copies };
