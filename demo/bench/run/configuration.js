@@ -7,6 +7,17 @@
  * packGaussians); `peer` (playcanvas, spark) and `parity` instead of the last two.
  */
 
+import { PATH_NAMES } from '../scene/paths.js';
+import { PEERS } from './peer.js';
+
+/** Fields that are words, and the words that they may be. */
+const WORDS = {
+  path: PATH_NAMES,
+  layout: ['ground', 'overhead'],
+  mode: ['scene', 'classic', 'antialiased'],
+  peer: ['', ...PEERS],
+};
+
 export const DEFAULTS = Object.freeze({
   name: '',
   scene: '../scenes/skull.spz',
@@ -80,7 +91,15 @@ export async function readConfigurations(query, loadJson) {
   let all = list.map((fields) => merge(base, fields));
   for (const axis of axes)
     if (axis) all = all.flatMap((configuration) => axis.map((step) => ({ ...configuration, ...step })));
+  all.forEach(checkWords);
   return all.map((configuration) => ({ ...configuration, name: configuration.name || nameOf(configuration) }));
+}
+
+function checkWords(configuration) {
+  for (const [field, words] of Object.entries(WORDS)) {
+    if (words.includes(configuration[field])) continue;
+    throw new RangeError(`${field}: expected ${words.filter(Boolean).join(', ')}, found "${configuration[field]}"`);
+  }
 }
 
 function merge(base, fields) {
