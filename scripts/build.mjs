@@ -25,19 +25,12 @@ async function buildDemo() {
   const to = join(root, 'demo/dist');
   rmSync(to, { recursive: true, force: true });
   mkdirSync(to, { recursive: true });
-  for (const name of readdirSync(from))
-    if (name !== 'dist') cpSync(join(from, name), join(to, name), { recursive: true });
+  for (const name of readdirSync(from)) {
+    if (name !== 'dist' && name !== 'bench') cpSync(join(from, name), join(to, name), { recursive: true });
+  }
   cpSync(join(root, 'packages/element/cdn'), join(to, 'cdn'), { recursive: true });
-  // The packages were not there when this script started on a fresh clone.
-  const { build } = await import('esbuild');
-  await build({
-    entryPoints: [join(from, 'bench/bench.js')],
-    outfile: join(to, 'bench/bench.js'),
-    allowOverwrite: true,
-    bundle: true,
-    format: 'esm',
-    minify: true,
-    logLevel: 'warning',
-  });
+  // Its packages were not there when this script started on a fresh clone.
+  const { bundleBench } = await import('./lib/bundle-bench.mjs');
+  await bundleBench(join(to, 'bench'));
   if (!existsSync(join(to, 'index.html'))) throw new Error('demo/index.html is missing');
 }

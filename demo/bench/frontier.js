@@ -1,0 +1,119 @@
+/**
+ * The frontier page: accuracy and time of every configuration of scripts/frontier/configurations.mjs on one scene, path and
+ * size. All comparing is done here, so that only numbers leave the machine that it runs on.
+ */
+import { configurations as table } from '../../scripts/frontier/configurations.mjs';
+import { camerasAlong } from './scene/paths.js';
+import { showError, showProgress, showResults } from './page/show.js';
+import { DEFAULTS, readConfigurations, readRun } from './run/configuration.js';
+import { describeEnvironment, openDevice } from './run/environment.js';
+import { visitInTurns } from './run/measure.js';
+import { sendReport } from './run/report.js';
+import { BenchScene } from './run/scenes.js';
+import { Subjects } from './run/subjects.js';
+import { summarizeVisits } from './run/summary.js';
+import { compareImages, worstOf } from './quality/metrics.js';
+import { makeReferences } from './quality/reference.js';
+
+const query = new URLSearchParams(location.search);
+
+/** The table's lines that `only` (a regular expression over names) leaves, on the scene that the address describes. */
+async function chosen() {
+  const [base] = await readConfigurations(query, () => []);
+  const only = new RegExp(query.get('only') ?? '', 'i');
+  const common = Object.fromEntries(
+    ['scene', 'splats', 'layout', 'visible', 'mode', 'width', 'height', 'path', 'distance'].map((key) => [
+      key,
+      base[key],
+    ]),
+  );
+  const entries = table.filter(({ name }) => only.test(name)).map((line) => ({ ...DEFAULTS, ...line, ...common }));
+  if (entries.length === 0) throw new RangeError(`only: no configuration's name matches ${only}`);
+  return { common, entries };
+}
+
+/** Frames of the path over which the compared views are spread: ten seconds. The measured frames are its first ones. */
+const PATH_FRAMES = 600;
+
+/** `count` of the path's cameras, evenly spaced. */
+const spread = (cameras, count) =>
+  Array.from({ length: count }, (_, i) => cameras[Math.floor((i * cameras.length) / count)]);
+
+async function judge(subjects, entry, cameras, references) {
+  let subject;
+  try {
+    subject = await subjects.open(entry);
+    const views = [];
+    for (const [i, camera] of cameras.entries()) {
+      views.push(compareImages(await subject.capture(camera), references.images[i], camera));
+      const { ignoredOptions = [] } = await subject.facts();
+      // An option that nobody reads would show the default's figures under another name.
+      if (ignoredOptions.length > 0)
+        return { error: `the renderer has no option ${ignoredOptions.join(', ')}`, ignoredOptions };
+    }
+    return { quality: worstOf(views), views };
+  } catch (error) {
+    return { error: String(error?.stack ?? error) };
+  } finally {
+    subject?.close();
+  }
+}
+
+async function collect(run) {
+  const gpu = await openDevice();
+  const { common, entries } = await chosen();
+  showProgress('loading the scene');
+  const scene = await BenchScene.load(gpu.device, common);
+  const subjects = new Subjects(gpu.device, scene);
+  const along = (frames) => camerasAlong({ ...common, frames, radius: scene.radius * common.distance });
+  const cameras = along(run.frames);
+  const views = spread(along(PATH_FRAMES), Number(query.get('views') ?? 4));
+  const kind = query.get('reference') ?? 'auto';
+  const references = await makeReferences({
+    device: gpu.device,
+    scene,
+    cameras: views,
+    kind,
+    onProgress: showProgress,
+  });
+
+  const judged = [];
+  for (const entry of entries) {
+    showProgress(`comparing ${entry.name}`);
+    judged.push(await judge(subjects, entry, views, references));
+  }
+  const measurable = entries.filter((_, i) => !judged[i].error).map((entry) => ({ ...entry, cameras }));
+  const measured = await visitInTurns(measurable, {
+    ...run,
+    open: (entry) => subjects.open(entry),
+    onVisit: ({ name }, round) => showProgress(`round ${round + 1} of ${run.rounds}: ${name}`),
+  });
+  const results = entries.map((configuration, i) => {
+    if (judged[i].error) return { configuration, ...judged[i] };
+    const { visits, facts, error } = measured.shift();
+    return { configuration, ...judged[i], ...(error ? { error } : { ...summarizeVisits(visits), ...facts }) };
+  });
+  subjects.dispose();
+  await scene.destroy();
+  const { images, ...reference } = references;
+  return {
+    kind: 'frontier',
+    environment: describeEnvironment(gpu),
+    run,
+    scene: { ...common, splats: scene.count, antialiased: scene.antialiased, views: images.length },
+    reference,
+    results: results.map((result) => ({ ...result, configuration: { ...result.configuration, splats: scene.count } })),
+    errors: gpu.errors,
+  };
+}
+
+const run = readRun(query);
+let report;
+try {
+  report = await collect(run);
+  showResults(report.results, report);
+} catch (error) {
+  report = { kind: 'frontier', run, error: String(error.stack ?? error) };
+  showError(error);
+}
+await sendReport(report, run.report);

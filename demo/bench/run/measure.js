@@ -1,0 +1,134 @@
+/**
+ * Measures whatever can draw: our renderer and others alike.
+ *
+ * A subject is
+ *   draw(camera, timed)   draws and submits one frame; `timed` asks for timestamps
+ *   finish()              promise: the GPU has done all that was submitted
+ *   readTimes?()          promise of the passes [{label, begin, end}] in ms of each timed frame since the last call
+ *   settle?(camera)       promise: an asynchronous depth order has caught up with this camera
+ */
+
+export const PHASES = ['gpu', 'wall', 'throughput'];
+
+/** Timed frames between two readings of timestamps. */
+const READ_EVERY = 50;
+/** Frames that may be in flight when throughput is measured. */
+const IN_FLIGHT = 2;
+
+/** One visit to a subject: warm-up, then each phase over all cameras. Times in milliseconds. */
+export async function visit(subject, cameras, { warmUp, phases = PHASES }) {
+  const samples = { passes: [], wall: [], sortedWall: [], cpu: [], throughput: [] };
+  for (let i = 0; i < warmUp; i++) await drawAndWait(subject, cameras[i % cameras.length]);
+  if (subject.settle) await subject.settle(cameras[0]);
+  if (phases.includes('gpu') && subject.readTimes) samples.passes = await timePasses(subject, cameras);
+  if (phases.includes('wall')) {
+    await timeFrames(subject, cameras, samples);
+    if (subject.settle) samples.sortedWall = await timeSortedFrames(subject, cameras);
+  }
+  if (phases.includes('throughput')) samples.throughput = [await timeStream(subject, cameras)];
+  return samples;
+}
+
+async function drawAndWait(subject, camera, timed = false) {
+  subject.draw(camera, timed);
+  await subject.finish();
+  await nextTask();
+}
+
+async function timePasses(subject, cameras) {
+  const frames = [];
+  for (const [i, camera] of cameras.entries()) {
+    await drawAndWait(subject, camera, true);
+    if ((i + 1) % READ_EVERY === 0) frames.push(...(await subject.readTimes()));
+  }
+  frames.push(...(await subject.readTimes()));
+  return frames;
+}
+
+/** Each frame alone: from the call that draws it until the GPU is done. */
+async function timeFrames(subject, cameras, { wall, cpu }) {
+  for (const camera of cameras) {
+    const start = performance.now();
+    subject.draw(camera, false);
+    cpu.push(performance.now() - start);
+    await subject.finish();
+    wall.push(performance.now() - start);
+    await nextTask();
+  }
+}
+
+/** Each frame until it is shown in the order that belongs to its camera: for renderers that sort on the side. */
+async function timeSortedFrames(subject, cameras) {
+  const times = [];
+  for (const camera of cameras) {
+    const start = performance.now();
+    subject.draw(camera, false);
+    await subject.settle(camera);
+    subject.draw(camera, false);
+    await subject.finish();
+    times.push(performance.now() - start);
+    await nextTask();
+  }
+  return times;
+}
+
+/** Milliseconds a frame with two frames in flight, until the queue is drained. */
+async function timeStream(subject, cameras) {
+  await subject.finish();
+  const flying = [];
+  const start = performance.now();
+  for (const camera of cameras) {
+    subject.draw(camera, false);
+    flying.push(subject.finish());
+    if (flying.length > IN_FLIGHT) await flying.shift();
+    await nextTask();
+  }
+  await subject.finish();
+  return (performance.now() - start) / cameras.length;
+}
+
+/**
+ * Visits every subject in every round, forwards and backwards in turn, so that a machine that warms up or slows down
+ * treats all of them alike. `open` makes a subject; its `close` ends a visit.
+ * @returns for each entry its visits, or the error that ended them.
+ */
+export async function visitInTurns(entries, { rounds, open, onVisit = () => {}, ...how }) {
+  const results = entries.map(() => ({ visits: [], facts: undefined, error: undefined }));
+  for (let round = 0; round < rounds; round++) {
+    const order = [...entries.keys()];
+    if (round % 2 === 1) order.reverse();
+    for (const i of order) {
+      if (results[i].error) continue;
+      onVisit(entries[i], round);
+      await visitOnce(entries[i], results[i], open, how);
+    }
+  }
+  return results;
+}
+
+async function visitOnce(entry, result, open, how) {
+  let subject;
+  try {
+    subject = await open(entry);
+    result.visits.push(await visit(subject, entry.cameras, how));
+    result.facts = await subject.facts();
+  } catch (error) {
+    result.error = String(error?.stack ?? error);
+  } finally {
+    subject?.close();
+  }
+}
+
+const channel = new MessageChannel();
+const waiting = [];
+channel.port1.onmessage = () => waiting.shift()();
+// Node waits for open ports; a test that imports this must be able to end.
+channel.port1.unref?.();
+
+/** Lets workers, timers and messages have their turn, without the 4 ms that timers take. */
+export function nextTask() {
+  return new Promise((resolve) => {
+    waiting.push(resolve);
+    channel.port2.postMessage(0);
+  });
+}

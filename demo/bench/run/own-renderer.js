@@ -1,0 +1,106 @@
+/** Our renderer as a subject (see measure.js): one configuration of it, drawing into an off-screen texture. */
+import { PassTimer, Renderer } from '@gaussian-splat/renderer';
+import { scaledCamera } from '../scene/paths.js';
+import { watchOptions } from './levers.js';
+import { readPixels } from './read-pixels.js';
+import { Upscaler } from './upscale.js';
+
+const DISPLAY = 'rgba8unorm';
+const PRECISE = 'rgba32float';
+
+export class OwnRenderer {
+  #device;
+  #renderer;
+  #gaussians;
+  #scale;
+  #timer;
+  #target;
+  #unread;
+
+  /**
+   * @param upload {{buffers: GaussianBuffers[], ignored: string[]}} the scene; it stays yours.
+   * @param configuration {{options, resolutionScale, width, height}}
+   */
+  constructor(device, { buffers, ignored = [] }, { options, resolutionScale, width, height }) {
+    const watched = watchOptions(options);
+    this.#device = device;
+    this.#gaussians = buffers;
+    this.#scale = resolutionScale;
+    this.#renderer = new Renderer(device, watched.options);
+    this.#unread = () => [...watched.unread(), ...ignored];
+    this.#target = makeTarget(device, DISPLAY, { width, height }, resolutionScale);
+    if (device.features.has('timestamp-query')) {
+      this.#timer = new PassTimer(device);
+      this.readTimes = () => this.#timer.read();
+    }
+  }
+
+  draw(camera, timed) {
+    this.#drawInto(this.#target, camera, timed ? this.#timer : undefined);
+  }
+
+  finish() {
+    return this.#device.queue.onSubmittedWorkDone();
+  }
+
+  /** One view over black, before any rounding to 8 bits: [height, width, 4] premultiplied float32. */
+  async capture(camera) {
+    const target = makeTarget(this.#device, PRECISE, camera, this.#scale);
+    try {
+      this.#drawInto(target, camera);
+      return await readPixels(this.#device, target.texture);
+    } finally {
+      target.destroy();
+    }
+  }
+
+  /** What only this configuration can say about itself, after it has drawn. */
+  async facts() {
+    const scene = this.#gaussians.reduce((sum, { byteLength }) => sum + byteLength, 0);
+    const splats = this.#gaussians.reduce((sum, { count }) => sum + count, 0);
+    const renderer = this.#renderer.byteLength;
+    return {
+      splats,
+      shDegree: this.#gaussians[0]?.shDegree,
+      rasterizer: this.#renderer.rasterizer,
+      statistics: await this.#renderer.readStatistics(),
+      bytes: { scene, renderer, perSplat: Number(((scene + renderer) / splats).toFixed(1)) },
+      ignoredOptions: this.#unread(),
+    };
+  }
+
+  close() {
+    this.#renderer.destroy();
+    this.#timer?.destroy();
+    this.#target.destroy();
+  }
+
+  #drawInto({ drawn, format, view, upscaler }, camera, timer) {
+    this.#renderer.render({
+      gaussians: this.#gaussians,
+      camera: this.#scale === 1 ? camera : scaledCamera(camera, this.#scale),
+      target: drawn.createView(),
+      targetFormat: format,
+      timer,
+    });
+    upscaler?.draw(view, timer);
+  }
+}
+
+/** The texture that shows the image and, at another resolution scale, the one that it is drawn into first. */
+function makeTarget(device, format, { width, height }, scale) {
+  const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.TEXTURE_BINDING;
+  const texture = device.createTexture({ label: 'bench.target', size: [width, height], format, usage });
+  const smaller = scaledCamera({ width, height, fx: 1, fy: 1, cx: 0, cy: 0 }, scale);
+  const drawn =
+    scale === 1
+      ? texture
+      : device.createTexture({ label: 'bench.drawn', size: [smaller.width, smaller.height], format, usage });
+  const upscaler = scale === 1 ? undefined : new Upscaler(device, format, drawn, { width, height });
+  const destroy = () => {
+    upscaler?.destroy();
+    drawn.destroy();
+    texture.destroy();
+  };
+  return { texture, drawn, format, view: texture.createView(), upscaler, destroy };
+}

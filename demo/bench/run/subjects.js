@@ -1,0 +1,38 @@
+/** Opens whatever a configuration asks for: our renderer, or another one. */
+import { OwnRenderer } from './own-renderer.js';
+import { openPeer } from './peer.js';
+
+/**
+ * Subjects of one scene. Ours are made anew for each visit, so that none holds memory while another is measured; peers take
+ * seconds to open, so they stay, idle, until `dispose`.
+ */
+export class Subjects {
+  #device;
+  #scene;
+  #peers = new Map();
+
+  constructor(device, scene) {
+    this.#device = device;
+    this.#scene = scene;
+  }
+
+  async open(configuration) {
+    if (configuration.peer) return this.#openPeer(configuration);
+    return new OwnRenderer(this.#device, await this.#scene.upload(configuration.pack), configuration);
+  }
+
+  async #openPeer(configuration) {
+    const { peer, parity, width, height } = configuration;
+    const key = JSON.stringify([peer, parity, width, height]);
+    if (!this.#peers.has(key)) {
+      const antialiased = this.#scene.antialiased;
+      this.#peers.set(key, await openPeer({ peer, parity, antialiased, width, height }, this.#scene.ply()));
+    }
+    return this.#peers.get(key);
+  }
+
+  dispose() {
+    for (const peer of this.#peers.values()) peer.dispose();
+    this.#peers.clear();
+  }
+}

@@ -1,0 +1,58 @@
+/** Few numbers out of many. */
+
+/** The value that the given share of samples (0..1) does not exceed; undefined without samples. */
+export function quantile(values, share) {
+  if (values.length === 0) return undefined;
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
+}
+
+const rounded = (value) => (value === undefined ? undefined : Number(value.toFixed(4)));
+
+/** Median and 95th percentile, in the unit of the values. */
+export const summarize = (values) =>
+  values.length === 0 ? undefined : { p50: rounded(quantile(values, 0.5)), p95: rounded(quantile(values, 0.95)) };
+
+/** From the first pass's begin to the last one's end: passes may overlap, so their sum would say too much. */
+export function spanOf(passes) {
+  const valid = passes.filter(({ begin, end }) => end >= begin);
+  if (valid.length === 0) return undefined;
+  return Math.max(...valid.map(({ end }) => end)) - Math.min(...valid.map(({ begin }) => begin));
+}
+
+/** Median duration of all passes of each label in a frame, over frames. */
+export function summarizeStages(frames) {
+  const labels = [...new Set(frames.flatMap((passes) => passes.map(({ label }) => label)))];
+  const total = (passes, label) =>
+    passes
+      .filter((pass) => pass.label === label && pass.end >= pass.begin)
+      .reduce((sum, p) => sum + p.end - p.begin, 0);
+  return Object.fromEntries(labels.map((label) => [label, summarize(frames.map((passes) => total(passes, label)))]));
+}
+
+/** All samples of a configuration over all rounds; undefined where nothing was measured. */
+export function summarizeVisits(visits) {
+  const all = (name) => visits.flatMap((visit) => visit[name]);
+  const frames = all('passes');
+  const spans = frames.map(spanOf).filter((span) => span !== undefined);
+  return {
+    span: summarize(spans),
+    stages: frames.length > 0 ? summarizeStages(frames) : undefined,
+    wall: summarize(all('wall')),
+    sortedWall: summarize(all('sortedWall')),
+    throughput: summarize(all('throughput')),
+    cpu: summarize(all('cpu')),
+    /** Medians of each round: how repeatable the figures are. */
+    rounds: {
+      span: visits.map((visit) =>
+        rounded(
+          quantile(
+            visit.passes.map(spanOf).filter((s) => s !== undefined),
+            0.5,
+          ),
+        ),
+      ),
+      wall: visits.map((visit) => rounded(quantile(visit.wall, 0.5))),
+    },
+  };
+}

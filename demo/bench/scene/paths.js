@@ -1,0 +1,71 @@
+/**
+ * Fixed camera paths, so that every machine and every renderer draws the same frames. A path is a function of the frame's
+ * number: time goes on by 1/60 s a frame, whatever the frame rate.
+ */
+import { lookAt } from '@gaussian-splat/core';
+
+const SECONDS = 1 / 60;
+const UP = [0, -1, 0];
+const NEAR = 0.2;
+const FAR = 1e10;
+/** Focal length in image heights: that of 1200 px at 1080 lines, a vertical field of view of 48.5 degrees. */
+const FOCAL = 1200 / 1080;
+const ZOOM = 64;
+/** Frames that the snap stays on each side. */
+const SNAP_FRAMES = 10;
+
+const yawed = (eye, angle) => lookAt(eye, [eye[0] + Math.sin(angle), eye[1] + 0.2, eye[2] + Math.cos(angle)], UP);
+
+/**
+ * World-to-camera matrix by frame, around a scene of radius r on the ground plane (y points down).
+ * `progress` runs from 0 to 1 over the frames of a visit.
+ */
+const PATHS = {
+  /** Around the scene, 28.6 degrees a second. */
+  orbit: ({ seconds, r }) =>
+    lookAt([r * Math.sin(0.5 * seconds), -0.45 * r, -r * Math.cos(0.5 * seconds)], [0, 0, 0], UP),
+  /** Into the scene. */
+  dolly: ({ seconds, r }) => lookAt([0, -0.3 * r, -r + 0.4 * seconds], [0, 0, 0.4 * seconds], UP),
+  /** In its middle, turning 60 degrees a second. */
+  yaw: ({ seconds, r }) => yawed([0, -0.3 * r, 0], (Math.PI / 3) * seconds),
+  /** In its middle, turning by 180 degrees at once: a depth order and its opposite. */
+  snap: ({ frame, r }) => yawed([0, -0.3 * r, 0], Math.floor(frame / SNAP_FRAMES) % 2 ? Math.PI : 0),
+  /** From the orbit's distance to 64 times as far, evenly on a logarithmic scale. */
+  zoom: ({ progress, r }) => lookAt([0, -0.45 * r * ZOOM ** progress, -r * ZOOM ** progress], [0, 0, 0], UP),
+  /** Sideways without turning: the depth order stays. */
+  strafe: ({ progress, r }) => {
+    const x = (progress - 0.5) * r;
+    return lookAt([x, -0.45 * r, -r], [x, 0, 0], UP);
+  },
+};
+
+export const PATH_NAMES = Object.keys(PATHS);
+
+/** The cameras of `frames` frames along a path, in pixels and OpenCV axes. */
+export function camerasAlong({ path, width, height, frames, radius }) {
+  if (!(path in PATHS)) throw new RangeError(`path: expected ${PATH_NAMES.join(', ')}, found "${path}"`);
+  return Array.from({ length: frames }, (_, frame) => ({
+    width,
+    height,
+    fx: FOCAL * height,
+    fy: FOCAL * height,
+    cx: width / 2,
+    cy: height / 2,
+    near: NEAR,
+    far: FAR,
+    worldToCamera: PATHS[path]({
+      frame,
+      seconds: frame * SECONDS,
+      progress: frame / Math.max(1, frames - 1),
+      r: radius,
+    }),
+  }));
+}
+
+/** The same view at another resolution. */
+export function scaledCamera(camera, scale) {
+  const width = Math.max(1, Math.round(camera.width * scale));
+  const height = Math.max(1, Math.round(camera.height * scale));
+  const [sx, sy] = [width / camera.width, height / camera.height];
+  return { ...camera, width, height, fx: camera.fx * sx, fy: camera.fy * sy, cx: camera.cx * sx, cy: camera.cy * sy };
+}

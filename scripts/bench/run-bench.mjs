@@ -1,0 +1,83 @@
+/** The work behind `npm run bench`. */
+import { readFileSync, writeFileSync } from 'node:fs';
+import { resolve } from 'node:path';
+import { parseArgs } from 'node:util';
+import { runPage } from '../lib/browser-page.mjs';
+import { benchTable } from './table.mjs';
+
+const USAGE = `usage: npm run bench -- [options]
+
+  --splats N        splats; the scene is repeated up to that number (default 100000)
+  --size WxH        image size (default 960x540)
+  --path NAME       orbit (default), dolly, yaw, snap, zoom or strafe
+  --frames N        frames of each visit (default 5)
+  --rounds N        visits to each configuration, in alternating order (default 3)
+  --scene FILE      a scene of yours instead of the one that ships
+  --list FILE       JSON array of configurations to compare; default: ours, PlayCanvas and Spark
+  --no-peers        ours alone
+  --query TEXT      anything else for the page's address, for example "layout=overhead&phases=wall"
+  --out FILE        where to write everything as JSON
+
+SwiftShader draws, on the CPU; GAUSSIAN_SPLAT_GPU=system takes the GPU of this machine.
+`;
+
+/** What is compared unless a list is given. */
+const OURS = [{ name: 'ours' }];
+const PEERS = [
+  { name: 'PlayCanvas', peer: 'playcanvas' },
+  { name: 'PlayCanvas, parity', peer: 'playcanvas', parity: true },
+  { name: 'Spark', peer: 'spark' },
+];
+
+/** Folder that a person's relative paths start from: npm itself runs scripts in the project's root. */
+const from = process.env.INIT_CWD ?? process.cwd();
+
+function readOptions() {
+  const text = (fallback) => ({ type: 'string', default: fallback });
+  const { values } = parseArgs({
+    allowNegative: true,
+    options: {
+      splats: text('100000'),
+      size: text('960x540'),
+      path: text('orbit'),
+      frames: text('5'),
+      rounds: text('3'),
+      scene: { type: 'string' },
+      list: { type: 'string' },
+      peers: { type: 'boolean', default: true },
+      query: text(''),
+      out: { type: 'string' },
+      help: { type: 'boolean' },
+    },
+  });
+  return values;
+}
+
+async function main() {
+  const options = readOptions();
+  if (options.help) return console.log(USAGE);
+  const { splats, size, path, frames, rounds } = options;
+  const list = options.list
+    ? readFileSync(resolve(from, options.list), 'utf8')
+    : JSON.stringify([...OURS, ...(options.peers ? PEERS : [])]);
+  const query = { list, splats, sizes: size, paths: path, frames, rounds, warmup: '3' };
+  const more = Object.fromEntries(new URLSearchParams(options.query));
+  const report = await runPage(
+    'bench/index.html',
+    { ...query, ...more },
+    {
+      scene: options.scene && resolve(from, options.scene),
+      onProgress: (line) => console.error(line),
+    },
+  );
+  if (options.out) writeFileSync(resolve(from, options.out), `${JSON.stringify(report, null, 2)}\n`);
+  console.log(benchTable(report));
+  if (report.errors.length > 0) throw new Error(`WebGPU: ${report.errors.join('\n')}`);
+}
+
+try {
+  await main();
+} catch (error) {
+  console.error(`${error.message}\n\n${USAGE}`);
+  process.exit(1);
+}

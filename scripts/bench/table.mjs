@@ -1,0 +1,38 @@
+/** A benchmark's report as text. */
+
+const ms = (summary) => (summary ? summary.p50.toFixed(1) : '');
+
+const COLUMNS = [
+  ['', ({ configuration }) => configuration.name],
+  ['splats', ({ configuration }) => String(configuration.splats)],
+  ['visible', ({ statistics }) => String(statistics?.visible ?? '')],
+  ['path', ({ configuration: { path, width, height } }) => `${path} ${width}x${height}`],
+  ['GPU', ({ span }) => ms(span)],
+  ['wall', ({ wall }) => ms(wall)],
+  ['p95', ({ wall }) => (wall ? wall.p95.toFixed(1) : '')],
+  ['ordered', ({ sortedWall }) => ms(sortedWall)],
+  ['stream', ({ throughput }) => ms(throughput)],
+  ['CPU', ({ cpu }) => (cpu ? cpu.p50.toFixed(2) : '')],
+  ['B/splat', ({ bytes }) => String(bytes?.perSplat ?? '')],
+];
+
+/** Medians in milliseconds, one line for each configuration. */
+export function benchTable({ environment, results }) {
+  const { adapter, versions } = environment;
+  const rows = results.map((result) =>
+    result.error ? [result.configuration.name, result.error.split('\n')[0]] : COLUMNS.map(([, text]) => text(result)),
+  );
+  const all = [COLUMNS.map(([title]) => title), ...rows.filter((row) => row.length > 2)];
+  const widths = COLUMNS.map((_, k) => Math.max(...all.map((row) => row[k].length)));
+  const line = (row) =>
+    row.length > 2
+      ? row.map((cell, k) => (k === 0 ? cell.padEnd(widths[k]) : cell.padStart(widths[k]))).join('  ')
+      : row.join(': ');
+  return [
+    `${adapter.description || adapter.vendor}; ${versions.commit}; PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}`,
+    'Milliseconds, medians. GPU: first pass begins to last one ends. wall: one frame, drained. ordered: until drawn in its own',
+    'order. stream: a frame with two in flight.',
+    '',
+    ...[COLUMNS.map(([title]) => title), ...rows].map(line),
+  ].join('\n');
+}

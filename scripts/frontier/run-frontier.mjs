@@ -1,0 +1,125 @@
+/** The work behind `npm run frontier`: collects in the browser, or takes what was collected elsewhere, and draws. */
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join, resolve } from 'node:path';
+import { parseArgs } from 'node:util';
+import { adapterName } from '../../demo/bench/run/environment.js';
+import { runPage } from '../lib/browser-page.mjs';
+import { root } from '../lib/run.mjs';
+import { drawChart } from './chart.mjs';
+import { hypervolume, nonDominated, pointsOf } from './front.mjs';
+
+const USAGE = `usage: npm run frontier -- [options]
+
+  --size WxH        image size (default 480x270)
+  --splats N        splats; 0, the default, is the scene as it is
+  --path NAME       camera path (default orbit)
+  --distance F      of the path from the scene; default 0.5, where it fills the image's height
+  --views N         views that are compared with the reference (default 4)
+  --frames N        frames of each visit (default 5)
+  --rounds N        visits to each configuration, in alternating order (default 2)
+  --only REGEX      only configurations whose name matches
+  --scene FILE      a scene of yours instead of the one that ships
+  --query TEXT      anything else for the page's address, for example "reference=renderer"
+  --from FILE       draws a report that the page posted on another machine; measures nothing
+  --out FOLDER      where frontier-ADAPTER.json and .svg go (default docs/frontier)
+
+The table is scripts/frontier/configurations.mjs. SwiftShader draws; GAUSSIAN_SPLAT_GPU=system takes this machine's GPU.
+`;
+
+const from = process.env.INIT_CWD ?? process.cwd();
+
+function readOptions() {
+  const text = (fallback) => ({ type: 'string', default: fallback });
+  const { values } = parseArgs({
+    options: {
+      size: text('480x270'),
+      splats: text('0'),
+      path: text('orbit'),
+      distance: text('0.5'),
+      views: text('4'),
+      frames: text('5'),
+      rounds: text('2'),
+      only: text(''),
+      scene: { type: 'string' },
+      query: text(''),
+      from: { type: 'string' },
+      out: text(join(root, 'docs/frontier')),
+      help: { type: 'boolean' },
+    },
+  });
+  return values;
+}
+
+async function collect({ size, splats, path, distance, views, frames, rounds, only, scene, query }) {
+  const asked = {
+    sizes: size,
+    splats,
+    paths: path,
+    distance,
+    views,
+    frames,
+    rounds,
+    only,
+    warmup: '2',
+    phases: 'gpu,wall',
+  };
+  const more = Object.fromEntries(new URLSearchParams(query));
+  return runPage(
+    'bench/frontier.html',
+    { ...asked, ...more },
+    {
+      scene: scene && resolve(from, scene),
+      minutes: 60,
+      onProgress: (line) => console.error(line),
+    },
+  );
+}
+
+/** Part of a file's name that tells adapters apart. */
+function slugOf(adapter) {
+  const name = /swiftshader/i.test(adapterName(adapter)) ? 'swiftshader' : adapterName(adapter);
+  return name
+    .toLowerCase()
+    .replace(/[^a-z0-9]+/g, '-')
+    .replace(/^-|-$/g, '')
+    .slice(0, 40);
+}
+
+function describe(report) {
+  const front = new Set(nonDominated(pointsOf(report)).map(({ name }) => name));
+  const lines = report.results.map(({ configuration: { name }, error, quality, span, wall, sortedWall }) => {
+    if (error) return `  ${name.padEnd(28)} left out: ${error.split('\n')[0]}`;
+    const time = (span ?? sortedWall ?? wall).p50.toFixed(2);
+    const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  SSIM ${quality.ssim.toFixed(4)}`;
+    return `${front.has(name) ? '*' : ' '} ${name.padEnd(28)}${numbers}`;
+  });
+  const area = hypervolume(pointsOf(report));
+  return [
+    ...lines,
+    `* nothing is both faster and truer; ${area.toFixed(2)} decades x dB within 16.6 ms and above 36 dB`,
+  ].join('\n');
+}
+
+async function main() {
+  const options = readOptions();
+  if (options.help) return console.log(USAGE);
+  const report = options.from ? JSON.parse(readFileSync(resolve(from, options.from), 'utf8')) : await collect(options);
+  if (report.kind !== 'frontier')
+    throw new Error(`expected the report of bench/frontier.html, found kind "${report.kind}"`);
+  if (report.error) throw new Error(report.error);
+  const folder = resolve(from, options.out);
+  mkdirSync(folder, { recursive: true });
+  const name = join(folder, `frontier-${slugOf(report.environment.adapter)}`);
+  writeFileSync(`${name}.json`, `${JSON.stringify(report, null, 2)}\n`);
+  writeFileSync(`${name}.svg`, drawChart(report));
+  console.log(describe(report));
+  console.log(`${name}.svg`);
+  if (report.errors.length > 0) throw new Error(`WebGPU: ${report.errors.join('\n')}`);
+}
+
+try {
+  await main();
+} catch (error) {
+  console.error(`${error.message}\n\n${USAGE}`);
+  process.exit(1);
+}

@@ -1,0 +1,48 @@
+/** Bundles the benchmark pages, with the peers they measure, into a folder that any static host can serve. */
+import { execFileSync } from 'node:child_process';
+import { cpSync, readdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { build } from 'esbuild';
+import { root } from './run.mjs';
+
+const ENTRIES = ['bench', 'frontier', 'quality/oracle-worker', 'peers/playcanvas', 'peers/spark'];
+
+/** @param folder where the pages go, for example demo/dist/bench. */
+export async function bundleBench(folder) {
+  const from = join(root, 'demo/bench');
+  for (const name of readdirSync(from, { recursive: true })) {
+    if (/\.(html|css)$/.test(name)) cpSync(join(from, name), join(folder, name));
+  }
+  await build({
+    entryPoints: ENTRIES.map((name) => join(from, `${name}.js`)),
+    outdir: folder,
+    outbase: from,
+    bundle: true,
+    format: 'esm',
+    target: 'es2024',
+    minify: true,
+    logLevel: 'warning',
+    define: { BENCH_VERSIONS: JSON.stringify(versions()) },
+  });
+}
+
+function versions() {
+  const dependencies = JSON.parse(readFileSync(join(root, 'package.json'), 'utf8')).devDependencies;
+  const renderer = JSON.parse(readFileSync(join(root, 'packages/renderer/package.json'), 'utf8')).version;
+  return {
+    renderer,
+    commit: commit(),
+    playcanvas: dependencies.playcanvas,
+    spark: dependencies['@sparkjsdev/spark'],
+    three: dependencies.three,
+  };
+}
+
+/** The commit that was built, `-dirty` if files differ from it; `unknown` outside a checkout. */
+function commit() {
+  try {
+    return execFileSync('git', ['describe', '--always', '--dirty'], { cwd: root, encoding: 'utf8' }).trim();
+  } catch {
+    return 'unknown';
+  }
+}

@@ -1,0 +1,57 @@
+/** The built pages in Chromium: small runs of ours beside another renderer. Needs `npm run build`, which `npm test` does. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { scriptModule } from './load.js';
+
+const { runPage } = await scriptModule('lib/browser-page.mjs');
+const { pointsOf } = await scriptModule('frontier/front.mjs');
+
+const SMALL = { frames: '2', rounds: '2', warmup: '1' };
+
+test('the benchmark page measures a list in one report', { timeout: 180_000 }, async () => {
+  const list = JSON.stringify([
+    { name: 'ours' },
+    { name: 'half', resolutionScale: 0.5, options: { rasterizer: 'tiles', depthKeyBits: 16, warp: 9 } },
+    { name: 'PlayCanvas', peer: 'playcanvas' },
+  ]);
+  const report = await runPage('bench/index.html', { ...SMALL, list, n: '2000', w: '96', h: '64' });
+  assert.deepEqual(report.errors, []);
+  assert.equal(report.results.length, 3);
+  const [ours, half, playcanvas] = report.results;
+  for (const { configuration, wall, cpu, throughput, error } of report.results) {
+    assert.equal(error, undefined);
+    assert.equal(configuration.splats, 2000);
+    for (const { p50 } of [wall, cpu, throughput]) assert.ok(p50 > 0, `${configuration.name} took time`);
+  }
+  assert.ok(ours.statistics.visible > 100 && ours.statistics.visible <= 2000);
+  assert.ok(ours.bytes.perSplat > 100);
+  assert.deepEqual(half.ignoredOptions, ['warp']);
+  assert.equal(half.rasterizer, 'tiles');
+  if (report.environment.timestamps) {
+    assert.ok(ours.span.p50 > 0 && playcanvas.span.p50 > 0);
+    assert.ok('upscale' in half.stages && 'rasterize' in ours.stages);
+    assert.ok(ours.span.p50 <= ours.wall.p95, 'the GPU is not busy for longer than anybody waits');
+  }
+  await assert.rejects(runPage('bench/index.html', { ...SMALL, paths: 'nowhere' }), /path: expected orbit/);
+});
+
+test('what hangs overhead is not visible', { timeout: 180_000 }, async () => {
+  const common = { ...SMALL, rounds: '1', w: '96', h: '64', phases: 'wall' };
+  const overhead = { ...common, layout: 'overhead', visible: '5000' };
+  const few = await runPage('bench/index.html', { ...overhead, n: '5000' });
+  const many = await runPage('bench/index.html', { ...overhead, n: '200000' });
+  assert.equal(many.results[0].configuration.splats, 200_000);
+  assert.equal(many.results[0].statistics.visible, few.results[0].statistics.visible);
+});
+
+test('the frontier page compares with the oracle', { timeout: 180_000 }, async () => {
+  const query = { ...SMALL, rounds: '1', n: '20000', w: '192', h: '128', distance: '0.5', views: '2' };
+  const report = await runPage('bench/frontier.html', { ...query, only: '^(default|scale 0.5)$' });
+  assert.deepEqual(report.errors, []);
+  assert.equal(report.reference.kind, 'oracle');
+  const [full, half] = report.results;
+  assert.equal(full.views.length, 2);
+  assert.ok(full.quality.psnr >= 59, `default: ${full.quality.psnr} dB`);
+  assert.ok(half.quality.psnr < full.quality.psnr - 10, `half: ${half.quality.psnr} dB`);
+  assert.equal(pointsOf(report).length, 2);
+});

@@ -1,0 +1,98 @@
+/** Scenes of the benchmark: copies, camera paths, and the PLY files that other renderers are given. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { eyeOf, validateCamera, type Camera, type GaussianCloud } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
+import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
+import { room } from '../support/scenes.js';
+import { benchModule } from './load.js';
+
+interface Copy {
+  readonly offset: readonly [number, number, number];
+  readonly length: number;
+}
+
+const { placeCopies } = await benchModule('scene/placement.js');
+const { tileCloud, packCopies, firstSplats } = await benchModule('scene/tiling.js');
+const { camerasAlong, PATH_NAMES, scaledCamera } = await benchModule('scene/paths.js');
+const { writePly } = await benchModule('peers/ply.js');
+
+const small: GaussianCloud = firstSplats(room().cloud, 300);
+const SIZE = { width: 320, height: 180 };
+
+test('copies add up to the number of splats that was asked for', () => {
+  for (const count of [0, 100, 300, 301, 2999, 3000]) {
+    const { copies, radius } = placeCopies({ base: 300, count });
+    const total = copies.reduce((sum: number, { length }: Copy) => sum + length, 0);
+    assert.equal(total, count || 300);
+    assert.ok(radius > 0);
+    assert.equal(new Set(copies.map(({ offset }: Copy) => offset.join())).size, copies.length, 'no two in one place');
+  }
+  assert.throws(() => placeCopies({ base: 1, count: 1, layout: 'pile' }), /layout: expected ground or overhead/);
+});
+
+test('what stands overhead is seen from no frame of any path but zoom', () => {
+  const { copies, radius } = placeCopies({ base: 300, count: 30_000, layout: 'overhead', visible: 900 });
+  const above: Copy[] = copies.filter(({ offset }: Copy) => offset[1] !== 0);
+  assert.equal(above.length, 97);
+  for (const path of PATH_NAMES.filter((name: string) => name !== 'zoom')) {
+    for (const camera of camerasAlong({ path, ...SIZE, frames: 200, radius }) as Camera[]) {
+      for (const { offset } of above) assert.ok(!isNearView(camera, offset), `${path} sees a copy at ${offset}`);
+    }
+  }
+});
+
+/** Whether a ball of radius 1 around a point may touch the picture. */
+function isNearView({ worldToCamera: m, height, fy }: Camera, point: readonly number[]): boolean {
+  const [, y, z] = [0, 1, 2].map(
+    (r) => m[4 * r] * point[0] + m[4 * r + 1] * point[1] + m[4 * r + 2] * point[2] + m[4 * r + 3],
+  );
+  const half = Math.atan(height / (2 * fy));
+  // Distance to the upper plane of the view: the scene lies below, copies above.
+  return -y * Math.cos(half) - z * Math.sin(half) < 1 && z > -1;
+}
+
+test('every path gives valid cameras, and strafing does not turn', () => {
+  for (const path of PATH_NAMES) {
+    const cameras: Camera[] = camerasAlong({ path, ...SIZE, frames: 30, radius: 2.5 });
+    assert.equal(cameras.length, 30);
+    cameras.forEach((camera) => validateCamera(camera));
+  }
+  const [first, ...others]: Camera[] = camerasAlong({ path: 'strafe', ...SIZE, frames: 10, radius: 2.5 });
+  const rotation = ({ worldToCamera: m }: Camera) => [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => m[i].toFixed(12)).join();
+  for (const camera of others) assert.equal(rotation(camera), rotation(first));
+  const zoom: Camera[] = camerasAlong({ path: 'zoom', ...SIZE, frames: 10, radius: 2.5 });
+  const distance = (camera: Camera) => Math.hypot(...eyeOf(camera.worldToCamera));
+  assert.ok(Math.abs(distance(zoom[9]) / distance(zoom[0]) - 64) < 1e-9);
+  assert.throws(() => camerasAlong({ path: 'walk', ...SIZE, frames: 1, radius: 1 }), /path: expected orbit/);
+});
+
+test('a camera at another resolution sees the same', () => {
+  const [camera]: Camera[] = camerasAlong({ path: 'orbit', ...SIZE, frames: 1, radius: 2.5 });
+  const half: Camera = scaledCamera(camera, 0.5);
+  assert.deepEqual([half.width, half.height, half.fx, half.cx], [160, 90, camera.fx / 2, camera.cx / 2]);
+});
+
+test('packed copies are what packing the whole tiled cloud gives', () => {
+  const { copies } = placeCopies({ base: small.count, count: 1000 });
+  const expected: PackedGaussians = packGaussians(tileCloud(small, copies));
+  const packed: PackedGaussians = packCopies(small, packGaussians(small), copies);
+  assert.equal(packed.count, 1000);
+  assert.deepEqual(packed.geometry, expected.geometry);
+  assert.deepEqual(packed.sh, expected.sh);
+});
+
+test('a PLY for other renderers reads back as the tiled cloud', async () => {
+  const { copies } = placeCopies({ base: small.count, count: 700 });
+  const expected: GaussianCloud = tileCloud(small, copies);
+  const bytes = new Uint8Array(await (writePly(small, copies) as Blob).arrayBuffer());
+  const cloud = await readScene(bytes, { name: 'scene.ply' });
+  assert.equal(cloud.count, 700);
+  assert.equal(cloud.shDegree, small.shDegree);
+  for (const name of ['positions', 'rotations', 'scales', 'opacities', 'sh'] as const) {
+    for (let i = 0; i < expected[name].length; i++) {
+      const limit = 2e-6 * Math.max(1, Math.abs(expected[name][i]));
+      assert.ok(Math.abs(cloud[name][i] - expected[name][i]) <= limit, `${name}[${i}]`);
+    }
+  }
+});

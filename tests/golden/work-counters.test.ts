@@ -1,0 +1,112 @@
+/**
+ * How much work a frame is: splats, passes, dispatches, bytes. Times on a shared machine say little; these figures are the
+ * same everywhere, so a change that makes a frame more expensive is seen by its author.
+ * `UPDATE_WORK_COUNTERS=1 npm test -- work-counters` writes work-counters.json anew.
+ */
+import assert from 'node:assert/strict';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { after, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { GaussianBuffers, packGaussians, Renderer, type RendererOptions } from '@gaussian-splat/renderer';
+import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { room } from '../support/scenes.js';
+import { countWork } from '../support/work-counters.js';
+
+type Figures = Readonly<Record<string, number>>;
+
+const file = fileURLToPath(new URL('work-counters.json', import.meta.url));
+const expected = JSON.parse(readFileSync(file, 'utf8')) as Record<string, Figures>;
+const found: Record<string, Figures> = {};
+
+/** Passes and calls are exact; what follows from arithmetic in float32 may differ by this share between GPUs. */
+const TOLERANCE: Readonly<Record<string, number>> = {
+  visible: 0.001,
+  pairs: 0.005,
+  sceneBytes: 0.01,
+  rendererBytes: 0.01,
+};
+
+const CONFIGURATIONS: readonly (readonly [name: string, options: RendererOptions])[] = [
+  ['quads', { rasterizer: 'quads' }],
+  ['tiles', { rasterizer: 'tiles' }],
+];
+
+/** A frame of the room, after one that allocates and compiles. */
+async function measure(options: RendererOptions): Promise<Figures> {
+  // A device of its own: what renderers share on a device is made once and would be missing in the second count.
+  const device = await (await requestNodeAdapter()).requestDevice();
+  const counter = countWork(device);
+  const { cloud, cameras } = room();
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device, options);
+  const [camera] = cameras;
+  const size = [camera.width, camera.height];
+  const target = device.createTexture({ size, format: 'rgba8unorm', usage: 0x10 }).createView();
+  counter.take();
+  const draw = (): void => renderer.render({ gaussians, camera, target, targetFormat: 'rgba8unorm' });
+  draw();
+  const { buffersCreated, bytesAllocated } = counter.take();
+  draw();
+  const { buffersCreated: buffersPerFrame, bytesAllocated: bytesPerFrame, ...frame } = counter.take();
+  const { visible, ...others } = await renderer.readStatistics();
+  const figures = {
+    visible,
+    ...('pairs' in others ? { pairs: others.pairs as number } : {}),
+    ...frame,
+    buffersPerFrame,
+    bytesPerFrame,
+    buffersOfFirstFrame: buffersCreated,
+    bytesOfFirstFrame: bytesAllocated,
+    sceneBytes: gaussians.byteLength,
+    rendererBytes: renderer.byteLength,
+  };
+  renderer.destroy();
+  gaussians.destroy();
+  return figures;
+}
+
+function assertSame(name: string, figures: Figures): void {
+  for (const [figure, before] of Object.entries(expected[name] ?? {})) {
+    const now = figures[figure];
+    const tolerance = (TOLERANCE[figure] ?? 0) * before;
+    assert.ok(
+      Math.abs(now - before) <= tolerance,
+      `${name}: ${figure} was ${before}, is ${now}. If that is meant, UPDATE_WORK_COUNTERS=1 npm test -- work-counters`,
+    );
+  }
+}
+
+for (const [name, options] of CONFIGURATIONS) {
+  test(`work of a frame with ${name}`, async () => {
+    found[name] = await measure(options);
+    console.log(name, JSON.stringify(found[name]));
+    assert.equal(found[name].buffersPerFrame, 0, 'a frame creates no buffer');
+    assert.equal(found[name].bytesPerFrame, 0, 'a frame allocates nothing');
+    assert.ok(found[name].visible > 1000, 'the scene is visible');
+    if (process.env.UPDATE_WORK_COUNTERS) return;
+    assert.ok(name in expected, `work-counters.json has no figures of ${name}`);
+    assertSame(name, found[name]);
+  });
+}
+
+test('the counter sees what it is there to see', async () => {
+  const device = await (await requestNodeAdapter()).requestDevice();
+  const counter = countWork(device);
+  const buffer = device.createBuffer({ size: 64, usage: 0x8 });
+  device.queue.writeBuffer(buffer, 0, new Uint32Array(4));
+  const encoder = device.createCommandEncoder();
+  encoder.beginComputePass().end();
+  device.queue.submit([encoder.finish()]);
+  const { submits, computePasses, dispatches, buffersCreated, bytesAllocated, bytesWritten } = counter.take();
+  assert.deepEqual(
+    { submits, computePasses, dispatches, buffersCreated, bytesAllocated, bytesWritten },
+    { submits: 1, computePasses: 1, dispatches: 0, buffersCreated: 1, bytesAllocated: 64, bytesWritten: 16 },
+  );
+  assert.equal(counter.take().submits, 0, 'and starts anew');
+});
+
+after(() => {
+  if (process.env.UPDATE_WORK_COUNTERS) writeFileSync(file, `${JSON.stringify(found, null, 2)}\n`);
+  // Dawn keeps Node alive.
+  setImmediate(() => process.exit());
+});
