@@ -1,4 +1,5 @@
 /** A benchmark's report as text. */
+import { adapterName } from '../../demo/bench/run/environment.js';
 
 const ms = (summary) => (summary ? summary.p50.toFixed(1) : '');
 
@@ -29,9 +30,9 @@ export function benchTable({ environment, results }) {
       ? row.map((cell, k) => (k === 0 ? cell.padEnd(widths[k]) : cell.padStart(widths[k]))).join('  ')
       : row.join(': ');
   return [
-    `${adapter.description || adapter.vendor}; ${versions.commit}; PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}`,
-    'Milliseconds, medians. GPU: first pass begins to last one ends. wall: one frame, drained. ordered: until drawn in its own',
-    'order. stream: a frame with two in flight.',
+    `${adapterName(adapter)}; ${versions.commit}; PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}`,
+    'Milliseconds, medians. GPU: first pass begins to last one ends; wall: one frame, queue drained; p95: of wall;',
+    'ordered: until drawn in the order of its own camera; stream: a frame with two in flight.',
     '',
     ...[COLUMNS.map(([title]) => title), ...rows].map(line),
   ].join('\n');

@@ -25,6 +25,7 @@ const STYLE = `
   }
   svg { font: ${FONT}px system-ui, sans-serif; }
   text { fill: var(--ink); }
+  .label { paint-order: stroke; stroke: var(--ground); stroke-width: 3px; stroke-linejoin: round; }
   .quiet { fill: var(--quiet); }
   .grid { stroke: var(--line); }
   .own { fill: var(--own); } .peer { fill: var(--peer); }
@@ -140,7 +141,7 @@ function drawPoints(points, front, { x, y }) {
   const labels = placed.map(({ text, at, anchor, point, far }) => {
     const line = far ? tag('line', { class: 'leader', x1: point.x, y1: point.y, x2: at.x, y2: at.y - 4 }) : '';
     const weight = point.weight ? { 'font-weight': 600 } : {};
-    return line + words(at.x, at.y, text, { 'text-anchor': anchor, ...weight });
+    return line + words(at.x, at.y, text, { class: 'label', 'text-anchor': anchor, ...weight });
   });
   return [...marks, ...labels].join('\n');
 }
@@ -151,8 +152,8 @@ function drawCaption({ environment, scene, reference, run }) {
   const against = reference.kind === 'oracle' ? 'the float64 oracle' : 'our compute rasterizer in float32';
   const lines = [
     `Orange: ours (${versions.commit}); blue: PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}. Filled: GPU time, first pass to last; hollow: wall time, queue drained.`,
-    `Dashed: no configuration is both faster and truer. ${scene.views} views of the path “${scene.path}”, covered pixels, against ${against}; ${run.rounds} rounds of ${run.frames} frames. Bold: on the front.`,
-    `Scene ${scene.scene.split('/').at(-1)}, ${scene.antialiased ? 'antialiased' : 'classic'}. ${browser}, ${date.slice(0, 10)}.`,
+    `Dashed, bold: nothing else is both faster and truer. ${scene.views} views of the path “${scene.path}”, covered pixels, against ${against}.`,
+    `Scene ${scene.scene.split('/').at(-1)}, ${scene.antialiased ? 'antialiased' : 'classic'}; ${run.rounds} × ${run.frames} frames; ${browser}; ${date.slice(0, 10)}.`,
   ];
   return lines
     .map((line, i) => words(MARGIN.left - 40, HEIGHT - 40 + 15 * i, line, { class: 'quiet', 'font-size': 11 }))
