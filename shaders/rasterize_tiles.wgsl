@@ -25,6 +25,9 @@ const TILE_THREADS = TILE * TILE;
 // Pairs that a thread looks at in one go, and words with a bit for each pair of all threads.
 const PAIRS_PER_THREAD = 4u;
 const HIT_WORDS = PAIRS_PER_THREAD * TILE_THREADS / 32u;
+const BATCH_WORDS = TILE_THREADS / 32u;
+// Blocks of 8 x 4 pixels, each painted by 32 threads.
+const BLOCKS = TILE_THREADS / 32u;
 // Splats that wait to be painted: those just found and, at most a batch, those left over from before.
 const QUEUE = (PAIRS_PER_THREAD + 1u) * TILE_THREADS;
 // sqrt(log2(e) / 2): in axes stretched by it a Gaussian is 2^-(u² + v²).
@@ -39,10 +42,10 @@ var<workgroup> queued: u32;
 var<workgroup> shapes: array<vec4f, TILE_THREADS>;
 // 1 / sigma_v in those axes, red and green, blue and depth, log2 of the opacity;
 var<workgroup> paints: array<vec4u, TILE_THREADS>;
-// a bit for each block of 8 x 4 pixels of the tile that the splat touches.
-var<workgroup> blocks: array<u32, TILE_THREADS>;
+// for each block of 8 x 4 pixels of the tile a bit for each splat that touches it.
+var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
 // Of the batch, a bit for each splat that contributed.
-var<workgroup> contributors: array<atomic<u32>, TILE_THREADS / 32u>;
+var<workgroup> contributors: array<atomic<u32>, BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
 
@@ -52,16 +55,18 @@ fn pixel_in_tile(lane: u32) -> vec2u {
   return vec2u((own % 2u) * 8u + lane % 8u, (own / 2u) * 4u + (lane / 8u) % 4u);
 }
 
-fn touched_blocks(s: ProjectedSplat, tile_corner: vec2f) -> u32 {
+// Notes splat k of the batch for the blocks of the tile that it touches.
+fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
   let c = coverage_of(s);
-  var mask = 0u;
+  let word = k / 32u;
+  let bit = 1u << (k % 32u);
   for (var row = 0u; row < 4u; row++) {
     let top = tile_corner.y + f32(row) * 4.0 + 0.5;
     let range = band_range(c, top - 0.01, top + 3.01) + vec2f(-0.01, 0.01) - tile_corner.x;
-    let touches = vec2<bool>(range.x <= 7.5 && range.y >= 0.5, range.x <= 15.5 && range.y >= 8.5);
-    mask |= select(0u, select(0u, 1u, touches.x) | select(0u, 2u, touches.y), range.x <= range.y) << (2u * row);
+    if (range.x > range.y) { continue; }
+    if (range.x <= 7.5 && range.y >= 0.5) { atomicOr(&block_hits[2u * row * BATCH_WORDS + word], bit); }
+    if (range.x <= 15.5 && range.y >= 8.5) { atomicOr(&block_hits[(2u * row + 1u) * BATCH_WORDS + word], bit); }
   }
-  return mask;
 }
 
 // Adds the pairs from `start` on that touch the tile to the queue, in their order. Ends with a barrier.
@@ -97,7 +102,7 @@ fn find_splats(start: u32, end: u32, tile_bit: u32, lane: u32) {
 
 fn load_splat(k: u32, tile_corner: vec2f) {
   let s = splats[queue[k]];
-  blocks[k] = touched_blocks(s, tile_corner);
+  hit_blocks(k, s, tile_corner);
   shapes[k] = s.shape * vec4f(1.0, 1.0, BASE_2_AXIS, 1.0);
   let inverse_sigma_v = bitcast<f32>(s.paint.x) * BASE_2_AXIS;
   let power = log2(bitcast<f32>(s.paint.w));
@@ -109,7 +114,7 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
   let corner = tile.xy * TILE;
   let pixel = corner + pixel_in_tile(lane);
   let center = vec2f(pixel) + 0.5;
-  let own_block = 1u << (lane / 32u);
+  let own_block = lane / 32u;
   let bin = tile.xy / vec2u(BIN_COLUMNS, BIN_ROWS);
   let in_bin = tile.xy % vec2u(BIN_COLUMNS, BIN_ROWS);
   let tile_bit = 1u << (in_bin.y * BIN_COLUMNS + in_bin.x);
@@ -130,13 +135,25 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
     }
     let count = min(waiting, TILE_THREADS);
     if (count == 0u) { break; }
-    if (lane < count) { load_splat(lane, vec2f(corner)); }
+    if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
-    if (takes_notes && lane < TILE_THREADS / 32u) { atomicStore(&contributors[lane], 0u); }
+    if (takes_notes && lane < BATCH_WORDS) { atomicStore(&contributors[lane], 0u); }
+    workgroupBarrier();
+    if (lane < count) { load_splat(lane, vec2f(corner)); }
     workgroupBarrier();
 
-    for (var k = 0u; k < count && !finished; k++) {
-      if ((blocks[k] & own_block) == 0u) { continue; }
+    var word = 0u;
+    var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS]);
+    while (!finished) {
+      // The next splat of the batch that touches the block.
+      if (ahead == 0u) {
+        word++;
+        if (word == BATCH_WORDS) { break; }
+        ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
+        continue;
+      }
+      let k = word * 32u + countTrailingZeros(ahead);
+      ahead &= ahead - 1u;
       let shape = shapes[k];
       let paint = paints[k];
       let offset = center - shape.xy;
@@ -148,7 +165,7 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
       let remaining = transmittance * (1.0 - alpha);
       if (remaining <= transmittance_min) {
         finished = true;
-        break;
+        continue;
       }
       let weight = transmittance * alpha;
       let blue_depth = unpack2x16float(paint.z);

@@ -75,12 +75,11 @@ export class OwnRenderer {
     this.#target.destroy();
   }
 
-  #drawInto({ drawn, format, view, upscaler }, camera, timer) {
+  #drawInto({ drawn, view, upscaler }, camera, timer) {
     this.#renderer.render({
       gaussians: this.#gaussians,
       camera: this.#scale === 1 ? camera : scaledCamera(camera, this.#scale),
-      target: drawn.createView(),
-      targetFormat: format,
+      target: drawn,
       timer,
     });
     upscaler?.draw(view, timer);
@@ -89,7 +88,7 @@ export class OwnRenderer {
 
 /** The texture that shows the image and, at another resolution scale, the one that it is drawn into first. */
 function makeTarget(device, format, { width, height }, scale) {
-  const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.TEXTURE_BINDING;
+  const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.STORAGE_BINDING;
   const texture = device.createTexture({ label: 'bench.target', size: [width, height], format, usage });
   const smaller = scaledCamera({ width, height, fx: 1, fy: 1, cx: 0, cy: 0 }, scale);
   const drawn =

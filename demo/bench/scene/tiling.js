@@ -44,55 +44,59 @@ export function tileCloud(cloud, copies) {
  */
 export async function uploadTiled(device, cloud, copies, packOptions) {
   const packed = packGaussians(cloud, packOptions);
+  if (copies.length === 1) return [await GaussianBuffers.upload(device, shifted(packed, copies[0].offset))];
   const uploads = [];
   for (let first = 0; first < copies.length;) {
     let [end, count] = [first, 0];
     while (end < copies.length && (end === first || count + copies[end].length <= UPLOAD))
       count += copies[end++].length;
-    const part = packCopies(cloud, packed, copies.slice(first, end), packOptions);
-    uploads.push(await GaussianBuffers.upload(device, part));
+    uploads.push(await GaussianBuffers.upload(device, packCopies(packed, copies.slice(first, end))));
     first = end;
   }
   return uploads;
 }
 
-/** Packed copies of a cloud that is packed already: all of its typed arrays are repeated, whatever they hold. */
-export function packCopies(cloud, packed, copies, packOptions) {
-  const count = copies.reduce((sum, { length }) => sum + length, 0);
-  const arrays = Object.entries(packed).filter(([, value]) => ArrayBuffer.isView(value));
-  const out = { ...packed, count };
-  for (const [name, array] of arrays) out[name] = new array.constructor((array.length / packed.count) * count);
-  const shiftInPlace = positionsArePlain(cloud, packed);
+/** Splats whose bounds the packed scene keeps together. */
+const CHUNK = 256;
+/** Numbers of a chunk: least x, y, z, reach, greatest x, y, z, nothing. */
+const CHUNK_NUMBERS = 8;
+
+/** Packed copies of a packed scene, each cut to whole chunks: at most 255 splats of a copy are missing. */
+export function packCopies(packed, copies) {
+  const lengths = copies.map(({ length }) => Math.floor(length / CHUNK) * CHUNK);
+  const count = lengths.reduce((sum, length) => sum + length, 0);
+  const strides = { geometry: packed.geometry.length / packed.count, sh: packed.sh.length / packed.count };
+  const geometry = new Uint32Array(strides.geometry * count);
+  const sh = new Uint32Array(strides.sh * count);
+  const chunks = new Float32Array((CHUNK_NUMBERS * count) / CHUNK);
   let at = 0;
-  for (const { offset, length } of copies) {
-    const source = shiftInPlace ? packed : packGaussians(shiftedCloud(cloud, offset), packOptions);
-    for (const [name, array] of arrays) {
-      const stride = array.length / packed.count;
-      out[name].set(source[name].subarray(0, stride * length), stride * at);
-    }
-    if (shiftInPlace) {
-      const stride = packed.geometry.length / packed.count;
-      shift(new Float32Array(out.geometry.buffer), stride * at, stride, length, offset);
-    }
+  copies.forEach(({ offset }, i) => {
+    const length = lengths[i];
+    geometry.set(packed.geometry.subarray(0, strides.geometry * length), strides.geometry * at);
+    sh.set(packed.sh.subarray(0, strides.sh * length), strides.sh * at);
+    const firstChunk = (CHUNK_NUMBERS * at) / CHUNK;
+    chunks.set(packed.chunks.subarray(0, (CHUNK_NUMBERS * length) / CHUNK), firstChunk);
+    const own = {
+      geometry: geometry.subarray(strides.geometry * at, strides.geometry * (at + length)),
+      chunks: chunks.subarray(firstChunk, firstChunk + (CHUNK_NUMBERS * length) / CHUNK),
+    };
+    shiftPacked(own, strides.geometry, offset);
     at += length;
-  }
-  return out;
+  });
+  return { ...packed, count, geometry, sh, chunks };
 }
 
-/** Whether a splat's geometry starts with its position in float32; if not, each copy is packed anew, which is slow. */
-function positionsArePlain({ count, positions }, packed) {
-  const floats = new Float32Array(packed.geometry.buffer, packed.geometry.byteOffset, packed.geometry.length);
-  const stride = packed.geometry.length / packed.count;
-  return (
-    packed.count === count &&
-    [0, count - 1].every((i) => [0, 1, 2].every((k) => floats[stride * i + k] === positions[3 * i + k]))
-  );
+function shifted(packed, offset) {
+  const moved = { ...packed, geometry: packed.geometry.slice(), chunks: packed.chunks.slice() };
+  shiftPacked(moved, packed.geometry.length / packed.count, offset);
+  return moved;
 }
 
-function shiftedCloud(cloud, offset) {
-  const positions = cloud.positions.slice();
-  shift(positions, 0, 3, cloud.count, offset);
-  return { ...cloud, positions };
+/** Moves packed splats, each of which starts with its position in float32, and the bounds of their chunks. */
+function shiftPacked({ geometry, chunks }, stride, offset) {
+  const floats = new Float32Array(geometry.buffer, geometry.byteOffset, geometry.length);
+  shift(floats, 0, stride, geometry.length / stride, offset);
+  shift(chunks, 0, CHUNK_NUMBERS / 2, (2 * chunks.length) / CHUNK_NUMBERS, offset);
 }
 
 /** Adds an offset to the three floats at the start of each of `length` records. */

@@ -1,13 +1,11 @@
 import { dot, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { constants, layouts } from './generated/shaders.js';
-import { BUFFER_USAGE } from './gpu/kernel.js';
+import { BUFFER_USAGE, dispatchGrid } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import type { PassTimer } from './gpu/pass-timer.js';
-import { writeStruct } from './gpu/struct.js';
 import type { PageTable } from './page-table.js';
 import { OrderKeysStage } from './stages/order-keys.js';
 import { SortStage } from './stages/sort.js';
-import { dispatchGrid } from './gpu/kernel.js';
 
 const KEY_BITS = 32;
 const { SORT_BLOCK, DIGITS, CULL_GROUP } = constants;
@@ -106,17 +104,17 @@ export class DepthOrder {
   }
 
   #writePlan(plan: GPUBuffer, blocks: number): void {
-    const bytes = new ArrayBuffer(layouts.Plan.size);
-    const [sort_x, sort_y] = dispatchGrid(blocks);
-    const zeros = Object.fromEntries(Object.keys(layouts.Plan.fields).map((name) => [name, 0])) as PlanNumbers;
-    const { pages: _, ...fields } = layouts.Plan.fields;
-    const values = { ...zeros, visible: this.length, sort_blocks: blocks, sort_x, sort_y, sort_z: 1 };
-    writeStruct({ size: layouts.Plan.size, fields }, values, bytes);
-    this.#device.queue.writeBuffer(plan, 0, bytes);
+    const words = new Uint32Array(layouts.Plan.size / 4);
+    const { visible, sort_blocks, sort_x, sort_y, sort_z } = layouts.Plan.fields;
+    const [columns, rows] = dispatchGrid(blocks);
+    words[visible.offset / 4] = this.length;
+    words[sort_blocks.offset / 4] = blocks;
+    words[sort_x.offset / 4] = columns;
+    words[sort_y.offset / 4] = rows;
+    words[sort_z.offset / 4] = 1;
+    this.#device.queue.writeBuffer(plan, 0, words);
   }
 }
-
-type PlanNumbers = Record<keyof typeof layouts.Plan.fields, number>;
 
 /** Unit vector along which a camera measures depth, in world coordinates. */
 export function axisOf({ worldToCamera }: Camera): Vector3 {
