@@ -31,8 +31,9 @@ async function buildDemo() {
   // The packages were not there when this script started on a fresh clone.
   const { build } = await import('esbuild');
   await build({
-    entryPoints: [join(from, 'bench/bench.js')],
-    outfile: join(to, 'bench/bench.js'),
+    entryPoints: ['bench/bench.js', 'check/check.js'].map((name) => join(from, name)),
+    outbase: from,
+    outdir: to,
     allowOverwrite: true,
     bundle: true,
     format: 'esm',
