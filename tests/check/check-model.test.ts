@@ -26,7 +26,13 @@ function command(...args: string[]): { status: number | null; text: string } {
 
 /** What is wrong with each fixture, values included. */
 const FAULTS: Readonly<Record<string, readonly string[]>> = {
-  'faulty-values.onnx': ['contract/count', 'contract/covariance', 'contract/not-finite', 'contract/opacity'],
+  'faulty-values.onnx': [
+    'contract/count',
+    'contract/covariance',
+    'contract/not-finite',
+    'contract/not-finite',
+    'contract/opacity',
+  ],
   'faulty-random.onnx': ['contract/not-deterministic'],
   'faulty-run.onnx': ['contract/run'],
   'subgraphs.onnx': [
@@ -43,14 +49,16 @@ for (const name of fixtureNames()) {
     const report = await checkModel(fixturePath(name), { run: true });
     assert.deepEqual(codes(report), FAULTS[name] ?? []);
     const runs = report.sections.find(({ title }) => title === 'Runs');
-    assert.equal(runs?.rows.length, codes(report).some((code) => /run|inference/.test(code)) ? undefined : 3);
+    const isRun = !codes(report).some((code) => /run|inference/.test(code));
+    const hasControls = ['packed-sh-half.onnx', 'post.onnx'].includes(name);
+    assert.equal(runs?.rows.length, isRun ? (hasControls ? 5 : 3) : undefined);
   });
 }
 
 test('values that were run are the ones in the table: a live count follows its control', async () => {
   const { sections } = await checkModel(fixturePath('packed-sh-half.onnx'), { run: true });
   const live = sections.find(({ title }) => title === 'Runs')!.rows.map(([, rows]) => rows);
-  assert.deepEqual(live, ['32 of 64 rows', '64 rows', '0 of 64 rows']);
+  assert.deepEqual(live, ['32 of 64 rows', '32 of 64 rows', '32 of 64 rows', '0 of 64 rows', '64 rows']);
 });
 
 test('the command: a table and 0, faults and 1, wrong use and 2', () => {
@@ -60,7 +68,15 @@ test('the command: a table and 0, faults and 1, wrong use and 2', () => {
   assert.match(good.text, /keeps the contract \(header/);
   const bad = command(fixturePath('faulty-values.onnx'), '--run');
   assert.equal(bad.status, 1, bad.text);
-  for (const part of ['4 faults', 'contract/covariance', 'in 3 of 64 rows', 'found NaN', 'found 65', 'found 1.5']) {
+  for (const part of [
+    '5 faults',
+    'colors of row 6',
+    'contract/covariance',
+    'in 3 of 64 rows',
+    'found NaN',
+    'found 65',
+    'found 1.5',
+  ]) {
     assert.ok(bad.text.includes(part), `${part} in ${bad.text}`);
   }
   assert.match(command(fixturePath('canonical.onnx')).text, /Warning: no contract was found/);
@@ -69,6 +85,17 @@ test('the command: a table and 0, faults and 1, wrong use and 2', () => {
   assert.match(missing.text, /no-such\.onnx.*ENOENT.*Check the path/s);
   for (const args of [[], ['a', 'b'], ['--nonsense']]) assert.equal(command(...args).status, 2, args.join());
   assert.equal(command('--help').status, 0);
+});
+
+test('bounds are held against runs at defaults; controls may leave them', async () => {
+  const path = join(folder, 'bounds.json');
+  const contract = JSON.parse(readFileSync(fixturePath('packed-sh-half.contract.json'), 'utf8')) as object;
+  const checkWith = async (minZ: number): Promise<string[]> => {
+    writeFileSync(path, JSON.stringify({ ...contract, bounds: { min: [-1, -1, minZ], max: [1, 1, 1] } }));
+    return codes(await checkModel(fixturePath('packed-sh-half.onnx'), { contract: path, run: true }));
+  };
+  // By default the upper half of the ball lives, with the control at its most all of it.
+  assert.deepEqual([await checkWith(0), await checkWith(0.5)], [[], ['contract/conflict']]);
 });
 
 test('--contract counts before the file beside the model', async () => {

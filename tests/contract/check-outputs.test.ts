@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import {
+  checkBounds,
   checkOutputs,
   compareRuns,
   halfToNumber,
@@ -161,8 +162,13 @@ test('split: scales, rotations, logits', () => {
 
 test('declared bounds hold the centres', () => {
   const bounded = (max: number): Contract => ({ ...PACKED, bounds: { min: [0, 0, 0], max: [max, max, max] } });
-  assert.deepEqual(check(packed(2), bounded(3)), []);
-  assert.deepEqual(codes(check(packed(2), bounded(2.5))), ['conflict']);
+  const report = checkOutputs(PACKED, { gaussians: packed(2) });
+  assert.deepEqual(checkBounds(PACKED, report), []);
+  assert.deepEqual(checkBounds(bounded(3), report), []);
+  const faults = checkBounds(bounded(2.5), report);
+  assertHelpful(faults);
+  assert.deepEqual(codes(faults), ['conflict']);
+  assert.equal(faults[0].tensor, 'gaussians');
 });
 
 test('pictures are finite', () => {

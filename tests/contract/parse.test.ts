@@ -114,6 +114,13 @@ test('split: either covariances or scales with rotations, either colours or harm
   );
 });
 
+test('matrices, controls and pictures may be several', () => {
+  const control = { role: 'control', range: [0, 1], default: 0 };
+  const matrices = { a: { role: 'view' }, b: { role: 'view', axes: 'RUB' } };
+  const inputs = { ...matrices, c: control, d: control, e: { role: 'image' }, f: { role: 'image' } };
+  parseContract({ ...PACKED, inputs });
+});
+
 test('all faults are reported, and survive postMessage', () => {
   const bad = {
     version: 1,

@@ -20,6 +20,8 @@ export interface SampleTensor {
 export interface Sample {
   /** What is special about it, for the table. */
   readonly label: string;
+  /** True if controls, poses and shapes are at their defaults: declared bounds must then hold. */
+  readonly isDefault: boolean;
   readonly inputs: Readonly<Record<string, SampleTensor>>;
 }
 
@@ -27,27 +29,34 @@ export interface Sample {
 const SAMPLE_ROWS = 16;
 const SAMPLE_PIXELS = 64;
 
-/** Inputs for runs that reach the ends of what the contract declares: defaults; latest time and largest controls; smallest. */
+/** Inputs for runs that reach the ends of what the contract declares: times and views at defaults, then controls. */
 export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
   const given = givenTensors(header, contract);
   const end = contract.duration ?? 1;
   const states: [label: string, state: GeneratorState][] = [
-    ['defaults, time 0', { camera: cameraFor(contract, 0), timeSeconds: 0 }],
-    ['other view, mid time, controls at most', at(contract, 2, 0.5 * end, 1)],
-    ['other view, last time, controls at least', at(contract, 4, end, 0)],
+    ['defaults', stateAt(contract, 0, 0)],
+    ['mid time, another view', stateAt(contract, 2, 0.5 * end)],
+    ['last time, a third view', stateAt(contract, 4, end)],
   ];
+  if (Object.values(contract.inputs).some(({ role }) => role === 'control')) {
+    states.push(['controls at least', stateAt(contract, 0, 0, 0)], ['controls at most', stateAt(contract, 0, 0, 1)]);
+  }
   return states.map(([label, state]) => ({
     label,
+    isDefault: state.controls === undefined,
     inputs: { ...bindInputs(header, contract, state), ...given },
   }));
 }
 
-function at(contract: Contract, angle: number, timeSeconds: number, end: 0 | 1): GeneratorState {
+/** @param controlEnd which end of their ranges controls are at; undefined for their defaults. */
+function stateAt(contract: Contract, angle: number, timeSeconds: number, controlEnd?: 0 | 1): GeneratorState {
+  const camera = cameraFor(contract, angle);
+  if (controlEnd === undefined) return { camera, timeSeconds };
   const controls: Record<string, number> = {};
   for (const [name, binding] of Object.entries(contract.inputs)) {
-    if (binding.role === 'control') controls[name] = binding.range[end];
+    if (binding.role === 'control') controls[name] = binding.range[controlEnd];
   }
-  return { camera: cameraFor(contract, angle), timeSeconds, controls, seed: 1 + end };
+  return { camera, timeSeconds, controls };
 }
 
 /** A view of 640x480 pixels from around the declared bounds, or around the unit box. */

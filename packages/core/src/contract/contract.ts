@@ -21,7 +21,7 @@ export interface Contract {
   readonly dtype?: 'float32' | 'float16';
   /** Degree of the spherical harmonics. The shape says it too; declared here it is checked. */
   readonly shDegree?: ShDegree;
-  /** Box around all Gaussians at all times, in world units. */
+  /** Box around all centres at all times, in world units, with controls, poses and shapes at their defaults. */
   readonly bounds?: { readonly min: Vector3; readonly max: Vector3 };
   /** Length in seconds of what the input `time` or `frame` plays. */
   readonly duration?: number;

@@ -132,11 +132,11 @@ function skeletonConflicts({ joints, parents }: InputBinding & { role: 'pose' })
       ];
 }
 
-/** Roles that a page sets once: two inputs of the same role are a mistake, apart from controls and Gaussians. */
+/** Roles that a page sets once: two inputs of the same role are a mistake. Controls and pictures are told apart by name. */
 function repeatedRoles({ inputs }: Contract): [place: string, expected: string, found: string][] {
   const seen = new Map<string, string>();
   return Object.entries(inputs).flatMap(([name, binding]) => {
-    if (binding.role === 'control') return [];
+    if (binding.role === 'control' || binding.role === 'image') return [];
     const role = binding.role === 'gaussians' ? `gaussians (${binding.attribute})` : binding.role;
     const first = seen.get(role);
     seen.set(role, name);

@@ -256,7 +256,7 @@ export const CONTRACT_SCHEMA: Schema = {
       },
       required: ['min', 'max'],
       additionalProperties: false,
-      description: 'Box around all Gaussians at all times',
+      description: 'Box around all centres at all times, with controls, poses and shapes at their defaults',
     },
     duration: positive('Seconds that the input time or frame plays'),
     fps: positive('Frames to a second of the input frame'),
