@@ -53,6 +53,18 @@ test('published examples and fixtures are contracts, for us and for ajv', () => 
   }
 });
 
+test('docs/contract.md names every code that there is, and every field of the schema', () => {
+  const errors = readFileSync(`${root}packages/core/src/errors.ts`, 'utf8');
+  const guide = readFileSync(`${root}docs/contract.md`, 'utf8');
+  const codesOf = (text: string): string[] => [
+    ...new Set([...text.matchAll(/contract\/[a-z-]+(?=['`])/g)].map(String)),
+  ];
+  assert.deepEqual(codesOf(guide).sort(), codesOf(errors).sort());
+  for (const field of Object.keys(CONTRACT_SCHEMA.properties!).filter((name) => name !== '$schema')) {
+    assert.match(guide, new RegExp(`[\`"]${field}[\`"]`), field);
+  }
+});
+
 /** One of each role and layout: the compiler holds it against the types, ajv against the schema. */
 const EVERYTHING: readonly Contract[] = [
   {

@@ -12,7 +12,7 @@ import {
   type OnnxTensor,
   type Vector3,
 } from '@gaussian-splat/core';
-import { bindInputs, type GeneratorState, type InputValue } from '@gaussian-splat/generator';
+import { bindInputs, sameInputs, type GeneratorState, type InputValue } from '@gaussian-splat/generator';
 import { headerWith, PACKED, tensor } from '../contract/support.js';
 import { seededRandom } from '../support/random.js';
 
@@ -150,6 +150,21 @@ test('poses, shapes and controls: set, or the default of the contract, or at res
 test('Gaussians and pictures come from elsewhere', () => {
   const header = headerWith([tensor('image', [1, 3, 8, 8])], [tensor('gaussians', [1, 13])]);
   assert.deepEqual(bindInputs(header, { ...PACKED, inputs: { image: { role: 'image' } } }, {}), {});
+});
+
+test('the same inputs are told from others: then nothing needs to run', () => {
+  const header = headerWith([tensor('t', [1]), tensor('v', [4, 4])], [tensor('gaussians', [1, 13])]);
+  const contract: Contract = { ...PACKED, inputs: { t: { role: 'time', unit: 'seconds' }, v: { role: 'view' } } };
+  const at = (state: GeneratorState): Record<string, InputValue> => bindInputs(header, contract, { camera, ...state });
+  assert.equal(sameInputs(at({}), at({ timeSeconds: 0, seed: 5, controls: { other: 1 } })), true);
+  assert.equal(sameInputs(at({}), at({ timeSeconds: 1e-6 })), false);
+  // What the generator does not look at does not count.
+  assert.equal(sameInputs(at({}), at({ camera: { ...camera, fx: 1 } })), true);
+  const worldToCamera = lookAt([1, -2, -4.001], [0.2, 0.1, 0], [0, -1, 0]);
+  assert.equal(sameInputs(at({}), at({ camera: { ...camera, worldToCamera } })), false);
+  const { v: view, ...time } = at({});
+  assert.deepEqual([sameInputs(at({}), time), sameInputs(time, at({}))], [false, false]);
+  assert.equal(sameInputs({ x: view }, { x: { ...view, dims: [16] } }), false);
 });
 
 test('a missing camera, a wrong length and NaN are named', () => {

@@ -35,14 +35,19 @@ export function bindInputs(header: OnnxHeader, contract: Contract, state: Genera
   return values;
 }
 
-/** Roles whose values depend on the camera: only these need a run when nothing but the camera moves. */
-export const CAMERA_ROLES: ReadonlySet<InputBinding['role']> = new Set([
-  'view',
-  'projection',
-  'view_projection',
-  'camera_position',
-  'viewport',
-]);
+/** True if two sets of values are the same, bit for bit: a generator without a seed would then write the same again. */
+export function sameInputs(a: Readonly<Record<string, InputValue>>, b: Readonly<Record<string, InputValue>>): boolean {
+  const names = Object.keys(a);
+  return (
+    names.length === Object.keys(b).length && names.every((name) => Object.hasOwn(b, name) && same(a[name], b[name]))
+  );
+}
+
+function same(a: InputValue, b: InputValue): boolean {
+  if (a.dtype !== b.dtype || a.data.length !== b.data.length) return false;
+  for (let i = 0; i < a.data.length; i++) if (!Object.is(a.data[i], b.data[i])) return false;
+  return a.dims.length === b.dims.length && a.dims.every((dim, i) => dim === b.dims[i]);
+}
 
 function numbersOf(
   input: OnnxTensor,
