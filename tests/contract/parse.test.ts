@@ -114,6 +114,14 @@ test('split: either covariances or scales with rotations, either colours or harm
   );
 });
 
+test('hostile contracts give short messages', () => {
+  const many = Object.fromEntries(Array.from({ length: 50_000 }, (_, i) => [`${'x'.repeat(i % 200)}${i}`, 0]));
+  const faults = faultsOf(() => parseContract({ ...PACKED, ...many, inputs: { ['y'.repeat(1e6)]: { role: 'z' } } }));
+  assert.equal(faults.length, 50_001);
+  const { message } = new ContractError(faults);
+  assert.ok(message.length < 20_000 && message.endsWith('- and 49981 more'), `${message.length}`);
+});
+
 test('matrices, controls and pictures may be several', () => {
   const control = { role: 'control', range: [0, 1], default: 0 };
   const matrices = { a: { role: 'view' }, b: { role: 'view', axes: 'RUB' } };

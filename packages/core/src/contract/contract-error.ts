@@ -18,6 +18,9 @@ export interface ContractErrorData extends ErrorData {
   readonly faults: readonly ContractFault[];
 }
 
+/** Faults that the message of an error spells out; all of them are in its `faults`. */
+const MESSAGE_FAULTS = 20;
+
 /** Everything that is wrong between a file, its contract and its values. Code and phrases are those of the first fault. */
 export class ContractError extends GaussianSplatError {
   override readonly name = 'ContractError';
@@ -28,7 +31,9 @@ export class ContractError extends GaussianSplatError {
     super(faults[0].code, faults[0]);
     this.faults = faults;
     if (faults.length > 1) {
-      this.message = `${faults.length} faults:\n${faults.map((fault) => `- ${describeFault(fault)}`).join('\n')}`;
+      const lines = faults.slice(0, MESSAGE_FAULTS).map((fault) => `- ${describeFault(fault)}`);
+      if (faults.length > MESSAGE_FAULTS) lines.push(`- and ${faults.length - MESSAGE_FAULTS} more`);
+      this.message = `${faults.length} faults:\n${lines.join('\n')}`;
     }
   }
 

@@ -72,7 +72,7 @@ function validateObject(value: Record<string, unknown>, schema: Schema, where: s
   const { properties = {}, additionalProperties, required = [], dependentRequired = {} } = schema;
   const faults: ContractFault[] = [];
   for (const [key, inner] of Object.entries(value)) {
-    const place = `${where}${/^[\w$]+$/.test(key) ? `.${key}` : `[${JSON.stringify(key)}]`}`;
+    const place = `${where}${/^[\w$]{1,60}$/.test(key) ? `.${key}` : `[${describe(key)}]`}`;
     if (Object.hasOwn(properties, key)) faults.push(...validate(inner, properties[key], place));
     else if (additionalProperties) faults.push(...validate(inner, additionalProperties, place));
     else if (additionalProperties === false) faults.push(unknownField(place, key, Object.keys(properties), value));
