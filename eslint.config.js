@@ -7,8 +7,13 @@ const MAY_IMPORT = {
   core: [],
   formats: ['core'],
   renderer: ['core'],
+  generator: ['core'],
+  check: ['core', 'generator'],
   element: ['core', 'formats', 'renderer'],
 };
+
+/** The packages that may load ONNX Runtime. */
+const RUN_MODELS = ['generator', 'check'];
 
 const BROWSER_ONLY = ['document', 'window', 'customElements', 'HTMLElement', 'localStorage'];
 
@@ -26,7 +31,10 @@ const directions = Object.entries(MAY_IMPORT).map(([name, allowed]) => ({
               message: `${name} must not know ${other}: see docs/architecture.md.`,
             })),
           { group: ['../../*'], message: 'Import another package by its name.' },
-          { group: ['node:*', 'fs', 'path'], message: 'Packages run in browsers.' },
+          ...(name === 'check' ? [] : [{ group: ['node:*', 'fs', 'path'], message: 'Packages run in browsers.' }]),
+          ...(RUN_MODELS.includes(name)
+            ? []
+            : [{ group: ['onnxruntime*'], message: 'Only generator and check run models.' }]),
           ...(name === 'element' ? [] : [{ group: ['lit', 'lit/*'], message: 'Only the element touches the DOM.' }]),
         ],
       },

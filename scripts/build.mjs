@@ -16,7 +16,7 @@ must(process.execPath, [
 await buildDemo();
 
 function projects() {
-  return ['core', 'formats', 'renderer', 'element'].map((name) => `packages/${name}`);
+  return ['core', 'formats', 'renderer', 'generator', 'check', 'element'].map((name) => `packages/${name}`);
 }
 
 /** demo/dist is the whole site: any static host can serve it. */
@@ -32,5 +32,15 @@ async function buildDemo() {
   // Its packages were not there when this script started on a fresh clone.
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));
+  const { build } = await import('esbuild');
+  await build({
+    entryPoints: [join(from, 'check/check.js')],
+    outfile: join(to, 'check/check.js'),
+    allowOverwrite: true,
+    bundle: true,
+    format: 'esm',
+    minify: true,
+    logLevel: 'warning',
+  });
   if (!existsSync(join(to, 'index.html'))) throw new Error('demo/index.html is missing');
 }

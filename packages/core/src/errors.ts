@@ -40,10 +40,55 @@ export type ErrorCode =
   | 'out-of-memory/allocation'
   /** The GPU device was lost and could not be brought back. */
   | 'device-lost/unrecoverable'
+  /** An ONNX file and its Gaussian Generator contract do not fit: see `ContractError`, and docs/contract.md for each. */
+  | ContractErrorCode
   /** A caller's argument breaks the documented contract of a function. */
   | 'argument/camera'
   | 'argument/cloud'
   | 'argument/value';
+
+/** Stable codes of everything that can be wrong between an ONNX file, its contract and what it writes. */
+export type ContractErrorCode =
+  /** The contract cannot be read as JSON. */
+  | 'contract/json'
+  /** A field of the contract is missing, unknown, or not what the schema asks for. */
+  | 'contract/schema'
+  /** The contract is of a version that this reader does not know. */
+  | 'contract/version'
+  /** There is no contract, and the names of inputs and outputs do not say enough to infer one. */
+  | 'contract/inference'
+  /** An input of the ONNX file has no role in the contract. */
+  | 'contract/unbound-input'
+  /** The contract names a tensor that the ONNX file does not have. */
+  | 'contract/missing-tensor'
+  /** A tensor's shape is not the one that its role asks for. */
+  | 'contract/shape'
+  /** A tensor's element type is not one that its role allows, or not the one that the contract declares. */
+  | 'contract/dtype'
+  /** Outputs disagree on the number of Gaussians, or it is above `nMax`, or symbolic without `nMax`. */
+  | 'contract/rows'
+  /** The degree of spherical harmonics that the shape tells is none, or not the one declared. */
+  | 'contract/sh-degree'
+  /** Facts within one contract contradict each other. */
+  | 'contract/conflict'
+  /** The file asks for an IR version or an opset newer than the runtime knows. */
+  | 'contract/opset'
+  /** The file uses an operator of a domain that the runtime does not have. */
+  | 'contract/operator'
+  /** A file with external data is missing, too short, or outside the model's folder. */
+  | 'contract/external-data'
+  /** The runtime refused or failed to run the model. */
+  | 'contract/run'
+  /** A value is NaN or infinite where it must be finite. */
+  | 'contract/not-finite'
+  /** A covariance is not positive semi-definite, or a scale is negative, or a rotation is zero. */
+  | 'contract/covariance'
+  /** An opacity is outside 0..1. */
+  | 'contract/opacity'
+  /** The live count is negative or above the number of rows. */
+  | 'contract/count'
+  /** The same inputs gave other outputs although no input is a seed. */
+  | 'contract/not-deterministic';
 
 /** What a person needs to mend the fault. Every field is a full phrase without a trailing full stop. */
 export interface ErrorDetails {
@@ -66,7 +111,7 @@ export interface ErrorData extends Omit<ErrorDetails, 'cause'> {
 
 /** The one error class of all packages. */
 export class GaussianSplatError extends Error implements ErrorDetails {
-  override readonly name = 'GaussianSplatError';
+  override readonly name: string = 'GaussianSplatError';
   readonly code: ErrorCode;
   readonly expected: string;
   readonly found: string;
@@ -83,7 +128,7 @@ export class GaussianSplatError extends Error implements ErrorDetails {
     this.remedy = remedy;
   }
 
-  /** Family of the code: `decode`, `network`, `unsupported`, `out-of-memory`, `device-lost` or `argument`. */
+  /** Family of the code: `decode`, `network`, `unsupported`, `out-of-memory`, `device-lost`, `contract` or `argument`. */
   get family(): string {
     return this.code.slice(0, this.code.indexOf('/'));
   }

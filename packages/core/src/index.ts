@@ -3,3 +3,5 @@ export * from './camera.js';
 export * from './errors.js';
 export * from './gaussian-cloud.js';
 export * from './vector.js';
+export * from './onnx/index.js';
+export * from './contract/index.js';

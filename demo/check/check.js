@@ -1,0 +1,102 @@
+/** The conformance checker as a page: the same reader, the same checks and the same tables as the command. */
+import {
+  blobSource,
+  checkContract,
+  checkFile,
+  ContractError,
+  contractReport,
+  describeFault,
+  GaussianSplatError,
+  readOnnxHeader,
+  resolveContract,
+} from '@gaussian-splat/core';
+
+const byId = (id) => document.getElementById(id);
+
+/** Counts up with every drop: an answer that a later drop overtook is not shown. */
+let latest = 0;
+
+/** Checks files that came together: a model, perhaps a contract, perhaps external data. */
+async function check(files) {
+  const turn = ++latest;
+  const result = await examine(files).catch(asFaults);
+  if (turn === latest) byId('report').replaceChildren(...describe(result));
+}
+
+async function examine(files) {
+  const isJson = (file) => /\.json$/i.test(file.name);
+  const others = files.filter((file) => !isJson(file));
+  // A file of another name is examined, too, so that the reader can say what it is.
+  const model = others.find((file) => /\.onnx$/i.test(file.name)) ?? others[0];
+  if (model === undefined) return { name: files[0]?.name ?? 'No file', faults: ['Drop the ONNX file along with it.'] };
+  const header = await readOnnxHeader(blobSource(model, model.name));
+  const explicit = await files.find(isJson)?.text();
+  // Only what was dropped is known: without any other file nobody has looked for external data.
+  const beside = others.filter((file) => file !== model);
+  const sizes = beside.length > 0 ? new Map(beside.map((file) => [file.name, file.size])) : undefined;
+  try {
+    const resolved = resolveContract({ header, explicit });
+    const faults = checkContract(header, resolved.contract, { files: sizes }).map(describeFault);
+    return { name: model.name, sections: contractReport(header, resolved), inferred: resolved.notes, faults };
+  } catch (error) {
+    const found = [...checkFile(header, { files: sizes }).map(describeFault), ...asFaults(error, model.name).faults];
+    return { name: model.name, sections: contractReport(header, undefined), faults: found };
+  }
+}
+
+/** What an error says, fault by fault. Errors that are not named are bugs, and are left to the console. */
+function asFaults(error, name = 'This file') {
+  if (error instanceof ContractError) return { name, faults: error.faults.map(describeFault) };
+  if (error instanceof GaussianSplatError) return { name, faults: [error.message] };
+  throw error;
+}
+
+function describe({ name, sections = [], inferred = [], faults }) {
+  const count = `${faults.length} fault${faults.length === 1 ? '' : 's'}`;
+  const verdict = element('p', faults.length > 0 ? `${name}: ${count}` : `${name} keeps the contract.`);
+  verdict.className = `verdict ${faults.length > 0 ? 'bad' : 'good'}`;
+  const list = element('ul');
+  list.className = 'faults';
+  list.append(...faults.map((fault) => element('li', fault)));
+  const warning = 'No contract was found; it was inferred from names. Write one to be sure.';
+  return [
+    verdict,
+    ...(faults.length > 0 ? [list] : []),
+    ...(inferred.length > 0 ? [element('p', warning)] : []),
+    ...sections.map(table),
+  ];
+}
+
+function table({ title, rows }) {
+  const body = element('tbody');
+  for (const [first, ...rest] of rows) {
+    const row = element('tr');
+    const head = element('th', first);
+    head.scope = 'row';
+    row.append(head, ...rest.map((cell) => element('td', cell)));
+    body.append(row);
+  }
+  const result = element('table');
+  result.append(element('caption', title), body);
+  return result;
+}
+
+function element(name, text = '') {
+  const made = document.createElement(name);
+  made.textContent = text;
+  return made;
+}
+
+byId('files').addEventListener('change', ({ target }) => {
+  if (target.files.length > 0) check([...target.files]);
+});
+
+const drop = byId('drop');
+// A file that misses the field would otherwise replace the page.
+for (const type of ['dragenter', 'dragover', 'drop']) addEventListener(type, (event) => event.preventDefault());
+for (const type of ['dragenter', 'dragover']) drop.addEventListener(type, () => drop.classList.add('over'));
+for (const type of ['dragleave', 'drop']) drop.addEventListener(type, () => drop.classList.remove('over'));
+drop.addEventListener('drop', (event) => {
+  const files = [...event.dataTransfer.files];
+  if (files.length > 0) check(files);
+});

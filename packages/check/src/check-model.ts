@@ -1,0 +1,80 @@
+import {
+  checkContract,
+  checkFile,
+  ContractError,
+  contractReport,
+  GaussianSplatError,
+  readOnnxHeader,
+  resolveContract,
+  type ContractFault,
+  type OnnxHeader,
+  type ReportSection,
+  type ResolvedContract,
+} from '@gaussian-splat/core';
+import { openModel, readText, type ModelLocation } from './model-location.js';
+import { runModel } from './run-model.js';
+
+export interface CheckOptions {
+  /** Path or address of a contract, which then counts before every other. */
+  readonly contract?: string;
+  /** Run the model, too, and check its values. */
+  readonly run?: boolean;
+}
+
+/** A fault of the contract, or an error that kept the check from getting so far. */
+export type CheckFault = ContractFault | GaussianSplatError;
+
+export interface CheckReport {
+  readonly sections: readonly ReportSection[];
+  readonly faults: readonly CheckFault[];
+  /** What was inferred because nobody wrote a contract. */
+  readonly warnings: readonly string[];
+}
+
+/**
+ * Checks one model against its contract.
+ * @param model path or address of an ONNX file.
+ * @returns tables and every fault; only programming errors are thrown.
+ */
+export async function checkModel(model: string, options: CheckOptions = {}): Promise<CheckReport> {
+  let location: ModelLocation | undefined;
+  try {
+    location = await openModel(model);
+    return await checkLocation(location, options);
+  } catch (error) {
+    if (!(error instanceof GaussianSplatError)) throw error;
+    return { sections: [], faults: [error], warnings: [] };
+  } finally {
+    await location?.close();
+  }
+}
+
+async function checkLocation(location: ModelLocation, options: CheckOptions): Promise<CheckReport> {
+  const header = await readOnnxHeader(location.source);
+  const { resolved, faults: contractFaults } = await contractOf(location, header, options);
+  const files = await location.externalSizes(header.externalFiles);
+  const headerFaults = resolved
+    ? checkContract(header, resolved.contract, { files })
+    : [...checkFile(header, { files }), ...contractFaults];
+  const sections = contractReport(header, resolved);
+  const warnings = resolved?.notes ?? [];
+  if (!options.run || !resolved || headerFaults.length > 0) return { sections, faults: headerFaults, warnings };
+  const { faults, rows } = await runModel(location, header, resolved.contract);
+  return { sections: rows.length > 0 ? [...sections, { title: 'Runs', rows }] : sections, faults, warnings };
+}
+
+/** The contract, or what is wrong with it; the file's own tables are shown in either case. */
+async function contractOf(
+  location: ModelLocation,
+  header: OnnxHeader,
+  { contract }: CheckOptions,
+): Promise<{ resolved?: ResolvedContract; faults: readonly ContractFault[] }> {
+  const explicit = contract === undefined ? undefined : await readText(contract);
+  const sidecar = explicit === undefined ? await location.sidecar() : undefined;
+  try {
+    return { resolved: resolveContract({ header, explicit, sidecar }), faults: [] };
+  } catch (error) {
+    if (error instanceof ContractError) return { faults: error.faults };
+    throw error;
+  }
+}

@@ -1,0 +1,42 @@
+import { open, stat, type FileHandle } from 'node:fs/promises';
+import { dirname, join } from 'node:path';
+import { isInside, type ByteSource, type ExternalFile } from '@gaussian-splat/core';
+
+/** A file on disk, read in pieces. */
+export class FileSource implements ByteSource {
+  readonly name: string;
+  readonly size: number;
+  readonly chunk = 65_536;
+  readonly #handle: FileHandle;
+
+  private constructor(name: string, size: number, handle: FileHandle) {
+    this.name = name;
+    this.size = size;
+    this.#handle = handle;
+  }
+
+  /** @throws the error of `node:fs` if the file cannot be opened. */
+  static async open(path: string): Promise<FileSource> {
+    const handle = await open(path);
+    return new FileSource(path, (await handle.stat()).size, handle);
+  }
+
+  async read(offset: number, length: number): Promise<Uint8Array> {
+    const { buffer, bytesRead } = await this.#handle.read(new Uint8Array(length), 0, length, offset);
+    return buffer.subarray(0, bytesRead);
+  }
+
+  close(): Promise<void> {
+    return this.#handle.close();
+  }
+}
+
+/** Sizes of the external files that lie beside a model, by the location that the model writes. */
+export async function externalSizes(model: string, files: readonly ExternalFile[]): Promise<Map<string, number>> {
+  const sizes = new Map<string, number>();
+  for (const { location } of files) {
+    const status = isInside(location) ? await stat(join(dirname(model), location)).catch(() => undefined) : undefined;
+    if (status?.isFile()) sizes.set(location, status.size);
+  }
+  return sizes;
+}

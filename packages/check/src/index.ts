@@ -1,0 +1,2 @@
+export { checkModel, type CheckFault, type CheckOptions, type CheckReport } from './check-model.js';
+export { formatReport, main } from './main.js';

@@ -1,0 +1,74 @@
+import { parseArgs } from 'node:util';
+import { describeFault, type ReportSection } from '@gaussian-splat/core';
+import { checkModel, type CheckFault, type CheckReport } from './check-model.js';
+
+const USAGE = `Usage: gaussian-splat-check MODEL [--contract CONTRACT.json] [--run]
+
+Checks an ONNX file (a path or an address) against the Gaussian Generator contract.
+
+  --contract FILE   the contract; otherwise NAME.contract.json beside the model, the model's metadata, or its names
+  --run             run the model on the CPU, too, and check its values
+
+Exit status: 0 if it keeps the contract, 1 if not, 2 if the command is wrong.`;
+
+/**
+ * The command. Prints tables and faults.
+ * @param args without the program's own name.
+ * @returns the exit status.
+ */
+export async function main(args: readonly string[]): Promise<number> {
+  let parsed: ReturnType<typeof parse>;
+  try {
+    parsed = parse(args);
+  } catch (error) {
+    console.error(`${(error as Error).message}\n\n${USAGE}`);
+    return 2;
+  }
+  const { values, positionals } = parsed;
+  if (values.help) {
+    console.log(USAGE);
+    return 0;
+  }
+  if (positionals.length !== 1) {
+    console.error(`Expected one model, found ${positionals.length}.\n\n${USAGE}`);
+    return 2;
+  }
+  const report = await checkModel(positionals[0], { contract: values.contract, run: values.run });
+  console.log(formatReport(positionals[0], report, values.run ?? false));
+  return report.faults.length > 0 ? 1 : 0;
+}
+
+function parse(args: readonly string[]) {
+  return parseArgs({
+    args: [...args],
+    allowPositionals: true,
+    options: { contract: { type: 'string' }, run: { type: 'boolean' }, help: { type: 'boolean', short: 'h' } },
+  });
+}
+
+/** The report as text for a terminal. */
+export function formatReport(model: string, { sections, faults, warnings }: CheckReport, isRun: boolean): string {
+  const tables = sections.map(formatSection);
+  const notes =
+    warnings.length > 0 ? ['Warning: no contract was found; it was inferred from names. Write one to be sure.'] : [];
+  const verdict =
+    faults.length > 0
+      ? [
+          `${model}: ${faults.length} fault${faults.length > 1 ? 's' : ''}`,
+          ...faults.map((fault) => `  ${lineOf(fault)}`),
+        ]
+      : [`${model}: keeps the contract${isRun ? ', header and values' : ' (header; --run checks values, too)'}`];
+  return [...tables, ...notes, verdict.join('\n')].join('\n\n');
+}
+
+const lineOf = (fault: CheckFault): string => (fault instanceof Error ? fault.message : describeFault(fault));
+
+function formatSection({ title, rows }: ReportSection): string {
+  const widths: number[] = [];
+  for (const row of rows) row.forEach((cell, i) => (widths[i] = Math.max(widths[i] ?? 0, cell.length)));
+  // A last column may be long; it needs no padding.
+  const lines = rows.map((row) =>
+    row.map((cell, i) => (i < row.length - 1 ? cell.padEnd(widths[i]) : cell)).join('  '),
+  );
+  return [title, ...lines.map((line) => `  ${line.trimEnd()}`)].join('\n');
+}

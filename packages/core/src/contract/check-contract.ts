@@ -1,0 +1,228 @@
+import { describeTensor, type OnnxDim, type OnnxHeader, type OnnxTensor } from '../onnx/header.js';
+import type { ContractFault } from './contract-error.js';
+import type { Contract, ControlInput, InputBinding, OutputBinding } from './contract.js';
+import { checkFile, type CheckFileOptions } from './check-file.js';
+import { tensorNames } from './parse-contract.js';
+import {
+  describeShapes,
+  findTensor,
+  inputRule,
+  outputRule,
+  shapeFits,
+  shDegreeOf,
+  type TensorRule,
+} from './tensor-rules.js';
+
+/**
+ * Holds the header of a file against a contract, before any runtime is loaded: names, shapes, element types, numbers of
+ * Gaussians, opsets, operators, external files.
+ * @returns every fault; none if the file keeps the contract.
+ */
+export function checkContract(header: OnnxHeader, contract: Contract, options: CheckFileOptions = {}): ContractFault[] {
+  return [
+    ...checkFile(header, options),
+    ...header.inputs.flatMap((input) => checkInput(input, contract)),
+    ...missingInputs(header, contract),
+    ...checkOutputTensors(header, contract.outputs),
+    ...checkGaussians(header, contract),
+  ];
+}
+
+function checkInput(input: OnnxTensor, { inputs }: Contract): ContractFault[] {
+  const binding = Object.hasOwn(inputs, input.name) ? inputs[input.name] : undefined;
+  if (binding === undefined) return [unboundInput(input)];
+  const where = `input ${input.name} (${binding.role})`;
+  const rule = inputRule(binding);
+  const faults = rule ? checkTensor(input, rule, where) : checkControl(input, where);
+  return faults.length > 0 ? faults : checkDefault(input, binding, where);
+}
+
+function unboundInput({ name, ...tensor }: OnnxTensor): ContractFault {
+  return {
+    code: 'contract/unbound-input',
+    tensor: name,
+    where: `input ${name}`,
+    expected: 'a role in the contract',
+    found: `none for ${describeTensor(tensor)}`,
+    remedy: `add ${JSON.stringify(name)} to the contract's inputs, for example as a control with range and default`,
+  };
+}
+
+function missingInputs(header: OnnxHeader, { inputs }: Contract): ContractFault[] {
+  return Object.keys(inputs)
+    .filter((name) => !findTensor(header.inputs, name))
+    .map((name) => missingTensor('input', name, inputs[name].role, header.inputs));
+}
+
+function missingTensor(
+  kind: 'input' | 'output',
+  name: string,
+  role: string,
+  tensors: readonly OnnxTensor[],
+): ContractFault {
+  const names = tensors.slice(0, 20).map((tensor) => tensor.name);
+  return {
+    code: 'contract/missing-tensor',
+    tensor: name,
+    where: `${kind} ${name} (${role})`,
+    expected: `an ${kind} of this name in the file`,
+    found: names.length > 0 ? `${kind}s ${names.join(', ')}` : `no ${kind}s`,
+    remedy: `correct the name in the contract, or export the model with it`,
+  };
+}
+
+/** Shape and element type of one tensor. */
+function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): ContractFault[] {
+  const faults: ContractFault[] = [];
+  const common = { tensor: tensor.name, where };
+  if (tensor.dims === undefined) {
+    const remedy = 'run onnx.shape_inference.infer_shapes on the model, or declare the shape at export';
+    faults.push({
+      ...common,
+      code: 'contract/shape',
+      expected: describeShapes(rule),
+      found: 'no shape in the file',
+      remedy,
+    });
+  } else if (!shapeFits(tensor.dims, rule)) {
+    const remedy = 'export the tensor in this shape; fixed sizes must be numbers, not symbols';
+    const found = `[${tensor.dims.map((dim) => dim ?? '?').join(', ')}]`;
+    faults.push({ ...common, code: 'contract/shape', expected: describeShapes(rule), found, remedy });
+  }
+  if (!rule.dtypes.includes(tensor.dtype)) {
+    const [expected, found] = [rule.dtypes.join(' or '), tensor.dtype];
+    faults.push({
+      ...common,
+      code: 'contract/dtype',
+      expected,
+      found,
+      remedy: `cast it to ${rule.dtypes[0]} at export`,
+    });
+  }
+  return faults;
+}
+
+const CONTROL_DTYPES: TensorRule['dtypes'] = ['float32', 'int32', 'int64'];
+
+function checkControl(input: OnnxTensor, where: string): ContractFault[] {
+  // The rule asks for the shape that the tensor has, if all its sizes are fixed.
+  const shape = input.dims?.map((dim) => (typeof dim === 'number' && dim > 0 ? dim : 'size'));
+  return checkTensor(input, { shapes: [shape ?? ['any fixed sizes']], dtypes: CONTROL_DTYPES }, where);
+}
+
+/** Defaults and names must be as many as the tensor has elements. */
+function checkDefault({ name, dims }: OnnxTensor, binding: InputBinding, where: string): ContractFault[] {
+  const size = elementCount(dims ?? []);
+  const lengths: [field: string, length: number | undefined, expected: number][] = [];
+  if (binding.role === 'control') lengths.push(['default', lengthOf(binding.default), size]);
+  if (binding.role === 'shape')
+    lengths.push(['default', binding.default?.length, size], ['names', binding.names?.length, size]);
+  if (binding.role === 'pose') {
+    lengths.push(['default', binding.default?.length, size]);
+    if (binding.format !== 'parameters') {
+      const joints = Number(dims?.[0]);
+      lengths.push(['joints', binding.joints?.length, joints], ['parents', binding.parents?.length, joints]);
+    }
+  }
+  return lengths
+    .filter(([, length, expected]) => length !== undefined && length !== expected)
+    .map(([field, length, expected]) => ({
+      code: 'contract/shape',
+      tensor: name,
+      where: `${where}, ${field}`,
+      expected: `a list of ${expected}, as the tensor has`,
+      found: `a list of ${length}`,
+      remedy: `correct ${field} in the contract`,
+    }));
+}
+
+const lengthOf = (value: ControlInput['default']): number | undefined =>
+  typeof value === 'number' ? undefined : value.length;
+
+const elementCount = (dims: readonly OnnxDim[]): number =>
+  dims.reduce<number>((product, dim) => product * Number(dim), 1);
+
+function checkOutputTensors(header: OnnxHeader, outputs: OutputBinding): ContractFault[] {
+  return tensorNames(outputs).flatMap(([field, name]) => {
+    const tensor = findTensor(header.outputs, name);
+    if (tensor === undefined) return [missingTensor('output', name, field, header.outputs)];
+    return checkTensor(tensor, outputRule(outputs, field), `output ${name} (${field})`);
+  });
+}
+
+/** What all tensors of Gaussians must agree on: their number, their element type, the degree of the harmonics. */
+function checkGaussians(header: OnnxHeader, contract: Contract): ContractFault[] {
+  const { outputs } = contract;
+  const tensors = tensorNames(outputs).flatMap(([field, name]) => {
+    const tensor = findTensor(header.outputs, name);
+    const fits = tensor?.dims && shapeFits(tensor.dims, outputRule(outputs, field));
+    return tensor && fits && field !== 'count' && field !== 'image' ? [{ field, ...tensor, dims: tensor.dims! }] : [];
+  });
+  return [...checkRows(tensors, contract), ...checkDtypes(tensors, contract), ...checkShDegree(tensors, contract)];
+}
+
+interface GaussianOutput extends OnnxTensor {
+  readonly field: string;
+  readonly dims: readonly OnnxDim[];
+}
+
+function checkRows(tensors: readonly GaussianOutput[], { nMax }: Contract): ContractFault[] {
+  const faults: ContractFault[] = [];
+  const fixed = tensors.filter(({ dims }) => typeof dims[0] === 'number');
+  const [first] = fixed;
+  for (const { name, dims } of fixed) {
+    const common = { code: 'contract/rows', tensor: name, where: `output ${name}`, found: `N = ${dims[0]}` } as const;
+    if (dims[0] !== first.dims[0]) {
+      const expected = `N = ${first.dims[0]}, as ${first.name} has`;
+      faults.push({ ...common, expected, remedy: 'write as many rows of every attribute' });
+    }
+    if (nMax !== undefined && Number(dims[0]) > nMax) {
+      faults.push({ ...common, expected: `at most nMax = ${nMax} rows`, remedy: 'raise nMax in the contract' });
+    }
+  }
+  const [symbolic] = tensors.filter(({ dims }) => typeof dims[0] !== 'number');
+  if (symbolic && fixed.length === 0 && nMax === undefined) {
+    faults.push({
+      code: 'contract/rows',
+      tensor: symbolic.name,
+      where: `output ${symbolic.name}`,
+      expected: 'a number of rows, or nMax in the contract',
+      found: `N = ${symbolic.dims[0] ?? 'unknown'} and no nMax`,
+      remedy: 'declare nMax, the most Gaussians that one run writes',
+    });
+  }
+  return faults;
+}
+
+function checkDtypes(tensors: readonly GaussianOutput[], { dtype }: Contract): ContractFault[] {
+  const floats = tensors.filter((tensor) => tensor.dtype === 'float32' || tensor.dtype === 'float16');
+  const expected = dtype ?? floats[0]?.dtype;
+  return floats
+    .filter((tensor) => tensor.dtype !== expected)
+    .map(({ name, dtype: found }) => ({
+      code: 'contract/dtype',
+      tensor: name,
+      where: `output ${name}`,
+      expected: dtype ? `${dtype}, as the contract declares` : `${expected}, as ${floats[0].name} has`,
+      found,
+      remedy: 'write all Gaussian outputs in one element type, and declare that one',
+    }));
+}
+
+function checkShDegree(tensors: readonly GaussianOutput[], { outputs, shDegree }: Contract): ContractFault[] {
+  const tensor = tensors.find(({ field }) => field === 'sh' || (outputs.layout === 'packed' && field === 'gaussians'));
+  if (shDegree === undefined || outputs.layout === 'image') return [];
+  // Plain colours are as good as degree 0.
+  const found = (tensor && shDegreeOf(outputs, tensor.dims)) ?? 0;
+  if (found === shDegree || (tensor === undefined && tensorNames(outputs).some(([field]) => field === 'sh'))) return [];
+  return [
+    {
+      code: 'contract/sh-degree',
+      tensor: tensor?.name,
+      where: tensor ? `output ${tensor.name}` : 'shDegree',
+      expected: `harmonics of degree ${shDegree}, as the contract declares`,
+      found: tensor ? `degree ${found} (${describeTensor(tensor)})` : 'plain colours',
+      remedy: 'correct shDegree in the contract, or leave it out',
+    },
+  ];
+}

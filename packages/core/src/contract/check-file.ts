@@ -1,0 +1,87 @@
+import type { ExternalFile, OnnxHeader } from '../onnx/header.js';
+import type { ContractFault } from './contract-error.js';
+
+/** What ONNX Runtime 1.30 reads. */
+export const RUNTIME_LIMITS = { irVersion: 13, oldestOpset: 7, newestOpset: 26 } as const;
+
+/** Domains of operators that onnxruntime-web has kernels for, besides ONNX's own. */
+const RUNTIME_DOMAINS = ['com.microsoft', 'ai.onnx.ml'];
+
+export interface CheckFileOptions {
+  /**
+   * Sizes in bytes of the files beside the model that are at hand, by the location that the model writes. Leave it out where
+   * nobody has looked: missing files are then no fault.
+   */
+  readonly files?: ReadonlyMap<string, number>;
+}
+
+/** What holds for a file whatever its contract says: versions, operators, external data. */
+export function checkFile(header: OnnxHeader, { files }: CheckFileOptions): ContractFault[] {
+  return [
+    ...checkVersions(header),
+    ...checkOperators(header),
+    ...header.externalFiles.flatMap((file) => checkExternalFile(file, files)),
+  ];
+}
+
+function checkVersions({ irVersion, opsets }: OnnxHeader): ContractFault[] {
+  const faults: ContractFault[] = [];
+  const opset = opsets.get('ai.onnx');
+  const { oldestOpset, newestOpset } = RUNTIME_LIMITS;
+  if (irVersion > RUNTIME_LIMITS.irVersion) {
+    faults.push({
+      code: 'contract/opset',
+      where: 'IR version',
+      expected: `at most ${RUNTIME_LIMITS.irVersion}`,
+      found: String(irVersion),
+      remedy: 'save the model with an older IR version (model.ir_version in Python)',
+    });
+  }
+  if (opset !== undefined && (opset < oldestOpset || opset > newestOpset)) {
+    faults.push({
+      code: 'contract/opset',
+      where: 'opset of ai.onnx',
+      expected: `${oldestOpset} to ${newestOpset}`,
+      found: String(opset),
+      remedy: 'export the model with opset_version=17',
+    });
+  }
+  return faults;
+}
+
+function checkOperators({ operators, functions }: OnnxHeader): ContractFault[] {
+  return [...operators.keys()]
+    .filter((name) => name.includes(':') && !functions.has(name))
+    .filter((name) => !RUNTIME_DOMAINS.includes(name.slice(0, name.lastIndexOf(':'))))
+    .map((name) => ({
+      code: 'contract/operator',
+      where: `operator ${name}`,
+      expected: `operators of ONNX itself or of ${RUNTIME_DOMAINS.join(' or ')}`,
+      found: `an operator of the domain ${name.slice(0, name.lastIndexOf(':'))}`,
+      remedy: 'export the model with standard operators',
+    }));
+}
+
+function checkExternalFile({ location, byteLength }: ExternalFile, files: CheckFileOptions['files']): ContractFault[] {
+  const fault = (expected: string, found: string, remedy: string): ContractFault[] => [
+    { code: 'contract/external-data', where: `external data ${JSON.stringify(location)}`, expected, found, remedy },
+  ];
+  if (!isInside(location)) {
+    return fault(
+      'a path inside the folder of the model',
+      'one that leads elsewhere',
+      'save the model with plain file names',
+    );
+  }
+  const size = files?.get(location);
+  if (files === undefined || (size !== undefined && size >= byteLength)) return [];
+  return size === undefined
+    ? fault('this file beside the model', 'none', 'put it beside the model; it holds weights')
+    : fault(`at least ${byteLength} bytes`, `${size}`, 'copy the file again; it is incomplete');
+}
+
+/** True for a relative path that stays inside its folder, on any system. */
+export function isInside(location: string): boolean {
+  const parts = location.split(/[/\\]/);
+  return location !== '' && !/^[a-z][a-z0-9+.-]*:/i.test(location) && parts[0] !== '' && !parts.includes('..');
+}

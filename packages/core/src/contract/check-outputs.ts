@@ -1,0 +1,241 @@
+import type { Vector3 } from '../vector.js';
+import type { ContractFault } from './contract-error.js';
+import type { Contract } from './contract.js';
+import { checkRow, type RowFault, type RowReader } from './gaussian-values.js';
+import { halfToNumber } from './half.js';
+import { attributeSlices, type AttributeSlice } from './layout.js';
+import { tensorNames } from './parse-contract.js';
+import { describeShapes, outputRule, shapeFits } from './tensor-rules.js';
+
+/** What a run wrote to one output. */
+export interface OutputTensor {
+  readonly dtype: string;
+  readonly dims: readonly number[];
+  /** Numbers in row-major order; float16 as bits in a `Uint16Array`, or as a `Float16Array` where there is one. */
+  readonly data: ArrayLike<number>;
+}
+
+/** What {@link checkOutputs} found. */
+export interface OutputReport {
+  /** Every fault; values of the same kind in one tensor are one fault that names the first row and how many there are. */
+  readonly faults: readonly ContractFault[];
+  /** Rows that the tensors have. */
+  readonly rows: number;
+  /** Rows that live: `count` where it is written, else all. Only these are checked. */
+  readonly live: number;
+  /** Box of the live, finite centres in world units; undefined if there are none. */
+  readonly bounds: { readonly min: Vector3; readonly max: Vector3 } | undefined;
+}
+
+/**
+ * Checks what one run of a generator wrote: shapes, live count, finite numbers, covariances positive semi-definite, scales
+ * and opacities in range. A pure function over arrays: it runs in a browser as well as in a shell.
+ *
+ * @param outputs what the run wrote, by the names of the file's outputs.
+ */
+export function checkOutputs(contract: Contract, outputs: Readonly<Record<string, OutputTensor>>): OutputReport {
+  const faults = checkShapes(contract, outputs);
+  if (faults.length > 0) return { faults, rows: 0, live: 0, bounds: undefined };
+  if (contract.outputs.layout === 'image') {
+    return { faults: checkImage(contract.outputs.image, outputs), rows: 0, live: 0, bounds: undefined };
+  }
+  const slices = attributeSlices(contract.outputs, (name) => columnsOf(outputs[name]));
+  const rows = outputs[slices[0].tensor].dims[0];
+  const { live, countFaults } = liveRows(contract.outputs.count, outputs, rows);
+  const readers = slices.map((slice) => readerOf(slice, outputs[slice.tensor]));
+  const rowFaults = collectRowFaults(readers, live);
+  const bounds = boundsOf(
+    readers.find(({ attribute }) => attribute === 'positions')!,
+    live,
+  );
+  return {
+    faults: [...countFaults, ...rowFaults],
+    rows,
+    live,
+    bounds,
+  };
+}
+
+/**
+ * Whether the centres that a run wrote lie within the bounds that the contract declares, up to rounding. Bounds speak of all
+ * times and views, but of controls, poses and shapes at their defaults: runs with others may leave them.
+ */
+export function checkBounds({ bounds: declared, outputs }: Contract, { bounds }: OutputReport): ContractFault[] {
+  if (!declared || !bounds) return [];
+  const slack = 1e-3 * Math.max(...declared.max.map((max, axis) => max - declared.min[axis]));
+  const isInside = [0, 1, 2].every(
+    (axis) => bounds.min[axis] >= declared.min[axis] - slack && bounds.max[axis] <= declared.max[axis] + slack,
+  );
+  if (isInside) return [];
+  const show = ({ min, max }: { min: Vector3; max: Vector3 }): string => `${min.join(' ')} to ${max.join(' ')}`;
+  const tensor = outputs.layout === 'split' ? outputs.positions : tensorNames(outputs)[0][1];
+  return [
+    {
+      code: 'contract/conflict',
+      tensor,
+      where: `output ${tensor}, positions`,
+      expected: `centres within the declared bounds, ${show(declared)}`,
+      found: show(bounds),
+      remedy: 'widen bounds in the contract',
+    },
+  ];
+}
+
+/** Faults of a second run with the same inputs: every output must hold the same numbers, bit for bit. */
+export function compareRuns(
+  contract: Contract,
+  first: Readonly<Record<string, OutputTensor>>,
+  second: Readonly<Record<string, OutputTensor>>,
+): ContractFault[] {
+  if (Object.values(contract.inputs).some(({ role }) => role === 'seed')) return [];
+  return tensorNames(contract.outputs).flatMap(([, name]) => {
+    const [a, b] = [first[name], second[name]];
+    const at = a && b ? firstDifference(a, b) : -1;
+    if (at < 0) return [];
+    return [
+      {
+        code: 'contract/not-deterministic',
+        tensor: name,
+        where: `output ${name}`,
+        expected: 'the same numbers for the same inputs, as no input has the role seed',
+        found:
+          a.data.length === b.data.length
+            ? `other numbers, first at element ${at}`
+            : `dims [${a.dims}], then [${b.dims}]`,
+        remedy: 'give the model an input with the role seed, or take the random numbers out of it',
+      },
+    ];
+  });
+}
+
+function firstDifference(a: OutputTensor, b: OutputTensor): number {
+  if (a.data.length !== b.data.length || a.dims.some((dim, i) => dim !== b.dims[i])) return 0;
+  for (let i = 0; i < a.data.length; i++) if (!Object.is(a.data[i], b.data[i])) return i;
+  return -1;
+}
+
+const columnsOf = ({ dims }: OutputTensor): number => dims.slice(1).reduce((product, dim) => product * dim, 1);
+
+/** Presence, shape and row counts of what was written; values can only be read where these are right. */
+function checkShapes(
+  { outputs: binding, nMax }: Contract,
+  outputs: Readonly<Record<string, OutputTensor>>,
+): ContractFault[] {
+  let rows: { name: string; count: number } | undefined;
+  return tensorNames(binding).flatMap(([field, name]): ContractFault[] => {
+    const where = `output ${name} (${field})`;
+    const tensor = Object.hasOwn(outputs, name) ? outputs[name] : undefined;
+    if (tensor === undefined) {
+      const found = Object.keys(outputs).join(', ') || 'nothing';
+      const remedy = 'correct the name in the contract, or export the model with it';
+      return [{ code: 'contract/missing-tensor', tensor: name, where, expected: 'this output', found, remedy }];
+    }
+    const rule = outputRule(binding, field);
+    const isEmpty = tensor.dims[0] === 0 && tensor.data.length === 0;
+    // No Gaussian at all is an answer; N is otherwise positive.
+    const dims = isEmpty && tensor.dims.length > 1 ? [1, ...tensor.dims.slice(1)] : tensor.dims;
+    const length = tensor.dims.reduce((product, dim) => product * dim, 1);
+    if (!shapeFits(dims, rule) || length !== tensor.data.length) {
+      const found = `[${tensor.dims.join(', ')}] with ${tensor.data.length} numbers`;
+      const remedy = 'write the tensor in the shape that the contract declares';
+      return [{ code: 'contract/shape', tensor: name, where, expected: describeShapes(rule), found, remedy }];
+    }
+    if (field === 'count' || field === 'image') return [];
+    const count = tensor.dims[0];
+    rows ??= { name, count };
+    const common = { code: 'contract/rows', tensor: name, where, found: `${count} rows` } as const;
+    if (count !== rows.count) {
+      const expected = `${rows.count} rows, as ${rows.name} has`;
+      return [{ ...common, expected, remedy: 'write as many rows of every attribute' }];
+    }
+    return nMax !== undefined && count > nMax
+      ? [{ ...common, expected: `at most nMax = ${nMax} rows`, remedy: 'raise nMax in the contract' }]
+      : [];
+  });
+}
+
+function liveRows(
+  name: string | undefined,
+  outputs: Readonly<Record<string, OutputTensor>>,
+  rows: number,
+): { live: number; countFaults: ContractFault[] } {
+  if (name === undefined) return { live: rows, countFaults: [] };
+  const count = outputs[name].data[0];
+  if (Number.isInteger(count) && count >= 0 && count <= rows) return { live: count, countFaults: [] };
+  const fault: ContractFault = {
+    code: 'contract/count',
+    tensor: name,
+    where: `output ${name}`,
+    expected: `a live count of 0 to ${rows}, the number of rows`,
+    found: String(count),
+    remedy: 'clamp the count in the model',
+  };
+  return { live: Math.min(Math.max(0, Math.trunc(count) || 0), rows), countFaults: [fault] };
+}
+
+/** Access to one attribute of any row as numbers, whatever the element type. */
+function readerOf(slice: AttributeSlice, { dtype, data }: OutputTensor): RowReader {
+  const isBits = dtype === 'float16' && data instanceof Uint16Array;
+  const { offset, rowStride } = slice;
+  const read = isBits
+    ? (row: number, component: number): number => halfToNumber(data[row * rowStride + offset + component])
+    : (row: number, component: number): number => data[row * rowStride + offset + component];
+  return { ...slice, isHalf: dtype === 'float16', read };
+}
+
+/** Walks all live rows and turns what is wrong into one fault for each kind and tensor. */
+function collectRowFaults(readers: readonly RowReader[], live: number): ContractFault[] {
+  const kinds = new Map<string, { fault: RowFault; reader: RowReader; row: number; count: number }>();
+  for (const reader of readers) {
+    for (let row = 0; row < live; row++) {
+      const fault = checkRow(reader, row);
+      if (fault === undefined) continue;
+      const key = `${reader.attribute} ${fault.code}`;
+      const kind = kinds.get(key);
+      if (kind) kind.count++;
+      else kinds.set(key, { fault, reader, row, count: 1 });
+    }
+  }
+  return [...kinds.values()].map(({ fault, reader, row, count }) => ({
+    code: fault.code,
+    tensor: reader.tensor,
+    where: `output ${reader.tensor}, ${reader.attribute} of row ${row}`,
+    expected: fault.expected,
+    found: `${fault.found}${count > 1 ? `; in ${count} of ${live} rows` : ''}`,
+    remedy: fault.remedy,
+  }));
+}
+
+function boundsOf({ read }: RowReader, live: number): OutputReport['bounds'] {
+  const min: [number, number, number] = [Infinity, Infinity, Infinity];
+  const max: [number, number, number] = [-Infinity, -Infinity, -Infinity];
+  for (let row = 0; row < live; row++) {
+    for (let axis = 0; axis < 3; axis++) {
+      const value = read(row, axis);
+      if (!Number.isFinite(value)) continue;
+      if (value < min[axis]) min[axis] = value;
+      if (value > max[axis]) max[axis] = value;
+    }
+  }
+  return min.every(Number.isFinite) ? { min, max } : undefined;
+}
+
+function checkImage(name: string, outputs: Readonly<Record<string, OutputTensor>>): ContractFault[] {
+  const { data, dtype } = outputs[name];
+  const isBits = dtype === 'float16' && data instanceof Uint16Array;
+  for (let i = 0; i < data.length; i++) {
+    const value = isBits ? halfToNumber(data[i]) : data[i];
+    if (Number.isFinite(value)) continue;
+    return [
+      {
+        code: 'contract/not-finite',
+        tensor: name,
+        where: `output ${name}, element ${i}`,
+        expected: 'finite numbers',
+        found: String(value),
+        remedy: 'find the operation that divides by zero or overflows',
+      },
+    ];
+  }
+  return [];
+}

@@ -1,0 +1,253 @@
+import type { ShDegree } from '../gaussian-cloud.js';
+import type { Vector3 } from '../vector.js';
+
+/**
+ * A Gaussian Generator contract, version 1: what an ONNX file's inputs mean and how its outputs are written. Published
+ * wording, with examples: docs/contract.md; as JSON Schema: contract.schema.json.
+ */
+export interface Contract {
+  /** Address of the JSON Schema, for editors; not read. */
+  readonly $schema?: string;
+  readonly version: 1;
+  /** Name for people. */
+  readonly name?: string;
+  /** What each input of the ONNX file means, by its name. A file without inputs has none: `{}`. */
+  readonly inputs: Readonly<Record<string, InputBinding>>;
+  /** Where and how the Gaussians are written. */
+  readonly outputs: OutputBinding;
+  /** Most Gaussians that one run writes: needed where the file leaves their number N symbolic. */
+  readonly nMax?: number;
+  /** Element type of the Gaussian outputs. The file says it too; declared here it is checked. */
+  readonly dtype?: 'float32' | 'float16';
+  /** Degree of the spherical harmonics. The shape says it too; declared here it is checked. */
+  readonly shDegree?: ShDegree;
+  /** Box around all centres at all times, in world units, with controls, poses and shapes at their defaults. */
+  readonly bounds?: { readonly min: Vector3; readonly max: Vector3 };
+  /** Length in seconds of what the input `time` or `frame` plays. */
+  readonly duration?: number;
+  /** Frames to a second of what the input `frame` counts. */
+  readonly fps?: number;
+  readonly coordinates?: Coordinates;
+  /** True if trained with opacity compensation for the screen-space dilation (Mip-Splatting style). Default false. */
+  readonly antialiased?: boolean;
+  /** SPDX identifier, or a few words. */
+  readonly license?: string;
+  /** Who is to be named. */
+  readonly attribution?: string;
+}
+
+/** The frame that Gaussians are written in. Default: y down, right-handed, the trainers' frame; units unknown. */
+export interface Coordinates {
+  readonly up?: '+x' | '-x' | '+y' | '-y' | '+z' | '-z';
+  readonly handedness?: 'right' | 'left';
+  /** Metres to one world unit. */
+  readonly metresPerUnit?: number;
+}
+
+/** How the 16 numbers of a matrix that acts on column vectors are laid out in the tensor; default `row-major`, as PyTorch reads it. */
+export type MatrixOrder = 'row-major' | 'column-major';
+
+/**
+ * Where the camera's x, y and z axes point: left or right, up or down, forward or back. `RDF` is OpenCV's and the
+ * default, `RUB` OpenGL's, `LUF` PyTorch3D's and Visionary's.
+ */
+export type CameraAxes = 'RDF' | 'RDB' | 'RUF' | 'RUB' | 'LDF' | 'LDB' | 'LUF' | 'LUB';
+
+/** Order of the four numbers of a quaternion. */
+export type QuaternionOrder = 'wxyz' | 'xyzw';
+
+/** Whether red, green and blue are innermost ([(d+1)², 3]), or the coefficients ([3, (d+1)²], as in INRIA's PLY files). */
+export type ShOrder = 'coefficient-major' | 'channel-major';
+
+/** [4,4] float32: world to camera. */
+export interface ViewInput {
+  readonly role: 'view';
+  readonly order?: MatrixOrder;
+  readonly axes?: CameraAxes;
+}
+
+/** [4,4] float32: camera to clip space, depth 0..1 from near to far as WebGPU has it, x right and y up. */
+export interface ProjectionInput {
+  readonly role: 'projection';
+  readonly order?: MatrixOrder;
+  /** Axes of the camera that the matrix takes points from. */
+  readonly axes?: CameraAxes;
+}
+
+/** [4,4] float32: world to clip space, the product projection · view. */
+export interface ViewProjectionInput {
+  readonly role: 'view_projection';
+  readonly order?: MatrixOrder;
+}
+
+/** [3] float32: the eye, in world units. */
+export interface CameraPositionInput {
+  readonly role: 'camera_position';
+}
+
+/** [2] float32: width and height of the picture in pixels. */
+export interface ViewportInput {
+  readonly role: 'viewport';
+}
+
+/** One float32: seconds, or a share 0..1 of the contract's `duration`, which must then be declared. */
+export interface TimeInput {
+  readonly role: 'time';
+  readonly unit: 'seconds' | 'normalized';
+}
+
+/** One int32 or int64: index of a frame, 0 or more. */
+export interface FrameInput {
+  readonly role: 'frame';
+}
+
+/** One int32 or int64: seed of a generator that draws random numbers. Without it outputs must repeat. */
+export interface SeedInput {
+  readonly role: 'seed';
+}
+
+/** [J,3] axis-angle in radians, [J,4] quaternions, or [P] parameters of the model's own; float32. */
+export interface PoseInput {
+  readonly role: 'pose';
+  readonly format: 'axis-angle' | 'quaternion' | 'parameters';
+  /** Required for quaternions. */
+  readonly quaternionOrder?: QuaternionOrder;
+  /** Names of the J joints, in the tensor's order. */
+  readonly joints?: readonly string[];
+  /** For each joint the index of its parent, -1 for roots; a parent stands before its children. */
+  readonly parents?: readonly number[];
+  /** Flattened; default: no rotation, or zeros. */
+  readonly default?: readonly number[];
+}
+
+/** [B] float32: coefficients of a body or an expression. */
+export interface ShapeInput {
+  readonly role: 'shape';
+  /** Names of the B coefficients. */
+  readonly names?: readonly string[];
+  /** Default: zeros. */
+  readonly default?: readonly number[];
+}
+
+/** Float32, int32 or int64 of any fixed shape: a control for people, named as the input is. */
+export interface ControlInput {
+  readonly role: 'control';
+  /** Smallest and largest value of each element. */
+  readonly range: readonly [min: number, max: number];
+  /** One number for all elements, or all of them flattened. */
+  readonly default: number | readonly number[];
+  /** Step between values. */
+  readonly step?: number;
+  /** Name for people; default: that of the input. */
+  readonly label?: string;
+}
+
+/** Gaussians of the generator before this one in a chain, in one of the output layouts: one input for each tensor. */
+export interface GaussiansInput extends Activations {
+  readonly role: 'gaussians';
+  /** Which tensor of the layout this input takes. */
+  readonly attribute: GaussianTensor;
+}
+
+/** [1,3,H,W] float32 or float16: red, green and blue planes in 0..1, top row first. */
+export interface ImageInput {
+  readonly role: 'image';
+}
+
+/** Role of one input of the ONNX file. */
+export type InputBinding =
+  | ViewInput
+  | ProjectionInput
+  | ViewProjectionInput
+  | CameraPositionInput
+  | ViewportInput
+  | TimeInput
+  | FrameInput
+  | SeedInput
+  | PoseInput
+  | ShapeInput
+  | ControlInput
+  | GaussiansInput
+  | ImageInput;
+
+export type InputRole = InputBinding['role'];
+
+/** What one Gaussian is made of. */
+export type GaussianAttribute = 'positions' | 'covariances' | 'scales' | 'rotations' | 'colors' | 'sh' | 'opacities';
+
+/** A tensor of Gaussians: everything in one, one attribute, or the live count. */
+export type GaussianTensor = 'packed' | GaussianAttribute | 'count';
+
+/** How numbers are written. Declared, never guessed: each is required where the attribute is there. */
+export interface Activations {
+  /** What the colour columns of a packed tensor hold. */
+  readonly color?: 'rgb' | 'sh';
+  /** Whether opacities are written as 0..1 or before the sigmoid. */
+  readonly opacityActivation?: 'linear' | 'logit';
+  /** Whether scales are written as standard deviations or as their natural logarithms. */
+  readonly scaleActivation?: 'linear' | 'log';
+  readonly rotationOrder?: QuaternionOrder;
+  readonly shOrder?: ShOrder;
+}
+
+/**
+ * One tensor [N, D], float32 or float16: position (3), covariance xx, xy, xz, yy, yz, zz (6), colour (3) or spherical
+ * harmonics (3(d+1)²), opacity (1).
+ */
+export interface PackedOutputs {
+  readonly layout: 'packed';
+  /** Name of the output. */
+  readonly gaussians: string;
+  readonly color: 'rgb' | 'sh';
+  readonly opacityActivation: 'linear' | 'logit';
+  /** Required with `sh`. */
+  readonly shOrder?: ShOrder;
+  /** Name of an output [1] int32: how many of the N rows live. */
+  readonly count?: string;
+}
+
+/** One tensor for each attribute, all float32 or all float16, all with the same N. Values are names of outputs. */
+export interface SplitOutputs {
+  readonly layout: 'split';
+  /** [N,3] centres in world units. */
+  readonly positions: string;
+  /** [N,6] xx, xy, xz, yy, yz, zz in square world units. Either these, or scales and rotations. */
+  readonly covariances?: string;
+  /** [N,3] standard deviations in world units, along the axes that the rotation turns. */
+  readonly scales?: string;
+  readonly scaleActivation?: 'linear' | 'log';
+  /** [N,4] quaternions, local axes to world; they need not be unit. */
+  readonly rotations?: string;
+  readonly rotationOrder?: QuaternionOrder;
+  /** [N,3] red, green, blue in 0..1. Either these or `sh`. */
+  readonly colors?: string;
+  /** [N,(d+1)²,3] or [N,3,(d+1)²], as `shOrder` says. */
+  readonly sh?: string;
+  readonly shOrder?: ShOrder;
+  /** [N] or [N,1]. */
+  readonly opacities: string;
+  readonly opacityActivation: 'linear' | 'logit';
+  /** Name of an output [1] int32: how many of the N rows live. */
+  readonly count?: string;
+}
+
+/**
+ * What Visionary's exporters write: one tensor [N,10] = position, opacity 0..1, covariance xx, xy, xz, yy, yz, zz; and
+ * another with colours [N,4] (the fourth is padding) or [N,3], or coefficient-major harmonics [N,3(d+1)²].
+ */
+export interface VisionaryOutputs {
+  readonly layout: 'visionary';
+  readonly gaussians: string;
+  /** Either these or `sh`. */
+  readonly colors?: string;
+  readonly sh?: string;
+  readonly count?: string;
+}
+
+/** A post-processor: one tensor [1,3,H,W] of red, green and blue planes in 0..1. */
+export interface ImageOutputs {
+  readonly layout: 'image';
+  readonly image: string;
+}
+
+export type OutputBinding = PackedOutputs | SplitOutputs | VisionaryOutputs | ImageOutputs;

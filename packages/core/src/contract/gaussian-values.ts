@@ -1,0 +1,113 @@
+import type { ContractErrorCode } from '../errors.js';
+import type { AttributeSlice } from './layout.js';
+
+/** One attribute of the rows of a tensor, read as numbers. */
+export interface RowReader extends AttributeSlice {
+  readonly isHalf: boolean;
+  readonly read: (row: number, component: number) => number;
+}
+
+export interface RowFault {
+  readonly code: ContractErrorCode;
+  readonly expected: string;
+  readonly found: string;
+  readonly remedy: string;
+}
+
+/** Relative rounding error of one number: half a unit in the last place. */
+const HALF_ROUNDING = 2 ** -11;
+const FLOAT_ROUNDING = 2 ** -24;
+/** Absolute rounding error of float16 numbers near zero. */
+const HALF_SMALLEST = 2 ** -25;
+/** A covariance R·S·Sᵀ·Rᵀ computed in the type of its numbers takes some ten roundings to each of them. */
+const COVARIANCE_ROUNDINGS = 16;
+
+/** What is wrong with one attribute of one row; undefined if nothing is. */
+export function checkRow(reader: RowReader, row: number): RowFault | undefined {
+  const { attribute, activation, components, read } = reader;
+  for (let i = 0; i < components; i++) {
+    const value = read(row, i);
+    // Infinite logits and the logarithm of a zero scale are opacities 0 and 1 and a flat disc.
+    const isAllowed = activation === 'logit' ? !Number.isNaN(value) : activation === 'log' && value === -Infinity;
+    if (!Number.isFinite(value) && !isAllowed) return notFinite(value);
+  }
+  switch (attribute) {
+    case 'covariances':
+      return checkCovariance(reader, row);
+    case 'scales':
+      return activation === 'linear' ? checkScale(reader, row) : undefined;
+    case 'rotations':
+      return checkRotation(reader, row);
+    case 'opacities':
+      return activation === 'linear' ? checkOpacity(reader, row) : undefined;
+    default:
+      return undefined;
+  }
+}
+
+const notFinite = (value: number): RowFault => ({
+  code: 'contract/not-finite',
+  expected: 'finite numbers',
+  found: String(value),
+  remedy: 'find the operation that divides by zero or overflows; pad unused rows with opacity 0, not with NaN',
+});
+
+function checkOpacity({ read, isHalf }: RowReader, row: number): RowFault | undefined {
+  const value = read(row, 0);
+  const slack = isHalf ? HALF_ROUNDING : 1e-6;
+  if (value >= -slack && value <= 1 + slack) return undefined;
+  return {
+    code: 'contract/opacity',
+    expected: 'an opacity of 0 to 1',
+    found: String(value),
+    remedy: 'apply the sigmoid in the model, or declare opacityActivation "logit"',
+  };
+}
+
+function checkScale({ read }: RowReader, row: number): RowFault | undefined {
+  const scales = [read(row, 0), read(row, 1), read(row, 2)];
+  if (scales.every((scale) => scale >= 0)) return undefined;
+  return {
+    code: 'contract/covariance',
+    expected: 'standard deviations of 0 or more',
+    found: scales.join(' '),
+    remedy: 'apply the exponential in the model, or declare scaleActivation "log"',
+  };
+}
+
+function checkRotation({ read }: RowReader, row: number): RowFault | undefined {
+  if ([0, 1, 2, 3].some((i) => read(row, i) !== 0)) return undefined;
+  return {
+    code: 'contract/covariance',
+    expected: 'a quaternion other than zero',
+    found: '0 0 0 0',
+    remedy: 'write the identity where there is no rotation; pad unused rows with it, too',
+  };
+}
+
+function checkCovariance({ read, isHalf }: RowReader, row: number): RowFault | undefined {
+  const matrix = [0, 1, 2, 3, 4, 5].map((i) => read(row, i));
+  const trace = matrix[0] + matrix[3] + matrix[5];
+  const rounding = COVARIANCE_ROUNDINGS * FLOAT_ROUNDING + (isHalf ? HALF_ROUNDING : 0);
+  // Rounding moves an eigenvalue by no more than the Frobenius norm of the errors.
+  const slack = rounding * Math.abs(trace) + (isHalf ? 3 * HALF_SMALLEST : 0);
+  const smallest = smallestEigenvalue(matrix);
+  if (smallest >= -slack) return undefined;
+  return {
+    code: 'contract/covariance',
+    expected: 'a positive semi-definite covariance xx xy xz yy yz zz',
+    found: `${matrix.map((value) => Number(value.toPrecision(4))).join(' ')} with the eigenvalue ${smallest.toPrecision(3)}`,
+    remedy: 'write R·S·S·Rᵀ, and check the order of the six numbers',
+  };
+}
+
+/** Smallest eigenvalue of the symmetric matrix xx, xy, xz, yy, yz, zz, by the trigonometric solution of the cubic. */
+export function smallestEigenvalue([xx, xy, xz, yy, yz, zz]: readonly number[]): number {
+  const mean = (xx + yy + zz) / 3;
+  const [a, b, c] = [xx - mean, yy - mean, zz - mean];
+  const spread = Math.sqrt((a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6);
+  if (spread === 0) return mean;
+  const determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+  const cosine = Math.min(1, Math.max(-1, determinant / (2 * spread ** 3)));
+  return mean + 2 * spread * Math.cos(Math.acos(cosine) / 3 + (2 * Math.PI) / 3);
+}

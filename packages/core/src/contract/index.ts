@@ -1,0 +1,18 @@
+export * from './contract.js';
+export { checkContract } from './check-contract.js';
+export { checkFile, RUNTIME_LIMITS, isInside, type CheckFileOptions } from './check-file.js';
+export { checkBounds, checkOutputs, compareRuns, type OutputReport, type OutputTensor } from './check-outputs.js';
+export { ContractError, describeFault, type ContractErrorData, type ContractFault } from './contract-error.js';
+export { halfToNumber, numberToHalf } from './half.js';
+export { gaussianLayout, type AttributeSlice, type GaussianLayout } from './layout.js';
+export { CONTRACT_VERSION, parseContract } from './parse-contract.js';
+export { contractReport, type ReportSection } from './report.js';
+export {
+  CONTRACT_METADATA_KEY,
+  resolveContract,
+  sidecarName,
+  type ContractSource,
+  type ContractSources,
+  type ResolvedContract,
+} from './resolve-contract.js';
+export { CONTRACT_SCHEMA } from './schema.js';

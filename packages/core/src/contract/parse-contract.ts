@@ -1,0 +1,183 @@
+import { ContractError, type ContractFault } from './contract-error.js';
+import type { Contract, InputBinding, OutputBinding } from './contract.js';
+import { CONTRACT_SCHEMA } from './schema.js';
+import { describe, validate } from './validate.js';
+
+/** The version of the contract that this reader knows. */
+export const CONTRACT_VERSION = 1;
+
+/**
+ * Reads a contract.
+ *
+ * @param json its JSON text, or the value parsed from it.
+ * @param where what the contract is called in messages, for example a file name.
+ * @throws ContractError with every fault: `contract/json`, `contract/version`, `contract/schema`, `contract/conflict`.
+ */
+export function parseContract(json: unknown, where = 'contract'): Contract {
+  const value = typeof json === 'string' ? parseJson(json, where) : json;
+  const version = (value as { version?: unknown } | null)?.version;
+  if (typeof version === 'number' && version !== CONTRACT_VERSION)
+    throw new ContractError([unknownVersion(version, where)]);
+  const faults = validate(value, CONTRACT_SCHEMA, where);
+  if (faults.length > 0) throw new ContractError(faults);
+  const contract = value as Contract;
+  const conflicts = conflictsOf(contract, where);
+  if (conflicts.length > 0) throw new ContractError(conflicts);
+  return contract;
+}
+
+function parseJson(text: string, where: string): unknown {
+  try {
+    return JSON.parse(text.replace(/^\ufeff/, ''));
+  } catch (error) {
+    const isPage = /^\s*</.test(text);
+    throw new ContractError([
+      {
+        code: 'contract/json',
+        where,
+        expected: 'a contract in JSON',
+        found: isPage ? 'a web page (HTML or XML)' : `text that is none (${(error as Error).message})`,
+        remedy: isPage ? 'check the address; the server sent something else' : 'correct the JSON',
+      },
+    ]);
+  }
+}
+
+function unknownVersion(version: number, where: string): ContractFault {
+  return {
+    code: 'contract/version',
+    where: `${where}.version`,
+    expected: `${CONTRACT_VERSION}`,
+    found: String(version),
+    remedy:
+      version > CONTRACT_VERSION
+        ? 'update this library, or write the contract in version 1'
+        : 'write the contract in version 1; see docs/contract.md',
+  };
+}
+
+/** Facts that are each in order but cannot hold together. */
+function conflictsOf(contract: Contract, where: string): ContractFault[] {
+  const conflict = (place: string, expected: string, found: string, remedy: string): ContractFault => ({
+    code: 'contract/conflict',
+    where: `${where}.${place}`,
+    expected,
+    found,
+    remedy,
+  });
+  return [
+    ...Object.entries(contract.inputs).flatMap(([name, binding]) =>
+      inputConflicts(binding, contract).map(([field, expected, found, remedy]) =>
+        conflict(`inputs.${name}${field && `.${field}`}`, expected, found, remedy),
+      ),
+    ),
+    ...repeatedRoles(contract).map(([place, expected, found]) =>
+      conflict(place, expected, found, 'feed one of them, and make the other a part of the model'),
+    ),
+    ...repeatedTensors(contract.outputs).map(([field, other]) =>
+      conflict(
+        `outputs.${field}`,
+        'an output of its own',
+        `the output that ${other} names, too`,
+        'name another output',
+      ),
+    ),
+    ...boundsConflicts(contract).map((axis) =>
+      conflict(`bounds`, `min at or below max on axis ${axis}`, 'min above max', 'exchange the two'),
+    ),
+  ];
+}
+
+type Conflict = readonly [field: string, expected: string, found: string, remedy: string];
+
+function inputConflicts(binding: InputBinding, { duration }: Contract): Conflict[] {
+  switch (binding.role) {
+    case 'time':
+      return binding.unit === 'normalized' && duration === undefined
+        ? [['unit', 'the duration that normalized time is a share of', 'no duration', 'declare duration in seconds']]
+        : [];
+    case 'control':
+      return controlConflicts(binding);
+    case 'pose':
+      return skeletonConflicts(binding);
+    default:
+      return [];
+  }
+}
+
+function controlConflicts({ range: [min, max], default: initial }: InputBinding & { role: 'control' }): Conflict[] {
+  if (!(min <= max)) return [['range', 'the smallest value first', describe([min, max]), 'exchange the two']];
+  const outside = [initial].flat().find((value) => value < min || value > max);
+  return outside === undefined
+    ? []
+    : [['default', `a value within ${min}..${max}`, String(outside), 'widen the range or change the default']];
+}
+
+function skeletonConflicts({ joints, parents }: InputBinding & { role: 'pose' }): Conflict[] {
+  if (parents && joints && parents.length !== joints.length) {
+    return [
+      ['parents', `one for each of ${joints.length} joints`, `${parents.length}`, 'list as many parents as joints'],
+    ];
+  }
+  const wrong = parents?.findIndex((parent, joint) => parent >= joint) ?? -1;
+  return wrong < 0
+    ? []
+    : [
+        [
+          'parents',
+          'parents before their children',
+          `parent ${parents![wrong]} of joint ${wrong}`,
+          'reorder the joints',
+        ],
+      ];
+}
+
+/** Roles that a page sets once: two inputs of the same role are a mistake. Controls and pictures are told apart by name. */
+function repeatedRoles({ inputs }: Contract): [place: string, expected: string, found: string][] {
+  const seen = new Map<string, string>();
+  return Object.entries(inputs).flatMap(([name, binding]) => {
+    if (binding.role === 'control' || binding.role === 'image') return [];
+    const role = binding.role === 'gaussians' ? `gaussians (${binding.attribute})` : binding.role;
+    const first = seen.get(role);
+    seen.set(role, name);
+    // Matrices may be wanted in two conventions.
+    const isMatrix = ['view', 'projection', 'view_projection'].includes(role);
+    return first === undefined || isMatrix
+      ? []
+      : [[`inputs.${name}`, `one input with the role ${role}`, `${first} and ${name}`] as [string, string, string]];
+  });
+}
+
+/** Every field of an output binding that names a tensor. */
+export function tensorNames(outputs: OutputBinding): [field: string, tensor: string][] {
+  const fields = [
+    'gaussians',
+    'positions',
+    'covariances',
+    'scales',
+    'rotations',
+    'colors',
+    'sh',
+    'opacities',
+    'image',
+    'count',
+  ];
+  const binding = outputs as unknown as Readonly<Record<string, string | undefined>>;
+  return fields.flatMap((field) => {
+    const tensor = binding[field];
+    return tensor === undefined ? [] : [[field, tensor] as [string, string]];
+  });
+}
+
+function repeatedTensors(outputs: OutputBinding): [field: string, other: string][] {
+  const seen = new Map<string, string>();
+  return tensorNames(outputs).flatMap(([field, tensor]) => {
+    const first = seen.get(tensor);
+    seen.set(tensor, field);
+    return first === undefined ? [] : [[field, first] as [string, string]];
+  });
+}
+
+function boundsConflicts({ bounds }: Contract): string[] {
+  return bounds ? ['x', 'y', 'z'].filter((_, axis) => bounds.min[axis] > bounds.max[axis]) : [];
+}

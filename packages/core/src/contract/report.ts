@@ -1,0 +1,92 @@
+import { describeTensor, type OnnxHeader } from '../onnx/header.js';
+import type { Contract, InputBinding } from './contract.js';
+import { tensorNames } from './parse-contract.js';
+import type { ResolvedContract } from './resolve-contract.js';
+import { findTensor } from './tensor-rules.js';
+
+/** A table for people: rows of cells, all rows of a section with the same number of cells. */
+export interface ReportSection {
+  readonly title: string;
+  readonly rows: readonly (readonly string[])[];
+}
+
+/** What a file and its contract say, as tables: the shell prints them, the page shows them. */
+export function contractReport(header: OnnxHeader, resolved: ResolvedContract | undefined): ReportSection[] {
+  return [
+    { title: 'File', rows: fileRows(header) },
+    ...(resolved ? [{ title: 'Contract', rows: contractRows(resolved) }] : []),
+    { title: 'Inputs', rows: inputRows(header, resolved?.contract) },
+    { title: 'Outputs', rows: outputRows(header, resolved?.contract) },
+  ].filter(({ rows }) => rows.length > 0);
+}
+
+function fileRows(header: OnnxHeader): string[][] {
+  const { byteLength, irVersion, producer, opsets, operators, externalFiles, initializerBytes } = header;
+  const used = [...operators].sort(([a], [b]) => (a < b ? -1 : 1)).map(([name, times]) => `${name} ${times}`);
+  const rows = [
+    ['size', `${grouped(byteLength)} bytes, of which ${grouped(initializerBytes)} are weights`],
+    ['written by', producer || 'unknown'],
+    ['versions', [`IR ${irVersion}`, ...[...opsets].map(([domain, version]) => `${domain} ${version}`)].join(', ')],
+    ['operators', used.length > 40 ? `${used.slice(0, 40).join(', ')} and ${used.length - 40} more` : used.join(', ')],
+  ];
+  for (const { location, byteLength: length } of externalFiles) {
+    rows.push(['external data', `${location}${length > 0 ? `, at least ${grouped(length)} bytes` : ''}`]);
+  }
+  return rows;
+}
+
+const SOURCES: Readonly<Record<ResolvedContract['source'], string>> = {
+  explicit: 'given by the caller',
+  sidecar: 'file beside the model',
+  metadata: "the file's own metadata",
+  inferred: 'inferred from names',
+};
+
+function contractRows({ contract, source, notes }: ResolvedContract): string[][] {
+  const { layout, ...details } = contract.outputs;
+  const facts = Object.entries(contract).filter(([name]) => !['$schema', 'inputs', 'outputs'].includes(name));
+  return [
+    ['source', SOURCES[source]],
+    ...notes.map((note) => ['inferred', note]),
+    ['layout', [layout, ...Object.entries(details).flatMap(describeDetail)].join(', ')],
+    ...facts.map(([name, value]) => [name, typeof value === 'string' ? value : JSON.stringify(value)]),
+  ];
+}
+
+/** Activations and orders; names of tensors stand in the table of outputs. */
+function describeDetail([key, value]: [string, unknown]): string[] {
+  return /^(color|.*Activation|.*Order)$/.test(key) ? [`${key} ${String(value)}`] : [];
+}
+
+function inputRows(header: OnnxHeader, contract: Contract | undefined): string[][] {
+  return header.inputs.map((input) => {
+    const binding = contract && Object.hasOwn(contract.inputs, input.name) ? contract.inputs[input.name] : undefined;
+    return [input.name, describeTensor(input), binding ? describeBinding(binding) : contract ? 'no role' : ''];
+  });
+}
+
+function describeBinding({ role, ...details }: InputBinding): string {
+  const entries = Object.entries(details).map(([key, value]) => {
+    const text = typeof value === 'string' ? value : JSON.stringify(value);
+    return `${key} ${text.length > 40 ? `${text.slice(0, 37)}...` : text}`;
+  });
+  return [role, ...entries].join(', ');
+}
+
+function outputRows(header: OnnxHeader, contract: Contract | undefined): string[][] {
+  const fields = new Map(contract ? tensorNames(contract.outputs).map(([field, tensor]) => [tensor, field]) : []);
+  const missing = [...fields.keys()].filter((name) => !findTensor(header.outputs, name));
+  return [
+    ...header.outputs.map((output) => [
+      output.name,
+      describeTensor(output),
+      fields.get(output.name) ?? (contract ? 'not used' : ''),
+    ]),
+    ...missing.map((name) => [name, 'not in the file', fields.get(name)!]),
+  ];
+}
+
+/** Digits grouped for people: 1,234,567. */
+function grouped(value: number): string {
+  return String(value).replace(/\B(?=(\d{3})+$)/g, ',');
+}

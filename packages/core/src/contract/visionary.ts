@@ -1,0 +1,74 @@
+import type { OnnxHeader, OnnxTensor } from '../onnx/header.js';
+import { ContractError } from './contract-error.js';
+import type { Contract, InputBinding, VisionaryOutputs } from './contract.js';
+import type { InferredContract } from './infer.js';
+
+/**
+ * Files exported for Visionary carry no contract. Their outputs are known by name: `gauss…` [N,10], one with `color`, `rgb` or
+ * `sh` in its name, `num_points`. Their camera looks along +z with x left and y up, their matrices are the bytes of
+ * column-major ones, their time is a share of a cycle of 2.5 s.
+ */
+export function inferVisionary(header: OnnxHeader): InferredContract | undefined {
+  const outputs = visionaryOutputs(header);
+  if (outputs === undefined) return undefined;
+  const inputs: Record<string, InputBinding> = {};
+  const unknown: OnnxTensor[] = [];
+  for (const input of header.inputs) {
+    const binding = visionaryInput(input.name);
+    if (binding) inputs[input.name] = binding;
+    else unknown.push(input);
+  }
+  if (unknown.length > 0) {
+    throw new ContractError(
+      unknown.map(({ name }) => ({
+        code: 'contract/inference',
+        tensor: name,
+        where: `input ${name}`,
+        expected: "one of the inputs of Visionary's profile: a camera or view matrix, a projection, a time",
+        found: 'another name and no contract',
+        remedy: 'write a contract with the layout visionary: see docs/contract.md',
+      })),
+    );
+  }
+  const contract: Contract = {
+    version: 1,
+    inputs,
+    outputs,
+    ...(Object.values(inputs).some(({ role }) => role === 'time') ? { duration: VISIONARY_CYCLE_SECONDS } : {}),
+  };
+  const roles = Object.entries(inputs).map(([name, { role }]) => `input ${name} is ${role}`);
+  return { contract, notes: ["names are those of Visionary's exporters", ...roles, describeOutputs(outputs)] };
+}
+
+/** Visionary plays 0.4 of a cycle to a second. */
+const VISIONARY_CYCLE_SECONDS = 2.5;
+
+function visionaryOutputs({ outputs }: OnnxHeader): VisionaryOutputs | undefined {
+  const gaussians = outputs.find(({ name, dims }) => /^gauss/i.test(name) && dims?.length === 2 && dims[1] === 10);
+  const color = outputs.find(({ name }) => name !== gaussians?.name && /color|sh|rgb/i.test(name));
+  if (gaussians === undefined || color === undefined) return undefined;
+  const columns = color.dims?.[1];
+  const isPlain = columns === 4 || (columns === 3 && /rgb/i.test(color.name));
+  return {
+    layout: 'visionary',
+    gaussians: gaussians.name,
+    ...(isPlain ? { colors: color.name } : { sh: color.name }),
+    ...(outputs.some(({ name }) => name === 'num_points') ? { count: 'num_points' } : {}),
+  };
+}
+
+/**
+ * Role of an input by its name. Visionary asks for `matrix` before it asks for `proj`, and so feeds the camera to
+ * `projection_matrix`; here such an input gets what its name says.
+ */
+function visionaryInput(name: string): InputBinding | undefined {
+  const lower = name.toLowerCase();
+  if (lower.includes('proj')) return { role: 'projection', order: 'column-major', axes: 'LUF' };
+  if (/camera|view|matrix/.test(lower)) return { role: 'view', order: 'column-major', axes: 'LUF' };
+  return lower.includes('time') || lower === 't' ? { role: 'time', unit: 'normalized' } : undefined;
+}
+
+function describeOutputs({ gaussians, colors, sh, count }: VisionaryOutputs): string {
+  const color = colors === undefined ? `harmonics ${sh}` : `colours ${colors}`;
+  return `outputs are ${gaussians} and ${color}${count ? `, count ${count}` : ', no count'}`;
+}

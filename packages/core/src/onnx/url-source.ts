@@ -1,0 +1,209 @@
+import { GaussianSplatError } from '../errors.js';
+import { type ByteSource } from './byte-source.js';
+
+export interface UrlSourceOptions {
+  /** `cors` (default) or `same-origin`. */
+  readonly mode?: 'cors' | 'same-origin';
+  /** Which cookies are sent; default `same-origin`. */
+  readonly credentials?: 'omit' | 'same-origin' | 'include';
+  /** Aborts every request; reads then reject with the signal's reason. */
+  readonly signal?: AbortSignal;
+  /** Bytes of one Range request; default 65,536. */
+  readonly chunk?: number;
+  /** Range requests before the rest is fetched as a whole; default 32. Many small requests take longer than one large. */
+  readonly maxRequests?: number;
+}
+
+/** A file on a server. */
+export interface UrlSource extends ByteSource {
+  /** Requests made so far. */
+  readonly requests: number;
+  /** Bytes of bodies received so far. */
+  readonly bytesReceived: number;
+  /** The whole file, where the server sent it whole: it need not be fetched again. */
+  readonly whole: Uint8Array | undefined;
+}
+
+const DEFAULT_CHUNK = 65_536;
+const DEFAULT_MAX_REQUESTS = 32;
+/** Answers by which servers refuse the Range header rather than the file. */
+const RANGE_REFUSALS = [400, 405, 412, 416, 501];
+
+/**
+ * Opens a file on a server for reading in pieces by HTTP Range; where the server or the browser refuses Range, the file is
+ * fetched whole.
+ *
+ * @param url absolute, or relative to the page.
+ * @throws GaussianSplatError `network/url`, `network/unreachable`, `network/status` or `network/interrupted`; the reason of
+ * the signal.
+ */
+export async function openUrl(url: string | URL, options: UrlSourceOptions = {}): Promise<UrlSource> {
+  const file = new RemoteFile(parseUrl(url), options);
+  await file.open();
+  return file;
+}
+
+class RemoteFile implements UrlSource {
+  readonly #address: URL;
+  readonly #options: UrlSourceOptions;
+  readonly #maxRequests: number;
+  readonly name: string;
+  readonly chunk: number;
+  requests = 0;
+  bytesReceived = 0;
+  size = 0;
+  whole: Uint8Array | undefined;
+  /** The first piece, which opening the file brought along. */
+  #head: Uint8Array | undefined;
+
+  constructor(address: URL, options: UrlSourceOptions) {
+    this.#address = address;
+    this.#options = options;
+    this.#maxRequests = options.maxRequests ?? DEFAULT_MAX_REQUESTS;
+    this.name = address.href.slice(0, 200);
+    this.chunk = options.chunk ?? DEFAULT_CHUNK;
+  }
+
+  async open(): Promise<void> {
+    const response = await this.#requestRange(0, this.chunk);
+    const size = response && (sizeFromContentRange(response) ?? (await this.#sizeByHead()));
+    if (response === undefined || size === undefined) return this.#fetchWhole();
+    const head = await this.#body(response);
+    if (head.length !== Math.min(size, this.chunk)) return this.#fetchWhole();
+    this.size = size;
+    this.#head = head;
+  }
+
+  async read(offset: number, length: number): Promise<Uint8Array> {
+    const end = Math.min(offset + length, this.size);
+    if (offset >= end) return new Uint8Array(0);
+    if (this.whole === undefined && this.#head && end <= this.#head.length) return this.#head.subarray(offset, end);
+    if (this.whole === undefined) {
+      const piece = await this.#fetchPiece(offset, end);
+      if (piece) return piece;
+      await this.#fetchWhole();
+    }
+    return this.whole!.subarray(offset, end);
+  }
+
+  /** One piece, or undefined where the file should rather be fetched whole. */
+  async #fetchPiece(offset: number, end: number): Promise<Uint8Array | undefined> {
+    if (this.requests >= this.#maxRequests) return undefined;
+    const response = await this.#requestRange(offset, end);
+    if (response === undefined) return undefined;
+    const total = sizeFromContentRange(response);
+    const piece = await this.#body(response);
+    // Another length means that the file was replaced meanwhile, or that a proxy answers with something else.
+    return piece.length === end - offset && (total ?? this.size) === this.size ? piece : undefined;
+  }
+
+  /** The answer to a Range request; undefined if Range is refused; the whole file is kept if the server sends that. */
+  async #requestRange(offset: number, end: number): Promise<Response | undefined> {
+    let response: Response;
+    try {
+      response = await this.#request({ headers: { Range: `bytes=${offset}-${end - 1}` } });
+    } catch (error) {
+      this.#options.signal?.throwIfAborted();
+      // Where Range is not on a browser's safe list, it asks the other origin first, and many refuse.
+      if (error instanceof GaussianSplatError && error.code === 'network/unreachable') return undefined;
+      throw error;
+    }
+    if (response.status === 206 && isPlain(response)) return response;
+    if (response.status === 200) {
+      this.#keepWhole(await this.#body(response));
+      return undefined;
+    }
+    await response.body?.cancel().catch(() => {});
+    if (response.status === 206 || RANGE_REFUSALS.includes(response.status)) return undefined;
+    throw this.#badStatus(response);
+  }
+
+  /** Across origins Content-Range is often hidden from scripts; Content-Length is not. */
+  async #sizeByHead(): Promise<number | undefined> {
+    const response = await this.#request({ method: 'HEAD' });
+    const length = response.headers.get('Content-Length');
+    return response.ok && isPlain(response) && /^\d+$/.test(length ?? '') ? Number(length) : undefined;
+  }
+
+  async #fetchWhole(): Promise<void> {
+    if (this.whole !== undefined) return;
+    const response = await this.#request({});
+    if (!response.ok) {
+      await response.body?.cancel().catch(() => {});
+      throw this.#badStatus(response);
+    }
+    this.#keepWhole(await this.#body(response));
+  }
+
+  #keepWhole(bytes: Uint8Array): void {
+    this.whole = bytes;
+    this.size = bytes.length;
+    this.#head = undefined;
+  }
+
+  async #request(init: RequestInit): Promise<Response> {
+    const { mode = 'cors', credentials = 'same-origin', signal } = this.#options;
+    this.requests++;
+    return fetch(this.#address, { ...init, mode, credentials, signal }).catch((cause: unknown) => {
+      signal?.throwIfAborted();
+      throw new GaussianSplatError('network/unreachable', {
+        where: this.name,
+        expected: 'an answer from the server',
+        found: `none that may be read (${(cause as Error)?.message ?? 'unknown cause'})`,
+        remedy:
+          'check the address and the connection; a server of another origin must send "Access-Control-Allow-Origin"',
+        cause,
+      });
+    });
+  }
+
+  async #body(response: Response): Promise<Uint8Array> {
+    const buffer = await response.arrayBuffer().catch((cause: unknown) => {
+      this.#options.signal?.throwIfAborted();
+      throw new GaussianSplatError('network/interrupted', {
+        where: this.name,
+        expected: 'the rest of the file',
+        found: `the end of the connection (${(cause as Error)?.message ?? 'unknown cause'})`,
+        remedy: 'load the model again; the connection broke off',
+        cause,
+      });
+    });
+    this.bytesReceived += buffer.byteLength;
+    return new Uint8Array(buffer);
+  }
+
+  #badStatus({ status, statusText }: Response): GaussianSplatError {
+    return new GaussianSplatError('network/status', {
+      where: this.name,
+      expected: 'HTTP status 200 or 206',
+      found: `HTTP status ${status}${statusText ? ` (${statusText})` : ''}`,
+      remedy:
+        status === 404 ? 'check the path and the spelling, capital letters included' : 'check the address of the model',
+    });
+  }
+}
+
+function sizeFromContentRange(response: Response): number | undefined {
+  const match = /^bytes \d+-\d+\/(\d+)$/.exec(response.headers.get('Content-Range') ?? '');
+  return match ? Number(match[1]) : undefined;
+}
+
+/** Lengths and ranges of an encoded transfer are not those of the file. */
+function isPlain(response: Response): boolean {
+  return /^\s*(identity)?\s*$/i.test(response.headers.get('Content-Encoding') ?? '');
+}
+
+function parseUrl(url: string | URL): URL {
+  const base = globalThis.location?.href;
+  try {
+    return new URL(url, base);
+  } catch (cause) {
+    throw new GaussianSplatError('network/url', {
+      where: `address ${JSON.stringify(String(url).slice(0, 200))}`,
+      expected: base ? `an absolute URL or one relative to ${base.slice(0, 200)}` : 'an absolute URL',
+      found: 'text that is none',
+      remedy: 'correct the address of the model',
+      cause,
+    });
+  }
+}

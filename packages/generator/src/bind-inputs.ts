@@ -1,0 +1,129 @@
+import {
+  describeTensor,
+  eyeOf,
+  GaussianSplatError,
+  type Camera,
+  type Contract,
+  type InputBinding,
+  type OnnxHeader,
+  type OnnxTensor,
+} from '@gaussian-splat/core';
+import { inOrder, projectionMatrix, viewMatrix, viewProjectionMatrix } from './camera-matrices.js';
+import type { GeneratorState } from './state.js';
+
+/** The value of one input, ready for a tensor. */
+export interface InputValue {
+  readonly dtype: 'float32' | 'int32' | 'int64';
+  readonly dims: readonly number[];
+  readonly data: Float32Array | Int32Array | BigInt64Array;
+}
+
+/**
+ * The values of a generator's inputs, in the conventions that its contract declares. Inputs with the roles `gaussians` and
+ * `image` are left out: their tensors come from another generator or from a picture.
+ *
+ * @param header of a file that keeps the contract (`checkContract` found nothing).
+ * @throws GaussianSplatError `argument/value` if the state lacks a camera, or a value has the wrong length or is not finite.
+ */
+export function bindInputs(header: OnnxHeader, contract: Contract, state: GeneratorState): Record<string, InputValue> {
+  const values: Record<string, InputValue> = {};
+  for (const input of header.inputs) {
+    const binding = contract.inputs[input.name];
+    if (binding.role === 'gaussians' || binding.role === 'image') continue;
+    values[input.name] = toTensor(input, numbersOf(input, binding, contract, state));
+  }
+  return values;
+}
+
+/** True if two sets of values are the same, bit for bit: a generator without a seed would then write the same again. */
+export function sameInputs(a: Readonly<Record<string, InputValue>>, b: Readonly<Record<string, InputValue>>): boolean {
+  const names = Object.keys(a);
+  return (
+    names.length === Object.keys(b).length && names.every((name) => Object.hasOwn(b, name) && same(a[name], b[name]))
+  );
+}
+
+function same(a: InputValue, b: InputValue): boolean {
+  if (a.dtype !== b.dtype || a.data.length !== b.data.length) return false;
+  for (let i = 0; i < a.data.length; i++) if (!Object.is(a.data[i], b.data[i])) return false;
+  return a.dims.length === b.dims.length && a.dims.every((dim, i) => dim === b.dims[i]);
+}
+
+function numbersOf(
+  input: OnnxTensor,
+  binding: Exclude<InputBinding, { role: 'gaussians' | 'image' }>,
+  contract: Contract,
+  state: GeneratorState,
+): ArrayLike<number> {
+  const { timeSeconds = 0 } = state;
+  const camera = (): Camera => state.camera ?? needCamera(input.name, binding.role);
+  switch (binding.role) {
+    case 'view':
+      return inOrder(viewMatrix(camera(), binding.axes ?? 'RDF'), binding.order ?? 'row-major');
+    case 'projection':
+      return inOrder(projectionMatrix(camera(), binding.axes ?? 'RDF'), binding.order ?? 'row-major');
+    case 'view_projection':
+      return inOrder(viewProjectionMatrix(camera()), binding.order ?? 'row-major');
+    case 'camera_position':
+      return eyeOf(camera().worldToCamera);
+    case 'viewport':
+      return [camera().width, camera().height];
+    case 'time':
+      return [binding.unit === 'seconds' ? timeSeconds : timeSeconds / contract.duration!];
+    case 'frame':
+      return [state.frame ?? Math.floor(timeSeconds * (contract.fps ?? 0))];
+    case 'seed':
+      return [state.seed ?? 0];
+    case 'pose':
+      return state.pose ?? binding.default ?? restPose(input, binding);
+    case 'shape':
+      return state.shape ?? binding.default ?? new Array<number>(sizeOf(input)).fill(0);
+    case 'control':
+      return filled(input, state.controls?.[input.name] ?? binding.default);
+  }
+}
+
+/** Zeros, or for quaternions the identity. */
+function restPose(input: OnnxTensor, { format, quaternionOrder }: InputBinding & { role: 'pose' }): number[] {
+  const identity = quaternionOrder === 'xyzw' ? [0, 0, 0, 1] : [1, 0, 0, 0];
+  return Array.from({ length: sizeOf(input) }, (_, i) => (format === 'quaternion' ? identity[i % 4] : 0));
+}
+
+const filled = (input: OnnxTensor, value: number | ArrayLike<number>): ArrayLike<number> =>
+  typeof value === 'number' ? new Array<number>(sizeOf(input)).fill(value) : value;
+
+const sizeOf = ({ dims }: OnnxTensor): number =>
+  (dims ?? []).reduce<number>((product, dim) => product * Number(dim), 1);
+
+function toTensor(input: OnnxTensor, numbers: ArrayLike<number>): InputValue {
+  const { name, dtype } = input;
+  if (numbers.length !== sizeOf(input)) {
+    throw wrong(name, `${sizeOf(input)} numbers for ${describeTensor(input)}`, `${numbers.length}`);
+  }
+  const bad = Array.prototype.find.call(numbers, (value: unknown) => !Number.isFinite(value)) as unknown;
+  if (bad !== undefined) throw wrong(name, 'finite numbers', String(bad));
+  const dims = (input.dims ?? []).map(Number);
+  if (dtype === 'float32') return { dtype, dims, data: Float32Array.from(numbers) };
+  const whole = Array.from(numbers, Math.round);
+  if (dtype === 'int32') return { dtype, dims, data: Int32Array.from(whole) };
+  if (dtype === 'int64') return { dtype, dims, data: BigInt64Array.from(whole, (value) => BigInt(value)) };
+  throw wrong(name, 'an input of float32, int32 or int64', dtype);
+}
+
+function needCamera(name: string, role: string): never {
+  throw new GaussianSplatError('argument/value', {
+    where: `input ${name} (${role})`,
+    expected: 'a camera in the state of the generator',
+    found: 'none',
+    remedy: 'set camera before the generator runs',
+  });
+}
+
+function wrong(name: string, expected: string, found: string): GaussianSplatError {
+  return new GaussianSplatError('argument/value', {
+    where: `input ${name}`,
+    expected,
+    found,
+    remedy: 'set a value that fits the input; its contract says which',
+  });
+}

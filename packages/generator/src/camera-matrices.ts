@@ -1,0 +1,40 @@
+import type { Camera, CameraAxes, MatrixOrder } from '@gaussian-splat/core';
+import { multiply } from '@gaussian-splat/core';
+
+/** Signs that turn OpenCV's camera axes (right, down, forward) into others. */
+function axisSigns(axes: CameraAxes): readonly [number, number, number] {
+  return [axes[0] === 'R' ? 1 : -1, axes[1] === 'D' ? 1 : -1, axes[2] === 'F' ? 1 : -1];
+}
+
+/** World to camera with the axes declared; row-major float64. */
+export function viewMatrix({ worldToCamera }: Camera, axes: CameraAxes): Float64Array {
+  const signs = axisSigns(axes);
+  return Float64Array.from({ length: 16 }, (_, i) => worldToCamera[i] * (i < 12 ? signs[Math.floor(i / 4)] : 1));
+}
+
+/**
+ * Camera to clip space as WebGPU has it: x right, y up, depth 0 at `near` and 1 at `far`, w the distance along the line of
+ * sight in world units; row-major float64. A point lands where the camera's intrinsics put it, off-centre ones included.
+ */
+export function projectionMatrix(camera: Camera, axes: CameraAxes): Float64Array {
+  const { width, height, fx, fy, cx, cy, near, far } = camera;
+  const depth = far / (far - near);
+  const fromOpenCv = [
+    ...[(2 * fx) / width, 0, (2 * cx) / width - 1, 0],
+    ...[0, (-2 * fy) / height, 1 - (2 * cy) / height, 0],
+    ...[0, 0, depth, -near * depth],
+    ...[0, 0, 1, 0],
+  ];
+  const signs = [...axisSigns(axes), 1];
+  return Float64Array.from(fromOpenCv, (value, i) => value * signs[i % 4]);
+}
+
+/** World to clip space; row-major float64. */
+export function viewProjectionMatrix(camera: Camera): Float64Array {
+  return multiply(projectionMatrix(camera, 'RDF'), viewMatrix(camera, 'RDF'));
+}
+
+/** The numbers of a row-major matrix in the order declared. */
+export function inOrder(matrix: ArrayLike<number>, order: MatrixOrder): number[] {
+  return Array.from({ length: 16 }, (_, i) => matrix[order === 'row-major' ? i : 4 * (i % 4) + Math.floor(i / 4)]);
+}

@@ -1,0 +1,7 @@
+/** `npm run check -- MODEL [--contract CONTRACT.json] [--run]`: the conformance checker of packages/check. */
+import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
+
+ensureDependencies();
+ensureBuilt();
+const { main } = await import('../packages/check/dist/index.js');
+process.exit(await main(process.argv.slice(2)));

@@ -1,0 +1,165 @@
+/** The checker as a command and as a function, on the fixtures and on real files. */
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:http';
+import type { AddressInfo } from 'node:net';
+import { tmpdir } from 'node:os';
+import { basename, join } from 'node:path';
+import { after, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { checkModel, formatReport, type CheckReport } from '@gaussian-splat/check';
+import { needsSharedData, sharedPath } from '../support/data.js';
+import { fixtureBytes, fixtureNames, fixturePath } from '../support/generators.js';
+
+const root = fileURLToPath(new URL('../../', import.meta.url));
+const folder = mkdtempSync(join(tmpdir(), 'check-'));
+after(() => rmSync(folder, { recursive: true }));
+
+const codes = ({ faults }: CheckReport): string[] => faults.map(({ code }) => code).sort();
+
+function command(...args: string[]): { status: number | null; text: string } {
+  const bin = `${root}packages/check/bin/gaussian-splat-check.js`;
+  const { status, stdout, stderr } = spawnSync(process.execPath, [bin, ...args], { encoding: 'utf8' });
+  return { status, text: stdout + stderr };
+}
+
+/** What is wrong with each fixture, values included. */
+const FAULTS: Readonly<Record<string, readonly string[]>> = {
+  'faulty-values.onnx': [
+    'contract/count',
+    'contract/covariance',
+    'contract/not-finite',
+    'contract/not-finite',
+    'contract/opacity',
+  ],
+  'faulty-random.onnx': ['contract/not-deterministic'],
+  'faulty-run.onnx': ['contract/run'],
+  'subgraphs.onnx': [
+    'contract/inference',
+    'contract/inference',
+    'contract/inference',
+    'contract/inference',
+    'contract/operator',
+  ],
+};
+
+for (const name of fixtureNames()) {
+  test(`${name}, run on the CPU`, async () => {
+    const report = await checkModel(fixturePath(name), { run: true });
+    assert.deepEqual(codes(report), FAULTS[name] ?? []);
+    const runs = report.sections.find(({ title }) => title === 'Runs');
+    const isRun = !codes(report).some((code) => /run|inference/.test(code));
+    const hasControls = ['packed-sh-half.onnx', 'post.onnx'].includes(name);
+    assert.equal(runs?.rows.length, isRun ? (hasControls ? 5 : 3) : undefined);
+  });
+}
+
+test('values that were run are the ones in the table: a live count follows its control', async () => {
+  const { sections } = await checkModel(fixturePath('packed-sh-half.onnx'), { run: true });
+  const live = sections.find(({ title }) => title === 'Runs')!.rows.map(([, rows]) => rows);
+  assert.deepEqual(live, ['32 of 64 rows', '32 of 64 rows', '32 of 64 rows', '0 of 64 rows', '64 rows']);
+});
+
+test('the command: a table and 0, faults and 1, wrong use and 2', () => {
+  const good = command(fixturePath('packed.onnx'));
+  assert.equal(good.status, 0, good.text);
+  assert.match(good.text, /time +float32 \[1\] +time, unit seconds/);
+  assert.match(good.text, /keeps the contract \(header/);
+  const bad = command(fixturePath('faulty-values.onnx'), '--run');
+  assert.equal(bad.status, 1, bad.text);
+  for (const part of [
+    '5 faults',
+    'colors of row 6',
+    'contract/covariance',
+    'in 3 of 64 rows',
+    'found NaN',
+    'found 65',
+    'found 1.5',
+  ]) {
+    assert.ok(bad.text.includes(part), `${part} in ${bad.text}`);
+  }
+  assert.match(command(fixturePath('canonical.onnx')).text, /Warning: no contract was found/);
+  const missing = command('no-such.onnx');
+  assert.equal(missing.status, 1);
+  assert.match(missing.text, /no-such\.onnx.*ENOENT.*Check the path/s);
+  for (const args of [[], ['a', 'b'], ['--nonsense']]) assert.equal(command(...args).status, 2, args.join());
+  assert.equal(command('--help').status, 0);
+});
+
+test('bounds are held against runs at defaults; controls may leave them', async () => {
+  const path = join(folder, 'bounds.json');
+  const contract = JSON.parse(readFileSync(fixturePath('packed-sh-half.contract.json'), 'utf8')) as object;
+  const checkWith = async (minZ: number): Promise<string[]> => {
+    writeFileSync(path, JSON.stringify({ ...contract, bounds: { min: [-1, -1, minZ], max: [1, 1, 1] } }));
+    return codes(await checkModel(fixturePath('packed-sh-half.onnx'), { contract: path, run: true }));
+  };
+  // By default the upper half of the ball lives, with the control at its most all of it.
+  assert.deepEqual([await checkWith(0), await checkWith(0.5)], [[], ['contract/conflict']]);
+});
+
+test('--contract counts before the file beside the model', async () => {
+  const path = join(folder, 'own.json');
+  writeFileSync(path, JSON.stringify({ version: 1, inputs: {}, outputs: { layout: 'image', image: 'x' } }));
+  const report = await checkModel(fixturePath('split.onnx'), { contract: path });
+  assert.deepEqual(codes(report), ['contract/missing-tensor', 'contract/unbound-input', 'contract/unbound-input']);
+  writeFileSync(path, '{');
+  assert.deepEqual(codes(await checkModel(fixturePath('split.onnx'), { contract: path })), ['contract/json']);
+});
+
+test('external data that is missing or short', async () => {
+  copyFileSync(fixturePath('external.onnx'), join(folder, 'external.onnx'));
+  const report = (): Promise<CheckReport> => checkModel(join(folder, 'external.onnx'), { run: true });
+  assert.deepEqual(codes(await report()), ['contract/external-data']);
+  writeFileSync(join(folder, 'external.weights'), readFileSync(fixturePath('external.weights')).subarray(0, 6000));
+  assert.deepEqual(codes(await report()), ['contract/external-data']);
+  copyFileSync(fixturePath('external.weights'), join(folder, 'external.weights'));
+  assert.deepEqual(codes(await report()), []);
+});
+
+test('files that are no models', async () => {
+  for (const [content, code] of [
+    ['<!doctype html><title>404</title>', 'decode/html'],
+    ['', 'decode/unknown-format'],
+    [fixtureBytes('packed.onnx').subarray(0, 3000), 'decode/truncated'],
+  ] as const) {
+    writeFileSync(join(folder, 'bad.onnx'), content);
+    assert.deepEqual(codes(await checkModel(join(folder, 'bad.onnx'))), [code]);
+  }
+});
+
+test('a model on a server, with its sidecar and its weights', async () => {
+  const server = createServer((request, response) => {
+    const name = basename(new URL(request.url ?? '', 'http://x').pathname);
+    // Every unknown path gets a page with status 200, as many servers do it.
+    const known = ['split.onnx', 'split.contract.json', 'external.onnx', 'external.weights'].includes(name);
+    response.end(known ? readFileSync(fixturePath(name)) : '<!doctype html><p>Welcome');
+  });
+  await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
+  const base = `http://127.0.0.1:${(server.address() as AddressInfo).port}`;
+  try {
+    const split = await checkModel(`${base}/split.onnx`, { run: true });
+    assert.deepEqual(codes(split), []);
+    assert.match(formatReport('split', split, true), /file beside the model/);
+    const external = await checkModel(`${base}/external.onnx`, { run: true });
+    assert.deepEqual([codes(external), external.warnings.length > 0], [[], true]);
+    assert.deepEqual(codes(await checkModel(`${base}/other.onnx`)), ['decode/html']);
+  } finally {
+    server.closeAllConnections();
+    server.close();
+  }
+});
+
+test(
+  'real decoders of Octree-GS are no generators by themselves, and the checker says why',
+  { skip: needsSharedData },
+  async () => {
+    for (const name of ['color', 'cov', 'opacity']) {
+      const report = await checkModel(sharedPath(`generators/octree-gs/${name}_mlp.onnx`), { run: true });
+      assert.deepEqual([...new Set(codes(report))], ['contract/inference']);
+      const text = formatReport(name, report, true);
+      assert.match(text, /ai\.onnx 10/);
+      assert.match(text, /float32 \[\w+, 1, 1, 35\]/);
+    }
+  },
+);
