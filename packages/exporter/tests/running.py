@@ -11,7 +11,7 @@ import onnxruntime as ort
 from gaussian_exporter.arrays import AnyArray, Doubles
 from gaussian_exporter.contract import Coordinates, Facts
 
-FACTS = Facts("test", "CC0-1.0", "nobody", coordinates=Coordinates("-y", "right", 1.0))
+FACTS = Facts("test", "CC0-1.0", "nobody", coordinates=Coordinates("-y", "right", 1.0), duration=2.0)
 UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 
 

@@ -87,7 +87,8 @@ def test_contract_says_what_the_file_holds() -> None:
     contract = json.loads({prop.key: prop.value for prop in model.metadata_props}[METADATA_KEY])
     assert contract["version"] == 1 and contract["nMax"] == 500 and contract["dtype"] == "float32"
     assert contract["license"] == "CC0-1.0" and contract["antialiased"] is False
-    assert [given["role"] for given in contract["inputs"]] == ["camera_position"]
+    assert contract["inputs"] == {"camera_position": {"role": "camera_position"}}
+    assert contract["outputs"]["color"] == "rgb" and "shDegree" not in contract
     low, high = contract["bounds"]["min"], contract["bounds"]["max"]
     positions = run(model, {"camera_position": np.zeros(3)})["gaussians"][:, :3]
     assert np.array_equal(positions.min(0), np.float32(low)) and np.array_equal(positions.max(0), np.float32(high))

@@ -15,74 +15,60 @@ from .errors import ExportError
 METADATA_KEY = "gaussian_contract"
 VERSION = 1
 
-Role = Literal[
-    "view", "projection", "view_projection", "camera_position", "viewport", "time", "frame", "seed", "pose", "shape",
-    "control", "gaussians", "image",
-]  # fmt: skip
 Layout = Literal["packed", "split"]
 DType = Literal["float32", "float16"]
+Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Json = dict[str, object]
 
 
 @dataclass(frozen=True)
-class Skeleton:
-    """Joint names and the index of each joint's parent, -1 for the root; parents come before their children."""
-
-    joints: Sequence[str]
-    parents: Sequence[int]
-
-    def json(self) -> Json:
-        """As the contract writes it."""
-        return {"joints": list(self.joints), "parents": list(self.parents)}
-
-
-@dataclass(frozen=True)
 class Input:
-    """One ONNX input and the role that feeds it. `default` and `range` are flat numbers; `unit` belongs to a time
-    ("seconds" or "normalized"), `format` to a pose ("axis-angle", "quaternion", "parameters")."""
+    """One ONNX input and the role that feeds it: its name, and what the contract says of it."""
 
     name: str
-    role: Role
-    shape: Sequence[int]
-    default: Sequence[float] | None = None
-    range: tuple[float, float] | None = None
-    unit: str | None = None
-    format: str | None = None
-    skeleton: Skeleton | None = None
-    label: str | None = None
-
-    def json(self) -> Json:
-        """As the contract writes it: absent facts are left out."""
-        facts: Json = {"name": self.name, "role": self.role, "shape": list(self.shape), "dtype": "float32"}
-        optional: Json = {
-            "default": None if self.default is None else list(self.default),
-            "range": None if self.range is None else list(self.range),
-            "unit": self.unit,
-            "format": self.format,
-            "skeleton": None if self.skeleton is None else self.skeleton.json(),
-            "label": self.label,
-        }
-        return facts | {key: value for key, value in optional.items() if value is not None}
+    binding: Json
 
 
-@dataclass(frozen=True)
-class Output:
-    """One ONNX output: what it holds, and the numbers' shape."""
+def camera_position(name: str = "camera_position") -> Input:
+    """[3]: the eye, in world units."""
+    return Input(name, {"role": "camera_position"})
 
-    name: str
-    kind: str
-    shape: Sequence[int]
 
-    def json(self, dtype: DType) -> Json:
-        """As the contract writes it."""
-        return {"name": self.name, "kind": self.kind, "shape": list(self.shape), "dtype": dtype}
+def normalized_time(name: str = "time") -> Input:
+    """[1]: a share 0..1 of the contract's duration, which must be declared."""
+    return Input(name, {"role": "time", "unit": "normalized"})
+
+
+def pose(name: str, joints: Sequence[str], parents: Sequence[int], quaternions: bool) -> Input:
+    """[J,3] axis-angle in radians, or [J,4] quaternions w x y z; at rest by default."""
+    rest = [1.0, 0.0, 0.0, 0.0] if quaternions else [0.0, 0.0, 0.0]
+    kind: Json = {"format": "quaternion", "quaternionOrder": "wxyz"} if quaternions else {"format": "axis-angle"}
+    skeleton: Json = {"joints": list(joints), "parents": [int(parent) for parent in parents]}
+    return Input(name, {"role": "pose", **kind, **skeleton, "default": rest * len(joints)})
+
+
+def shape(name: str, count: int) -> Input:
+    """[count]: coefficients of a body; zeros by default. A contract has one input of this role at most."""
+    return Input(name, {"role": "shape", "default": [0.0] * count})
+
+
+def control(name: str, default: float | Sequence[float], low: float, high: float, label: str | None = None) -> Input:
+    """Float32 of any shape: a control for people. One default for all elements, or one for each."""
+    value = default if isinstance(default, (int, float)) else list(default)
+    named = {} if label is None else {"label": label}
+    return Input(name, {"role": "control", "range": [low, high], "default": value, **named})
+
+
+def image(name: str = "image") -> Input:
+    """[1,3,H,W]: red, green and blue planes in 0..1, top row first."""
+    return Input(name, {"role": "image"})
 
 
 @dataclass(frozen=True)
 class Coordinates:
-    """World axes: which points up, the handedness, and metres in a unit (0 where nobody knows)."""
+    """The frame that Gaussians are written in: which axis points up, the handedness, metres in a unit if known."""
 
-    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "-y"
+    up: Up = "-y"
     handedness: Literal["right", "left"] = "right"
     metres_per_unit: float | None = None
 
@@ -94,7 +80,7 @@ class Coordinates:
 
 @dataclass(frozen=True)
 class Facts:
-    """What only the person who exports can know."""
+    """What only the person who exports can know. `duration` in seconds, `fps` in frames to a second."""
 
     name: str
     license: str
@@ -106,59 +92,76 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Contract:
-    """All that a page must know to run a generator. `bounds` is (min xyz, max xyz) in world units, or None for
-    post-processors, which write images and no Gaussians."""
+class GaussianOutputs:
+    """How Gaussians are written. sh_degree is None for plain colours; names are those of the layout's tensors."""
 
-    facts: Facts
+    layout: Layout
+    n_max: int
     dtype: DType
-    inputs: Sequence[Input]
-    outputs: Sequence[Output]
-    layout: Layout | None = None
-    n_max: int | None = None
-    sh_degree: int | None = None
-    bounds: tuple[Sequence[float], Sequence[float]] | None = None
+    sh_degree: int | None
+    bounds: tuple[Sequence[float], Sequence[float]]
 
     def json(self) -> Json:
-        """The object that is written; keys in the order a reader wants them."""
-        facts = self.facts
-        result: Json = {"version": VERSION, "name": facts.name}
-        if self.n_max is not None:
-            result["nMax"] = self.n_max
-        result["dtype"] = self.dtype
-        if self.sh_degree is not None:
-            result["shDegree"] = self.sh_degree
-        if self.bounds is not None:
-            result["bounds"] = {"min": list(self.bounds[0]), "max": list(self.bounds[1])}
-        for key, value in (("duration", facts.duration), ("fps", facts.fps)):
-            if value is not None:
-                result[key] = value
-        if self.layout is not None:
-            result["coordinates"] = facts.coordinates.json()
-            result["antialiased"] = facts.antialiased
-        result |= {"license": facts.license, "attribution": facts.attribution}
-        result["inputs"] = [given.json() for given in self.inputs]
-        result["outputs"] = self._outputs()
-        return result
-
-    def _outputs(self) -> Json:
-        tensors = [output.json(self.dtype) for output in self.outputs]
-        if self.layout is None:
-            return {"layout": "image", "tensors": tensors}
-        color = "sh" if self.sh_degree else "linear"
-        activations: Json = {"opacity": "linear", "scale": "linear", "color": color}
-        order: Json = {"rotation": "wxyz", "sh": "coefficient-major"}
-        return {"layout": self.layout, "tensors": tensors, "activations": activations, "order": order}
-
-    def metadata(self) -> dict[str, str]:
-        """The file's metadata_props."""
-        return {METADATA_KEY: json.dumps(self.json(), ensure_ascii=False, allow_nan=False)}
+        """The contract's `outputs`."""
+        sh: Json = {} if self.sh_degree is None else {"shOrder": "coefficient-major"}
+        if self.layout == "packed":
+            color = "rgb" if self.sh_degree is None else "sh"
+            return {"layout": "packed", "gaussians": "gaussians", "color": color, "opacityActivation": "linear", **sh}
+        names = ["positions", "covariances", "colors" if self.sh_degree is None else "sh", "opacities"]
+        return {"layout": "split", **{name: name for name in names}, "opacityActivation": "linear", **sh}
 
 
-def of_metadata(metadata: dict[str, str], where: str) -> Json:
-    """The contract of a file's metadata_props. Raises ExportError where there is none."""
+def gaussian_contract(facts: Facts, inputs: Sequence[Input], outputs: GaussianOutputs) -> Json:
+    """The contract of a generator, keys in the order a reader wants them."""
+    if facts.duration is None and any(given.binding.get("unit") == "normalized" for given in inputs):
+        raise ExportError(
+            "argument/value",
+            where="duration",
+            expected="the seconds that time 0 to 1 plays",
+            found="none",
+            remedy="give --duration SECONDS",
+        )
+    low, high = outputs.bounds
+    written: Json = {"nMax": outputs.n_max, "dtype": outputs.dtype}
+    if outputs.sh_degree is not None:
+        written["shDegree"] = outputs.sh_degree
+    playing = {key: value for key, value in (("duration", facts.duration), ("fps", facts.fps)) if value is not None}
+    return {
+        "version": VERSION,
+        "name": facts.name,
+        "inputs": {given.name: given.binding for given in inputs},
+        "outputs": outputs.json(),
+        **written,
+        "bounds": {"min": list(low), "max": list(high)},
+        **playing,
+        "coordinates": facts.coordinates.json(),
+        "antialiased": facts.antialiased,
+        "license": facts.license,
+        "attribution": facts.attribution,
+    }
+
+
+def image_contract(facts: Facts, inputs: Sequence[Input]) -> Json:
+    """The contract of a post-processor, whose output is called `processed`."""
+    return {
+        "version": VERSION,
+        "name": facts.name,
+        "inputs": {given.name: given.binding for given in inputs},
+        "outputs": {"layout": "image", "image": "processed"},
+        "license": facts.license,
+        "attribution": facts.attribution,
+    }
+
+
+def metadata(contract: Json) -> dict[str, str]:
+    """The file's metadata_props."""
+    return {METADATA_KEY: json.dumps(contract, ensure_ascii=False, allow_nan=False)}
+
+
+def of_metadata(props: dict[str, str], where: str) -> Json:
+    """The contract of a file's metadata_props. Raises contract/violation where there is none."""
     try:
-        found = json.loads(metadata[METADATA_KEY])
+        found = json.loads(props[METADATA_KEY])
     except (KeyError, ValueError) as error:
         raise ExportError(
             "contract/violation",

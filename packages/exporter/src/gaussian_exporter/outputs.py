@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import onnx
 
 from .arrays import AnyArray
-from .contract import Contract, DType, Facts, Input, Layout, Output
+from .contract import DType, Facts, GaussianOutputs, Input, Layout, gaussian_contract, metadata
 from .errors import ExportError
 from .graph import Graph, Tensor
 from .pieces.covariance import covariance_of_scale_and_rotation
@@ -64,29 +64,25 @@ def finish(
     options: Options,
 ) -> onnx.ModelProto:
     """Adds the outputs and returns the generator. `bounds`: corners around every position at the inputs' defaults."""
-    outputs = packed(graph, gaussians, options) if options.layout == "packed" else split(graph, gaussians, options)
-    contract = Contract(
-        facts=facts,
-        dtype=options.dtype,
-        inputs=inputs,
-        outputs=outputs,
+    write = write_packed if options.layout == "packed" else write_split
+    write(graph, gaussians, options)
+    outputs = GaussianOutputs(
         layout=options.layout,
         n_max=gaussians.positions.shape[0],
+        dtype=options.dtype,
         sh_degree=None if gaussians.sh is None else gaussians.sh_degree(),
         bounds=([float(x) for x in bounds[0]], [float(x) for x in bounds[1]]),
     )
-    return graph.model(contract.metadata())
+    return graph.model(metadata(gaussian_contract(facts, inputs, outputs)))
 
 
-def packed(graph: Graph, gaussians: Gaussians, options: Options) -> list[Output]:
+def write_packed(graph: Graph, gaussians: Gaussians, options: Options) -> None:
     """One tensor: position 3, covariance 6, colour 3 or harmonics, opacity 1."""
     columns = [gaussians.positions, gaussians.covariance(), gaussians.colour(), gaussians.opacities]
-    rows = graph.concat(columns, 1)
-    graph.output("gaussians", rows, options.dtype == "float16")
-    return [Output("gaussians", "gaussians", rows.shape)]
+    graph.output("gaussians", graph.concat(columns, 1), options.dtype == "float16")
 
 
-def split(graph: Graph, gaussians: Gaussians, options: Options) -> list[Output]:
+def write_split(graph: Graph, gaussians: Gaussians, options: Options) -> None:
     """A tensor for each attribute."""
     colour = "colors" if gaussians.sh is None else "sh"
     tensors = {
@@ -95,10 +91,9 @@ def split(graph: Graph, gaussians: Gaussians, options: Options) -> list[Output]:
         colour: gaussians.colors if gaussians.sh is None else gaussians.sh,
         "opacities": gaussians.opacities,
     }
-    found = [(name, tensor) for name, tensor in tensors.items() if tensor is not None]
-    for name, tensor in found:
-        graph.output(name, tensor, options.dtype == "float16")
-    return [Output(name, name, tensor.shape) for name, tensor in found]
+    for name, tensor in tensors.items():
+        if tensor is not None:
+            graph.output(name, tensor, options.dtype == "float16")
 
 
 def save(model: onnx.ModelProto, path: str) -> int:

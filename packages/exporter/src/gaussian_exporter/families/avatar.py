@@ -14,7 +14,7 @@ import numpy as np
 import onnx
 
 from ..arrays import Floats, rotation_matrices
-from ..contract import Facts, Input, Skeleton
+from ..contract import Facts, Input, camera_position, control, pose, shape
 from ..errors import ExportError
 from ..graph import Graph, Tensor
 from ..outputs import Gaussians, Options, finish
@@ -61,14 +61,15 @@ def export_avatar(
     """
     check(avatar)
     graph = Graph("avatar")
-    pose = graph.input("pose", len(avatar.parents), 4 if pose_format == "quaternion" else 3)
-    rotations = rotation_matrix(pose) if pose_format == "quaternion" else rotation_of_axis_angle(pose)
-    inputs = [pose_input(avatar, pose_format)]
+    quaternions = pose_format == "quaternion"
+    given = graph.input("pose", len(avatar.parents), 4 if quaternions else 3)
+    rotations = rotation_matrix(given) if quaternions else rotation_of_axis_angle(given)
+    inputs = [pose("pose", avatar.joint_names, avatar.parents, quaternions)]
     positions, joints = blended(avatar, graph, rotations, inputs)
     frames = posed_joints(rotations, relative_to_parent(joints, avatar.parents), avatar.parents)
     carried = graph.constant(avatar.weights, "weights") @ skinning_matrices(frames, joints)
     translation = graph.input("translation", 3)
-    inputs.append(Input("translation", "control", [3], default=[0.0] * 3, range=(-10.0, 10.0)))
+    inputs.append(control("translation", 0.0, -10.0, 10.0))
     gaussians = skinned(avatar, graph, positions, carried, translation, inputs)
     bounds = avatar.positions.min(0), avatar.positions.max(0)
     return finish(graph, gaussians, inputs, bounds, facts, options or Options())
@@ -108,36 +109,27 @@ def _demand(holds: bool, where: str, expected: str, found: str) -> None:
         )
 
 
-def pose_input(avatar: Avatar, pose_format: PoseFormat) -> Input:
-    """The pose, with the skeleton it belongs to; at rest by default."""
-    joints = len(avatar.parents)
-    rest = [1.0, 0.0, 0.0, 0.0] if pose_format == "quaternion" else [0.0] * 3
-    skeleton = Skeleton(list(avatar.joint_names), [int(parent) for parent in avatar.parents])
-    return Input("pose", "pose", [joints, len(rest)], default=rest * joints, format=pose_format, skeleton=skeleton)
-
-
 def blended(avatar: Avatar, graph: Graph, rotations: Tensor, inputs: list[Input]) -> tuple[Tensor, Tensor]:
     """Positions (N,3) and joints (J,3) at rest, of this shape, expression and pose. Adds the inputs it needs."""
     positions = graph.constant(avatar.positions, "positions")
     joints = graph.constant(avatar.joints, "joints")
     if avatar.shape_directions is not None and avatar.joint_directions is not None:
-        shape = coefficients(graph, "shape", avatar.shape_directions.shape[2], inputs)
-        positions = positions + along(shape, avatar.shape_directions, "shape_directions")
-        joints = joints + along(shape, avatar.joint_directions, "joint_directions")
+        count = avatar.shape_directions.shape[2]
+        inputs.append(shape("shape", count))
+        body = graph.input("shape", count).reshape(1, count)
+        positions = positions + along(body, avatar.shape_directions, "shape_directions")
+        joints = joints + along(body, avatar.joint_directions, "joint_directions")
     if avatar.expression_directions is not None:
-        expression = coefficients(graph, "expression", avatar.expression_directions.shape[2], inputs)
+        count = avatar.expression_directions.shape[2]
+        # The role `shape` is there once only, so that a page knows which coefficients are the body's.
+        inputs.append(control("expression", 0.0, -3.0, 3.0))
+        expression = graph.input("expression", count).reshape(1, count)
         positions = positions + along(expression, avatar.expression_directions, "expression_directions")
     if avatar.pose_directions is not None:
         bends = rotations.part(1, rotations.shape[0], 0) - graph.constant(np.eye(3)[None], "identity")
         bends = bends.reshape(1, 9 * (rotations.shape[0] - 1))
         positions = positions + along(bends, avatar.pose_directions, "pose_directions")
     return positions, joints
-
-
-def coefficients(graph: Graph, name: str, count: int, inputs: list[Input]) -> Tensor:
-    """An input of coefficients, as a row (1,B); zero by default."""
-    inputs.append(Input(name, "shape", [count], default=[0.0] * count, range=(-3.0, 3.0)))
-    return graph.input(name, count).reshape(1, count)
 
 
 def along(row: Tensor, directions: Floats, name: str) -> Tensor:
@@ -160,7 +152,7 @@ def skinned(
     sh = graph.constant(avatar.sh, "sh")
     if avatar.sh.shape[1] > 1:
         camera = graph.input("camera_position", 3)
-        inputs.append(Input("camera_position", "camera_position", [3]))
+        inputs.append(camera_position())
         direction, _ = direction_and_distance(placed, camera)
         # Transposed, the blend turns the direction back into the frame that the harmonics were trained in.
         own = (turn * direction.reshape(count, 3, 1)).sum(1)

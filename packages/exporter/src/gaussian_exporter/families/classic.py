@@ -14,7 +14,7 @@ import onnx
 from ..arrays import Floats, covariances, sigmoid
 from ..checkpoints.files import latest_iteration
 from ..checkpoints.ply import Vertices, read_ply
-from ..contract import Facts, Input
+from ..contract import Facts, camera_position
 from ..errors import ExportError
 from ..graph import Graph
 from ..outputs import Gaussians, Options, finish
@@ -96,7 +96,7 @@ def export_classic(
     seen = None
     if colours == "view":
         camera = graph.input("camera_position", 3)
-        inputs.append(Input("camera_position", "camera_position", [3]))
+        inputs.append(camera_position())
         seen = harmonics.colour(direction_and_distance(positions, camera)[0], sh)
     gaussians = Gaussians(
         positions=positions,

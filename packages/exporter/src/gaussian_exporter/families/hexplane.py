@@ -15,7 +15,7 @@ import numpy as np
 import onnx
 
 from ..arrays import Doubles, Floats, sigmoid
-from ..contract import Facts, Input
+from ..contract import Facts, normalized_time
 from ..errors import ExportError
 from ..graph import Graph, Tensor
 from ..outputs import Gaussians, Options, finish
@@ -55,9 +55,8 @@ def export_hexplane(
     graph = Graph("hexplane")
     time = graph.input("time", 1)
     hidden = mlp(features(cloud, deformation, graph, time), deformation.trunk, "trunk").unary("Relu")
-    inputs = [Input("time", "time", [1], default=[0.0], range=(0.0, 1.0), unit="normalized")]
     bounds = cloud.positions.min(0), cloud.positions.max(0)
-    return finish(graph, move(cloud, deformation, hidden), inputs, bounds, facts, options or Options())
+    return finish(graph, move(cloud, deformation, hidden), [normalized_time()], bounds, facts, options or Options())
 
 
 def check(cloud: Cloud, deformation: Deformation) -> None:

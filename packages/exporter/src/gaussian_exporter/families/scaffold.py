@@ -16,7 +16,7 @@ import numpy as np
 import onnx
 
 from ..arrays import Floats
-from ..contract import Facts, Input
+from ..contract import Facts, camera_position, control
 from ..errors import ExportError
 from ..graph import Graph, Tensor
 from ..outputs import Gaussians, Options, finish
@@ -69,14 +69,14 @@ def export_scaffold(model: Scaffold, facts: Facts, options: Options | None = Non
     check(model)
     graph = Graph("scaffold" if model.levels is None else "octree")
     camera = graph.input("camera_position", 3)
-    inputs = [Input("camera_position", "camera_position", [3])]
+    inputs = [camera_position()]
     anchors = graph.constant(model.anchors, "anchors")
     seen = direction_and_distance(anchors, camera)
     decoded = decode(model, graph, *seen)
     opacity = decoded["opacity"].unary("Tanh")
     if model.levels is not None:
         resolution = graph.input("resolution_scale", 1)
-        inputs.append(Input("resolution_scale", "control", [1], default=[1.0], range=(0.25, 16.0), label="coarseness"))
+        inputs.append(control("resolution_scale", 1.0, 0.25, 16.0, "coarseness"))
         opacity = opacity * presence(model.levels, anchors, camera, resolution)
     gaussians = place(model, graph, anchors, opacity, decoded)
     return finish(graph, gaussians, inputs, reach(model), facts, options or Options())
