@@ -94,6 +94,14 @@ def test_wide_splits_and_long_sums() -> None:
     assert found(made([total], axis, size=100_000)) == {("slow", "CumSum")}
 
 
+def test_convolutions_that_come_out_wrong() -> None:
+    for inputs, expected in ((6, {("wrong", "Conv")}), (8, set()), (3, set()), (5, set())):
+        weight: dict[str, AnyArray] = {"w": np.zeros((8, inputs, 3, 3), np.float32)}
+        weight["s"] = np.array([1, inputs, 4, 4], np.int64)
+        nodes = [helper.make_node("Reshape", ["x", "s"], ["p"]), helper.make_node("Conv", ["p", "w"], ["y"])]
+        assert found(made(nodes, weight, size=inputs * 4)) == expected
+
+
 def test_symbolic_sizes_half_floats_and_foreign_operators() -> None:
     relu = helper.make_node("Relu", ["x"], ["y"])
     assert any("cannot be captured" in str(finding) for finding in gpu_findings(made([relu], size="n")))

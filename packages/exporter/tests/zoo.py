@@ -10,10 +10,12 @@ import onnx
 from gaussian_exporter.arrays import AnyArray
 from gaussian_exporter.families.avatar import export_avatar
 from gaussian_exporter.families.classic import export_classic
+from gaussian_exporter.families.feed_forward import export_feed_forward
 from gaussian_exporter.families.hexplane import export_hexplane
+from gaussian_exporter.families.image_filter import export_image_filter
 from gaussian_exporter.families.scaffold import export_scaffold
 
-from . import test_avatar, test_classic, test_hexplane, test_scaffold
+from . import test_avatar, test_classic, test_hexplane, test_networks, test_scaffold
 from .running import FACTS
 
 Case = tuple[onnx.ModelProto, dict[str, AnyArray]]
@@ -38,6 +40,14 @@ def every_family() -> dict[str, Case]:
         "hexplane": (export_hexplane(test_hexplane.small(), moving, FACTS), {"time": np.array([0.3], np.float32)}),
         "avatar": (export_avatar(test_avatar.avatar(degree=1), FACTS), body),
     }
+    picture = test_networks.given()["image"]
+    for kind, norm in (("style", True), ("noise", False)):
+        model = test_networks.image_filter("picture" if kind == "style" else "noise", norm)
+        exported = export_image_filter(model, test_networks.WIDTH, test_networks.HEIGHT, FACTS)
+        cases[kind] = (exported, {"image": picture, "strength": np.ones(1, np.float32)})
+    for views in (1, 2):
+        network = test_networks.feed_forward(views)
+        cases[f"feed-forward-{views}"] = (export_feed_forward(network, FACTS), test_networks.given(views))
     for rule in ("round", "progressive", "ceil"):
         octree = test_scaffold.scaffold(levels=test_scaffold.levels(60, rule))
         cases[f"octree-{rule}"] = (export_scaffold(octree, FACTS), {**camera, **level})

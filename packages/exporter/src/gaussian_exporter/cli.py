@@ -14,13 +14,16 @@ import onnx
 from .checkpoints.avatar_file import read_avatar
 from .checkpoints.files import existing
 from .checkpoints.hexplane_folder import read_hexplane
+from .checkpoints.networks import read_feed_forward, read_image_filter
 from .checkpoints.scaffold_folder import read_scaffold
 from .conformance import check_outputs
 from .contract import Coordinates, DType, Facts, Json, Layout, Up, of_metadata
 from .errors import ExportError
 from .families.avatar import PoseFormat, export_avatar
 from .families.classic import Colours, export_classic, read_cloud
+from .families.feed_forward import export_feed_forward
 from .families.hexplane import export_hexplane
+from .families.image_filter import export_image_filter
 from .families.scaffold import export_scaffold
 from .outputs import Options, save
 from .placement import gpu_findings
@@ -151,9 +154,31 @@ def _avatar(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.M
     return export_avatar(read_avatar(given.checkpoint), facts, options, cast(PoseFormat, given.pose))
 
 
+def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    return export_feed_forward(read_feed_forward(given.checkpoint), facts, options)
+
+
+def _image_filter_options(family: Command) -> None:
+    family.add_argument("--size", type=size, help="WIDTHxHEIGHT in pixels; default: as in config.json")
+
+
+def size(text: str) -> tuple[int, int]:
+    """A picture's size, written as 640x480."""
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
+def _image_filter(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    model, config = read_image_filter(given.checkpoint)
+    width, height = given.size or (int(config["width"]), int(config["height"]))
+    return export_image_filter(model, width, height, facts)
+
+
 FAMILIES: dict[str, tuple[Callable[[Command], None], str, Export]] = {
     "classic": (_classic_options, "3DGS: a PLY file, or the trainer's folder", _classic),
     "scaffold": (_scaffold_options, "Scaffold-GS or Octree-GS: the trainer's folder", _scaffold),
     "hexplane": (_no_options, "4DGS: the folder of 4DGaussians", _hexplane),
     "avatar": (_avatar_options, "a skinned avatar: one .npz file", _avatar),
+    "feed-forward": (_no_options, "pictures to Gaussians: a folder of config.json and model.pth", _feed_forward),
+    "image-filter": (_image_filter_options, "style or denoising: a folder of config.json and model.pth", _image_filter),
 }

@@ -16,6 +16,8 @@ from typing import Literal
 import onnx
 from onnx import TensorProto, helper
 
+from .pieces.convolution import is_wrong_on_webgpu
+
 # Operators of ai.onnx with a float32 kernel. Control flow (If) has one too, but ends capture.
 _KERNEL_NAMES = """
     Abs Acos Acosh Add And ArgMax ArgMin Asin Asinh Atan Atanh AveragePool BatchNormalization Cast Ceil Clip
@@ -50,12 +52,13 @@ MOST_SPLIT_OUTPUTS = 9
 # CumSum lets each thread add up its whole prefix.
 LONGEST_CUMSUM = 4096
 
-Kind = Literal["fallback", "failure", "slow"]
+Kind = Literal["fallback", "failure", "wrong", "slow"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One reason why a file will not stay on the GPU (fallback), not run (failure), or be slow there."""
+    """One reason why a file will not stay on the GPU (fallback), not run (failure), compute
+    other numbers there than on the CPU (wrong), or be slow."""
 
     kind: Kind
     node: str
@@ -81,6 +84,7 @@ class _Values:
         self.constants |= {node.output[0] for node in graph.node if node.op_type == "Constant"}
         self.types = {initializer.name: initializer.data_type for initializer in graph.initializer}
         self.dims: dict[str, list[int | None]] = {}
+        self.dims |= {initializer.name: list(initializer.dims) for initializer in graph.initializer}
         for value in [*graph.input, *graph.value_info, *graph.output]:
             tensor = value.type.tensor_type
             self.types[value.name] = tensor.elem_type
@@ -148,6 +152,11 @@ def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
     if node.op_type == "Split" and len(node.output) > MOST_SPLIT_OUTPUTS:
         reason = f"{len(node.output)} outputs need more storage buffers than a shader may bind"
         yield Finding("failure", node.name, "Split", reason, f"split into at most {MOST_SPLIT_OUTPUTS}, or use Gather")
+    if node.op_type == "Conv" and len(values.dims.get(node.input[1], [])) == 4:
+        outputs, inputs, size = (side or 0 for side in values.dims[node.input[1]][:3])
+        if is_wrong_on_webgpu(inputs, outputs, size):
+            reason = f"{inputs} channels to {outputs} come out wrong (seen with onnxruntime-webgpu 1.27.0)"
+            yield Finding("wrong", node.name, "Conv", reason, "pad the channels going in to a multiple of 4")
     if node.op_type == "CumSum":
         longest = max((size or 0 for size in values.dims.get(node.input[0], [])), default=0)
         if longest > LONGEST_CUMSUM:
