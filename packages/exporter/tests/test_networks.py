@@ -94,7 +94,7 @@ def feed_forward(views: int = 2) -> FeedForward:
 
 def given(views: int = 2) -> dict[str, AnyArray]:
     rng = np.random.default_rng(1)
-    feeds: dict[str, AnyArray] = {"intrinsics": np.array([1.1, 1.4, 0.48, 0.53])}
+    feeds: dict[str, AnyArray] = {"focal_length": np.array([1.1, 1.4]), "principal_point": np.array([0.48, 0.53])}
     for name in ("image", "image_2")[:views]:
         feeds[name] = rng.random((1, 3, HEIGHT, WIDTH))
     if views == 2:
@@ -126,7 +126,7 @@ def swept(model: FeedForward, own: Doubles, other: Doubles, k: Doubles, pose: Do
 
 
 def reference(model: FeedForward, feeds: dict[str, AnyArray]) -> dict[str, Doubles]:
-    k = feeds["intrinsics"].astype(np.float64)
+    k = np.concatenate([feeds["focal_length"], feeds["principal_point"]]).astype(np.float64)
     pictures = [feeds[name][0].astype(np.float64) for name in ("image", "image_2")[: model.views]]
     encoded = []
     for picture in pictures:

@@ -173,7 +173,7 @@ def test_feed_forward(views: Path, tmp_path: Path, count: int) -> None:
     k = feed_forward.shares(scene.intrinsics[0], SIZE, SIZE)
     pose = scene.views[1] @ torch.linalg.inv(scene.views[0])
     images = [scene.pictures[i : i + 1, :3] for i in range(count)]
-    feeds = {"intrinsics": k.numpy(), "image": images[0].numpy()}
+    feeds = {"focal_length": k[:2].numpy(), "principal_point": k[2:].numpy(), "image": images[0].numpy()}
     if count == 2:
         feeds |= {"image_2": images[1].numpy(), "relative_pose": pose.numpy()}
     exported = export_feed_forward(read_feed_forward(tmp_path), FACTS)

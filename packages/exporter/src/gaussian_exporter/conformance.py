@@ -48,7 +48,8 @@ def _flat(shape: list[int]) -> int:
 
 
 def check_outputs(model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = None) -> dict[str, AnyArray]:
-    """Runs the model twice on the CPU provider of onnxruntime and returns its outputs.
+    """Runs the model on the CPU provider of onnxruntime, at defaults twice and at both ends of its controls; returns
+    its outputs at defaults.
 
     Raises contract/violation for numbers that are not finite, opacities outside 0..1, covariances that are no
     covariances, or results that differ from run to run; needs onnxruntime.
@@ -61,15 +62,29 @@ def check_outputs(model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = No
     names = [output.name for output in session.get_outputs()]
     first, second = (dict(zip(names, session.run(None, given), strict=True)) for _ in range(2))
     for name, values in first.items():
+        if not np.array_equal(values, second[name], equal_nan=True):
+            raise _violation(name, "the same result twice", "a difference", "declare a seed")
+    ends = [dict(zip(names, session.run(None, given | end), strict=True)) for end in _ends_of_controls(contract, given)]
+    for results in (first, *ends):
+        _check_values(cast(dict[str, Any], contract["outputs"]), results)
+    return first
+
+
+def _ends_of_controls(contract: Json, given: dict[str, AnyArray]) -> Iterator[dict[str, AnyArray]]:
+    """All controls at the least, and all at the most that their ranges allow: people will go there."""
+    bindings = cast(dict[str, Any], contract["inputs"])
+    ranges = {name: each["range"] for name, each in bindings.items() if each["role"] == "control"}
+    for end in (0, 1) if ranges else ():
+        yield {name: np.full_like(given[name], limits[end]) for name, limits in ranges.items()}
+
+
+def _check_values(outputs: dict[str, Any], results: dict[str, AnyArray]) -> None:
+    for name, values in results.items():
         if not np.isfinite(values).all():
             wrong = int((~np.isfinite(values)).sum())
             raise _violation(name, "finite numbers", f"{wrong} of {values.size} that are not", "train longer or prune")
-        if not np.array_equal(values, second[name]):
-            raise _violation(name, "the same result twice", "a difference", "declare a seed")
-    outputs = cast(dict[str, Any], contract["outputs"])
-    for check in _checks(outputs, first):
+    for check in _checks(outputs, results):
         check()
-    return first
 
 
 def _checks(outputs: dict[str, Any], values: dict[str, AnyArray]) -> Iterator[Callable[[], None]]:

@@ -82,16 +82,18 @@ class Pose:
 def export_feed_forward(model: FeedForward, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
     """A generator of views * height * width Gaussians, row by row of the first picture, then of the second.
 
-    Inputs: `image` (and `image_2`), `intrinsics` (fx, fy, cx, cy as shares of width and height), and with two pictures
-    `relative_pose`, the 4x4 matrix from the first camera's frame (OpenCV axes) to the second's.
+    Inputs: `image` (and `image_2`), `focal_length` and `principal_point` ([2] each, as shares of width and height; the
+    same for every picture), and with two pictures `relative_pose`, the 4x4 matrix from the first camera's frame (OpenCV
+    axes) to the second's.
     """
     check(model)
     graph = Graph("feed_forward")
     pictures = [graph.input(name, 1, 3, model.height, model.width) for name in ("image", "image_2")[: model.views]]
-    numbers = graph.input("intrinsics", 4)
-    camera = Camera(*(numbers.part(i, i + 1) for i in range(4)))
+    focal, principal = graph.input("focal_length", 2), graph.input("principal_point", 2)
+    camera = Camera(focal.part(0, 1), focal.part(1, 2), principal.part(0, 1), principal.part(1, 2))
     inputs: list[Input] = [image(name) for name in ("image", "image_2")[: model.views]]
-    inputs.append(control("intrinsics", [1.0, model.width / model.height, 0.5, 0.5], 0.0, 10.0))
+    inputs.append(control("focal_length", [1.0, model.width / model.height], 0.1, 20.0))
+    inputs.append(control("principal_point", 0.5, -1.0, 2.0))
     found = gaussians(model, graph, pictures, camera, inputs)
     return finish(graph, found, inputs, reach(model), facts, options or Options())
 
