@@ -4,9 +4,9 @@ import { fileURLToPath } from 'node:url';
 
 export const root = fileURLToPath(new URL('../../', import.meta.url));
 
-/** Runs a command in the project's root and returns its exit status. */
-export function run(command, args, { env = {}, stdio = 'inherit' } = {}) {
-  const result = spawnSync(command, args, { cwd: root, stdio, env: { ...process.env, ...env } });
+/** Runs a command, in the project's root unless told otherwise, and returns its exit status. */
+export function run(command, args, { env = {}, stdio = 'inherit', cwd = root } = {}) {
+  const result = spawnSync(command, args, { cwd, stdio, env: { ...process.env, ...env } });
   if (result.error) throw result.error;
   return result.status ?? 1;
 }

@@ -1,0 +1,1 @@
+"""Trained Gaussian models to ONNX Gaussian Generators."""

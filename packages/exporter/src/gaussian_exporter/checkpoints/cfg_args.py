@@ -1,0 +1,37 @@
+"""The file `cfg_args` of INRIA's trainer and its descendants: an argparse Namespace as text, read and not evaluated."""
+
+import ast
+from pathlib import Path
+
+from ..errors import ExportError
+
+
+def read_cfg_args(path: Path) -> dict[str, object]:
+    """Names and literal values. An absent file gives no names; values that are not literals are left out."""
+    if not path.exists():
+        return {}
+    text = path.read_text(errors="replace")
+    try:
+        call = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError) as error:
+        raise _unreadable(path, text) from error
+    if not isinstance(call, ast.Call):
+        raise _unreadable(path, text)
+    return {word.arg: value for word in call.keywords if word.arg for value in _literal(word.value)}
+
+
+def _literal(node: ast.expr) -> list[object]:
+    try:
+        return [ast.literal_eval(node)]
+    except (ValueError, TypeError, MemoryError, RecursionError):
+        return []
+
+
+def _unreadable(path: Path, text: str) -> ExportError:
+    return ExportError(
+        "checkpoint/unreadable",
+        where=str(path),
+        expected="the text Namespace(name=value, ...)",
+        found=repr(text[:60]),
+        remedy="remove the file and give the facts as options",
+    )

@@ -1,0 +1,85 @@
+"""Convolutional networks as a folder of config.json and model.pth (a state_dict), or model.npz."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, cast
+
+from ..errors import ExportError
+from ..families.feed_forward import FeedForward
+from ..families.image_filter import ImageFilter, Output
+from ..pieces.convolution import Convolution
+from .avatar_file import read_npz
+from .files import existing
+from .torch_file import Weights, read_weights
+
+
+def read_feed_forward(folder: Path) -> FeedForward:
+    """config.json: width, height, views, near, far, depths; layers encoder.0-3, depth.0-1, head.0-2."""
+    config, weights = read_network(folder, "feed-forward", ("width", "height", "views", "near", "far", "depths"))
+
+    def stack(name: str, count: int) -> list[Convolution]:
+        return [convolution(weights.under(f"{name}.{index}")) for index in range(count)]
+
+    return FeedForward(
+        width=int(config["width"]),
+        height=int(config["height"]),
+        views=int(config["views"]),
+        near=float(config["near"]),
+        far=float(config["far"]),
+        depths=int(config["depths"]),
+        encoder=stack("encoder", 4),
+        depth=stack("depth", 2),
+        head=stack("head", 3),
+    )
+
+
+def read_image_filter(folder: Path) -> tuple[ImageFilter, dict[str, Any]]:
+    """config.json: output, width, height; layers stem, down.i, blocks.i.0-1, up.i, out. Returns the config, too."""
+    config, weights = read_network(folder, "image filter", ("output", "width", "height"))
+
+    def numbers(name: str) -> list[int]:
+        return sorted({int(key.split(".")[1]) for key in weights.tensors if key.startswith(f"{name}.")})
+
+    return ImageFilter(
+        stem=convolution(weights.under("stem")),
+        down=[convolution(weights.under(f"down.{i}")) for i in numbers("down")],
+        blocks=[
+            (convolution(weights.under(f"blocks.{i}.0")), convolution(weights.under(f"blocks.{i}.1")))
+            for i in numbers("blocks")
+        ],
+        up=[convolution(weights.under(f"up.{i}")) for i in numbers("up")],
+        out=convolution(weights.under("out")),
+        output=cast(Output, config["output"]),
+    ), config
+
+
+def convolution(weights: Weights) -> Convolution:
+    """weight, bias and, if they are there, norm.weight and norm.bias."""
+    norm = (weights.get("norm.weight"), weights.get("norm.bias")) if "norm.weight" in weights else None
+    return Convolution(weights.get("weight"), weights.get("bias"), norm)
+
+
+def read_network(folder: Path, kind: str, keys: tuple[str, ...]) -> tuple[dict[str, Any], Weights]:
+    """The two files of a network."""
+    path = existing(folder / "config.json", f"the config.json of a {kind} network")
+    try:
+        config = json.loads(path.read_text())
+    except ValueError as error:
+        raise _broken(path, "JSON", str(error)) from error
+    missing = [key for key in keys if key not in config] if isinstance(config, dict) else list(keys)
+    if missing:
+        raise _broken(path, f"the keys {', '.join(keys)}", f"none of the name {missing[0]}")
+    arrays = folder / "model.npz"
+    return config, Weights(read_npz(arrays), str(arrays)) if arrays.exists() else read_weights(folder / "model.pth")
+
+
+def _broken(path: Path, expected: str, found: str) -> ExportError:
+    return ExportError(
+        "checkpoint/unreadable",
+        where=str(path),
+        expected=expected,
+        found=found,
+        remedy="give the folder that packages/exporter/training wrote",
+    )

@@ -1,0 +1,192 @@
+"""PyTorch's files (torch.save and TorchScript) read without PyTorch.
+
+Both are zip archives of raw tensors and one pickle that says where each tensor lies. A pickle may name any function to
+be called; here only the handful that rebuild tensors are known, everything else becomes an inert record. So a file
+from a stranger can be read, and exporting needs no PyTorch of some gigabytes.
+"""
+
+from __future__ import annotations
+
+import pickle
+import zipfile
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import AnyArray, Floats
+from ..errors import ExportError, listed
+from ..pieces.mlp import Linear
+from .files import existing
+
+_STORAGES = {
+    "FloatStorage": "f4",
+    "DoubleStorage": "f8",
+    "HalfStorage": "f2",
+    "BFloat16Storage": "bf16",
+    "LongStorage": "i8",
+    "IntStorage": "i4",
+    "ShortStorage": "i2",
+    "CharStorage": "i1",
+    "ByteStorage": "u1",
+    "BoolStorage": "?",
+}
+
+
+class Record:
+    """An object of a class that is not known here: its state, or what it would have been called with."""
+
+    def __init__(self, *arguments: object):
+        """Keeps the arguments of whatever was to be built."""
+        self.arguments = arguments
+        self.state: dict[str, object] = {}
+
+    def __setstate__(self, state: object) -> None:
+        """The pickle's BUILD: keeps a state that is a mapping."""
+        if isinstance(state, Mapping):
+            self.state = {str(key): value for key, value in state.items()}
+
+    def __setitem__(self, key: object, value: object) -> None:
+        """The pickle's SETITEM on unknown mappings."""
+        self.state[str(key)] = value
+
+    def append(self, value: object) -> None:
+        """The pickle's APPEND on unknown lists."""
+        self.state[str(len(self.state))] = value
+
+
+def _rebuild_tensor(storage: AnyArray, offset: int, size: Sequence[int], stride: Sequence[int], *_: object) -> AnyArray:
+    last = offset + sum((n - 1) * step for n, step in zip(size, stride, strict=True))
+    if 0 in size:
+        return np.zeros(tuple(size), storage.dtype)
+    if min(stride, default=0) < 0 or offset < 0 or last >= storage.size:
+        raise ValueError(f"a tensor {tuple(size)} that reaches beyond its {storage.size} numbers")
+    steps = tuple(step * storage.itemsize for step in stride)
+    return np.lib.stride_tricks.as_strided(storage[offset:], tuple(size), steps, writeable=False).copy()
+
+
+_KNOWN: dict[tuple[str, str], Callable[..., Any]] = {
+    ("torch._utils", "_rebuild_tensor_v2"): _rebuild_tensor,
+    ("torch._utils", "_rebuild_tensor"): _rebuild_tensor,
+    ("torch._utils", "_rebuild_parameter"): lambda data, *_: data,
+    ("collections", "OrderedDict"): OrderedDict,
+    ("torch", "Size"): tuple,
+}
+
+
+class _Reader(pickle.Unpickler):
+    def __init__(self, archive: zipfile.ZipFile, prefix: str):
+        super().__init__(archive.open(f"{prefix}data.pkl"))
+        self._archive = archive
+        self._prefix = prefix
+
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) in _KNOWN:
+            return _KNOWN[module, name]
+        if module == "torch" and name in _STORAGES:
+            return _STORAGES[name]
+        # A class of its own for each name: NEWOBJ wants a class, REDUCE anything that can be called.
+        return type(name, (Record,), {})
+
+    def persistent_load(self, pid: Any) -> AnyArray:
+        _, kind, key, *_rest = pid
+        data = self._archive.read(f"{self._prefix}data/{key}")
+        if kind == "bf16":
+            return (np.frombuffer(data, "<u2").astype(np.uint32) << 16).view(np.float32)
+        if not isinstance(kind, str):
+            raise ValueError(f"storage of an unknown type {kind!r}")
+        return np.frombuffer(data, np.dtype(kind).newbyteorder("<"))
+
+
+def read_torch(path: Path) -> object:
+    """Whatever lies in the file: tensors as arrays, dicts and lists as such, other objects as Record."""
+    try:
+        with zipfile.ZipFile(existing(path, "a file of torch.save or torch.jit.save")) as archive:
+            prefix = next((name[: -len("data.pkl")] for name in archive.namelist() if name.endswith("data.pkl")), None)
+            if prefix is None:
+                raise ValueError(f"a zip archive of {listed(archive.namelist())}")
+            return _Reader(archive, prefix).load()
+    except (zipfile.BadZipFile, pickle.UnpicklingError, ValueError, KeyError, EOFError, TypeError, IndexError) as error:
+        raise ExportError(
+            "checkpoint/unreadable",
+            where=str(path),
+            expected="a zip archive of PyTorch 1.6 or later with tensors in it",
+            found=str(error) or type(error).__name__,
+            remedy="if the file is older, load it in PyTorch and torch.save its state_dict again",
+        ) from error
+
+
+def read_tensors(path: Path) -> dict[str, AnyArray]:
+    """All tensors of a file by their dotted names, as in a state_dict."""
+    return dict(_flattened(read_torch(path), ""))
+
+
+def _flattened(value: object, name: str) -> list[tuple[str, AnyArray]]:
+    if isinstance(value, np.ndarray):
+        return [(name, value)]
+    if isinstance(value, Record):
+        children: Mapping[Any, object] = value.state
+    elif isinstance(value, Mapping):
+        children = value
+    elif isinstance(value, (list, tuple)):
+        children = dict(enumerate(value))
+    else:
+        return []
+    dot = f"{name}." if name else ""
+    return [item for key, child in children.items() for item in _flattened(child, f"{dot}{key}")]
+
+
+class Weights:
+    """Named tensors of one file, asked for with the shape that the model needs."""
+
+    def __init__(self, tensors: Mapping[str, AnyArray], where: str):
+        """`where` is the file's name, for messages."""
+        self.tensors = tensors
+        self.where = where
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a tensor of that name."""
+        return name in self.tensors
+
+    def get(self, name: str) -> Floats:
+        """A tensor as float32. Raises checkpoint/incomplete if it is missing."""
+        if name not in self.tensors:
+            raise ExportError(
+                "checkpoint/incomplete",
+                where=self.where,
+                expected=f"a tensor '{name}'",
+                found=listed(list(self.tensors)),
+                remedy="check that the file belongs to this family of models and is not the optimizer's state",
+            )
+        return np.asarray(self.tensors[name], np.float32)
+
+    def under(self, prefix: str) -> Weights:
+        """The tensors whose names begin with `prefix.`, without it."""
+        start = f"{prefix}."
+        found = {name[len(start) :]: value for name, value in self.tensors.items() if name.startswith(start)}
+        return Weights(found, f"{self.where}: {prefix}")
+
+    def linears(self) -> list[Linear]:
+        """All linear layers of a Sequential, in the order of their numbers. At least one."""
+        numbers = sorted({int(n.split(".")[0]) for n in self.tensors if n.split(".")[0].isdigit()})
+        layers = [Linear(self.get(f"{n}.weight"), self.get(f"{n}.bias")) for n in numbers]
+        if not layers:
+            self.get("0.weight")
+        for before, after in pairwise(layers):
+            if before.outputs != after.inputs:
+                raise ExportError(
+                    "checkpoint/mismatch",
+                    where=self.where,
+                    expected=f"a layer of {before.outputs} inputs",
+                    found=f"one of {after.inputs}",
+                    remedy="the layers are not one Sequential; check which network the file holds",
+                )
+        return layers
+
+
+def read_weights(path: Path) -> Weights:
+    """All tensors of a file, to be asked for by name."""
+    return Weights(read_tensors(path), str(path))

@@ -1,0 +1,184 @@
+"""The command `gaussian-export FAMILY CHECKPOINT OUT.onnx`, and `gaussian-export check FILE.onnx`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import cast, get_args
+
+import onnx
+
+from .checkpoints.avatar_file import read_avatar
+from .checkpoints.files import existing
+from .checkpoints.hexplane_folder import read_hexplane
+from .checkpoints.networks import read_feed_forward, read_image_filter
+from .checkpoints.scaffold_folder import read_scaffold
+from .conformance import check_outputs
+from .contract import Coordinates, DType, Facts, Json, Layout, Up, of_metadata
+from .errors import ExportError
+from .families.avatar import PoseFormat, export_avatar
+from .families.classic import Colours, export_classic, read_cloud
+from .families.feed_forward import export_feed_forward
+from .families.hexplane import export_hexplane
+from .families.image_filter import export_image_filter
+from .families.scaffold import export_scaffold
+from .outputs import Options, save
+from .placement import gpu_findings
+
+Command = argparse.ArgumentParser
+Export = Callable[[argparse.Namespace, Facts, Options], onnx.ModelProto]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command; 0 if all went well, 1 with a message for people if not, 2 for wrong options."""
+    given = parser().parse_args(arguments)
+    try:
+        check(given.file) if given.family == "check" else export(given)
+    except ExportError as error:
+        print(f"gaussian-export: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def parser() -> Command:
+    """All families and their options."""
+    root = Command(prog="gaussian-export", description="Trained Gaussian models to ONNX Gaussian Generators.")
+    families = root.add_subparsers(dest="family", required=True, metavar="FAMILY")
+    for name, (describe, what, _) in FAMILIES.items():
+        family = families.add_parser(name, help=what, description=what)
+        family.add_argument("checkpoint", type=Path, help="what the trainer wrote: a file or a folder")
+        family.add_argument("out", type=Path, help="the .onnx file to write")
+        add_common(family)
+        describe(family)
+    checker = families.add_parser("check", help="run a file on the CPU, and say what would leave the GPU")
+    checker.add_argument("file", type=Path)
+    return root
+
+
+def add_common(family: Command) -> None:
+    """Options of every family: facts for the contract, and how the output is written."""
+    facts = family.add_argument_group("facts for the contract")
+    facts.add_argument("--name", help="name for people; default: the output's file name")
+    facts.add_argument("--license", required=True, help="SPDX identifier, or a few words")
+    facts.add_argument("--attribution", required=True, help="who is to be named")
+    facts.add_argument("--antialiased", action="store_true", help="trained with opacity compensation (Mip-Splatting)")
+    facts.add_argument("--up", choices=get_args(Up), default="-y", help="the axis that points up; default -y")
+    facts.add_argument("--left-handed", action="store_true")
+    facts.add_argument("--metres-per-unit", type=float)
+    facts.add_argument("--duration", type=float, help="seconds that time 0 to 1 plays")
+    facts.add_argument("--fps", type=float)
+    written = family.add_argument_group("output")
+    written.add_argument("--layout", choices=get_args(Layout), default="packed")
+    written.add_argument("--dtype", choices=get_args(DType), default="float32", help="float16 needs shader-f16")
+
+
+def facts_of(given: argparse.Namespace) -> Facts:
+    """The contract's facts among the options."""
+    handedness: Json = {"handedness": "left"} if given.left_handed else {}
+    coordinates = Coordinates(up=given.up, metres_per_unit=given.metres_per_unit, **handedness)  # type: ignore[arg-type]
+    return Facts(
+        name=given.name or given.out.stem,
+        license=given.license,
+        attribution=given.attribution,
+        antialiased=given.antialiased,
+        coordinates=coordinates,
+        duration=given.duration,
+        fps=given.fps,
+    )
+
+
+def export(given: argparse.Namespace) -> None:
+    """Reads the checkpoint, writes the file, and reports on it."""
+    _, _, build = FAMILIES[given.family]
+    model = build(given, facts_of(given), Options(given.layout, given.dtype))
+    size = save(model, str(given.out))
+    shapes = ", ".join(f"{o.name} {[d.dim_value for d in o.type.tensor_type.shape.dim]}" for o in model.graph.output)
+    print(f"{given.out}: {size:,} bytes, {len(model.graph.node)} nodes, writes {shapes}")
+    report_findings(model)
+
+
+def check(path: Path) -> None:
+    """Holds a file against its contract, and reports what would leave the GPU."""
+    model = onnx.load(existing(path, "an .onnx file"))
+    contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
+    print(f"{path}: contract version {contract['version']}, {contract.get('name', 'without a name')}")
+    if find_spec("onnxruntime") is None:
+        print("not run: install onnxruntime (pip install 'gaussian-splat-exporter[check]')")
+    else:
+        for name, values in check_outputs(model).items():
+            print(f"ran on the CPU: {name} {list(values.shape)} {values.dtype}, all checks passed")
+    report_findings(model)
+
+
+def report_findings(model: onnx.ModelProto) -> None:
+    """Prints what would leave the GPU, or that nothing would."""
+    findings = gpu_findings(model)
+    for finding in findings:
+        print(finding)
+    if not findings:
+        print("WebGPU: every node has a kernel, shapes are fixed, the graph can be captured")
+
+
+def _classic_options(family: Command) -> None:
+    family.add_argument("--colours", choices=get_args(Colours), default="sh", help="view: harmonics in the graph")
+
+
+def _scaffold_options(family: Command) -> None:
+    family.add_argument("--appearance", type=int, default=0, help="training image whose appearance is baked in")
+
+
+def _avatar_options(family: Command) -> None:
+    family.add_argument("--pose", choices=get_args(PoseFormat), default="axis-angle")
+
+
+def _no_options(family: Command) -> None:
+    pass
+
+
+def _classic(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    return export_classic(read_cloud(given.checkpoint), facts, options, cast(Colours, given.colours))
+
+
+def _scaffold(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    return export_scaffold(read_scaffold(given.checkpoint, given.appearance), facts, options)
+
+
+def _hexplane(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    return export_hexplane(*read_hexplane(given.checkpoint), facts, options)
+
+
+def _avatar(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    return export_avatar(read_avatar(given.checkpoint), facts, options, cast(PoseFormat, given.pose))
+
+
+def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    return export_feed_forward(read_feed_forward(given.checkpoint), facts, options)
+
+
+def _image_filter_options(family: Command) -> None:
+    family.add_argument("--size", type=size, help="WIDTHxHEIGHT in pixels; default: as in config.json")
+
+
+def size(text: str) -> tuple[int, int]:
+    """A picture's size, written as 640x480."""
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
+def _image_filter(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    model, config = read_image_filter(given.checkpoint)
+    width, height = given.size or (int(config["width"]), int(config["height"]))
+    return export_image_filter(model, width, height, facts)
+
+
+FAMILIES: dict[str, tuple[Callable[[Command], None], str, Export]] = {
+    "classic": (_classic_options, "3DGS: a PLY file, or the trainer's folder", _classic),
+    "scaffold": (_scaffold_options, "Scaffold-GS or Octree-GS: the trainer's folder", _scaffold),
+    "hexplane": (_no_options, "4DGS: the folder of 4DGaussians", _hexplane),
+    "avatar": (_avatar_options, "a skinned avatar: one .npz file", _avatar),
+    "feed-forward": (_no_options, "pictures to Gaussians: a folder of config.json and model.pth", _feed_forward),
+    "image-filter": (_image_filter_options, "style or denoising: a folder of config.json and model.pth", _image_filter),
+}

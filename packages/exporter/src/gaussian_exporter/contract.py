@@ -1,0 +1,181 @@
+"""The Gaussian Generator contract, version 1, as the JSON that lies in a file's metadata under `gaussian_contract`.
+
+Everything this package knows about the words of the contract is in this module.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from .errors import ExportError
+
+METADATA_KEY = "gaussian_contract"
+VERSION = 1
+
+Layout = Literal["packed", "split"]
+DType = Literal["float32", "float16"]
+Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Json = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Input:
+    """One ONNX input and the role that feeds it: its name, and what the contract says of it."""
+
+    name: str
+    binding: Json
+
+
+def camera_position(name: str = "camera_position") -> Input:
+    """[3]: the eye, in world units."""
+    return Input(name, {"role": "camera_position"})
+
+
+def normalized_time(name: str = "time") -> Input:
+    """[1]: a share 0..1 of the contract's duration, which must be declared."""
+    return Input(name, {"role": "time", "unit": "normalized"})
+
+
+def pose(name: str, joints: Sequence[str], parents: Sequence[int], quaternions: bool) -> Input:
+    """[J,3] axis-angle in radians, or [J,4] quaternions w x y z; at rest by default."""
+    rest = [1.0, 0.0, 0.0, 0.0] if quaternions else [0.0, 0.0, 0.0]
+    kind: Json = {"format": "quaternion", "quaternionOrder": "wxyz"} if quaternions else {"format": "axis-angle"}
+    skeleton: Json = {"joints": list(joints), "parents": [int(parent) for parent in parents]}
+    return Input(name, {"role": "pose", **kind, **skeleton, "default": rest * len(joints)})
+
+
+def shape(name: str, count: int) -> Input:
+    """[count]: coefficients of a body; zeros by default. A contract has one input of this role at most."""
+    return Input(name, {"role": "shape", "default": [0.0] * count})
+
+
+def control(name: str, default: float | Sequence[float], low: float, high: float, label: str | None = None) -> Input:
+    """Float32 of any shape: a control for people. One default for all elements, or one for each."""
+    value = default if isinstance(default, (int, float)) else list(default)
+    named = {} if label is None else {"label": label}
+    return Input(name, {"role": "control", "range": [low, high], "default": value, **named})
+
+
+def image(name: str = "image") -> Input:
+    """[1,3,H,W]: red, green and blue planes in 0..1, top row first."""
+    return Input(name, {"role": "image"})
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """The frame that Gaussians are written in: which axis points up, the handedness, metres in a unit if known."""
+
+    up: Up = "-y"
+    handedness: Literal["right", "left"] = "right"
+    metres_per_unit: float | None = None
+
+    def json(self) -> Json:
+        """As the contract writes it."""
+        scale = {} if self.metres_per_unit is None else {"metresPerUnit": self.metres_per_unit}
+        return {"up": self.up, "handedness": self.handedness, **scale}
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What only the person who exports can know. `duration` in seconds, `fps` in frames to a second."""
+
+    name: str
+    license: str
+    attribution: str
+    antialiased: bool = False
+    coordinates: Coordinates = field(default_factory=Coordinates)
+    duration: float | None = None
+    fps: float | None = None
+
+
+@dataclass(frozen=True)
+class GaussianOutputs:
+    """How Gaussians are written. sh_degree is None for plain colours; names are those of the layout's tensors."""
+
+    layout: Layout
+    n_max: int
+    dtype: DType
+    sh_degree: int | None
+    bounds: tuple[Sequence[float], Sequence[float]]
+
+    def json(self) -> Json:
+        """The contract's `outputs`."""
+        sh: Json = {} if self.sh_degree is None else {"shOrder": "coefficient-major"}
+        if self.layout == "packed":
+            color = "rgb" if self.sh_degree is None else "sh"
+            return {"layout": "packed", "gaussians": "gaussians", "color": color, "opacityActivation": "linear", **sh}
+        names = ["positions", "covariances", "colors" if self.sh_degree is None else "sh", "opacities"]
+        return {"layout": "split", **{name: name for name in names}, "opacityActivation": "linear", **sh}
+
+
+def gaussian_contract(facts: Facts, inputs: Sequence[Input], outputs: GaussianOutputs) -> Json:
+    """The contract of a generator, keys in the order a reader wants them."""
+    if facts.duration is None and any(given.binding.get("unit") == "normalized" for given in inputs):
+        raise ExportError(
+            "argument/value",
+            where="duration",
+            expected="the seconds that time 0 to 1 plays",
+            found="none",
+            remedy="give --duration SECONDS",
+        )
+    low, high = outputs.bounds
+    written: Json = {"nMax": outputs.n_max, "dtype": outputs.dtype}
+    if outputs.sh_degree is not None:
+        written["shDegree"] = outputs.sh_degree
+    playing = {key: value for key, value in (("duration", facts.duration), ("fps", facts.fps)) if value is not None}
+    return {
+        "version": VERSION,
+        "name": facts.name,
+        "inputs": {given.name: given.binding for given in inputs},
+        "outputs": outputs.json(),
+        **written,
+        "bounds": {"min": list(low), "max": list(high)},
+        **playing,
+        "coordinates": facts.coordinates.json(),
+        "antialiased": facts.antialiased,
+        "license": facts.license,
+        "attribution": facts.attribution,
+    }
+
+
+def image_contract(facts: Facts, inputs: Sequence[Input]) -> Json:
+    """The contract of a post-processor, whose output is called `processed`."""
+    return {
+        "version": VERSION,
+        "name": facts.name,
+        "inputs": {given.name: given.binding for given in inputs},
+        "outputs": {"layout": "image", "image": "processed"},
+        "license": facts.license,
+        "attribution": facts.attribution,
+    }
+
+
+def metadata(contract: Json) -> dict[str, str]:
+    """The file's metadata_props."""
+    return {METADATA_KEY: json.dumps(contract, ensure_ascii=False, allow_nan=False)}
+
+
+def of_metadata(props: dict[str, str], where: str) -> Json:
+    """The contract of a file's metadata_props. Raises contract/violation where there is none."""
+    try:
+        found = json.loads(props[METADATA_KEY])
+    except (KeyError, ValueError) as error:
+        raise ExportError(
+            "contract/violation",
+            where=where,
+            expected=f"metadata '{METADATA_KEY}' with JSON in it",
+            found="none" if isinstance(error, KeyError) else str(error),
+            remedy="export the model with gaussian-export, or write NAME.contract.json next to it",
+        ) from error
+    if not isinstance(found, dict) or found.get("version") != VERSION:
+        raise ExportError(
+            "contract/violation",
+            where=where,
+            expected=f"a contract of version {VERSION}",
+            found=str(found)[:80],
+            remedy="export the model again with this version",
+        )
+    return found

@@ -1,0 +1,34 @@
+"""Errors for people: what was expected, what was found, where, and what to do; with a code that never changes."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+ErrorCode = Literal[
+    "checkpoint/not-found",  # a file of the checkpoint is not there
+    "checkpoint/unreadable",  # not the format it should be, truncated, or it holds more than data
+    "checkpoint/incomplete",  # a known format without something the model needs
+    "checkpoint/mismatch",  # two parts of a checkpoint contradict one another
+    "checkpoint/unsupported",  # a known model with a part that has no exporter
+    "argument/value",  # an option outside its range
+    "graph/invalid",  # a graph that ONNX refuses
+    "contract/violation",  # outputs or metadata that break the contract
+]
+
+
+class ExportError(Exception):
+    """Anything the exporter cannot do. `code` is stable and meant for programs; the text is meant for people."""
+
+    def __init__(self, code: ErrorCode, *, where: str, expected: str, found: str, remedy: str):
+        """Every part is a full phrase without a trailing full stop."""
+        super().__init__(f"{where}: expected {expected}, found {found}. {remedy[:1].upper()}{remedy[1:]}. [{code}]")
+        self.code = code
+        self.where = where
+        self.expected = expected
+        self.found = found
+        self.remedy = remedy
+
+
+def listed(names: Sequence[str], limit: int = 8) -> str:
+    """Names for a message, at most `limit` of them."""
+    shown = ", ".join(list(names)[:limit])
+    return f"{shown} and {len(names) - limit} more" if len(names) > limit else shown or "nothing"

@@ -1,0 +1,109 @@
+"""Classic 3DGS: every Gaussian as trained.
+
+Written with its harmonics the file is constant: a page runs it once. With `colours="view"` the harmonics are evaluated
+in the graph from the camera's position, which makes the output 13 numbers a Gaussian instead of up to 58.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import onnx
+
+from ..arrays import Floats, covariances, sigmoid
+from ..checkpoints.files import latest_iteration
+from ..checkpoints.ply import Vertices, read_ply
+from ..contract import Facts, camera_position
+from ..errors import ExportError
+from ..graph import Graph
+from ..outputs import Gaussians, Options, finish
+from ..pieces import harmonics
+from ..pieces.view import direction_and_distance
+
+Colours = Literal["sh", "view"]
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Gaussians as a PLY file holds them: positions (N,3), log_scales (N,3), rotations (N,4) w x y z, opacity_logits
+    (N,1), sh (N,(degree+1)^2,3)."""
+
+    positions: Floats
+    log_scales: Floats
+    rotations: Floats
+    opacity_logits: Floats
+    sh: Floats
+
+
+def read_cloud(path: Path) -> Cloud:
+    """A PLY file in INRIA's layout, or the folder of a training with point_cloud/iteration_N/point_cloud.ply in it."""
+    if path.is_dir():
+        path = latest_iteration(path) / "point_cloud.ply"
+    return cloud_of_vertices(read_ply(path))
+
+
+def cloud_of_vertices(vertices: Vertices) -> Cloud:
+    """INRIA's columns. Raises for harmonics of a degree other than 0 to 3."""
+    dc = vertices.columns("f_dc_0", "f_dc_1", "f_dc_2")
+    rest = vertices.numbered("f_rest_")
+    if rest.shape[1] not in (0, 9, 24, 45):
+        raise ExportError(
+            "checkpoint/unsupported",
+            where=str(vertices.path),
+            expected="0, 9, 24 or 45 properties f_rest_*",
+            found=str(rest.shape[1]),
+            remedy="harmonics are read up to degree 3",
+        )
+    # The file holds all of red's coefficients, then green's, then blue's.
+    rest = rest.reshape(len(vertices), 3, -1).transpose(0, 2, 1)
+    return Cloud(
+        vertices.columns("x", "y", "z"),
+        vertices.columns("scale_0", "scale_1", "scale_2"),
+        vertices.columns("rot_0", "rot_1", "rot_2", "rot_3"),
+        vertices.columns("opacity"),
+        np.concatenate([dc[:, None], rest], 1),
+    )
+
+
+def usable(cloud: Cloud) -> Cloud:
+    """Without Gaussians that cannot be drawn: not finite, or with a zero quaternion. Infinite opacities are fine."""
+    sh = cloud.sh.reshape(len(cloud.sh), -1)
+    numbers = np.concatenate([cloud.positions, cloud.log_scales, cloud.rotations, sh], 1)
+    kept = np.isfinite(numbers).all(1) & (np.abs(cloud.rotations).max(1) > 0) & ~np.isnan(cloud.opacity_logits[:, 0])
+    if not kept.any():
+        raise ExportError(
+            "checkpoint/unreadable",
+            where="the Gaussians",
+            expected="at least one that can be drawn",
+            found=f"{len(kept)} with numbers that are not finite",
+            remedy="training diverged; export an earlier checkpoint",
+        )
+    parts = (cloud.positions, cloud.log_scales, cloud.rotations, cloud.opacity_logits, cloud.sh)
+    return Cloud(*(part[kept] for part in parts))
+
+
+def export_classic(
+    cloud: Cloud, facts: Facts, options: Options | None = None, colours: Colours = "sh"
+) -> onnx.ModelProto:
+    """A generator of the cloud's Gaussians, activated: opacities 0..1, covariances in world units squared."""
+    options = options or Options()
+    cloud = usable(cloud)
+    graph = Graph("classic")
+    positions = graph.constant(cloud.positions, "positions")
+    sh = graph.constant(cloud.sh, "sh")
+    inputs = []
+    seen = None
+    if colours == "view":
+        camera = graph.input("camera_position", 3)
+        inputs.append(camera_position())
+        seen = harmonics.colour(direction_and_distance(positions, camera)[0], sh)
+    gaussians = Gaussians(
+        positions=positions,
+        covariances=graph.constant(covariances(np.exp(np.float64(cloud.log_scales)), cloud.rotations), "covariances"),
+        opacities=graph.constant(sigmoid(cloud.opacity_logits), "opacities"),
+        colors=seen,
+        sh=sh if seen is None else None,
+    )
+    bounds = cloud.positions.min(0), cloud.positions.max(0)
+    return finish(graph, gaussians, inputs, bounds, facts, options)

@@ -1,0 +1,245 @@
+"""Single-shot generators: one or two pictures in, a Gaussian for every pixel out, in the first camera's frame.
+
+The way of pixelSplat and MVSplat, small enough for a page. With two pictures the depth of each pixel comes from a plane
+sweep: features of the other picture are looked up at candidate depths and compared. With one picture the network
+guesses. Either way a depth is an average of inverse depths, weighted by a softmax; a head adds what makes it a
+Gaussian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+import onnx
+
+from ..arrays import Doubles
+from ..contract import Facts, Input, control, image
+from ..errors import ExportError
+from ..graph import Graph, Tensor
+from ..outputs import Gaussians, Options, finish
+from ..pieces.convolution import Convolution, convolve, enlarge, rows_of
+from ..pieces.covariance import covariance_of_half, rotation_matrix
+
+# The encoder's strides; features are a quarter of the picture's size.
+STRIDES = (1, 2, 2, 1)
+REDUCTION = 4
+# The head's channels: inverse depth, opacity, scales, quaternion, colour.
+HEAD = (1, 1, 3, 4, 3)
+# How far the head may move an inverse depth (as a power of e), and the range of a Gaussian's size in pixels.
+REFINEMENT = 0.2
+SMALLEST, LARGEST = 0.2, 4.2
+# A second camera this near to a point, in world units, does not see it.
+NEAREST = 1e-3
+
+
+@dataclass(frozen=True)
+class FeedForward:
+    """A trained network for `views` (1 or 2) pictures of one size, multiples of 4. encoder: four layers; depth: two,
+    the last with a channel for each of `depths` candidates, spaced evenly in inverse depth from near to far (world
+    units); head: three, ending in 12 channels."""
+
+    width: int
+    height: int
+    views: int
+    near: float
+    far: float
+    depths: int
+    encoder: Sequence[Convolution]
+    depth: Sequence[Convolution]
+    head: Sequence[Convolution]
+
+    def inverse_depths(self) -> Doubles:
+        """The candidates (D), near first."""
+        result: Doubles = np.linspace(1 / self.near, 1 / self.far, self.depths)
+        return result
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Intrinsics as numbers (1), shares of the picture's width and height."""
+
+    fx: Tensor
+    fy: Tensor
+    cx: Tensor
+    cy: Tensor
+
+
+@dataclass(frozen=True)
+class Pose:
+    """From one camera to another: x -> turn x + shift. turn (3,3), shift (1,3)."""
+
+    turn: Tensor
+    shift: Tensor
+
+    def inverse(self) -> Pose:
+        """The way back."""
+        return Pose(self.turn.transpose(1, 0), (self.shift @ self.turn) * -1.0)
+
+
+def export_feed_forward(model: FeedForward, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
+    """A generator of views * height * width Gaussians, row by row of the first picture, then of the second.
+
+    Inputs: `image` (and `image_2`), `focal_length` and `principal_point` ([2] each, as shares of width and height; the
+    same for every picture), and with two pictures `relative_pose`, the 4x4 matrix from the first camera's frame (OpenCV
+    axes) to the second's.
+    """
+    check(model)
+    graph = Graph("feed_forward")
+    pictures = [graph.input(name, 1, 3, model.height, model.width) for name in ("image", "image_2")[: model.views]]
+    focal, principal = graph.input("focal_length", 2), graph.input("principal_point", 2)
+    camera = Camera(focal.part(0, 1), focal.part(1, 2), principal.part(0, 1), principal.part(1, 2))
+    inputs: list[Input] = [image(name) for name in ("image", "image_2")[: model.views]]
+    inputs.append(control("focal_length", [1.0, model.width / model.height], 0.1, 20.0))
+    inputs.append(control("principal_point", 0.5, -1.0, 2.0))
+    found = gaussians(model, graph, pictures, camera, inputs)
+    return finish(graph, found, inputs, reach(model), facts, options or Options())
+
+
+def check(model: FeedForward) -> None:
+    """Raises checkpoint/mismatch where the layers do not make this network."""
+    features = model.encoder[-1].weight.shape[0]
+    sweep = features + (model.depths if model.views == 2 else 0)
+    head = features + model.encoder[0].weight.shape[0] + 3 + 1
+    wanted = {
+        "views": (model.views in (1, 2), "1 or 2", str(model.views)),
+        "size": (not model.width % REDUCTION and not model.height % REDUCTION, f"multiples of {REDUCTION}", ""),
+        "near and far": (0 < model.near < model.far, "0 < near < far", f"{model.near}, {model.far}"),
+        "encoder": (len(model.encoder) == len(STRIDES), f"{len(STRIDES)} layers", str(len(model.encoder))),
+        "depth": (model.depth[0].weight.shape[1] == sweep, f"{sweep} channels in", str(model.depth[0].weight.shape)),
+        "depth's end": (len(model.depth[-1].bias) == model.depths, str(model.depths), str(len(model.depth[-1].bias))),
+        "head": (model.head[0].weight.shape[1] == head, f"{head} channels in", str(model.head[0].weight.shape)),
+        "head's end": (len(model.head[-1].bias) == sum(HEAD), str(sum(HEAD)), str(len(model.head[-1].bias))),
+    }
+    for where, (holds, expected, found) in wanted.items():
+        if not holds:
+            raise ExportError(
+                "checkpoint/mismatch",
+                where=f"feed-forward network: {where}",
+                expected=expected,
+                found=found or f"{model.width}x{model.height}",
+                remedy="config.json and model.pth must be of one training",
+            )
+
+
+def gaussians(
+    model: FeedForward, graph: Graph, pictures: list[Tensor], camera: Camera, inputs: list[Input]
+) -> Gaussians:
+    """The Gaussians of every picture, one after the other."""
+    encoded = [encode(model, picture) for picture in pictures]
+    if model.views == 1:
+        return placed(model, pictures[0], encoded[0], None, camera, None)
+    matrix = graph.input("relative_pose", 4, 4)
+    rest = np.eye(4)
+    rest[0, 3] = -0.1
+    inputs.append(control("relative_pose", [float(x) for x in rest.ravel()], -100.0, 100.0))
+    upper = matrix.part(0, 3, 0)
+    pose = Pose(upper.part(0, 3, 1), upper.part(3, 4, 1).reshape(1, 3))
+    first = placed(
+        model, pictures[0], encoded[0], sweep(model, encoded[0][1], encoded[1][1], camera, pose), camera, None
+    )
+    back = pose.inverse()
+    cost = sweep(model, encoded[1][1], encoded[0][1], camera, back)
+    return joined(graph, first, placed(model, pictures[1], encoded[1], cost, camera, back))
+
+
+def joined(graph: Graph, first: Gaussians, second: Gaussians) -> Gaussians:
+    """Two lists as one."""
+    if first.colors is None or second.colors is None:
+        raise ValueError("pixel-aligned Gaussians have plain colours")
+    return Gaussians(
+        positions=graph.concat([first.positions, second.positions], 0),
+        covariances=graph.concat([first.covariance(), second.covariance()], 0),
+        colors=graph.concat([first.colors, second.colors], 0),
+        opacities=graph.concat([first.opacities, second.opacities], 0),
+    )
+
+
+def encode(model: FeedForward, picture: Tensor) -> tuple[Tensor, Tensor]:
+    """Fine features (1,C,H,W) and coarse ones (1,F,H/4,W/4)."""
+    x = picture * 2.0 - 1.0
+    fine = None
+    for index, (layer, stride) in enumerate(zip(model.encoder, STRIDES, strict=True)):
+        x = convolve(x, layer, f"encoder_{index}", stride).unary("Relu")
+        fine = x if fine is None else fine
+    return (x if fine is None else fine), x
+
+
+def rays(graph: Graph, width: int, height: int, camera: Camera) -> Tensor:
+    """Directions with z = 1 through all pixel centres (height*width,3), row by row."""
+    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width, indexing="ij")
+    x = (graph.constant(u.reshape(-1, 1), "u") - camera.cx) / camera.fx
+    y = (graph.constant(v.reshape(-1, 1), "v") - camera.cy) / camera.fy
+    return graph.concat([x, y, graph.constant(np.ones((width * height, 1)), "ones")], 1)
+
+
+def sweep(model: FeedForward, own: Tensor, other: Tensor, camera: Camera, pose: Pose) -> Tensor:
+    """How alike own features (1,F,h,w) and the other picture's are at each candidate depth (1,D,h,w)."""
+    graph = own.graph
+    channels, height, width = own.shape[1:]
+    count, pixels = model.depths, height * width
+    depths = graph.constant((1 / model.inverse_depths()).reshape(count, 1, 1), "depths")
+    turned = rays(graph, width, height, camera) @ pose.turn.transpose(1, 0)
+    points = depths * turned.reshape(1, pixels, 3) + pose.shift.reshape(1, 1, 3)
+    z = points.part(2, 3, 2).clip(NEAREST, 1e6)
+    x = points.part(0, 1, 2) / z * camera.fx + camera.cx
+    y = points.part(1, 2, 2) / z * camera.fy + camera.cy
+    grid = (graph.concat([x, y], 2) * 2.0 - 1.0).reshape(1, count * height, width, 2)
+    shape = (1, channels, count * height, width)
+    seen = graph.node("GridSample", [other, grid], shape, mode="bilinear", padding_mode="zeros", align_corners=0)
+    alike = (seen.reshape(channels, count, pixels) * own.reshape(channels, 1, pixels)).sum(0)
+    return (alike * (1 / sqrt(channels))).reshape(1, count, height, width)
+
+
+def inverse_depth(model: FeedForward, features: Tensor, cost: Tensor | None) -> Tensor:
+    """(1,1,h,w), from coarse features and the plane sweep, if there was one."""
+    graph = features.graph
+    given = features if cost is None else graph.concat([cost, features], 1)
+    logits = convolve(convolve(given, model.depth[0], "depth_0").unary("Relu"), model.depth[1], "depth_1")
+    logits = logits if cost is None else logits + cost
+    rows = rows_of(logits)
+    weights = graph.node("Softmax", [rows], rows.shape, axis=1)
+    candidates = graph.constant(model.inverse_depths().reshape(-1, 1), "inverse_depths")
+    return (weights @ candidates).reshape(1, 1, *features.shape[2:])
+
+
+def placed(
+    model: FeedForward,
+    picture: Tensor,
+    encoded: tuple[Tensor, Tensor],
+    cost: Tensor | None,
+    camera: Camera,
+    pose: Pose | None,
+) -> Gaussians:
+    """One picture's Gaussians; `pose` leads from its camera to the first one's, None for the first."""
+    graph, (fine, coarse) = picture.graph, encoded
+    guess = enlarge(inverse_depth(model, coarse, cost), REDUCTION, smooth=True)
+    x = graph.concat([enlarge(coarse, REDUCTION, smooth=True), fine, picture, guess], 1)
+    for index, layer in enumerate(model.head):
+        x = convolve(x if index == 0 else x.unary("Relu"), layer, f"head_{index}")
+    ends = np.cumsum(HEAD)
+    rows = rows_of(x)
+    nearer, opacity, size, turn, tint = (rows.part(int(e - n), int(e)) for e, n in zip(ends, HEAD, strict=True))
+    inverse = (rows_of(guess) * (nearer.unary("Tanh") * REFINEMENT).unary("Exp")).clip(1 / model.far, 1 / model.near)
+    depth = inverse.unary("Reciprocal")
+    scales = (size.unary("Sigmoid") * (LARGEST - SMALLEST) + SMALLEST) * depth / (camera.fx * float(model.width))
+    quaternions = turn + graph.constant(np.array([[1, 0, 0, 0]]), "upright")
+    half = rotation_matrix(quaternions) * scales.reshape(scales.shape[0], 1, 3)
+    positions = rays(graph, model.width, model.height, camera) * depth
+    if pose is not None:
+        positions = positions @ pose.turn.transpose(1, 0) + pose.shift
+        half = (pose.turn.reshape(1, 3, 3, 1) * half.reshape(half.shape[0], 1, 3, 3)).sum(2)
+    return Gaussians(
+        positions=positions,
+        covariances=covariance_of_half(half),
+        opacities=opacity.unary("Sigmoid"),
+        colors=(rows_of(picture) + tint.unary("Tanh") * 0.5).clip(0, 1),
+    )
+
+
+def reach(model: FeedForward) -> tuple[Doubles, Doubles]:
+    """Corners of the first camera's view at its default intrinsics, from near to far."""
+    half = np.array([0.5, 0.5 * model.height / model.width]) * model.far
+    return np.array([-half[0], -half[1], model.near]), np.array([half[0], half[1], model.far])

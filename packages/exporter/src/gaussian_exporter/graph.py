@@ -1,0 +1,256 @@
+"""A builder of ONNX graphs with fixed shapes, for operators that the WebGPU provider of ONNX Runtime runs.
+
+Shapes are known while building, so a wrong one fails here, with the line that asked for it, and not in a browser.
+Numbers are float32; integers occur only as constants (shapes, axes, indices), never as results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import blake2b
+from math import prod
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+from .arrays import AnyArray
+from .errors import ExportError
+
+# GridSample of opset 20 has no WebGPU kernel, that of 16 has; reductions take their axes as in opset 13.
+OPSET = 17
+IR_VERSION = 8
+# A WebGPU device of default limits binds 8 storage buffers to a shader: 7 inputs and one output.
+MOST_CONCAT_INPUTS = 7
+
+Shape = tuple[int, ...]
+Number = float | int
+
+
+@dataclass(frozen=True)
+class Tensor:
+    """A value in a graph: float32 (or whatever `cast` made of it) of a known shape."""
+
+    graph: Graph
+    name: str
+    shape: Shape
+
+    def __add__(self, other: Tensor | Number) -> Tensor:
+        """Sum, broadcast."""
+        return self.graph.binary("Add", self, other)
+
+    def __sub__(self, other: Tensor | Number) -> Tensor:
+        """Difference, broadcast."""
+        return self.graph.binary("Sub", self, other)
+
+    def __rsub__(self, other: Number) -> Tensor:
+        """A number less this tensor."""
+        return self.graph.binary("Sub", self.graph.scalar(other), self)
+
+    def __mul__(self, other: Tensor | Number) -> Tensor:
+        """Product, broadcast."""
+        return self.graph.binary("Mul", self, other)
+
+    def __truediv__(self, other: Tensor | Number) -> Tensor:
+        """Quotient, broadcast."""
+        return self.graph.binary("Div", self, other)
+
+    def __matmul__(self, other: Tensor) -> Tensor:
+        """Matrix product; leading axes are a batch and broadcast."""
+        if self.shape[-1] != other.shape[-2]:
+            raise wrong_shape("MatMul", f"{self.shape[-1]} rows on the right", str(other.shape))
+        batch = np.broadcast_shapes(self.shape[:-2], other.shape[:-2])
+        return self.graph.node("MatMul", [self, other], (*batch, self.shape[-2], other.shape[-1]))
+
+    def unary(self, operator: str) -> Tensor:
+        """An operator of one argument that keeps the shape, by its ONNX name: Relu, Sigmoid, Exp, Sqrt, ..."""
+        return self.graph.node(operator, [self], self.shape)
+
+    def clip(self, low: Number, high: Number) -> Tensor:
+        """Values held between two numbers."""
+        return self.graph.node("Clip", [self, self.graph.scalar(low), self.graph.scalar(high)], self.shape)
+
+    def sum(self, axis: int, keep: bool = False) -> Tensor:
+        """Sum along one axis."""
+        axes = self.graph.integers([axis])
+        return self.graph.node("ReduceSum", [self, axes], reduced(self.shape, [axis], keep), keepdims=int(keep))
+
+    def mean(self, axes: Sequence[int], keep: bool = False) -> Tensor:
+        """Mean along some axes."""
+        return self.graph.node(
+            "ReduceMean", [self], reduced(self.shape, axes, keep), axes=list(axes), keepdims=int(keep)
+        )
+
+    def reshape(self, *shape: int) -> Tensor:
+        """The same numbers in another shape; no axis may be -1."""
+        if prod(shape) != prod(self.shape):
+            raise wrong_shape("Reshape", f"{prod(self.shape)} elements", str(shape))
+        return self if shape == self.shape else self.graph.node("Reshape", [self, self.graph.integers(shape)], shape)
+
+    def transpose(self, *axes: int) -> Tensor:
+        """Axes in another order."""
+        return self.graph.node("Transpose", [self], tuple(self.shape[axis] for axis in axes), perm=list(axes))
+
+    def part(self, start: int, stop: int, axis: int = -1) -> Tensor:
+        """Elements start (inclusive) to stop (exclusive) along one axis."""
+        axis %= len(self.shape)
+        if not 0 <= start < stop <= self.shape[axis]:
+            raise wrong_shape("Slice", f"0 <= start < stop <= {self.shape[axis]}", f"{start}, {stop}")
+        if (start, stop) == (0, self.shape[axis]):
+            return self
+        ends = [self.graph.integers([number]) for number in (start, stop, axis)]
+        return self.graph.node("Slice", [self, *ends], replaced(self.shape, axis, stop - start))
+
+    def take(self, indices: Sequence[int], axis: int = 0) -> Tensor:
+        """Elements at constant indices along one axis."""
+        axis %= len(self.shape)
+        shape = replaced(self.shape, axis, len(indices))
+        return self.graph.node("Gather", [self, self.graph.integers(indices)], shape, axis=axis)
+
+    def expand(self, *shape: int) -> Tensor:
+        """Repeated along axes of length 1."""
+        if np.broadcast_shapes(self.shape, shape) != shape:
+            raise wrong_shape("Expand", f"a shape that {self.shape} broadcasts to", str(shape))
+        return self.graph.node("Expand", [self, self.graph.integers(shape)], shape)
+
+
+def replaced(shape: Shape, axis: int, size: int) -> Shape:
+    """The shape with one axis of another size."""
+    return (*shape[:axis], size, *shape[axis + 1 :])
+
+
+def reduced(shape: Shape, axes: Sequence[int], keep: bool) -> Shape:
+    """The shape after a reduction along axes."""
+    gone = {axis % len(shape) for axis in axes}
+    return tuple(1 if i in gone else size for i, size in enumerate(shape) if keep or i not in gone)
+
+
+def wrong_shape(operator: str, expected: str, found: str) -> ExportError:
+    """The error of an operator that is given what it cannot take."""
+    return ExportError(
+        "graph/invalid",
+        where=f"operator {operator}",
+        expected=expected,
+        found=found,
+        remedy="the checkpoint's parts do not fit one another; compare its configuration with its weights",
+    )
+
+
+class Graph:
+    """One ONNX graph being built. Inputs first, then operators on tensors, then outputs, then `model`."""
+
+    def __init__(self, name: str):
+        """`name` is the graph's name inside the file."""
+        self.name = name
+        self._nodes: list[onnx.NodeProto] = []
+        self._inputs: list[onnx.ValueInfoProto] = []
+        self._outputs: list[onnx.ValueInfoProto] = []
+        self._constants: dict[str, onnx.TensorProto] = {}
+        self._by_value: dict[tuple[str, Shape, bytes], Tensor] = {}
+
+    def input(self, name: str, *shape: int) -> Tensor:
+        """A float32 input of fixed shape."""
+        self._inputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, shape))
+        return Tensor(self, name, shape)
+
+    def constant(self, value: AnyArray | Sequence[Number], name: str = "constant") -> Tensor:
+        """Numbers baked into the file as float32. Equal arrays are stored once. Not finite numbers are refused."""
+        array = np.ascontiguousarray(np.asarray(value, np.float32))
+        if not np.isfinite(array).all():
+            raise ExportError(
+                "checkpoint/unreadable",
+                where=f"constant {name} {array.shape}",
+                expected="finite numbers",
+                found=f"{int((~np.isfinite(array)).sum())} of {array.size} not finite",
+                remedy="training diverged or the file is damaged; export an earlier checkpoint",
+            )
+        return self._initializer(array, name)
+
+    def scalar(self, value: Number) -> Tensor:
+        """One number, without axes."""
+        return self._initializer(np.asarray(value, np.float32), "number")
+
+    def integers(self, values: Sequence[int]) -> Tensor:
+        """Constant int64 numbers: shapes, axes and indices, which ONNX wants in that type."""
+        return self._initializer(np.asarray(list(values), np.int64), "integers")
+
+    def _initializer(self, array: AnyArray, name: str) -> Tensor:
+        key = (array.dtype.str, array.shape, blake2b(array.tobytes()).digest())
+        if key not in self._by_value:
+            unique = f"{name}_{len(self._constants)}"
+            self._constants[unique] = numpy_helper.from_array(array, unique)
+            self._by_value[key] = Tensor(self, unique, array.shape)
+        return self._by_value[key]
+
+    def node(
+        self, operator: str, inputs: Sequence[Tensor], shape: Shape, **attributes: int | float | str | Sequence[int]
+    ) -> Tensor:
+        """Adds an operator of one result, whose shape the caller knows."""
+        name = f"{operator.lower()}_{len(self._nodes)}"
+        node = helper.make_node(operator, [tensor.name for tensor in inputs], [name], name=name)
+        node.attribute.extend(helper.make_attribute(key, value) for key, value in attributes.items())
+        self._nodes.append(node)
+        return Tensor(self, name, shape)
+
+    def binary(self, operator: str, left: Tensor, right: Tensor | Number) -> Tensor:
+        """An operator of two arguments that broadcast."""
+        other = right if isinstance(right, Tensor) else self.scalar(right)
+        try:
+            shape = np.broadcast_shapes(left.shape, other.shape)
+        except ValueError as error:
+            raise wrong_shape(operator, f"something that fits {left.shape}", str(other.shape)) from error
+        return self.node(operator, [left, other], shape)
+
+    def concat(self, tensors: Sequence[Tensor], axis: int) -> Tensor:
+        """Tensors one after the other, in steps of at most MOST_CONCAT_INPUTS."""
+        if len(tensors) == 1:
+            return tensors[0]
+        if len(tensors) > MOST_CONCAT_INPUTS:
+            step = MOST_CONCAT_INPUTS
+            groups = [self.concat(tensors[i : i + step], axis) for i in range(0, len(tensors), step)]
+            return self.concat(groups, axis)
+        axis %= len(tensors[0].shape)
+        rest = {replaced(tensor.shape, axis, 0) for tensor in tensors}
+        if len(rest) != 1:
+            raise wrong_shape("Concat", "shapes that differ along one axis only", str([t.shape for t in tensors]))
+        total = sum(tensor.shape[axis] for tensor in tensors)
+        return self.node("Concat", tensors, replaced(tensors[0].shape, axis, total), axis=axis)
+
+    def output(self, name: str, tensor: Tensor, half: bool = False) -> None:
+        """Names a result, as float32 or, with `half`, cast to float16."""
+        if half:
+            self._nodes.append(helper.make_node("Cast", [tensor.name], [name], name=name, to=TensorProto.FLOAT16))
+        elif tensor.name == (self._nodes[-1].output[0] if self._nodes else ""):
+            self._nodes[-1].output[0] = name
+        else:
+            self._nodes.append(helper.make_node("Identity", [tensor.name], [name], name=name))
+        kind = TensorProto.FLOAT16 if half else TensorProto.FLOAT
+        self._outputs.append(helper.make_tensor_value_info(name, kind, tensor.shape))
+
+    def model(self, metadata: dict[str, str]) -> onnx.ModelProto:
+        """The finished file. ONNX's own checker and shape inference must agree with every shape that was declared."""
+        graph = helper.make_graph(
+            self._nodes, self.name, self._inputs, self._outputs, list(self._used_constants().values())
+        )
+        model = helper.make_model(
+            graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="gaussian-splat-exporter"
+        )
+        model.ir_version = IR_VERSION
+        helper.set_model_props(model, metadata)
+        try:
+            onnx.checker.check_model(model)
+            onnx.shape_inference.infer_shapes(model, check_type=True, strict_mode=True)
+        except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
+            raise ExportError(
+                "graph/invalid",
+                where=f"graph {self.name}",
+                expected="a graph that ONNX accepts",
+                found=str(error).splitlines()[0],
+                remedy="this is a fault of the exporter; please report it with the command that you ran",
+            ) from error
+        return model
+
+    def _used_constants(self) -> dict[str, onnx.TensorProto]:
+        used = {name for node in self._nodes for name in node.input}
+        return {name: value for name, value in self._constants.items() if name in used}

@@ -1,0 +1,112 @@
+"""From tensors of Gaussians to a finished generator: outputs, bounds and contract."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import onnx
+
+from .arrays import AnyArray
+from .contract import DType, Facts, GaussianOutputs, Input, Layout, gaussian_contract, metadata
+from .errors import ExportError
+from .graph import Graph, Tensor
+from .pieces.covariance import covariance_of_scale_and_rotation
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a generator is written. float16 halves what it writes and needs the device feature shader-f16."""
+
+    layout: Layout = "packed"
+    dtype: DType = "float32"
+
+
+@dataclass(frozen=True)
+class Gaussians:
+    """What every family makes. positions (N,3) world units; covariances (N,6) or scales (N,3) standard deviations
+    with rotations (N,4) w x y z of any length; colors (N,3) 0..1 or sh (N,(d+1)^2,3); opacities (N,1) 0..1."""
+
+    positions: Tensor
+    opacities: Tensor
+    covariances: Tensor | None = None
+    scales: Tensor | None = None
+    rotations: Tensor | None = None
+    colors: Tensor | None = None
+    sh: Tensor | None = None
+
+    def covariance(self) -> Tensor:
+        """The covariances (N,6), made from scales and rotations if they were not given."""
+        if self.covariances is not None:
+            return self.covariances
+        if self.scales is None or self.rotations is None:
+            raise ValueError("Gaussians need covariances, or scales and rotations")
+        return covariance_of_scale_and_rotation(self.scales, self.rotations)
+
+    def colour(self) -> Tensor:
+        """Colours (N,3), or harmonics as rows of (d+1)^2 * 3, all channels of a coefficient together."""
+        colour = self.colors if self.sh is None else self.sh
+        if colour is None:
+            raise ValueError("Gaussians need colors or sh")
+        return colour if len(colour.shape) == 2 else colour.reshape(colour.shape[0], colour.shape[1] * 3)
+
+    def sh_degree(self) -> int:
+        """Degree of the harmonics; 0 with plain colours."""
+        return 0 if self.sh is None else {1: 0, 4: 1, 9: 2, 16: 3}[self.sh.shape[1]]
+
+
+def finish(
+    graph: Graph,
+    gaussians: Gaussians,
+    inputs: Sequence[Input],
+    bounds: tuple[AnyArray, AnyArray],
+    facts: Facts,
+    options: Options,
+) -> onnx.ModelProto:
+    """Adds the outputs and returns the generator. `bounds`: corners around every position at the inputs' defaults."""
+    write = write_packed if options.layout == "packed" else write_split
+    write(graph, gaussians, options)
+    outputs = GaussianOutputs(
+        layout=options.layout,
+        n_max=gaussians.positions.shape[0],
+        dtype=options.dtype,
+        sh_degree=None if gaussians.sh is None else gaussians.sh_degree(),
+        bounds=([float(x) for x in bounds[0]], [float(x) for x in bounds[1]]),
+    )
+    return graph.model(metadata(gaussian_contract(facts, inputs, outputs)))
+
+
+def write_packed(graph: Graph, gaussians: Gaussians, options: Options) -> None:
+    """One tensor: position 3, covariance 6, colour 3 or harmonics, opacity 1."""
+    columns = [gaussians.positions, gaussians.covariance(), gaussians.colour(), gaussians.opacities]
+    graph.output("gaussians", graph.concat(columns, 1), options.dtype == "float16")
+
+
+def write_split(graph: Graph, gaussians: Gaussians, options: Options) -> None:
+    """A tensor for each attribute."""
+    colour = "colors" if gaussians.sh is None else "sh"
+    tensors = {
+        "positions": gaussians.positions,
+        "covariances": gaussians.covariance(),
+        colour: gaussians.colors if gaussians.sh is None else gaussians.sh,
+        "opacities": gaussians.opacities,
+    }
+    for name, tensor in tensors.items():
+        if tensor is not None:
+            graph.output(name, tensor, options.dtype == "float16")
+
+
+def save(model: onnx.ModelProto, path: str) -> int:
+    """Writes the file and returns its bytes. Protobuf ends at 2 GiB."""
+    size = int(model.ByteSize())
+    if size >= 2**31 - 1:
+        raise ExportError(
+            "argument/value",
+            where=path,
+            expected="a model of less than 2 GiB",
+            found=f"{size / 2**30:.1f} GiB",
+            remedy="export fewer Gaussians, or a lower degree of harmonics",
+        )
+    with open(path, "wb") as file:
+        file.write(model.SerializeToString())
+    return size

@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gaussian_exporter.cli import main
+
+from .test_classic import cloud
+from .test_hexplane import write_cloud
+
+FACTS = ["--license", "CC0-1.0", "--attribution", "nobody"]
+
+
+def test_a_scene_is_exported_and_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_cloud(tmp_path / "scene.ply", cloud(50, 1))
+    out = tmp_path / "scene.onnx"
+    assert main(["classic", str(tmp_path / "scene.ply"), str(out), *FACTS, "--colours", "view"]) == 0
+    assert "writes gaussians [50, 13]" in capsys.readouterr().out
+    assert main(["check", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "gaussians [50, 13] float32, all checks passed" in printed and "the graph can be captured" in printed
+
+
+def test_half_floats_are_said_to_need_a_feature(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_cloud(tmp_path / "scene.ply", cloud(50, 1))
+    command = ["classic", str(tmp_path / "scene.ply"), str(tmp_path / "a.onnx"), *FACTS, "--dtype", "float16"]
+    assert main(command) == 0
+    assert "shader-f16" in capsys.readouterr().out
+
+
+def test_faults_end_with_a_message_and_no_traceback(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scene.ply").write_bytes(b"version https://git-lfs.github.com/spec/v1\n")
+    assert main(["classic", str(tmp_path / "scene.ply"), str(tmp_path / "a.onnx"), *FACTS]) == 1
+    assert "found a git-LFS pointer" in capsys.readouterr().err
+    assert main(["hexplane", str(tmp_path / "nowhere"), str(tmp_path / "a.onnx"), *FACTS]) == 1
+    assert "[checkpoint/not-found]" in capsys.readouterr().err
+
+
+def test_a_license_must_be_given(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit):
+        main(["classic", "a.ply", str(tmp_path / "a.onnx")])

@@ -1,0 +1,135 @@
+from __future__ import annotations
+
+import numpy as np
+import onnx
+import onnx.defs
+import pytest
+from onnx import TensorProto, helper, numpy_helper
+
+from gaussian_exporter.arrays import AnyArray
+from gaussian_exporter.conformance import check_outputs
+from gaussian_exporter.errors import ExportError
+from gaussian_exporter.families.classic import export_classic
+from gaussian_exporter.graph import Graph
+from gaussian_exporter.outputs import Options
+from gaussian_exporter.placement import KERNELS, gpu_findings
+
+from .running import FACTS
+from .test_classic import cloud
+from .zoo import every_family
+
+
+def made(
+    nodes: list[onnx.NodeProto],
+    constants: dict[str, AnyArray] | None = None,
+    size: int | str = 8,
+    opset: int = 17,
+    kind: int = TensorProto.FLOAT,
+) -> onnx.ModelProto:
+    """A model x [size, 4] -> y with the given nodes."""
+    given = [numpy_helper.from_array(value, name) for name, value in (constants or {}).items()]
+    x = helper.make_tensor_value_info("x", kind, [size, 4])
+    y = helper.make_tensor_value_info("y", TensorProto.FLOAT, None)
+    graph = helper.make_graph(nodes, "g", [x], [y], given)
+    return helper.make_model(graph, opset_imports=[helper.make_opsetid("", opset)], ir_version=8)
+
+
+def found(model: onnx.ModelProto) -> set[tuple[str, str]]:
+    return {(finding.kind, finding.operator) for finding in gpu_findings(model) if finding.operator != "shape"}
+
+
+@pytest.mark.parametrize("name", list(every_family()))
+def test_every_family_stays_on_the_gpu(name: str) -> None:
+    model, _ = every_family()[name]
+    assert [str(finding) for finding in gpu_findings(model)] == []
+
+
+@pytest.mark.parametrize("name", list(every_family()))
+def test_every_family_keeps_the_contract(name: str) -> None:
+    model, _ = every_family()[name]
+    assert all(np.isfinite(values).all() for values in check_outputs(model).values())
+
+
+def test_what_falls_back_is_named_with_what_to_write_instead() -> None:
+    mask = helper.make_node("Compress", ["x", "m"], ["c"], axis=0, name="dead")
+    turn = helper.make_node("Round", ["c"], ["y"], name="whole")
+    findings = gpu_findings(made([mask, turn], {"m": np.ones(8, bool)}))
+    named = {finding.node: str(finding) for finding in findings}
+    assert "opacity 0" in named["dead"] and "Floor(x + 0.5)" in named["whole"]
+
+
+def test_operators_after_their_last_kernel() -> None:
+    plane: dict[str, AnyArray] = {"plane": np.zeros((1, 1, 4, 4), np.float32), "s": np.array([1, 8, 2, 2], np.int64)}
+    for opset, mode, expected in ((17, "bilinear", set()), (20, "linear", {("fallback", "GridSample")})):
+        nodes = [
+            helper.make_node("Reshape", ["x", "s"], ["grid"]),
+            helper.make_node("GridSample", ["plane", "grid"], ["y"], mode=mode),
+        ]
+        assert found(made(nodes, plane, opset=opset)) == expected
+
+
+def test_int64_arithmetic_but_not_indices() -> None:
+    nodes = [
+        helper.make_node("ArgMax", ["x"], ["i"], axis=1, keepdims=0),
+        helper.make_node("Unsqueeze", ["i", "axis"], ["j"]),
+        helper.make_node("Gather", ["table", "j"], ["y"]),
+    ]
+    constants: dict[str, AnyArray] = {"axis": np.array([1], np.int64), "table": np.ones((4, 2), np.float32)}
+    assert found(made(nodes, constants)) == {("fallback", "Unsqueeze")}
+
+
+def test_arithmetic_of_constants_does_not_count() -> None:
+    nodes = [helper.make_node("Round", ["c"], ["r"]), helper.make_node("Add", ["x", "r"], ["y"])]
+    assert found(made(nodes, {"c": np.ones(4, np.float32)})) == set()
+
+
+def test_wide_splits_and_long_sums() -> None:
+    parts = [f"p{i}" for i in range(12)]
+    split = helper.make_node("Split", ["x"], parts, axis=0)
+    join = helper.make_node("Concat", parts, ["y"], axis=0)
+    assert found(made([split, join], size=12)) == {("failure", "Split")}
+    total = helper.make_node("CumSum", ["x", "axis"], ["y"])
+    axis = {"axis": np.array(0, np.int64)}
+    assert found(made([total], axis, size=100)) == set()
+    assert found(made([total], axis, size=100_000)) == {("slow", "CumSum")}
+
+
+def test_convolutions_that_come_out_wrong() -> None:
+    for inputs, expected in ((6, {("wrong", "Conv")}), (8, set()), (3, set()), (5, set())):
+        weight: dict[str, AnyArray] = {"w": np.zeros((8, inputs, 3, 3), np.float32)}
+        weight["s"] = np.array([1, inputs, 4, 4], np.int64)
+        nodes = [helper.make_node("Reshape", ["x", "s"], ["p"]), helper.make_node("Conv", ["p", "w"], ["y"])]
+        assert found(made(nodes, weight, size=inputs * 4)) == expected
+
+
+def test_symbolic_sizes_half_floats_and_foreign_operators() -> None:
+    relu = helper.make_node("Relu", ["x"], ["y"])
+    assert any("cannot be captured" in str(finding) for finding in gpu_findings(made([relu], size="n")))
+    assert ("failure", "type") in found(export_classic(cloud(), FACTS, Options(dtype="float16")))
+    assert found(made([helper.make_node("Magic", ["x"], ["y"], domain="com.nobody")])) == {("failure", "Magic")}
+
+
+def test_outputs_that_break_the_contract_are_named() -> None:
+    def rows(covariance: list[float], opacity: float) -> onnx.ModelProto:
+        graph = Graph("broken")
+        scale = graph.input("scale", 1)
+        graph.output("gaussians", graph.constant(np.array([[0.0] * 3 + covariance + [0.5] * 3 + [opacity]])) * scale)
+        contract = (
+            '{"version":1,"inputs":{"scale":{"role":"control","range":[0,1],"default":1}},'
+            '"outputs":{"layout":"packed","gaussians":"gaussians","color":"rgb","opacityActivation":"linear"}}'
+        )
+        return graph.model({"gaussian_contract": contract})
+
+    good = [1.0, 0, 0, 1, 0, 1]
+    assert check_outputs(rows(good, 1.0))["gaussians"].shape == (1, 13)
+    with pytest.raises(ExportError, match=r"opacities: expected 0 to 1, found 1.5 to 1.5"):
+        check_outputs(rows(good, 1.5))
+    with pytest.raises(ExportError, match=r"negative eigenvalue, the first in row 0"):
+        check_outputs(rows([1.0, 2, 0, 1, 0, 1], 1.0))
+    infinite = {"scale": np.array([np.inf], np.float32)}
+    with pytest.raises(ExportError, match=r"gaussians: expected finite numbers"):
+        check_outputs(rows(good, 1.0), infinite)
+
+
+def test_the_list_of_kernels_names_operators_that_exist() -> None:
+    assert {schema.name for schema in onnx.defs.get_all_schemas()} >= KERNELS

@@ -1,0 +1,226 @@
+"""Trainers, for a few steps on tiny pictures, through to files that keep the contract and agree with PyTorch's own
+forward pass. Needs PyTorch: npm run test:exporter -- --torch."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+
+from gaussian_exporter.arrays import AnyArray
+from gaussian_exporter.checkpoints.avatar_file import read_avatar
+from gaussian_exporter.checkpoints.hexplane_folder import read_hexplane
+from gaussian_exporter.checkpoints.networks import read_feed_forward, read_image_filter
+from gaussian_exporter.checkpoints.scaffold_folder import read_scaffold
+from gaussian_exporter.conformance import check_outputs
+from gaussian_exporter.families.avatar import export_avatar
+from gaussian_exporter.families.feed_forward import export_feed_forward
+from gaussian_exporter.families.hexplane import export_hexplane
+from gaussian_exporter.families.image_filter import export_image_filter
+from gaussian_exporter.families.scaffold import export_scaffold
+from gaussian_exporter.placement import gpu_findings
+
+from .running import FACTS, error, parts, run
+from .test_classic import cloud
+from .test_hexplane import write_cloud
+
+torch: Any = pytest.importorskip("torch", reason="PyTorch is not installed: npm run test:exporter -- --torch")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "training"))
+# The machine is shared: threads that wait for one another take ten times as long as one.
+torch.set_num_threads(1)
+SIZE = 16
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Orbits around a still and a swaying heap of Gaussians: still.npz, sway.npz and their points."""
+    import make_views
+
+    folder = tmp_path_factory.mktemp("views")
+    write_cloud(folder / "scene.ply", cloud(40, 0))
+    for kind, name in (("orbit", "still"), ("sway", "sway")):
+        arguments = [kind, str(folder / "scene.ply"), str(folder / name), "--size", str(SIZE), "--count", "16"]
+        make_views.main(arguments)
+    return folder
+
+
+def inputs(folder: Path, name: str) -> list[str]:
+    return [str(folder / f"{name}.npz"), str(folder / f"{name}.npy")]
+
+
+def recorded(folder: Path) -> dict[str, Any]:
+    record: dict[str, Any] = json.loads((folder / "record.json").read_text())
+    assert record["options"]["seed"] == 0 and record["seconds"] >= 0
+    return record
+
+
+def assert_agrees(model: onnx.ModelProto, feeds: dict[str, AnyArray], splats: Any) -> None:
+    """The exported file writes what PyTorch computes."""
+    check_outputs(model)
+    assert gpu_findings(model) == []
+    found = parts(run(model, feeds)["gaussians"])
+    full = splats.covariances.detach().numpy()
+    assert error(found["positions"], splats.positions.detach().numpy()) < 1e-4
+    assert error(found["covariances"], full[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]) < 1e-3
+    assert error(found["opacities"][:, 0], splats.opacities.detach().numpy()) < 1e-4
+
+
+def test_scaffold(views: Path, tmp_path: Path) -> None:
+    import common
+    import scaffold
+
+    still = common.load_views(views / "still.npz", "cpu")
+    points = np.load(views / "still.npy")
+    _, untrained = scaffold.train(still, points, 1, 60, 0)
+    scaffold.main([str(views / "still.npz"), str(views / "still.npy"), str(tmp_path), "--steps", "80", "--count", "40"])
+    assert recorded(tmp_path)["held_out_psnr"] > untrained + 1
+    model = export_scaffold(read_scaffold(tmp_path), FACTS)
+    again, _ = scaffold.train(still, points, 3, 60, 0)
+    again.save(tmp_path / "again")
+    eye = np.array([0.5, -0.3, -3.0], np.float32)
+    exported = export_scaffold(read_scaffold(tmp_path / "again"), FACTS)
+    assert_agrees(exported, {"camera_position": eye}, again(torch.tensor(eye)))
+    assert gpu_findings(model) == []
+
+
+def test_hexplane(views: Path, tmp_path: Path) -> None:
+    import common
+    import hexplane
+
+    swaying = common.load_views(views / "sway.npz", "cpu")
+    points = np.load(views / "sway.npy")
+    _, untrained = hexplane.train(swaying, points, 1, 60, 0)
+    hexplane.main([*inputs(views, "sway"), str(tmp_path), "--steps", "60", "--count", "40"])
+    assert recorded(tmp_path)["held_out_psnr"] > untrained + 1
+    again, _ = hexplane.train(swaying, points, 20, 60, 0)
+    again.save(tmp_path / "again")
+    exported = export_hexplane(*read_hexplane(tmp_path / "again"), FACTS)
+    assert_agrees(exported, {"time": np.array([0.3])}, again(torch.tensor([0.3])))
+
+
+def tiny_body() -> Any:
+    """A bent tube of two bones, which one target makes longer."""
+    import makehuman
+
+    rng = np.random.default_rng(0)
+    height, angle = rng.uniform(-1, 1, 60), rng.uniform(0, 2 * np.pi, 60)
+    vertices = np.stack([0.25 * np.cos(angle), height, 0.25 * np.sin(angle)], 1)
+    upper = 1 / (1 + np.exp(-6 * vertices[:, 1]))
+    directions = np.zeros((60, 3, 1))
+    directions[:, 1, 0] = vertices[:, 1] * 0.5
+    triangles = np.array([rng.choice(60, 3, replace=False) for _ in range(80)])
+    joints = np.array([[0.0, 1, 0], [0, 0, 0]])
+    moves = np.array([[[0.0], [0.5], [0]], [[0], [0], [0]]])
+    weights = np.stack([upper, 1 - upper], 1)
+    return makehuman.Body(vertices, triangles, weights, joints, [-1, 0], ["root", "knee"], directions, moves)
+
+
+def test_avatar(tmp_path: Path) -> None:
+    import avatar
+
+    body = tiny_body()
+    _, untrained = avatar.train(body, 1, 40, 0, SIZE)
+    model, score = avatar.train(body, 50, 40, 0, SIZE)
+    assert score > untrained + 1
+    model.save(tmp_path)
+    exported = export_avatar(read_avatar(tmp_path / "avatar.npz"), FACTS)
+    pose, shape = np.array([[0, 0, 0], [0.6, -0.2, 0.3]], np.float32), np.array([0.7], np.float32)
+    feeds: dict[str, AnyArray] = {"pose": pose, "shape": shape, "translation": np.zeros(3)}
+    assert_agrees(exported, feeds, model(torch.tensor(pose), torch.tensor(shape)))
+
+
+def test_the_real_body_is_read_and_exported(shared: Path, tmp_path: Path) -> None:
+    import avatar
+    import makehuman
+
+    body = makehuman.read_body(shared / "avatars" / "body-cc0")
+    assert body.vertices.shape == (13380, 3) and len(body.parents) == len(body.names) > 30
+    assert 1.5 < np.ptp(body.vertices[:, 1]) < 1.9
+    model = avatar.Avatar(body, np.arange(13380))
+    model.save(tmp_path)
+    exported = export_avatar(read_avatar(tmp_path / "avatar.npz"), FACTS)
+    rng = np.random.default_rng(0)
+    pose = (rng.normal(size=(len(body.parents), 3)) * 0.3).astype(np.float32)
+    shape = np.array([0.4], np.float32)
+    feeds: dict[str, AnyArray] = {"pose": pose, "shape": shape, "translation": np.zeros(3)}
+    assert_agrees(exported, feeds, model(torch.tensor(pose), torch.tensor(shape)))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_feed_forward(views: Path, tmp_path: Path, count: int) -> None:
+    import common
+    import feed_forward
+
+    scene = common.load_views(views / "still.npz", "cpu")
+    sizes = {"fine": 8, "coarse": 8, "depths": 8}
+    models = [feed_forward.train([scene], steps, count, 0, **sizes)[0] for steps in (1, 100)]
+
+    def loss(each: Any) -> float:
+        torch.manual_seed(0)
+        with torch.no_grad():
+            targets = range(0, 16, 4)
+            pairs = [feed_forward.attempt(each, scene, feed_forward.neighbours(scene, i)[:count], i) for i in targets]
+            return sum(float(common.loss_of(*pair)) for pair in pairs)
+
+    assert loss(models[1]) < 0.9 * loss(models[0])
+    model = models[1]
+    model.save(tmp_path)
+    k = feed_forward.shares(scene.intrinsics[0], SIZE, SIZE)
+    pose = scene.views[1] @ torch.linalg.inv(scene.views[0])
+    images = [scene.pictures[i : i + 1, :3] for i in range(count)]
+    feeds = {"focal_length": k[:2].numpy(), "principal_point": k[2:].numpy(), "image": images[0].numpy()}
+    if count == 2:
+        feeds |= {"image_2": images[1].numpy(), "relative_pose": pose.numpy()}
+    exported = export_feed_forward(read_feed_forward(tmp_path), FACTS)
+    assert_agrees(exported, feeds, model(images, k, pose if count == 2 else None))
+
+
+@pytest.mark.parametrize("kind", ["oil", "denoise"])
+def test_style(views: Path, tmp_path: Path, kind: str) -> None:
+    import common
+    import style
+
+    arguments = [str(views / "still.npz"), str(tmp_path), "--kind", kind, "--steps", "10", "--count", "8"]
+    style.main(arguments)
+    assert recorded(tmp_path)["held_out_psnr"] > 5
+    pictures = common.load_views(views / "still.npz", "cpu").pictures[:, :3]
+    model, scores = style.train(pictures, kind, 2, 8, 0)
+    assert set(scores) == {"held_out_psnr", "untouched_psnr"}
+    model.save(tmp_path, SIZE, SIZE)
+    network, _ = read_image_filter(tmp_path)
+    exported = export_image_filter(network, SIZE, SIZE, FACTS)
+    feeds = {"image": pictures[:1].numpy(), "strength": np.ones(1)}
+    expected = model(pictures[:1]).detach().clamp(0, 1).numpy()
+    assert error(run(exported, feeds)["processed"].reshape(-1, 1), expected.reshape(-1, 1)) < 1e-4
+
+
+def test_the_plain_rasterizer_draws_one_gaussian_as_its_formula_says() -> None:
+    import rasterizer
+
+    covariance = torch.tensor([[0.02, 0.005, 0], [0.005, 0.01, 0], [0, 0, 0.01]])
+    splats = rasterizer.Splats(
+        torch.tensor([[0.1, -0.05, 2.0]]), covariance[None], torch.tensor([[0.9, 0.5, 0.1]]), torch.tensor([0.8])
+    )
+    k = torch.tensor([[30.0, 0, 10], [0, 30, 8], [0, 0, 1]])
+    found = rasterizer.picture(splats, rasterizer.Camera(torch.eye(4), k, 20, 16))
+    jacobian = np.array([[15, 0, -0.75], [0, 15, 0.375]])
+    flat = jacobian @ covariance.numpy() @ jacobian.T + 0.3 * np.eye(2)
+    offset = np.array([8.5, 9.5]) - [11.5, 7.25]
+    alpha = 0.8 * np.exp(-0.5 * offset @ np.linalg.inv(flat) @ offset)
+    assert np.allclose(found[:, 9, 8].numpy(), alpha * np.array([0.9, 0.5, 0.1, 1]), rtol=1e-5)
+
+
+def test_kuwahara_keeps_edges_and_evens_the_rest() -> None:
+    import style
+
+    picture = torch.zeros(1, 3, 20, 20)
+    picture[..., 10:] = 1
+    noisy = picture + 0.05 * torch.randn_like(picture)
+    painted = style.kuwahara(noisy, 3)
+    assert (painted - picture).abs().mean() < 0.4 * (noisy - picture).abs().mean()
+    assert torch.equal(style.kuwahara(picture, 3), picture)

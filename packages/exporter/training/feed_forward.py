@@ -1,0 +1,216 @@
+"""Trains a feed-forward generator: python feed_forward.py OUT VIEWS.npz [VIEWS.npz ...] [--steps 20000] [--count 2]
+
+Each VIEWS file holds one scene, all of one size (multiples of 4). `--count` is how many pictures go in: 1 or 2. A step
+takes neighbouring views, makes Gaussians of one (or two), and draws them for another. Every eighth view is never drawn
+while training. OUT is the folder that `gaussian-export feed-forward` reads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F  # noqa: N812
+
+from common import HELD_OUT_EVERY, Record, Views, device, load_views, loss_of, psnr, seed
+from rasterizer import Camera, Splats, covariances, picture
+
+REDUCTION = 4
+HEAD = (1, 1, 3, 4, 3)
+REFINEMENT = 0.2
+SMALLEST, LARGEST = 0.2, 4.2
+NEAREST = 1e-3
+NEIGHBOURS = 4
+
+
+@dataclass
+class Shape:
+    """What config.json holds."""
+
+    width: int
+    height: int
+    views: int
+    near: float
+    far: float
+    depths: int = 32
+
+
+class Generator(nn.Module):
+    """The network of gaussian_exporter.families.feed_forward, with the same names."""
+
+    def __init__(self, shape: Shape, fine: int = 32, coarse: int = 64):
+        """`fine` and `coarse`: channels of features, multiples of 4."""
+        super().__init__()
+        self.shape = shape
+        sweep = coarse + (shape.depths if shape.views == 2 else 0)
+        sizes = [(3, fine), (fine, coarse), (coarse, coarse), (coarse, coarse)]
+        strides = (1, 2, 2, 1)
+        self.encoder = nn.ModuleList(nn.Conv2d(i, o, 3, s, 1) for (i, o), s in zip(sizes, strides, strict=True))
+        self.depth = nn.ModuleList([nn.Conv2d(sweep, coarse, 3, 1, 1), nn.Conv2d(coarse, shape.depths, 3, 1, 1)])
+        sizes = [(coarse + fine + 4, fine), (fine, fine), (fine, sum(HEAD))]
+        self.head = nn.ModuleList(nn.Conv2d(i, o, 3, 1, 1) for i, o in sizes)
+        self.register_buffer("candidates", torch.linspace(1 / shape.near, 1 / shape.far, shape.depths))
+
+    def encode(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        """Fine and coarse features of a picture (1,3,H,W)."""
+        x, fine = image * 2 - 1, None
+        for layer in self.encoder:
+            x = F.relu(layer(x))
+            fine = x if fine is None else fine
+        return (x if fine is None else fine), x
+
+    def rays(self, k: Tensor, width: int, height: int) -> Tensor:
+        """Directions with z = 1 through pixel centres (H*W,3); k: fx, fy, cx, cy as shares of width and height."""
+        v, u = torch.meshgrid(
+            (torch.arange(height, device=k.device) + 0.5) / height,
+            (torch.arange(width, device=k.device) + 0.5) / width,
+            indexing="ij",
+        )
+        x, y = (u.flatten() - k[2]) / k[0], (v.flatten() - k[3]) / k[1]
+        return torch.stack([x, y, torch.ones_like(x)], 1)
+
+    def sweep(self, own: Tensor, other: Tensor, k: Tensor, pose: Tensor) -> Tensor:
+        """(1,D,h,w): how alike features are at each candidate depth. pose (4,4): own camera to the other."""
+        channels, height, width = own.shape[1:]
+        points = (self.rays(k, width, height) @ pose[:3, :3].T)[None] / self.candidates[:, None, None] + pose[:3, 3]
+        z = points[..., 2].clamp(min=NEAREST)
+        x, y = points[..., 0] / z * k[0] + k[2], points[..., 1] / z * k[1] + k[3]
+        grid = (torch.stack([x, y], -1) * 2 - 1).reshape(1, -1, width, 2)
+        seen = F.grid_sample(other, grid, align_corners=False, padding_mode="zeros")
+        alike = (seen.reshape(channels, len(self.candidates), -1) * own.reshape(channels, 1, -1)).sum(0)
+        return (alike / channels**0.5).reshape(1, -1, height, width)
+
+    def place(self, image: Tensor, encoded: tuple[Tensor, Tensor], cost: Tensor | None, k: Tensor) -> Splats:
+        """One picture's Gaussians in its own camera's frame."""
+        fine, coarse = encoded
+        x = coarse if cost is None else torch.cat([cost, coarse], 1)
+        logits = self.depth[1](F.relu(self.depth[0](x))) + (0 if cost is None else cost)
+        guess = torch.einsum("bdhw,d->bhw", logits.softmax(1), self.candidates)[:, None]
+
+        def enlarged(values: Tensor) -> Tensor:
+            return F.interpolate(values, scale_factor=REDUCTION, mode="bilinear", align_corners=False)
+
+        guess = enlarged(guess)
+        x = torch.cat([enlarged(coarse), fine, image, guess], 1)
+        for index, layer in enumerate(self.head):
+            x = layer(F.relu(x) if index else x)
+        nearer, opacity, size, turn, tint = x[0].flatten(1).T.split(HEAD, 1)
+        inverse = guess.flatten()[:, None] * torch.exp(REFINEMENT * torch.tanh(nearer))
+        depth = 1 / inverse.clamp(1 / self.shape.far, 1 / self.shape.near)
+        scales = (torch.sigmoid(size) * (LARGEST - SMALLEST) + SMALLEST) * depth / (k[0] * self.shape.width)
+        upright = turn + torch.tensor([1.0, 0, 0, 0], device=turn.device)
+        colors = (image[0].flatten(1).T + 0.5 * torch.tanh(tint)).clamp(0, 1)
+        positions = self.rays(k, self.shape.width, self.shape.height) * depth
+        return Splats(positions, covariances(scales, upright), colors, torch.sigmoid(opacity[:, 0]))
+
+    def forward(self, images: list[Tensor], k: Tensor, pose: Tensor | None) -> Splats:
+        """Gaussians of all pictures in the first camera's frame; pose (4,4): first camera to the second."""
+        encoded = [self.encode(image) for image in images]
+        if len(images) == 1 or pose is None:
+            return self.place(images[0], encoded[0], None, k)
+        back = torch.linalg.inv(pose)
+        costs = [self.sweep(encoded[i][1], encoded[1 - i][1], k, p) for i, p in enumerate((pose, back))]
+        first, second = (self.place(images[i], encoded[i], costs[i], k) for i in range(2))
+        turn = back[:3, :3]
+        return Splats(
+            torch.cat([first.positions, second.positions @ turn.T + back[:3, 3]]),
+            torch.cat([first.covariances, turn @ second.covariances @ turn.T]),
+            torch.cat([first.colors, second.colors]),
+            torch.cat([first.opacities, second.opacities]),
+        )
+
+    def save(self, folder: Path) -> None:
+        """config.json and model.pth."""
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "config.json").write_text(json.dumps(vars(self.shape)))
+        state = {name: value.cpu() for name, value in self.state_dict().items() if name != "candidates"}
+        torch.save(state, folder / "model.pth")
+
+
+def shares(intrinsics: Tensor, width: int, height: int) -> Tensor:
+    """fx, fy, cx, cy as shares of width and height."""
+    k = intrinsics
+    return torch.stack([k[0, 0] / width, k[1, 1] / height, k[0, 2] / width, k[1, 2] / height])
+
+
+def attempt(model: Generator, views: Views, given: list[int], target: int) -> tuple[Tensor, Tensor]:
+    """The target as drawn from the given views, and as it is."""
+    _, _, height, width = views.pictures.shape
+    images = [views.pictures[i : i + 1, :3] for i in given]
+    world = torch.linalg.inv(views.views[given[0]])
+    pose = views.views[given[1]] @ world if len(given) == 2 else None
+    splats = model(images, shares(views.intrinsics[given[0]], width, height), pose)
+    camera = Camera(views.views[target] @ world, views.intrinsics[target], width, height)
+    return picture(splats, camera), views.pictures[target]
+
+
+def neighbours(views: Views, target: int) -> list[int]:
+    """The nearest other views by the cameras' places, nearest first."""
+    eyes = torch.stack([views.camera(i).position for i in range(len(views.pictures))])
+    order = torch.argsort((eyes - eyes[target]).norm(dim=1)).tolist()
+    return [i for i in order if i != target][:NEIGHBOURS]
+
+
+def depth_range(scenes: list[Views]) -> tuple[float, float]:
+    """Near and far: cameras look at something around the origin."""
+    distances = torch.cat(
+        [torch.stack([s.camera(i).position for i in range(len(s.pictures))]).norm(dim=1) for s in scenes]
+    )
+    return float(distances.min()) * 0.5, float(distances.max()) * 2
+
+
+def train(scenes: list[Views], steps: int, views: int, number: int, **sizes: int) -> tuple[Generator, float]:
+    """The network, and its PSNR on targets it never drew."""
+    rng = seed(number)
+    height, width = scenes[0].pictures.shape[2:]
+    depths = {"depths": sizes.pop("depths")} if "depths" in sizes else {}
+    model = Generator(Shape(width, height, views, *depth_range(scenes), **depths), **sizes).to(
+        scenes[0].pictures.device
+    )
+    optimizer = torch.optim.Adam(model.parameters(), lr=4e-4)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
+    for step in range(steps):
+        scene = scenes[int(rng.integers(len(scenes)))]
+        target = int(rng.choice([i for i in range(len(scene.pictures)) if i % HELD_OUT_EVERY != HELD_OUT_EVERY // 2]))
+        given = rng.permutation(neighbours(scene, target))[:views].tolist()
+        loss = loss_of(*attempt(model, scene, given, target))
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        optimizer.step()
+        schedule.step()
+        if step % 1000 == 0 or step == steps - 1:
+            print(f"step {step}: loss {loss.item():.4f}", flush=True)
+    scores = []
+    with torch.no_grad():
+        for scene in scenes:
+            for target in range(HELD_OUT_EVERY // 2, len(scene.pictures), HELD_OUT_EVERY):
+                found, wanted = attempt(model, scene, neighbours(scene, target)[:views], target)
+                scores.append(psnr(found[:3], wanted[:3]))
+    return model, float(np.mean(scores))
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("views", type=Path, nargs="+")
+    parser.add_argument("--steps", type=int, default=20_000)
+    parser.add_argument("--count", type=int, default=2, choices=(1, 2))
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args(argv)
+    given.views = [str(path) for path in given.views]
+    record = Record(given)
+    scenes = [load_views(Path(path), device()) for path in given.views]
+    model, score = train(scenes, given.steps, given.count, given.seed)
+    model.save(given.out)
+    record.write(held_out_psnr=score, shape=vars(model.shape))
+
+
+if __name__ == "__main__":
+    main()
