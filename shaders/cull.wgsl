@@ -1,7 +1,7 @@
 // Which splats of the chunks at hand paint anything: one thread per splat, one bit of `visible_bits` per splat, and the number
 // of visible splats of each group of 256. Bits and counts, not atomic slots, so that compaction keeps the file's order and
 // equal depths never flicker.
-#import shared/projection
+#import shared/visibility
 #import shared/group
 #import shared/gathered
 
@@ -12,25 +12,9 @@
 @group(0) @binding(4) var<storage, read_write> group_counts: array<u32>;
 @group(0) @binding(5) var<storage, read_write> gathered: array<atomic<u32>>;
 
-// Splats with less than this opacity times their area in px² are left out. A lever: 0 leaves out none.
-override min_contribution: f32 = 0.0;
-
-const TWO_PI = 6.283185307179586;
-
 var<workgroup> bits: array<atomic<u32>, WORDS_PER_GROUP>;
 var<workgroup> nearest_inverted: atomic<u32>;
 var<workgroup> farthest: atomic<u32>;
-
-// Camera depth of a splat that paints something, 0 of any other.
-fn visible_depth(packed: PackedGaussian) -> f32 {
-  let g = unpack_gaussian(packed);
-  // The cheap tests first: most splats of a scene fail one of them.
-  let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
-  if (g.opacity < alpha_min || !is_in_depth_range(view, depth)) { return 0.0; }
-  let e = project_ellipse(view, g);
-  let contributes = e.opacity * TWO_PI * e.sigma_x * e.sigma_v >= min_contribution;
-  return select(0.0, depth, contributes && covers_a_pixel(view, e));
-}
 
 @compute @workgroup_size(CULL_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {

@@ -9,7 +9,7 @@
 @group(0) @binding(2) var<storage, read_write> chunk_list: array<u32>;
 // Indirect arguments of `cull` and `compact` for each page, three words; the first counts the chunks.
 @group(0) @binding(3) var<storage, read_write> chunk_args: array<atomic<u32>>;
-// Set to nothing for chunks that are culled.
+// Set to nothing.
 @group(0) @binding(4) var<storage, read_write> group_counts: array<u32>;
 @group(0) @binding(5) var<storage, read_write> visible_bits: array<u32>;
 
@@ -56,11 +56,11 @@ fn may_be_visible(c: Chunk) -> bool {
 fn main(@builtin(global_invocation_id) id: vec3u) {
   let chunk = id.x;
   if (chunk * CULL_GROUP >= view.splat_count) { return; }
+  let group = view.first_group + chunk;
+  group_counts[group] = 0u;
   if (may_be_visible(chunks[chunk])) {
     chunk_list[view.first_group + atomicAdd(&chunk_args[3u * view.page], 1u)] = chunk;
   } else {
-    let group = view.first_group + chunk;
-    group_counts[group] = 0u;
     for (var w = 0u; w < WORDS_PER_GROUP; w++) { visible_bits[group * WORDS_PER_GROUP + w] = 0u; }
   }
 }

@@ -10,6 +10,7 @@ import { ProjectStage } from './stages/project.js';
 import { ScanStage } from './stages/scan.js';
 import { SortStage } from './stages/sort.js';
 import { thinBlocks, ThinStage } from './stages/thin.js';
+import type { Threads } from './stages/threads.js';
 import { constants } from './generated/shaders.js';
 
 /** The stages before the rasterizer; each is a shader of the same name. */
@@ -24,16 +25,20 @@ export interface Stages {
   readonly sort: SortStage;
 }
 
-export function makeStages(device: GPUDevice, { alpha_min, min_contribution }: Overrides): Stages {
+export function makeStages(
+  device: GPUDevice,
+  { alpha_min, min_contribution }: Overrides,
+  threads: Threads,
+): Stages {
   return {
     cullChunks: new CullChunksStage(device),
-    cull: new CullStage(device, { alpha_min, min_contribution }),
+    cull: new CullStage(device, { alpha_min, min_contribution }, threads),
     scan: new ScanStage(device),
     plan: new PlanStage(device),
     compact: new CompactStage(device),
     thin: new ThinStage(device),
     project: new ProjectStage(device),
-    sort: new SortStage(device),
+    sort: new SortStage(device, 'indices', threads),
   };
 }
 

@@ -6,6 +6,7 @@ import type { PassTimer } from './gpu/pass-timer.js';
 import type { PageTable } from './page-table.js';
 import { OrderKeysStage } from './stages/order-keys.js';
 import { SortStage } from './stages/sort.js';
+import type { Threads } from './stages/threads.js';
 
 const KEY_BITS = 32;
 const { SORT_BLOCK, DIGITS, CULL_GROUP } = constants;
@@ -29,11 +30,11 @@ export class DepthOrder {
   /** Needed while sorting only. */
   #working: GpuMemory | undefined;
 
-  constructor(device: GPUDevice, table: PageTable) {
+  constructor(device: GPUDevice, table: PageTable, threads: Threads) {
     this.#device = device;
     this.#table = table;
     this.#keys = new OrderKeysStage(device);
-    this.#sort = new SortStage(device);
+    this.#sort = new SortStage(device, 'indices', threads);
     this.#memory = new GpuMemory(device);
     this.length = CULL_GROUP * table.groups;
   }

@@ -1,4 +1,5 @@
 export { capture } from './capture.js';
+export { chooseVariants, type ChoiceOptions, type ChoiceStore } from './choice/choose.js';
 export { deviceDescriptor } from './device.js';
 export { GaussianBuffers, type GaussianPage } from './gaussian-buffers.js';
 export { PassTimer, type PassTime } from './gpu/pass-timer.js';
@@ -8,3 +9,5 @@ export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 export { Renderer, type FrameRequest, type RendererOptions } from './renderer.js';
 export type { FrameStatistics } from './statistics.js';
+export type { Threads } from './stages/threads.js';
+export type { Variants } from './variants.js';

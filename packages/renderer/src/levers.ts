@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
+import type { Threads } from './stages/threads.js';
 
 /**
  * Everything that trades accuracy for speed, one lever each. docs/frontier has what each costs and saves.
@@ -10,11 +11,13 @@ export interface Levers {
    * in float32 and with an end where nothing behind can be seen. `auto`: see {@link Renderer.create}.
    */
   readonly rasterizer: 'auto' | RasterizerName;
+  /** How stages share their work; the image is the same. `auto`: see {@link Renderer.create}. */
+  readonly threads: 'auto' | Threads;
   /**
-   * Precision in which quads are blended and images kept. `rgba32float` takes twice the memory and bandwidth, and quads then need the
+   * Precision in which quads are blended and images kept. `auto`: see {@link Renderer.create}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
    * feature `float32-blendable`.
    */
-  readonly accumulation: AccumulationFormat;
+  readonly accumulation: 'auto' | AccumulationFormat;
   /**
    * Bits of the keys that splats are sorted by while the camera turns. 32 are those of the float32 depth and sort exactly; fewer
    * are spread over the logarithm of the visible depths.
@@ -37,7 +40,8 @@ export interface Levers {
 /** The levers that leave nothing out: what scenes were trained with. */
 const EXACT: Levers = {
   rasterizer: 'auto',
-  accumulation: 'rgba16float',
+  threads: 'auto',
+  accumulation: 'auto',
   depthKeyBits: 24,
   sortAngle: 2e-5,
   transmittanceMin: 1e-4,

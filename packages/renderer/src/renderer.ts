@@ -13,12 +13,14 @@ import { writeStruct } from './gpu/struct.js';
 import { leversOf, type Levers, type Quality } from './levers.js';
 import { PageTable } from './page-table.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
-import type { Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import type { AccumulationFormat, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
 import { maxPairs, TilesRasterizer } from './rasterizers/tiles.js';
 import { maxVisible, Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
 import { sortedIn } from './stages/sort.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
+import { chooseVariants } from './choice/choose.js';
+import { settle, type Variants } from './variants.js';
 
 /** A quality, and single levers that differ from it. */
 export interface RendererOptions extends Partial<Levers> {
@@ -85,7 +87,8 @@ const TURNING_FRAMES = 64;
  * for a read-back. Splats are sorted while the camera turns; a camera that moves without turning sorts nothing.
  */
 export class Renderer {
-  readonly levers: Levers;
+  /** The levers in force; nothing is left `auto`. */
+  readonly levers: Levers & Variants;
   readonly #device: GPUDevice;
   readonly #stages: Stages;
   readonly #compose: ComposeStage;
@@ -104,15 +107,25 @@ export class Renderer {
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
     this.#device = device;
-    this.levers = leversOf(options);
+    this.levers = settle(device, leversOf(options));
     this.#onIncomplete = options.onIncomplete ?? (() => undefined);
     const overrides = overridesOf(this.levers);
-    this.#stages = makeStages(device, overrides);
+    this.#stages = makeStages(device, overrides, this.levers.threads);
     this.#compose = new ComposeStage(device);
     this.#rasterizer = makeRasterizer(device, this.levers, overrides);
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
+  }
+
+  /**
+   * A renderer whose `auto` levers have been decided on this device: variants that give a wrong image are ruled out by a known answer, the
+   * others are timed (see {@link chooseVariants}). The constructor decides by what has been chosen on the device before, or else takes
+   * `quads`, `rgba16float` and `parallel`, which work everywhere.
+   */
+  static async create(device: GPUDevice, options: RendererOptions = {}): Promise<Renderer> {
+    await chooseVariants(device);
+    return new Renderer(device, options);
   }
 
   /** Name of the rasterizer in use. */
@@ -255,7 +268,7 @@ export class Renderer {
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
   #rebind(table: PageTable): void {
     const capacity = this.#capacity!;
-    const depthOrder = this.#resources?.depthOrder ?? new DepthOrder(this.#device, table);
+    const depthOrder = this.#resources?.depthOrder ?? new DepthOrder(this.#device, table, this.levers.threads);
     this.#resources?.scratch.destroy();
     this.#resources?.bindings.destroy();
     this.#resources?.monitor.destroy();
@@ -342,13 +355,17 @@ function requireTextureSize(device: GPUDevice, { width, height }: Camera): void 
   });
 }
 
-function makeRasterizer(device: GPUDevice, { rasterizer, accumulation }: Levers, overrides: Overrides): Rasterizer {
-  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides);
+function makeRasterizer(
+  device: GPUDevice,
+  { rasterizer, accumulation, threads }: Variants,
+  overrides: Overrides,
+): Rasterizer {
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, threads);
   requireBlendable(device, accumulation);
   return new QuadsRasterizer(device, accumulation, overrides);
 }
 
-function requireBlendable(device: GPUDevice, format: Levers['accumulation']): void {
+function requireBlendable(device: GPUDevice, format: AccumulationFormat): void {
   if (format !== 'rgba32float' || device.features.has('float32-blendable')) return;
   throw new GaussianSplatError('unsupported/limits', {
     where: 'RendererOptions.accumulation',

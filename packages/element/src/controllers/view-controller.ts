@@ -112,8 +112,7 @@ export class ViewController implements FrameClient {
     const texture = context.getCurrentTexture();
     return {
       camera: this.#options.camera.view(width, height),
-      target: texture.createView(),
-      targetFormat: texture.format,
+      target: texture,
     };
   }
 
@@ -122,11 +121,19 @@ export class ViewController implements FrameClient {
     const context = (this.#context ??= this.#options.canvasOf()?.getContext('webgpu') ?? null);
     if (context === null) throw noContext();
     if (this.#configured !== device) {
-      context.configure({ device, format: navigator.gpu.getPreferredCanvasFormat(), alphaMode: 'premultiplied' });
+      const format = navigator.gpu.getPreferredCanvasFormat();
+      context.configure({ device, format, usage: canvasUsage(device, format), alphaMode: 'premultiplied' });
       this.#configured = device;
     }
     return context;
   }
+}
+
+/** Compute shaders may then write the canvas itself, where the device lets them. */
+function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsageFlags {
+  const { RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
+  const isStorable = format === 'rgba8unorm' || device.features.has('bgra8unorm-storage');
+  return isStorable ? RENDER_ATTACHMENT | STORAGE_BINDING : RENDER_ATTACHMENT;
 }
 
 function noContext(): GaussianSplatError {

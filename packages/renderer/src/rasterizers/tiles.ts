@@ -13,6 +13,7 @@ import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
+import type { Threads } from '../stages/threads.js';
 import type { OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
 
 const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, SORT_BLOCK, DIGITS } = constants;
@@ -79,12 +80,12 @@ export class TilesRasterizer implements Rasterizer {
   #buffers: PairBuffers | undefined;
   #bound: GridBindings | undefined;
 
-  constructor(device: GPUDevice, overrides: Overrides) {
+  constructor(device: GPUDevice, overrides: Overrides, threads: Threads) {
     this.#device = device;
     this.#overrides = overrides;
     this.#memory = new GpuMemory(device);
     this.#kernels = makeKernels(device, overrides);
-    this.#sort = new SortStage(device, 'pairs');
+    this.#sort = new SortStage(device, 'pairs', threads);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
     this.#scanLength = this.#memory.buffer('gs.rasterize.scan_length', 16, usage);

@@ -1,5 +1,6 @@
-import { constants, cull, cullChunks } from '../generated/shaders.js';
+import { constants, cull, cullChunks, cullSerial } from '../generated/shaders.js';
 import { kernelOf, type ComputeKernel, type Overrides, type Resources } from '../gpu/kernel.js';
+import type { Threads } from './threads.js';
 
 /** Which chunks of a page may hold visible splats. */
 export class CullChunksStage {
@@ -20,10 +21,11 @@ export class CullChunksStage {
 
 /** Which splats of the listed chunks paint anything, and how many of each group of 256. */
 export class CullStage {
-  readonly #kernel: ComputeKernel<typeof cull>;
+  readonly #kernel: ComputeKernel<typeof cull> | ComputeKernel<typeof cullSerial>;
 
-  constructor(device: GPUDevice, overrides: Overrides = {}) {
-    this.#kernel = kernelOf(device, cull, overrides);
+  constructor(device: GPUDevice, overrides: Overrides = {}, threads: Threads = 'parallel') {
+    this.#kernel =
+      threads === 'serial' ? kernelOf(device, cullSerial, overrides) : kernelOf(device, cull, overrides);
   }
 
   bind(resources: Resources<typeof cull>): GPUBindGroup {

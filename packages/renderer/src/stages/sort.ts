@@ -1,7 +1,17 @@
-import { constants, layouts, sortCount, sortScan, sortScatter } from '../generated/shaders.js';
-import { BUFFER_USAGE, kernelOf, perDevice, specialise, type ComputeKernel } from '../gpu/kernel.js';
+import {
+  constants,
+  layouts,
+  sortCount,
+  sortCountSerial,
+  sortScan,
+  sortScanSerial,
+  sortScatter,
+  sortScatterSerial,
+} from '../generated/shaders.js';
+import { BUFFER_USAGE, kernelOf, perDevice, specialise, type ComputeKernel, type ShaderDescription } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
+import type { Threads } from './threads.js';
 
 /** The buffers that {@link SortStage} works on. */
 export interface SortBuffers {
@@ -22,7 +32,8 @@ interface SortPass {
   readonly scatter: GPUBindGroup;
 }
 
-const DIGIT_BITS = Math.log2(constants.DIGITS);
+const { DIGITS, DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP } = constants;
+const DIGIT_BITS = Math.log2(DIGITS);
 const MAX_KEY_BITS = 32;
 
 /** Passes that keys of so many bits take. */
@@ -39,17 +50,20 @@ export const sortedIn = (keyBits: number): 0 | 1 => (passCount(keyBits) % 2 === 
  * Counts are reduced and scanned between dispatches, so no workgroup ever waits for another.
  */
 export class SortStage {
-  readonly #count: ComputeKernel<typeof sortCount>;
-  readonly #scan: ComputeKernel<typeof sortScan>;
-  readonly #scatter: ComputeKernel<typeof sortScatter>;
+  readonly #count: ComputeKernel<typeof sortCount> | ComputeKernel<typeof sortCountSerial>;
+  readonly #scan: ComputeKernel<typeof sortScan> | ComputeKernel<typeof sortScanSerial>;
+  readonly #scanGroups: number;
+  readonly #scatter: ComputeKernel<typeof sortScatter> | ComputeKernel<typeof sortScatterSerial>;
   readonly #passUniforms: readonly GPUBuffer[];
 
-  constructor(device: GPUDevice, moving: SortValues = 'indices') {
-    const scatter =
-      moving === 'indices' ? sortScatter : specialise(sortScatter, 'pairs', 'alias Value = u32', 'alias Value = vec2u');
-    this.#count = kernelOf(device, sortCount);
-    this.#scan = kernelOf(device, sortScan);
-    this.#scatter = kernelOf(device, scatter);
+  constructor(device: GPUDevice, moving: SortValues = 'indices', threads: Threads = 'parallel') {
+    const isSerial = threads === 'serial';
+    this.#count = isSerial ? kernelOf(device, sortCountSerial) : kernelOf(device, sortCount);
+    this.#scan = isSerial ? kernelOf(device, sortScanSerial) : kernelOf(device, sortScan);
+    this.#scanGroups = DIGITS / (isSerial ? DIGITS_PER_SERIAL_GROUP : DIGITS_PER_GROUP);
+    this.#scatter = isSerial
+      ? kernelOf(device, movingShader(sortScatterSerial, moving))
+      : kernelOf(device, movingShader(sortScatter, moving));
     this.#passUniforms = perDevice(device, `sort passes ${moving}`, () => makePassUniforms(device, moving));
   }
 
@@ -77,13 +91,17 @@ export class SortStage {
   record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], plan: GPUBuffer): void {
     for (const { count, scan, scatter } of bindings) {
       this.#count.dispatchIndirect(pass, count, plan, planOffsets.sort);
-      this.#scan.dispatch(pass, scan, constants.DIGITS / constants.DIGITS_PER_GROUP);
+      this.#scan.dispatch(pass, scan, this.#scanGroups);
       this.#scatter.dispatchIndirect(pass, scatter, plan, planOffsets.sort);
     }
   }
 }
 
 export type SortBindings = ReturnType<SortStage['bind']>;
+
+function movingShader<S extends ShaderDescription>(shader: S, moving: SortValues): S {
+  return moving === 'indices' ? shader : specialise(shader, 'pairs', 'alias Value = u32', 'alias Value = vec2u');
+}
 
 function makePassUniforms(device: GPUDevice, moving: SortValues): GPUBuffer[] {
   return Array.from({ length: MAX_KEY_BITS / DIGIT_BITS }, (_, index) => {

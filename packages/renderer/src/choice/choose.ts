@@ -1,0 +1,163 @@
+import { GaussianBuffers } from '../gaussian-buffers.js';
+import { perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
+import { packGaussians } from '../pack/pack.js';
+import { Renderer } from '../renderer.js';
+import { remember, SAFE, type Variants } from '../variants.js';
+import { givesKnownAnswer, probeCamera, sphereCloud } from './known-answer.js';
+import { sortsRight, timeSort } from './sort-probe.js';
+
+/** Where a choice is kept between visits: `localStorage`, or anything like it. */
+export interface ChoiceStore {
+  getItem(key: string): string | null;
+  setItem(key: string, value: string): void;
+}
+
+export interface ChoiceOptions {
+  /** Default: the page's `localStorage` where there is one. null: nothing is kept. */
+  readonly store?: ChoiceStore | null;
+}
+
+/** Changes whenever a variant does, so that old choices are made anew. */
+const VERSION = 1;
+
+/** Scenes of the probe: until one candidate is left, or the time is up. */
+const ROUNDS = [
+  { splats: 4_000, width: 320, height: 180 },
+  { splats: 32_000, width: 960, height: 540 },
+  { splats: 256_000, width: 1920, height: 1080 },
+];
+/** Milliseconds that all rounds may take, and how much longer than the last one the next is expected to be. */
+const BUDGET = 400;
+const GROWTH = 8;
+/** A candidate so much slower than the fastest, in a round that takes as long as is worth measuring, is out. */
+const HOPELESS = 1.5;
+const MEASURABLE = 1.5;
+
+/**
+ * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a known answer are out, the
+ * others are timed on small scenes. Takes a few tenths of a second the first time on an adapter; then the choice is kept in `store`, and
+ * only its answer is checked again.
+ */
+export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): Promise<Variants> {
+  return perDevice(device, 'choice', async () => {
+    const store = options.store === undefined ? pageStore() : options.store;
+    const kept = readChoice(store, keyFor(device));
+    const variants = kept !== undefined && (await isRight(device, kept)) ? kept : await probe(device);
+    remember(device, variants);
+    writeChoice(store, keyFor(device), variants);
+    return variants;
+  });
+}
+
+async function probe(device: GPUDevice): Promise<Variants> {
+  const threads = await chooseThreads(device);
+  const candidates: Variants[] = [];
+  for (const candidate of candidatesFor(device, threads)) {
+    if (await isRight(device, candidate)) candidates.push(candidate);
+  }
+  if (candidates.length === 0) return SAFE;
+  return chooseFastest(device, candidates);
+}
+
+async function chooseThreads(device: GPUDevice): Promise<Variants['threads']> {
+  // A processor in disguise, by its own account.
+  if (device.adapterInfo?.isFallbackAdapter && (await sortsRight(device, 'serial'))) return 'serial';
+  const times = { parallel: Infinity, serial: Infinity };
+  for (const threads of ['parallel', 'serial'] as const) {
+    if (await sortsRight(device, threads)) times[threads] = await timeSort(device, threads);
+  }
+  return times.serial < times.parallel ? 'serial' : 'parallel';
+}
+
+function candidatesFor(device: GPUDevice, threads: Variants['threads']): Variants[] {
+  const quads: Variants = { rasterizer: 'quads', accumulation: 'rgba16float', threads };
+  const tiles: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads };
+  const precise: Variants = { ...quads, accumulation: 'rgba32float' };
+  const canBlend = device.features.has('float32-blendable');
+  // Tiles are made of barriers, which is what a processor in disguise is worst at: ten times slower, and seconds to compile.
+  return [quads, ...(canBlend ? [precise] : []), ...(threads === 'parallel' ? [tiles] : [])];
+}
+
+const isRight = async (device: GPUDevice, variants: Variants): Promise<boolean> => {
+  device.pushErrorScope('validation');
+  const isAnswer = await givesKnownAnswer(device, variants).catch(() => false);
+  return (await device.popErrorScope().catch(() => undefined)) === null && isAnswer;
+};
+
+async function chooseFastest(device: GPUDevice, candidates: readonly Variants[]): Promise<Variants> {
+  const start = performance.now();
+  let last = 0;
+  let left = candidates.map((variants) => ({ variants, time: Infinity }));
+  for (const round of ROUNDS) {
+    if (left.length === 1 || performance.now() - start + GROWTH * last > BUDGET) break;
+    const begin = performance.now();
+    for (const candidate of left) candidate.time = await timeFrames(device, candidate.variants, round);
+    last = performance.now() - begin;
+    left.sort((a, b) => a.time - b.time);
+    const best = left[0].time;
+    left = left.filter(({ time }) => best < MEASURABLE || time <= HOPELESS * best);
+  }
+  return left[0].variants;
+}
+
+/** Milliseconds of the fastest of a few frames of a turning camera, waited for. */
+async function timeFrames(
+  device: GPUDevice,
+  variants: Variants,
+  { splats, width, height }: (typeof ROUNDS)[number],
+): Promise<number> {
+  const size = Math.cbrt(400 / splats);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(sphereCloud(splats, size)));
+  const renderer = new Renderer(device, variants);
+  const usage = TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.storageBinding;
+  const target = device.createTexture({ label: 'gs.probe', size: [width, height], format: 'rgba8unorm', usage });
+  const camera = probeCamera(width, height);
+  let best = Infinity;
+  for (let frame = 0; frame < 4; frame++) {
+    const before = performance.now();
+    renderer.render({ gaussians, camera, target });
+    await device.queue.onSubmittedWorkDone();
+    // The first frame also makes pipelines and orders everything.
+    if (frame > 0) best = Math.min(best, performance.now() - before);
+  }
+  target.destroy();
+  renderer.destroy();
+  gaussians.destroy();
+  return best;
+}
+
+function keyFor(device: GPUDevice): string {
+  const { vendor = '', architecture = '', device: model = '', description = '' } = device.adapterInfo ?? {};
+  const features = [...device.features].sort().join(' ');
+  return `gaussian-splat ${VERSION} ${[vendor, architecture, model, description].join(' ')} ${features}`;
+}
+
+function pageStore(): ChoiceStore | null {
+  try {
+    return (globalThis as { localStorage?: ChoiceStore }).localStorage ?? null;
+  } catch {
+    // A page may be denied its storage.
+    return null;
+  }
+}
+
+function readChoice(store: ChoiceStore | null, key: string): Variants | undefined {
+  try {
+    const { rasterizer, accumulation, threads } = JSON.parse(store?.getItem(key) ?? '{}') as Partial<Variants>;
+    const isKnown =
+      (rasterizer === 'quads' || rasterizer === 'tiles') &&
+      (accumulation === 'rgba16float' || accumulation === 'rgba32float') &&
+      (threads === 'parallel' || threads === 'serial');
+    return isKnown ? { rasterizer, accumulation, threads } : undefined;
+  } catch {
+    return undefined;
+  }
+}
+
+function writeChoice(store: ChoiceStore | null, key: string, variants: Variants): void {
+  try {
+    store?.setItem(key, JSON.stringify(variants));
+  } catch {
+    // A full or forbidden store costs the next visit a few tenths of a second.
+  }
+}

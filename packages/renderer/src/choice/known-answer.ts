@@ -1,0 +1,113 @@
+import { lookAt, type Camera, type GaussianCloud } from '@gaussian-splat/core';
+import { capture } from '../capture.js';
+import { GaussianBuffers } from '../gaussian-buffers.js';
+import { constants } from '../generated/shaders.js';
+import { packGaussians } from '../pack/pack.js';
+import { Renderer, type RendererOptions } from '../renderer.js';
+
+/** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
+const TOLERANCE = 0.02;
+const SPLATS = 64;
+const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
+
+/** True if a renderer with these options draws the image that the mathematics ask for. */
+export async function givesKnownAnswer(device: GPUDevice, options: RendererOptions): Promise<boolean> {
+  const cloud = sphereCloud(SPLATS, 1);
+  const camera = probeCamera(48, 32);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud, { sh: 'float16' }));
+  const renderer = new Renderer(device, options);
+  try {
+    const pixels = await capture(device, renderer, { gaussians, camera });
+    const expected = drawSpheres(cloud, camera);
+    return pixels.every((value, i) => Math.abs(value - expected[i]) <= TOLERANCE);
+  } finally {
+    renderer.destroy();
+    gaussians.destroy();
+  }
+}
+
+/** A camera that looks at the spheres askew, so that a transposed matrix shows. */
+export function probeCamera(width: number, height: number): Camera {
+  const worldToCamera = lookAt([1.2, -0.8, -2.6], [0.1, 0.05, 0], [0.1, -1, 0.2]);
+  const focal = 1.1 * width;
+  return { width, height, fx: focal, fy: focal, cx: width / 2, cy: height / 2, worldToCamera, near: 0.2, far: 100 };
+}
+
+/** Splats that are spheres, of random place, size, opacity and view-dependent colour; the same on every machine. */
+export function sphereCloud(count: number, size: number): GaussianCloud {
+  let state = 1;
+  const random = (): number => (state = (state * 48271) % 0x7fffffff) / 0x7fffffff;
+  const fill = (length: number, value: (i: number) => number): Float32Array => Float32Array.from({ length }, (_, i) => value(i));
+  const radii = fill(count, () => size * (0.02 + 0.1 * random()));
+  return {
+    count,
+    shDegree: 1,
+    antialiased: false,
+    origin: [0, 0, 0],
+    droppedCount: 0,
+    positions: fill(3 * count, () => 1.6 * (random() - 0.5)),
+    scales: fill(3 * count, (i) => radii[Math.floor(i / 3)]),
+    rotations: fill(4 * count, (i) => (i % 4 === 0 ? 1 : 0)),
+    opacities: fill(count, () => 0.2 + 0.75 * random()),
+    sh: fill(12 * count, (i) => (i % 12 < 3 ? 2.4 * (random() - 0.5) : 0.3 * (random() - 0.5))),
+  };
+}
+
+/** The image in float64, front to back: spheres have closed forms where other splats need matrices. */
+function drawSpheres(cloud: GaussianCloud, camera: Camera): Float64Array {
+  const { width, height } = camera;
+  const pixels = new Float64Array(4 * width * height).map((_, i) => (i % 4 === 3 ? 1 : 0));
+  const spheres = Array.from({ length: cloud.count }, (_, i) => projectSphere(cloud, i, camera));
+  for (const sphere of spheres.sort((a, b) => a.depth - b.depth)) {
+    for (let i = 0; i < width * height; i++) {
+      const alpha = alphaAt(sphere, (i % width) + 0.5, Math.floor(i / width) + 0.5);
+      const light = pixels[4 * i + 3];
+      if (alpha < ALPHA_MIN || light * (1 - alpha) <= 1e-4) continue;
+      sphere.color.forEach((value, channel) => (pixels[4 * i + channel] += light * alpha * value));
+      pixels[4 * i + 3] = light * (1 - alpha);
+    }
+  }
+  return pixels.map((value, i) => (i % 4 === 3 ? 1 - value : value));
+}
+
+interface Sphere {
+  readonly x: number;
+  readonly y: number;
+  readonly depth: number;
+  /** Screen covariance in px². */
+  readonly xx: number;
+  readonly xy: number;
+  readonly yy: number;
+  readonly opacity: number;
+  readonly color: readonly number[];
+}
+
+function projectSphere({ positions, scales, opacities, sh }: GaussianCloud, i: number, camera: Camera): Sphere {
+  const { fx, fy, cx, cy, worldToCamera: m } = camera;
+  const [px, py, pz] = positions.subarray(3 * i, 3 * i + 3);
+  const [x, y, z] = [0, 4, 8].map((r) => m[r] * px + m[r + 1] * py + m[r + 2] * pz + m[r + 3]);
+  const [tx, ty] = [x / z, y / z];
+  const variance = scales[3 * i] ** 2;
+  // The direction from the eye in world axes: the camera's rows, transposed.
+  const [dx, dy, dz] = [0, 1, 2].map((c) => (m[c] * x + m[4 + c] * y + m[8 + c] * z) / Math.hypot(x, y, z));
+  const color = [0, 1, 2].map((channel) => {
+    const [a, b, c, d] = [0, 3, 6, 9].map((k) => sh[12 * i + k + channel]);
+    return Math.max(0, 0.5 + SH_C0 * a + SH_C1 * (-dy * b + dz * c - dx * d));
+  });
+  return {
+    x: fx * tx + cx,
+    y: fy * ty + cy,
+    depth: z,
+    xx: (fx / z) ** 2 * variance * (1 + tx * tx) + DILATION,
+    xy: ((fx * fy) / (z * z)) * variance * tx * ty,
+    yy: (fy / z) ** 2 * variance * (1 + ty * ty) + DILATION,
+    opacity: opacities[i],
+    color,
+  };
+}
+
+function alphaAt({ x, y, xx, xy, yy, opacity }: Sphere, atX: number, atY: number): number {
+  const [dx, dy] = [atX - x, atY - y];
+  const distance = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
+  return Math.min(ALPHA_MAX, opacity * Math.exp(-0.5 * distance));
+}

@@ -1,0 +1,34 @@
+import { perDevice } from './gpu/kernel.js';
+import type { Levers } from './levers.js';
+import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
+import type { Threads } from './stages/threads.js';
+
+/** What a renderer leaves to the device: all of them draw the same image, at different speeds. */
+export interface Variants {
+  readonly rasterizer: RasterizerName;
+  readonly accumulation: AccumulationFormat;
+  readonly threads: Threads;
+}
+
+/** What works everywhere. */
+export const SAFE: Variants = { rasterizer: 'quads', accumulation: 'rgba16float', threads: 'parallel' };
+
+/** Variants known to suit a device, set by `chooseVariants`. */
+const known = (device: GPUDevice): { variants: Variants } => perDevice(device, 'variants', () => ({ variants: SAFE }));
+
+export function remember(device: GPUDevice, variants: Variants): void {
+  known(device).variants = variants;
+}
+
+/** Levers with every `auto` replaced by what suits the device. */
+export function settle(device: GPUDevice, levers: Levers): Levers & Variants {
+  const { variants } = known(device);
+  const rasterizer = levers.rasterizer === 'auto' ? variants.rasterizer : levers.rasterizer;
+  const suits = rasterizer === variants.rasterizer ? variants.accumulation : SAFE.accumulation;
+  return {
+    ...levers,
+    rasterizer,
+    accumulation: levers.accumulation === 'auto' ? suits : levers.accumulation,
+    threads: levers.threads === 'auto' ? variants.threads : levers.threads,
+  };
+}

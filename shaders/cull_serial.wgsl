@@ -1,0 +1,41 @@
+// `cull` for processors that run few threads one after the other: a thread looks at 32 splats, and none waits for another.
+#import shared/visibility
+#import shared/group
+#import shared/gathered
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
+@group(0) @binding(2) var<storage, read> chunk_list: array<u32>;
+@group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
+// Nothing at first.
+@group(0) @binding(4) var<storage, read_write> group_counts: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read_write> gathered: array<atomic<u32>>;
+
+@compute @workgroup_size(WORDS_PER_GROUP)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let chunk = chunk_list[view.first_group + workgroup_id.x];
+  let group = view.first_group + chunk;
+  let first = chunk * CULL_GROUP + lane * 32u;
+  var bits = 0u;
+  var nearest = 0xffffffffu;
+  var farthest = 0u;
+  for (var k = 0u; k < 32u && first + k < view.splat_count; k++) {
+    let packed = gaussians[first + k];
+    if (!is_usable(packed)) {
+      atomicAdd(&gathered[UNUSABLE], 1u);
+      continue;
+    }
+    let depth = visible_depth(packed);
+    if (depth > 0.0) {
+      bits |= 1u << k;
+      nearest = min(nearest, bitcast<u32>(depth));
+      farthest = max(farthest, bitcast<u32>(depth));
+    }
+  }
+  visible_bits[group * WORDS_PER_GROUP + lane] = bits;
+  if (bits != 0u) {
+    atomicAdd(&group_counts[group], countOneBits(bits));
+    atomicMax(&gathered[NEAREST_INVERTED], ~nearest);
+    atomicMax(&gathered[FARTHEST], farthest);
+  }
+}

@@ -1,0 +1,22 @@
+// `sort_scan` for processors that run few threads one after the other: a thread sums up a whole digit.
+#import shared/plan
+#import shared/sort
+
+@group(0) @binding(0) var<storage, read> plan: Plan;
+// [digit][block]
+@group(0) @binding(1) var<storage, read_write> counts: array<u32>;
+@group(0) @binding(2) var<storage, read_write> digit_totals: array<u32>;
+
+const DIGITS_PER_SERIAL_GROUP = 8u;
+
+@compute @workgroup_size(DIGITS_PER_SERIAL_GROUP)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+  let first = id.x * plan.sort_blocks;
+  var sum = 0u;
+  for (var i = first; i < first + plan.sort_blocks; i++) {
+    let own = counts[i];
+    counts[i] = sum;
+    sum += own;
+  }
+  digit_totals[id.x] = sum;
+}

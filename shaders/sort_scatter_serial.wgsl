@@ -1,0 +1,43 @@
+// `sort_scatter` for processors that run few threads one after the other: a thread moves a whole block, in its order.
+#import shared/plan
+#import shared/group
+#import shared/sort
+
+@group(0) @binding(0) var<uniform> digit_pass: SortPass;
+@group(0) @binding(1) var<storage, read> plan: Plan;
+@group(0) @binding(2) var<storage, read> keys_in: array<u32>;
+@group(0) @binding(3) var<storage, read> values_in: array<Value>;
+// Exclusive prefix sums over the blocks: [digit][block]
+@group(0) @binding(4) var<storage, read> block_offsets: array<u32>;
+@group(0) @binding(5) var<storage, read> digit_totals: array<u32>;
+@group(0) @binding(6) var<storage, read_write> keys_out: array<u32>;
+@group(0) @binding(7) var<storage, read_write> values_out: array<Value>;
+
+// What moves along with a key.
+alias Value = u32;
+
+@compute @workgroup_size(1)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u) {
+  let block_id = group_index(workgroup_id);
+  if (block_id >= plan.sort_blocks) { return; }
+  // Where the next key with a digit goes.
+  var next: array<u32, DIGITS>;
+  var smaller = 0u;
+  for (var digit = 0u; digit < DIGITS; digit++) {
+    next[digit] = smaller + block_offsets[digit * plan.sort_blocks + block_id];
+    smaller += digit_totals[digit];
+  }
+  let end = min(block_id * SORT_BLOCK + SORT_BLOCK, plan.visible);
+  for (var i = block_id * SORT_BLOCK; i < end; i++) {
+    let key = keys_in[i];
+    let digit = digit_of(key, digit_pass.shift);
+    let place = next[digit];
+    next[digit] = place + 1u;
+    var value = Value(i);
+    if (digit_pass.makes_indices == 0u) { value = values_in[i]; }
+    if (place < plan.visible) {
+      keys_out[place] = key;
+      values_out[place] = value;
+    }
+  }
+}
