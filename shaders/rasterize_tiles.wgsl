@@ -23,7 +23,7 @@ override takes_notes: bool = false;
 
 const TILE_THREADS = TILE * TILE;
 // Pairs that a thread looks at in one go, and words with a bit for each pair of all threads.
-const PAIRS_PER_THREAD = 4u;
+const PAIRS_PER_THREAD = 2u;
 const HIT_WORDS = PAIRS_PER_THREAD * TILE_THREADS / 32u;
 const BATCH_WORDS = TILE_THREADS / 32u;
 // Blocks of 8 x 4 pixels, each painted by 32 threads.

@@ -28,6 +28,7 @@ const ABSENT: RawAttributes = {
   touchAction: null,
   up: null,
   maxPixelRatio: null,
+  quality: null,
 };
 
 test('orbits', () => {
@@ -121,6 +122,7 @@ test('an absent attribute takes its default in silence', () => {
   assert.equal(read.touchAction, 'pan-y');
   assert.equal(read.interpolationDecay, 50);
   assert.equal(read.maxPixelRatio, Infinity);
+  assert.equal(read.quality, 'default');
   assert.equal(read.camera.up, '-y');
   assert.deepEqual(read.camera.orbit, { theta: 0, phi: 75 * DEGREE, radius: 'auto' });
 });
@@ -135,6 +137,7 @@ test('a malformed attribute takes its default with one warning that says what wa
     up: 'up',
     'interpolation-decay': 'interpolationDecay',
     'max-pixel-ratio': 'maxPixelRatio',
+    quality: 'quality',
   })) {
     const warnings: string[] = [];
     const read = readAttributes({ ...ABSENT, [key]: 'nonsense' }, (sentence) => warnings.push(sentence));

@@ -1,5 +1,5 @@
 /** The device to measure on, and everything about it that a reader of the figures needs. */
-import { deviceDescriptor } from '@gaussian-splat/renderer';
+import { chooseVariants, deviceDescriptor } from '@gaussian-splat/renderer';
 
 /** Set by the build: the project's version and commit, and the versions of the peers. */
 const VERSIONS = typeof BENCH_VERSIONS === 'undefined' ? {} : BENCH_VERSIONS;
@@ -16,15 +16,17 @@ export async function openDevice() {
   const canTime = adapter.features.has('timestamp-query');
   const features = new Set([...(descriptor.requiredFeatures ?? []), ...(canTime ? ['timestamp-query'] : [])]);
   const device = await adapter.requestDevice({ ...descriptor, requiredFeatures: [...features] });
+  // What `auto` means, as the element would find out; never from an earlier visit.
+  const variants = await chooseVariants(device, { store: null });
   const errors = [];
   const note = (message) => errors.length < 20 && errors.push(message.slice(0, 300));
   device.addEventListener('uncapturederror', ({ error }) => note(error.message));
   device.lost.then(({ reason, message }) => reason !== 'destroyed' && note(`device lost: ${message}`));
-  return { adapter, device, canTime, errors };
+  return { adapter, device, canTime, errors, variants };
 }
 
 /** Adapter, features, limits, browser and versions. */
-export function describeEnvironment({ adapter, device, canTime }) {
+export function describeEnvironment({ adapter, device, canTime, variants }) {
   const { vendor, architecture, device: model, description } = adapter.info;
   const limits = ['maxBufferSize', 'maxStorageBufferBindingSize', 'maxTextureDimension2D'];
   return {
@@ -33,6 +35,7 @@ export function describeEnvironment({ adapter, device, canTime }) {
     features: [...device.features].sort(),
     limits: Object.fromEntries(limits.map((name) => [name, device.limits[name]])),
     timestamps: canTime,
+    variants,
     userAgent: navigator.userAgent,
     processors: navigator.hardwareConcurrency,
     versions: VERSIONS,

@@ -9,6 +9,7 @@ import {
   upGrammar,
   type AttributeGrammar,
 } from './camera/grammar.js';
+import { QUALITIES, type Quality } from '@gaussian-splat/renderer';
 import type { CameraSettings } from './camera/settings.js';
 
 /** When loading starts: once the element is in sight, or as soon as it is in the page. */
@@ -35,6 +36,7 @@ export interface RawAttributes {
   readonly touchAction: Raw;
   readonly up: Raw;
   readonly maxPixelRatio: Raw;
+  readonly quality: Raw;
 }
 
 /** All of them, read. */
@@ -47,6 +49,8 @@ export interface Attributes {
   readonly touchAction: TouchAction;
   /** Most drawn pixels for one CSS pixel. */
   readonly maxPixelRatio: number;
+  /** The renderer's mix of accuracy and speed. */
+  readonly quality: Quality;
 }
 
 const orbit = orbitGrammar('0deg 75deg auto');
@@ -54,6 +58,7 @@ const orbitLimit = orbitGrammar('auto');
 const crossorigin = keywordGrammar(['anonymous', 'use-credentials']);
 const loading = keywordGrammar<Loading>(['lazy', 'eager']);
 const touchAction = keywordGrammar<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']);
+const quality = keywordGrammar<Quality>(['default', ...(Object.keys(QUALITIES) as Quality[])]);
 const interpolationDecay = numberGrammar(50, 0, 'milliseconds, 0 or more');
 // Far below any ratio in use, so that 0 is refused but thumbnails of pixels are not.
 const maxPixelRatio = numberGrammar(Infinity, 1 / 64, 'drawn pixels for each CSS pixel, above 0');
@@ -68,6 +73,7 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
     interpolationDecay: read('interpolation-decay', raw.interpolationDecay, interpolationDecay),
     touchAction: read('touch-action', raw.touchAction, touchAction),
     maxPixelRatio: read('max-pixel-ratio', raw.maxPixelRatio, maxPixelRatio),
+    quality: read('quality', raw.quality, quality),
     camera: {
       orbit: read('camera-orbit', raw.cameraOrbit, orbit),
       target: read('camera-target', raw.cameraTarget, targetGrammar),

@@ -1,3 +1,4 @@
+import type { Quality } from '@gaussian-splat/renderer';
 import { isServer, LitElement, type PropertyDeclarations, type TemplateResult } from 'lit';
 import { readAttributes, type Attributes, type Loading, type TouchAction } from './attributes.js';
 import type { CameraOrbit, CameraTarget, FieldOfView } from './camera/values.js';
@@ -92,6 +93,7 @@ export class GaussianSplatElement extends LitElement {
     disablePan: { type: Boolean, attribute: 'disable-pan' },
     up: {},
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
+    quality: {},
   };
 
   /** URL of the scene file. */
@@ -132,6 +134,8 @@ export class GaussianSplatElement extends LitElement {
   declare up: 'x' | '-x' | 'y' | '-y' | 'z' | '-z' | null;
   /** Most drawn pixels for one CSS pixel; default no limit. */
   declare maxPixelRatio: number | string | null;
+  /** Accuracy against speed: `reference`, `default`, `balanced` or `fast`. */
+  declare quality: Quality | null;
 
   #attributes: Attributes;
   readonly #stage: Stage;

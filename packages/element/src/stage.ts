@@ -78,6 +78,7 @@ export class Stage {
       canvasOf: canvas,
       isVisible: () => this.#visibility.isVisible,
       maxPixelRatio: () => attributes().maxPixelRatio,
+      quality: () => attributes().quality,
       decayMs: () => (prefersReducedMotion() ? 0 : attributes().interpolationDecay),
       onCameraChange: (source) => this.#dispatch(new CustomEvent('camera-change', { detail: { source } })),
       onError: (error) => this.scene.fail(error),
@@ -103,8 +104,9 @@ export class Stage {
   }
 
   #requestScene(): void {
-    const { loading, credentials } = this.#options.attributes();
-    const request: SceneRequest | null = this.#src ? { url: absoluteUrl(this.#src), credentials } : null;
+    const { loading, credentials, quality } = this.#options.attributes();
+    const sh = quality === 'reference' ? 'float16' : 'auto';
+    const request: SceneRequest | null = this.#src ? { url: absoluteUrl(this.#src), credentials, sh } : null;
     if (this.#host.isConnected) this.scene.want(request, loading === 'eager' || this.#visibility.isVisible);
   }
 

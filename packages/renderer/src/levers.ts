@@ -78,12 +78,12 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
  * The levers of a quality, with those that differ from it.
  * @throws GaussianSplatError `argument/value` for a number out of range or an unknown quality.
  */
-export function leversOf({ quality = 'default', ...own }: Partial<Levers> & { readonly quality?: Quality }): Levers {
+export function leversOf(options: Partial<Levers> & { readonly quality?: Quality }): Levers {
+  const quality = options.quality ?? 'default';
   if (!Object.hasOwn(QUALITIES, quality)) throw invalid('quality', Object.keys(QUALITIES).join(', '), quality);
   const base = QUALITIES[quality];
   const names = Object.keys(base) as (keyof Levers)[];
-  const given = Object.fromEntries(names.filter((name) => own[name] !== undefined).map((name) => [name, own[name]]));
-  const levers = { ...base, ...given };
+  const levers = Object.fromEntries(names.map((name) => [name, options[name] ?? base[name]])) as unknown as Levers;
   for (const [name, [least, most]] of Object.entries(RANGES) as [keyof Levers, [number, number]][]) {
     const value = Number(levers[name]);
     if (!(value >= least && value <= most)) throw invalid(name, `a number from ${least} to ${most}`, levers[name]);

@@ -1,5 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { FrameRequest } from '@gaussian-splat/renderer';
+import type { FrameRequest, Quality } from '@gaussian-splat/renderer';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
@@ -15,6 +15,7 @@ export interface ViewOptions {
   /** False where nobody would see a frame. */
   readonly isVisible: () => boolean;
   readonly maxPixelRatio: () => number;
+  readonly quality: () => Quality;
   /** Time constant of the camera's motion, ms. */
   readonly decayMs: () => number;
   readonly onCameraChange: (source: CameraChangeSource) => void;
@@ -53,6 +54,7 @@ export class ViewController implements FrameClient {
    */
   show(scene: GpuScene): Promise<void> {
     this.#scene = scene;
+    scene.onIncomplete = () => this.requestFrame();
     return new Promise((resolve, reject) => {
       this.#first = { resolve, reject };
       this.requestFrame();
@@ -93,6 +95,7 @@ export class ViewController implements FrameClient {
   #render(scene: GpuScene, request: Omit<FrameRequest, 'gaussians'>): void {
     const first = this.#first;
     this.#first = undefined;
+    scene.setQuality(this.#options.quality());
     if (first === undefined) scene.render(request);
     else scene.renderFirst(request).then(first.resolve, first.reject);
   }

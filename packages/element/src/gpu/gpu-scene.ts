@@ -1,5 +1,5 @@
 import { GaussianSplatError, type Bounds } from '@gaussian-splat/core';
-import { GaussianBuffers, Renderer, type FrameRequest } from '@gaussian-splat/renderer';
+import { chooseVariants, GaussianBuffers, Renderer, type FrameRequest, type Quality } from '@gaussian-splat/renderer';
 import type { LoadedScene, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { assertWebGpu } from './request-device.js';
@@ -12,7 +12,10 @@ import type { DeviceLease, SharedDevice } from './shared-device.js';
 export class GpuScene {
   readonly bounds: Bounds;
   readonly gaussians: GaussianBuffers;
-  readonly #renderer: Renderer;
+  /** Called when the frame just drawn lacked something that the next one will have. */
+  onIncomplete: () => void = () => undefined;
+  #renderer: Renderer;
+  #quality: Quality = 'default';
   readonly #lease: DeviceLease;
   #destroyed = false;
 
@@ -20,7 +23,7 @@ export class GpuScene {
     this.#lease = lease;
     this.gaussians = gaussians;
     this.bounds = bounds;
-    this.#renderer = new Renderer(lease.device);
+    this.#renderer = this.#makeRenderer();
   }
 
   get device(): GPUDevice {
@@ -38,6 +41,18 @@ export class GpuScene {
 
   get isDestroyed(): boolean {
     return this.#destroyed;
+  }
+
+  /** Draws the frames to come at this quality. */
+  setQuality(quality: Quality): void {
+    if (quality === this.#quality) return;
+    this.#quality = quality;
+    this.#renderer.destroy();
+    this.#renderer = this.#makeRenderer();
+  }
+
+  #makeRenderer(): Renderer {
+    return new Renderer(this.device, { quality: this.#quality, onIncomplete: () => this.onIncomplete() });
   }
 
   /** Encodes and submits one frame. */
@@ -92,9 +107,11 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
   const giveUp = (): void => abort.abort(options.signal.reason);
   options.signal.addEventListener('abort', giveUp, { once: true });
   const acquiring = options.device.acquire();
+  // While the bytes are on their way there is time to find out what suits the device.
+  const choosing = acquiring.then(({ device }) => chooseVariants(device));
   const loading = options.loader.load(request, abort.signal, options.onProgress);
   try {
-    const [lease, scene] = await Promise.all([acquiring, loading]);
+    const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(ignore)]);
     options.signal.throwIfAborted();
     options.beforeUpload();
     return await upload(lease, scene, options.signal);

@@ -21,7 +21,7 @@ export async function loadScene(
     const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress: throttled(onProgress) });
     const cloud = await readScene(bytes, { name: fileName(url), signal });
     signal.throwIfAborted();
-    return { packed: packGaussians(cloud), bounds: boundsOf(cloud) };
+    return { packed: packGaussians(cloud, { sh: request.sh }), bounds: boundsOf(cloud) };
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(request.url));

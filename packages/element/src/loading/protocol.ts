@@ -1,6 +1,6 @@
 /** What the page and the scene worker say to each other. */
 import type { Bounds, ErrorData } from '@gaussian-splat/core';
-import type { PackedGaussians } from '@gaussian-splat/renderer';
+import type { PackedGaussians, ShPrecision } from '@gaussian-splat/renderer';
 
 /** A scene to fetch. */
 export interface SceneRequest {
@@ -8,6 +8,8 @@ export interface SceneRequest {
   readonly url: string;
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
+  /** Precision of the spherical harmonics on the GPU. */
+  readonly sh: ShPrecision | 'auto';
 }
 
 /** A scene, fetched and packed, ready for upload. */
