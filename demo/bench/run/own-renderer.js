@@ -47,7 +47,8 @@ export class OwnRenderer {
   async capture(camera) {
     const target = makeTarget(this.#device, PRECISE, camera, this.#scale);
     try {
-      this.#drawInto(target, camera);
+      do this.#drawInto(target, camera);
+      while (!(await this.#renderer.isComplete()));
       return await readPixels(this.#device, target.texture);
     } finally {
       target.destroy();

@@ -12,6 +12,8 @@ export interface Capacity {
 /** Scenes up to this size get room for all their splats at once: 64 MB. */
 const SMALL_SCENE = 1_300_000;
 const LEAST_PAIRS = 1 << 16;
+/** Room for pairs that small scenes get without asking, so that a first frame from near by has it: 48 MB. */
+const GENEROUS_PAIRS = 1 << 21;
 /** More room than was needed. */
 const HEADROOM = 1.25;
 /** Share of the room that must be in use before there is more, or less. */
@@ -29,7 +31,8 @@ const PATIENCE = 4;
 /** Room to begin with. */
 export function initialCapacity(splats: number, most: Capacity): Capacity {
   const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
-  return { visible, pairs: Math.min(most.pairs, Math.max(LEAST_PAIRS, Math.ceil(1.5 * visible))) };
+  const pairs = Math.max(LEAST_PAIRS, Math.min(4 * visible, GENEROUS_PAIRS), Math.ceil(1.5 * visible));
+  return { visible, pairs: Math.min(most.pairs, pairs) };
 }
 
 /**
@@ -83,7 +86,7 @@ export class CapacityMonitor {
         const [visible, hidden, pairs, lostPairs] = new Uint32Array(this.#staging.getMappedRange().slice(0));
         this.#staging.unmap();
         this.#isReading = false;
-        this.#judge({ visible: visible + hidden, pairs: pairs + lostPairs }, hidden + lostPairs > 0);
+        this.judge({ visible: visible + hidden, pairs: pairs + lostPairs }, hidden + lostPairs > 0);
       },
       // The device is lost, or this monitor was destroyed meanwhile.
       () => undefined,
@@ -95,7 +98,8 @@ export class CapacityMonitor {
     this.#staging.destroy();
   }
 
-  #judge(used: Capacity, overflowed: boolean): void {
+  /** Takes note of what a frame would have needed. */
+  judge(used: Capacity, overflowed: boolean): void {
     const grown = {
       visible: grow(used.visible, this.#capacity.visible, this.#most.visible),
       pairs: grow(used.pairs, this.#capacity.pairs, this.#most.pairs),

@@ -5,8 +5,12 @@ import type { FrameRequest, Renderer } from './renderer.js';
 const ROW_ALIGNMENT = 256;
 const BYTES_PER_PIXEL = 16;
 
+/** Images drawn until one had room for everything: room grows by a quarter more than was asked for. */
+const MOST_TRIES = 4;
+
 /**
- * Draws one image and reads it back in float32, before any rounding to 8 bits.
+ * Draws one image and reads it back in float32, before any rounding to 8 bits. Drawn again where the renderer's buffers had no
+ * room for all of it.
  * @returns [height, width, 4] premultiplied red, green, blue and alpha, row by row from the top.
  */
 export async function capture(
@@ -28,7 +32,10 @@ export async function capture(
     usage: BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination,
   });
   try {
-    renderer.render({ ...request, target: texture.createView(), targetFormat: texture.format });
+    for (let tries = 0; tries < MOST_TRIES; tries++) {
+      renderer.render({ ...request, target: texture });
+      if (await renderer.isComplete()) break;
+    }
     const encoder = device.createCommandEncoder({ label: 'gs.capture' });
     encoder.copyTextureToBuffer({ texture }, { buffer: staging, bytesPerRow }, [width, height]);
     device.queue.submit([encoder.finish()]);

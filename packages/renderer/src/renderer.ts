@@ -175,6 +175,18 @@ export class Renderer {
     return readStatistics(this.#device, { plan, gathered, pairPlan: this.#rasterizer.pairPlan });
   }
 
+  /**
+   * Whether the last frame had room for all that it should show; if not, the next one will. Reads back from the GPU: for single
+   * images, not for every frame.
+   */
+  async isComplete(): Promise<boolean> {
+    if (this.#resources === undefined) return true;
+    const { visible, overflow, pairs, pairOverflow } = await this.readStatistics();
+    if (overflow + pairOverflow === 0) return true;
+    this.#resources?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
+    return false;
+  }
+
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
   destroy(): void {
     this.#releaseResources();

@@ -88,17 +88,30 @@ const isRight = async (device: GPUDevice, variants: Variants): Promise<boolean> 
 async function chooseFastest(device: GPUDevice, candidates: readonly Variants[]): Promise<Variants> {
   let left = candidates.map((variants) => ({ variants, time: 0 }));
   let spent = 0;
+  const latency = await timeNothing(device);
   for (const round of ROUNDS) {
     // Only what the GPU did counts: pipelines that had to be made first are of use later.
     const last = FRAMES * left.reduce((sum, { time }) => sum + time, 0);
     if (left.length === 1 || spent + GROWTH * last > BUDGET) break;
-    for (const candidate of left) candidate.time = await timeFrames(device, candidate.variants, round);
+    for (const candidate of left) candidate.time = (await timeFrames(device, candidate.variants, round)) - latency;
     spent += FRAMES * left.reduce((sum, { time }) => sum + time, 0);
     left.sort((a, b) => a.time - b.time);
     const best = left[0].time;
     left = left.filter(({ time }) => best < MEASURABLE || time <= HOPELESS * best);
   }
   return left[0].variants;
+}
+
+/** Milliseconds until a GPU with nothing to do says so: browsers take some, and they say nothing of a candidate. */
+async function timeNothing(device: GPUDevice): Promise<number> {
+  let best = Infinity;
+  for (let i = 0; i < FRAMES; i++) {
+    const before = performance.now();
+    device.queue.submit([device.createCommandEncoder({ label: 'gs.probe' }).finish()]);
+    await device.queue.onSubmittedWorkDone();
+    best = Math.min(best, performance.now() - before);
+  }
+  return best;
 }
 
 /** Milliseconds of the fastest of a few frames of a turning camera, waited for. */
