@@ -1,4 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import type { FrameRequest } from '@gaussian-splat/renderer';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
@@ -17,6 +17,8 @@ export interface ViewOptions {
   readonly maxPixelRatio: () => number;
   /** Time constant of the camera's motion, ms. */
   readonly decayMs: () => number;
+  /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
+  readonly onFrame: (scene: GpuScene, camera: Camera, now: number) => void;
   readonly onCameraChange: (source: CameraChangeSource) => void;
   /** Drawing has failed for good. */
   readonly onError: (error: unknown) => void;
@@ -82,7 +84,9 @@ export class ViewController implements FrameClient {
     if (pixels === null) return this.#finishUnseen();
     const source = camera.step(now, decayMs());
     try {
-      this.#render(scene, this.#frameRequest(scene, pixels));
+      const request = this.#frameRequest(scene, pixels);
+      this.#options.onFrame(scene, request.camera, now);
+      this.#render(scene, request);
     } catch (error) {
       return onError(error);
     }

@@ -8,6 +8,8 @@ export interface SceneRequest {
   readonly url: string;
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
+  /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
+  readonly contract?: unknown;
 }
 
 /** A scene, fetched and packed, ready for upload. */
