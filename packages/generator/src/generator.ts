@@ -26,6 +26,8 @@ export interface GeneratorOptions extends AcquireOptions {
 
 /** Runs whose work the GPU may not have finished before another one starts: one is computed while the next is recorded. */
 const MAX_IN_FLIGHT = 2;
+/** A run that keeps the GPU for longer than this, ms, is waited for: frames that are drawn meanwhile stand behind it in the queue. */
+const SLOW_RUN_MS = 50;
 
 interface Wish {
   readonly state: GeneratorState;
@@ -51,6 +53,7 @@ export class Generator {
   #shown: Wish['inputs'] | undefined;
   #running: Promise<void> | undefined;
   #runs = 0;
+  #isSlow = false;
   #isClosed = false;
 
   private constructor(lease: SessionLease, options: GeneratorOptions) {
@@ -134,8 +137,17 @@ export class Generator {
     });
     if (this.#isClosed) return;
     this.#options.onFrame?.({ state, milliseconds: performance.now() - start });
-    // Never a backlog on the GPU either. A lost device finishes nothing, and is reported elsewhere.
-    this.#unfinished.push(session.device.queue.onSubmittedWorkDone().catch(() => undefined));
-    if (this.#unfinished.length >= MAX_IN_FLIGHT) await this.#unfinished.shift();
+    await this.#waitForRoom(session.device.queue);
+  }
+
+  /** Never a backlog on the GPU either. A lost device finishes nothing, and is reported elsewhere. */
+  async #waitForRoom(queue: GPUQueue): Promise<void> {
+    const start = performance.now();
+    const finished = queue.onSubmittedWorkDone().then(
+      () => (this.#isSlow = performance.now() - start > SLOW_RUN_MS),
+      () => undefined,
+    );
+    this.#unfinished.push(finished);
+    while (this.#unfinished.length >= (this.#isSlow ? 1 : MAX_IN_FLIGHT)) await this.#unfinished.shift();
   }
 }

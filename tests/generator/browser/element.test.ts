@@ -178,6 +178,27 @@ describe('a generator in the element', () => {
     assertEqual([a.statistics?.splats, b.statistics?.splats], [64, 64]);
   });
 
+  it('is slow: orbiting goes on at its own rate, and the latest time is shown in the end', async () => {
+    const element = await showLoaded({ src: `${FIXTURES}heavy.onnx` });
+    let frames = 0;
+    const shown: number[] = [];
+    element.addEventListener('camera-change', () => frames++);
+    element.addEventListener('seeked', () => shown.push(element.currentTime));
+    const start = performance.now();
+    for (let i = 0; i < 30; i++) {
+      element.currentTime = 1 + i / 10;
+      element.setAttribute('camera-orbit', `${3 * i}deg 75deg auto`);
+      element.jumpCameraToGoal();
+      await new Promise(requestAnimationFrame);
+    }
+    const elapsed = performance.now() - start;
+    await until(() => !element.seeking, 'the last frame');
+    console.log(`${frames} frames and ${shown.length} runs in ${Math.round(elapsed)} ms`);
+    assert(frames >= 15, `${frames} frames were drawn`);
+    assert(shown.length <= frames, `${shown.length} runs for ${frames} frames`);
+    assertEqual(element.currentTime, 1 + 29 / 10, 'time on show');
+  });
+
   const faults: Readonly<Record<string, readonly [attributes: Record<string, string>, reason: string]>> = {
     'a missing file': [{ src: '/net/status/404?x.onnx', contract: contractWith({}) }, 'network/status'],
     'a web page': [{ src: '/net/html/x.onnx' }, 'decode/html'],

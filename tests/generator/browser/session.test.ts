@@ -27,6 +27,17 @@ async function codeOf(promise: Promise<unknown>): Promise<string> {
   return 'none';
 }
 
+/** Address of the ball as a model of another opset. */
+async function withOpset(version: number): Promise<string> {
+  const bytes = new Uint8Array(await (await fetch(`${FIXTURES}packed.onnx`)).arrayBuffer());
+  // The only opset of the file: field 8 of the model, with an empty domain and version 17.
+  const entry = [0x42, 0x04, 0x0a, 0x00, 0x10, 17];
+  const at = bytes.findIndex((_, i) => entry.every((byte, k) => bytes[i + k] === byte));
+  assert(at > 0, 'the opset of the fixture');
+  bytes[at + 5] = version;
+  return URL.createObjectURL(new Blob([bytes]));
+}
+
 describe('generators', () => {
   before(async () => {
     device = await makeDevice();
@@ -81,6 +92,7 @@ describe('generators', () => {
       ],
       'no contract and names that say nothing': [`${FIXTURES}subgraphs.onnx`, 'contract/inference'],
       'external data that is missing': ['/net/renamed/external.onnx', 'contract/external-data'],
+      'an opset that is too new': [await withOpset(27), 'contract/opset'],
       'a post-processor': [`${FIXTURES}post.onnx`, 'decode/unsupported'],
       'a link of a chain': [`${FIXTURES}link.onnx`, 'decode/unsupported'],
       'a contract that is no JSON': [`${FIXTURES}packed.onnx`, 'contract/json', '{"version": 1'],
