@@ -211,7 +211,9 @@ class DeviceLostError extends Error {}
 /** A device that does not come at all is final at first, but after a loss it may only need a moment. */
 function isDeviceFailure(error: unknown, isNew: boolean): boolean {
   if (error instanceof DeviceLostError) return true;
-  return !isNew && error instanceof GaussianSplatError && error.family === 'unsupported';
+  if (!(error instanceof GaussianSplatError)) return false;
+  // A generator may be the first to notice.
+  return error.family === 'device-lost' || (!isNew && error.family === 'unsupported');
 }
 
 function unrecoverable(cause: unknown): GaussianSplatError {
