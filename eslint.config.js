@@ -9,7 +9,7 @@ const MAY_IMPORT = {
   renderer: ['core'],
   generator: ['core'],
   check: ['core', 'generator'],
-  element: ['core', 'formats', 'renderer'],
+  element: ['core', 'formats', 'generator', 'renderer'],
 };
 
 /** The packages that may load ONNX Runtime. */

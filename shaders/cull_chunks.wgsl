@@ -1,6 +1,7 @@
 // Which chunks of a page may hold visible splats: one thread for each chunk. The tests are linear in camera space, so that
 // the corners of a box decide for all its points, and err only towards keeping.
 #import shared/view
+#import shared/chunk
 #import shared/group
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -12,15 +13,6 @@
 // Set to nothing.
 @group(0) @binding(4) var<storage, read_write> group_counts: array<u32>;
 @group(0) @binding(5) var<storage, read_write> visible_bits: array<u32>;
-
-// Bounds of 256 splats in page-local coordinates: the box of their centres, and the farthest that any of them reaches with
-// alpha >= 1/255.
-struct Chunk {
-  low: vec3f,
-  reach: f32,
-  high: vec3f,
-  unused: f32,
-}
 
 const CHUNK_THREADS = 64u;
 // Pixels that dilation can add to a splat's half extent (sqrt(0.3 · 2 ln 255) = 1.83), and one for rounding.

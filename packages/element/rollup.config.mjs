@@ -2,7 +2,9 @@
  * The CDN build: `cdn/gaussian-splat.min.js` (the element and the renderer in one file, for a script tag with an
  * integrity attribute), and beside it the scene worker with a chunk for every reader, which it finds from its own URL.
  */
-import { rmSync } from 'node:fs';
+import { cpSync, mkdirSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { nodeResolve } from '@rollup/plugin-node-resolve';
 import terser from '@rollup/plugin-terser';
@@ -19,6 +21,23 @@ const plugins = [
 /** Chunks carry a hash in their name, so those of earlier builds would pile up. */
 const emptyFirst = { name: 'empty-first', buildStart: () => rmSync(path('./cdn'), { recursive: true, force: true }) };
 
+/** ONNX Runtime for generators, in both its builds: fetched by pages that show a generator, and by no other. */
+const RUNTIME_FILES = [
+  'ort.jspi.bundle.min.mjs',
+  'ort-wasm-simd-threaded.jspi.wasm',
+  'ort.webgpu.bundle.min.mjs',
+  'ort-wasm-simd-threaded.asyncify.wasm',
+];
+
+const copyRuntime = {
+  name: 'copy-runtime',
+  writeBundle() {
+    const from = dirname(createRequire(import.meta.url).resolve('onnxruntime-web/webgpu'));
+    mkdirSync(path('./cdn/onnxruntime'), { recursive: true });
+    for (const file of RUNTIME_FILES) cpSync(join(from, file), path(`./cdn/onnxruntime/${file}`));
+  },
+};
+
 const output = {
   dir: path('./cdn'),
   format: 'es',
@@ -31,8 +50,10 @@ export default [
     input: { 'gaussian-splat.min': path('./dist/index.js') },
     // Where workers are refused, the element imports the worker's module; it is the same file, not a copy.
     external: (id) => id.endsWith('scene-worker.js'),
-    plugins: [emptyFirst, ...plugins],
-    output: { ...output, paths: () => './scene-worker.js' },
+    // What generators need is a chunk of its own, loaded when the first is shown; it finds the runtime beside itself.
+    preserveEntrySignatures: 'allow-extension',
+    plugins: [emptyFirst, ...plugins, copyRuntime],
+    output: { ...output, chunkFileNames: 'generator-[hash].js', paths: () => './scene-worker.js' },
   },
   {
     input: { 'scene-worker': path('./dist/loading/scene-worker.js') },

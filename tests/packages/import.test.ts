@@ -1,7 +1,7 @@
 /** Importing a package on a server: in plain Node, without a browser global, and with its exports where they should be. */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
-import { readdirSync, readFileSync } from 'node:fs';
+import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 
@@ -9,7 +9,10 @@ const root = fileURLToPath(new URL('../../', import.meta.url));
 
 /** Every entry of every package's `exports` that is a module. */
 function entries(): string[] {
-  return readdirSync(`${root}packages`).flatMap((folder) => {
+  const folders = readdirSync(`${root}packages`).filter((folder) =>
+    existsSync(`${root}packages/${folder}/package.json`),
+  );
+  return folders.flatMap((folder) => {
     const { name, exports } = JSON.parse(readFileSync(`${root}packages/${folder}/package.json`, 'utf8')) as {
       name: string;
       exports: Record<string, unknown>;

@@ -89,7 +89,11 @@ export class OwnRenderer {
 
 /** The texture that shows the image and, at another resolution scale, the one that it is drawn into first. */
 function makeTarget(device, format, { width, height }, scale) {
-  const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.STORAGE_BINDING;
+  const usage =
+    GPUTextureUsage.RENDER_ATTACHMENT |
+    GPUTextureUsage.COPY_SRC |
+    GPUTextureUsage.TEXTURE_BINDING |
+    GPUTextureUsage.STORAGE_BINDING;
   const texture = device.createTexture({ label: 'bench.target', size: [width, height], format, usage });
   const smaller = scaledCamera({ width, height, fx: 1, fy: 1, cx: 0, cy: 0 }, scale);
   const drawn =

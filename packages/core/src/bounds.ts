@@ -16,7 +16,7 @@ export interface Bounds {
 const SAMPLE_LIMIT = 65_536;
 
 /** Bounds of a cloud; of an empty one, a unit ball at its origin. */
-export function boundsOf(cloud: GaussianCloud): Bounds {
+export function boundsOf(cloud: Pick<GaussianCloud, 'count' | 'positions' | 'opacities' | 'origin'>): Bounds {
   const { count, positions, opacities, origin } = cloud;
   if (count === 0) return { min: origin, max: origin, center: origin, radius: 1 };
   const min = [Infinity, Infinity, Infinity];

@@ -1,5 +1,5 @@
 import type { Quality } from '@gaussian-splat/renderer';
-import { isServer, LitElement, type PropertyDeclarations, type TemplateResult } from 'lit';
+import { isServer, LitElement, type PropertyDeclarations, type PropertyValues, type TemplateResult } from 'lit';
 import { readAttributes, type Attributes, type Loading, type TouchAction } from './attributes.js';
 import type { CameraOrbit, CameraTarget, FieldOfView } from './camera/values.js';
 import type { ElementError } from './errors.js';
@@ -7,6 +7,8 @@ import type { GaussianSplatEventMap } from './events.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
+import type { LiveState } from './live/live-model.js';
+import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues, type Numbers } from './live/values.js';
 import { Stage } from './stage.js';
 import { styles } from './styles.js';
 import { DEFAULT_LABEL, template } from './template.js';
@@ -57,6 +59,9 @@ const STATES = ['loading', 'ready', 'error', 'unsupported'] as const;
  * @fires progress - Bytes have arrived.
  * @fires error - The scene cannot be shown; `detail` is the same object as the property `error`.
  * @fires camera-change - The camera has moved; `detail.source` says who moved it.
+ * @fires generator-error - A run of the generator failed; the last good frame stays.
+ * @fires generator-fallback - The generator runs on the CPU; `detail.reason` says why.
+ * @fires play, playing, pause, timeupdate, seeking, seeked, ended, ratechange, durationchange, loadedmetadata - As of HTMLMediaElement.
  * @fires contextlost - The GPU device was lost; the element recovers by itself.
  * @fires contextrestored - The picture is back.
  */
@@ -71,6 +76,8 @@ export class GaussianSplatElement extends LitElement {
   static frameScheduler = new FrameScheduler();
   /** How long a removed element keeps its scene, in milliseconds: moving it within the page costs nothing. */
   static releaseDelay = 1_000;
+  /** Folder of the files of onnxruntime-web 1.30.0, which generators need; null for `onnxruntime/` beside the bundle. */
+  static runtimeLocation: string | null = null;
 
   static override styles = styles;
   static override properties: PropertyDeclarations = {
@@ -94,6 +101,11 @@ export class GaussianSplatElement extends LitElement {
     up: {},
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
     quality: {},
+    contract: {},
+    time: {},
+    pose: {},
+    loop: { type: Boolean },
+    controls: { attribute: false },
   };
 
   /** URL of the scene file. */
@@ -136,10 +148,22 @@ export class GaussianSplatElement extends LitElement {
   declare maxPixelRatio: number | string | null;
   /** Accuracy against speed: `reference`, `default`, `balanced` or `fast`. */
   declare quality: Quality | null;
+  /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
+  declare contract: string | object | null;
+  /** Seconds: where the scene's time is put whenever this changes. See {@link currentTime} for where it is. */
+  declare time: number | string | null;
+  /** Pose of a generator, flattened or nested, as its contract declares it: text, a list, a typed array. A new pose is a new object. */
+  declare pose: Numbers | null;
+  /** Starts again at the end. */
+  declare loop: boolean;
+  /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
+  declare controls: ControlValues | null;
 
   #attributes: Attributes;
   readonly #stage: Stage;
   readonly #internals: ElementInternals | null;
+  #liveValues: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {} };
+  #controlObserver: MutationObserver | undefined;
   readonly #warned = new Set<string>();
 
   constructor() {
@@ -148,6 +172,7 @@ export class GaussianSplatElement extends LitElement {
     this.cameraControls = false;
     this.disableZoom = false;
     this.disablePan = false;
+    this.loop = false;
     this.#attributes = this.#readAttributes();
     this.#internals = isServer ? null : this.attachInternals();
     this.#stage = new Stage(this, {
@@ -159,6 +184,8 @@ export class GaussianSplatElement extends LitElement {
         touchAction: this.#attributes.touchAction,
       }),
       services: () => this.constructor as typeof GaussianSplatElement,
+      loops: () => this.loop,
+      liveValues: () => this.#liveValues,
       canvas: () => this.renderRoot?.querySelector('canvas') ?? null,
       surface: () => this.renderRoot?.querySelector<HTMLElement>('#view') ?? null,
     });
@@ -186,7 +213,57 @@ export class GaussianSplatElement extends LitElement {
   get statistics(): SceneStatistics | null {
     const gaussians = this.#stage.scene.scene?.gaussians;
     if (!gaussians) return null;
-    return { splats: gaussians.count, dropped: gaussians.droppedCount, bytes: gaussians.byteLength };
+    return { splats: gaussians.count, dropped: gaussians.droppedCount ?? 0, bytes: gaussians.byteLength };
+  }
+
+  /** Seconds into a scene that moves; setting it seeks. */
+  get currentTime(): number {
+    return this.#stage.playback.currentTime;
+  }
+
+  set currentTime(seconds: number) {
+    this.#stage.playback.currentTime = seconds;
+  }
+
+  /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
+  get duration(): number {
+    return this.#stage.playback.duration;
+  }
+
+  get paused(): boolean {
+    return this.#stage.playback.paused;
+  }
+
+  get ended(): boolean {
+    return this.#stage.playback.ended;
+  }
+
+  /** True until the frame of the time that was set is on show. */
+  get seeking(): boolean {
+    return this.#stage.playback.seeking;
+  }
+
+  /** Speed of the time; 1 is that of the clock, negative runs backwards. */
+  get playbackRate(): number {
+    return this.#stage.playback.playbackRate;
+  }
+
+  set playbackRate(rate: number) {
+    this.#stage.playback.playbackRate = rate;
+  }
+
+  /**
+   * Lets the time run, once the scene is there. Frames are drawn as the page has them; the generator follows as fast as it can.
+   * @returns rejects with a `NotSupportedError` where there is no scene that moves.
+   */
+  async play(): Promise<void> {
+    await this.ready;
+    if (Number.isNaN(this.duration)) throw new DOMException('There is no scene that moves', 'NotSupportedError');
+    this.#stage.playback.play();
+  }
+
+  pause(): void {
+    this.#stage.playback.pause();
   }
 
   /** Where the camera is now; as a string, a value for `camera-orbit`. */
@@ -222,12 +299,29 @@ export class GaussianSplatElement extends LitElement {
     else super.focus(options);
   }
 
-  protected override willUpdate(): void {
+  override connectedCallback(): void {
+    super.connectedCallback();
+    // Names of controls are the model's: no list of observed attributes can hold them.
+    this.#controlObserver ??= new MutationObserver((records) => {
+      if (records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) this.requestUpdate();
+    });
+    this.#controlObserver.observe(this, { attributes: true });
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.#controlObserver?.disconnect();
+  }
+
+  protected override willUpdate(changed: PropertyValues<this>): void {
     this.#applyAttributes();
+    if (isServer) return;
+    this.#readLiveValues();
+    if (changed.has('time')) this.#seekToAttribute();
   }
 
   protected override updated(): void {
-    this.#stage.setSource(this.src);
+    this.#stage.setSource(this.src, this.contract);
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
     // Through the style object, which a strict Content-Security-Policy allows, and not the attribute, which it refuses.
@@ -258,11 +352,26 @@ export class GaussianSplatElement extends LitElement {
   }
 
   #readAttributes(): Attributes {
-    return readAttributes(this, (sentence) => {
-      if (this.#warned.has(sentence)) return;
-      this.#warned.add(sentence);
-      console.warn(sentence);
-    });
+    return readAttributes(this, (sentence) => this.#warn(sentence));
+  }
+
+  #readLiveValues(): void {
+    const pose = readNumbers(this.pose);
+    if (pose === undefined && this.pose) this.#warn('<gaussian-splat>: pose expects numbers; the rest pose counts.');
+    const controls = readControls(this.attributes, this.controls, (sentence) => this.#warn(sentence));
+    this.#liveValues = { pose, controls };
+  }
+
+  #seekToAttribute(): void {
+    const seconds = this.time === null || this.time === '' ? NaN : Number(this.time);
+    if (Number.isFinite(seconds)) this.#stage.playback.currentTime = seconds;
+    else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
+  }
+
+  #warn(sentence: string): void {
+    if (this.#warned.has(sentence)) return;
+    this.#warned.add(sentence);
+    console.warn(sentence);
   }
 
   #showStates(): void {

@@ -1,7 +1,7 @@
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
 
 /** Families of failure, as `element.error.code` gives them. */
-export type ElementErrorCode = 'unsupported' | 'network' | 'decode' | 'device-lost' | 'out-of-memory';
+export type ElementErrorCode = 'unsupported' | 'network' | 'decode' | 'contract' | 'device-lost' | 'out-of-memory';
 
 /** Why an element shows no scene. */
 export interface ElementError {
@@ -14,7 +14,14 @@ export interface ElementError {
   readonly cause: unknown;
 }
 
-const FAMILIES: readonly ElementErrorCode[] = ['unsupported', 'network', 'decode', 'device-lost', 'out-of-memory'];
+const FAMILIES: readonly ElementErrorCode[] = [
+  'unsupported',
+  'network',
+  'decode',
+  'contract',
+  'device-lost',
+  'out-of-memory',
+];
 
 /** Any failure in the element's own terms. */
 export function toElementError(error: unknown): ElementError {
@@ -46,6 +53,7 @@ const VISITOR_MESSAGES: Readonly<Record<ElementErrorCode, string>> = {
   unsupported: 'This 3D scene needs WebGPU, which is not available here.',
   network: 'The 3D scene could not be downloaded.',
   decode: 'The 3D scene could not be read.',
+  contract: 'The model of the 3D scene could not be run.',
   'device-lost': 'The graphics device was lost. Reload the page to see the 3D scene.',
   'out-of-memory': 'The 3D scene needs more memory than this device has.',
 };

@@ -15,6 +15,11 @@ export interface LoadDetail {
   readonly url: string;
 }
 
+export interface FallbackDetail {
+  /** Why the generator does not run on the GPU, for people. */
+  readonly reason: string;
+}
+
 /** Events of `<gaussian-splat>`. None of them bubbles. */
 export interface GaussianSplatEventMap {
   /** The scene's first frame is on the screen. */
@@ -25,6 +30,21 @@ export interface GaussianSplatEventMap {
   error: CustomEvent<ElementError>;
   /** The camera has moved; at most once a frame. */
   'camera-change': CustomEvent<CameraChangeDetail>;
+  /** A run of the generator failed; the last good frame stays, and the next change tries again. */
+  'generator-error': CustomEvent<ElementError>;
+  /** The generator runs on the CPU, because of the reason given. */
+  'generator-fallback': CustomEvent<FallbackDetail>;
+  /** Time of a scene that moves: as of HTMLMediaElement. */
+  play: Event;
+  playing: Event;
+  pause: Event;
+  timeupdate: Event;
+  seeking: Event;
+  seeked: Event;
+  ended: Event;
+  ratechange: Event;
+  durationchange: Event;
+  loadedmetadata: Event;
   /** The GPU device was lost. The element recovers by itself. */
   contextlost: Event;
   /** The picture is back after a loss. */

@@ -1,7 +1,9 @@
+import type { Camera } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { CameraAction } from './camera/gestures.js';
 import { CameraController } from './controllers/camera-controller.js';
+import { PlaybackController } from './controllers/playback-controller.js';
 import { InputController, type InputOptions } from './controllers/input-controller.js';
 import { SceneController } from './controllers/scene-controller.js';
 import { SizeController } from './controllers/size-controller.js';
@@ -10,6 +12,9 @@ import { VisibilityController } from './controllers/visibility-controller.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { FrameScheduler } from './gpu/frame-scheduler.js';
 import type { SharedDevice } from './gpu/shared-device.js';
+import { toElementError } from './errors.js';
+import type { GpuScene } from './gpu/gpu-scene.js';
+import type { LiveListeners, LiveState } from './live/live-model.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { SceneLoader } from './loading/scene-loader.js';
 
@@ -20,6 +25,8 @@ export interface Services {
   readonly frameScheduler: FrameScheduler;
   /** How long a removed element keeps its scene, ms. */
   readonly releaseDelay: number;
+  /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
+  readonly runtimeLocation: string | null;
 }
 
 /** What the stage asks its element for. */
@@ -27,6 +34,8 @@ export interface StageOptions {
   readonly attributes: () => Attributes;
   readonly input: () => InputOptions;
   readonly services: () => Services;
+  readonly loops: () => boolean;
+  readonly liveValues: () => Omit<LiveState, 'timeSeconds'>;
   /** Parts of the shadow tree, once they are rendered. */
   readonly canvas: () => HTMLCanvasElement | null;
   readonly surface: () => HTMLElement | null;
@@ -39,6 +48,7 @@ export interface StageOptions {
 export class Stage {
   readonly camera: CameraController;
   readonly scene: SceneController;
+  readonly playback: PlaybackController;
   /** Share of the bytes that have arrived, 0..1; null while their number is not known. */
   progress: number | null = null;
   readonly #host: ReactiveControllerHost & HTMLElement;
@@ -47,6 +57,8 @@ export class Stage {
   readonly #size: SizeController;
   readonly #view: ViewController;
   #src: string | null = null;
+  #contract: unknown = null;
+  #lastFault = '';
 
   constructor(host: ReactiveControllerHost & HTMLElement, options: StageOptions) {
     this.#host = host;
@@ -54,6 +66,11 @@ export class Stage {
     this.camera = new CameraController(options.attributes().camera, () => this.#view.requestFrame());
     this.#visibility = new VisibilityController(host, () => this.#onVisibility());
     this.#size = new SizeController(host, options.canvas, () => this.#onSize());
+    this.playback = new PlaybackController({
+      loops: options.loops,
+      requestFrame: () => this.#view.requestFrame(),
+      dispatch: (type) => this.#dispatch(new Event(type)),
+    });
     this.#view = this.#createView();
     this.scene = this.#createScene();
     new InputController(host, options.surface, options.input, (action) => this.#act(action));
@@ -62,8 +79,9 @@ export class Stage {
   }
 
   /** The scene to show, as the `src` attribute has it. Called after every update; only changes act. */
-  setSource(src: string | null): void {
+  setSource(src: string | null, contract: unknown): void {
     this.#src = src;
+    this.#contract = contract;
     this.#requestScene();
     // A changed attribute may concern the picture, for example its pixel ratio.
     this.#view.requestFrame();
@@ -80,6 +98,7 @@ export class Stage {
       maxPixelRatio: () => attributes().maxPixelRatio,
       quality: () => attributes().quality,
       decayMs: () => (prefersReducedMotion() ? 0 : attributes().interpolationDecay),
+      onFrame: (scene, camera, now) => this.#advance(scene, camera, now),
       onCameraChange: (source) => this.#dispatch(new CustomEvent('camera-change', { detail: { source } })),
       onError: (error) => this.scene.fail(error),
     });
@@ -93,9 +112,23 @@ export class Stage {
       releaseDelayMs: () => services().releaseDelay,
       show: (scene, isNew) => {
         if (isNew) this.camera.frame(scene.bounds);
+        this.playback.setDuration(scene.live?.duration ?? NaN);
         return this.#view.show(scene);
       },
-      hide: (clear) => (clear ? this.#view.clear() : this.#view.pause()),
+      hide: (clear) => {
+        if (clear) this.playback.setDuration(NaN);
+        if (clear) this.#view.clear();
+        else this.#view.pause();
+      },
+      live: () => ({
+        runtimeLocation: services().runtimeLocation,
+        state: () => this.#liveState(),
+        camera: (bounds) => {
+          if (bounds) this.camera.frame(bounds);
+          return this.camera.view(...FIRST_SIZE);
+        },
+        listeners: this.#liveListeners(),
+      }),
       onProgress: (loaded, total) => this.#onProgress(loaded, total),
       onLoad: (url) => this.#dispatch(new CustomEvent('load', { detail: { url } })),
       onError: (error) => this.#dispatch(new CustomEvent('error', { detail: error })),
@@ -106,12 +139,15 @@ export class Stage {
   #requestScene(): void {
     const { loading, credentials, quality } = this.#options.attributes();
     const sh = quality === 'reference' ? 'float16' : 'auto';
-    const request: SceneRequest | null = this.#src ? { url: absoluteUrl(this.#src), credentials, sh } : null;
+    const request: SceneRequest | null = this.#src
+      ? { url: absoluteUrl(this.#src), credentials, sh, contract: this.#contract }
+      : null;
     if (this.#host.isConnected) this.scene.want(request, loading === 'eager' || this.#visibility.isVisible);
   }
 
   #onVisibility(): void {
     this.#requestScene();
+    if (!this.#visibility.isVisible) this.playback.suspend();
     this.#view.requestFrame();
   }
 
@@ -127,6 +163,42 @@ export class Stage {
     this.#dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));
   }
 
+  #liveState(): LiveState {
+    return { ...this.#options.liveValues(), timeSeconds: this.playback.currentTime };
+  }
+
+  /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
+  #advance({ live }: GpuScene, camera: Camera, now: number): void {
+    if (live === undefined) return;
+    this.playback.tick(now);
+    try {
+      live.request(this.#liveState(), camera);
+    } catch (error) {
+      // Values of the page that do not fit the model: told once, not once a frame.
+      this.#onLiveError(error);
+    }
+  }
+
+  #liveListeners(): LiveListeners {
+    return {
+      onFrame: (timeSeconds) => {
+        this.#lastFault = '';
+        this.#view.requestFrame();
+        this.playback.frameShown(timeSeconds);
+      },
+      onError: (error) => this.#onLiveError(error),
+      onFallback: (reason) => this.#dispatch(new CustomEvent('generator-fallback', { detail: { reason } })),
+    };
+  }
+
+  #onLiveError(cause: unknown): void {
+    const error = toElementError(cause);
+    // The loss of the device has events of its own.
+    if (error.code === 'device-lost' || error.message === this.#lastFault) return;
+    this.#lastFault = error.message;
+    this.#dispatch(new CustomEvent('generator-error', { detail: error }));
+  }
+
   #act(action: CameraAction): void {
     const { camera } = this;
     if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
@@ -139,6 +211,9 @@ export class Stage {
     this.#host.dispatchEvent(event);
   }
 }
+
+/** Width and height, in pixels, that a generator hears of before the picture has a size: those of an element without style. */
+const FIRST_SIZE = [300, 150] as const;
 
 /** The worker has a base URL of its own, so it is given whole ones. What is no URL stays as it is, and fails there. */
 function absoluteUrl(src: string): string {

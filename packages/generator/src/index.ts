@@ -1,3 +1,19 @@
 export { bindInputs, sameInputs, type InputValue } from './bind-inputs.js';
 export { inOrder, projectionMatrix, viewMatrix, viewProjectionMatrix } from './camera-matrices.js';
+export { Generator, type GaussianSink, type GeneratedFrame, type GeneratorOptions } from './generator.js';
+export {
+  addGaussianModelToScene,
+  GaussianModels,
+  loadAllGenerators,
+  onFrame,
+  registerGaussianGenerator,
+  runGenerators,
+  type GaussianModel,
+  type MakeSink,
+} from './gaussian-models.js';
+export { GeneratorSession } from './runtime/generator-session.js';
+export type { RunOutputs, SessionKind } from './runtime/live-session.js';
+export { isRuntimeRequested, setRuntimeLocation } from './runtime/load-runtime.js';
+export { openModel, type GeneratorModel, type ModelSource } from './runtime/open-model.js';
+export { acquireSession, type AcquireOptions, type SessionLease } from './runtime/shared-sessions.js';
 export type { GeneratorState } from './state.js';

@@ -25,11 +25,7 @@ export interface Stages {
   readonly sort: SortStage;
 }
 
-export function makeStages(
-  device: GPUDevice,
-  { alpha_min, min_contribution }: Overrides,
-  threads: Threads,
-): Stages {
+export function makeStages(device: GPUDevice, { alpha_min, min_contribution }: Overrides, threads: Threads): Stages {
   return {
     cullChunks: new CullChunksStage(device),
     cull: new CullStage(device, { alpha_min, min_contribution }, threads),

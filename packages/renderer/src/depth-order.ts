@@ -27,6 +27,8 @@ export class DepthOrder {
   readonly #memory: GpuMemory;
   #order: GPUBuffer | undefined;
   #axis: Vector3 | undefined;
+  /** Of the content that was ordered. */
+  #version = 0;
   /** Needed while sorting only. */
   #working: GpuMemory | undefined;
 
@@ -54,8 +56,9 @@ export class DepthOrder {
     return this.#memory.byteLength + (this.#working?.byteLength ?? 0);
   }
 
-  /** True if the order serves a camera, whose axis may have turned by an angle in radians. */
+  /** True if the order serves the content at hand and a camera, whose axis may have turned by an angle in radians. */
   serves(camera: Camera, angle: number): boolean {
+    if (this.#version !== this.#table.version) return false;
     return this.#axis !== undefined && angleBetween(this.#axis, axisOf(camera)) <= angle;
   }
 
@@ -88,6 +91,7 @@ export class DepthOrder {
     this.#sort.record(pass, bindings, plan);
     pass.end();
     this.#axis = axisOf(camera);
+    this.#version = this.#table.version;
   }
 
   /** Frees what only the sorting needed. */

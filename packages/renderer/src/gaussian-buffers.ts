@@ -1,4 +1,5 @@
 import type { ShDegree, Vector3 } from '@gaussian-splat/core';
+import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
@@ -6,19 +7,8 @@ import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
 import { shWords, type ShPrecision } from './pack/sh.js';
 
-/** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
-export interface GaussianPage {
-  readonly count: number;
-  /** array<PackedGaussian> */
-  readonly geometry: GPUBuffer;
-  /** array<vec2u>: spherical harmonics, see pack/sh.ts */
-  readonly sh: GPUBuffer;
-  /** array<Chunk>: bounds of each 256 splats */
-  readonly chunks: GPUBuffer;
-}
-
 /** Gaussians on the GPU, ready for any {@link Renderer} of the same device. */
-export class GaussianBuffers {
+export class GaussianBuffers implements GaussianScene {
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
@@ -29,6 +19,7 @@ export class GaussianBuffers {
   /** Splats of the source that were left out because a value was not usable. */
   readonly droppedCount: number;
   readonly pages: readonly GaussianPage[];
+  readonly version = 0;
   readonly #memory: GpuMemory;
 
   private constructor(device: GPUDevice, packed: PackedGaussians) {
@@ -88,8 +79,8 @@ function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemo
   return pages;
 }
 
-/** Splats in a page: what the limits allow, in whole chunks, of which one dispatch takes a row. */
-function pageCapacity(device: GPUDevice, bytesPerSplat: number): number {
+/** Splats in a page of so many bytes a splat: what the limits allow, in whole chunks, of which one dispatch takes a row. */
+export function pageCapacity(device: GPUDevice, bytesPerSplat: number): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
   const splats = Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / bytesPerSplat);
   return Math.min(Math.floor(splats / constants.CULL_GROUP), constants.MAX_GROUPS_X) * constants.CULL_GROUP;

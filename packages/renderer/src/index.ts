@@ -1,7 +1,9 @@
 export { capture } from './capture.js';
 export { chooseVariants, type ChoiceOptions, type ChoiceStore } from './choice/choose.js';
 export { deviceDescriptor } from './device.js';
-export { GaussianBuffers, type GaussianPage } from './gaussian-buffers.js';
+export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
+export { GaussianBuffers } from './gaussian-buffers.js';
+export type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 export { PassTimer, type PassTime } from './gpu/pass-timer.js';
 export { QUALITIES, type Levers, type Quality } from './levers.js';
 export { packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';

@@ -61,8 +61,8 @@ export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
 export const QUALITIES: Readonly<Record<Quality, Levers>> = {
   reference: { ...EXACT, rasterizer: 'tiles', accumulation: 'rgba32float', depthKeyBits: 32, sortAngle: 0 },
   default: EXACT,
-  balanced: { ...EXACT, transmittanceMin: 1 / 255, alphaMin: 1.2 / 255, depthKeyBits: 16 },
-  fast: { ...EXACT, transmittanceMin: 1 / 100, alphaMin: 1.7 / 255, depthKeyBits: 16 },
+  balanced: { ...EXACT, transmittanceMin: 1 / 255, alphaMin: 1.1 / 255, depthKeyBits: 16 },
+  fast: { ...EXACT, transmittanceMin: 1 / 100, alphaMin: 1.25 / 255, depthKeyBits: 16 },
 };
 
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {

@@ -1,5 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { GaussianBuffers, GaussianPage } from './gaussian-buffers.js';
+import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
@@ -21,9 +21,9 @@ export class PageTable {
   readonly #memory: GpuMemory;
   readonly #uniforms: GPUBuffer;
   readonly #uniformBytes: ArrayBuffer;
-  readonly #scenes: readonly GaussianBuffers[];
+  readonly #scenes: readonly GaussianScene[];
 
-  constructor(device: GPUDevice, scenes: readonly GaussianBuffers[]) {
+  constructor(device: GPUDevice, scenes: readonly GaussianScene[]) {
     this.#device = device;
     this.#scenes = scenes;
     this.#memory = new GpuMemory(device);
@@ -44,6 +44,11 @@ export class PageTable {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
 
+  /** Grows when the content of a scene changes; 0 if none ever does. */
+  get version(): number {
+    return this.#scenes.reduce((sum, { version }) => sum + version, 0);
+  }
+
   get byteLength(): number {
     return this.#memory.byteLength;
   }
@@ -54,7 +59,7 @@ export class PageTable {
   }
 
   /** True if the table was made for exactly these scenes. */
-  holds(scenes: readonly GaussianBuffers[]): boolean {
+  holds(scenes: readonly GaussianScene[]): boolean {
     return scenes.length === this.#scenes.length && scenes.every((scene, i) => scene === this.#scenes[i]);
   }
 

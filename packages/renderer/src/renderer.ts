@@ -2,9 +2,10 @@ import { GaussianSplatError, validateCamera, type Camera, type Vector3 } from '@
 import { AccumulationTexture } from './accumulation.js';
 import { FrameBindings, makeStages, type Stages } from './bindings.js';
 import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
+import { ContentWatch } from './content-watch.js';
 import { angleBetween, axisOf, DepthOrder } from './depth-order.js';
 import { recordProjection } from './frame.js';
-import type { GaussianBuffers } from './gaussian-buffers.js';
+import type { GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE, type Overrides } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
@@ -35,7 +36,7 @@ export interface RendererOptions extends Partial<Levers> {
 /** One image to draw. */
 export interface FrameRequest {
   /** One scene, or several that are sorted and blended together. Order decides between equal depths. */
-  readonly gaussians: GaussianBuffers | readonly GaussianBuffers[];
+  readonly gaussians: GaussianScene | readonly GaussianScene[];
   /** Its width and height must be those of the target. */
   readonly camera: Camera;
   /** A texture with the usage STORAGE_BINDING saves `tiles` a pass. */
@@ -103,6 +104,7 @@ export class Renderer {
   #accumulation: Accumulation | undefined;
   #lastAxis: Vector3 | undefined;
   #turningFrames = 0;
+  readonly #content = new ContentWatch();
 
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
@@ -150,7 +152,7 @@ export class Renderer {
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
     const target = this.#targetOf(request);
-    const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianBuffers];
+    const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
     const resources = this.#resourcesFor(scenes);
     const { table, scratch, bindings, depthOrder, monitor } = resources;
     const drawn = scaled(camera, this.levers.resolutionScale);
@@ -198,12 +200,12 @@ export class Renderer {
 
   /**
    * Sees to an order of all splats where one is of use: for the first frame, and for the first of those between which the camera
-   * does not turn. While it turns, only the visible splats are sorted.
+   * does not turn. While it turns, or the content changes, only the visible splats are sorted.
    * @returns whether the order serves this frame
    */
   #prepareOrder(
     encoder: GPUCommandEncoder,
-    { depthOrder }: Resources,
+    { depthOrder, table }: Resources,
     camera: Camera,
     timer: PassTimer | undefined,
   ): boolean {
@@ -211,11 +213,12 @@ export class Renderer {
     const axis = axisOf(camera);
     const turned = this.#lastAxis === undefined ? 0 : angleBetween(this.#lastAxis, axis);
     this.#lastAxis = axis;
+    const isStill = this.#content.isStill(table.version);
     if (depthOrder.serves(camera, sortAngle)) {
       this.#turningFrames = 0;
       return true;
     }
-    if (depthOrder.isPossible && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL)) {
+    if (isStill && depthOrder.isPossible && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL)) {
       depthOrder.record(encoder, camera, timer);
       return true;
     }
@@ -257,7 +260,7 @@ export class Renderer {
     return { view, format: target.format, isStorable, width, height };
   }
 
-  #resourcesFor(scenes: readonly GaussianBuffers[]): Resources {
+  #resourcesFor(scenes: readonly GaussianScene[]): Resources {
     const current = this.#resources;
     if (current?.table.holds(scenes)) {
       // The monitor has asked for other room.

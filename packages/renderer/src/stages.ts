@@ -10,6 +10,7 @@ export { planOffsets, Scratch } from './scratch.js';
 export { CompactStage } from './stages/compact.js';
 export { ComposeStage } from './stages/compose.js';
 export { CullChunksStage, cullGroups, CullStage } from './stages/cull.js';
+export { IngestStage } from './stages/ingest.js';
 export { OrderKeysStage } from './stages/order-keys.js';
 export { PlanStage } from './stages/plan.js';
 export { ProjectStage } from './stages/project.js';

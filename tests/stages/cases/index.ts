@@ -1,5 +1,6 @@
 import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
+import { ingestCases } from './ingest.js';
 import { orderCases } from './order.js';
 import { projectionCases } from './projection.js';
 import { scanCases } from './scan.js';
@@ -11,4 +12,5 @@ export const stageCases: readonly StageCase[] = [
   ...compactCases,
   ...orderCases,
   ...sortCases,
+  ...ingestCases,
 ];

@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
-import { openGpuScene, type GpuScene } from '../gpu/gpu-scene.js';
+import { openGpuScene, type GpuScene, type OpenOptions } from '../gpu/gpu-scene.js';
 import type { SharedDevice } from '../gpu/shared-device.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
@@ -19,6 +19,8 @@ export interface SceneOptions {
   readonly show: (scene: GpuScene, isNew: boolean) => Promise<void>;
   /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
   readonly hide: (clear: boolean) => void;
+  /** What a generator needs to know beyond the request. */
+  readonly live: OpenOptions['live'];
   readonly onProgress: (loaded: number, total: number | undefined) => void;
   readonly onLoad: (url: string) => void;
   readonly onError: (error: ElementError) => void;
@@ -157,9 +159,12 @@ export class SceneController implements ReactiveController {
     isNew: boolean,
     onProgress: (loaded: number, total: number | undefined) => void,
   ): Promise<void> {
-    const { device, loader, show } = this.#options;
+    const { device, loader, show, live } = this.#options;
     const beforeUpload = (): void => this.#drop(false);
-    const scene = await openGpuScene(request, { device: device(), loader: loader(), signal, onProgress, beforeUpload });
+    const scene = await openGpuScene(request, {
+      ...{ device: device(), loader: loader() },
+      ...{ signal, onProgress, beforeUpload, live },
+    });
     if (signal.aborted) return scene.destroy();
     this.#scene = scene;
     await Promise.race([show(scene, isNew), scene.lost]);
@@ -206,7 +211,9 @@ class DeviceLostError extends Error {}
 /** A device that does not come at all is final at first, but after a loss it may only need a moment. */
 function isDeviceFailure(error: unknown, isNew: boolean): boolean {
   if (error instanceof DeviceLostError) return true;
-  return !isNew && error instanceof GaussianSplatError && error.family === 'unsupported';
+  if (!(error instanceof GaussianSplatError)) return false;
+  // A generator may be the first to notice.
+  return error.family === 'device-lost' || (!isNew && error.family === 'unsupported');
 }
 
 function unrecoverable(cause: unknown): GaussianSplatError {
@@ -220,7 +227,7 @@ function unrecoverable(cause: unknown): GaussianSplatError {
 }
 
 const isSame = (a: SceneRequest, b: SceneRequest | null): boolean =>
-  a.url === b?.url && a.credentials === b.credentials;
+  a.url === b?.url && a.credentials === b.credentials && a.contract === b.contract;
 
 const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
 

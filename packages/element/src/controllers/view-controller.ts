@@ -1,4 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import type { FrameRequest, Quality } from '@gaussian-splat/renderer';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
@@ -18,6 +18,8 @@ export interface ViewOptions {
   readonly quality: () => Quality;
   /** Time constant of the camera's motion, ms. */
   readonly decayMs: () => number;
+  /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
+  readonly onFrame: (scene: GpuScene, camera: Camera, now: number) => void;
   readonly onCameraChange: (source: CameraChangeSource) => void;
   /** Drawing has failed for good. */
   readonly onError: (error: unknown) => void;
@@ -84,7 +86,9 @@ export class ViewController implements FrameClient {
     if (pixels === null) return this.#finishUnseen();
     const source = camera.step(now, decayMs());
     try {
-      this.#render(scene, this.#frameRequest(scene, pixels));
+      const request = this.#frameRequest(scene, pixels);
+      this.#options.onFrame(scene, request.camera, now);
+      this.#render(scene, request);
     } catch (error) {
       return onError(error);
     }

@@ -1,9 +1,25 @@
 import { GaussianSplatError, type Bounds } from '@gaussian-splat/core';
-import { chooseVariants, GaussianBuffers, Renderer, type FrameRequest, type Quality } from '@gaussian-splat/renderer';
+import {
+  chooseVariants,
+  GaussianBuffers,
+  Renderer,
+  type FrameRequest,
+  type GaussianScene,
+  type Quality,
+} from '@gaussian-splat/renderer';
+import type { LiveModel, LiveRequest } from '../live/live-model.js';
 import type { LoadedScene, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { assertWebGpu } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
+
+/** Gaussians with one owner. */
+export interface OwnedGaussians extends GaussianScene {
+  /** Splats of the file that were left out; a generator's are counted by nobody. */
+  readonly droppedCount?: number;
+  readonly byteLength: number;
+  destroy(): void;
+}
 
 /**
  * A scene on the GPU: its splats, the renderer that draws them (whose buffers fit this scene and this picture size,
@@ -11,7 +27,9 @@ import type { DeviceLease, SharedDevice } from './shared-device.js';
  */
 export class GpuScene {
   readonly bounds: Bounds;
-  readonly gaussians: GaussianBuffers;
+  readonly gaussians: OwnedGaussians;
+  /** The generator that writes the Gaussians; undefined for those of a file. */
+  readonly live: LiveModel | undefined;
   /** Called when the frame just drawn lacked something that the next one will have. */
   onIncomplete: () => void = () => undefined;
   #renderer: Renderer;
@@ -19,8 +37,9 @@ export class GpuScene {
   readonly #lease: DeviceLease;
   #destroyed = false;
 
-  constructor(lease: DeviceLease, gaussians: GaussianBuffers, bounds: Bounds) {
+  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, live?: LiveModel) {
     this.#lease = lease;
+    this.live = live;
     this.gaussians = gaussians;
     this.bounds = bounds;
     this.#renderer = this.#makeRenderer();
@@ -83,6 +102,7 @@ export class GpuScene {
   destroy(): void {
     if (this.#destroyed) return;
     this.#destroyed = true;
+    this.live?.close();
     this.#renderer.destroy();
     this.gaussians.destroy();
     this.#lease.release();
@@ -96,12 +116,15 @@ export interface OpenOptions {
   readonly onProgress: ProgressListener;
   /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. */
   readonly beforeUpload: () => void;
+  /** What a generator needs to know beyond the request. */
+  readonly live: () => Omit<LiveRequest, 'url' | 'contract' | 'credentials'>;
 }
 
 /** Device and file at the same time, then the upload. Rejects with GaussianSplatError or the signal's reason. */
 export async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
   // Known at once, and then not a byte is fetched.
   assertWebGpu();
+  if (isGenerator(request)) return openLiveScene(request, options);
   // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
@@ -122,6 +145,37 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
     throw error;
   } finally {
     options.signal.removeEventListener('abort', giveUp);
+  }
+}
+
+/** Generators are known by the name of the file, or by the contract that the page gives along. */
+function isGenerator({ url, contract }: SceneRequest): boolean {
+  if (contract !== undefined && contract !== null && contract !== '') return true;
+  const { pathname, protocol, hash } = URL.canParse(url) ? new URL(url) : { pathname: url, protocol: '', hash: '' };
+  return /\.onnx$/i.test(protocol === 'blob:' ? hash : pathname);
+}
+
+async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+  const { signal, onProgress, beforeUpload } = options;
+  const opening = import('../live/open-live-model.js');
+  const acquiring = options.device.acquire();
+  opening.catch(ignore);
+  const lease = await acquiring;
+  try {
+    signal.throwIfAborted();
+    const { openLiveModel } = await opening;
+    const { url, contract, credentials } = request;
+    const live = await openLiveModel(
+      { ...options.live(), url, contract, credentials },
+      lease.device,
+      signal,
+      onProgress,
+    );
+    beforeUpload();
+    return new GpuScene(lease, live.gaussians, live.bounds, live);
+  } catch (error) {
+    lease.release();
+    throw error;
   }
 }
 

@@ -20,6 +20,28 @@ export function assertWebGpu(): void {
   });
 }
 
+/** What models on the same device can use where it is there; float16 models need the first. */
+const GENERATOR_FEATURES: readonly GPUFeatureName[] = ['shader-f16', 'subgroups' as GPUFeatureName];
+const GENERATOR_LIMITS = [
+  'maxStorageBuffersPerShaderStage',
+  'maxComputeWorkgroupStorageSize',
+  'maxComputeInvocationsPerWorkgroup',
+  'maxComputeWorkgroupSizeX',
+  'maxComputeWorkgroupSizeY',
+  'maxComputeWorkgroupSizeZ',
+] as const;
+
+/** One device serves scenes and generators: nobody knows beforehand which a page will show. */
+function withGeneratorNeeds(adapter: GPUAdapter, descriptor: GPUDeviceDescriptor): GPUDeviceDescriptor {
+  const features = GENERATOR_FEATURES.filter((feature) => adapter.features.has(feature));
+  const limits = Object.fromEntries(GENERATOR_LIMITS.map((name) => [name, adapter.limits[name]]));
+  return {
+    ...descriptor,
+    requiredFeatures: [...(descriptor.requiredFeatures ?? []), ...features],
+    requiredLimits: { ...descriptor.requiredLimits, ...limits },
+  };
+}
+
 /** A GPU device with the limits that the renderer can use. Throws GaussianSplatError `unsupported/*`. */
 export async function requestGpuDevice(): Promise<GPUDevice> {
   assertWebGpu();
@@ -33,7 +55,7 @@ export async function requestGpuDevice(): Promise<GPUDevice> {
     });
   }
   try {
-    return await adapter.requestDevice(deviceDescriptor(adapter));
+    return await adapter.requestDevice(withGeneratorNeeds(adapter, deviceDescriptor(adapter)));
   } catch (error) {
     throw new GaussianSplatError('unsupported/limits', {
       where: 'the graphics adapter',

@@ -10,6 +10,8 @@ export interface SceneRequest {
   readonly credentials: RequestCredentials;
   /** Precision of the spherical harmonics on the GPU. */
   readonly sh: ShPrecision | 'auto';
+  /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
+  readonly contract?: unknown;
 }
 
 /** A scene, fetched and packed, ready for upload. */

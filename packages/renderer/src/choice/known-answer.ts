@@ -37,7 +37,8 @@ export function probeCamera(width: number, height: number): Camera {
 export function sphereCloud(count: number, size: number): GaussianCloud {
   let state = 1;
   const random = (): number => (state = (state * 48271) % 0x7fffffff) / 0x7fffffff;
-  const fill = (length: number, value: (i: number) => number): Float32Array => Float32Array.from({ length }, (_, i) => value(i));
+  const fill = (length: number, value: (i: number) => number): Float32Array =>
+    Float32Array.from({ length }, (_, i) => value(i));
   const radii = fill(count, () => size * (0.02 + 0.1 * random()));
   return {
     count,

@@ -6,7 +6,7 @@ export interface StructLayout {
 
 export type StructValues<L extends StructLayout> = Readonly<Record<keyof L['fields'], number | ArrayLike<number>>>;
 
-/** Writes a struct into `target` at a byte offset: whole numbers for `u32` and its vectors, float32 for everything else. */
+/** Writes a struct into `target` at a byte offset: whole numbers for `u32`, `i32` and their vectors, float32 for everything else. */
 export function writeStruct<L extends StructLayout>(
   layout: L,
   values: StructValues<L>,
@@ -17,7 +17,7 @@ export function writeStruct<L extends StructLayout>(
   const integers = new Uint32Array(target, byteOffset, layout.size / 4);
   for (const [name, { offset, type }] of Object.entries(layout.fields)) {
     const value = values[name as keyof L['fields']];
-    const target32 = type === 'u32' || /^vec\du$/.test(type) ? integers : floats;
+    const target32 = /^([ui]32|vec\d[ui])$/.test(type) ? integers : floats;
     if (typeof value === 'number') target32[offset / 4] = value;
     else target32.set(value, offset / 4);
   }

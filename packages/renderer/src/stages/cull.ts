@@ -24,8 +24,7 @@ export class CullStage {
   readonly #kernel: ComputeKernel<typeof cull> | ComputeKernel<typeof cullSerial>;
 
   constructor(device: GPUDevice, overrides: Overrides = {}, threads: Threads = 'parallel') {
-    this.#kernel =
-      threads === 'serial' ? kernelOf(device, cullSerial, overrides) : kernelOf(device, cull, overrides);
+    this.#kernel = threads === 'serial' ? kernelOf(device, cullSerial, overrides) : kernelOf(device, cull, overrides);
   }
 
   bind(resources: Resources<typeof cull>): GPUBindGroup {

@@ -8,7 +8,14 @@ import {
   sortScatter,
   sortScatterSerial,
 } from '../generated/shaders.js';
-import { BUFFER_USAGE, kernelOf, perDevice, specialise, type ComputeKernel, type ShaderDescription } from '../gpu/kernel.js';
+import {
+  BUFFER_USAGE,
+  kernelOf,
+  perDevice,
+  specialise,
+  type ComputeKernel,
+  type ShaderDescription,
+} from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import type { Threads } from './threads.js';

@@ -8,6 +8,7 @@ import { fileURLToPath } from 'node:url';
 
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
 const fixtures = fileURLToPath(new URL('../fixtures/', import.meta.url));
+const generators = join(root, 'tests/fixtures/generators');
 const sharedData = join(root, '../shared/data');
 
 /** Answers under /net/; everything else is left to the test runner's own server. */
@@ -55,6 +56,19 @@ const ANSWERS = {
     res.writeHead(200, { 'Content-Length': bytes.length, 'Cache-Control': 'no-store' });
     res.write(bytes.subarray(0, bytes.length / 2));
     setTimeout(() => res.destroy(), 100);
+  },
+
+  /** The first half of a generator, as if that were all; contracts beside it are not there. */
+  head(context, name) {
+    if (!name.endsWith('.onnx')) return void (context.status = 404);
+    const bytes = readFileSync(join(generators, name));
+    context.body = bytes.subarray(0, bytes.length / 2);
+  },
+
+  /** A generator without any of the files that belong beside it. */
+  renamed(context, name) {
+    if (!name.endsWith('.onnx')) return void (context.status = 404);
+    context.body = readFileSync(join(generators, name));
   },
 
   /** Without Content-Length. */

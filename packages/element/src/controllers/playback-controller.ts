@@ -1,0 +1,171 @@
+/** What a playback tells its element: names of HTMLMediaElement's events. */
+export type PlaybackEvent =
+  | 'play'
+  | 'playing'
+  | 'pause'
+  | 'timeupdate'
+  | 'seeking'
+  | 'seeked'
+  | 'ended'
+  | 'ratechange'
+  | 'durationchange'
+  | 'loadedmetadata';
+
+export interface PlaybackOptions {
+  readonly loops: () => boolean;
+  /** Asks for a frame: while it plays, or after a seek. */
+  readonly requestFrame: () => void;
+  readonly dispatch: (type: PlaybackEvent) => void;
+}
+
+/** Between two timeupdate events while it plays, ms: as browsers have it for video. */
+const UPDATE_INTERVAL_MS = 250;
+
+/** The clock of a scene that moves, with the words and events of HTMLMediaElement. It is asked for the time once a frame. */
+export class PlaybackController {
+  readonly #options: PlaybackOptions;
+  #time = 0;
+  #duration = NaN;
+  #rate = 1;
+  #isPaused = true;
+  #hasEnded = false;
+  #seekTarget: number | undefined;
+  #lastTick: number | undefined;
+  #lastUpdate = -Infinity;
+
+  constructor(options: PlaybackOptions) {
+    this.#options = options;
+  }
+
+  /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
+  get duration(): number {
+    return this.#duration;
+  }
+
+  get currentTime(): number {
+    return this.#time;
+  }
+
+  /** Seeks: events follow once the frame of that time is on show. */
+  set currentTime(seconds: number) {
+    if (!Number.isFinite(seconds))
+      throw new TypeError(`currentTime expects a finite number of seconds, found ${seconds}`);
+    const end = Number.isNaN(this.#duration) ? Infinity : this.#duration;
+    this.#time = Math.min(end, Math.max(0, seconds));
+    this.#hasEnded = false;
+    // Before there is a scene this is where it starts.
+    if (Number.isNaN(this.#duration)) return;
+    this.#seekTarget = this.#time;
+    this.#options.dispatch('seeking');
+    this.#options.requestFrame();
+  }
+
+  get seeking(): boolean {
+    return this.#seekTarget !== undefined;
+  }
+
+  get paused(): boolean {
+    return this.#isPaused;
+  }
+
+  get ended(): boolean {
+    return this.#hasEnded;
+  }
+
+  get playbackRate(): number {
+    return this.#rate;
+  }
+
+  set playbackRate(rate: number) {
+    if (!Number.isFinite(rate)) throw new TypeError(`playbackRate expects a finite number, found ${rate}`);
+    if (rate === this.#rate) return;
+    this.#rate = rate;
+    this.#options.dispatch('ratechange');
+    this.#options.requestFrame();
+  }
+
+  play(): void {
+    if (!this.#isPaused) return;
+    this.#isPaused = false;
+    if (this.#hasEnded) this.currentTime = 0;
+    this.#options.dispatch('play');
+    this.#lastTick = undefined;
+    this.#options.requestFrame();
+  }
+
+  pause(): void {
+    if (this.#isPaused) return;
+    this.#isPaused = true;
+    this.#options.dispatch('timeupdate');
+    this.#options.dispatch('pause');
+  }
+
+  /** A scene is there; NaN: none, or one that does not move. */
+  setDuration(seconds: number): void {
+    if (Object.is(seconds, this.#duration)) return;
+    this.#duration = seconds;
+    this.#seekTarget = undefined;
+    if (Number.isNaN(seconds)) return this.#reset();
+    this.#time = Math.min(this.#time, seconds);
+    this.#options.dispatch('durationchange');
+    this.#options.dispatch('loadedmetadata');
+    this.#options.requestFrame();
+  }
+
+  /** Moves on to the moment of a frame. @param now requestAnimationFrame's clock, ms */
+  tick(now: number): void {
+    if (this.#isPaused || Number.isNaN(this.#duration)) return;
+    if (this.#lastTick === undefined) this.#options.dispatch('playing');
+    const elapsed = this.#lastTick === undefined ? 0 : (now - this.#lastTick) / 1000;
+    this.#lastTick = now;
+    this.#advance(elapsed * this.#rate);
+    if (now - this.#lastUpdate >= UPDATE_INTERVAL_MS) {
+      this.#lastUpdate = now;
+      this.#options.dispatch('timeupdate');
+    }
+    if (!this.#isPaused) this.#options.requestFrame();
+  }
+
+  /** A pause of the picture is not time that passes: the element was out of sight. */
+  suspend(): void {
+    if (this.#lastTick !== undefined) this.#lastTick = undefined;
+  }
+
+  /** The frame of a time is on show. */
+  frameShown(seconds: number): void {
+    if (this.#seekTarget === undefined || seconds !== this.#seekTarget) return;
+    this.#seekTarget = undefined;
+    this.#options.dispatch('timeupdate');
+    this.#options.dispatch('seeked');
+  }
+
+  #advance(seconds: number): void {
+    const next = this.#time + seconds;
+    // While it plays a seek is over as soon as the clock has gone on.
+    if (this.#seekTarget !== undefined && seconds !== 0) this.frameShown(this.#seekTarget);
+    if (next >= 0 && next < this.#duration) {
+      this.#time = next;
+    } else if (this.#options.loops() && Number.isFinite(this.#duration) && this.#duration > 0) {
+      this.#time = next - this.#duration * Math.floor(next / this.#duration);
+    } else {
+      this.#end(next < 0 ? 0 : this.#duration);
+    }
+  }
+
+  #end(time: number): void {
+    this.#time = time;
+    this.#isPaused = true;
+    this.#hasEnded = true;
+    for (const type of ['timeupdate', 'pause', 'ended'] as const) this.#options.dispatch(type);
+    this.#options.requestFrame();
+  }
+
+  #reset(): void {
+    this.#time = 0;
+    this.#hasEnded = false;
+    this.#lastTick = undefined;
+    if (this.#isPaused) return;
+    this.#isPaused = true;
+    this.#options.dispatch('pause');
+  }
+}

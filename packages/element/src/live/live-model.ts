@@ -1,0 +1,46 @@
+import type { Bounds, Camera } from '@gaussian-splat/core';
+import type { DynamicGaussians } from '@gaussian-splat/renderer';
+
+/** What a page says about a generator, apart from the camera. */
+export interface LiveState {
+  readonly timeSeconds: number;
+  /** Flattened; undefined for the model's rest pose. */
+  readonly pose: readonly number[] | undefined;
+  /** By the names of inputs; small and capital letters are the same, as attributes have no capital ones. */
+  readonly controls: Readonly<Record<string, readonly number[]>>;
+}
+
+/** Whom a model tells. */
+export interface LiveListeners {
+  /** A frame for a time is ready to be drawn. */
+  readonly onFrame: (timeSeconds: number) => void;
+  /** A run failed; the last good frame stays. */
+  readonly onError: (error: unknown) => void;
+  /** The model runs on the CPU. */
+  readonly onFallback: (reason: string) => void;
+}
+
+/** A generator behind a scene, with the first frame in its Gaussians. */
+export interface LiveModel {
+  readonly gaussians: DynamicGaussians;
+  readonly bounds: Bounds;
+  /** Seconds; Infinity where the contract declares none. */
+  readonly duration: number;
+  /** Asks for the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
+  request(state: LiveState, camera: Camera): void;
+  close(): void;
+}
+
+/** Where the generator is, and what its first frame shows. */
+export interface LiveRequest {
+  readonly url: string;
+  /** Address of a contract, its JSON text, or the contract itself; null for that of the model or beside it. */
+  readonly contract: unknown;
+  readonly credentials: RequestCredentials;
+  /** Folder of the runtime's files; null for the one beside the bundle. */
+  readonly runtimeLocation: string | null;
+  readonly state: () => LiveState;
+  /** A camera before anything is known of the scene but, perhaps, the bounds that the contract declares. */
+  readonly camera: (bounds: Bounds | undefined) => Camera;
+  readonly listeners: LiveListeners;
+}

@@ -1,0 +1,59 @@
+/** Values that attributes write as text and properties hold as numbers: poses and controls. */
+
+/** Numbers in any shape that people write them: a number, a list, lists of lists, a typed array, or any of these as text. */
+export type Numbers = string | number | ArrayLike<number> | readonly (ArrayLike<number> | number)[];
+
+/**
+ * The numbers, flattened. Text is JSON or numbers with spaces or commas between them.
+ * @returns undefined for nothing, and for what holds anything but finite numbers.
+ */
+export function readNumbers(value: Numbers | null | undefined): number[] | undefined {
+  if (value === null || value === undefined || value === '') return undefined;
+  const parsed: unknown = typeof value === 'string' ? parseText(value) : value;
+  const numbers = flatten(parsed);
+  return numbers.length > 0 && numbers.every(Number.isFinite) ? numbers : undefined;
+}
+
+function parseText(text: string): unknown {
+  if (!text.trim().startsWith('['))
+    return text
+      .trim()
+      .split(/[\s,]+/)
+      .map(Number);
+  try {
+    return JSON.parse(text);
+  } catch {
+    return undefined;
+  }
+}
+
+function flatten(value: unknown): number[] {
+  if (typeof value === 'number') return [value];
+  if (ArrayBuffer.isView(value)) return Array.from(value as unknown as ArrayLike<number>);
+  return Array.isArray(value) ? value.flatMap(flatten) : [NaN];
+}
+
+/** Prefix of the attributes that hold controls: `control-smile="0.5"`. */
+export const CONTROL_PREFIX = 'control-';
+
+/** Controls as a page gives them, by the names of the model's inputs. */
+export type ControlValues = Readonly<Record<string, Numbers>>;
+
+/** The controls of an element: its attributes, and above them its property. Malformed ones are left out and told to `warn`. */
+export function readControls(
+  attributes: Iterable<{ readonly name: string; readonly value: string }>,
+  property: ControlValues | null | undefined,
+  warn: (sentence: string) => void,
+): Record<string, number[]> {
+  const written: [string, Numbers][] = [];
+  for (const { name, value } of attributes) {
+    if (name.startsWith(CONTROL_PREFIX)) written.push([name.slice(CONTROL_PREFIX.length), value]);
+  }
+  const controls: Record<string, number[]> = {};
+  for (const [name, value] of [...written, ...Object.entries(property ?? {})]) {
+    const numbers = readNumbers(value);
+    if (numbers) controls[name] = numbers;
+    else warn(`<gaussian-splat>: control ${name} expects numbers, found ${JSON.stringify(value)}; its default counts.`);
+  }
+  return controls;
+}

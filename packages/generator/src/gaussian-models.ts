@@ -1,0 +1,126 @@
+import { GaussianSplatError, type Contract, type GaussianLayout } from '@gaussian-splat/core';
+import { Generator, type GaussianSink, type GeneratedFrame } from './generator.js';
+import type { ModelSource } from './runtime/open-model.js';
+import type { GeneratorState } from './state.js';
+
+/** Makes what the Gaussians of a model are written into, for example `DynamicGaussians.create(device, layout)`. */
+export type MakeSink<S extends GaussianSink> = (layout: GaussianLayout, contract: Contract) => S | Promise<S>;
+
+/** A model in the scene. */
+export interface GaussianModel<S extends GaussianSink = GaussianSink> {
+  readonly generator: Generator;
+  /** What is drawn. */
+  readonly gaussians: S;
+  /** State of this model alone, on top of what `runGenerators` is given. */
+  state: GeneratorState;
+  /** Takes it out of the scene. The sink belongs to whoever made it. */
+  remove(): void;
+}
+
+/** Generators by name, and the models that show them: what a page of several generators keeps. */
+export class GaussianModels {
+  readonly #sources = new Map<string, ModelSource>();
+  readonly #models = new Set<GaussianModel>();
+  readonly #listeners = new Set<(model: GaussianModel, frame: GeneratedFrame) => void>();
+  readonly #failures = new Set<(model: GaussianModel | undefined, error: unknown) => void>();
+  #loaded = new Map<string, Generator>();
+  #device: GPUDevice | undefined;
+
+  /** Gives a generator a name. Nothing is fetched yet. */
+  registerGaussianGenerator(name: string, source: ModelSource): void {
+    this.#sources.set(name, source);
+  }
+
+  /**
+   * Fetches and checks all registered generators, for a device.
+   * @throws what `openModel` throws for the first that fails.
+   */
+  async loadAllGenerators(device: GPUDevice): Promise<void> {
+    this.#device = device;
+    const names = [...this.#sources.keys()].filter((name) => !this.#loaded.has(name));
+    await Promise.all(
+      names.map(async (name) => this.#loaded.set(name, await Generator.open(this.#sources.get(name)!, device))),
+    );
+  }
+
+  /**
+   * Puts a model into the scene. Models of one generator share its session.
+   * @throws GaussianSplatError `argument/value` for a name that is not registered, or before {@link loadAllGenerators}.
+   */
+  async addGaussianModelToScene<S extends GaussianSink>(
+    name: string,
+    makeSink: MakeSink<S>,
+  ): Promise<GaussianModel<S>> {
+    const source = this.#sources.get(name);
+    if (source === undefined || this.#device === undefined) throw unknownGenerator(name, [...this.#sources.keys()]);
+    const generator = await Generator.open(source, this.#device, {
+      onFrame: (frame) => this.#listeners.forEach((listener) => listener(model, frame)),
+      onError: (error) => this.#failures.forEach((listener) => listener(model, error)),
+    });
+    const { layout, contract } = generator.model;
+    const gaussians = await makeSink(layout, contract);
+    generator.sink = gaussians;
+    const remove = (): void => {
+      this.#models.delete(model);
+      generator.close();
+    };
+    const model: GaussianModel<S> = { generator, gaussians, state: {}, remove };
+    this.#models.add(model);
+    return model;
+  }
+
+  /** Listens to every new frame of every model, and to runs that fail. @returns what ends it. */
+  onFrame(
+    listener: (model: GaussianModel, frame: GeneratedFrame) => void,
+    onError?: (model: GaussianModel | undefined, error: unknown) => void,
+  ): () => void {
+    this.#listeners.add(listener);
+    if (onError) this.#failures.add(onError);
+    return () => {
+      this.#listeners.delete(listener);
+      if (onError) this.#failures.delete(onError);
+    };
+  }
+
+  /**
+   * Asks all models for the Gaussians of a state; each model's own `state` counts above it. Returns at once.
+   * @throws GaussianSplatError `argument/value` if a state does not fit a contract.
+   */
+  runGenerators(state: GeneratorState): void {
+    for (const model of this.#models) model.generator.request({ ...state, ...model.state });
+  }
+
+  /** Takes all models out and forgets all names. */
+  clear(): void {
+    for (const model of [...this.#models]) model.remove();
+    for (const generator of this.#loaded.values()) generator.close();
+    this.#loaded = new Map();
+    this.#sources.clear();
+    this.#device = undefined;
+  }
+}
+
+function unknownGenerator(name: string, known: readonly string[]): GaussianSplatError {
+  return new GaussianSplatError('argument/value', {
+    where: `generator ${JSON.stringify(name)}`,
+    expected: 'a registered generator, and loadAllGenerators before',
+    found: known.length > 0 ? `the registered generators ${known.join(', ')}` : 'no registered generator',
+    remedy: 'call registerGaussianGenerator(name, source), then await loadAllGenerators(device)',
+  });
+}
+
+/** The page's own. */
+const page = new GaussianModels();
+
+/** {@link GaussianModels.registerGaussianGenerator} of the page. */
+export const registerGaussianGenerator: GaussianModels['registerGaussianGenerator'] = (name, source) =>
+  page.registerGaussianGenerator(name, source);
+/** {@link GaussianModels.loadAllGenerators} of the page. */
+export const loadAllGenerators: GaussianModels['loadAllGenerators'] = (device) => page.loadAllGenerators(device);
+/** {@link GaussianModels.addGaussianModelToScene} of the page. */
+export const addGaussianModelToScene: GaussianModels['addGaussianModelToScene'] = (name, makeSink) =>
+  page.addGaussianModelToScene(name, makeSink);
+/** {@link GaussianModels.onFrame} of the page. */
+export const onFrame: GaussianModels['onFrame'] = (listener, onError) => page.onFrame(listener, onError);
+/** {@link GaussianModels.runGenerators} of the page. */
+export const runGenerators: GaussianModels['runGenerators'] = (state) => page.runGenerators(state);

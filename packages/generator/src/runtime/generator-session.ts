@@ -1,0 +1,120 @@
+import { ContractError, GaussianSplatError } from '@gaussian-splat/core';
+import { bindInputs, type InputValue } from '../bind-inputs.js';
+import type { GeneratorState } from '../state.js';
+import type { LiveSession, RunOutputs, SessionKind } from './live-session.js';
+import type { GeneratorModel } from './open-model.js';
+import { runFault, startSession } from './start-session.js';
+
+/** Runs that may fail one after the other before the session is given up. */
+const MAX_FAILURES = 2;
+
+/**
+ * A generator on one device: one session of the runtime, however many show it. A run that fails takes the runtime's session with
+ * it; the next run starts another.
+ */
+export class GeneratorSession {
+  readonly model: GeneratorModel;
+  readonly device: GPUDevice;
+  readonly #onFallback: (reason: string) => void;
+  #live: Promise<LiveSession> | undefined;
+  #kind: SessionKind | undefined;
+  #failures = 0;
+  #isLost = false;
+  #isReleased = false;
+
+  /** @param onFallback told once if the model has to run on the CPU */
+  constructor(model: GeneratorModel, device: GPUDevice, onFallback: (reason: string) => void = () => undefined) {
+    this.model = model;
+    this.device = device;
+    this.#onFallback = onFallback;
+    void device.lost.then(() => (this.#isLost = true));
+  }
+
+  /** How it runs; undefined until it has. */
+  get kind(): SessionKind | undefined {
+    return this.#kind;
+  }
+
+  /** Values of the inputs for a state of the page. @throws GaussianSplatError `argument/value` */
+  bind(state: GeneratorState): Record<string, InputValue> {
+    return bindInputs(this.model.header, this.model.contract, state);
+  }
+
+  /**
+   * Runs the model; the first run also starts the session. `use` must submit its work before it returns.
+   * @throws ContractError `contract/run` if the runtime fails; GaussianSplatError `device-lost/unrecoverable` if the device is lost,
+   * `network/*` if the runtime cannot be fetched; what `use` throws.
+   */
+  async run(inputs: Readonly<Record<string, InputValue>>, use: (outputs: RunOutputs) => void): Promise<void> {
+    this.#requireLife();
+    const starting = (this.#live ??= this.#start(inputs));
+    let live: LiveSession;
+    try {
+      live = await starting;
+    } catch (error) {
+      if (this.#live === starting) this.#live = undefined;
+      this.#requireLife();
+      if (error instanceof ContractError) this.#failures = MAX_FAILURES;
+      throw error;
+    }
+    try {
+      await live.run(inputs, (outputs) => {
+        // A lost device writes nothing, and the runtime does not notice.
+        this.#requireLife();
+        use(outputs);
+      });
+      this.#failures = 0;
+    } catch (error) {
+      throw await this.#afterFailure(live, starting, error);
+    }
+  }
+
+  /** Lets go of the runtime's session. */
+  async release(): Promise<void> {
+    this.#isReleased = true;
+    const live = this.#live;
+    this.#live = undefined;
+    await live?.then(
+      (session) => session.release(),
+      () => undefined,
+    );
+  }
+
+  async #start(inputs: Readonly<Record<string, InputValue>>): Promise<LiveSession> {
+    const { model, device } = this;
+    const isLost = (): boolean => this.#isLost;
+    const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;
+    const live = await startSession({ model, device, inputs, isLost, onFallback });
+    this.#kind = live.kind;
+    return live;
+  }
+
+  async #afterFailure(live: LiveSession, starting: Promise<LiveSession>, error: unknown): Promise<unknown> {
+    if (!live.hasFailed) return error;
+    if (this.#live === starting) {
+      this.#live = undefined;
+      this.#failures++;
+      await live.release();
+    }
+    if (this.#isLost) return deviceLost(error);
+    return new ContractError([runFault(this.model, error instanceof Error ? error.message : String(error))]);
+  }
+
+  #requireLife(): void {
+    if (this.#isLost) throw deviceLost(undefined);
+    if (this.#isReleased) throw new DOMException('The generator was closed', 'AbortError');
+    if (this.#failures >= MAX_FAILURES) {
+      throw new ContractError([runFault(this.model, `${MAX_FAILURES} runs in a row that failed`)]);
+    }
+  }
+}
+
+function deviceLost(cause: unknown): GaussianSplatError {
+  return new GaussianSplatError('device-lost/unrecoverable', {
+    where: 'GPU device of the generator',
+    expected: 'a device that stays',
+    found: 'a device that was lost',
+    remedy: 'open the generator again on a new device',
+    cause,
+  });
+}

@@ -1,0 +1,135 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type * as OnnxRuntime from 'onnxruntime-web/webgpu';
+import { fetchBytes } from './fetch-bytes.js';
+
+export type Ort = typeof OnnxRuntime;
+
+/** Longest that one call of the runtime may take, ms. What has not ended by then never will. */
+const CALL_LIMIT_MS = 120_000;
+/** What WebAssembly says when the module's memory can no longer be trusted. */
+const FATAL = /\bAborted\(|unreachable|out of bounds|table index/;
+
+/**
+ * One loaded copy of ONNX Runtime. Its calls must never overlap: two runs at a time never settle, two creations refuse each other
+ * for good. So there is one queue for everything.
+ */
+export class Runtime {
+  readonly ort: Ort;
+  #tail: Promise<unknown> = Promise.resolve();
+  #breakage: unknown;
+
+  constructor(ort: Ort) {
+    this.ort = ort;
+  }
+
+  /** True once this copy cannot be used any more; {@link loadRuntime} then loads another. */
+  get isBroken(): boolean {
+    return this.#breakage !== undefined;
+  }
+
+  /** Runs a task when all earlier ones have ended, however they ended. */
+  exclusive<T>(task: () => Promise<T>): Promise<T> {
+    const result = this.#tail.then(() => this.#guard(task));
+    this.#tail = result.catch(() => undefined);
+    return result;
+  }
+
+  async #guard<T>(task: () => Promise<T>): Promise<T> {
+    if (this.#breakage !== undefined) throw this.#breakage;
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const limit = new Promise<never>((_, reject) => {
+      timer = setTimeout(
+        () => reject((this.#breakage = new Error(`no end within ${CALL_LIMIT_MS} ms`))),
+        CALL_LIMIT_MS,
+      );
+    });
+    try {
+      return await Promise.race([task(), limit]);
+    } catch (error) {
+      if (error instanceof WebAssembly.RuntimeError || FATAL.test(String(error))) this.#breakage = error;
+      throw error;
+    } finally {
+      clearTimeout(timer);
+    }
+  }
+}
+
+let location: string | undefined;
+let loading: Promise<Runtime> | undefined;
+let copies = 0;
+
+/**
+ * Where the files of onnxruntime-web 1.30.0 are (`ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs` and the `.wasm` files that they
+ * name). Default: the folder `onnxruntime/` beside this module, where the CDN build has them.
+ * @param folder absolute, or relative to the page.
+ */
+export function setRuntimeLocation(folder: string | URL): void {
+  const url = new URL(folder, globalThis.location?.href);
+  if (!url.pathname.endsWith('/')) url.pathname += '/';
+  if (url.href !== location) loading = undefined;
+  location = url.href;
+}
+
+/** True once a byte of the runtime has been asked for. */
+export const isRuntimeRequested = (): boolean => loading !== undefined;
+
+/**
+ * The page's copy of ONNX Runtime: fetched when first asked for; the build for browsers that can suspend WebAssembly where they can
+ * (JSPI), else the larger one for all others. Both hold kernels for WebGPU and for the CPU.
+ * @throws GaussianSplatError `network/*` if a file of it cannot be had; asked again, it is fetched again.
+ */
+export async function loadRuntime(): Promise<Runtime> {
+  const current = (loading ??= load());
+  try {
+    const runtime = await current;
+    if (!runtime.isBroken) return runtime;
+  } catch (error) {
+    if (loading === current) loading = undefined;
+    throw error;
+  }
+  if (loading === current) loading = load();
+  return loading;
+}
+
+async function load(): Promise<Runtime> {
+  const folder = location ?? new URL('./onnxruntime/', import.meta.url).href;
+  const build = 'Suspending' in WebAssembly ? 'jspi' : 'asyncify';
+  const script = `${folder}ort.${build === 'jspi' ? 'jspi' : 'webgpu'}.bundle.min.mjs`;
+  // Fetched by us: a copy of the runtime that did not find its WebAssembly never works again.
+  const [ort, wasmBinary] = await Promise.all([
+    importScript(script),
+    fetchBytes(`${folder}ort-wasm-simd-threaded.${build}.wasm`),
+  ]);
+  requireWasm(wasmBinary, folder);
+  // What it has to say comes with its errors, which are passed on.
+  ort.env.logLevel = 'fatal';
+  ort.env.wasm.numThreads = 1;
+  ort.env.wasm.wasmBinary = wasmBinary.buffer;
+  return new Runtime(ort);
+}
+
+/** A module is evaluated once for each address: another copy needs another address. */
+async function importScript(script: string): Promise<Ort> {
+  const address = copies++ === 0 ? script : `${script}?copy=${copies}`;
+  try {
+    return (await import(/* @vite-ignore */ /* webpackIgnore: true */ address)) as Ort;
+  } catch (cause) {
+    throw new GaussianSplatError('network/unreachable', {
+      where: script.slice(0, 200),
+      expected: 'the script of onnxruntime-web 1.30.0',
+      found: (cause as Error)?.message ?? 'nothing',
+      remedy: 'put the files of onnxruntime-web there, or name their folder with setRuntimeLocation',
+      cause,
+    });
+  }
+}
+
+function requireWasm(bytes: Uint8Array, folder: string): void {
+  if (bytes[0] === 0 && bytes[1] === 0x61 && bytes[2] === 0x73 && bytes[3] === 0x6d) return;
+  throw new GaussianSplatError('network/status', {
+    where: folder.slice(0, 200),
+    expected: 'the WebAssembly file of onnxruntime-web 1.30.0',
+    found: 'something else, perhaps a web page',
+    remedy: 'put the files of onnxruntime-web there, or name their folder with setRuntimeLocation',
+  });
+}

@@ -1,0 +1,126 @@
+import {
+  bytesSource,
+  checkContract,
+  ContractError,
+  gaussianLayout,
+  GaussianSplatError,
+  openUrl,
+  readOnnxHeader,
+  resolveContract,
+  sidecarName,
+  type ByteSource,
+  type Contract,
+  type ContractFault,
+  type GaussianLayout,
+  type OnnxHeader,
+  type ResolvedContract,
+  type UrlSource,
+} from '@gaussian-splat/core';
+import { fetchBytes, type FetchOptions } from './fetch-bytes.js';
+
+/** Where a generator is. */
+export interface ModelSource {
+  /** Address of the ONNX file, absolute or relative to the page. */
+  readonly url: string;
+  /** The contract, as JSON text or as the object; default: a file beside the model, then what the model itself carries. */
+  readonly contract?: unknown;
+  readonly credentials?: 'omit' | 'same-origin' | 'include';
+}
+
+/** A generator that keeps its contract, with all of its bytes, and without any runtime. */
+export interface GeneratorModel {
+  readonly url: string;
+  readonly header: OnnxHeader;
+  readonly contract: Contract;
+  readonly layout: GaussianLayout;
+  /** What was inferred for want of a contract, for a warning; sentences without a full stop. */
+  readonly notes: readonly string[];
+  readonly bytes: Uint8Array;
+  /** Files beside the model, by the locations that the model writes. */
+  readonly externalData: readonly { readonly path: string; readonly data: Uint8Array }[];
+}
+
+/**
+ * Fetches a generator and holds it against its contract: first the header, and the weights only of a file that is in order.
+ * @throws ContractError with every fault; GaussianSplatError `decode/*` for a file that is no ONNX model, `decode/unsupported` for one
+ * that cannot run by itself, `network/*`; the reason of the signal.
+ */
+export async function openModel(
+  source: ModelSource,
+  options: Omit<FetchOptions, 'credentials'> = {},
+): Promise<GeneratorModel> {
+  const { credentials = 'same-origin' } = source;
+  const request = { credentials, signal: options.signal };
+  const url = await openUrl(source.url, request);
+  const header = await readOnnxHeader(url);
+  const { contract, notes } = await contractOf(source, header, request);
+  const faults = checkContract(header, contract);
+  if (faults.length > 0) throw new ContractError(faults);
+  const layout = gaussianLayout(header, contract);
+  if (layout === undefined) throw cannotStandAlone(header, 'a post-processor, which writes a picture');
+  requireOwnInputs(header, contract);
+  const externalData = await fetchExternal(source, header, contract, request);
+  const bytes = await wholeFile(url, source.url, { ...request, onProgress: options.onProgress });
+  // What was fetched piece by piece may have been replaced since.
+  await readOnnxHeader(bytesSource(bytes, header.name));
+  return { url: source.url, header, contract, layout, notes, bytes, externalData };
+}
+
+async function contractOf(source: ModelSource, header: OnnxHeader, request: FetchOptions): Promise<ResolvedContract> {
+  const explicit = source.contract;
+  if (explicit !== undefined && explicit !== null) return resolveContract({ header, explicit });
+  if (/^(data|blob):/.test(source.url)) return resolveContract({ header });
+  const bytes = await fetchBytes(sidecarName(source.url), { ...request, mayBeMissing: true });
+  const text = bytes && new TextDecoder().decode(bytes);
+  // Servers of single-page applications answer with their page where there is no file.
+  const sidecar = text === undefined || /^\s*</.test(text) ? undefined : text;
+  return resolveContract({ header, sidecar });
+}
+
+async function fetchExternal(
+  source: ModelSource,
+  header: OnnxHeader,
+  contract: Contract,
+  request: FetchOptions,
+): Promise<GeneratorModel['externalData']> {
+  const files = await Promise.all(
+    header.externalFiles.map(async ({ location: path }) => {
+      const address = new URL(path, new URL(source.url, globalThis.location?.href)).href;
+      return { path, data: await fetchBytes(address, { ...request, mayBeMissing: true }) };
+    }),
+  );
+  const found = files.filter(
+    (file): file is { path: string; data: Uint8Array<ArrayBuffer> } => file.data !== undefined,
+  );
+  const sizes = new Map(found.map(({ path, data }) => [path, data.length]));
+  const faults: ContractFault[] = files.length > 0 ? checkContract(header, contract, { files: sizes }) : [];
+  if (faults.length > 0) throw new ContractError(faults);
+  return found;
+}
+
+/** Reading the header may have fetched all of it already. */
+async function wholeFile(opened: UrlSource & ByteSource, url: string, request: FetchOptions): Promise<Uint8Array> {
+  const { size, chunk, whole } = opened;
+  const known = whole ?? (size <= chunk ? await opened.read(0, size) : undefined);
+  if (known === undefined) return fetchBytes(url, request);
+  request.onProgress?.(known.length, known.length);
+  return known;
+}
+
+function requireOwnInputs(header: OnnxHeader, { inputs }: Contract): void {
+  for (const { name } of header.inputs) {
+    const { role } = inputs[name];
+    if (role === 'gaussians' || role === 'image') {
+      throw cannotStandAlone(header, `input ${name} with the role ${role}, which takes what another model writes`);
+    }
+  }
+}
+
+function cannotStandAlone(header: OnnxHeader, found: string): GaussianSplatError {
+  return new GaussianSplatError('decode/unsupported', {
+    where: header.name,
+    expected: 'a generator that writes Gaussians and needs no other model',
+    found,
+    remedy: 'chains of models are not run yet: export them as one model',
+  });
+}

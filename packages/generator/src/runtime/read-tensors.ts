@@ -1,0 +1,22 @@
+/** The beginning of a buffer: a number of bytes that is a multiple of 4. */
+export interface TensorPart {
+  readonly buffer: GPUBuffer;
+  readonly size: number;
+}
+
+/** Parts of buffers, copied at once and read when the GPU is done. For checks, never for frames. */
+export async function readTensors(device: GPUDevice, parts: readonly TensorPart[]): Promise<Uint8Array[]> {
+  const encoder = device.createCommandEncoder({ label: 'gs.generator.read' });
+  // MAP_READ and COPY_DST.
+  const staging = parts.map(({ size }) =>
+    device.createBuffer({ label: 'gs.generator.read', size: Math.max(4, size), usage: 0x1 | 0x8 }),
+  );
+  parts.forEach(({ buffer, size }, i) => encoder.copyBufferToBuffer(buffer, 0, staging[i], 0, size));
+  device.queue.submit([encoder.finish()]);
+  try {
+    await Promise.all(staging.map((buffer) => buffer.mapAsync(0x1)));
+    return staging.map((buffer) => new Uint8Array(buffer.getMappedRange().slice(0)));
+  } finally {
+    for (const buffer of staging) buffer.destroy();
+  }
+}

@@ -1,0 +1,139 @@
+import { ContractError, type ContractFault } from '@gaussian-splat/core';
+import type { InputValue } from '../bind-inputs.js';
+import { LiveSession, type RunOutputs, type SessionKind } from './live-session.js';
+import { loadRuntime } from './load-runtime.js';
+import type { GeneratorModel } from './open-model.js';
+import { readTensors, type TensorPart } from './read-tensors.js';
+
+/** Bytes of each output in which runs are compared. */
+const COMPARED_BYTES = 65_536;
+
+export interface StartOptions {
+  readonly model: GeneratorModel;
+  readonly device: GPUDevice;
+  /** Inputs of the warm-up. */
+  readonly inputs: Readonly<Record<string, InputValue>>;
+  /** True once the device is lost: then there is nothing left to try. */
+  readonly isLost: () => boolean;
+  /** The model runs, but on the CPU; the reason is for people. */
+  readonly onFallback: (reason: string) => void;
+}
+
+/**
+ * A session that has run, so that everything is compiled: with its GPU commands recorded where model and runtime allow, else with
+ * commands made for every run, else on the CPU.
+ * @throws ContractError `contract/run` if the model runs nowhere; GaussianSplatError `network/*` if the runtime cannot be had.
+ */
+export async function startSession(options: StartOptions): Promise<LiveSession> {
+  const { model, device, isLost, onFallback } = options;
+  const refusals: string[] = [];
+  if (isHalfWithoutFeature(model, device)) {
+    refusals.push('webgpu: its float16 tensors need the device feature shader-f16, which this device does not have');
+  } else {
+    const session = await startOnGpu(options, refusals);
+    if (session) return session;
+  }
+  if (!isLost()) {
+    onFallback(refusals.join('; '));
+    const started = await start('wasm', options, refusals);
+    if (started) return started.session;
+  }
+  throw new ContractError([runFault(model, refusals.join('; ') || 'a lost device')]);
+}
+
+/**
+ * Recorded commands must write what commands made anew write: outputs that are constants, for one, are not written again, and what
+ * stands in their buffers is something else.
+ */
+async function startOnGpu(options: StartOptions, refusals: string[]): Promise<LiveSession | undefined> {
+  const plain = await start('webgpu', options, refusals);
+  if (plain === undefined || !canBeRecorded(options.model)) return plain?.session;
+  // One at a time: both would hold the weights.
+  await plain.session.release();
+  const recorded = await start('captured', options, []);
+  if (recorded && isEqual(recorded.written, plain.written)) {
+    const replayed = await attempt(recorded.session, options, []);
+    if (replayed && isEqual(replayed, plain.written)) return recorded.session;
+  }
+  await recorded?.session.release();
+  return (await start('webgpu', options, refusals))?.session;
+}
+
+/** A fault of the runtime, in our words. */
+export function runFault({ header }: GeneratorModel, found: string): ContractFault {
+  return {
+    code: 'contract/run',
+    where: header.name,
+    expected: 'a model that ONNX Runtime runs',
+    found: found.slice(0, 1000),
+    remedy: 'run it in a shell (npm run check -- MODEL --run), and mend or simplify what the runtime refuses',
+  };
+}
+
+function isHalfWithoutFeature({ header, layout }: GeneratorModel, device: GPUDevice): boolean {
+  const isHalf = layout.dtype === 'float16' || header.inputs.some(({ dtype }) => dtype === 'float16');
+  return isHalf && !device.features.has('shader-f16');
+}
+
+/** Commands can be recorded only for fixed shapes and with all inputs on the GPU, where there are no 64-bit integers. */
+function canBeRecorded({ header }: GeneratorModel): boolean {
+  const isFixed = [...header.inputs, ...header.outputs].every(({ dims }) =>
+    dims?.every((dim) => typeof dim === 'number'),
+  );
+  return isFixed && header.inputs.every(({ dtype }) => dtype !== 'int64');
+}
+
+interface Started {
+  readonly session: LiveSession;
+  /** The first bytes of each output of its first run. */
+  readonly written: readonly Uint8Array[];
+}
+
+async function start(kind: SessionKind, options: StartOptions, refusals: string[]): Promise<Started | undefined> {
+  const { model, device } = options;
+  const runtime = await loadRuntime();
+  let session: LiveSession;
+  try {
+    session = await LiveSession.create(kind, runtime, model, device);
+  } catch (error) {
+    refusals.push(`${kind}: ${messageOf(error)}`);
+    return undefined;
+  }
+  const written = await attempt(session, options, refusals);
+  if (written) return { session, written };
+  await session.release();
+  return undefined;
+}
+
+/** One run, and the first bytes of what it wrote; undefined if it fails. */
+async function attempt(
+  session: LiveSession,
+  { device, inputs, model }: StartOptions,
+  refusals: string[],
+): Promise<Uint8Array[] | undefined> {
+  let reading: Promise<Uint8Array[]> = Promise.resolve([]);
+  try {
+    await session.run(inputs, (outputs) => {
+      reading = readTensors(device, writtenParts(model, outputs));
+    });
+    return await reading;
+  } catch (error) {
+    refusals.push(`${session.kind}: ${messageOf(error)}`);
+    return undefined;
+  }
+}
+
+const messageOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
+
+/** What a run has written of each buffer, or the beginning of it; what lies behind is anybody's. */
+function writtenParts({ layout }: GeneratorModel, { tensors, rows }: RunOutputs): TensorPart[] {
+  const elementBytes = layout.dtype === 'float16' ? 2 : 4;
+  return Object.entries(tensors).map(([name, buffer]) => {
+    const slice = layout.attributes.find(({ tensor }) => tensor === name);
+    const size = slice ? rows * slice.rowStride * elementBytes : 4;
+    return { buffer, size: Math.min(COMPARED_BYTES, size - (size % 4)) };
+  });
+}
+
+const isEqual = (a: readonly Uint8Array[], b: readonly Uint8Array[]): boolean =>
+  a.every((bytes, i) => bytes.length === b[i].length && bytes.every((byte, k) => byte === b[i][k]));

@@ -1,0 +1,217 @@
+import {
+  boundsOf,
+  GaussianSplatError,
+  type Bounds,
+  type GaussianLayout,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
+import { pageCapacity } from './gaussian-buffers.js';
+import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+import { layouts } from './generated/shaders.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
+import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { writeStruct } from './gpu/struct.js';
+import { CHUNK_NUMBERS } from './pack/chunks.js';
+import { GEOMETRY_WORDS } from './pack/pack.js';
+import { shWords } from './pack/sh.js';
+import { readPlaces } from './read-places.js';
+import { IngestStage } from './stages/ingest.js';
+import { cullGroups } from './stages/cull.js';
+import { ingestValues, TensorPlaces } from './tensor-places.js';
+
+export interface DynamicGaussiansOptions {
+  /** True if the model was trained with opacity compensation for the dilation. Default false. */
+  readonly antialiased?: boolean;
+}
+
+const ORIGIN: Vector3 = [0, 0, 0];
+/** Sets of tensors whose bindings are kept: a generator's outputs go around in few buffers. */
+const MAX_BINDINGS = 8;
+
+/** A page with what only its filling needs. */
+interface DynamicPage extends GaussianPage {
+  /** Number of its first row among all rows. */
+  readonly first: number;
+  /** `Ingest` of shaders/ingest.wgsl. */
+  readonly uniform: GPUBuffer;
+}
+
+/**
+ * Gaussians that a generator writes anew as often as it likes, on the GPU from end to end.
+ *
+ * ```ts
+ * const gaussians = await DynamicGaussians.create(device, gaussianLayout(header, contract));
+ * gaussians.ingest({ gaussians: tensorBuffer }, rows); // after every run
+ * renderer.render({ gaussians, camera, target: texture });
+ * ```
+ *
+ * The tensors of a run are one copy of the Gaussians, the packed pages that are drawn the other. {@link ingest} goes from one to
+ * the other in a single submission, so that a frame shows all of one run or all of another, however long the next run takes.
+ */
+export class DynamicGaussians implements GaussianScene {
+  /** Rows for which there is room. */
+  readonly count: number;
+  readonly shDegree: ShDegree;
+  readonly shPrecision = 'float16';
+  readonly antialiased: boolean;
+  readonly origin = ORIGIN;
+  readonly pages: readonly DynamicPage[];
+  readonly layout: GaussianLayout;
+  readonly #device: GPUDevice;
+  readonly #stage: IngestStage;
+  readonly #memory: GpuMemory;
+  readonly #places: TensorPlaces;
+  readonly #bindings = new Map<string, readonly GPUBindGroup[]>();
+  #version = 0;
+  #rows = -1;
+
+  private constructor(device: GPUDevice, layout: GaussianLayout, { antialiased = false }: DynamicGaussiansOptions) {
+    this.#device = device;
+    this.layout = layout;
+    this.count = layout.capacity;
+    this.shDegree = layout.shDegree ?? 0;
+    this.antialiased = antialiased;
+    this.#stage = new IngestStage(device);
+    this.#memory = new GpuMemory(device);
+    try {
+      this.#places = new TensorPlaces(layout, this.#memory);
+      this.pages = this.#makePages();
+    } catch (error) {
+      this.#memory.destroy();
+      throw error;
+    }
+    // Until the first run there is nothing to see.
+    this.ingest({}, 0);
+  }
+
+  /**
+   * Allocates room for what a generator can write at most.
+   * @param layout as core's `gaussianLayout` finds it
+   * @throws GaussianSplatError `out-of-memory/allocation` if the device has no room.
+   */
+  static create(
+    device: GPUDevice,
+    layout: GaussianLayout,
+    options: DynamicGaussiansOptions = {},
+  ): Promise<DynamicGaussians> {
+    const what = `generated scene of up to ${layout.capacity} splats`;
+    return withMemoryCheck(device, what, () => new DynamicGaussians(device, layout, options));
+  }
+
+  /** Number of runs taken in so far, and one. */
+  get version(): number {
+    return this.#version;
+  }
+
+  /** Bytes of GPU memory held; the tensors belong to the generator. */
+  get byteLength(): number {
+    return this.#memory.byteLength;
+  }
+
+  /**
+   * Takes over what a run wrote: encodes and submits one compute pass; nothing is read back, and once a set of buffers has been
+   * seen nothing is created. The tensors may be overwritten by anything submitted afterwards.
+   *
+   * Rows from the live count on, and rows with numbers that cannot be used, are not drawn.
+   * @param tensors storage buffers by the names of the layout's tensors; that of the count needs COPY_SRC. Sizes of float16 tensors
+   * are rounded up to 4 bytes.
+   * @param rows number of rows that this run wrote, 0 to the layout's capacity. With 0 no tensor is needed.
+   * @throws GaussianSplatError `contract/rows` if there are more rows than capacity; `argument/value` for a tensor that is missing or
+   * too small. What was shown before stays.
+   */
+  ingest(tensors: Readonly<Record<string, GPUBuffer>>, rows: number): void {
+    requireRows(rows, this.count);
+    const counter = rows > 0 && this.layout.count !== undefined ? tensors[this.layout.count] : undefined;
+    this.#places.check(tensors, rows);
+    const bindings = this.#bindingsOf(rows > 0 ? tensors : {});
+    this.#writeRows(rows);
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.ingest' });
+    if (counter) {
+      const { offset } = layouts.Ingest.fields.count;
+      for (const { uniform } of this.pages) encoder.copyBufferToBuffer(counter, 0, uniform, offset, 4);
+    }
+    const pass = encoder.beginComputePass({ label: 'gs.ingest' });
+    this.pages.forEach(({ count }, page) => this.#stage.record(pass, bindings[page], count));
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+    this.#version++;
+  }
+
+  /**
+   * Where the splats are, from a sample of up to 65,536 of them. Reads back from the GPU: for framing a camera once, not for
+   * every frame.
+   */
+  async readBounds(): Promise<Bounds> {
+    return boundsOf({ ...(await readPlaces(this.#device, this.pages)), origin: this.origin });
+  }
+
+  destroy(): void {
+    this.#bindings.clear();
+    this.#memory.destroy();
+  }
+
+  #makePages(): DynamicPage[] {
+    const shStride = shWords(this.shDegree, this.shPrecision);
+    const capacity = pageCapacity(this.#device, Math.max(4 * GEOMETRY_WORDS, 4 * shStride, this.#places.bytesPerRow));
+    const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
+    const pages: DynamicPage[] = [];
+    for (let first = 0; first < this.count; first += capacity) {
+      const count = Math.min(capacity, this.count - first);
+      const part = (name: string, words: number): GPUBuffer =>
+        this.#memory.buffer(`gs.ingest.${name}`, 4 * words, storage | copySource);
+      const page = {
+        first,
+        count,
+        geometry: part('geometry', GEOMETRY_WORDS * count),
+        sh: part('sh', shStride * count),
+        chunks: part('chunks', CHUNK_NUMBERS * cullGroups(count)),
+        uniform: this.#memory.buffer('gs.ingest.uniform', layouts.Ingest.size, uniform | copyDestination),
+      };
+      const bytes = new ArrayBuffer(layouts.Ingest.size);
+      writeStruct(layouts.Ingest, ingestValues(this.layout, first, count), bytes);
+      this.#device.queue.writeBuffer(page.uniform, 0, bytes);
+      pages.push(page);
+    }
+    return pages;
+  }
+
+  /** Without a count tensor all rows live. */
+  #writeRows(rows: number): void {
+    if (rows === this.#rows) return;
+    this.#rows = rows;
+    const { count, rows: rowsField } = layouts.Ingest.fields;
+    if (rowsField.offset !== count.offset + 4) throw new Error('Ingest: rows must follow count');
+    const words = Uint32Array.of(rows, rows);
+    for (const { uniform } of this.pages) this.#device.queue.writeBuffer(uniform, count.offset, words);
+  }
+
+  #bindingsOf(tensors: Readonly<Record<string, GPUBuffer>>): readonly GPUBindGroup[] {
+    const key = this.#places.keyOf(tensors);
+    let bindings = this.#bindings.get(key);
+    if (bindings === undefined) {
+      if (this.#bindings.size >= MAX_BINDINGS) this.#bindings.clear();
+      bindings = this.pages.map((page) =>
+        this.#stage.bind({
+          ...this.#places.resources(tensors, page),
+          ingest: page.uniform,
+          gaussians: page.geometry,
+          sh: page.sh,
+          chunks: page.chunks,
+        }),
+      );
+      this.#bindings.set(key, bindings);
+    }
+    return bindings;
+  }
+}
+
+function requireRows(rows: number, capacity: number): void {
+  if (Number.isInteger(rows) && rows >= 0 && rows <= capacity) return;
+  throw new GaussianSplatError('contract/rows', {
+    where: 'a run of the generator',
+    expected: `0 to ${capacity} rows, as the file or nMax of its contract says`,
+    found: `${rows}`,
+    remedy: 'raise nMax in the contract to the most rows that a run writes',
+  });
+}

@@ -1,0 +1,31 @@
+import type { ShDegree, Vector3 } from '@gaussian-splat/core';
+import type { ShPrecision } from './pack/sh.js';
+
+/** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
+export interface GaussianPage {
+  readonly count: number;
+  /** array<PackedGaussian> */
+  readonly geometry: GPUBuffer;
+  /** array<vec2u>: spherical harmonics, see pack/sh.ts */
+  readonly sh: GPUBuffer;
+  /** array<Chunk>: bounds of each 256 splats */
+  readonly chunks: GPUBuffer;
+}
+
+/**
+ * What a {@link Renderer} draws: Gaussians on the GPU. `GaussianBuffers` holds those of a file, `DynamicGaussians` those that a
+ * generator writes. Everything but the content of the buffers stays the same for as long as the scene lives.
+ */
+export interface GaussianScene {
+  /** Splats for which there is room; all of them are drawn, but for those that paint nothing. */
+  readonly count: number;
+  readonly shDegree: ShDegree;
+  readonly shPrecision: ShPrecision;
+  /** True if the scene was trained with opacity compensation; the renderer follows. */
+  readonly antialiased: boolean;
+  /** World position, in float64, that the positions on the GPU are relative to. */
+  readonly origin: Vector3;
+  readonly pages: readonly GaussianPage[];
+  /** Grows whenever the content of the buffers changes; 0 for a scene that never does. */
+  readonly version: number;
+}

@@ -1,0 +1,68 @@
+import { constants } from './generated/shaders.js';
+import type { GaussianPage } from './gaussian-scene.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
+import { GEOMETRY_WORDS } from './pack/pack.js';
+
+/** Runs of 256 splats that are read at most. */
+const MAX_RUNS = 256;
+const { CULL_GROUP } = constants;
+const RUN_BYTES = 4 * GEOMETRY_WORDS * CULL_GROUP;
+
+/** Centres and opacities of splats. */
+export interface Places {
+  readonly count: number;
+  /** [N, 3] relative to the origin of the scene */
+  readonly positions: Float32Array;
+  /** [N] */
+  readonly opacities: Float32Array;
+}
+
+/** Reads runs of splats that are evenly spread over the pages back from the GPU; splats of opacity 0 are left out. */
+export async function readPlaces(device: GPUDevice, pages: readonly GaussianPage[]): Promise<Places> {
+  const runs = pages.flatMap(({ geometry, count }) =>
+    Array.from({ length: Math.ceil(count / CULL_GROUP) }, (_, run) => ({
+      geometry,
+      offset: run * RUN_BYTES,
+      size: 4 * GEOMETRY_WORDS * Math.min(CULL_GROUP, count - run * CULL_GROUP),
+    })),
+  );
+  const step = Math.max(1, Math.ceil(runs.length / MAX_RUNS));
+  const sample = runs.filter((_, i) => i % step === 0);
+  const staging = device.createBuffer({
+    label: 'gs.places',
+    size: Math.max(4, RUN_BYTES * sample.length),
+    usage: BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination,
+  });
+  try {
+    const encoder = device.createCommandEncoder({ label: 'gs.places' });
+    sample.forEach(({ geometry, offset, size }, i) =>
+      encoder.copyBufferToBuffer(geometry, offset, staging, i * RUN_BYTES, size),
+    );
+    device.queue.submit([encoder.finish()]);
+    await staging.mapAsync(0x1);
+    return visiblePlaces(new Uint32Array(staging.getMappedRange()));
+  } finally {
+    staging.destroy();
+  }
+}
+
+function visiblePlaces(words: Uint32Array): Places {
+  const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
+  const [positions, opacities] = [[] as number[], [] as number[]];
+  for (let at = 0; at + GEOMETRY_WORDS <= words.length; at += GEOMETRY_WORDS) {
+    const opacity = opacityOf(words, at);
+    if (!(opacity > 0)) continue;
+    positions.push(floats[at], floats[at + 1], floats[at + 2]);
+    opacities.push(opacity);
+  }
+  return { count: opacities.length, positions: Float32Array.from(positions), opacities: Float32Array.from(opacities) };
+}
+
+const float = new Float32Array(1);
+const bits = new Uint32Array(float.buffer);
+
+/** As `unpack_gaussian` of shaders/shared/gaussian.wgsl puts it together. */
+function opacityOf(words: Uint32Array, at: number): number {
+  bits[0] = (words[at + 5] << 24) | ((words[at + 6] & 0x3ff) << 14) | ((words[at + 7] & 0x3ff) << 4);
+  return float[0];
+}

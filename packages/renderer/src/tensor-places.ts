@@ -1,0 +1,159 @@
+import {
+  GaussianSplatError,
+  type AttributeSlice,
+  type GaussianAttribute,
+  type GaussianLayout,
+} from '@gaussian-splat/core';
+import { constants, type layouts } from './generated/shaders.js';
+import { BUFFER_USAGE, type Resource } from './gpu/kernel.js';
+import type { GpuMemory } from './gpu/memory.js';
+import type { StructValues } from './gpu/struct.js';
+
+/** Bindings of shaders/ingest.wgsl, and the attributes that each can hold; rotations may be missing. */
+const BINDINGS = {
+  positions: ['positions'],
+  shapes: ['covariances', 'scales'],
+  rotations: ['rotations'],
+  colors: ['colors', 'sh'],
+  opacities: ['opacities'],
+} as const satisfies Record<string, readonly GaussianAttribute[]>;
+
+type Binding = keyof typeof BINDINGS;
+const BINDING_NAMES = Object.keys(BINDINGS) as Binding[];
+
+/** Rows of a tensor that belong to a page. */
+interface RowRange {
+  readonly first: number;
+  readonly count: number;
+}
+
+/** Finds the parts of a generator's tensors that the bindings of `ingest` take. */
+export class TensorPlaces {
+  readonly #layout: GaussianLayout;
+  readonly #elementBytes: number;
+  readonly #slices: Readonly<Record<Binding, AttributeSlice | undefined>>;
+  /** Stands where there is no tensor. */
+  readonly #nothing: GPUBuffer;
+  readonly #numbers = new WeakMap<GPUBuffer, number>();
+  #lastNumber = 0;
+
+  constructor(layout: GaussianLayout, memory: GpuMemory) {
+    this.#layout = layout;
+    this.#elementBytes = layout.dtype === 'float16' ? 2 : 4;
+    this.#slices = slicesOf(layout);
+    this.#nothing = memory.buffer('gs.ingest.nothing', 4, BUFFER_USAGE.storage);
+  }
+
+  /** Of the widest tensor. */
+  get bytesPerRow(): number {
+    return this.#elementBytes * Math.max(...this.#layout.attributes.map(({ rowStride }) => rowStride));
+  }
+
+  /** @throws GaussianSplatError `argument/value` unless every tensor is there and large enough. */
+  check(tensors: Readonly<Record<string, GPUBuffer>>, rows: number): void {
+    if (rows === 0) return;
+    for (const { tensor, rowStride } of this.#layout.attributes) {
+      const least = Math.ceil((rows * rowStride * this.#elementBytes) / 4) * 4;
+      requireBytes(tensor, tensors[tensor], least);
+    }
+    if (this.#layout.count !== undefined) requireBytes(this.#layout.count, tensors[this.#layout.count], 4);
+  }
+
+  /** The same text for the same buffers. */
+  keyOf(tensors: Readonly<Record<string, GPUBuffer>>): string {
+    let key = '';
+    for (const name of BINDING_NAMES) {
+      const slice = this.#slices[name];
+      const buffer = slice && tensors[slice.tensor];
+      key += `${buffer ? this.#numberOf(buffer) : 0} `;
+    }
+    return key;
+  }
+
+  /** What the bindings of a page take. Where a run wrote fewer rows than come before the page there is nothing. */
+  resources(tensors: Readonly<Record<string, GPUBuffer>>, { first, count }: RowRange): Record<Binding, Resource> {
+    const resourceOf = (name: Binding): Resource => {
+      const slice = this.#slices[name];
+      const buffer = slice && tensors[slice.tensor];
+      if (slice === undefined || buffer === undefined) return this.#nothing;
+      const rowBytes = slice.rowStride * this.#elementBytes;
+      const size = Math.min(
+        Math.ceil((count * rowBytes) / 4) * 4,
+        Math.floor((buffer.size - first * rowBytes) / 4) * 4,
+      );
+      return size <= 0 ? this.#nothing : { buffer, offset: first * rowBytes, size };
+    };
+    return {
+      positions: resourceOf('positions'),
+      shapes: resourceOf('shapes'),
+      rotations: resourceOf('rotations'),
+      colors: resourceOf('colors'),
+      opacities: resourceOf('opacities'),
+    };
+  }
+
+  #numberOf(buffer: GPUBuffer): number {
+    let number = this.#numbers.get(buffer);
+    if (number === undefined) this.#numbers.set(buffer, (number = ++this.#lastNumber));
+    return number;
+  }
+}
+
+/** `Ingest` of a page, before any run. */
+export function ingestValues(
+  layout: GaussianLayout,
+  first: number,
+  count: number,
+): StructValues<typeof layouts.Ingest> {
+  const slices = slicesOf(layout);
+  const place = (name: Binding): number[] => [slices[name]?.offset ?? 0, slices[name]?.rowStride ?? 0];
+  return {
+    count: 0,
+    rows: 0,
+    page_rows: count,
+    first_row: first,
+    is_half: layout.dtype === 'float16' ? 1 : 0,
+    shape_kind: shapeKind(slices.shapes),
+    color_kind: colorKind(slices.colors),
+    sh_degree: layout.shDegree ?? 0,
+    is_w_first: slices.rotations?.quaternionOrder === 'wxyz' ? 1 : 0,
+    is_logit: slices.opacities?.activation === 'logit' ? 1 : 0,
+    positions: place('positions'),
+    shapes: place('shapes'),
+    rotations: place('rotations'),
+    colors: place('colors'),
+    opacities: place('opacities'),
+  };
+}
+
+function slicesOf({ attributes }: GaussianLayout): Record<Binding, AttributeSlice | undefined> {
+  const find = (names: readonly GaussianAttribute[]): AttributeSlice | undefined =>
+    attributes.find(({ attribute }) => names.includes(attribute));
+  return {
+    positions: find(BINDINGS.positions),
+    shapes: find(BINDINGS.shapes),
+    rotations: find(BINDINGS.rotations),
+    colors: find(BINDINGS.colors),
+    opacities: find(BINDINGS.opacities),
+  };
+}
+
+function shapeKind(slice: AttributeSlice | undefined): number {
+  if (slice?.attribute === 'covariances') return constants.SHAPE_COVARIANCE;
+  return slice?.activation === 'log' ? constants.SHAPE_LOG_SCALE : constants.SHAPE_SCALE;
+}
+
+function colorKind(slice: AttributeSlice | undefined): number {
+  if (slice?.attribute !== 'sh') return constants.COLOR_RGB;
+  return slice.shOrder === 'channel-major' ? constants.COLOR_CHANNEL_MAJOR : constants.COLOR_COEFFICIENT_MAJOR;
+}
+
+function requireBytes(name: string, buffer: GPUBuffer | undefined, least: number): void {
+  if (buffer !== undefined && buffer.size >= least) return;
+  throw new GaussianSplatError('argument/value', {
+    where: `tensor ${name}`,
+    expected: `a storage buffer of at least ${least} bytes`,
+    found: buffer === undefined ? 'none' : `${buffer.size} bytes`,
+    remedy: 'pass the buffers that the run wrote, and the number of rows that it wrote',
+  });
+}

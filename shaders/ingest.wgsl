@@ -1,0 +1,300 @@
+// Turns the tensors that one run of a generator wrote into a page of packed Gaussians: one thread for each row, and one
+// workgroup for each chunk, whose bounds it finds. Rows that do not live become splats that paint nothing; rows with a number
+// that cannot be used become zeros, which `cull` counts as unusable.
+#import shared/gaussian
+#import shared/sh
+#import shared/falloff
+#import shared/chunk
+#import shared/group
+
+struct Ingest {
+  // Rows that live in this run, as the generator counts them; any number may stand here.
+  count: i32,
+  // Rows that the tensors have in this run.
+  rows: u32,
+  // Rows for which the page has room, and the number of its first among all rows.
+  page_rows: u32,
+  first_row: u32,
+  // 1 for float16 tensors, which are read as integers: no device feature is needed.
+  is_half: u32,
+  // What `shape` holds: one of SHAPE_*.
+  shape_kind: u32,
+  // What `colors` holds: one of COLOR_*.
+  color_kind: u32,
+  sh_degree: u32,
+  // 1 for quaternions in the order w, x, y, z; 0 for x, y, z, w.
+  is_w_first: u32,
+  // 1 for opacities before the sigmoid.
+  is_logit: u32,
+  // Where each attribute lies: elements before it in a row, and elements of a row.
+  positions: vec2u,
+  shapes: vec2u,
+  rotations: vec2u,
+  colors: vec2u,
+  opacities: vec2u,
+}
+
+const SHAPE_COVARIANCE = 0u;
+const SHAPE_SCALE = 1u;
+const SHAPE_LOG_SCALE = 2u;
+const COLOR_RGB = 0u;
+const COLOR_COEFFICIENT_MAJOR = 1u;
+const COLOR_CHANNEL_MAJOR = 2u;
+
+@group(0) @binding(0) var<uniform> ingest: Ingest;
+// The tensors' parts that belong to the page, as 32-bit words. One tensor may stand in several places.
+@group(0) @binding(1) var<storage, read> positions: array<u32>;
+// Covariances, or scales.
+@group(0) @binding(2) var<storage, read> shapes: array<u32>;
+@group(0) @binding(3) var<storage, read> rotations: array<u32>;
+// Red, green, blue, or spherical harmonics.
+@group(0) @binding(4) var<storage, read> colors: array<u32>;
+@group(0) @binding(5) var<storage, read> opacities: array<u32>;
+@group(0) @binding(6) var<storage, read_write> gaussians: array<PackedGaussian>;
+@group(0) @binding(7) var<storage, read_write> sh: array<vec2u>;
+@group(0) @binding(8) var<storage, read_write> chunks: array<Chunk>;
+
+const POSITIONS = 0u;
+const SHAPES = 1u;
+const ROTATIONS = 2u;
+const COLORS = 3u;
+const OPACITIES = 4u;
+
+const HALF_MAX = 65504.0;
+// Larger than any coordinate that can be drawn; WGSL knows no infinity.
+const BEYOND = 1e30;
+const LARGEST_LOG = 88.0;
+
+fn tensor_word(tensor: u32, word: u32) -> u32 {
+  switch tensor {
+    case POSITIONS: { return positions[word]; }
+    case SHAPES: { return shapes[word]; }
+    case ROTATIONS: { return rotations[word]; }
+    case COLORS: { return colors[word]; }
+    default: { return opacities[word]; }
+  }
+}
+
+// The float32 bits of a float16, subnormal numbers, infinities and NaN included: `unpack2x16float` may lose all three.
+fn widen(half: u32) -> u32 {
+  let sign = (half & 0x8000u) << 16u;
+  let magnitude = half & 0x7fffu;
+  if (magnitude >= 0x7c00u) { return sign | EXPONENT_BITS | ((magnitude & 0x3ffu) << 13u); }
+  if (magnitude < 0x0400u) { return sign | bitcast<u32>(f32(magnitude) * 5.960464477539063e-8); }
+  return sign | ((magnitude << 13u) + 0x38000000u);
+}
+
+// Bits of element `component` of an attribute of a row.
+fn bits_of(tensor: u32, slice: vec2u, row: u32, component: u32) -> u32 {
+  let at = row * slice.y + slice.x + component;
+  if (ingest.is_half == 0u) { return tensor_word(tensor, at); }
+  return widen((tensor_word(tensor, at / 2u) >> (16u * (at & 1u))) & 0xffffu);
+}
+
+fn triple_of(tensor: u32, slice: vec2u, row: u32, component: u32) -> vec3u {
+  return vec3u(
+    bits_of(tensor, slice, row, component), bits_of(tensor, slice, row, component + 1u), bits_of(tensor, slice, row, component + 2u),
+  );
+}
+
+fn are_finite(words: vec3u) -> bool {
+  return has_finite_bits(vec4u(words, 0u));
+}
+
+// Lower triangular root of a covariance, Σ = L Lᵀ.
+struct Factor {
+  // xx, yx, zx; yy, zy; zz
+  x: vec3f,
+  y: vec2f,
+  z: f32,
+  usable: bool,
+}
+
+fn no_factor() -> Factor {
+  return Factor(vec3f(0.0), vec2f(0.0), 0.0, false);
+}
+
+fn ratio(a: f32, b: f32) -> f32 {
+  if (b > 0.0) { return a / b; }
+  return 0.0;
+}
+
+// Cholesky's factor. Needles and discs have pivots that are mere rounding, or even negative: no number may then exceed what the
+// diagonal allows, so that L Lᵀ keeps the diagonal and is off by no more than the rounding was.
+fn factor_of_covariance(row: u32) -> Factor {
+  let first = triple_of(SHAPES, ingest.shapes, row, 0u);
+  let last = triple_of(SHAPES, ingest.shapes, row, 3u);
+  if (!are_finite(first) || !are_finite(last)) { return no_factor(); }
+  let a = bitcast<vec3f>(first);
+  let b = bitcast<vec3f>(last);
+  let variances = max(vec3f(a.x, b.x, b.z), vec3f(0.0));
+  let sigmas = sqrt(variances);
+  let xx = sigmas.x;
+  let yx = clamp(ratio(a.y, xx), -sigmas.y, sigmas.y);
+  let zx = clamp(ratio(a.z, xx), -sigmas.z, sigmas.z);
+  let yy = sqrt(max(variances.y - yx * yx, 0.0));
+  let rest = max(variances.z - zx * zx, 0.0);
+  let room = sqrt(rest);
+  let zy = clamp(ratio(b.y - zx * yx, yy), -room, room);
+  return Factor(vec3f(xx, yx, zx), vec2f(yy, zy), sqrt(max(rest - zy * zy, 0.0)), true);
+}
+
+// The same from the axes themselves: the rows of R S made orthogonal one after the other, as pack/factor.ts of the renderer does
+// it, so that needles keep the digits that a covariance would lose.
+fn factor_of_axes(row: u32) -> Factor {
+  let scale_bits = triple_of(SHAPES, ingest.shapes, row, 0u);
+  let is_log = ingest.shape_kind == SHAPE_LOG_SCALE;
+  // The logarithm of a scale of 0 is -infinity.
+  let is_flat = (scale_bits == vec3u(0xff800000u)) & vec3<bool>(is_log);
+  if (!are_finite(select(scale_bits, vec3u(0u), is_flat))) { return no_factor(); }
+  let written = bitcast<vec3f>(select(scale_bits, vec3u(0u), is_flat));
+  let scales = select(select(written, exp(min(written, vec3f(LARGEST_LOG))), is_log), vec3f(0.0), is_flat);
+  let head = triple_of(ROTATIONS, ingest.rotations, row, 0u);
+  let tail = bits_of(ROTATIONS, ingest.rotations, row, 3u);
+  if (!has_finite_bits(vec4u(head, tail)) || any(scales < vec3f(0.0))) { return no_factor(); }
+  var q = bitcast<vec4f>(vec4u(head, tail));
+  if (ingest.is_w_first != 0u) { q = q.yzwx; }
+  // Divided by the largest first: squares of tiny or huge components would leave float32's range.
+  let largest = max(max(abs(q.x), abs(q.y)), max(abs(q.z), abs(q.w)));
+  if (largest <= 0.0) { return no_factor(); }
+  q /= largest;
+  q /= sqrt(dot(q, q));
+  let twice = 2.0 * q.xyz;
+  let a = vec3f(1.0 - twice.y * q.y - twice.z * q.z, twice.x * q.y - twice.z * q.w, twice.x * q.z + twice.y * q.w) * scales;
+  var b = vec3f(twice.x * q.y + twice.z * q.w, 1.0 - twice.x * q.x - twice.z * q.z, twice.y * q.z - twice.x * q.w) * scales;
+  var c = vec3f(twice.x * q.z - twice.y * q.w, twice.y * q.z + twice.x * q.w, 1.0 - twice.x * q.x - twice.y * q.y) * scales;
+  let xx = length(a);
+  // A row of length 0 is orthogonal to everything.
+  let x = vec3f(ratio(a.x, xx), ratio(a.y, xx), ratio(a.z, xx));
+  let yx = dot(x, b);
+  let zx = dot(x, c);
+  b -= yx * x;
+  c -= zx * x;
+  let yy = length(b);
+  let y = vec3f(ratio(b.x, yy), ratio(b.y, yy), ratio(b.z, yy));
+  let zy = dot(y, c);
+  return Factor(vec3f(xx, yx, zx), vec2f(yy, zy), length(c - zy * y), true);
+}
+
+struct Opacity {
+  value: f32,
+  usable: bool,
+}
+
+fn opacity_of(row: u32) -> Opacity {
+  let written = bits_of(OPACITIES, ingest.opacities, row, 0u);
+  let is_finite = (written & EXPONENT_BITS) != EXPONENT_BITS;
+  if (ingest.is_logit == 0u) { return Opacity(clamp(bitcast<f32>(select(0u, written, is_finite)), 0.0, 1.0), is_finite); }
+  // Infinite logits are opacities of exactly 0 and 1.
+  if (!is_finite) { return Opacity(select(1.0, 0.0, written == 0xff800000u), (written & 0x007fffffu) == 0u); }
+  let logit = clamp(bitcast<f32>(written), -LARGEST_LOG, LARGEST_LOG);
+  return Opacity(1.0 / (1.0 + exp(-logit)), true);
+}
+
+// The highest bits of a float32, to the nearest: those that PackedGaussian keeps.
+fn high_22(value: f32) -> u32 { return (bitcast<u32>(value) + 0x200u) >> 10u; }
+
+// 28 of them, on the same side of 1/255 as the opacity: splats below it are not drawn.
+fn high_28(opacity: f32) -> u32 {
+  let first_visible = (bitcast<u32>(ALPHA_MIN) + 15u) >> 4u;
+  let nearest = (bitcast<u32>(opacity) + 8u) >> 4u;
+  return select(min(nearest, first_visible - 1u), max(nearest, first_visible), opacity >= ALPHA_MIN);
+}
+
+fn pack_gaussian(position: vec3u, f: Factor, opacity: f32) -> PackedGaussian {
+  let last = high_22(f.z);
+  let visible = high_28(opacity);
+  return PackedGaussian(
+    vec4u(position, (high_22(f.x.x) << 10u) | (last >> 12u)),
+    vec4u(
+      (high_22(f.x.y) << 10u) | ((last >> 2u) & 0x3ffu),
+      (high_22(f.y.x) << 10u) | ((last & 3u) << 8u) | (visible >> 20u),
+      (high_22(f.x.z) << 10u) | ((visible >> 10u) & 0x3ffu),
+      (high_22(f.y.y) << 10u) | (visible & 0x3ffu),
+    ),
+  );
+}
+
+// Bits of number k of a row's harmonics in the order [coefficient][channel].
+fn harmonic(row: u32, k: u32, coefficients: u32) -> u32 {
+  switch ingest.color_kind {
+    case COLOR_RGB: {
+      let written = bits_of(COLORS, ingest.colors, row, k);
+      if ((written & EXPONENT_BITS) == EXPONENT_BITS) { return written; }
+      return bitcast<u32>((bitcast<f32>(written) - 0.5) / SH_C0);
+    }
+    case COLOR_COEFFICIENT_MAJOR: { return bits_of(COLORS, ingest.colors, row, k); }
+    default: { return bits_of(COLORS, ingest.colors, row, (k % 3u) * coefficients + k / 3u); }
+  }
+}
+
+// Packs the harmonics of a row as float16; false if one of them is not finite.
+fn pack_harmonics(row: u32) -> bool {
+  let coefficients = (ingest.sh_degree + 1u) * (ingest.sh_degree + 1u);
+  let words = sh_stride(ingest.sh_degree, SH_FLOAT16);
+  var usable = true;
+  for (var word = 0u; word < words; word++) {
+    var numbers = vec4u(0u);
+    for (var k = 0u; k < 4u; k++) {
+      if (4u * word + k < 3u * coefficients) { numbers[k] = harmonic(row, 4u * word + k, coefficients); }
+    }
+    usable = usable && has_finite_bits(numbers);
+    let values = clamp(bitcast<vec4f>(select(vec4u(0u), numbers, has_finite_bits(numbers))), vec4f(-HALF_MAX), vec4f(HALF_MAX));
+    sh[row * words + word] = vec2u(pack2x16float(values.xy), pack2x16float(values.zw));
+  }
+  return usable;
+}
+
+// Lowest corner and minus the reach; highest corner.
+var<workgroup> lows: array<vec4f, CULL_GROUP>;
+var<workgroup> highs: array<vec3f, CULL_GROUP>;
+
+// Packs a row that lives and notes its bounds.
+fn ingest_row(row: u32, lane: u32) -> PackedGaussian {
+  let nothing = PackedGaussian(vec4u(0u), vec4u(0u));
+  let position = triple_of(POSITIONS, ingest.positions, row, 0u);
+  let opacity = opacity_of(row);
+  var factor: Factor;
+  if (ingest.shape_kind == SHAPE_COVARIANCE) { factor = factor_of_covariance(row); } else { factor = factor_of_axes(row); }
+  let has_color = pack_harmonics(row);
+  if (!(are_finite(position) && opacity.usable && factor.usable && has_color)) { return nothing; }
+  let packed = pack_gaussian(position, factor, opacity.value);
+  if (!is_usable(packed)) { return nothing; }
+  let center = bitcast<vec3f>(position);
+  // No axis is longer than the factor as a whole. A little more for what packing rounds away.
+  let longest = 1.001 * length(vec3f(length(factor.x), length(factor.y), factor.z));
+  let reach = longest * sqrt(2.0 * log(max(opacity.value / ALPHA_MIN, 1.0)));
+  lows[lane] = vec4f(center, -reach);
+  highs[lane] = center;
+  return packed;
+}
+
+@compute @workgroup_size(CULL_GROUP)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let chunk = group_index(workgroup_id);
+  let row = chunk * CULL_GROUP + lane;
+  let living = min(u32(max(ingest.count, 0)), ingest.rows);
+  lows[lane] = vec4f(vec3f(BEYOND), 0.0);
+  highs[lane] = vec3f(-BEYOND);
+  if (row < ingest.page_rows) {
+    if (ingest.first_row + row < living) {
+      gaussians[row] = ingest_row(row, lane);
+    } else {
+      // An extent of 1 and an opacity of 0: in order, and not drawn.
+      gaussians[row] = PackedGaussian(vec4u(0u, 0u, 0u, bitcast<u32>(1.0)), vec4u(0u));
+    }
+  }
+  workgroupBarrier();
+  for (var half = CULL_GROUP / 2u; half > 0u; half /= 2u) {
+    if (lane < half) {
+      lows[lane] = min(lows[lane], lows[lane + half]);
+      highs[lane] = max(highs[lane], highs[lane + half]);
+    }
+    workgroupBarrier();
+  }
+  // Rows without a chunk may be threads of the last row of workgroups.
+  if (lane == 0u && chunk * CULL_GROUP < ingest.page_rows) {
+    // A chunk without any splat is a box turned inside out, which no camera sees.
+    chunks[chunk] = Chunk(lows[0].xyz, -lows[0].w, highs[0], 0.0);
+  }
+}

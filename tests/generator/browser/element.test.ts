@@ -1,0 +1,235 @@
+/** Generators in <gaussian-splat>: declarative inputs, the media clock, faults that keep the picture. */
+import '@gaussian-splat/element';
+import { GaussianSplatElement, type ElementError } from '@gaussian-splat/element';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  devices,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from '../../element/browser/support/harness.js';
+import { screenOf } from '../../element/browser/support/screen.js';
+import { calls, FIXTURES, RUNTIME } from './support.js';
+
+GaussianSplatElement.runtimeLocation = RUNTIME;
+
+const BALL = `${FIXTURES}packed.onnx`;
+const OUTPUTS = { layout: 'packed', gaussians: 'gaussians', color: 'rgb', opacityActivation: 'linear' };
+const contractWith = (more: object, inputs: object = { time: { role: 'time', unit: 'seconds' } }): string =>
+  JSON.stringify({ version: 1, inputs, outputs: OUTPUTS, ...more });
+
+const resources = (part: string): number =>
+  performance.getEntriesByType('resource').filter(({ name }) => name.includes(part)).length;
+
+/** Covered pixels of the picture on the screen, and where their middle is. */
+async function pictureOf(element: GaussianSplatElement): Promise<{ count: number; x: number; y: number }> {
+  return (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 700) ?? { count: 0, x: 0, y: 0 };
+}
+
+describe('a generator in the element', () => {
+  it('no other scene fetches the runtime or the code for generators', async () => {
+    await showLoaded({ src: COMPASS });
+    assertEqual(
+      [resources('onnxruntime-web'), resources('open-live-model'), resources('packages/generator')].slice(0, 2),
+      [0, 0],
+    );
+  });
+
+  it('is shown, with its duration, and fires load', async () => {
+    const element = show({ src: BALL });
+    const events: string[] = [];
+    for (const type of ['durationchange', 'loadedmetadata', 'load', 'error', 'generator-error']) {
+      element.addEventListener(type, () => events.push(type));
+    }
+    await element.ready;
+    assert(element.loaded, String(element.error?.message));
+    await until(() => events.includes('load'), 'load');
+    assertEqual(events, ['durationchange', 'loadedmetadata', 'load']);
+    assertEqual([element.statistics?.splats, element.duration, element.paused], [64, 6.2831853, true]);
+    const { count } = await pictureOf(element);
+    assert(count > 500, `${count} pixels are covered`);
+  });
+
+  it('follows the attribute time, and says when the frame is on show', async () => {
+    const element = await showLoaded({ src: BALL });
+    const still = await pictureOf(element);
+    const [seeking, seeked] = [nextEvent(element, 'seeking'), nextEvent(element, 'seeked')];
+    element.setAttribute('time', '1.5707');
+    await seeking;
+    assert(element.seeking, 'seeking until the frame is there');
+    await seeked;
+    await delay(200);
+    const grown = await pictureOf(element);
+    assert(grown.count > 1.05 * still.count, `${still.count} pixels, then ${grown.count}`);
+    assertEqual([element.currentTime, element.seeking], [1.5707, false]);
+  });
+
+  it('plays, pauses, ends, loops and keeps the words of media elements', async () => {
+    const element = await showLoaded({ src: BALL, contract: contractWith({ duration: 0.6 }) });
+    const events: string[] = [];
+    for (const type of ['play', 'playing', 'pause', 'ended', 'ratechange', 'seeking']) {
+      element.addEventListener(type, () => events.push(type));
+    }
+    let updates = 0;
+    element.addEventListener('timeupdate', () => updates++);
+    await element.play();
+    await nextEvent(element, 'ended');
+    assertEqual(events, ['play', 'playing', 'pause', 'ended']);
+    assertEqual([element.currentTime, element.ended, element.paused], [0.6, true, true]);
+    assert(updates >= 2, `${updates} time updates`);
+    element.loop = true;
+    element.playbackRate = 2;
+    await element.play();
+    assertEqual([element.ended, element.currentTime < 0.6], [false, true]);
+    await delay(1200);
+    assert(!element.paused && element.currentTime >= 0 && element.currentTime <= 0.6, `${element.currentTime} s`);
+    element.pause();
+    const { currentTime } = element;
+    await delay(100);
+    assertEqual([element.currentTime, element.paused], [currentTime, true]);
+    assertEqual(events.slice(4), ['ratechange', 'seeking', 'play', 'playing', 'pause']);
+  });
+
+  it('a scene that does not move cannot play', async () => {
+    const element = await showLoaded({ src: COMPASS });
+    const refusal = await element.play().then(
+      () => 'none',
+      (error: Error) => error.name,
+    );
+    assertEqual([refusal, Number.isNaN(element.duration), element.paused], ['NotSupportedError', true, true]);
+  });
+
+  it('takes pose and controls from attributes and properties', async () => {
+    const element = await showLoaded(
+      { src: `${FIXTURES}split.onnx` },
+      'width: 120px; height: 100px; background: white',
+    );
+    const rest = await pictureOf(element);
+    // The fixture shifts all centres by the sum of the pose, along each axis.
+    element.setAttribute('pose', '[[0.3, 0, 0], [0, 0, 0.2]]');
+    await element.updateComplete;
+    await delay(500);
+    const shifted = await pictureOf(element);
+    assert(Math.abs(shifted.x - rest.x) > 2, `middle at ${rest.x}, then ${shifted.x}`);
+    element.pose = new Float32Array(6);
+    await element.updateComplete;
+    await delay(500);
+    const back = await pictureOf(element);
+    assert(Math.abs(back.x - rest.x) < 1, `middle at ${rest.x}, then ${back.x}`);
+    const contract = contractWith({}, { time: { role: 'control', range: [-2, 2], default: 0 } });
+    const slider = await showLoaded({ src: BALL, contract });
+    const before = await pictureOf(slider);
+    slider.setAttribute('control-time', '1.57');
+    await delay(600);
+    const grown = await pictureOf(slider);
+    assert(grown.count > 1.05 * before.count, `attribute: ${before.count} pixels, then ${grown.count}`);
+    slider.controls = { time: -1.57 };
+    await delay(600);
+    const shrunk = await pictureOf(slider);
+    assert(shrunk.count < 0.97 * before.count, `property: ${before.count} pixels, then ${shrunk.count}`);
+  });
+
+  it('a pose that does not fit is told once, and the last good frame stays', async () => {
+    const element = await showLoaded({ src: `${FIXTURES}split.onnx` });
+    const before = await pictureOf(element);
+    let faults = 0;
+    element.addEventListener('generator-error', () => faults++);
+    const event = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
+    element.pose = [1, 2, 3];
+    assertEqual((await event).detail.reason, 'argument/value');
+    element.setAttribute('camera-orbit', '40deg 75deg auto');
+    await delay(500);
+    assertEqual([faults, element.loaded, element.error], [1, true, null]);
+    assert((await pictureOf(element)).count > 0.5 * before.count, 'the picture is gone');
+  });
+
+  it('makes no buffer and reads nothing back while it plays', async () => {
+    const element = await showLoaded({ src: BALL });
+    element.loop = true;
+    await element.play();
+    await delay(1000);
+    const before = { ...calls };
+    const time = element.currentTime;
+    await delay(1000);
+    assert(element.currentTime !== time, 'it does not play');
+    const { createBuffer, mapAsync, createComputePipeline } = calls;
+    assertEqual(
+      [createBuffer, mapAsync, createComputePipeline],
+      [before.createBuffer, before.mapAsync, before.createComputePipeline],
+    );
+    element.pause();
+  });
+
+  it('two at once, and a source that changes many times, end with what was asked for last', async () => {
+    const [a, b] = [show({ src: BALL }), show({ src: `${FIXTURES}split.onnx` })];
+    for (let i = 0; i < 8; i++) {
+      a.src = i % 2 ? BALL : `${FIXTURES}split.onnx`;
+      await delay(20 * i);
+    }
+    a.src = COMPASS;
+    await a.updateComplete;
+    a.src = BALL;
+    await Promise.all([a.ready, b.ready]);
+    assert(a.loaded && b.loaded, `${a.error?.message} ${b.error?.message}`);
+    assertEqual([a.statistics?.splats, b.statistics?.splats], [64, 64]);
+  });
+
+  it('is slow: orbiting goes on at its own rate, and the latest time is shown in the end', async () => {
+    const element = await showLoaded({ src: `${FIXTURES}heavy.onnx` });
+    let frames = 0;
+    const shown: number[] = [];
+    element.addEventListener('camera-change', () => frames++);
+    element.addEventListener('seeked', () => shown.push(element.currentTime));
+    const start = performance.now();
+    for (let i = 0; i < 30; i++) {
+      element.currentTime = 1 + i / 10;
+      element.setAttribute('camera-orbit', `${3 * i}deg 75deg auto`);
+      element.jumpCameraToGoal();
+      await new Promise(requestAnimationFrame);
+    }
+    const elapsed = performance.now() - start;
+    await until(() => !element.seeking, 'the last frame');
+    console.log(`${frames} frames and ${shown.length} runs in ${Math.round(elapsed)} ms`);
+    assert(frames >= 15, `${frames} frames were drawn`);
+    assert(shown.length <= frames, `${shown.length} runs for ${frames} frames`);
+    assertEqual(element.currentTime, 1 + 29 / 10, 'time on show');
+  });
+
+  const faults: Readonly<Record<string, readonly [attributes: Record<string, string>, reason: string]>> = {
+    'a missing file': [{ src: '/net/status/404?x.onnx', contract: contractWith({}) }, 'network/status'],
+    'a web page': [{ src: '/net/html/x.onnx' }, 'decode/html'],
+    'a truncated file': [{ src: '/net/head/packed.onnx' }, 'decode/truncated'],
+    'a contract that is not there': [{ src: BALL, contract: '/net/status/404' }, 'network/status'],
+    'a contract that is none': [{ src: BALL, contract: '{"version": 1}' }, 'contract/schema'],
+    'a run that always fails': [{ src: `${FIXTURES}faulty-run.onnx` }, 'contract/run'],
+  };
+  for (const [name, [attributes, reason]] of Object.entries(faults)) {
+    it(`${name}: ${reason}, and the next source is shown`, async () => {
+      const element = show(attributes);
+      const { detail } = await nextEvent<CustomEvent<ElementError>>(element, 'error');
+      assertEqual([detail.reason, detail.code], [reason, reason.split('/')[0]]);
+      element.contract = null;
+      element.src = BALL;
+      await element.ready;
+      assert(element.loaded, String(element.error?.message));
+    });
+  }
+
+  it('a lost device, while it plays: back on a new one, at its time', async () => {
+    const element = await showLoaded({ src: BALL });
+    element.loop = true;
+    await element.play();
+    await delay(300);
+    const restored = nextEvent(element, 'contextrestored');
+    devices[devices.length - 1].destroy();
+    await restored;
+    assert(element.loaded && !element.paused, 'shown and playing');
+    await delay(400);
+    assert((await pictureOf(element)).count > 500, 'the picture is back');
+    element.pause();
+  });
+});

@@ -1,0 +1,72 @@
+/** The papers' names over the typed core, and the build that a page loads from a CDN. */
+import { GaussianModels } from '@gaussian-splat/generator';
+import { DynamicGaussians } from '@gaussian-splat/renderer';
+import { assert, assertEqual, nextEvent, until } from '../../element/browser/support/harness.js';
+import { FIXTURES, makeDevice } from './support.js';
+
+describe('models of a page', () => {
+  it('register, load, add, run, and hear of frames', async () => {
+    const device = await makeDevice();
+    const models = new GaussianModels();
+    models.registerGaussianGenerator('ball', { url: `${FIXTURES}packed.onnx` });
+    const early = await models
+      .addGaussianModelToScene('ball', () => ({ ingest: () => undefined }))
+      .catch((e: unknown) => e);
+    assertEqual((early as { code: string }).code, 'argument/value', 'before loading');
+    await models.loadAllGenerators(device);
+    const unknown = await models
+      .addGaussianModelToScene('cube', () => ({ ingest: () => undefined }))
+      .catch((e: unknown) => e);
+    assertEqual((unknown as { code: string }).code, 'argument/value', 'an unknown name');
+    const add = (): ReturnType<typeof models.addGaussianModelToScene<DynamicGaussians>> =>
+      models.addGaussianModelToScene('ball', (layout) => DynamicGaussians.create(device, layout));
+    const [a, b] = [await add(), await add()];
+    const heard: [number, number | undefined][] = [];
+    const stop = models.onFrame((model, { state }) => heard.push([model === a ? 0 : 1, state.timeSeconds]));
+    b.state = { timeSeconds: 9 };
+    models.runGenerators({ timeSeconds: 1 });
+    await Promise.all([a.generator.idle, b.generator.idle]);
+    assertEqual(heard.sort(), [
+      [0, 1],
+      [1, 9],
+    ]);
+    assert(a.gaussians.version === 2 && b.gaussians.version === 2, 'each has taken one run in');
+    models.runGenerators({ timeSeconds: 2 });
+    await Promise.all([a.generator.idle, b.generator.idle]);
+    assertEqual(heard.length, 3, 'the one whose state is its own has not run again');
+    stop();
+    a.remove();
+    models.runGenerators({ timeSeconds: 3 });
+    await a.generator.idle;
+    assertEqual([heard.length, a.gaussians.version], [3, 3], 'after removal');
+    models.clear();
+    for (const { gaussians } of [a, b]) gaussians.destroy();
+    device.destroy();
+  });
+});
+
+describe('the CDN build', () => {
+  it('shows a generator with the runtime that is beside it', async () => {
+    const frame = document.createElement('iframe');
+    document.body.append(frame);
+    await (frame.contentDocument?.readyState === 'complete' ? undefined : nextEvent(frame, 'load'));
+    const page = frame.contentDocument;
+    assert(page, 'a page in the frame');
+    page.body.innerHTML = `<gaussian-splat src="${FIXTURES}packed.onnx" loading="eager" style="display: block; width: 100px; height: 100px"></gaussian-splat>`;
+    const script = page.createElement('script');
+    script.type = 'module';
+    script.src = '/packages/element/cdn/gaussian-splat.min.js';
+    page.head.append(script);
+    const element = page.querySelector('gaussian-splat');
+    assert(element, 'the element');
+    await until(() => element.loaded || !!element.error, 'the scene', 40_000);
+    assert(element.loaded, String(element.error?.message));
+    const fetched = frame.contentWindow?.performance
+      .getEntriesByType('resource')
+      .map(({ name }) => new URL(name).pathname);
+    assert(
+      fetched?.some((path) => /cdn\/onnxruntime\/.*\.wasm$/.test(path)),
+      `fetched ${fetched?.join(' ')}`,
+    );
+  });
+});

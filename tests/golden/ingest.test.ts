@@ -1,0 +1,157 @@
+/** Gaussians that come as a generator's tensors, drawn, against the same Gaussians packed on the CPU. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { capture, DynamicGaussians, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { mortonOrder } from '@gaussian-splat/renderer/stages';
+import { writeTensors, type TensorSpec, type WrittenTensors } from '../support/generator-tensors.js';
+import { psnr } from '../support/metrics.js';
+import { nodeDevice } from '../support/node-device.js';
+import { brightColors, edgeOnDiscs, hugeSplats, needles, opacityLadder, room } from '../support/scenes.js';
+
+const LIMIT_DB = 55;
+/**
+ * Rounded to float16, covariances of needles and discs are indefinite: there is no true picture of them, only a bound of how far apart
+ * two ways to mend them are.
+ */
+const MENDED_DB = 35;
+const SPECS: readonly Omit<TensorSpec, 'dtype'>[] = [
+  { layout: 'packed', shape: 'covariance', color: 'coefficient-major', opacity: 'linear', quaternionOrder: 'wxyz' },
+  { layout: 'split', shape: 'log-scale', color: 'channel-major', opacity: 'logit', quaternionOrder: 'xyzw' },
+];
+
+/**
+ * The cloud in the order that packing it would give it: rounded to float16 many splats have equal depths, and those are blended in
+ * their order.
+ */
+function inDrawnOrder(cloud: GaussianCloud, spec: TensorSpec): GaussianCloud {
+  const { positions } = writeTensors(cloud, spec).cloud;
+  const order = mortonOrder(
+    positions,
+    Uint32Array.from({ length: cloud.count }, (_, i) => i),
+  );
+  const permuted = (values: Float32Array): Float32Array => {
+    const width = values.length / cloud.count;
+    return values.map((_, i) => values[width * order[Math.floor(i / width)] + (i % width)]);
+  };
+  const { scales, rotations, opacities, sh } = cloud;
+  return {
+    ...cloud,
+    positions: permuted(cloud.positions),
+    scales: permuted(scales),
+    rotations: permuted(rotations),
+    opacities: permuted(opacities),
+    sh: permuted(sh),
+  };
+}
+
+/** Premultiplied pixels, and a mask of those that any splat covers. */
+async function drawCloud(cloud: GaussianCloud, camera: Camera): Promise<{ pixels: Float32Array; mask: Uint8Array }> {
+  const device = await nodeDevice();
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud, { sh: 'float16' }));
+  const renderer = new Renderer(device);
+  const pixels = await capture(device, renderer, { gaussians, camera });
+  renderer.destroy();
+  gaussians.destroy();
+  return { pixels, mask: Uint8Array.from({ length: pixels.length / 4 }, (_, i) => Number(pixels[4 * i + 3] > 0)) };
+}
+
+async function uploadTensors({ tensors }: WrittenTensors): Promise<Record<string, GPUBuffer>> {
+  const device = await nodeDevice();
+  return Object.fromEntries(
+    Object.entries(tensors).map(([name, words]) => {
+      const buffer = device.createBuffer({ size: words.byteLength, usage: 0x80 | 0x8 | 0x4 });
+      device.queue.writeBuffer(buffer, 0, words);
+      return [name, buffer];
+    }),
+  );
+}
+
+for (const dtype of ['float32', 'float16'] as const) {
+  for (const one of SPECS) {
+    test(`ingest, ${one.layout}, ${one.shape}, ${dtype}: the frame of the CPU's packing`, async () => {
+      const device = await nodeDevice();
+      for (const make of [room, needles, hugeSplats, opacityLadder, brightColors, edgeOnDiscs]) {
+        const { name, cloud, cameras } = make();
+        const written = writeTensors(inDrawnOrder(cloud, { ...one, dtype }), { ...one, dtype });
+        const gaussians = await DynamicGaussians.create(device, written.layout);
+        gaussians.ingest(await uploadTensors(written), cloud.count);
+        const renderer = new Renderer(device);
+        const camera = cameras[0];
+        const { pixels, mask } = await drawCloud(written.cloud, camera);
+        const decibels = psnr(await capture(device, renderer, { gaussians, camera }), pixels, { mask, channels: 4 });
+        console.log(`ingest ${one.shape} ${dtype} ${name}`.padEnd(45), `${decibels.toFixed(2)} dB`);
+        const isMended = dtype === 'float16' && one.shape === 'covariance' && [needles, edgeOnDiscs].includes(make);
+        assert.ok(decibels >= (isMended ? MENDED_DB : LIMIT_DB), `${name}: ${decibels} dB`);
+        renderer.destroy();
+        gaussians.destroy();
+      }
+    });
+  }
+}
+
+test('ingest: a new run replaces all of the old one, also for a camera that stands still', async () => {
+  const device = await nodeDevice();
+  const { cloud, cameras } = room();
+  const spec = { ...SPECS[0], dtype: 'float32' } as const;
+  const moved = { ...cloud, positions: cloud.positions.map((x, i) => (i % 3 === 2 ? x + 1.5 : x)) };
+  const written = writeTensors(cloud, spec);
+  const [first, second] = [await uploadTensors(written), await uploadTensors(writeTensors(moved, spec))];
+  const gaussians = await DynamicGaussians.create(device, written.layout);
+  const renderer = new Renderer(device);
+  const draw = (): Promise<Float32Array> => capture(device, renderer, { gaussians, camera: cameras[0] });
+  assert.ok(
+    (await draw()).every((x) => x === 0),
+    'nothing before the first run',
+  );
+  gaussians.ingest(first, cloud.count);
+  // Long enough still for an order of all splats, which must not outlive its content.
+  let before = await draw();
+  for (let frame = 0; frame < 12; frame++) before = await draw();
+  gaussians.ingest(second, cloud.count);
+  const after = await draw();
+  const { pixels, mask } = await drawCloud(moved, cameras[0]);
+  const [close, far] = [after, before].map((image) => psnr(image, pixels, { mask, channels: 4 }));
+  console.log(`ingest: the new run ${close.toFixed(2)} dB, the old one ${far.toFixed(2)} dB`);
+  assert.ok(close >= LIMIT_DB && far < 40, `${close} dB, ${far} dB`);
+  gaussians.ingest({}, 0);
+  assert.ok(
+    (await draw()).every((x) => x === 0),
+    'nothing after a run without Gaussians',
+  );
+  renderer.destroy();
+  gaussians.destroy();
+});
+
+test('ingest: bounds come from what is drawn', async () => {
+  const device = await nodeDevice();
+  const { cloud } = room();
+  const written = writeTensors(cloud, { ...SPECS[0], dtype: 'float32' });
+  const gaussians = await DynamicGaussians.create(device, written.layout);
+  gaussians.ingest(await uploadTensors(written), cloud.count);
+  const { min, max } = await gaussians.readBounds();
+  for (let axis = 0; axis < 3; axis++) {
+    const column = Array.from({ length: cloud.count }, (_, i) => cloud.positions[3 * i + axis]);
+    assert.deepEqual([min[axis], max[axis]], [Math.min(...column), Math.max(...column)]);
+  }
+  gaussians.destroy();
+});
+
+test('ingest: a tensor that is missing or too small, or too many rows, is refused and changes nothing', async () => {
+  const device = await nodeDevice();
+  const { cloud } = room();
+  const { layout } = writeTensors(cloud, { ...SPECS[0], dtype: 'float32' });
+  const gaussians = await DynamicGaussians.create(device, layout);
+  const before = gaussians.version;
+  const small = device.createBuffer({ size: 64, usage: 0x80 });
+  assert.throws(() => gaussians.ingest({ gaussians: small }, cloud.count), { code: 'argument/value' });
+  assert.throws(() => gaussians.ingest({}, cloud.count), { code: 'argument/value' });
+  assert.throws(() => gaussians.ingest({ gaussians: small }, cloud.count + 1), { code: 'contract/rows' });
+  assert.equal(gaussians.version, before);
+  gaussians.destroy();
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
