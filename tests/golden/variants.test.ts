@@ -1,0 +1,66 @@
+/** Variants of the stages draw one image; those that a device is served best with are found by measuring. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { capture, chooseVariants, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
+import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { nodeDevice } from '../support/node-device.js';
+import { room } from '../support/scenes.js';
+
+test('serial and parallel stages draw the same bytes, moving and turning', async () => {
+  const device = await nodeDevice();
+  const { cloud, cameras } = room();
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderers = (['parallel', 'serial'] as const).map((threads) => new Renderer(device, { threads }));
+  for (const camera of [...cameras, cameras[0]]) {
+    const [parallel, serial] = [
+      await capture(device, renderers[0], { gaussians, camera }),
+      await capture(device, renderers[1], { gaussians, camera }),
+    ];
+    assert.deepEqual(Buffer.from(parallel.buffer), Buffer.from(serial.buffer));
+  }
+  assert.ok((await renderers[1].readStatistics()).visible > 1000);
+});
+
+test('every variant gives the known answer, and a wrong rule does not', async () => {
+  const device = await nodeDevice();
+  for (const threads of ['parallel', 'serial'] as const) {
+    for (const rasterizer of ['quads', 'tiles'] as const) {
+      assert.ok(await givesKnownAnswer(device, { threads, rasterizer }), `${threads} ${rasterizer}`);
+    }
+  }
+  assert.equal(await givesKnownAnswer(device, { alphaMin: 0.05 }), false, 'an alpha threshold of 0.05');
+  assert.equal(await givesKnownAnswer(device, { shDegree: 0 }), false, 'no view-dependent colour');
+  assert.equal(await givesKnownAnswer(device, { resolutionScale: 0.5 }), false, 'half the pixels');
+});
+
+test('the choice is made once, kept for the adapter, and made anew from a damaged store', async () => {
+  const adapter = await requestNodeAdapter();
+  const entries = new Map<string, string>();
+  const store = {
+    getItem: (key: string) => entries.get(key) ?? null,
+    setItem: (key: string, value: string) => void entries.set(key, value),
+  };
+  const chosen = await chooseVariants(await adapter.requestDevice(), { store });
+  assert.equal(chosen.rasterizer, 'quads', 'tiles are no choice for SwiftShader');
+  assert.equal(chosen.threads, 'serial', 'nor are barriers');
+  assert.equal(entries.size, 1);
+  const [key] = entries.keys();
+  const kept = JSON.stringify({ ...chosen, threads: 'parallel' });
+  entries.set(key, kept);
+  assert.equal((await chooseVariants(await (await requestNodeAdapter()).requestDevice(), { store })).threads, 'parallel');
+  for (const damage of ['{', 'null', '{"rasterizer":"crayons"}']) {
+    entries.set(key, damage);
+    const device = await (await requestNodeAdapter()).requestDevice();
+    assert.deepEqual(await chooseVariants(device, { store }), chosen, damage);
+    const renderer = await Renderer.create(device);
+    assert.equal(renderer.levers.threads, chosen.threads);
+    renderer.destroy();
+    device.destroy();
+  }
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
