@@ -73,14 +73,47 @@ test('a camera at another resolution sees the same', () => {
   assert.deepEqual([half.width, half.height, half.fx, half.cx], [160, 90, camera.fx / 2, camera.cx / 2]);
 });
 
-test('packed copies are what packing the whole tiled cloud gives', () => {
-  const { copies } = placeCopies({ base: small.count, count: 1000 });
-  const expected: PackedGaussians = packGaussians(tileCloud(small, copies));
-  const packed: PackedGaussians = packCopies(small, packGaussians(small), copies);
-  assert.equal(packed.count, 1000);
-  assert.deepEqual(packed.geometry, expected.geometry);
-  assert.deepEqual(packed.sh, expected.sh);
+test('packed copies are the packed scene in whole chunks, moved with their bounds', () => {
+  const count = 600;
+  const large = repeated(small, count);
+  const packed: PackedGaussians = packGaussians(large);
+  const offsets = [
+    [0, 0, 0],
+    [2, 0, -2],
+  ];
+  const copies = [
+    { offset: offsets[0], length: count },
+    { offset: offsets[1], length: 300 },
+  ];
+  const tiled: PackedGaussians = packCopies(packed, copies);
+  // 600 and 300 splats are two chunks and one.
+  assert.equal(tiled.count, 512 + 256);
+  const [from, to] = [new Float32Array(packed.geometry.buffer), new Float32Array(tiled.geometry.buffer)];
+  for (let i = 0; i < tiled.count; i++) {
+    const copy = i < 512 ? 0 : 1;
+    const source = i - 512 * copy;
+    for (let axis = 0; axis < 3; axis++) {
+      assert.ok(Math.abs(to[8 * i + axis] - from[8 * source + axis] - offsets[copy][axis]) < 1e-5, `splat ${i}`);
+    }
+    assert.deepEqual(tiled.geometry.slice(8 * i + 3, 8 * i + 8), packed.geometry.slice(8 * source + 3, 8 * source + 8));
+    // Every splat lies within the bounds of its chunk.
+    const chunk = tiled.chunks.subarray(8 * Math.floor(i / 256));
+    for (let axis = 0; axis < 3; axis++) {
+      assert.ok(to[8 * i + axis] >= chunk[axis] - 1e-5 && to[8 * i + axis] <= chunk[4 + axis] + 1e-5, `bounds of ${i}`);
+    }
+  }
+  const stride = packed.sh.length / packed.count;
+  assert.deepEqual(tiled.sh.slice(stride * 512), packed.sh.slice(0, stride * 256));
 });
+
+/** The cloud's splats over and over, each time a little farther, up to `count`. */
+function repeated(cloud: GaussianCloud, count: number): GaussianCloud {
+  const copies = Array.from({ length: Math.ceil(count / cloud.count) }, (_, i) => ({
+    offset: [0.37 * i, 0.11 * i, 0.05 * i],
+    length: cloud.count,
+  }));
+  return firstSplats(tileCloud(cloud, copies), count) as GaussianCloud;
+}
 
 test('a PLY for other renderers reads back as the tiled cloud', async () => {
   const { copies } = placeCopies({ base: small.count, count: 700 });

@@ -48,7 +48,10 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
   const [key] = entries.keys();
   const kept = JSON.stringify({ ...chosen, threads: 'parallel' });
   entries.set(key, kept);
-  assert.equal((await chooseVariants(await (await requestNodeAdapter()).requestDevice(), { store })).threads, 'parallel');
+  assert.equal(
+    (await chooseVariants(await (await requestNodeAdapter()).requestDevice(), { store })).threads,
+    'parallel',
+  );
   for (const damage of ['{', 'null', '{"rasterizer":"crayons"}']) {
     entries.set(key, damage);
     const device = await (await requestNodeAdapter()).requestDevice();
