@@ -9,17 +9,11 @@
 @group(0) @binding(2) var<storage, read> pairs: array<vec2u>;
 @group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
 @group(0) @binding(4) var image: texture_storage_2d<rgba16float, write>;
-// Notes: a bit for each slot whose splat gave at least 1/255 of its colour to a pixel, and for each pixel the sum of
-// weight times depth in world units.
-@group(0) @binding(5) var<storage, read_write> contributed: array<atomic<u32>>;
-@group(0) @binding(6) var<storage, read_write> depths: array<f32>;
 
 // A pixel is finished before a splat that would take its transmittance to this or below.
 override transmittance_min: f32 = 1e-4;
 // True to write premultiplied colour over the background, false for colour and transmittance.
 override is_final: bool = false;
-// True to note depths, and which splats contributed.
-override takes_notes: bool = false;
 
 const TILE_THREADS = TILE * TILE;
 // Pairs that a thread looks at in one go, and words with a bit for each pair of all threads.
@@ -44,8 +38,6 @@ var<workgroup> shapes: array<vec4f, TILE_THREADS>;
 var<workgroup> paints: array<vec4u, TILE_THREADS>;
 // for each block of 8 x 4 pixels of the tile a bit for each splat that touches it.
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
-// Of the batch, a bit for each splat that contributed.
-var<workgroup> contributors: array<atomic<u32>, BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
 
@@ -122,7 +114,6 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
   let power_min = log2(alpha_min);
 
   var color = vec3f(0.0);
-  var depth = 0.0;
   var transmittance = 1.0;
   var finished = any(center > view.viewport);
   var start = range.x;
@@ -137,7 +128,6 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
     if (count == 0u) { break; }
     if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
-    if (takes_notes && lane < BATCH_WORDS) { atomicStore(&contributors[lane], 0u); }
     workgroupBarrier();
     if (lane < count) { load_splat(lane, vec2f(corner)); }
     workgroupBarrier();
@@ -168,21 +158,12 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
         continue;
       }
       let weight = transmittance * alpha;
-      let blue_depth = unpack2x16float(paint.z);
-      color += weight * vec3f(unpack2x16float(paint.y), blue_depth.x);
+      color += weight * vec3f(unpack2x16float(paint.y), unpack2x16float(paint.z).x);
       transmittance = remaining;
-      if (takes_notes) {
-        depth += weight * blue_depth.y;
-        if (weight >= ALPHA_MIN) { atomicOr(&contributors[k / 32u], 1u << (k % 32u)); }
-      }
     }
     if (!finished) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
 
-    if (takes_notes && lane < count && (atomicLoad(&contributors[lane / 32u]) & (1u << (lane % 32u))) != 0u) {
-      let slot = queue[lane];
-      atomicOr(&contributed[slot / 32u], 1u << (slot % 32u));
-    }
     // What is left over moves up: read by all before it is overwritten.
     let left = waiting - count;
     var moved: array<u32, PAIRS_PER_THREAD>;
@@ -200,7 +181,6 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
     }
   }
   if (any(center > view.viewport)) { return; }
-  if (takes_notes) { depths[pixel.y * u32(view.viewport.x) + pixel.x] = depth; }
   var result = vec4f(color, transmittance);
   if (is_final) { result = vec4f(color, 1.0 - transmittance) + transmittance * view.background; }
   textureStore(image, pixel, result);

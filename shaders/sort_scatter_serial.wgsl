@@ -1,20 +1,5 @@
 // `sort_scatter` for processors that run few threads one after the other: a thread moves a whole block, in its order.
-#import shared/plan
-#import shared/group
-#import shared/sort
-
-@group(0) @binding(0) var<uniform> digit_pass: SortPass;
-@group(0) @binding(1) var<storage, read> plan: Plan;
-@group(0) @binding(2) var<storage, read> keys_in: array<u32>;
-@group(0) @binding(3) var<storage, read> values_in: array<Value>;
-// Exclusive prefix sums over the blocks: [digit][block]
-@group(0) @binding(4) var<storage, read> block_offsets: array<u32>;
-@group(0) @binding(5) var<storage, read> digit_totals: array<u32>;
-@group(0) @binding(6) var<storage, read_write> keys_out: array<u32>;
-@group(0) @binding(7) var<storage, read_write> values_out: array<Value>;
-
-// What moves along with a key.
-alias Value = u32;
+#import shared/sort_scatter
 
 @compute @workgroup_size(1)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u) {

@@ -20,8 +20,8 @@ import {
 const LIMITS = { psnr: 69, p999: 0.5 / 255 };
 
 /**
- * The worst pixel: a splat more or less at its rim, where alpha is 1/255 and float32 decides otherwise than float64, is 1/255 of its
- * colour, and colours reach 4 in one scene.
+ * The worst pixel: a splat more or less at its rim, where alpha is 1/255 and shapes stored to 14 bits decide otherwise than float64, is 1/255
+ * of its colour, and colours reach 4 in one scene.
  */
 const worstOf = (scene: string): number => (scene === 'brightColors' ? 4.3 : 1.1) / 255;
 

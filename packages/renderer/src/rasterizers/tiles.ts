@@ -74,8 +74,6 @@ export class TilesRasterizer implements Rasterizer {
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
   readonly #scanLength: GPUBuffer;
-  /** Bound where notes would go; none are taken. */
-  readonly #noNotes: readonly [GPUBuffer, GPUBuffer];
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
   #bound: GridBindings | undefined;
@@ -89,8 +87,6 @@ export class TilesRasterizer implements Rasterizer {
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
     this.#scanLength = this.#memory.buffer('gs.rasterize.scan_length', 16, usage);
-    const nothing = (name: string): GPUBuffer => this.#memory.buffer(`gs.rasterize.${name}`, 4, BUFFER_USAGE.storage);
-    this.#noNotes = [nothing('contributed'), nothing('depths')];
   }
 
   get byteLength(): number {
@@ -213,15 +209,12 @@ export class TilesRasterizer implements Rasterizer {
   #imageBindings(kernel: RasterizeKernel, bound: GridBindings, image: GPUTextureView): GPUBindGroup {
     const known = bound.rasterize.get(image);
     if (known) return known;
-    const [contributed, depths] = this.#noNotes;
     const made = kernel.bind({
       view: this.#view,
       splats: this.#inputs!.splats,
       pairs: this.#buffers!.pairs[sortedIn(bound.grid.bits)],
       ranges: bound.ranges,
       image,
-      contributed,
-      depths,
     });
     bound.rasterize.set(image, made);
     return made;
