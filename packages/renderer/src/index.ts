@@ -8,6 +8,8 @@ export { PassTimer, type PassTime } from './gpu/pass-timer.js';
 export { QUALITIES, type Levers, type Quality } from './levers.js';
 export { packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export type { ShPrecision } from './pack/sh.js';
+export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
+export { PictureTensor, type PictureFit, type PictureShape } from './pictures/picture-tensor.js';
 export type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 export { Renderer, type FrameRequest, type RendererOptions } from './renderer.js';
 export type { FrameStatistics } from './statistics.js';

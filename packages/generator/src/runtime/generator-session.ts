@@ -1,5 +1,7 @@
 import { ContractError, GaussianSplatError } from '@gaussian-splat/core';
-import { bindInputs, type InputValue } from '../bind-inputs.js';
+import { bindInputs } from '../bind-inputs.js';
+import { bindPictures } from '../bind-pictures.js';
+import type { Inputs } from '../input-value.js';
 import type { GeneratorState } from '../state.js';
 import type { LiveSession, RunOutputs, SessionKind } from './live-session.js';
 import type { GeneratorModel } from './open-model.js';
@@ -35,9 +37,14 @@ export class GeneratorSession {
     return this.#kind;
   }
 
-  /** Values of the inputs for a state of the page. @throws GaussianSplatError `argument/value` */
-  bind(state: GeneratorState): Record<string, InputValue> {
-    return bindInputs(this.model.header, this.model.contract, state);
+  /**
+   * Values of the inputs for a state of the page.
+   * @param given inputs that another model writes; they are left out.
+   * @throws GaussianSplatError `argument/value`
+   */
+  bind(state: GeneratorState, given: ReadonlySet<string> = new Set()): Inputs {
+    const { header, contract } = this.model;
+    return { ...bindInputs(header, contract, state), ...bindPictures(header, contract, state, given) };
   }
 
   /**
@@ -45,7 +52,7 @@ export class GeneratorSession {
    * @throws ContractError `contract/run` if the runtime fails; GaussianSplatError `device-lost/unrecoverable` if the device is lost,
    * `network/*` if the runtime cannot be fetched; what `use` throws.
    */
-  async run(inputs: Readonly<Record<string, InputValue>>, use: (outputs: RunOutputs) => void): Promise<void> {
+  async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     this.#requireLife();
     const starting = (this.#live ??= this.#start(inputs));
     let live: LiveSession;
@@ -80,7 +87,7 @@ export class GeneratorSession {
     );
   }
 
-  async #start(inputs: Readonly<Record<string, InputValue>>): Promise<LiveSession> {
+  async #start(inputs: Inputs): Promise<LiveSession> {
     const { model, device } = this;
     const isLost = (): boolean => this.#isLost;
     const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;

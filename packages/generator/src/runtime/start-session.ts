@@ -1,5 +1,5 @@
 import { ContractError, type ContractFault } from '@gaussian-splat/core';
-import type { InputValue } from '../bind-inputs.js';
+import { elementsOf, type Inputs } from '../input-value.js';
 import { LiveSession, type RunOutputs, type SessionKind } from './live-session.js';
 import { loadRuntime } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
@@ -12,7 +12,7 @@ export interface StartOptions {
   readonly model: GeneratorModel;
   readonly device: GPUDevice;
   /** Inputs of the warm-up. */
-  readonly inputs: Readonly<Record<string, InputValue>>;
+  readonly inputs: Inputs;
   /** True once the device is lost: then there is nothing left to try. */
   readonly isLost: () => boolean;
   /** The model runs, but on the CPU; the reason is for people. */
@@ -70,8 +70,8 @@ export function runFault({ header }: GeneratorModel, found: string): ContractFau
   };
 }
 
-function isHalfWithoutFeature({ header, layout }: GeneratorModel, device: GPUDevice): boolean {
-  const isHalf = layout.dtype === 'float16' || header.inputs.some(({ dtype }) => dtype === 'float16');
+function isHalfWithoutFeature({ header, outputs }: GeneratorModel, device: GPUDevice): boolean {
+  const isHalf = [...outputs, ...header.inputs].some(({ dtype }) => dtype === 'float16');
   return isHalf && !device.features.has('shader-f16');
 }
 
@@ -126,12 +126,10 @@ async function attempt(
 const messageOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
 /** What a run has written of each buffer, or the beginning of it; what lies behind is anybody's. */
-function writtenParts({ layout }: GeneratorModel, { tensors, rows }: RunOutputs): TensorPart[] {
-  const elementBytes = layout.dtype === 'float16' ? 2 : 4;
-  return Object.entries(tensors).map(([name, buffer]) => {
-    const slice = layout.attributes.find(({ tensor }) => tensor === name);
-    const size = slice ? rows * slice.rowStride * elementBytes : 4;
-    return { buffer, size: Math.min(COMPARED_BYTES, size - (size % 4)) };
+function writtenParts({ outputs }: GeneratorModel, { tensors, dims }: RunOutputs): TensorPart[] {
+  return outputs.map(({ name, dtype }) => {
+    const size = elementsOf(dims[name]) * (dtype === 'float16' ? 2 : 4);
+    return { buffer: tensors[name], size: Math.min(COMPARED_BYTES, size - (size % 4)) };
   });
 }
 
