@@ -25,7 +25,9 @@ export function bindPictures(
     const picture = state.pictures?.[input.name];
     if (picture === undefined) throw missing(input);
     if (!fits(picture, input)) throw misfit(picture, input);
-    pictures[input.name] = picture;
+    // As it is now: whoever owns it may change it.
+    const { buffer, dtype, dims, version } = picture;
+    pictures[input.name] = { buffer, dtype, dims, version };
   }
   return pictures;
 }

@@ -121,7 +121,7 @@ export class Generator {
   /** Ends it: a run on its way reaches nobody any more. */
   close(): void {
     this.#loop.close();
-    this.#chain.release();
+    this.#chain.release(this.#loop.idle);
   }
 
   #shows(inputs: Wish['inputs']): boolean {

@@ -117,7 +117,7 @@ export class PostProcessor {
   /** Ends it: a run on its way reaches nobody any more. */
   close(): void {
     this.#loop.close();
-    this.#chain.release();
+    this.#chain.release(this.#loop.idle);
   }
 
   #run({ inputs }: Wish): Promise<void> {

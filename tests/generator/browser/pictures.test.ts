@@ -1,6 +1,6 @@
 /** Pictures as tensors, post-processors and chains, from GPU buffer to GPU buffer. */
 import { DynamicGaussians, FilteredFrame, PictureTensor, type PictureFit } from '@gaussian-splat/renderer';
-import { Generator, PostProcessor, type GpuTensor } from '@gaussian-splat/generator';
+import { Generator, PostProcessor } from '@gaussian-splat/generator';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
 import {
   calls,
@@ -57,8 +57,6 @@ function resampled(
     ),
   );
 }
-
-const asGpuTensor = ({ buffer, dims, dtype, version }: PictureTensor): GpuTensor => ({ buffer, dims, dtype, version });
 
 async function tensorOf(width: number, height: number, shape: PictureTensor['shape'], fit?: PictureFit) {
   const tensor = new PictureTensor(device, shape);
@@ -122,7 +120,7 @@ describe('a post-processor', () => {
       });
       const { tensor, pixels } = await tensorOf(width, height, { width, height, dtype });
       for (const gain of [0.5, 0.25, 0.25]) {
-        post.request(asGpuTensor(tensor), { controls: { gain } });
+        post.request(tensor, { controls: { gain } });
         await post.idle;
       }
       await Promise.all(reading);
@@ -150,7 +148,7 @@ describe('a post-processor', () => {
       },
     });
     const next = async (): Promise<void> => {
-      post.request(asGpuTensor(frame.handOver({ width: 48, height: 32, dtype: 'float32' })));
+      post.request(frame.handOver({ width: 48, height: 32, dtype: 'float32' }));
       await post.idle;
     };
     for (let i = 0; i < 3; i++) await next();
@@ -174,7 +172,7 @@ describe('a post-processor', () => {
       onPicture: ({ buffer }) => (picture = readBuffer(device, buffer)),
     });
     const { tensor, pixels } = await tensorOf(48, 32, { width: 48, height: 32, dtype: 'float32' });
-    post.request(asGpuTensor(tensor), { controls: { gain: 0.5 } });
+    post.request(tensor, { controls: { gain: 0.5 } });
     await post.idle;
     assert(picture, 'a picture');
     const found = numbersOf(await picture, 'float32').slice(0, 3 * 48 * 32);
@@ -206,7 +204,7 @@ describe('Gaussians made of a picture', () => {
     assertEqual(code, 'argument/value');
     const { tensor, pixels } = await tensorOf(24, 16, { width: 8, height: 8, dtype: 'float32' }, 'cover');
     const ask = async (): Promise<void> => {
-      generator.request({ pictures: { image: asGpuTensor(tensor) } });
+      generator.request({ pictures: { image: tensor } });
       await generator.idle;
     };
     await ask();

@@ -10,6 +10,8 @@ export interface LivePicturesOptions {
   /** A picture has arrived. */
   readonly onChange: () => void;
   readonly onError: (error: unknown) => void;
+  /** Fulfils when no run reads a picture. */
+  readonly whenIdle: () => Promise<void>;
 }
 
 /** Size of a tensor as far as the model fixes it. */
@@ -64,9 +66,10 @@ export class LivePictures {
     }
   }
 
+  /** To be called after the model is closed. */
   destroy(): void {
     this.#isDestroyed = true;
-    for (const tensor of Object.values(this.#tensors)) tensor.destroy();
+    void this.#options.whenIdle().then(() => Object.values(this.#tensors).forEach((tensor) => tensor.destroy()));
   }
 
   async #load(name: string, source: Picture): Promise<void> {
@@ -87,7 +90,7 @@ export class LivePictures {
     const shape = { width: wanted.width ?? own.width, height: wanted.height ?? own.height, dtype: wanted.dtype };
     const found = this.#tensors[name] as PictureTensor | undefined;
     if (found?.shape.width === shape.width && found.shape.height === shape.height) return found;
-    found?.destroy();
+    void this.#options.whenIdle().then(() => found?.destroy());
     return (this.#tensors[name] = new PictureTensor(this.#device, shape));
   }
 }

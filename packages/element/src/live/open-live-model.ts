@@ -35,7 +35,8 @@ export async function openLiveModel(
     generator.sink = gaussians;
     const { onInput: onChange, onError } = listeners;
     const { credentials } = request;
-    pictures = new LivePictures(device, models, new Set(), { credentials, signal, onChange, onError });
+    const whenIdle = (): Promise<void> => generator.idle;
+    pictures = new LivePictures(device, models, new Set(), { credentials, signal, onChange, onError, whenIdle });
     const live = liveModel(generator, gaussians, pictures, request);
     const declared = declaredBounds(model.contract);
     pictures.update(request.state().pictures);

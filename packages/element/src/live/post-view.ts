@@ -49,7 +49,9 @@ export class PostView implements FrameFilter {
     const { credentials, signal, onChange, onError } = request;
     this.#reader = new StateReader(models, onError);
     const given = new Set([input.name]);
-    this.#pictures = new LivePictures(device, models.slice(0, 1), given, { credentials, signal, onChange, onError });
+    const whenIdle = (): Promise<void> => post.idle;
+    const options = { credentials, signal, onChange, onError, whenIdle };
+    this.#pictures = new LivePictures(device, models.slice(0, 1), given, options);
   }
 
   /** Fetches and checks it. Rejects with GaussianSplatError, or the signal's reason. */
@@ -92,16 +94,20 @@ export class PostView implements FrameFilter {
   }
 
   close(): void {
+    const surface = this.#surface;
+    this.#surface = undefined;
     this.#post.close();
     this.#pictures.destroy();
-    this.#surface?.destroy();
-    this.#surface = undefined;
+    void this.#post.idle.then(() => surface?.destroy());
   }
 
   #surfaceFor({ camera: { width, height } }: Frame): FilteredFrame {
     if (this.#surface?.width === width && this.#surface.height === height) return this.#surface;
-    this.#surface?.destroy();
+    const old = this.#surface;
+    // A run on its way may still read what was handed over.
+    void this.#post.idle.then(() => old?.destroy());
     this.#surface = new FilteredFrame(this.#device, width, height);
+    this.#tensor = undefined;
     this.#drawn = this.#handed = this.#filtered = '';
     return this.#surface;
   }
@@ -113,8 +119,7 @@ export class PostView implements FrameFilter {
     this.#pictures.update(state.pictures);
     if (this.#tensor === undefined || this.#handed !== this.#drawn) {
       const { width = surface.width, height = surface.height, dtype } = input;
-      const { buffer, dims, version } = surface.handOver({ width, height, dtype });
-      this.#tensor = { buffer, dims, dtype, version };
+      this.#tensor = surface.handOver({ width, height, dtype });
       this.#handed = this.#drawn;
     }
     this.#pending = surface;

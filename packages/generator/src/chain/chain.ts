@@ -77,10 +77,10 @@ export class Chain {
     }
   }
 
-  /** Gives its models back. */
-  release(): void {
+  /** Gives its models back. @param idle fulfils when the last run has ended: until then it may read what was handed over */
+  release(idle: Promise<void> = Promise.resolve()): void {
     for (const { release } of this.#leases) release();
-    for (const handOver of this.#handOvers) handOver.destroy();
+    void idle.then(() => this.#handOvers.forEach((handOver) => handOver.destroy()));
   }
 
   #session(i: number): GeneratorSession {
