@@ -21,7 +21,7 @@ export { sameInputs, type GpuTensor, type InputNumbers, type Inputs, type InputV
 export { PostProcessor, type PictureInput, type PostProcessorOptions } from './post-processor.js';
 export { GeneratorSession } from './runtime/generator-session.js';
 export type { RunOutputs, SessionKind } from './runtime/live-session.js';
-export { isRuntimeRequested, setRuntimeLocation } from './runtime/load-runtime.js';
+export { isRuntimeRequested, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';
 export { openModel, type GeneratorModel, type ModelSource } from './runtime/open-model.js';
 export { acquireSession, type AcquireOptions, type SessionLease } from './runtime/shared-sessions.js';
 export type { GeneratorState } from './state.js';

@@ -4,6 +4,7 @@ import { bindPictures } from '../bind-pictures.js';
 import type { Inputs } from '../input-value.js';
 import type { GeneratorState } from '../state.js';
 import type { LiveSession, RunOutputs, SessionKind } from './live-session.js';
+import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { runFault, startSession } from './start-session.js';
 
@@ -24,11 +25,15 @@ export class GeneratorSession {
   #isLost = false;
   #isReleased = false;
 
-  /** @param onFallback told once if the model has to run on the CPU */
+  /**
+   * @param onFallback told once if the model has to run on the CPU
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` if an output is larger than the device's buffers.
+   */
   constructor(model: GeneratorModel, device: GPUDevice, onFallback: (reason: string) => void = () => undefined) {
     this.model = model;
     this.device = device;
     this.#onFallback = onFallback;
+    requireRoom(model, device);
     void device.lost.then(() => (this.#isLost = true));
   }
 
@@ -53,17 +58,20 @@ export class GeneratorSession {
    * `network/*` if the runtime cannot be fetched; what `use` throws.
    */
   async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
+    try {
+      await this.#runOnce(inputs, use);
+    } catch (error) {
+      if (!(error instanceof RuntimeGone)) throw error;
+      // Another model has broken the copy of the runtime that held this session: it starts again in the next copy.
+      this.#live = undefined;
+      await this.#runOnce(inputs, use);
+    }
+  }
+
+  async #runOnce(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     this.#requireLife();
     const starting = (this.#live ??= this.#start(inputs));
-    let live: LiveSession;
-    try {
-      live = await starting;
-    } catch (error) {
-      if (this.#live === starting) this.#live = undefined;
-      this.#requireLife();
-      if (error instanceof ContractError) this.#failures = MAX_FAILURES;
-      throw error;
-    }
+    const live = await this.#started(starting);
     try {
       await live.run(inputs, (outputs) => {
         // A lost device writes nothing, and the runtime does not notice.
@@ -73,6 +81,17 @@ export class GeneratorSession {
       this.#failures = 0;
     } catch (error) {
       throw await this.#afterFailure(live, starting, error);
+    }
+  }
+
+  async #started(starting: Promise<LiveSession>): Promise<LiveSession> {
+    try {
+      return await starting;
+    } catch (error) {
+      if (this.#live === starting) this.#live = undefined;
+      this.#requireLife();
+      if (error instanceof ContractError) this.#failures = MAX_FAILURES;
+      throw error;
     }
   }
 
@@ -113,6 +132,20 @@ export class GeneratorSession {
     if (this.#failures >= MAX_FAILURES) {
       throw new ContractError([runFault(this.model, `${MAX_FAILURES} runs in a row that failed`)]);
     }
+  }
+}
+
+/** The runtime keeps each output in one buffer. */
+function requireRoom({ header, outputs }: GeneratorModel, { limits }: GPUDevice): void {
+  for (const { name, dtype, most = 0 } of outputs) {
+    const bytes = most * (dtype === 'float16' ? 2 : 4);
+    if (bytes <= limits.maxBufferSize) continue;
+    throw new GaussianSplatError('out-of-memory/buffer-limit', {
+      where: `output ${name} of ${header.name}`,
+      expected: `at most ${limits.maxBufferSize} bytes, the device's maxBufferSize`,
+      found: `${bytes} bytes`,
+      remedy: 'export fewer Gaussians (a lower nMax), or float16, or one tensor for each attribute',
+    });
   }
 }
 

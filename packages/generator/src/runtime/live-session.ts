@@ -8,7 +8,7 @@ import {
   type Inputs,
   type InputValue,
 } from '../input-value.js';
-import type { Runtime } from './load-runtime.js';
+import { RuntimeGone, type Runtime } from './load-runtime.js';
 import type { ModelOutput } from './model-outputs.js';
 import type { GeneratorModel } from './open-model.js';
 import { readTensors } from './read-tensors.js';
@@ -91,25 +91,32 @@ export class LiveSession {
   /**
    * Runs the model, and hands what it wrote to `use`, which must submit all its work before it returns. Nothing else of the runtime
    * runs in between.
-   * @throws what the runtime says, and then {@link hasFailed}; or what `use` throws.
+   * @throws what the runtime says, and then {@link hasFailed}; RuntimeGone if it never began; or what `use` throws.
    */
-  run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
-    return this.#runtime.exclusive(async () => {
-      const results = await this.#infer(inputs);
-      try {
-        const dims = Object.fromEntries(this.#names.map((name) => [name, results[name].dims]));
-        use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(results, this.#outputs) });
-      } finally {
-        // Recycled for what is submitted later; a captured session writes the same buffers for ever.
-        if (this.kind === 'webgpu') for (const name of this.#names) disposeGpu(results[name]);
-      }
-    });
+  async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
+    try {
+      await this.#runtime.exclusive(() => this.#run(inputs, use));
+    } catch (error) {
+      if (this.#runtime.isBroken && !(error instanceof RuntimeGone)) this.#hasFailed = true;
+      throw error;
+    }
   }
 
   /** Lets go of everything. Never rejects: a session that has failed may not even be able to leave. */
   async release(): Promise<void> {
     await this.#runtime.exclusive(() => this.#session.release()).catch(() => undefined);
     this.#buffers.destroy();
+  }
+
+  async #run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
+    const results = await this.#infer(inputs);
+    try {
+      const dims = Object.fromEntries(this.#names.map((name) => [name, results[name].dims]));
+      use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(results, this.#outputs) });
+    } finally {
+      // Recycled for what is submitted later; a captured session writes the same buffers for ever.
+      if (this.kind === 'webgpu') for (const name of this.#names) disposeGpu(results[name]);
+    }
   }
 
   async #infer(inputs: Inputs): Promise<Record<string, Tensor>> {

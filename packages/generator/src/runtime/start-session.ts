@@ -102,6 +102,8 @@ async function start(kind: SessionKind, options: StartOptions, refusals: string[
   const written = await attempt(session, options, refusals);
   if (written) return { session, written };
   await session.release();
+  // Whatever broke the runtime would do so again: on the CPU, for one, what does not end would stop the page.
+  if (runtime.isBroken) throw new ContractError([runFault(model, refusals.join('; '))]);
   return undefined;
 }
 
