@@ -83,6 +83,7 @@ function cpuRuntime(): Promise<typeof OnnxRuntime> {
 export async function runOnCpu(
   url: string,
   state: GeneratorState,
+  pictures: Readonly<Record<string, { dims: readonly number[]; data: Float32Array }>> = {},
 ): Promise<Record<string, { dims: readonly number[]; values: number[] }>> {
   const { InferenceSession, Tensor } = await cpuRuntime();
   const bytes = new Uint8Array(await (await fetch(url)).arrayBuffer());
@@ -99,6 +100,7 @@ export async function runOnCpu(
   const feeds = Object.entries(bindInputs(header, contract, state)).map(
     ([name, { dtype, data, dims }]) => [name, new Tensor(dtype, data as never, dims)] as const,
   );
+  for (const [name, { dims, data }] of Object.entries(pictures)) feeds.push([name, new Tensor('float32', data, dims)]);
   const results = await session.run(Object.fromEntries(feeds));
   await session.release();
   return Object.fromEntries(
