@@ -1,4 +1,5 @@
-"""Writes the small file of each family, for tests in browsers: python -m tests.write_zoo ../../tests/fixtures/families"""
+"""Writes the small file of each family, for tests in browsers:
+python -m tests.write_zoo ../../tests/fixtures/families"""
 
 from __future__ import annotations
 

@@ -165,7 +165,6 @@ async function compareFrames(
   const renderer = new Renderer(device);
   const live = await DynamicGaussians.create(device, layout);
   const fromCpu = await DynamicGaussians.create(device, layout);
-  const other = await stateAt(generator.model, 9);
   // An instance of its own: what a model without inputs has written it does not write again.
   const instance = await Generator.open({ url: generator.model.url }, device, { onError: reportError });
   instance.sink = live;
