@@ -19,7 +19,7 @@ after(() => rmSync(folder, { recursive: true }));
 const codes = ({ faults }: CheckReport): string[] => faults.map(({ code }) => code).sort();
 
 function command(...args: string[]): { status: number | null; text: string } {
-  const bin = `${root}packages/check/bin/gaussian-splat-check.js`;
+  const bin = `${root}packages/check/bin/gaussian-check.js`;
   const { status, stdout, stderr } = spawnSync(process.execPath, [bin, ...args], { encoding: 'utf8' });
   return { status, text: stdout + stderr };
 }
