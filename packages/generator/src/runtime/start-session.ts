@@ -1,4 +1,4 @@
-import { ContractError, type ContractFault } from '@gaussian-splat/core';
+import { ContractError, miscomputedConvolutions, type ContractFault } from '@gaussian-splat/core';
 import { elementsOf, type Inputs } from '../input-value.js';
 import { LiveSession, type RunOutputs, type SessionKind } from './live-session.js';
 import { loadRuntime } from './load-runtime.js';
@@ -29,6 +29,8 @@ export async function startSession(options: StartOptions): Promise<LiveSession> 
   const refusals: string[] = [];
   if (isHalfWithoutFeature(model, device)) {
     refusals.push('webgpu: its float16 tensors need the device feature shader-f16, which this device does not have');
+  } else if (miscomputedConvolutions(model.header).length > 0) {
+    refusals.push(convolutionReason(model));
   } else {
     const session = await startOnGpu(options, refusals);
     if (session) return session;
@@ -68,6 +70,11 @@ export function runFault({ header }: GeneratorModel, found: string): ContractFau
     found: found.slice(0, 1000),
     remedy: 'run it in a shell (npm run check -- MODEL --run), and mend or simplify what the runtime refuses',
   };
+}
+
+function convolutionReason({ header }: GeneratorModel): string {
+  const [{ inputs, outputs }] = miscomputedConvolutions(header);
+  return `webgpu: ONNX Runtime computes a convolution of ${inputs} channels to ${outputs} wrongly there; pad the channels going in to a multiple of 4`;
 }
 
 function isHalfWithoutFeature({ header, outputs }: GeneratorModel, device: GPUDevice): boolean {
