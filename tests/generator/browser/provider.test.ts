@@ -1,4 +1,5 @@
 /** What is known of ONNX Runtime's WebGPU provider, held against the version that ships: recorded commands, and convolutions. */
+import { bytesSource, readOnnxHeader } from '@gaussian-splat/core';
 import { PictureTensor } from '@gaussian-splat/renderer';
 import { bindInputs, openModel, PostProcessor, type GeneratorState } from '@gaussian-splat/generator';
 import type * as LoadRuntime from '../../../packages/generator/dist/runtime/load-runtime.js';
@@ -82,6 +83,35 @@ async function onProvider(url: string, image: PictureTensor): Promise<number[]> 
   assert(reading, 'a run');
   return numbersOf(await reading, 'float32').slice(0, 3 * 256);
 }
+
+it('the real decoders of Octree-GS, traced at opset 10, compute on the GPU what they compute on the CPU', async () => {
+  const { ort } = await loadRuntime();
+  const own = await makeDevice();
+  for (const name of ['color', 'cov', 'opacity']) {
+    const response = await fetch(`/net/shared/generators/octree-gs/${name}_mlp.onnx`);
+    if (!response.ok) return console.log('not tested: shared/data is not beside the checkout');
+    const bytes = new Uint8Array(await response.arrayBuffer());
+    const [input] = (await readOnnxHeader(bytesSource(bytes, name))).inputs;
+    const dims = (input.dims ?? []).map((dim) => (typeof dim === 'number' ? dim : 50));
+    const data = Float32Array.from(
+      wave(
+        dims.reduce((product, dim) => product * dim, 1),
+        1,
+      ),
+    );
+    const written: number[][] = [];
+    for (const provider of [{ name: 'webgpu', device: own } as const, 'wasm']) {
+      const session = await ort.InferenceSession.create(bytes, { executionProviders: [provider] });
+      const [tensor] = Object.values(await session.run({ [input.name]: new ort.Tensor('float32', data, dims) }));
+      written.push(Array.from((await tensor.getData()) as Float32Array));
+      await session.release();
+    }
+    const error = relativeError(written[0], written[1]);
+    console.log(`${name}_mlp of Octree-GS, ${dims.join('x')}: relative error ${error.toExponential(1)}`);
+    assert(written[1].some((value) => value !== 0) && error <= 1e-3, `${name}: relative error ${error}`);
+  }
+  own.destroy();
+});
 
 describe('convolutions', () => {
   for (const name of ['conv-8-8', 'conv-6-8', 'conv-9-4', 'conv-18-12']) {
