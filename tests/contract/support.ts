@@ -66,6 +66,7 @@ export function headerWith(
     operators: new Map(),
     functions: new Set(),
     externalFiles: [],
+    convolutions: [],
     initializerBytes: 0,
     ...rest,
   };

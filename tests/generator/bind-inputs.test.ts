@@ -12,7 +12,7 @@ import {
   type OnnxTensor,
   type Vector3,
 } from '@gaussian-splat/core';
-import { bindInputs, sameInputs, type GeneratorState, type InputValue } from '@gaussian-splat/generator';
+import { bindInputs, sameInputs, type GeneratorState, type InputNumbers } from '@gaussian-splat/generator';
 import { headerWith, PACKED, tensor } from '../contract/support.js';
 import { seededRandom } from '../support/random.js';
 
@@ -33,12 +33,12 @@ function bind(
   dims: OnnxTensor['dims'],
   state: GeneratorState = {},
   { dtype = 'float32', facts = {} }: { dtype?: OnnxTensor['dtype']; facts?: Partial<Contract> } = {},
-): InputValue {
+): InputNumbers {
   const header = headerWith([tensor('x', dims, dtype)], [tensor('gaussians', [1, 13])]);
   return bindInputs(header, { ...PACKED, ...facts, inputs: { x: binding } }, state).x;
 }
 
-const numbers = ({ data }: InputValue): number[] => Array.from(data as ArrayLike<number | bigint>, Number);
+const numbers = ({ data }: InputNumbers): number[] => Array.from(data as ArrayLike<number | bigint>, Number);
 const assertClose = (found: ArrayLike<number>, expected: ArrayLike<number>, tolerance = 2e-5): void => {
   assert.equal(found.length, expected.length);
   for (let i = 0; i < found.length; i++) {
@@ -124,7 +124,7 @@ test('time, frame, seed', () => {
   const facts = { duration: 4, fps: 30 };
   assert.deepEqual(numbers(bind({ role: 'time', unit: 'normalized' }, [], at(1), { facts })), [0.25]);
   assert.deepEqual(bind({ role: 'time', unit: 'seconds' }, [], {}).dims, []);
-  const frame = (state: GeneratorState): InputValue => bind({ role: 'frame' }, [1], state, { dtype: 'int64', facts });
+  const frame = (state: GeneratorState): InputNumbers => bind({ role: 'frame' }, [1], state, { dtype: 'int64', facts });
   assert.deepEqual(frame(at(1.99)).data, BigInt64Array.of(59n));
   assert.deepEqual(frame({ frame: 7, timeSeconds: 3 }).data, BigInt64Array.of(7n));
   assert.deepEqual(bind({ role: 'seed' }, [1], { seed: 9 }, { dtype: 'int32' }).data, Int32Array.of(9));
@@ -155,7 +155,8 @@ test('Gaussians and pictures come from elsewhere', () => {
 test('the same inputs are told from others: then nothing needs to run', () => {
   const header = headerWith([tensor('t', [1]), tensor('v', [4, 4])], [tensor('gaussians', [1, 13])]);
   const contract: Contract = { ...PACKED, inputs: { t: { role: 'time', unit: 'seconds' }, v: { role: 'view' } } };
-  const at = (state: GeneratorState): Record<string, InputValue> => bindInputs(header, contract, { camera, ...state });
+  const at = (state: GeneratorState): Record<string, InputNumbers> =>
+    bindInputs(header, contract, { camera, ...state });
   assert.equal(sameInputs(at({}), at({ timeSeconds: 0, seed: 5, controls: { other: 1 } })), true);
   assert.equal(sameInputs(at({}), at({ timeSeconds: 1e-6 })), false);
   // What the generator does not look at does not count.

@@ -1,9 +1,16 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
-import { blobSource, bytesSource, GaussianSplatError, readOnnxHeader, type OnnxHeader } from '@gaussian-splat/core';
+import {
+  blobSource,
+  bytesSource,
+  GaussianSplatError,
+  miscomputedConvolutions,
+  readOnnxHeader,
+  type OnnxHeader,
+} from '@gaussian-splat/core';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { fixtureBytes, fixtureNames, fixturePath } from '../support/generators.js';
+import { fixtureBytes, fixtureHeader, fixtureNames, fixturePath } from '../support/generators.js';
 
 /** A header in the words of expected.json, which the onnx package of Python wrote. */
 function plain(header: OnnxHeader): Record<string, unknown> {
@@ -49,6 +56,17 @@ test('external data: the length that the file must have', async () => {
   const { externalFiles, initializerBytes } = await readOnnxHeader(bytesSource(fixtureBytes('external.onnx')));
   assert.deepEqual(externalFiles, [{ location: 'external.weights', byteLength: 6656 }]);
   assert.ok(initializerBytes < 300, `${initializerBytes} bytes: only the entries are in the model`);
+});
+
+test('convolutions are listed with their channels and kernels, from their weights', async () => {
+  const header = await fixtureHeader('conv-6-8.onnx');
+  assert.deepEqual(header.convolutions, [
+    { inputs: 3, outputs: 6, kernel: [3, 3] },
+    { inputs: 6, outputs: 8, kernel: [3, 3] },
+    { inputs: 8, outputs: 3, kernel: [3, 3] },
+  ]);
+  assert.deepEqual(miscomputedConvolutions(header), [{ inputs: 6, outputs: 8, kernel: [3, 3] }]);
+  assert.deepEqual((await fixtureHeader('packed.onnx')).convolutions, []);
 });
 
 test('real decoders of Octree-GS', { skip: needsSharedData }, async () => {

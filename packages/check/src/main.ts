@@ -2,7 +2,7 @@ import { parseArgs } from 'node:util';
 import { describeFault, type ReportSection } from '@gaussian-splat/core';
 import { checkModel, type CheckFault, type CheckReport } from './check-model.js';
 
-const USAGE = `Usage: gaussian-splat-check MODEL [--contract CONTRACT.json] [--run]
+const USAGE = `Usage: gaussian-check MODEL [--contract CONTRACT.json] [--run]
 
 Checks an ONNX file (a path or an address) against the Gaussian Generator contract.
 

@@ -88,7 +88,9 @@ export type ContractErrorCode =
   /** The live count is negative or above the number of rows. */
   | 'contract/count'
   /** The same inputs gave other outputs although no input is a seed. */
-  | 'contract/not-deterministic';
+  | 'contract/not-deterministic'
+  /** Models of a chain do not fit one another, or stand where they cannot. */
+  | 'contract/chain';
 
 /** What a person needs to mend the fault. Every field is a full phrase without a trailing full stop. */
 export interface ErrorDetails {

@@ -102,6 +102,8 @@ export class GaussianSplatElement extends LitElement {
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
     quality: {},
     contract: {},
+    chain: {},
+    postprocess: {},
     time: {},
     pose: {},
     loop: { type: Boolean },
@@ -150,6 +152,10 @@ export class GaussianSplatElement extends LitElement {
   declare quality: Quality | null;
   /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
   declare contract: string | object | null;
+  /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */
+  declare chain: string | null;
+  /** URL of a post-processor that makes the picture shown from the one drawn, or several with spaces between them. */
+  declare postprocess: string | null;
   /** Seconds: where the scene's time is put whenever this changes. See {@link currentTime} for where it is. */
   declare time: number | string | null;
   /** Pose of a generator, flattened or nested, as its contract declares it: text, a list, a typed array. A new pose is a new object. */
@@ -162,7 +168,7 @@ export class GaussianSplatElement extends LitElement {
   #attributes: Attributes;
   readonly #stage: Stage;
   readonly #internals: ElementInternals | null;
-  #liveValues: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {} };
+  #liveValues: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
   #controlObserver: MutationObserver | undefined;
   readonly #warned = new Set<string>();
 
@@ -321,7 +327,7 @@ export class GaussianSplatElement extends LitElement {
   }
 
   protected override updated(): void {
-    this.#stage.setSource(this.src, this.contract);
+    this.#stage.setSource(this);
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
     // Through the style object, which a strict Content-Security-Policy allows, and not the attribute, which it refuses.
@@ -358,8 +364,7 @@ export class GaussianSplatElement extends LitElement {
   #readLiveValues(): void {
     const pose = readNumbers(this.pose);
     if (pose === undefined && this.pose) this.#warn('<gaussian-splat>: pose expects numbers; the rest pose counts.');
-    const controls = readControls(this.attributes, this.controls, (sentence) => this.#warn(sentence));
-    this.#liveValues = { pose, controls };
+    this.#liveValues = { pose, ...readControls(this.attributes, this.controls, (sentence) => this.#warn(sentence)) };
   }
 
   #seekToAttribute(): void {

@@ -11,7 +11,7 @@ export type {
 } from './events.js';
 export { GaussianSplatElement, type SceneStatistics } from './element.js';
 export { CameraOrbit, CameraTarget, FieldOfView } from './camera/values.js';
-export type { ControlValues, Numbers } from './live/values.js';
+export type { ControlValues, Numbers, Picture } from './live/values.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 
 // Two copies of this module on one page, or a server without custom elements, must not fail.

@@ -15,6 +15,7 @@ import type { SharedDevice } from './gpu/shared-device.js';
 import { toElementError } from './errors.js';
 import type { GpuScene } from './gpu/gpu-scene.js';
 import type { LiveListeners, LiveState } from './live/live-model.js';
+import { PostController } from './live/post-controller.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { SceneLoader } from './loading/scene-loader.js';
 
@@ -27,6 +28,15 @@ export interface Services {
   readonly releaseDelay: number;
   /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
+}
+
+/** What is to be shown, as the element's attributes have it. */
+export interface Source {
+  readonly src: string | null;
+  readonly contract: unknown;
+  /** URLs with spaces between them. */
+  readonly chain: string | null;
+  readonly postprocess: string | null;
 }
 
 /** What the stage asks its element for. */
@@ -56,8 +66,8 @@ export class Stage {
   readonly #visibility: VisibilityController;
   readonly #size: SizeController;
   readonly #view: ViewController;
-  #src: string | null = null;
-  #contract: unknown = null;
+  readonly #post: PostController;
+  #source: Source = { src: null, contract: null, chain: null, postprocess: null };
   #lastFault = '';
 
   constructor(host: ReactiveControllerHost & HTMLElement, options: StageOptions) {
@@ -72,16 +82,17 @@ export class Stage {
       dispatch: (type) => this.#dispatch(new Event(type)),
     });
     this.#view = this.#createView();
+    this.#post = this.#createPost();
     this.scene = this.#createScene();
     new InputController(host, options.surface, options.input, (action) => this.#act(action));
     // Put back after a while, an eager element loads again though nothing has come into sight.
     host.addController({ hostConnected: () => this.#requestScene() });
   }
 
-  /** The scene to show, as the `src` attribute has it. Called after every update; only changes act. */
-  setSource(src: string | null, contract: unknown): void {
-    this.#src = src;
-    this.#contract = contract;
+  /** The scene to show. Called after every update; only changes act. */
+  setSource(source: Source): void {
+    this.#source = source;
+    this.#post.want(absoluteUrls(source.postprocess));
     this.#requestScene();
     // A changed attribute may concern the picture, for example its pixel ratio.
     this.#view.requestFrame();
@@ -113,9 +124,11 @@ export class Stage {
       show: (scene, isNew) => {
         if (isNew) this.camera.frame(scene.bounds);
         this.playback.setDuration(scene.live?.duration ?? NaN);
+        this.#post.attach(scene);
         return this.#view.show(scene);
       },
       hide: (clear) => {
+        this.#post.attach(null);
         if (clear) this.playback.setDuration(NaN);
         if (clear) this.#view.clear();
         else this.#view.pause();
@@ -123,6 +136,7 @@ export class Stage {
       live: () => ({
         runtimeLocation: services().runtimeLocation,
         state: () => this.#liveState(),
+        ownsControls: () => !this.#post.isWanted,
         camera: (bounds) => {
           if (bounds) this.camera.frame(bounds);
           return this.camera.view(...FIRST_SIZE);
@@ -136,11 +150,25 @@ export class Stage {
     });
   }
 
+  #createPost(): PostController {
+    return new PostController({
+      requestFrame: () => this.#view.requestFrame(),
+      request: () => ({
+        credentials: this.#options.attributes().credentials,
+        runtimeLocation: this.#options.services().runtimeLocation,
+        state: () => this.#liveState(),
+        onError: (error) => this.#onLiveError(error),
+        onFallback: (reason) => this.#dispatch(new CustomEvent('generator-fallback', { detail: { reason } })),
+      }),
+    });
+  }
+
   #requestScene(): void {
     const { loading, credentials, quality } = this.#options.attributes();
     const sh = quality === 'reference' ? 'float16' : 'auto';
-    const request: SceneRequest | null = this.#src
-      ? { url: absoluteUrl(this.#src), credentials, sh, contract: this.#contract }
+    const { src, contract, chain } = this.#source;
+    const request: SceneRequest | null = src
+      ? { url: absoluteUrl(src), credentials, sh, contract, chain: absoluteUrls(chain) }
       : null;
     if (this.#host.isConnected) this.scene.want(request, loading === 'eager' || this.#visibility.isVisible);
   }
@@ -188,6 +216,7 @@ export class Stage {
       },
       onError: (error) => this.#onLiveError(error),
       onFallback: (reason) => this.#dispatch(new CustomEvent('generator-fallback', { detail: { reason } })),
+      onInput: () => this.#view.requestFrame(),
     };
   }
 
@@ -219,5 +248,8 @@ const FIRST_SIZE = [300, 150] as const;
 function absoluteUrl(src: string): string {
   return URL.canParse(src, document.baseURI) ? new URL(src, document.baseURI).href : src;
 }
+
+const absoluteUrls = (urls: string | null): readonly string[] =>
+  (urls ?? '').split(/\s+/).filter(Boolean).map(absoluteUrl);
 
 const prefersReducedMotion = (): boolean => matchMedia('(prefers-reduced-motion: reduce)').matches;

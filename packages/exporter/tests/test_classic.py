@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gaussian_exporter.checkpoints.ply import read_ply
+from gaussian_exporter.conformance import check_outputs
 from gaussian_exporter.contract import METADATA_KEY
 from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.classic import Cloud, export_classic, read_cloud
@@ -64,10 +65,22 @@ def test_split_layout_writes_one_tensor_for_each_attribute() -> None:
 
 def test_float16_halves_the_output_and_keeps_three_digits() -> None:
     given = cloud()
-    rows = run(export_classic(given, FACTS, Options(dtype="float16")))["gaussians"]
+    rows = run(export_classic(given, FACTS, Options("packed", "float16")))["gaussians"]
     assert rows.dtype == np.float16
     full = run(export_classic(given, FACTS))["gaussians"]
     assert error(rows, full) < 1e-3
+
+
+def test_float16_keeps_needles_as_scales_and_rotations() -> None:
+    given = cloud()
+    given.log_scales[:] = [0.0, -5.0, -6.0]
+    model = export_classic(given, FACTS, Options(dtype="float16"))
+    check_outputs(model)
+    found = run(model)
+    assert set(found) == {"positions", "scales", "rotations", "sh", "opacities"}
+    assert error(found["scales"], np.exp(np.float64(given.log_scales))) < 1e-3
+    full = parts(run(export_classic(given, FACTS))["gaussians"])["covariances"]
+    assert error(covariance(found["scales"], found["rotations"]), full) < 2e-3
 
 
 def test_unusable_gaussians_are_left_out_and_infinite_opacities_are_exact() -> None:

@@ -9,14 +9,8 @@ import {
   type OnnxTensor,
 } from '@gaussian-splat/core';
 import { inOrder, projectionMatrix, viewMatrix, viewProjectionMatrix } from './camera-matrices.js';
+import type { InputNumbers } from './input-value.js';
 import type { GeneratorState } from './state.js';
-
-/** The value of one input, ready for a tensor. */
-export interface InputValue {
-  readonly dtype: 'float32' | 'int32' | 'int64';
-  readonly dims: readonly number[];
-  readonly data: Float32Array | Int32Array | BigInt64Array;
-}
 
 /**
  * The values of a generator's inputs, in the conventions that its contract declares. Inputs with the roles `gaussians` and
@@ -25,28 +19,18 @@ export interface InputValue {
  * @param header of a file that keeps the contract (`checkContract` found nothing).
  * @throws GaussianSplatError `argument/value` if the state lacks a camera, or a value has the wrong length or is not finite.
  */
-export function bindInputs(header: OnnxHeader, contract: Contract, state: GeneratorState): Record<string, InputValue> {
-  const values: Record<string, InputValue> = {};
+export function bindInputs(
+  header: OnnxHeader,
+  contract: Contract,
+  state: GeneratorState,
+): Record<string, InputNumbers> {
+  const values: Record<string, InputNumbers> = {};
   for (const input of header.inputs) {
     const binding = contract.inputs[input.name];
     if (binding.role === 'gaussians' || binding.role === 'image') continue;
     values[input.name] = toTensor(input, numbersOf(input, binding, contract, state));
   }
   return values;
-}
-
-/** True if two sets of values are the same, bit for bit: a generator without a seed would then write the same again. */
-export function sameInputs(a: Readonly<Record<string, InputValue>>, b: Readonly<Record<string, InputValue>>): boolean {
-  const names = Object.keys(a);
-  return (
-    names.length === Object.keys(b).length && names.every((name) => Object.hasOwn(b, name) && same(a[name], b[name]))
-  );
-}
-
-function same(a: InputValue, b: InputValue): boolean {
-  if (a.dtype !== b.dtype || a.data.length !== b.data.length) return false;
-  for (let i = 0; i < a.data.length; i++) if (!Object.is(a.data[i], b.data[i])) return false;
-  return a.dims.length === b.dims.length && a.dims.every((dim, i) => dim === b.dims[i]);
 }
 
 function numbersOf(
@@ -95,7 +79,7 @@ const filled = (input: OnnxTensor, value: number | ArrayLike<number>): ArrayLike
 const sizeOf = ({ dims }: OnnxTensor): number =>
   (dims ?? []).reduce<number>((product, dim) => product * Number(dim), 1);
 
-function toTensor(input: OnnxTensor, numbers: ArrayLike<number>): InputValue {
+function toTensor(input: OnnxTensor, numbers: ArrayLike<number>): InputNumbers {
   const { name, dtype } = input;
   if (numbers.length !== sizeOf(input)) {
     throw wrong(name, `${sizeOf(input)} numbers for ${describeTensor(input)}`, `${numbers.length}`);

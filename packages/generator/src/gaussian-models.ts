@@ -1,4 +1,4 @@
-import { GaussianSplatError, type Contract, type GaussianLayout } from '@gaussian-splat/core';
+import { ContractError, GaussianSplatError, type Contract, type GaussianLayout } from '@gaussian-splat/core';
 import { Generator, type GaussianSink, type GeneratedFrame } from './generator.js';
 import type { ModelSource } from './runtime/open-model.js';
 import type { GeneratorState } from './state.js';
@@ -17,29 +17,39 @@ export interface GaussianModel<S extends GaussianSink = GaussianSink> {
   remove(): void;
 }
 
+/** A generator by its name. */
+interface Registered {
+  readonly source: ModelSource;
+  readonly after: string | undefined;
+}
+
 /** Generators by name, and the models that show them: what a page of several generators keeps. */
 export class GaussianModels {
-  readonly #sources = new Map<string, ModelSource>();
+  readonly #sources = new Map<string, Registered>();
   readonly #models = new Set<GaussianModel>();
   readonly #listeners = new Set<(model: GaussianModel, frame: GeneratedFrame) => void>();
   readonly #failures = new Set<(model: GaussianModel | undefined, error: unknown) => void>();
   #loaded = new Map<string, Generator>();
   #device: GPUDevice | undefined;
 
-  /** Gives a generator a name. Nothing is fetched yet. */
-  registerGaussianGenerator(name: string, source: ModelSource): void {
-    this.#sources.set(name, source);
+  /**
+   * Gives a generator a name. Nothing is fetched yet.
+   * @param options.after name of the generator whose Gaussians this one takes: they run as a chain.
+   */
+  registerGaussianGenerator(name: string, source: ModelSource, options: { readonly after?: string } = {}): void {
+    this.#sources.set(name, { source, after: options.after });
   }
 
   /**
    * Fetches and checks all registered generators, for a device.
-   * @throws what `openModel` throws for the first that fails.
+   * @throws what `Generator.open` throws for the first that fails; ContractError `contract/chain` for generators that follow one another in
+   * a circle, GaussianSplatError `argument/value` for one that follows an unknown name.
    */
   async loadAllGenerators(device: GPUDevice): Promise<void> {
     this.#device = device;
     const names = [...this.#sources.keys()].filter((name) => !this.#loaded.has(name));
     await Promise.all(
-      names.map(async (name) => this.#loaded.set(name, await Generator.open(this.#sources.get(name)!, device))),
+      names.map(async (name) => this.#loaded.set(name, await Generator.open(this.#chainOf(name), device))),
     );
   }
 
@@ -51,9 +61,8 @@ export class GaussianModels {
     name: string,
     makeSink: MakeSink<S>,
   ): Promise<GaussianModel<S>> {
-    const source = this.#sources.get(name);
-    if (source === undefined || this.#device === undefined) throw unknownGenerator(name, [...this.#sources.keys()]);
-    const generator = await Generator.open(source, this.#device, {
+    if (this.#device === undefined) throw unknownGenerator(name, [...this.#sources.keys()]);
+    const generator = await Generator.open(this.#chainOf(name), this.#device, {
       onFrame: (frame) => this.#listeners.forEach((listener) => listener(model, frame)),
       onError: (error) => this.#failures.forEach((listener) => listener(model, error)),
     });
@@ -98,7 +107,29 @@ export class GaussianModels {
     this.#sources.clear();
     this.#device = undefined;
   }
+
+  /** Sources from the first of the chain that ends with a name. */
+  #chainOf(last: string): readonly ModelSource[] {
+    const names: string[] = [];
+    for (let name: string | undefined = last; name !== undefined; name = this.#sources.get(name)?.after) {
+      if (names.includes(name)) throw circle([...names, name]);
+      if (!this.#sources.has(name)) throw unknownGenerator(name, [...this.#sources.keys()]);
+      names.push(name);
+    }
+    return names.reverse().map((name) => this.#sources.get(name)!.source);
+  }
 }
+
+const circle = (names: readonly string[]): ContractError =>
+  new ContractError([
+    {
+      code: 'contract/chain',
+      where: `generator ${names[0]}`,
+      expected: 'a chain with a first generator, which takes no Gaussians',
+      found: `a circle: ${names.join(' after ')}`,
+      remedy: 'register one of them without "after"',
+    },
+  ]);
 
 function unknownGenerator(name: string, known: readonly string[]): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
@@ -113,8 +144,8 @@ function unknownGenerator(name: string, known: readonly string[]): GaussianSplat
 const page = new GaussianModels();
 
 /** {@link GaussianModels.registerGaussianGenerator} of the page. */
-export const registerGaussianGenerator: GaussianModels['registerGaussianGenerator'] = (name, source) =>
-  page.registerGaussianGenerator(name, source);
+export const registerGaussianGenerator: GaussianModels['registerGaussianGenerator'] = (name, source, options) =>
+  page.registerGaussianGenerator(name, source, options);
 /** {@link GaussianModels.loadAllGenerators} of the page. */
 export const loadAllGenerators: GaussianModels['loadAllGenerators'] = (device) => page.loadAllGenerators(device);
 /** {@link GaussianModels.addGaussianModelToScene} of the page. */

@@ -1,8 +1,10 @@
-import { sameInputs, type InputValue } from './bind-inputs.js';
-import type { GeneratorSession } from './runtime/generator-session.js';
-import type { RunOutputs } from './runtime/live-session.js';
-import { acquireSession, type AcquireOptions, type SessionLease } from './runtime/shared-sessions.js';
-import type { ModelSource } from './runtime/open-model.js';
+import { ContractError, type GaussianLayout } from '@gaussian-splat/core';
+import { Chain } from './chain/chain.js';
+import { sameInputs, type Inputs } from './input-value.js';
+import { RunLoop } from './run-loop.js';
+import type { RunOutputs, SessionKind } from './runtime/live-session.js';
+import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
+import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
 
 /** Takes what runs write: `DynamicGaussians` of the renderer is one. It must submit its work before it returns. */
@@ -24,14 +26,12 @@ export interface GeneratorOptions extends AcquireOptions {
   readonly onError?: (error: unknown) => void;
 }
 
-/** Runs whose work the GPU may not have finished before another one starts: one is computed while the next is recorded. */
-const MAX_IN_FLIGHT = 2;
-/** A run that keeps the GPU for longer than this, ms, is waited for: frames that are drawn meanwhile stand behind it in the queue. */
-const SLOW_RUN_MS = 50;
+/** A model that writes Gaussians. */
+export type GaussianModelFile = GeneratorModel & { readonly layout: GaussianLayout };
 
 interface Wish {
   readonly state: GeneratorState;
-  readonly inputs: Readonly<Record<string, InputValue>>;
+  readonly inputs: readonly Inputs[];
 }
 
 /**
@@ -46,36 +46,57 @@ interface Wish {
 export class Generator {
   /** Where runs go; without one there are no runs. */
   sink: GaussianSink | undefined;
-  readonly #lease: SessionLease;
+  readonly #chain: Chain;
   readonly #options: GeneratorOptions;
-  readonly #unfinished: Promise<unknown>[] = [];
-  #wish: Wish | undefined;
+  readonly #loop: RunLoop<Wish>;
   #shown: Wish['inputs'] | undefined;
-  #running: Promise<void> | undefined;
   #runs = 0;
-  #isSlow = false;
-  #isClosed = false;
 
-  private constructor(lease: SessionLease, options: GeneratorOptions) {
-    this.#lease = lease;
+  private constructor(chain: Chain, options: GeneratorOptions) {
+    this.#chain = chain;
     this.#options = options;
+    this.#loop = new RunLoop({
+      queue: chain.device.queue,
+      isDue: ({ inputs }) => this.sink !== undefined && !this.#shows(inputs),
+      run: (wish) => this.#run(wish),
+      onError: (error) => this.#options.onError?.(error),
+    });
   }
 
   /**
-   * Fetches a generator and checks it; not a byte of the runtime is fetched yet.
-   * @throws ContractError, GaussianSplatError: see `openModel`.
+   * Fetches a generator, or several of which each takes the Gaussians of the one before it, and checks them; not a byte of the runtime
+   * is fetched yet.
+   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not fit one another, or do
+   * not write Gaussians in the end.
    */
-  static async open(source: ModelSource, device: GPUDevice, options: GeneratorOptions = {}): Promise<Generator> {
-    return new Generator(await acquireSession(source, device, options), options);
+  static async open(
+    source: ModelSource | readonly ModelSource[],
+    device: GPUDevice,
+    options: GeneratorOptions = {},
+  ): Promise<Generator> {
+    const chain = await Chain.open(source, device, options);
+    try {
+      requireGaussians(chain.models.at(-1)!);
+      return new Generator(chain, options);
+    } catch (error) {
+      chain.release();
+      throw error;
+    }
   }
 
-  get model(): GeneratorSession['model'] {
-    return this.#lease.session.model;
+  /** The model that writes what is drawn: the last of a chain. */
+  get model(): GaussianModelFile {
+    return this.#chain.models.at(-1) as GaussianModelFile;
   }
 
-  /** How it runs; undefined before the first run. */
-  get kind(): GeneratorSession['kind'] {
-    return this.#lease.session.kind;
+  /** All models of the chain, in the order in which they run. */
+  get models(): readonly GeneratorModel[] {
+    return this.#chain.models;
+  }
+
+  /** How it runs, by the slowest of its models; undefined before the first run. */
+  get kind(): SessionKind | undefined {
+    return this.#chain.kind;
   }
 
   /** Runs that have reached the sink. */
@@ -85,7 +106,7 @@ export class Generator {
 
   /** Fulfils, and never rejects, when no run is on its way. */
   get idle(): Promise<void> {
-    return this.#running ?? Promise.resolve();
+    return this.#loop.idle;
   }
 
   /**
@@ -94,60 +115,40 @@ export class Generator {
    * @throws GaussianSplatError `argument/value` if the state does not fit the contract.
    */
   request(state: GeneratorState): void {
-    if (this.#isClosed) return;
-    this.#wish = { state, inputs: this.#lease.session.bind(state) };
-    this.#running ??= this.#work().finally(() => (this.#running = undefined));
+    if (!this.#loop.isClosed) this.#loop.request({ state, inputs: this.#chain.bind(state) });
   }
 
   /** Ends it: a run on its way reaches nobody any more. */
   close(): void {
-    this.#isClosed = true;
-    this.#wish = undefined;
-    this.#lease.release();
+    this.#loop.close();
+    this.#chain.release(this.#loop.idle);
   }
 
-  async #work(): Promise<void> {
-    // So that requests of the same task are one.
-    await Promise.resolve();
-    for (let wish = this.#take(); wish !== undefined; wish = this.#take()) {
-      try {
-        await this.#run(wish);
-      } catch (error) {
-        if (!this.#isClosed) this.#options.onError?.(error);
-      }
-    }
-  }
-
-  /** The latest wish, unless it is on show. */
-  #take(): Wish | undefined {
-    const wish = this.#wish;
-    this.#wish = undefined;
-    if (wish === undefined || this.sink === undefined || this.#isClosed) return undefined;
-    return this.#shown && sameInputs(wish.inputs, this.#shown) ? undefined : wish;
+  #shows(inputs: Wish['inputs']): boolean {
+    return this.#shown?.every((shown, i) => sameInputs(shown, inputs[i])) ?? false;
   }
 
   async #run({ state, inputs }: Wish): Promise<void> {
     const start = performance.now();
-    const { session } = this.#lease;
-    await session.run(inputs, ({ tensors, rows }) => {
-      if (this.#isClosed) return;
+    await this.#chain.run(inputs, ({ tensors, rows }) => {
+      if (this.#loop.isClosed) return;
       this.sink?.ingest(tensors, rows);
       this.#shown = inputs;
       this.#runs++;
     });
-    if (this.#isClosed) return;
-    this.#options.onFrame?.({ state, milliseconds: performance.now() - start });
-    await this.#waitForRoom(session.device.queue);
+    if (!this.#loop.isClosed) this.#options.onFrame?.({ state, milliseconds: performance.now() - start });
   }
+}
 
-  /** Never a backlog on the GPU either. A lost device finishes nothing, and is reported elsewhere. */
-  async #waitForRoom(queue: GPUQueue): Promise<void> {
-    const start = performance.now();
-    const finished = queue.onSubmittedWorkDone().then(
-      () => (this.#isSlow = performance.now() - start > SLOW_RUN_MS),
-      () => undefined,
-    );
-    this.#unfinished.push(finished);
-    while (this.#unfinished.length >= (this.#isSlow ? 1 : MAX_IN_FLIGHT)) await this.#unfinished.shift();
-  }
+function requireGaussians({ header, layout }: GeneratorModel): void {
+  if (layout !== undefined) return;
+  throw new ContractError([
+    {
+      code: 'contract/chain',
+      where: header.name,
+      expected: 'a model that writes Gaussians',
+      found: 'a post-processor, which writes a picture',
+      remedy: 'name it in the attribute postprocess, or open it with PostProcessor.open',
+    },
+  ]);
 }

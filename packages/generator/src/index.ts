@@ -1,6 +1,12 @@
-export { bindInputs, sameInputs, type InputValue } from './bind-inputs.js';
+export { bindInputs } from './bind-inputs.js';
 export { inOrder, projectionMatrix, viewMatrix, viewProjectionMatrix } from './camera-matrices.js';
-export { Generator, type GaussianSink, type GeneratedFrame, type GeneratorOptions } from './generator.js';
+export {
+  Generator,
+  type GaussianModelFile,
+  type GaussianSink,
+  type GeneratedFrame,
+  type GeneratorOptions,
+} from './generator.js';
 export {
   addGaussianModelToScene,
   GaussianModels,
@@ -11,9 +17,11 @@ export {
   type GaussianModel,
   type MakeSink,
 } from './gaussian-models.js';
+export { sameInputs, type GpuTensor, type InputNumbers, type Inputs, type InputValue } from './input-value.js';
+export { PostProcessor, type PictureInput, type PostProcessorOptions } from './post-processor.js';
 export { GeneratorSession } from './runtime/generator-session.js';
 export type { RunOutputs, SessionKind } from './runtime/live-session.js';
-export { isRuntimeRequested, setRuntimeLocation } from './runtime/load-runtime.js';
+export { isRuntimeRequested, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';
 export { openModel, type GeneratorModel, type ModelSource } from './runtime/open-model.js';
 export { acquireSession, type AcquireOptions, type SessionLease } from './runtime/shared-sessions.js';
 export type { GeneratorState } from './state.js';

@@ -1,4 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
+import type { GpuTensor } from './input-value.js';
 
 /** Everything that a page may set about a generator: what the roles of a contract are fed from. */
 export interface GeneratorState {
@@ -16,4 +17,9 @@ export interface GeneratorState {
   readonly shape?: ArrayLike<number>;
   /** Values of controls by the name of the input: one number for all elements, or all of them; default: the contract's. */
   readonly controls?: Readonly<Record<string, number | ArrayLike<number>>>;
+  /**
+   * Pictures [1,3,H,W] by the names of inputs with the role `image`, for example made by the renderer's `PictureTensor`; needed by every such
+   * input that no model before it in a chain writes.
+   */
+  readonly pictures?: Readonly<Record<string, GpuTensor>>;
 }

@@ -9,6 +9,8 @@ export { QUALITIES, type Levers, type Quality } from './levers.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, RasterizerName } from './rasterizers/rasterizer.js';
+export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
+export { PictureTensor, type PictureFit, type PictureShape } from './pictures/picture-tensor.js';
 export { Renderer, type FrameRequest, type RendererOptions } from './renderer.js';
 export type { FrameStatistics } from './statistics.js';
 export type { SortName } from './stages/sort.js';

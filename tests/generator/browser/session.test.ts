@@ -2,7 +2,17 @@
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
 import { Generator, isRuntimeRequested, type GeneratorOptions, type ModelSource } from '@gaussian-splat/generator';
 import { assert, assertEqual, delay } from '../../element/browser/support/harness.js';
-import { calls, CAMERA, FIXTURES, makeDevice, numbersOf, ReadingSink, relativeError, runOnCpu } from './support.js';
+import {
+  calls,
+  CAMERA,
+  codeOf,
+  FIXTURES,
+  makeDevice,
+  numbersOf,
+  ReadingSink,
+  relativeError,
+  runOnCpu,
+} from './support.js';
 
 let device: GPUDevice;
 const opened: Generator[] = [];
@@ -16,15 +26,6 @@ async function open(
   const generator = await Generator.open({ url: FIXTURES + name, ...source }, device, { onError, ...options });
   opened.push(generator);
   return generator;
-}
-
-async function codeOf(promise: Promise<unknown>): Promise<string> {
-  try {
-    await promise;
-  } catch (error) {
-    return (error as { code?: string }).code ?? String(error);
-  }
-  return 'none';
 }
 
 /** Address of the ball as a model of another opset. */
@@ -93,8 +94,8 @@ describe('generators', () => {
       'no contract and names that say nothing': [`${FIXTURES}subgraphs.onnx`, 'contract/inference'],
       'external data that is missing': ['/net/renamed/external.onnx', 'contract/external-data'],
       'an opset that is too new': [await withOpset(27), 'contract/opset'],
-      'a post-processor': [`${FIXTURES}post.onnx`, 'decode/unsupported'],
-      'a link of a chain': [`${FIXTURES}link.onnx`, 'decode/unsupported'],
+      'a post-processor': [`${FIXTURES}post.onnx`, 'contract/chain'],
+      'a link of a chain': [`${FIXTURES}link.onnx`, 'contract/chain'],
       'a contract that is no JSON': [`${FIXTURES}packed.onnx`, 'contract/json', '{"version": 1'],
     };
     const found: Record<string, string> = {};

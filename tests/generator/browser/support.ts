@@ -38,21 +38,32 @@ export class ReadingSink implements GaussianSink {
   }
 
   ingest(tensors: Readonly<Record<string, GPUBuffer>>, rows: number): void {
-    const read = Object.entries(tensors).map(([name, buffer]) => [name, this.#read(buffer)] as const);
+    const read = Object.entries(tensors).map(([name, buffer]) => [name, readBuffer(this.#device, buffer)] as const);
     this.runs.push({ rows, tensors: Object.fromEntries(read) });
   }
+}
 
-  #read(buffer: GPUBuffer): Promise<Uint8Array> {
-    const staging = this.#device.createBuffer({ size: buffer.size, usage: 0x1 | 0x8 });
-    const encoder = this.#device.createCommandEncoder();
-    encoder.copyBufferToBuffer(buffer, 0, staging, 0, buffer.size);
-    this.#device.queue.submit([encoder.finish()]);
-    return staging.mapAsync(0x1).then(() => {
-      const bytes = new Uint8Array(staging.getMappedRange().slice(0));
-      staging.destroy();
-      return bytes;
-    });
+/** All bytes of a buffer as they are now. */
+export function readBuffer(device: GPUDevice, buffer: GPUBuffer): Promise<Uint8Array> {
+  const staging = device.createBuffer({ size: buffer.size, usage: 0x1 | 0x8 });
+  const encoder = device.createCommandEncoder();
+  encoder.copyBufferToBuffer(buffer, 0, staging, 0, buffer.size);
+  device.queue.submit([encoder.finish()]);
+  return staging.mapAsync(0x1).then(() => {
+    const bytes = new Uint8Array(staging.getMappedRange().slice(0));
+    staging.destroy();
+    return bytes;
+  });
+}
+
+/** The code of the error that a promise rejects with. */
+export async function codeOf(promise: Promise<unknown>): Promise<string> {
+  try {
+    await promise;
+  } catch (error) {
+    return (error as { code?: string }).code ?? String(error);
   }
+  return 'none';
 }
 
 let ort: Promise<typeof OnnxRuntime> | undefined;
@@ -72,6 +83,7 @@ function cpuRuntime(): Promise<typeof OnnxRuntime> {
 export async function runOnCpu(
   url: string,
   state: GeneratorState,
+  pictures: Readonly<Record<string, { dims: readonly number[]; data: Float32Array }>> = {},
 ): Promise<Record<string, { dims: readonly number[]; values: number[] }>> {
   const { InferenceSession, Tensor } = await cpuRuntime();
   const bytes = new Uint8Array(await (await fetch(url)).arrayBuffer());
@@ -88,6 +100,7 @@ export async function runOnCpu(
   const feeds = Object.entries(bindInputs(header, contract, state)).map(
     ([name, { dtype, data, dims }]) => [name, new Tensor(dtype, data as never, dims)] as const,
   );
+  for (const [name, { dims, data }] of Object.entries(pictures)) feeds.push([name, new Tensor('float32', data, dims)]);
   const results = await session.run(Object.fromEntries(feeds));
   await session.release();
   return Object.fromEntries(

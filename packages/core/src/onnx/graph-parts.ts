@@ -4,6 +4,8 @@ import { FieldCursor, type Span } from './protobuf.js';
 
 /** Longest name, in bytes, that is believed. */
 export const NAME_LIMIT = 65_536;
+/** Dimensions of the weights of a convolution over pictures: channels out and in, rows, columns. */
+const CONV_RANK = 4;
 /** Most dimensions of a tensor that are believed. */
 const RANK_LIMIT = 64;
 /** Subgraphs within subgraphs, as `If` and `Loop` have them, before a file counts as hostile. */
@@ -15,6 +17,10 @@ export interface Harvest {
   readonly externalFiles: ExternalFile[];
   /** Names of initializers of the outermost graph. */
   readonly initializers: string[];
+  /** Names of the weights of convolutions. */
+  readonly convWeights: string[];
+  /** Shapes of weights that might be those of a convolution over pictures, by name. */
+  readonly kernels: Map<string, readonly number[]>;
   initializerBytes: number;
 }
 
@@ -22,6 +28,8 @@ export const emptyHarvest = (): Harvest => ({
   operators: [],
   externalFiles: [],
   initializers: [],
+  convWeights: [],
+  kernels: new Map(),
   initializerBytes: 0,
 });
 
@@ -97,13 +105,16 @@ function readDim(bytes: LoadedBytes, span: Span): OnnxDim {
 export function readNode(bytes: LoadedBytes, span: Span, harvest: Harvest, depth = 0): void {
   let operator = '';
   let domain = '';
+  const inputs: string[] = [];
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
-    if (field.number === 4) operator = field.text(NAME_LIMIT);
+    if (field.number === 1 && inputs.length < 2) inputs.push(field.text(NAME_LIMIT));
+    else if (field.number === 4) operator = field.text(NAME_LIMIT);
     else if (field.number === 7) domain = field.text(NAME_LIMIT);
     else if (field.number === 5 && field.isDelimited) readAttribute(bytes, field, harvest, depth);
   }
   harvest.operators.push(operatorName(domain, operator));
+  if (operatorName(domain, operator) === 'Conv' && inputs.length > 1) harvest.convWeights.push(inputs[1]);
 }
 
 /** `MatMul` in ONNX's own domain, `com.example:Name` elsewhere. */
@@ -138,13 +149,16 @@ function readSubgraph(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: n
 export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): string {
   let name = '';
   const entries = new Map<string, string>();
+  const dims: number[] = [];
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
-    if (field.number === 8) name = field.text(NAME_LIMIT);
+    if (field.number === 1 && field.isVarint && dims.length <= CONV_RANK) dims.push(field.value);
+    else if (field.number === 8) name = field.text(NAME_LIMIT);
     else if (field.number === 13 && field.isDelimited) readEntry(bytes, field, entries, NAME_LIMIT);
   }
   harvest.initializerBytes += span.end - span.start;
   const location = entries.get('location');
+  if (dims.length === CONV_RANK) harvest.kernels.set(name, dims);
   if (location !== undefined) harvest.externalFiles.push({ location, byteLength: externalEnd(entries) });
   return name;
 }

@@ -49,6 +49,15 @@ export interface ExternalFile {
   readonly byteLength: number;
 }
 
+/** A convolution over pictures whose weights are in the file. */
+export interface Convolution {
+  /** Channels. */
+  readonly inputs: number;
+  readonly outputs: number;
+  /** Pixels of the kernel, down and across. */
+  readonly kernel: readonly [number, number];
+}
+
 /** What an ONNX file says about itself, without its weights. */
 export interface OnnxHeader {
   /** File name or address, for messages. */
@@ -68,6 +77,8 @@ export interface OnnxHeader {
   readonly outputs: readonly OnnxTensor[];
   /** How often each operator occurs, subgraphs included: `MatMul`, or `com.example:Name` outside ONNX's own domain. */
   readonly operators: ReadonlyMap<string, number>;
+  /** One for each set of weights. */
+  readonly convolutions: readonly Convolution[];
   /** Operators that the file itself defines, named as in {@link operators}. */
   readonly functions: ReadonlySet<string>;
   readonly externalFiles: readonly ExternalFile[];

@@ -13,7 +13,7 @@ import {
   readValueInfo,
   type Harvest,
 } from './graph-parts.js';
-import type { ExternalFile, OnnxHeader, OnnxTensor } from './header.js';
+import type { ExternalFile, Convolution, OnnxHeader, OnnxTensor } from './header.js';
 import { LoadedBytes, NotLoaded } from './loaded-bytes.js';
 import { FieldCursor } from './protobuf.js';
 
@@ -36,6 +36,8 @@ interface Draft {
   readonly operators: Map<string, number>;
   readonly functions: Set<string>;
   readonly initializers: Set<string>;
+  readonly convWeights: Set<string>;
+  readonly kernels: Map<string, readonly number[]>;
   readonly externalFiles: Map<string, ExternalFile>;
   initializerBytes: number;
 }
@@ -77,6 +79,8 @@ const emptyDraft = (): Draft => ({
   operators: new Map(),
   functions: new Set(),
   initializers: new Set(),
+  convWeights: new Set(),
+  kernels: new Map(),
   externalFiles: new Map(),
   initializerBytes: 0,
 });
@@ -179,7 +183,10 @@ function readGraphField(bytes: LoadedBytes, field: FieldCursor, draft: Draft): v
   keep(draft, harvest);
 }
 
-function keep(draft: Draft, { operators, initializers, externalFiles, initializerBytes }: Harvest): void {
+function keep(draft: Draft, harvest: Harvest): void {
+  const { operators, initializers, externalFiles, initializerBytes } = harvest;
+  for (const name of harvest.convWeights) draft.convWeights.add(name);
+  for (const [name, dims] of harvest.kernels) draft.kernels.set(name, dims);
   for (const name of operators) draft.operators.set(name, (draft.operators.get(name) ?? 0) + 1);
   for (const name of initializers) draft.initializers.add(name);
   for (const { location, byteLength } of externalFiles) {
@@ -201,6 +208,10 @@ function headerOf(draft: Draft, { name, size }: ByteSource): OnnxHeader {
     inputs: draft.inputs.filter((input) => !draft.initializers.has(input.name)),
     outputs: draft.outputs,
     operators: draft.operators,
+    convolutions: [...draft.convWeights].flatMap((weights): Convolution[] => {
+      const [outputs, inputs, ...kernel] = draft.kernels.get(weights) ?? [];
+      return outputs === undefined ? [] : [{ inputs, outputs, kernel: kernel as [number, number] }];
+    }),
     functions: draft.functions,
     externalFiles: [...draft.externalFiles.values()],
     initializerBytes: draft.initializerBytes,

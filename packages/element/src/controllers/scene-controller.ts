@@ -227,7 +227,10 @@ function unrecoverable(cause: unknown): GaussianSplatError {
 }
 
 const isSame = (a: SceneRequest, b: SceneRequest | null): boolean =>
-  a.url === b?.url && a.credentials === b.credentials && a.contract === b.contract;
+  a.url === b?.url &&
+  a.credentials === b.credentials &&
+  a.contract === b.contract &&
+  (a.chain ?? []).join(' ') === (b.chain ?? []).join(' ');
 
 const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
 

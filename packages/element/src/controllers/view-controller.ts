@@ -1,8 +1,9 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import type { FrameRequest, Quality } from '@gaussian-splat/renderer';
+import type { Quality } from '@gaussian-splat/renderer';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { Frame } from '../live/frame-filter.js';
 import type { CameraController } from './camera-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
@@ -96,7 +97,7 @@ export class ViewController implements FrameClient {
     if (source !== null) onCameraChange(source);
   }
 
-  #render(scene: GpuScene, request: Omit<FrameRequest, 'gaussians'>): void {
+  #render(scene: GpuScene, request: Frame): void {
     const first = this.#first;
     this.#first = undefined;
     scene.setQuality(this.#options.quality());
@@ -110,7 +111,7 @@ export class ViewController implements FrameClient {
     this.#first = undefined;
   }
 
-  #frameRequest(scene: GpuScene, { width, height }: PixelSize): Omit<FrameRequest, 'gaussians'> {
+  #frameRequest(scene: GpuScene, { width, height }: PixelSize): Frame {
     const context = this.#contextFor(scene.device);
     const canvas = context.canvas;
     // Setting a canvas's size clears it, even to the same size; here a frame follows at once.

@@ -1,12 +1,6 @@
 import { GaussianSplatError, type Bounds } from '@gaussian-splat/core';
-import {
-  chooseVariants,
-  GaussianBuffers,
-  Renderer,
-  type FrameRequest,
-  type GaussianScene,
-  type Quality,
-} from '@gaussian-splat/renderer';
+import { chooseVariants, GaussianBuffers, Renderer, type GaussianScene, type Quality } from '@gaussian-splat/renderer';
+import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { LiveModel, LiveRequest } from '../live/live-model.js';
 import type { LoadedScene, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
@@ -34,6 +28,7 @@ export class GpuScene {
   onIncomplete: () => void = () => undefined;
   #renderer: Renderer;
   #quality: Quality = 'default';
+  #filter: FrameFilter | undefined;
   readonly #lease: DeviceLease;
   #destroyed = false;
 
@@ -70,20 +65,37 @@ export class GpuScene {
     this.#renderer = this.#makeRenderer();
   }
 
+  /** What stands between the renderer and the canvas; undefined for frames as they are drawn. */
+  get filter(): FrameFilter | undefined {
+    return this.#filter;
+  }
+
+  /** The scene closes its filter when it gets another one, and when it is destroyed. */
+  setFilter(filter: FrameFilter | undefined): void {
+    this.#filter?.close();
+    this.#filter = filter;
+  }
+
   #makeRenderer(): Renderer {
-    return new Renderer(this.device, { quality: this.#quality, onIncomplete: () => this.onIncomplete() });
+    const onIncomplete = (): void => {
+      this.#filter?.invalidate();
+      this.onIncomplete();
+    };
+    return new Renderer(this.device, { quality: this.#quality, onIncomplete });
   }
 
   /** Encodes and submits one frame. */
-  render(frame: Omit<FrameRequest, 'gaussians'>): void {
-    this.#renderer.render({ ...frame, gaussians: this.gaussians });
+  render(frame: Frame): void {
+    const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, gaussians: this.gaussians });
+    if (this.#filter) this.#filter.render(frame, `${this.gaussians.version} ${this.#quality}`, draw);
+    else draw(frame);
   }
 
   /**
    * Renders the first frame, for which the renderer allocates its buffers, and waits until the GPU has finished it.
    * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU tells of a failed allocation only through a scope.
    */
-  async renderFirst(frame: Omit<FrameRequest, 'gaussians'>): Promise<void> {
+  async renderFirst(frame: Frame): Promise<void> {
     const { device } = this;
     device.pushErrorScope('out-of-memory');
     let refusal: Promise<GPUError | null>;
@@ -102,6 +114,7 @@ export class GpuScene {
   destroy(): void {
     if (this.#destroyed) return;
     this.#destroyed = true;
+    this.setFilter(undefined);
     this.live?.close();
     this.#renderer.destroy();
     this.gaussians.destroy();
@@ -117,7 +130,7 @@ export interface OpenOptions {
   /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. */
   readonly beforeUpload: () => void;
   /** What a generator needs to know beyond the request. */
-  readonly live: () => Omit<LiveRequest, 'url' | 'contract' | 'credentials'>;
+  readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials'>;
 }
 
 /** Device and file at the same time, then the upload. Rejects with GaussianSplatError or the signal's reason. */
@@ -164,9 +177,9 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
   try {
     signal.throwIfAborted();
     const { openLiveModel } = await opening;
-    const { url, contract, credentials } = request;
+    const { url, chain = [], contract, credentials } = request;
     const live = await openLiveModel(
-      { ...options.live(), url, contract, credentials },
+      { ...options.live(), url, chain, contract, credentials },
       lease.device,
       signal,
       onProgress,

@@ -1,13 +1,12 @@
 import type { Bounds, Camera } from '@gaussian-splat/core';
 import type { DynamicGaussians } from '@gaussian-splat/renderer';
+import type { ReadControls } from './values.js';
 
-/** What a page says about a generator, apart from the camera. */
-export interface LiveState {
+/** What a page says about a model, apart from the camera. Small and capital letters of names are the same. */
+export interface LiveState extends ReadControls {
   readonly timeSeconds: number;
   /** Flattened; undefined for the model's rest pose. */
   readonly pose: readonly number[] | undefined;
-  /** By the names of inputs; small and capital letters are the same, as attributes have no capital ones. */
-  readonly controls: Readonly<Record<string, readonly number[]>>;
 }
 
 /** Whom a model tells. */
@@ -18,6 +17,8 @@ export interface LiveListeners {
   readonly onError: (error: unknown) => void;
   /** The model runs on the CPU. */
   readonly onFallback: (reason: string) => void;
+  /** Something that the next run takes has arrived: a picture. */
+  readonly onInput: () => void;
 }
 
 /** A generator behind a scene, with the first frame in its Gaussians. */
@@ -34,12 +35,16 @@ export interface LiveModel {
 /** Where the generator is, and what its first frame shows. */
 export interface LiveRequest {
   readonly url: string;
+  /** Addresses of models that each take the Gaussians of the one before. */
+  readonly chain: readonly string[];
   /** Address of a contract, its JSON text, or the contract itself; null for that of the model or beside it. */
   readonly contract: unknown;
   readonly credentials: RequestCredentials;
   /** Folder of the runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
   readonly state: () => LiveState;
+  /** False where controls may be another model's. */
+  readonly ownsControls: () => boolean;
   /** A camera before anything is known of the scene but, perhaps, the bounds that the contract declares. */
   readonly camera: (bounds: Bounds | undefined) => Camera;
   readonly listeners: LiveListeners;

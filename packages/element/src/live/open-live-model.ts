@@ -1,9 +1,12 @@
-/** Loaded only when a generator is shown: everything that knows `@gaussian-splat/generator` is in this module. */
-import { GaussianSplatError, type Bounds, type Camera, type Contract } from '@gaussian-splat/core';
-import { Generator, setRuntimeLocation, type GeneratorState } from '@gaussian-splat/generator';
+/** Loaded only when a generator is shown: what knows `@gaussian-splat/generator` is behind this module and post-view.ts. */
+import type { Bounds, Contract } from '@gaussian-splat/core';
+import { Generator, setRuntimeLocation, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener } from '../loading/protocol.js';
-import type { LiveModel, LiveRequest, LiveState } from './live-model.js';
+import { fetchBeside } from './fetch-beside.js';
+import type { LiveModel, LiveRequest } from './live-model.js';
+import { LivePictures } from './live-pictures.js';
+import { StateReader } from './read-state.js';
 
 /** A generator, once its first run is in its Gaussians. Rejects with GaussianSplatError, or the signal's reason. */
 export async function openLiveModel(
@@ -13,12 +16,10 @@ export async function openLiveModel(
   onProgress: ProgressListener,
 ): Promise<LiveModel> {
   if (request.runtimeLocation !== null) setRuntimeLocation(new URL(request.runtimeLocation, document.baseURI));
-  const { credentials, url } = request;
-  const contract = await contractOf(request, signal);
   let firstFailure: unknown;
   let isOpen = false;
   const { listeners } = request;
-  const generator = await Generator.open({ url, credentials, contract }, device, {
+  const generator = await Generator.open(await sourcesOf(request, signal), device, {
     signal,
     onProgress,
     onFrame: ({ state }) => isOpen && listeners.onFrame(state.timeSeconds ?? 0),
@@ -26,68 +27,76 @@ export async function openLiveModel(
     onFallback: listeners.onFallback,
   });
   let gaussians: DynamicGaussians | undefined;
+  let pictures: LivePictures | undefined;
   try {
-    const { layout, contract: found } = generator.model;
-    for (const note of generator.model.notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
-    gaussians = await DynamicGaussians.create(device, layout, { antialiased: found.antialiased });
+    const { models, model } = generator;
+    for (const { notes, url } of models) for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
+    gaussians = await DynamicGaussians.create(device, model.layout, { antialiased: model.contract.antialiased });
     generator.sink = gaussians;
-    generator.request(toState(request.state(), found, request.camera(declaredBounds(found))));
+    const { onInput: onChange, onError } = listeners;
+    const { credentials } = request;
+    const whenIdle = (): Promise<void> => generator.idle;
+    pictures = new LivePictures(device, models, new Set(), { credentials, signal, onChange, onError, whenIdle });
+    const live = liveModel(generator, gaussians, pictures, request);
+    const declared = declaredBounds(model.contract);
+    pictures.update(request.state().pictures);
+    await pictures.settled();
+    live.request(request.state(), request.camera(declared));
     await generator.idle;
     signal.throwIfAborted();
     if (firstFailure !== undefined) throw asError(firstFailure);
-    const bounds = declaredBounds(found) ?? (await gaussians.readBounds());
+    const bounds = declared ?? (await gaussians.readBounds());
     signal.throwIfAborted();
     isOpen = true;
-    return liveModel(generator, gaussians, bounds);
+    return { ...live, bounds };
   } catch (error) {
     generator.close();
+    pictures?.destroy();
     gaussians?.destroy();
     throw error;
   }
 }
 
-function liveModel(generator: Generator, gaussians: DynamicGaussians, bounds: Bounds): LiveModel {
-  const { contract } = generator.model;
+function liveModel(
+  generator: Generator,
+  gaussians: DynamicGaussians,
+  pictures: LivePictures,
+  { listeners, ownsControls }: LiveRequest,
+): Omit<LiveModel, 'bounds'> {
+  const { models } = generator;
+  const reader = new StateReader(models, listeners.onError);
   return {
     gaussians,
-    bounds,
-    duration: contract.duration ?? Infinity,
-    request: (state, camera) => generator.request(toState(state, contract, camera)),
-    close: () => generator.close(),
+    duration: models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity,
+    request: (state, camera) => {
+      pictures.update(state.pictures);
+      generator.request(reader.read(state, camera, pictures.tensors, ownsControls()));
+    },
+    close: () => {
+      generator.close();
+      pictures.destroy();
+    },
   };
 }
 
-/** What the page says in the words of the generator. */
-function toState({ timeSeconds, pose, controls }: LiveState, contract: Contract, camera: Camera): GeneratorState {
-  const named: Record<string, number | readonly number[]> = {};
-  for (const [name, binding] of Object.entries(contract.inputs)) {
-    if (binding.role !== 'control') continue;
-    const value = controls[name] ?? controls[name.toLowerCase()];
-    if (value !== undefined) named[name] = value.length === 1 ? value[0] : value;
-  }
-  const shapeName = Object.keys(contract.inputs).find((name) => contract.inputs[name].role === 'shape') ?? '';
-  const shape = controls[shapeName] ?? controls[shapeName.toLowerCase()];
-  return { timeSeconds, camera, pose, controls: named, shape };
+/** The generator, and those that follow it in a chain. The contract that the page gives is the first one's. */
+async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<ModelSource[]> {
+  const { url, chain, credentials } = request;
+  const contract = await contractOf(request, signal);
+  return [{ url, credentials, contract }, ...chain.map((next) => ({ url: next, credentials }))];
 }
 
 async function contractOf({ contract, credentials }: LiveRequest, signal: AbortSignal): Promise<unknown> {
   if (typeof contract !== 'string' || contract.trim().startsWith('{')) return contract || undefined;
-  const url = new URL(contract, document.baseURI).href;
-  const response = await fetch(url, { credentials, signal }).catch((cause: unknown) => {
-    signal.throwIfAborted();
-    throw noContract(url, (cause as Error).message);
-  });
-  if (!response.ok) throw noContract(url, `HTTP status ${response.status}`);
+  const remedy = 'check the address in the attribute contract, or leave it out';
+  const response = await fetchBeside(
+    contract,
+    { credentials, signal },
+    'the contract that the attribute names',
+    remedy,
+  );
   return response.text();
 }
-
-const noContract = (url: string, found: string): GaussianSplatError =>
-  new GaussianSplatError('network/status', {
-    where: url.slice(0, 200),
-    expected: 'the contract that the attribute names',
-    found,
-    remedy: 'check the address in the attribute contract, or leave it out',
-  });
 
 /** Bounds of the centres are those of the subject, too. */
 function declaredBounds({ bounds }: Contract): Bounds | undefined {

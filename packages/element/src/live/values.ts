@@ -36,24 +36,47 @@ function flatten(value: unknown): number[] {
 /** Prefix of the attributes that hold controls: `control-smile="0.5"`. */
 export const CONTROL_PREFIX = 'control-';
 
-/** Controls as a page gives them, by the names of the model's inputs. */
-export type ControlValues = Readonly<Record<string, Numbers>>;
+/** A picture for a model: its URL, or what holds its pixels. */
+export type Picture = string | Blob | GPUCopyExternalImageSource;
 
-/** The controls of an element: its attributes, and above them its property. Malformed ones are left out and told to `warn`. */
+/** Controls as a page gives them, by the names of the model's inputs: numbers, and pictures for inputs that take one. */
+export type ControlValues = Readonly<Record<string, Numbers | Picture>>;
+
+/** Controls, sorted by what they hold. */
+export interface ReadControls {
+  readonly controls: Readonly<Record<string, readonly number[]>>;
+  readonly pictures: Readonly<Record<string, Picture>>;
+}
+
+/**
+ * The controls of an element: its attributes, and above them its property. What holds no numbers may be a picture; whether the model takes
+ * one there is known once it is loaded. Empty ones are told to `warn`.
+ */
 export function readControls(
   attributes: Iterable<{ readonly name: string; readonly value: string }>,
   property: ControlValues | null | undefined,
   warn: (sentence: string) => void,
-): Record<string, number[]> {
-  const written: [string, Numbers][] = [];
+): ReadControls {
+  const written: [string, Numbers | Picture][] = [];
   for (const { name, value } of attributes) {
     if (name.startsWith(CONTROL_PREFIX)) written.push([name.slice(CONTROL_PREFIX.length), value]);
   }
   const controls: Record<string, number[]> = {};
+  const pictures: Record<string, Picture> = {};
   for (const [name, value] of [...written, ...Object.entries(property ?? {})]) {
-    const numbers = readNumbers(value);
+    const numbers = isPixels(value) ? undefined : readNumbers(value as Numbers);
+    delete controls[name];
+    delete pictures[name];
     if (numbers) controls[name] = numbers;
+    else if (isPixels(value) || (typeof value === 'string' && value !== '')) pictures[name] = value as Picture;
     else warn(`<gaussian-splat>: control ${name} expects numbers, found ${JSON.stringify(value)}; its default counts.`);
   }
-  return controls;
+  return { controls, pictures };
 }
+
+const isPixels = (value: unknown): boolean =>
+  typeof value === 'object' && value !== null && !Array.isArray(value) && !ArrayBuffer.isView(value);
+
+/** The value of a name; attributes have no capital letters. */
+export const valueOf = <T>(values: Readonly<Record<string, T>>, name: string): T | undefined =>
+  values[name] ?? values[name.toLowerCase()];

@@ -12,6 +12,8 @@ export interface SceneRequest {
   readonly sh: ShPrecision | 'auto';
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
   readonly contract?: unknown;
+  /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */
+  readonly chain?: readonly string[];
 }
 
 /** A scene, fetched and packed, ready for upload. */

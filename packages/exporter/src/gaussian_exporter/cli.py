@@ -71,7 +71,7 @@ def add_common(family: Command) -> None:
     facts.add_argument("--duration", type=float, help="seconds that time 0 to 1 plays")
     facts.add_argument("--fps", type=float)
     written = family.add_argument_group("output")
-    written.add_argument("--layout", choices=get_args(Layout), default="packed")
+    written.add_argument("--layout", choices=get_args(Layout), help="default: packed, or split with float16")
     written.add_argument("--dtype", choices=get_args(DType), default="float32", help="float16 needs shader-f16")
 
 

@@ -90,13 +90,18 @@ def _check_values(outputs: dict[str, Any], results: dict[str, AnyArray]) -> None
 def _checks(outputs: dict[str, Any], values: dict[str, AnyArray]) -> Iterator[Callable[[], None]]:
     if outputs["layout"] == "image":
         return
+    covariances: AnyArray | None
     if outputs["layout"] == "packed":
         rows = values[outputs["gaussians"]]
         covariances, opacities = rows[:, 3:9], rows[:, -1]
     else:
-        covariances, opacities = values[outputs["covariances"]], values[outputs["opacities"]]
+        opacities = values[outputs["opacities"]]
+        covariances = values[outputs["covariances"]] if "covariances" in outputs else None
     yield lambda: _check_opacities(opacities)
-    yield lambda: _check_covariances(covariances)
+    if covariances is not None:
+        yield lambda: _check_covariances(covariances)
+    if "scales" in outputs:
+        yield lambda: _check_axes(values[outputs["scales"]], values[outputs["rotations"]])
 
 
 def _check_opacities(opacities: AnyArray) -> None:
@@ -112,6 +117,13 @@ def _check_covariances(covariances: AnyArray) -> None:
     if wrong.any():
         found = f"{int(wrong.sum())} of {len(wrong)} with a negative eigenvalue, the first in row {int(wrong.argmax())}"
         raise _violation("covariances", "positive semi-definite matrices", found, "build them as H H^T")
+
+
+def _check_axes(scales: AnyArray, rotations: AnyArray) -> None:
+    if (scales < 0).any():
+        raise _violation("scales", "0 or more", f"{float(scales.min()):.4g}", "apply the exponential in the graph")
+    if (np.abs(rotations).max(1) == 0).any():
+        raise _violation("rotations", "quaternions of a length above 0", "0 0 0 0", "normalise them in the graph")
 
 
 def _violation(where: str, expected: str, found: str, remedy: str) -> ExportError:

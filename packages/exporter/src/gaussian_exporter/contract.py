@@ -16,6 +16,8 @@ METADATA_KEY = "gaussian_contract"
 VERSION = 1
 
 Layout = Literal["packed", "split"]
+# What a split layout says of the shape: covariances, or scales and rotations.
+Shape = Literal["covariances", "axes"]
 DType = Literal["float32", "float16"]
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Json = dict[str, object]
@@ -96,6 +98,7 @@ class GaussianOutputs:
     """How Gaussians are written. sh_degree is None for plain colours; names are those of the layout's tensors."""
 
     layout: Layout
+    shape: Shape
     n_max: int
     dtype: DType
     sh_degree: int | None
@@ -107,8 +110,10 @@ class GaussianOutputs:
         if self.layout == "packed":
             color = "rgb" if self.sh_degree is None else "sh"
             return {"layout": "packed", "gaussians": "gaussians", "color": color, "opacityActivation": "linear", **sh}
-        names = ["positions", "covariances", "colors" if self.sh_degree is None else "sh", "opacities"]
-        return {"layout": "split", **{name: name for name in names}, "opacityActivation": "linear", **sh}
+        shape = ["covariances"] if self.shape == "covariances" else ["scales", "rotations"]
+        axes = {"scaleActivation": "linear", "rotationOrder": "wxyz"} if self.shape == "axes" else {}
+        names = ["positions", *shape, "colors" if self.sh_degree is None else "sh", "opacities"]
+        return {"layout": "split", **{name: name for name in names}, **axes, "opacityActivation": "linear", **sh}
 
 
 def gaussian_contract(facts: Facts, inputs: Sequence[Input], outputs: GaussianOutputs) -> Json:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import onnx
 
 from .arrays import AnyArray
-from .contract import DType, Facts, GaussianOutputs, Input, Layout, gaussian_contract, metadata
+from .contract import DType, Facts, GaussianOutputs, Input, Layout, Shape, gaussian_contract, metadata
 from .errors import ExportError
 from .graph import Graph, Tensor
 from .pieces.covariance import covariance_of_scale_and_rotation
@@ -16,10 +16,17 @@ from .pieces.covariance import covariance_of_scale_and_rotation
 
 @dataclass(frozen=True)
 class Options:
-    """How a generator is written. float16 halves what it writes and needs the device feature shader-f16."""
+    """How a generator is written. float16 halves what it writes and needs the device feature shader-f16. The default
+    layout is packed in float32, and split in float16: there scales and rotations take the place of covariances, since
+    float16 makes those of needles and discs indefinite."""
 
-    layout: Layout = "packed"
+    layout: Layout | None = None
     dtype: DType = "float32"
+
+    @property
+    def writes_axes(self) -> bool:
+        """Whether scales and rotations are written, by families that have them."""
+        return self.dtype == "float16" and self.layout != "packed"
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,10 @@ class Gaussians:
             raise ValueError("Gaussians need colors or sh")
         return colour if len(colour.shape) == 2 else colour.reshape(colour.shape[0], colour.shape[1] * 3)
 
+    def has_axes(self) -> bool:
+        """Whether there are scales and rotations, and not covariances alone."""
+        return self.scales is not None and self.rotations is not None
+
     def sh_degree(self) -> int:
         """Degree of the harmonics; 0 with plain colours."""
         return 0 if self.sh is None else {1: 0, 4: 1, 9: 2, 16: 3}[self.sh.shape[1]]
@@ -64,10 +75,15 @@ def finish(
     options: Options,
 ) -> onnx.ModelProto:
     """Adds the outputs and returns the generator. `bounds`: corners around every position at the inputs' defaults."""
-    write = write_packed if options.layout == "packed" else write_split
-    write(graph, gaussians, options)
+    layout = options.layout or ("split" if options.writes_axes else "packed")
+    shape: Shape = "axes" if options.writes_axes and gaussians.has_axes() else "covariances"
+    if layout == "packed":
+        write_packed(graph, gaussians, options)
+    else:
+        write_split(graph, gaussians, options, shape)
     outputs = GaussianOutputs(
-        layout=options.layout,
+        layout=layout,
+        shape=shape,
         n_max=gaussians.positions.shape[0],
         dtype=options.dtype,
         sh_degree=None if gaussians.sh is None else gaussians.sh_degree(),
@@ -82,12 +98,14 @@ def write_packed(graph: Graph, gaussians: Gaussians, options: Options) -> None:
     graph.output("gaussians", graph.concat(columns, 1), options.dtype == "float16")
 
 
-def write_split(graph: Graph, gaussians: Gaussians, options: Options) -> None:
-    """A tensor for each attribute."""
+def write_split(graph: Graph, gaussians: Gaussians, options: Options, shape: Shape) -> None:
+    """A tensor for each attribute. Scales are linear, rotations w x y z."""
     colour = "colors" if gaussians.sh is None else "sh"
     tensors = {
         "positions": gaussians.positions,
-        "covariances": gaussians.covariance(),
+        "covariances": gaussians.covariance() if shape == "covariances" else None,
+        "scales": gaussians.scales if shape == "axes" else None,
+        "rotations": gaussians.rotations if shape == "axes" else None,
         colour: gaussians.colors if gaussians.sh is None else gaussians.sh,
         "opacities": gaussians.opacities,
     }

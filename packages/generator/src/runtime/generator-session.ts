@@ -1,7 +1,10 @@
 import { ContractError, GaussianSplatError } from '@gaussian-splat/core';
-import { bindInputs, type InputValue } from '../bind-inputs.js';
+import { bindInputs } from '../bind-inputs.js';
+import { bindPictures } from '../bind-pictures.js';
+import type { Inputs } from '../input-value.js';
 import type { GeneratorState } from '../state.js';
 import type { LiveSession, RunOutputs, SessionKind } from './live-session.js';
+import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { runFault, startSession } from './start-session.js';
 
@@ -22,11 +25,15 @@ export class GeneratorSession {
   #isLost = false;
   #isReleased = false;
 
-  /** @param onFallback told once if the model has to run on the CPU */
+  /**
+   * @param onFallback told once if the model has to run on the CPU
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` if an output is larger than the device's buffers.
+   */
   constructor(model: GeneratorModel, device: GPUDevice, onFallback: (reason: string) => void = () => undefined) {
     this.model = model;
     this.device = device;
     this.#onFallback = onFallback;
+    requireRoom(model, device);
     void device.lost.then(() => (this.#isLost = true));
   }
 
@@ -35,9 +42,14 @@ export class GeneratorSession {
     return this.#kind;
   }
 
-  /** Values of the inputs for a state of the page. @throws GaussianSplatError `argument/value` */
-  bind(state: GeneratorState): Record<string, InputValue> {
-    return bindInputs(this.model.header, this.model.contract, state);
+  /**
+   * Values of the inputs for a state of the page.
+   * @param given inputs that another model writes; they are left out.
+   * @throws GaussianSplatError `argument/value`
+   */
+  bind(state: GeneratorState, given: ReadonlySet<string> = new Set()): Inputs {
+    const { header, contract } = this.model;
+    return { ...bindInputs(header, contract, state), ...bindPictures(header, contract, state, given) };
   }
 
   /**
@@ -45,18 +57,21 @@ export class GeneratorSession {
    * @throws ContractError `contract/run` if the runtime fails; GaussianSplatError `device-lost/unrecoverable` if the device is lost,
    * `network/*` if the runtime cannot be fetched; what `use` throws.
    */
-  async run(inputs: Readonly<Record<string, InputValue>>, use: (outputs: RunOutputs) => void): Promise<void> {
+  async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
+    try {
+      await this.#runOnce(inputs, use);
+    } catch (error) {
+      if (!(error instanceof RuntimeGone)) throw error;
+      // Another model has broken the copy of the runtime that held this session: it starts again in the next copy.
+      this.#live = undefined;
+      await this.#runOnce(inputs, use);
+    }
+  }
+
+  async #runOnce(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     this.#requireLife();
     const starting = (this.#live ??= this.#start(inputs));
-    let live: LiveSession;
-    try {
-      live = await starting;
-    } catch (error) {
-      if (this.#live === starting) this.#live = undefined;
-      this.#requireLife();
-      if (error instanceof ContractError) this.#failures = MAX_FAILURES;
-      throw error;
-    }
+    const live = await this.#started(starting);
     try {
       await live.run(inputs, (outputs) => {
         // A lost device writes nothing, and the runtime does not notice.
@@ -66,6 +81,17 @@ export class GeneratorSession {
       this.#failures = 0;
     } catch (error) {
       throw await this.#afterFailure(live, starting, error);
+    }
+  }
+
+  async #started(starting: Promise<LiveSession>): Promise<LiveSession> {
+    try {
+      return await starting;
+    } catch (error) {
+      if (this.#live === starting) this.#live = undefined;
+      this.#requireLife();
+      if (error instanceof ContractError) this.#failures = MAX_FAILURES;
+      throw error;
     }
   }
 
@@ -80,7 +106,7 @@ export class GeneratorSession {
     );
   }
 
-  async #start(inputs: Readonly<Record<string, InputValue>>): Promise<LiveSession> {
+  async #start(inputs: Inputs): Promise<LiveSession> {
     const { model, device } = this;
     const isLost = (): boolean => this.#isLost;
     const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;
@@ -106,6 +132,20 @@ export class GeneratorSession {
     if (this.#failures >= MAX_FAILURES) {
       throw new ContractError([runFault(this.model, `${MAX_FAILURES} runs in a row that failed`)]);
     }
+  }
+}
+
+/** The runtime keeps each output in one buffer. */
+function requireRoom({ header, outputs }: GeneratorModel, { limits }: GPUDevice): void {
+  for (const { name, dtype, most = 0 } of outputs) {
+    const bytes = most * (dtype === 'float16' ? 2 : 4);
+    if (bytes <= limits.maxBufferSize) continue;
+    throw new GaussianSplatError('out-of-memory/buffer-limit', {
+      where: `output ${name} of ${header.name}`,
+      expected: `at most ${limits.maxBufferSize} bytes, the device's maxBufferSize`,
+      found: `${bytes} bytes`,
+      remedy: 'export fewer Gaussians (a lower nMax), or float16, or one tensor for each attribute',
+    });
   }
 }
 

@@ -1,9 +1,19 @@
-import { ContractError, type GaussianLayout } from '@gaussian-splat/core';
+import { ContractError } from '@gaussian-splat/core';
 import type { InferenceSession, Tensor } from 'onnxruntime-web/webgpu';
-import type { InputValue } from '../bind-inputs.js';
-import type { Runtime } from './load-runtime.js';
+import {
+  elementsOf,
+  isOnGpu,
+  type GpuTensor,
+  type InputNumbers,
+  type Inputs,
+  type InputValue,
+} from '../input-value.js';
+import { RuntimeGone, type Runtime } from './load-runtime.js';
+import type { ModelOutput } from './model-outputs.js';
 import type { GeneratorModel } from './open-model.js';
-import { bufferBytes, TENSOR_USAGE } from './tensor-bytes.js';
+import { readTensors } from './read-tensors.js';
+import { SessionBuffers } from './session-buffers.js';
+import { bufferBytes } from './tensor-bytes.js';
 
 /** How a session runs: recorded GPU commands, GPU commands made anew, or the CPU. */
 export type SessionKind = 'captured' | 'webgpu' | 'wasm';
@@ -11,14 +21,14 @@ export type SessionKind = 'captured' | 'webgpu' | 'wasm';
 /** What one run wrote: storage buffers by the names of the outputs, valid until the next run. */
 export interface RunOutputs {
   readonly tensors: Readonly<Record<string, GPUBuffer>>;
-  /** Rows that this run wrote. */
+  /** Shapes of this run, by the same names. */
+  readonly dims: Readonly<Record<string, readonly number[]>>;
+  /** Rows of Gaussians that this run wrote; 1 for a picture. */
   readonly rows: number;
 }
 
 /** What the runtime would log comes with its errors, too. */
 const QUIET = { logSeverityLevel: 4 } as const;
-
-type Inputs = Readonly<Record<string, InputValue>>;
 
 /** A session of ONNX Runtime with its inputs and outputs on the GPU. After a run that failed it must not be used again. */
 export class LiveSession {
@@ -26,9 +36,9 @@ export class LiveSession {
   readonly #runtime: Runtime;
   readonly #session: InferenceSession;
   readonly #device: GPUDevice;
-  readonly #layout: GaussianLayout;
-  readonly #outputs: readonly string[];
-  readonly #buffers = new Map<string, GPUBuffer>();
+  readonly #outputs: readonly ModelOutput[];
+  readonly #names: readonly string[];
+  readonly #buffers: SessionBuffers;
   readonly #feeds: Record<string, Tensor> = {};
   #hasFailed = false;
 
@@ -37,15 +47,15 @@ export class LiveSession {
     runtime: Runtime,
     session: InferenceSession,
     device: GPUDevice,
-    { layout }: GeneratorModel,
+    { outputs }: GeneratorModel,
   ) {
     this.kind = kind;
     this.#runtime = runtime;
     this.#session = session;
     this.#device = device;
-    this.#layout = layout;
-    const count = layout.count === undefined ? [] : [layout.count];
-    this.#outputs = [...new Set([...layout.attributes.map(({ tensor }) => tensor), ...count])];
+    this.#outputs = outputs;
+    this.#names = outputs.map(({ name }) => name);
+    this.#buffers = new SessionBuffers(device);
   }
 
   /** @throws whatever the runtime says. */
@@ -81,107 +91,117 @@ export class LiveSession {
   /**
    * Runs the model, and hands what it wrote to `use`, which must submit all its work before it returns. Nothing else of the runtime
    * runs in between.
-   * @throws what the runtime says, and then {@link hasFailed}; or what `use` throws.
+   * @throws what the runtime says, and then {@link hasFailed}; RuntimeGone if it never began; or what `use` throws.
    */
-  run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
-    return this.#runtime.exclusive(async () => {
-      const results = await this.#infer(inputs);
-      try {
-        use({ tensors: this.#buffersOf(results), rows: rowsOf(results, this.#layout) });
-      } finally {
-        // Recycled for what is submitted later; a captured session writes the same buffers for ever.
-        if (this.kind === 'webgpu') for (const name of this.#outputs) disposeGpu(results[name]);
-      }
-    });
+  async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
+    try {
+      await this.#runtime.exclusive(() => this.#run(inputs, use));
+    } catch (error) {
+      if (this.#runtime.isBroken && !(error instanceof RuntimeGone)) this.#hasFailed = true;
+      throw error;
+    }
   }
 
   /** Lets go of everything. Never rejects: a session that has failed may not even be able to leave. */
   async release(): Promise<void> {
     await this.#runtime.exclusive(() => this.#session.release()).catch(() => undefined);
-    for (const buffer of this.#buffers.values()) buffer.destroy();
-    this.#buffers.clear();
+    this.#buffers.destroy();
+  }
+
+  async #run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
+    const results = await this.#infer(inputs);
+    try {
+      const dims = Object.fromEntries(this.#names.map((name) => [name, results[name].dims]));
+      use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(results, this.#outputs) });
+    } finally {
+      // Recycled for what is submitted later; a captured session writes the same buffers for ever.
+      if (this.kind === 'webgpu') for (const name of this.#names) disposeGpu(results[name]);
+    }
   }
 
   async #infer(inputs: Inputs): Promise<Record<string, Tensor>> {
     try {
-      for (const [name, input] of Object.entries(inputs)) this.#feed(name, input);
-      return await this.#session.run(this.#feeds, this.#outputs, QUIET);
+      for (const [name, input] of Object.entries(inputs)) await this.#feed(name, input);
+      return await this.#session.run(this.#feeds, this.#names, QUIET);
     } catch (error) {
       this.#hasFailed = true;
       throw error;
     }
   }
 
-  /** Inputs live in buffers of ours: the runtime would make new ones for every run. */
-  #feed(name: string, { dtype, dims, data }: InputValue): void {
-    const { Tensor } = this.#runtime.ort;
-    // WebGPU has no 64-bit integers: such inputs are read on the CPU.
-    if (this.kind === 'wasm' || dtype === 'int64') {
-      this.#feeds[name] = new Tensor(dtype, data as never, dims);
+  /** Inputs live in buffers of ours: the runtime would make new ones for every run, and recorded commands read what they have read first. */
+  async #feed(name: string, input: InputValue): Promise<void> {
+    const isRead = this.kind === 'wasm' || input.dtype === 'int64';
+    if (isRead) {
+      const { Tensor } = this.#runtime.ort;
+      const data = isOnGpu(input) ? await this.#readNumbers(input) : input.data;
+      this.#feeds[name] = new Tensor(input.dtype, data as never, input.dims);
       return;
     }
-    const buffer = this.#bufferFor(`input.${name}`, bufferBytes(dtype, data.length));
-    this.#feeds[name] ??= Tensor.fromGpuBuffer(buffer, { dataType: dtype, dims });
-    this.#device.queue.writeBuffer(buffer, 0, data as Float32Array<ArrayBuffer>);
+    const buffer = this.#tensorOn(name, input);
+    if (isOnGpu(input)) this.#buffers.copy(input.buffer, buffer, bytesOf(input));
+    else this.#device.queue.writeBuffer(buffer, 0, input.data as Float32Array<ArrayBuffer>);
   }
 
-  #bufferFor(name: string, size: number): GPUBuffer {
-    let buffer = this.#buffers.get(name);
-    if (buffer === undefined) {
-      buffer = this.#device.createBuffer({ label: `gs.generator.${name}`, size, usage: TENSOR_USAGE });
-      this.#buffers.set(name, buffer);
+  /** The buffer of an input, and the runtime's word for it. */
+  #tensorOn(name: string, { dtype, dims }: InputValue): GPUBuffer {
+    const buffer = this.#buffers.of(`input.${name}`, bufferBytes(dtype, elementsOf(dims)));
+    const feed = this.#feeds[name] as Tensor | undefined;
+    const isSame = feed?.gpuBuffer === buffer && feed.dims.every((dim, i) => dim === dims[i]);
+    if (!isSame) {
+      const dataType = dtype as 'float32' | 'float16' | 'int32';
+      this.#feeds[name] = this.#runtime.ort.Tensor.fromGpuBuffer(buffer, { dataType, dims });
     }
     return buffer;
   }
 
+  /** For a model on the CPU. The length of what is read back is that of whole words. */
+  async #readNumbers(input: GpuTensor): Promise<Float32Array | Int32Array | Uint16Array> {
+    const [{ buffer }] = await readTensors(this.#device, [{ buffer: input.buffer, size: wholeWords(bytesOf(input)) }]);
+    const length = elementsOf(input.dims);
+    if (input.dtype === 'float16') return new Uint16Array(buffer, 0, length);
+    return input.dtype === 'int32' ? new Int32Array(buffer, 0, length) : new Float32Array(buffer, 0, length);
+  }
+
   #buffersOf(results: Readonly<Record<string, Tensor>>): Record<string, GPUBuffer> {
     const tensors: Record<string, GPUBuffer> = {};
-    for (const name of this.#outputs) {
-      const tensor = results[name];
-      tensors[name] = tensor.location === 'gpu-buffer' ? (tensor.gpuBuffer as GPUBuffer) : this.#upload(name, tensor);
+    for (const output of this.#outputs) {
+      const tensor = results[output.name];
+      tensors[output.name] =
+        tensor.location === 'gpu-buffer' ? (tensor.gpuBuffer as GPUBuffer) : this.#upload(output, tensor);
     }
     return tensors;
   }
 
   /** Outputs of the CPU; empty ones are there, too, wherever the model ran. */
-  #upload(name: string, { type, data, size }: Tensor): GPUBuffer {
-    const slice = this.#layout.attributes.find(({ tensor }) => tensor === name);
-    const most = slice ? this.#layout.capacity * slice.rowStride : 1;
-    const buffer = this.#bufferFor(`output.${name}`, bufferBytes(type, most));
+  #upload({ name, most }: ModelOutput, { type, data, size }: Tensor): GPUBuffer {
+    const buffer = this.#buffers.of(`output.${name}`, bufferBytes(type, most ?? size));
     // More than the contract allows is refused by whoever takes it.
-    if (size === 0 || size > most) return buffer;
-    const { buffer: memory, byteOffset, byteLength } = data as Float32Array<ArrayBuffer>;
-    const whole = byteLength - (byteLength % 4);
-    this.#device.queue.writeBuffer(buffer, 0, memory, byteOffset, whole);
-    if (whole < byteLength)
-      this.#writeRest(buffer, whole, new Uint8Array(memory, byteOffset + whole, byteLength - whole));
+    if (size > 0 && size <= (most ?? size)) this.#buffers.write(buffer, data as Float32Array<ArrayBuffer>);
     return buffer;
   }
-
-  /** GPU buffers are written in whole words; an odd number of float16 is not. */
-  #writeRest(buffer: GPUBuffer, at: number, rest: Uint8Array): void {
-    const word = new Uint8Array(4);
-    word.set(rest);
-    this.#device.queue.writeBuffer(buffer, at, word);
-  }
 }
+
+const wholeWords = (bytes: number): number => Math.ceil(bytes / 4) * 4;
+const bytesOf = ({ dtype, dims }: GpuTensor | InputNumbers): number => elementsOf(dims) * (dtype === 'float16' ? 2 : 4);
 
 function disposeGpu(tensor: Tensor): void {
   if (tensor.location === 'gpu-buffer') tensor.dispose();
 }
 
-/** Rows of all tensors, which must agree. */
-function rowsOf(results: Readonly<Record<string, Tensor>>, { attributes }: GaussianLayout): number {
-  const [first] = attributes;
-  const rows = results[first.tensor].dims[0];
-  for (const { tensor } of attributes) {
+/** Rows of all tensors of Gaussians, which must agree. */
+function rowsOf(results: Readonly<Record<string, Tensor>>, outputs: readonly ModelOutput[]): number {
+  const [first, ...others] = outputs.filter(({ kind }) => kind === 'gaussians').map(({ name }) => name);
+  if (first === undefined) return 1;
+  const rows = results[first].dims[0];
+  for (const tensor of others) {
     if (results[tensor].dims[0] === rows) continue;
     throw new ContractError([
       {
         code: 'contract/rows',
         tensor,
         where: `output ${tensor}`,
-        expected: `${rows} rows, as ${first.tensor} has`,
+        expected: `${rows} rows, as ${first} has`,
         found: `${results[tensor].dims[0]} rows`,
         remedy: 'write as many rows of every attribute',
       },

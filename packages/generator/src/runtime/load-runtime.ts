@@ -4,10 +4,22 @@ import { fetchBytes } from './fetch-bytes.js';
 
 export type Ort = typeof OnnxRuntime;
 
-/** Longest that one call of the runtime may take, ms. What has not ended by then never will. */
-const CALL_LIMIT_MS = 120_000;
+/** Longest that one call of the runtime may take, ms. */
+let callLimit = 120_000;
+
+/**
+ * How long one call of the runtime may take, milliseconds; default 120,000. What has not ended by then is given up, and with it that copy of the
+ * runtime: the next call loads another. A model on the CPU holds the page's thread and cannot be given up.
+ */
+export function setRunLimit(milliseconds: number): void {
+  callLimit = milliseconds;
+}
+
 /** What WebAssembly says when the module's memory can no longer be trusted. */
 const FATAL = /\bAborted\(|unreachable|out of bounds|table index/;
+
+/** A call that never began, since an earlier one has broken this copy of the runtime: another copy would do it. */
+export class RuntimeGone extends Error {}
 
 /**
  * One loaded copy of ONNX Runtime. Its calls must never overlap: two runs at a time never settle, two creations refuse each other
@@ -27,7 +39,10 @@ export class Runtime {
     return this.#breakage !== undefined;
   }
 
-  /** Runs a task when all earlier ones have ended, however they ended. */
+  /**
+   * Runs a task when all earlier ones have ended, however they ended.
+   * @throws RuntimeGone if one of them has broken this copy; what the task throws.
+   */
   exclusive<T>(task: () => Promise<T>): Promise<T> {
     const result = this.#tail.then(() => this.#guard(task));
     this.#tail = result.catch(() => undefined);
@@ -35,13 +50,11 @@ export class Runtime {
   }
 
   async #guard<T>(task: () => Promise<T>): Promise<T> {
-    if (this.#breakage !== undefined) throw this.#breakage;
+    if (this.#breakage !== undefined) throw new RuntimeGone(String(this.#breakage));
     let timer: ReturnType<typeof setTimeout> | undefined;
     const limit = new Promise<never>((_, reject) => {
-      timer = setTimeout(
-        () => reject((this.#breakage = new Error(`no end within ${CALL_LIMIT_MS} ms`))),
-        CALL_LIMIT_MS,
-      );
+      const limit = callLimit;
+      timer = setTimeout(() => reject((this.#breakage = new Error(`no end within ${limit} ms`))), limit);
     });
     try {
       return await Promise.race([task(), limit]);

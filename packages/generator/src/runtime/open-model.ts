@@ -3,7 +3,6 @@ import {
   checkContract,
   ContractError,
   gaussianLayout,
-  GaussianSplatError,
   openUrl,
   readOnnxHeader,
   resolveContract,
@@ -17,6 +16,7 @@ import {
   type UrlSource,
 } from '@gaussian-splat/core';
 import { fetchBytes, type FetchOptions } from './fetch-bytes.js';
+import { modelOutputs, type ModelOutput } from './model-outputs.js';
 
 /** Where a generator is. */
 export interface ModelSource {
@@ -27,12 +27,15 @@ export interface ModelSource {
   readonly credentials?: 'omit' | 'same-origin' | 'include';
 }
 
-/** A generator that keeps its contract, with all of its bytes, and without any runtime. */
+/** A model that keeps its contract, with all of its bytes, and without any runtime. */
 export interface GeneratorModel {
   readonly url: string;
   readonly header: OnnxHeader;
   readonly contract: Contract;
-  readonly layout: GaussianLayout;
+  /** Undefined for a post-processor, which writes a picture. */
+  readonly layout: GaussianLayout | undefined;
+  /** All outputs that the contract names, each once. */
+  readonly outputs: readonly ModelOutput[];
   /** What was inferred for want of a contract, for a warning; sentences without a full stop. */
   readonly notes: readonly string[];
   readonly bytes: Uint8Array;
@@ -41,9 +44,9 @@ export interface GeneratorModel {
 }
 
 /**
- * Fetches a generator and holds it against its contract: first the header, and the weights only of a file that is in order.
- * @throws ContractError with every fault; GaussianSplatError `decode/*` for a file that is no ONNX model, `decode/unsupported` for one
- * that cannot run by itself, `network/*`; the reason of the signal.
+ * Fetches a model and holds it against its contract: first the header, and the weights only of a file that is in order.
+ * @throws ContractError with every fault; GaussianSplatError `decode/*` for a file that is no ONNX model, `network/*`; the reason of
+ * the signal.
  */
 export async function openModel(
   source: ModelSource,
@@ -57,13 +60,20 @@ export async function openModel(
   const faults = checkContract(header, contract);
   if (faults.length > 0) throw new ContractError(faults);
   const layout = gaussianLayout(header, contract);
-  if (layout === undefined) throw cannotStandAlone(header, 'a post-processor, which writes a picture');
-  requireOwnInputs(header, contract);
   const externalData = await fetchExternal(source, header, contract, request);
   const bytes = await wholeFile(url, source.url, { ...request, onProgress: options.onProgress });
   // What was fetched piece by piece may have been replaced since.
   await readOnnxHeader(bytesSource(bytes, header.name));
-  return { url: source.url, header, contract, layout, notes, bytes, externalData };
+  return {
+    url: source.url,
+    header,
+    contract,
+    layout,
+    outputs: modelOutputs(header, contract, layout),
+    notes,
+    bytes,
+    externalData,
+  };
 }
 
 async function contractOf(source: ModelSource, header: OnnxHeader, request: FetchOptions): Promise<ResolvedContract> {
@@ -105,22 +115,4 @@ async function wholeFile(opened: UrlSource & ByteSource, url: string, request: F
   if (known === undefined) return fetchBytes(url, request);
   request.onProgress?.(known.length, known.length);
   return known;
-}
-
-function requireOwnInputs(header: OnnxHeader, { inputs }: Contract): void {
-  for (const { name } of header.inputs) {
-    const { role } = inputs[name];
-    if (role === 'gaussians' || role === 'image') {
-      throw cannotStandAlone(header, `input ${name} with the role ${role}, which takes what another model writes`);
-    }
-  }
-}
-
-function cannotStandAlone(header: OnnxHeader, found: string): GaussianSplatError {
-  return new GaussianSplatError('decode/unsupported', {
-    where: header.name,
-    expected: 'a generator that writes Gaussians and needs no other model',
-    found,
-    remedy: 'chains of models are not run yet: export them as one model',
-  });
 }

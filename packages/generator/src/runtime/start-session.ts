@@ -1,5 +1,5 @@
-import { ContractError, type ContractFault } from '@gaussian-splat/core';
-import type { InputValue } from '../bind-inputs.js';
+import { ContractError, miscomputedConvolutions, type ContractFault } from '@gaussian-splat/core';
+import { elementsOf, type Inputs } from '../input-value.js';
 import { LiveSession, type RunOutputs, type SessionKind } from './live-session.js';
 import { loadRuntime } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
@@ -12,7 +12,7 @@ export interface StartOptions {
   readonly model: GeneratorModel;
   readonly device: GPUDevice;
   /** Inputs of the warm-up. */
-  readonly inputs: Readonly<Record<string, InputValue>>;
+  readonly inputs: Inputs;
   /** True once the device is lost: then there is nothing left to try. */
   readonly isLost: () => boolean;
   /** The model runs, but on the CPU; the reason is for people. */
@@ -29,6 +29,8 @@ export async function startSession(options: StartOptions): Promise<LiveSession> 
   const refusals: string[] = [];
   if (isHalfWithoutFeature(model, device)) {
     refusals.push('webgpu: its float16 tensors need the device feature shader-f16, which this device does not have');
+  } else if (miscomputedConvolutions(model.header).length > 0) {
+    refusals.push(convolutionReason(model));
   } else {
     const session = await startOnGpu(options, refusals);
     if (session) return session;
@@ -70,8 +72,13 @@ export function runFault({ header }: GeneratorModel, found: string): ContractFau
   };
 }
 
-function isHalfWithoutFeature({ header, layout }: GeneratorModel, device: GPUDevice): boolean {
-  const isHalf = layout.dtype === 'float16' || header.inputs.some(({ dtype }) => dtype === 'float16');
+function convolutionReason({ header }: GeneratorModel): string {
+  const [{ inputs, outputs }] = miscomputedConvolutions(header);
+  return `webgpu: ONNX Runtime computes a convolution of ${inputs} channels to ${outputs} wrongly there; pad the channels going in to a multiple of 4`;
+}
+
+function isHalfWithoutFeature({ header, outputs }: GeneratorModel, device: GPUDevice): boolean {
+  const isHalf = [...outputs, ...header.inputs].some(({ dtype }) => dtype === 'float16');
   return isHalf && !device.features.has('shader-f16');
 }
 
@@ -102,6 +109,8 @@ async function start(kind: SessionKind, options: StartOptions, refusals: string[
   const written = await attempt(session, options, refusals);
   if (written) return { session, written };
   await session.release();
+  // Whatever broke the runtime would do so again: on the CPU, for one, what does not end would stop the page.
+  if (runtime.isBroken) throw new ContractError([runFault(model, refusals.join('; '))]);
   return undefined;
 }
 
@@ -126,12 +135,10 @@ async function attempt(
 const messageOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
 /** What a run has written of each buffer, or the beginning of it; what lies behind is anybody's. */
-function writtenParts({ layout }: GeneratorModel, { tensors, rows }: RunOutputs): TensorPart[] {
-  const elementBytes = layout.dtype === 'float16' ? 2 : 4;
-  return Object.entries(tensors).map(([name, buffer]) => {
-    const slice = layout.attributes.find(({ tensor }) => tensor === name);
-    const size = slice ? rows * slice.rowStride * elementBytes : 4;
-    return { buffer, size: Math.min(COMPARED_BYTES, size - (size % 4)) };
+function writtenParts({ outputs }: GeneratorModel, { tensors, dims }: RunOutputs): TensorPart[] {
+  return outputs.map(({ name, dtype }) => {
+    const size = elementsOf(dims[name]) * (dtype === 'float16' ? 2 : 4);
+    return { buffer: tensors[name], size: Math.min(COMPARED_BYTES, size - (size % 4)) };
   });
 }
 

@@ -135,6 +135,7 @@ export const BUFFER_USAGE = {
 } as const;
 export const TEXTURE_USAGE = {
   copySource: 0x1,
+  copyDestination: 0x2,
   textureBinding: 0x4,
   storageBinding: 0x8,
   renderAttachment: 0x10,

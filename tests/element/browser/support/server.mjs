@@ -65,6 +65,41 @@ const ANSWERS = {
     context.body = bytes.subarray(0, bytes.length / 2);
   },
 
+  /** Half of a generator, then the connection breaks; nothing lies beside it. */
+  'cut-model'(context, name) {
+    if (!name.endsWith('.onnx')) return void (context.status = 404);
+    answerRaw(context, name, (bytes) => [bytes.length, bytes.subarray(0, bytes.length / 2)]);
+  },
+
+  /** A generator that is said to be longer than it is. */
+  'too-long'(context, name) {
+    if (!name.endsWith('.onnx')) return void (context.status = 404);
+    answerRaw(context, name, (bytes) => [bytes.length + 1000, bytes]);
+  },
+
+  /** A generator that is said to be shorter than it is. */
+  'too-short'(context, name) {
+    if (!name.endsWith('.onnx')) return void (context.status = 404);
+    answerRaw(context, name, (bytes) => [Math.floor(bytes.length / 2), bytes]);
+  },
+
+  empty(context, name) {
+    if (!name.endsWith('.onnx')) return void (context.status = 404);
+    context.body = Buffer.alloc(0);
+  },
+
+  lfs(context, name) {
+    if (!name.endsWith('.onnx')) return void (context.status = 404);
+    context.body = `version https://git-lfs.github.com/spec/v1\noid sha256:${'0'.repeat(64)}\nsize 12345\n`;
+  },
+
+  /** A generator with a contract beside it: text that is no JSON, or one of another model. */
+  sidecar(context, path) {
+    const [kind, name] = path.split('/');
+    if (name.endsWith('.onnx')) context.body = readFileSync(join(generators, name));
+    else context.body = kind === 'json' ? '{"version": 1,' : readFileSync(join(generators, 'split.contract.json'));
+  },
+
   /** A generator without any of the files that belong beside it. */
   renamed(context, name) {
     if (!name.endsWith('.onnx')) return void (context.status = 404);
@@ -110,6 +145,16 @@ const ANSWERS = {
       parent.postMessage({ ...seen, loaded: element.loaded, error: element.error?.message }, '*');`;
   },
 };
+
+/** Answers behind the server's back: with a length of our own, and an end when we like. */
+function answerRaw(context, name, make) {
+  const [length, body] = make(readFileSync(join(generators, name)));
+  context.respond = false;
+  const { res } = context;
+  res.writeHead(200, { 'Content-Length': length, 'Cache-Control': 'no-store' });
+  res.write(body);
+  setTimeout(() => res.destroy(), 100);
+}
 
 const TYPES = { '.js': 'text/javascript', '.ply': 'application/octet-stream' };
 

@@ -98,9 +98,14 @@ def export_classic(
         camera = graph.input("camera_position", 3)
         inputs.append(camera_position())
         seen = harmonics.colour(direction_and_distance(positions, camera)[0], sh)
+    scales = np.exp(np.float64(cloud.log_scales))
+    turns = cloud.rotations / np.linalg.norm(cloud.rotations, axis=1, keepdims=True)
+    axes = options.writes_axes
     gaussians = Gaussians(
         positions=positions,
-        covariances=graph.constant(covariances(np.exp(np.float64(cloud.log_scales)), cloud.rotations), "covariances"),
+        covariances=None if axes else graph.constant(covariances(scales, cloud.rotations), "covariances"),
+        scales=graph.constant(scales, "scales") if axes else None,
+        rotations=graph.constant(turns, "rotations") if axes else None,
         opacities=graph.constant(sigmoid(cloud.opacity_logits), "opacities"),
         colors=seen,
         sh=sh if seen is None else None,

@@ -1,0 +1,17 @@
+import type { FrameRequest } from '@gaussian-splat/renderer';
+
+/** A frame without the Gaussians. */
+export type Frame = Omit<FrameRequest, 'gaussians'> & { readonly target: GPUTexture };
+
+/** Something between the renderer and the canvas. Knows no runtime: what does is loaded when first needed. */
+export interface FrameFilter {
+  /**
+   * Shows a frame.
+   * @param content changes whenever the same camera would give another picture
+   * @param draw renders the frame into the target that it names
+   */
+  render(frame: Frame, content: string, draw: (frame: Frame) => void): void;
+  /** The frame drawn last lacked something: it is drawn again. */
+  invalidate(): void;
+  close(): void;
+}

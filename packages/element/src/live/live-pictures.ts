@@ -1,0 +1,138 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { GeneratorModel, GpuTensor } from '@gaussian-splat/generator';
+import { PictureTensor, type PictureShape } from '@gaussian-splat/renderer';
+import { fetchBeside } from './fetch-beside.js';
+import { valueOf, type Picture } from './values.js';
+
+export interface LivePicturesOptions {
+  readonly credentials: RequestCredentials;
+  readonly signal: AbortSignal;
+  /** A picture has arrived. */
+  readonly onChange: () => void;
+  readonly onError: (error: unknown) => void;
+  /** Fulfils when no run reads a picture. */
+  readonly whenIdle: () => Promise<void>;
+}
+
+/** Size of a tensor as far as the model fixes it. */
+type WantedShape = { readonly [Side in 'width' | 'height']: number | undefined } & Pick<PictureShape, 'dtype'>;
+
+/** The pictures that models take as inputs: fetched, cut to the model's proportions and resampled on the GPU whenever the page names others. */
+export class LivePictures {
+  readonly #device: GPUDevice;
+  readonly #options: LivePicturesOptions;
+  readonly #shapes = new Map<string, WantedShape>();
+  readonly #sources = new Map<string, Picture>();
+  readonly #tensors: Record<string, PictureTensor> = {};
+  readonly #loading = new Set<Promise<void>>();
+  #isDestroyed = false;
+
+  /** @param models whose inputs of the role image are the page's, but for those in `given` */
+  constructor(
+    device: GPUDevice,
+    models: readonly GeneratorModel[],
+    given: ReadonlySet<string>,
+    options: LivePicturesOptions,
+  ) {
+    this.#device = device;
+    this.#options = options;
+    for (const { header, contract } of models) {
+      for (const { name, dims, dtype } of header.inputs) {
+        if (contract.inputs[name].role !== 'image' || given.has(name)) continue;
+        const [height, width] = dims!.slice(2).map((size) => (typeof size === 'number' ? size : undefined));
+        this.#shapes.set(name, { width, height, dtype: dtype as PictureShape['dtype'] });
+      }
+    }
+  }
+
+  /** Those that have arrived, by the names of inputs. */
+  get tensors(): Readonly<Record<string, GpuTensor>> {
+    return this.#tensors;
+  }
+
+  /** Fulfils, and never rejects, once nothing is on its way. */
+  async settled(): Promise<void> {
+    while (this.#loading.size > 0) await Promise.all(this.#loading);
+  }
+
+  /** The pictures that the page names now; only new ones are loaded. */
+  update(pictures: Readonly<Record<string, Picture>>): void {
+    for (const name of this.#shapes.keys()) {
+      const source = valueOf(pictures, name);
+      if (source === undefined || source === this.#sources.get(name)) continue;
+      this.#sources.set(name, source);
+      const loading: Promise<void> = this.#load(name, source).finally(() => this.#loading.delete(loading));
+      this.#loading.add(loading);
+    }
+  }
+
+  /** To be called after the model is closed. */
+  destroy(): void {
+    this.#isDestroyed = true;
+    void this.#options.whenIdle().then(() => Object.values(this.#tensors).forEach((tensor) => tensor.destroy()));
+  }
+
+  async #load(name: string, source: Picture): Promise<void> {
+    try {
+      const pixels = await pixelsOf(name, source, this.#options);
+      if (this.#isDestroyed || this.#sources.get(name) !== source) return;
+      this.#tensorFor(name, pixels).upload(pixels);
+      if (pixels !== source && pixels instanceof ImageBitmap) pixels.close();
+      this.#options.onChange();
+    } catch (error) {
+      if (!this.#isDestroyed) this.#options.onError(error);
+    }
+  }
+
+  #tensorFor(name: string, pixels: GPUCopyExternalImageSource): PictureTensor {
+    const wanted = this.#shapes.get(name)!;
+    const own = ownSize(pixels);
+    const shape = { width: wanted.width ?? own.width, height: wanted.height ?? own.height, dtype: wanted.dtype };
+    const found = this.#tensors[name] as PictureTensor | undefined;
+    if (found?.shape.width === shape.width && found.shape.height === shape.height) return found;
+    void this.#options.whenIdle().then(() => found?.destroy());
+    return (this.#tensors[name] = new PictureTensor(this.#device, shape));
+  }
+}
+
+async function pixelsOf(
+  name: string,
+  source: Picture,
+  options: LivePicturesOptions,
+): Promise<GPUCopyExternalImageSource> {
+  if (source instanceof HTMLImageElement) {
+    await source.decode().catch((cause: unknown) => {
+      throw unreadable(name, source.src, cause);
+    });
+    return source;
+  }
+  if (typeof source !== 'string' && !(source instanceof Blob)) return source;
+  const blob = typeof source === 'string' ? await fetchPicture(source, options) : source;
+  // Of what the file says only the turning counts: colours stay as they are encoded.
+  return createImageBitmap(blob, { imageOrientation: 'from-image', premultiplyAlpha: 'premultiply' }).catch(
+    (cause: unknown) => {
+      throw unreadable(name, typeof source === 'string' ? source : source.type, cause);
+    },
+  );
+}
+
+async function fetchPicture(url: string, options: LivePicturesOptions): Promise<Blob> {
+  const response = await fetchBeside(url, options, 'the picture that the control names', 'check the address');
+  return response.blob();
+}
+
+function ownSize(pixels: GPUCopyExternalImageSource): { width: number; height: number } {
+  if ('displayWidth' in pixels) return { width: pixels.displayWidth, height: pixels.displayHeight };
+  if ('videoWidth' in pixels) return { width: pixels.videoWidth, height: pixels.videoHeight };
+  if ('naturalWidth' in pixels) return { width: pixels.naturalWidth, height: pixels.naturalHeight };
+  return { width: pixels.width, height: pixels.height };
+}
+
+const unreadable = (name: string, found: string, cause: unknown): GaussianSplatError =>
+  new GaussianSplatError('decode/unknown-format', {
+    where: `control ${name}`,
+    expected: 'a picture that this browser reads',
+    found: `${found.slice(0, 200)} (${(cause as Error)?.message ?? 'unknown cause'})`,
+    remedy: 'use PNG, JPEG or WebP',
+    cause,
+  });

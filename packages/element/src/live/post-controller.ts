@@ -1,0 +1,67 @@
+import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { PostRequest } from './post-view.js';
+
+export interface PostOptions {
+  /** What a post-processor needs to know beyond its address. */
+  readonly request: () => Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
+  readonly requestFrame: () => void;
+}
+
+/** Puts the post-processor of the attribute between the scene on show and the canvas. Until it is there, frames are shown as they are drawn. */
+export class PostController {
+  readonly #options: PostOptions;
+  #urls: readonly string[] = [];
+  #scene: GpuScene | null = null;
+  #running = new AbortController();
+
+  constructor(options: PostOptions) {
+    this.#options = options;
+  }
+
+  /** True where there is one, or will be. */
+  get isWanted(): boolean {
+    return this.#urls.length > 0;
+  }
+
+  /** @param urls absolute addresses, in the order in which they run; none for frames as they are drawn */
+  want(urls: readonly string[]): void {
+    if (urls.join(' ') === this.#urls.join(' ')) return;
+    this.#urls = urls;
+    this.#open();
+  }
+
+  /** A scene is on show, or none any more. A scene that is destroyed closes its processor itself. */
+  attach(scene: GpuScene | null): void {
+    this.#scene = scene;
+    this.#open();
+  }
+
+  #open(): void {
+    this.#running.abort();
+    this.#running = new AbortController();
+    const scene = this.#scene;
+    if (scene === null) return;
+    if (scene.filter) this.#options.requestFrame();
+    scene.setFilter(undefined);
+    if (this.#urls.length > 0) void this.#load(scene, this.#running.signal);
+  }
+
+  async #load(scene: GpuScene, signal: AbortSignal): Promise<void> {
+    const { request, requestFrame } = this.#options;
+    const options = request();
+    try {
+      const { PostView } = await import('./post-view.js');
+      if (signal.aborted) return;
+      const onError = (error: unknown): void => (signal.aborted ? undefined : options.onError(error));
+      const view = await PostView.open(
+        { ...options, urls: this.#urls, signal, onError, onChange: requestFrame },
+        scene.device,
+      );
+      if (signal.aborted || scene.isDestroyed) return view.close();
+      scene.setFilter(view);
+      requestFrame();
+    } catch (error) {
+      if (!signal.aborted) options.onError(error);
+    }
+  }
+}

@@ -1,0 +1,154 @@
+/** Loaded only when a post-processor is shown: see open-live-model.ts. */
+import { PostProcessor, setRuntimeLocation, type GpuTensor } from '@gaussian-splat/generator';
+import { FilteredFrame } from '@gaussian-splat/renderer';
+import type { Frame, FrameFilter } from './frame-filter.js';
+import type { LiveRequest } from './live-model.js';
+import { LivePictures } from './live-pictures.js';
+import { StateReader } from './read-state.js';
+
+export interface PostRequest extends Pick<LiveRequest, 'credentials' | 'runtimeLocation' | 'state'> {
+  /** One post-processor, or several one after the other. */
+  readonly urls: readonly string[];
+  readonly signal: AbortSignal;
+  /** The picture would be another one now. */
+  readonly onChange: () => void;
+  readonly onError: (error: unknown) => void;
+  readonly onFallback: (reason: string) => void;
+}
+
+/** A processor keeps pace from the first time on, ms, and until the second: a run until the GPU has finished it. */
+const KEEPS_PACE_MS = 34;
+const LOSES_PACE_MS = 50;
+
+/**
+ * Shows frames as a post-processor makes them. A frame at rest is always shown processed, as soon as that is ready. While the picture
+ * changes, processed frames are shown, one run late, if the processor keeps pace; otherwise the frames as they are drawn. Runs never hold up
+ * drawing: a frame goes to the processor when it is free, and only the latest does.
+ */
+export class PostView implements FrameFilter {
+  readonly #device: GPUDevice;
+  readonly #request: PostRequest;
+  readonly #post: PostProcessor;
+  readonly #reader: StateReader;
+  readonly #pictures: LivePictures;
+  #surface: FilteredFrame | undefined;
+  #tensor: GpuTensor | undefined;
+  /** The surface that a run on its way will paint. */
+  #pending: FilteredFrame | undefined;
+  /** What was drawn last, what was handed to the processor, and what it has made a picture of. */
+  #drawn = '';
+  #handed = '';
+  #filtered = '';
+  #keepsPace = false;
+
+  private constructor(device: GPUDevice, request: PostRequest, post: PostProcessor) {
+    this.#device = device;
+    this.#request = request;
+    this.#post = post;
+    const { models, input } = post;
+    const { credentials, signal, onChange, onError } = request;
+    this.#reader = new StateReader(models, onError);
+    const given = new Set([input.name]);
+    const whenIdle = (): Promise<void> => post.idle;
+    const options = { credentials, signal, onChange, onError, whenIdle };
+    this.#pictures = new LivePictures(device, models.slice(0, 1), given, options);
+  }
+
+  /** Fetches and checks it. Rejects with GaussianSplatError, or the signal's reason. */
+  static async open(request: PostRequest, device: GPUDevice): Promise<PostView> {
+    const { urls, credentials, runtimeLocation, signal, onFallback, onError, onChange } = request;
+    if (runtimeLocation !== null) setRuntimeLocation(new URL(runtimeLocation, document.baseURI));
+    let view: PostView | undefined;
+    const post = await PostProcessor.open(
+      urls.map((url) => ({ url, credentials })),
+      device,
+      {
+        signal,
+        onFallback,
+        onPicture: (picture) => {
+          if (view) view.#accept(picture);
+        },
+        onError: (error) => {
+          if (view) view.#fail();
+          onError(error);
+          onChange();
+        },
+      },
+    );
+    for (const { notes, url } of post.models)
+      for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
+    return (view = new PostView(device, request, post));
+  }
+
+  render(frame: Frame, content: string, draw: (frame: Frame) => void): void {
+    const surface = this.#surfaceFor(frame);
+    const key = `${content} ${JSON.stringify(frame.camera)} ${String(frame.background)}`;
+    if (key !== this.#drawn) draw({ ...frame, target: surface.drawn });
+    this.#drawn = key;
+    if (!this.#post.isBusy) this.#offer(surface, frame);
+    surface.present(this.#shows(key) ? 'filtered' : 'drawn', frame.target);
+  }
+
+  invalidate(): void {
+    this.#drawn = '';
+  }
+
+  close(): void {
+    const surface = this.#surface;
+    this.#surface = undefined;
+    this.#post.close();
+    this.#pictures.destroy();
+    void this.#post.idle.then(() => surface?.destroy());
+  }
+
+  #surfaceFor({ camera: { width, height } }: Frame): FilteredFrame {
+    if (this.#surface?.width === width && this.#surface.height === height) return this.#surface;
+    const old = this.#surface;
+    // A run on its way may still read what was handed over.
+    void this.#post.idle.then(() => old?.destroy());
+    this.#surface = new FilteredFrame(this.#device, width, height);
+    this.#tensor = undefined;
+    this.#drawn = this.#handed = this.#filtered = '';
+    return this.#surface;
+  }
+
+  /** Hands the drawn frame over, if it or a control is another one than last time. */
+  #offer(surface: FilteredFrame, { camera }: Frame): void {
+    const { input } = this.#post;
+    const state = this.#request.state();
+    this.#pictures.update(state.pictures);
+    if (this.#tensor === undefined || this.#handed !== this.#drawn) {
+      const { width = surface.width, height = surface.height, dtype } = input;
+      this.#tensor = surface.handOver({ width, height, dtype });
+      this.#handed = this.#drawn;
+    }
+    this.#pending = surface;
+    try {
+      this.#post.request(this.#tensor, this.#reader.read(state, camera, this.#pictures.tensors, false));
+    } catch (error) {
+      this.#request.onError(error);
+    }
+    void this.#post.idle.then(() => {
+      if (this.#handed !== this.#drawn) this.#request.onChange();
+    });
+  }
+
+  #accept(picture: GpuTensor): void {
+    // The element may have got another size since.
+    if (this.#pending !== this.#surface || picture.dtype === 'int32') return;
+    const { buffer, dims, dtype } = picture;
+    this.#surface?.accept({ buffer, dims, dtype });
+    this.#filtered = this.#handed;
+    this.#request.onChange();
+  }
+
+  #fail(): void {
+    this.#filtered = '';
+  }
+
+  #shows(key: string): boolean {
+    const { milliseconds = Infinity } = this.#post;
+    this.#keepsPace = milliseconds <= (this.#keepsPace ? LOSES_PACE_MS : KEEPS_PACE_MS);
+    return this.#filtered !== '' && (this.#filtered === key || this.#keepsPace);
+  }
+}

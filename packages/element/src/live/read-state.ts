@@ -1,0 +1,68 @@
+import { GaussianSplatError, type Camera, type Contract, type ControlInput } from '@gaussian-splat/core';
+import type { GeneratorModel, GeneratorState, GpuTensor } from '@gaussian-splat/generator';
+import type { LiveState } from './live-model.js';
+import { valueOf } from './values.js';
+
+/** Says in a generator's words what the page says. Values that do not fit are mended and reported, each once. */
+export class StateReader {
+  readonly #inputs: Contract['inputs'];
+  readonly #report: (error: GaussianSplatError) => void;
+  readonly #reported = new Set<string>();
+
+  /** @param models whose inputs the page may set */
+  constructor(models: readonly GeneratorModel[], report: (error: GaussianSplatError) => void) {
+    this.#inputs = Object.assign({}, ...models.map(({ contract }) => contract.inputs)) as Contract['inputs'];
+    this.#report = report;
+  }
+
+  read(
+    state: LiveState,
+    camera: Camera,
+    pictures: Readonly<Record<string, GpuTensor>>,
+    ownsControls: boolean,
+  ): GeneratorState {
+    const { timeSeconds, pose } = state;
+    const controls: Record<string, number | readonly number[]> = {};
+    let shape: readonly number[] | undefined;
+    for (const [name, binding] of Object.entries(this.#inputs)) {
+      const value = valueOf(state.controls, name);
+      if (binding.role === 'shape') shape = value;
+      if (binding.role !== 'control') continue;
+      if (valueOf(state.pictures, name) !== undefined)
+        this.#tell(name, 'numbers', String(state.pictures[name]), 'its default counts');
+      if (value !== undefined) controls[name] = this.#inRange(name, binding, value);
+    }
+    if (ownsControls) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.pictures)]);
+    return { timeSeconds, camera, pose, controls, shape, pictures };
+  }
+
+  #inRange(
+    name: string,
+    { range: [least, most] }: ControlInput,
+    values: readonly number[],
+  ): number | readonly number[] {
+    const inside = values.map((value) => Math.min(most, Math.max(least, value)));
+    if (inside.some((value, i) => value !== values[i])) {
+      this.#tell(name, `${least} to ${most}`, values.slice(0, 4).join(' '), 'the nearest value within counts');
+    }
+    return inside.length === 1 ? inside[0] : inside;
+  }
+
+  #reportUnknown(names: readonly string[]): void {
+    const settable = ['control', 'shape', 'image'];
+    const known = Object.keys(this.#inputs).filter((name) => settable.includes(this.#inputs[name].role));
+    for (const name of names) {
+      if (known.some((input) => input === name || input.toLowerCase() === name)) continue;
+      const expected =
+        known.length > 0 ? `one of the model's inputs ${known.join(', ')}` : 'no control: the model has none';
+      this.#tell(name, expected, 'a name that no input has', 'correct the name, or leave it out');
+    }
+  }
+
+  #tell(name: string, expected: string, found: string, remedy: string): void {
+    const error = new GaussianSplatError('argument/value', { where: `control ${name}`, expected, found, remedy });
+    if (this.#reported.has(error.message)) return;
+    this.#reported.add(error.message);
+    this.#report(error);
+  }
+}

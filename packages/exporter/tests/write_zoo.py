@@ -1,0 +1,19 @@
+"""Writes the small file of each family, for tests in browsers:
+python -m tests.write_zoo ../../tests/fixtures/families"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from .zoo import every_family
+
+
+def main(folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, (model, _) in every_family().items():
+        (folder / f"{name}.onnx").write_bytes(model.SerializeToString(deterministic=True))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

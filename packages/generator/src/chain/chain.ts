@@ -1,0 +1,128 @@
+import { ContractError, type ContractFault } from '@gaussian-splat/core';
+import { sameInputs, type Inputs } from '../input-value.js';
+import type { GeneratorSession } from '../runtime/generator-session.js';
+import type { RunOutputs, SessionKind } from '../runtime/live-session.js';
+import type { GeneratorModel, ModelSource } from '../runtime/open-model.js';
+import { acquireSession, type AcquireOptions, type SessionLease } from '../runtime/shared-sessions.js';
+import type { GeneratorState } from '../state.js';
+import { connect } from './connect.js';
+import { HandOver } from './hand-over.js';
+
+/** One model, or several of which each takes what the one before it writes. */
+export class Chain {
+  readonly device: GPUDevice;
+  readonly #leases: readonly SessionLease[];
+  readonly #handOvers: readonly HandOver[];
+  /** Inputs of the page that each model ran with last; undefined where what it wrote last is not to be relied on. */
+  readonly #ran: (Inputs | undefined)[] = [];
+
+  private constructor(leases: readonly SessionLease[], device: GPUDevice) {
+    this.device = device;
+    this.#leases = leases;
+    const models = leases.map(({ session }) => session.model);
+    requireNoneBefore(models[0]);
+    this.#handOvers = models.slice(1).map((after, i) => new HandOver(device, models[i], connect(models[i], after)));
+  }
+
+  /**
+   * Fetches all models and checks them, each and as a chain; not a byte of the runtime is fetched yet.
+   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` if they do not fit one another.
+   */
+  static async open(
+    sources: ModelSource | readonly ModelSource[],
+    device: GPUDevice,
+    options: AcquireOptions,
+  ): Promise<Chain> {
+    const list = Array.isArray(sources) ? (sources as readonly ModelSource[]) : [sources as ModelSource];
+    const reports = progressOf(list.length, options.onProgress);
+    const opening = list.map((source, i) => acquireSession(source, device, { ...options, onProgress: reports[i] }));
+    try {
+      return new Chain(await Promise.all(opening), device);
+    } catch (error) {
+      for (const lease of opening) lease.then(({ release }) => release(), ignore);
+      throw error;
+    }
+  }
+
+  /** In the order in which they run. */
+  get models(): readonly GeneratorModel[] {
+    return this.#leases.map(({ session }) => session.model);
+  }
+
+  /** How it runs, by its slowest model; undefined before the first run. */
+  get kind(): SessionKind | undefined {
+    const kinds = this.#leases.map(({ session }) => session.kind);
+    return SLOWEST_FIRST.find((kind) => kinds.includes(kind));
+  }
+
+  /** Values of the inputs of every model for a state of the page. @throws GaussianSplatError `argument/value` */
+  bind(state: GeneratorState): readonly Inputs[] {
+    return this.#leases.map(({ session }, i) => session.bind(state, this.#handOvers[i - 1]?.inputs));
+  }
+
+  /**
+   * Runs what the change of inputs asks for: a model whose inputs are those of its last run, and those before it, are left out.
+   * @throws as `GeneratorSession.run`.
+   */
+  async run(inputs: readonly Inputs[], use: (outputs: RunOutputs) => void): Promise<void> {
+    const changed = inputs.findIndex((values, i) => !this.#ran[i] || !sameInputs(values, this.#ran[i]));
+    const last = this.#leases.length - 1;
+    for (let i = Math.min(last, Math.max(0, changed)); i <= last; i++) {
+      const before = this.#handOvers[i - 1] as HandOver | undefined;
+      if (before?.rows === 0) return use({ tensors: {}, dims: {}, rows: 0 });
+      this.#ran.length = i;
+      const take = i === last ? use : (outputs: RunOutputs) => this.#handOvers[i].take(outputs);
+      await this.#session(i).run({ ...inputs[i], ...before?.tensors }, take);
+      this.#ran[i] = inputs[i];
+    }
+  }
+
+  /** Gives its models back. @param idle fulfils when the last run has ended: until then it may read what was handed over */
+  release(idle: Promise<void> = Promise.resolve()): void {
+    for (const { release } of this.#leases) release();
+    void idle.then(() => this.#handOvers.forEach((handOver) => handOver.destroy()));
+  }
+
+  #session(i: number): GeneratorSession {
+    return this.#leases[i].session;
+  }
+}
+
+const SLOWEST_FIRST: readonly SessionKind[] = ['wasm', 'webgpu', 'captured'];
+
+/** Listeners for each of several downloads, that tell one of their sum. */
+function progressOf(count: number, onProgress: AcquireOptions['onProgress']): AcquireOptions['onProgress'][] {
+  if (onProgress === undefined || count === 1) return new Array<typeof onProgress>(count).fill(onProgress);
+  const loads: { loaded: number; total: number | undefined }[] = Array.from({ length: count }, () => {
+    return { loaded: 0, total: undefined };
+  });
+  return loads.map((_, i) => (loaded: number, total: number | undefined) => {
+    loads[i] = { loaded, total };
+    const isKnown = loads.every((load) => load.total !== undefined);
+    onProgress(
+      loads.reduce((sum, load) => sum + load.loaded, 0),
+      isKnown ? loads.reduce((sum, load) => sum + load.total!, 0) : undefined,
+    );
+  });
+}
+
+/** The first of a chain must not wait for another model. */
+function requireNoneBefore({ header, contract }: GeneratorModel): void {
+  const faults = header.inputs
+    .filter(({ name }) => contract.inputs[name].role === 'gaussians')
+    .map(({ name }): ContractFault => {
+      return {
+        code: 'contract/chain',
+        tensor: name,
+        where: `input ${name} of ${header.name}`,
+        expected: 'a model before this one, whose Gaussians the input takes',
+        found: 'none',
+        remedy: 'open both as a chain, the one that makes Gaussians first',
+      };
+    });
+  if (faults.length > 0) throw new ContractError(faults);
+}
+
+function ignore(): void {
+  // The failure that matters has been thrown already.
+}

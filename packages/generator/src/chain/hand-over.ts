@@ -1,0 +1,84 @@
+import { bufferBytes, TENSOR_USAGE } from '../runtime/tensor-bytes.js';
+import { elementsOf, type GpuTensor, type Inputs } from '../input-value.js';
+import type { RunOutputs } from '../runtime/live-session.js';
+import type { GeneratorModel } from '../runtime/open-model.js';
+import type { Connection } from './connect.js';
+
+/** What lies between two models of a chain: the first one's outputs, kept on the GPU until the second has run. */
+export class HandOver {
+  readonly #device: GPUDevice;
+  readonly #model: GeneratorModel;
+  readonly #connections: readonly Connection[];
+  readonly #buffers = new Map<string, GPUBuffer>();
+  #tensors: Record<string, GpuTensor> = {};
+  #rows = 0;
+  #version = 0;
+
+  /** @param model the first of the two */
+  constructor(device: GPUDevice, model: GeneratorModel, connections: readonly Connection[]) {
+    this.#device = device;
+    this.#model = model;
+    this.#connections = connections;
+  }
+
+  /** Inputs of the second model that need no value of the page. */
+  get inputs(): ReadonlySet<string> {
+    return new Set(this.#connections.map(({ input }) => input));
+  }
+
+  /** What the first has written last. */
+  get tensors(): Inputs {
+    return this.#tensors;
+  }
+
+  /** Rows of Gaussians in it; without any, the second model need not run. */
+  get rows(): number {
+    return this.#rows;
+  }
+
+  /** Copies what the first model wrote; the runtime's buffers are good for this moment only. */
+  take({ tensors, dims, rows }: RunOutputs): void {
+    this.#version++;
+    this.#rows = rows;
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.generator.hand-over' });
+    const taken: Record<string, GpuTensor> = {};
+    for (const { output, input } of this.#connections) {
+      taken[input] = output === undefined ? this.#countRows(input) : this.#shaped(input, output, dims[output]);
+      const { buffer } = taken[input];
+      if (output !== undefined && buffer.size > 0) {
+        encoder.copyBufferToBuffer(tensors[output], 0, buffer, 0, usedBytes(taken[input]));
+      }
+    }
+    this.#device.queue.submit([encoder.finish()]);
+    this.#tensors = taken;
+  }
+
+  destroy(): void {
+    for (const buffer of this.#buffers.values()) buffer.destroy();
+    this.#buffers.clear();
+  }
+
+  #shaped(input: string, output: string, dims: readonly number[]): GpuTensor {
+    const { dtype, most } = this.#model.outputs.find(({ name }) => name === output)!;
+    const buffer = this.#bufferOf(input, bufferBytes(dtype, most ?? elementsOf(dims)));
+    return { buffer, dtype, dims, version: this.#version };
+  }
+
+  #countRows(input: string): GpuTensor {
+    const buffer = this.#bufferOf(input, bufferBytes('int32', 1));
+    this.#device.queue.writeBuffer(buffer, 0, Int32Array.of(this.#rows));
+    return { buffer, dtype: 'int32', dims: [1], version: this.#version };
+  }
+
+  #bufferOf(input: string, size: number): GPUBuffer {
+    const found = this.#buffers.get(input);
+    if (found !== undefined && found.size >= size) return found;
+    found?.destroy();
+    const buffer = this.#device.createBuffer({ label: `gs.generator.chain.${input}`, size, usage: TENSOR_USAGE });
+    this.#buffers.set(input, buffer);
+    return buffer;
+  }
+}
+
+const usedBytes = ({ dtype, dims }: GpuTensor): number =>
+  Math.ceil((elementsOf(dims) * (dtype === 'float16' ? 2 : 4)) / 4) * 4;

@@ -1,0 +1,43 @@
+/** Numbers of one input, ready for a tensor. */
+export interface InputNumbers {
+  readonly dtype: 'float32' | 'int32' | 'int64';
+  readonly dims: readonly number[];
+  readonly data: Float32Array | Int32Array | BigInt64Array;
+}
+
+/** A tensor that is on the GPU already: a picture, or what another model wrote. */
+export interface GpuTensor {
+  /** Holds the elements without gaps, float16 two to a word; needs the usage COPY_SRC. */
+  readonly buffer: GPUBuffer;
+  readonly dtype: 'float32' | 'float16' | 'int32';
+  readonly dims: readonly number[];
+  /** Rises whenever the content changes: by it a run knows whether there is anything new. */
+  readonly version: number;
+}
+
+/** The value of one input. */
+export type InputValue = InputNumbers | GpuTensor;
+
+/** Values by the names of inputs. */
+export type Inputs = Readonly<Record<string, InputValue>>;
+
+export const isOnGpu = (value: InputValue): value is GpuTensor => 'buffer' in value;
+
+/** Elements of a shape. */
+export const elementsOf = (dims: readonly number[]): number => dims.reduce((product, dim) => product * dim, 1);
+
+/** True if two sets of values are the same, bit for bit: a generator without a seed would then write the same again. */
+export function sameInputs(a: Inputs, b: Inputs): boolean {
+  const names = Object.keys(a);
+  return (
+    names.length === Object.keys(b).length && names.every((name) => Object.hasOwn(b, name) && same(a[name], b[name]))
+  );
+}
+
+function same(a: InputValue, b: InputValue): boolean {
+  if (a.dtype !== b.dtype || a.dims.length !== b.dims.length || a.dims.some((dim, i) => dim !== b.dims[i]))
+    return false;
+  if (isOnGpu(a) || isOnGpu(b)) return isOnGpu(a) && isOnGpu(b) && a.buffer === b.buffer && a.version === b.version;
+  for (let i = 0; i < a.data.length; i++) if (!Object.is(a.data[i], b.data[i])) return false;
+  return a.data.length === b.data.length;
+}

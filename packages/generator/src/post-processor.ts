@@ -1,0 +1,154 @@
+import { ContractError, type ContractFault } from '@gaussian-splat/core';
+import { Chain } from './chain/chain.js';
+import { sameInputs, type GpuTensor, type Inputs } from './input-value.js';
+import { RunLoop } from './run-loop.js';
+import type { SessionKind } from './runtime/live-session.js';
+import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
+import type { AcquireOptions } from './runtime/shared-sessions.js';
+import type { GeneratorState } from './state.js';
+
+/** The input that takes the picture. */
+export interface PictureInput {
+  readonly name: string;
+  /** Pixels; undefined where the model takes any size. */
+  readonly width: number | undefined;
+  readonly height: number | undefined;
+  readonly dtype: 'float32' | 'float16';
+}
+
+export interface PostProcessorOptions extends AcquireOptions {
+  /**
+   * Takes the finished picture, [1,3,H,W]. It must submit its work before it returns: afterwards the buffer is the runtime's again.
+   */
+  readonly onPicture: (picture: GpuTensor) => void;
+  /** A run failed. The next request tries again. */
+  readonly onError?: (error: unknown) => void;
+}
+
+interface Wish {
+  readonly inputs: readonly Inputs[];
+}
+
+/**
+ * A model that makes a picture of a picture (a style, a denoiser), or several one after the other, from GPU buffer to GPU buffer.
+ *
+ * ```ts
+ * const post = await PostProcessor.open({ url: 'style.onnx' }, device, { onPicture: paint });
+ * post.request(pictureTensor, { controls: { strength: 0.5 } });
+ * ```
+ */
+export class PostProcessor {
+  /** The input that takes the picture. */
+  readonly input: PictureInput;
+  readonly #chain: Chain;
+  readonly #options: PostProcessorOptions;
+  readonly #loop: RunLoop<Wish>;
+  #shown: Wish['inputs'] | undefined;
+  #version = 0;
+
+  private constructor(chain: Chain, options: PostProcessorOptions) {
+    this.#chain = chain;
+    this.#options = options;
+    this.input = pictureInput(chain.models);
+    this.#loop = new RunLoop({
+      queue: chain.device.queue,
+      isDue: ({ inputs }) => !(this.#shown?.every((shown, i) => sameInputs(shown, inputs[i])) ?? false),
+      run: (wish) => this.#run(wish),
+      onError: (error) => this.#options.onError?.(error),
+    });
+  }
+
+  /**
+   * Fetches and checks it; not a byte of the runtime is fetched yet.
+   * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not fit one another, or do
+   * not make a picture of one picture.
+   */
+  static async open(
+    source: ModelSource | readonly ModelSource[],
+    device: GPUDevice,
+    options: PostProcessorOptions,
+  ): Promise<PostProcessor> {
+    const chain = await Chain.open(source, device, options);
+    try {
+      return new PostProcessor(chain, options);
+    } catch (error) {
+      chain.release();
+      throw error;
+    }
+  }
+
+  /** All models, in the order in which they run. */
+  get models(): readonly GeneratorModel[] {
+    return this.#chain.models;
+  }
+
+  /** How it runs; undefined before the first run. */
+  get kind(): SessionKind | undefined {
+    return this.#chain.kind;
+  }
+
+  /** True from a request until the runtime is ready for the next: meanwhile the picture handed in must stay as it is. */
+  get isBusy(): boolean {
+    return this.#loop.isBusy;
+  }
+
+  /** From the start of the last finished run until the GPU had finished it, ms; undefined before. */
+  get milliseconds(): number | undefined {
+    return this.#loop.milliseconds;
+  }
+
+  /** Fulfils, and never rejects, when no run is on its way. */
+  get idle(): Promise<void> {
+    return this.#loop.idle;
+  }
+
+  /**
+   * Asks for the picture made of a picture. A request that has not started yet is replaced; one whose inputs are those of the last run
+   * is not run.
+   * @param picture for {@link input}; its `version` tells one content from another.
+   * @throws GaussianSplatError `argument/value` if the picture or the state does not fit the model.
+   */
+  request(picture: GpuTensor, state: GeneratorState = {}): void {
+    if (this.#loop.isClosed) return;
+    const pictures = { ...state.pictures, [this.input.name]: picture };
+    this.#loop.request({ inputs: this.#chain.bind({ ...state, pictures }) });
+  }
+
+  /** Ends it: a run on its way reaches nobody any more. */
+  close(): void {
+    this.#loop.close();
+    this.#chain.release(this.#loop.idle);
+  }
+
+  #run({ inputs }: Wish): Promise<void> {
+    const { name, dtype } = this.#chain.models.at(-1)!.outputs[0];
+    return this.#chain.run(inputs, ({ tensors, dims }) => {
+      if (this.#loop.isClosed) return;
+      this.#shown = inputs;
+      this.#options.onPicture({ buffer: tensors[name], dtype, dims: dims[name], version: ++this.#version });
+    });
+  }
+}
+
+function pictureInput(models: readonly GeneratorModel[]): PictureInput {
+  const [{ header, contract }] = models;
+  const inputs = header.inputs.filter(({ name }) => contract.inputs[name].role === 'image');
+  const faults = models
+    .filter(({ layout }) => layout !== undefined)
+    .map((model) => unsuitable(model, 'a model that writes a picture', 'a model that writes Gaussians'));
+  if (inputs.length !== 1) {
+    faults.push(unsuitable(models[0], 'one input with the role image', `${inputs.length} of them`));
+  }
+  if (faults.length > 0) throw new ContractError(faults);
+  const [{ name, dtype, dims }] = inputs;
+  const [height, width] = dims!.slice(2).map((size) => (typeof size === 'number' ? size : undefined));
+  return { name, width, height, dtype: dtype as 'float32' | 'float16' };
+}
+
+const unsuitable = ({ header }: GeneratorModel, expected: string, found: string): ContractFault => ({
+  code: 'contract/chain',
+  where: header.name,
+  expected,
+  found,
+  remedy: 'use a model that makes a picture of a picture; one that writes Gaussians is a src',
+});

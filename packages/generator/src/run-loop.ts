@@ -1,0 +1,97 @@
+/** Runs whose work the GPU may not have finished before another one starts: one is computed while the next is recorded. */
+const MAX_IN_FLIGHT = 2;
+/** A run that keeps the GPU for longer than this, ms, is waited for: frames that are drawn meanwhile stand behind it in the queue. */
+const SLOW_RUN_MS = 50;
+
+export interface RunLoopOptions<Wish> {
+  readonly queue: GPUQueue;
+  /** Whether there is anything to do for a wish. */
+  readonly isDue: (wish: Wish) => boolean;
+  /** Fulfils once the work is submitted. */
+  readonly run: (wish: Wish) => Promise<void>;
+  readonly onError: (error: unknown) => void;
+}
+
+/** Runs for what was asked last, as fast as runs finish and never faster: no backlog of calls, and none on the GPU. */
+export class RunLoop<Wish> {
+  readonly #options: RunLoopOptions<Wish>;
+  readonly #unfinished: Promise<unknown>[] = [];
+  #wish: Wish | undefined;
+  #running: Promise<void> | undefined;
+  #milliseconds: number | undefined;
+  #isSlow = false;
+  #isClosed = false;
+
+  constructor(options: RunLoopOptions<Wish>) {
+    this.#options = options;
+  }
+
+  get isClosed(): boolean {
+    return this.#isClosed;
+  }
+
+  get isBusy(): boolean {
+    return this.#running !== undefined;
+  }
+
+  /** From the start of the last finished run until the GPU had finished it, ms. */
+  get milliseconds(): number | undefined {
+    return this.#milliseconds;
+  }
+
+  /** Fulfils, and never rejects, when no run is on its way. */
+  get idle(): Promise<void> {
+    return this.#running ?? Promise.resolve();
+  }
+
+  /** Returns at once; a wish that has not started yet is replaced. */
+  request(wish: Wish): void {
+    if (this.#isClosed) return;
+    this.#wish = wish;
+    this.#running ??= this.#work().finally(() => (this.#running = undefined));
+  }
+
+  close(): void {
+    this.#isClosed = true;
+    this.#wish = undefined;
+  }
+
+  async #work(): Promise<void> {
+    // So that requests of the same task are one.
+    await Promise.resolve();
+    for (let wish = this.#take(); wish !== undefined; wish = this.#take()) {
+      try {
+        await this.#run(wish);
+      } catch (error) {
+        if (!this.#isClosed) this.#options.onError(error);
+      }
+    }
+  }
+
+  #take(): Wish | undefined {
+    const wish = this.#wish;
+    this.#wish = undefined;
+    return wish !== undefined && !this.#isClosed && this.#options.isDue(wish) ? wish : undefined;
+  }
+
+  async #run(wish: Wish): Promise<void> {
+    const start = performance.now();
+    await this.#options.run(wish);
+    if (!this.#isClosed) await this.#waitForRoom(start);
+  }
+
+  /** A lost device finishes nothing, and is reported elsewhere. */
+  async #waitForRoom(start: number): Promise<void> {
+    const submitted = performance.now();
+    const finished = this.#options.queue.onSubmittedWorkDone().then(
+      () => {
+        const now = performance.now();
+        this.#milliseconds = now - start;
+        this.#isSlow = now - submitted > SLOW_RUN_MS;
+      },
+      () => undefined,
+    );
+    this.#unfinished.push(finished);
+    while (this.#unfinished.length >= (this.#isSlow ? 1 : MAX_IN_FLIGHT)) await this.#unfinished.shift();
+  }
+}

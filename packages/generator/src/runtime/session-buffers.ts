@@ -1,0 +1,44 @@
+import { TENSOR_USAGE } from './tensor-bytes.js';
+
+/** GPU buffers of one session, by name; they grow where a picture or a number of rows does. */
+export class SessionBuffers {
+  readonly #device: GPUDevice;
+  readonly #buffers = new Map<string, GPUBuffer>();
+
+  constructor(device: GPUDevice) {
+    this.#device = device;
+  }
+
+  /** The buffer of a name, of `size` bytes or more. */
+  of(name: string, size: number): GPUBuffer {
+    const found = this.#buffers.get(name);
+    if (found !== undefined && found.size >= size) return found;
+    // What was submitted with the old one still runs to its end.
+    found?.destroy();
+    const buffer = this.#device.createBuffer({ label: `gs.generator.${name}`, size, usage: TENSOR_USAGE });
+    this.#buffers.set(name, buffer);
+    return buffer;
+  }
+
+  /** Copies the beginning of a buffer, in whole words. */
+  copy(from: GPUBuffer, to: GPUBuffer, bytes: number): void {
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.generator.copy' });
+    encoder.copyBufferToBuffer(from, 0, to, 0, Math.ceil(bytes / 4) * 4);
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  /** GPU buffers are written in whole words; an odd number of float16 is not. */
+  write(buffer: GPUBuffer, { buffer: memory, byteOffset, byteLength }: ArrayBufferView<ArrayBuffer>): void {
+    const whole = byteLength - (byteLength % 4);
+    this.#device.queue.writeBuffer(buffer, 0, memory, byteOffset, whole);
+    if (whole === byteLength) return;
+    const word = new Uint8Array(4);
+    word.set(new Uint8Array(memory, byteOffset + whole, byteLength - whole));
+    this.#device.queue.writeBuffer(buffer, whole, word);
+  }
+
+  destroy(): void {
+    for (const buffer of this.#buffers.values()) buffer.destroy();
+    this.#buffers.clear();
+  }
+}

@@ -1,0 +1,125 @@
+import { layouts, present, tensorToImage } from '../generated/shaders.js';
+import { BUFFER_USAGE, TEXTURE_USAGE } from '../gpu/kernel.js';
+import { writeStruct } from '../gpu/struct.js';
+import { FullScreenStage } from '../stages/full-screen.js';
+import { PictureTensor, type PictureShape } from './picture-tensor.js';
+
+/** A picture of a model on the GPU. */
+export interface ModelPicture {
+  readonly buffer: GPUBuffer;
+  readonly dtype: 'float32' | 'float16';
+  /** [1, 3, height, width] */
+  readonly dims: readonly number[];
+}
+
+const FORMAT = 'rgba16float';
+/** Buffers of models whose bindings are kept. */
+const MAX_BINDINGS = 8;
+
+/**
+ * Textures of one frame that a model makes another of, all of one size: the frame as it is drawn, the frame that was handed to the model,
+ * and what the model made of that.
+ *
+ * ```ts
+ * const frame = new FilteredFrame(device, width, height);
+ * renderer.render({ gaussians, camera, target: frame.drawn });
+ * const tensor = frame.handOver({ width: 256, height: 256, dtype: 'float32' }); // to the model
+ * frame.accept(picture); // from the model
+ * frame.present('filtered', canvasTexture);
+ * ```
+ */
+export class FilteredFrame {
+  readonly width: number;
+  readonly height: number;
+  /** Target for the renderer. */
+  readonly drawn: GPUTexture;
+  readonly #device: GPUDevice;
+  readonly #handed: GPUTexture;
+  readonly #filtered: GPUTexture;
+  readonly #present: FullScreenStage<typeof present>;
+  readonly #paint: FullScreenStage<typeof tensorToImage>;
+  readonly #uniform: GPUBuffer;
+  readonly #bindings = new Map<GPUBuffer, GPUBindGroup>();
+  readonly #shown: Readonly<Record<'drawn' | 'filtered', GPUBindGroup>>;
+  readonly #filteredView: GPUTextureView;
+  #tensor: PictureTensor | undefined;
+
+  constructor(device: GPUDevice, width: number, height: number) {
+    this.width = width;
+    this.height = height;
+    this.#device = device;
+    this.drawn = this.#texture('drawn', TEXTURE_USAGE.copySource | TEXTURE_USAGE.storageBinding);
+    this.#handed = this.#texture('handed', TEXTURE_USAGE.copyDestination);
+    this.#filtered = this.#texture('filtered', 0);
+    this.#filteredView = this.#filtered.createView();
+    this.#present = new FullScreenStage(device, present);
+    this.#paint = new FullScreenStage(device, tensorToImage);
+    const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
+    this.#uniform = device.createBuffer({ label: 'gs.filter.uniform', size: layouts.TensorToImage.size, usage });
+    this.#shown = {
+      drawn: this.#present.bind({ picture: this.drawn.createView() }),
+      filtered: this.#present.bind({ picture: this.#filteredView }),
+    };
+  }
+
+  /**
+   * Copies the drawn frame into a tensor for the model. The tensor, and the frame whose alpha the model's picture gets, stay as they are until
+   * the next call.
+   */
+  handOver(shape: PictureShape): PictureTensor {
+    const { width, height, dtype } = this.#tensor?.shape ?? {};
+    if (width !== shape.width || height !== shape.height || dtype !== shape.dtype) {
+      this.#tensor?.destroy();
+      this.#tensor = new PictureTensor(this.#device, shape);
+    }
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.hand-over' });
+    const size = [this.width, this.height];
+    encoder.copyTextureToTexture({ texture: this.drawn }, { texture: this.#handed }, size);
+    this.#device.queue.submit([encoder.finish()]);
+    this.#tensor!.write(this.#handed);
+    return this.#tensor!;
+  }
+
+  /** Takes over what the model made of the frame handed over last; submits its work before it returns. */
+  accept({ buffer, dtype, dims }: ModelPicture): void {
+    const bytes = new ArrayBuffer(layouts.TensorToImage.size);
+    writeStruct(layouts.TensorToImage, { size: [dims[3], dims[2]], is_half: dtype === 'float16' ? 1 : 0 }, bytes);
+    this.#device.queue.writeBuffer(this.#uniform, 0, bytes);
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.accept' });
+    this.#paint.record(encoder, this.#bindingsOf(buffer), this.#filteredView, FORMAT);
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  /** Puts one of the pictures into a texture of the same size. */
+  present(picture: 'drawn' | 'filtered', target: GPUTexture): void {
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.present' });
+    this.#present.record(encoder, this.#shown[picture], target.createView(), target.format);
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  destroy(): void {
+    for (const texture of [this.drawn, this.#handed, this.#filtered]) texture.destroy();
+    this.#uniform.destroy();
+    this.#tensor?.destroy();
+    this.#bindings.clear();
+  }
+
+  #texture(name: string, more: GPUTextureUsageFlags): GPUTexture {
+    return this.#device.createTexture({
+      label: `gs.filter.${name}`,
+      size: [this.width, this.height],
+      format: FORMAT,
+      usage: TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.textureBinding | more,
+    });
+  }
+
+  #bindingsOf(tensor: GPUBuffer): GPUBindGroup {
+    let bindings = this.#bindings.get(tensor);
+    if (bindings === undefined) {
+      if (this.#bindings.size >= MAX_BINDINGS) this.#bindings.clear();
+      bindings = this.#paint.bind({ image: this.#uniform, tensor, frame: this.#handed.createView() });
+      this.#bindings.set(tensor, bindings);
+    }
+    return bindings;
+  }
+}

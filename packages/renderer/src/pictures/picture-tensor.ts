@@ -1,0 +1,134 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { constants, imageToTensor, layouts } from '../generated/shaders.js';
+import { BUFFER_USAGE, kernelOf, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.js';
+import { GpuMemory } from '../gpu/memory.js';
+import { writeStruct } from '../gpu/struct.js';
+
+/** Size and element type of a tensor [1,3,height,width]. */
+export interface PictureShape {
+  readonly width: number;
+  readonly height: number;
+  readonly dtype: 'float32' | 'float16';
+}
+
+/**
+ * How a picture of another size gets into the tensor: `stretch` takes all of it, `cover` as much of its middle as has the tensor's
+ * proportions.
+ */
+export type PictureFit = 'stretch' | 'cover';
+
+/**
+ * A picture as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1 as they are encoded (sRGB), top row first, over
+ * black where the picture is transparent. Pictures of another size are resampled: bilinear, antialiased where they shrink.
+ */
+export class PictureTensor {
+  readonly shape: PictureShape;
+  /** [1, 3, height, width] */
+  readonly dims: readonly [1, 3, number, number];
+  /** The elements; float16 two to a word. */
+  readonly buffer: GPUBuffer;
+  readonly #device: GPUDevice;
+  readonly #kernel: ComputeKernel<typeof imageToTensor>;
+  readonly #memory: GpuMemory;
+  readonly #uniform: GPUBuffer;
+  readonly #uniformBytes = new ArrayBuffer(layouts.ImageToTensor.size);
+  readonly #bindings = new WeakMap<GPUTexture, GPUBindGroup>();
+  #version = 0;
+
+  /** @throws GaussianSplatError `out-of-memory/buffer-limit` for a size that the device does not allow. */
+  constructor(device: GPUDevice, shape: PictureShape) {
+    this.shape = shape;
+    this.dims = [1, 3, shape.height, shape.width];
+    this.#device = device;
+    this.#kernel = kernelOf(device, imageToTensor);
+    this.#memory = new GpuMemory(device);
+    const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
+    const bytes = 3 * shape.width * shape.height * (shape.dtype === 'float16' ? 2 : 4);
+    // Whole pieces of 16 bytes: ONNX Runtime copies no smaller ones.
+    const size = Math.ceil(bytes / 16) * 16;
+    this.buffer = this.#memory.buffer('gs.picture.tensor', size, storage | copySource | copyDestination);
+    const usage = uniform | copyDestination;
+    this.#uniform = this.#memory.buffer('gs.picture.uniform', layouts.ImageToTensor.size, usage);
+  }
+
+  get dtype(): PictureShape['dtype'] {
+    return this.shape.dtype;
+  }
+
+  /** Number of pictures taken in so far. */
+  get version(): number {
+    return this.#version;
+  }
+
+  /**
+   * Takes a picture over from a texture with the usage TEXTURE_BINDING: encodes and submits one compute pass; nothing is read back.
+   * Textures with alpha hold premultiplied colours.
+   */
+  write(texture: GPUTexture, fit: PictureFit = 'stretch'): void {
+    this.#writeUniform(texture.width, texture.height, fit);
+    let bindings = this.#bindings.get(texture);
+    if (bindings === undefined) {
+      bindings = this.#kernel.bind({ image: this.#uniform, picture: texture.createView(), tensor: this.buffer });
+      this.#bindings.set(texture, bindings);
+    }
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.picture' });
+    const pass = encoder.beginComputePass({ label: 'gs.picture' });
+    const { width, height, dtype } = this.shape;
+    const words = Math.ceil((3 * width * height) / (dtype === 'float16' ? 2 : 1));
+    this.#kernel.dispatch(pass, bindings, Math.ceil(words / constants.IMAGE_GROUP));
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+    this.#version++;
+  }
+
+  /**
+   * Takes over what a browser can draw (an ImageBitmap, an image, a canvas, a frame of a video), without reading it back.
+   * @throws GaussianSplatError `argument/value` for a picture without pixels, or larger than the device's textures.
+   */
+  upload(source: GPUCopyExternalImageSource, fit: PictureFit = 'cover'): void {
+    const { width, height } = sizeOf(source);
+    const most = this.#device.limits.maxTextureDimension2D;
+    if (!(width > 0 && height > 0 && width <= most && height <= most)) throw wrongSize(width, height, most);
+    const { copyDestination, textureBinding, renderAttachment } = TEXTURE_USAGE;
+    const texture = this.#device.createTexture({
+      label: 'gs.picture',
+      size: [width, height],
+      format: 'rgba8unorm',
+      usage: copyDestination | textureBinding | renderAttachment,
+    });
+    this.#device.queue.copyExternalImageToTexture({ source }, { texture, premultipliedAlpha: true }, [width, height]);
+    this.write(texture, fit);
+    // What has been submitted still finds it.
+    texture.destroy();
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+  }
+
+  #writeUniform(width: number, height: number, fit: PictureFit): void {
+    const { width: columns, height: rows, dtype } = this.shape;
+    let [across, down] = [width / columns, height / rows];
+    if (fit === 'cover') across = down = Math.min(across, down);
+    const corner = [(width - across * columns) / 2, (height - down * rows) / 2];
+    const values = { corner, step: [across, down], size: [columns, rows], is_half: dtype === 'float16' ? 1 : 0 };
+    writeStruct(layouts.ImageToTensor, values, this.#uniformBytes);
+    this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
+  }
+}
+
+/** Pixels of a picture; 0 by 0 of one that has not loaded. */
+function sizeOf(source: GPUCopyExternalImageSource): { width: number; height: number } {
+  if ('displayWidth' in source) return { width: source.displayWidth, height: source.displayHeight };
+  if ('videoWidth' in source) return { width: source.videoWidth, height: source.videoHeight };
+  if ('naturalWidth' in source) return { width: source.naturalWidth, height: source.naturalHeight };
+  return { width: source.width, height: source.height };
+}
+
+const wrongSize = (width: number, height: number, most: number): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: 'a picture for a model',
+    expected: `1 to ${most} pixels across and down`,
+    found: `${width} x ${height}`,
+    remedy: 'wait until the picture has loaded, or give a smaller one',
+  });

@@ -1,0 +1,57 @@
+#import shared/group
+
+// A picture to a tensor [1,3,height,width]: red, green and blue planes in 0..1, top row first. Where sizes differ each pixel is a mean
+// with triangular weights, as wide as a pixel's step (antialiased bilinear); what lies outside the picture does not count.
+@group(0) @binding(0) var<uniform> image: ImageToTensor;
+@group(0) @binding(1) var picture: texture_2d<f32>;
+// Float32, or two float16 to a word.
+@group(0) @binding(2) var<storage, read_write> tensor: array<u32>;
+
+struct ImageToTensor {
+  // Left upper corner of the part that is taken, in pixels of the picture.
+  corner: vec2f,
+  // Pixels of the picture to one of the tensor, across and down.
+  step: vec2f,
+  // Width and height of the tensor.
+  size: vec2u,
+  is_half: u32,
+}
+
+const IMAGE_GROUP = 64u;
+
+fn mean(at: vec2u, channel: u32) -> f32 {
+  let center = image.corner + (vec2f(at) + 0.5) * image.step;
+  let radius = max(image.step, vec2f(1.0));
+  let last = vec2i(textureDimensions(picture)) - 1;
+  let first_tap = max(vec2i(floor(center - radius - 0.5)) + 1, vec2i(0));
+  let last_tap = min(vec2i(ceil(center + radius - 0.5)) - 1, last);
+  var sum = 0.0;
+  var weights = 0.0;
+  for (var y = first_tap.y; y <= last_tap.y; y++) {
+    for (var x = first_tap.x; x <= last_tap.x; x++) {
+      let distance = abs(vec2f(f32(x), f32(y)) + 0.5 - center) / radius;
+      let weight = (1.0 - distance.x) * (1.0 - distance.y);
+      sum += weight * textureLoad(picture, vec2i(x, y), 0)[channel];
+      weights += weight;
+    }
+  }
+  return clamp(sum / max(weights, 1e-20), 0.0, 1.0);
+}
+
+fn element(index: u32) -> f32 {
+  let plane = image.size.x * image.size.y;
+  if (index >= 3u * plane) { return 0.0; }
+  let pixel = index % plane;
+  return mean(vec2u(pixel % image.size.x, pixel / image.size.x), index / plane);
+}
+
+@compute @workgroup_size(IMAGE_GROUP)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let word = group_index(group) * IMAGE_GROUP + lane;
+  let elements = 3u * image.size.x * image.size.y;
+  if (image.is_half == 1u) {
+    if (2u * word < elements) { tensor[word] = pack2x16float(vec2f(element(2u * word), element(2u * word + 1u))); }
+  } else if (word < elements) {
+    tensor[word] = bitcast<u32>(element(word));
+  }
+}

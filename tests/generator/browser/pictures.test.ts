@@ -1,0 +1,289 @@
+/** Pictures as tensors, post-processors and chains, from GPU buffer to GPU buffer. */
+import { DynamicGaussians, FilteredFrame, PictureTensor, type PictureFit } from '@gaussian-splat/renderer';
+import { Generator, PostProcessor } from '@gaussian-splat/generator';
+import { assert, assertEqual } from '../../element/browser/support/harness.js';
+import {
+  calls,
+  codeOf,
+  FIXTURES,
+  makeDevice,
+  numbersOf,
+  readBuffer,
+  ReadingSink,
+  relativeError,
+  runOnCpu,
+} from './support.js';
+
+let device: GPUDevice;
+
+/** A picture of smooth colours and one hard edge, opaque. */
+function colourful(width: number, height: number): Uint8ClampedArray<ArrayBuffer> {
+  const pixels = new Uint8ClampedArray(4 * width * height);
+  for (let i = 0; i < width * height; i++) {
+    const [x, y] = [i % width, Math.floor(i / width)];
+    pixels.set([(255 * x) / width, (255 * y) / height, 3 * x > width ? 255 : 0, 255], 4 * i);
+  }
+  return pixels;
+}
+
+/** The same resampling in plain numbers: triangular weights, pixel by pixel. */
+function resampled(
+  pixels: ArrayLike<number>,
+  [width, height]: readonly [number, number],
+  [columns, rows]: readonly [number, number],
+  fit: PictureFit,
+): number[] {
+  const steps = [width / columns, height / rows];
+  const step = fit === 'cover' ? [Math.min(...steps), Math.min(...steps)] : steps;
+  const corner = [(width - step[0] * columns) / 2, (height - step[1] * rows) / 2];
+  const weights = (index: number, axis: 0 | 1): number[] => {
+    const center = corner[axis] + (index + 0.5) * step[axis];
+    const size = axis === 0 ? width : height;
+    const found = Array.from({ length: size }, (_, k) =>
+      Math.max(0, 1 - Math.abs(k + 0.5 - center) / Math.max(1, step[axis])),
+    );
+    const sum = found.reduce((total, weight) => total + weight, 0);
+    return found.map((weight) => weight / sum);
+  };
+  return [0, 1, 2].flatMap((channel) =>
+    Array.from({ length: rows }, (_, y) => weights(y, 1)).flatMap((down) =>
+      Array.from({ length: columns }, (_, x) => weights(x, 0)).map((across) => {
+        let sum = 0;
+        down.forEach((dy, y) =>
+          across.forEach((dx, x) => (sum += dy * dx ? (dy * dx * pixels[4 * (y * width + x) + channel]) / 255 : 0)),
+        );
+        return sum;
+      }),
+    ),
+  );
+}
+
+async function tensorOf(width: number, height: number, shape: PictureTensor['shape'], fit?: PictureFit) {
+  const tensor = new PictureTensor(device, shape);
+  const pixels = colourful(width, height);
+  tensor.upload(await createImageBitmap(new ImageData(pixels, width, height)), fit);
+  return { tensor, pixels };
+}
+
+before(async () => {
+  device = await makeDevice();
+});
+
+describe('a picture as a tensor', () => {
+  for (const [from, to, fit, dtype] of [
+    [[16, 12], [16, 12], 'stretch', 'float32'],
+    [[40, 20], [8, 8], 'cover', 'float32'],
+    [[40, 20], [8, 8], 'stretch', 'float32'],
+    [[9, 31], [7, 5], 'cover', 'float16'],
+    [[5, 4], [11, 13], 'cover', 'float32'],
+  ] as const) {
+    it(`${from.join('x')} to ${to.join('x')}, ${fit}, ${dtype}`, async () => {
+      const { tensor, pixels } = await tensorOf(from[0], from[1], { width: to[0], height: to[1], dtype }, fit);
+      const found = numbersOf(await readBuffer(device, tensor.buffer), dtype).slice(0, 3 * to[0] * to[1]);
+      const error = relativeError(found, resampled(pixels, from, to, fit));
+      assert(error < (dtype === 'float16' ? 1e-3 : 1e-5), `relative error ${error}`);
+      tensor.destroy();
+    });
+  }
+
+  it('without pixels is refused', () => {
+    const tensor = new PictureTensor(device, { width: 8, height: 8, dtype: 'float32' });
+    let code = 'none';
+    try {
+      tensor.upload(new Image());
+    } catch (error) {
+      code = (error as { code: string }).code;
+    }
+    assertEqual(code, 'argument/value');
+    tensor.destroy();
+  });
+});
+
+describe('a post-processor', () => {
+  for (const [name, width, height, dtype, kind] of [
+    ['post.onnx', 21, 13, 'float32', 'webgpu'],
+    ['post-fixed.onnx', 48, 32, 'float32', 'captured'],
+    // Float16 without the device feature runs on the CPU: the picture is read back and uploaded again.
+    ['post-half.onnx', 9, 7, 'float16', 'wasm'],
+  ] as const) {
+    it(`${name}: what it is told to make of a picture, twice, and nothing for the same again`, async () => {
+      const pictures: number[][] = [];
+      const reading: Promise<void>[] = [];
+      const errors: unknown[] = [];
+      const post = await PostProcessor.open({ url: FIXTURES + name }, device, {
+        onError: (error) => errors.push(error),
+        onPicture: ({ buffer, dims }) => {
+          assertEqual(dims, [1, 3, height, width], 'shape');
+          const i = pictures.push([]) - 1;
+          reading.push(readBuffer(device, buffer).then((bytes) => void (pictures[i] = numbersOf(bytes, dtype))));
+        },
+      });
+      const { tensor, pixels } = await tensorOf(width, height, { width, height, dtype });
+      for (const gain of [0.5, 0.25, 0.25]) {
+        post.request(tensor, { controls: { gain } });
+        await post.idle;
+      }
+      await Promise.all(reading);
+      assertEqual(errors.map(String), [], 'errors');
+      assertEqual([pictures.length, post.isBusy], [2, false], 'runs');
+      if (!device.features.has('shader-f16')) assertEqual(post.kind, kind, 'kind');
+      const plain = resampled(pixels, [width, height], [width, height], 'stretch');
+      for (const [i, gain] of [0.5, 0.25].entries()) {
+        const expected = plain.map((x) => gain * x);
+        const error = relativeError(pictures[i].slice(0, expected.length), expected);
+        assert(error < (dtype === 'float16' ? 2e-3 : 1e-5), `gain ${gain}: relative error ${error}`);
+      }
+      post.close();
+      tensor.destroy();
+    });
+  }
+
+  it('makes no buffer and reads nothing back once it is warm', async () => {
+    const frame = new FilteredFrame(device, 48, 32);
+    let pictures = 0;
+    const post = await PostProcessor.open({ url: `${FIXTURES}post-fixed.onnx` }, device, {
+      onPicture: ({ buffer, dims }) => {
+        frame.accept({ buffer, dims, dtype: 'float32' });
+        pictures++;
+      },
+    });
+    const next = async (): Promise<void> => {
+      post.request(frame.handOver({ width: 48, height: 32, dtype: 'float32' }));
+      await post.idle;
+    };
+    for (let i = 0; i < 3; i++) await next();
+    const earlier = { ...calls };
+    for (let i = 0; i < 20; i++) await next();
+    assertEqual(pictures, 23, 'pictures');
+    assertEqual({ ...calls }, earlier, 'calls of 20 runs');
+    post.close();
+    frame.destroy();
+  });
+
+  it('one after the other: each takes the picture of the one before', async () => {
+    let picture: Promise<Uint8Array> | undefined;
+    const urls = ['post.onnx', 'post-fixed.onnx', 'post.onnx'].map((name) => ({ url: FIXTURES + name }));
+    const open = PostProcessor.open(urls, device, {
+      onPicture: ({ buffer }) => (picture = readBuffer(device, buffer)),
+    });
+    // A model of any size cannot feed one of a fixed size.
+    assertEqual(await codeOf(open), 'contract/chain');
+    const post = await PostProcessor.open(urls.slice(1), device, {
+      onPicture: ({ buffer }) => (picture = readBuffer(device, buffer)),
+    });
+    const { tensor, pixels } = await tensorOf(48, 32, { width: 48, height: 32, dtype: 'float32' });
+    post.request(tensor, { controls: { gain: 0.5 } });
+    await post.idle;
+    assert(picture, 'a picture');
+    const found = numbersOf(await picture, 'float32').slice(0, 3 * 48 * 32);
+    const expected = resampled(pixels, [48, 32], [48, 32], 'stretch').map((x) => 0.25 * x);
+    assert(relativeError(found, expected) < 1e-5, 'a quarter');
+    post.close();
+    tensor.destroy();
+  });
+
+  it('is none that writes Gaussians, takes Gaussians, or takes no picture', async () => {
+    const found: Record<string, string> = {};
+    for (const name of ['packed.onnx', 'link-fixed.onnx', 'picture.onnx']) {
+      found[name] = await codeOf(PostProcessor.open({ url: FIXTURES + name }, device, { onPicture: () => undefined }));
+    }
+    assertEqual(Object.values(found), ['contract/chain', 'contract/chain', 'contract/chain']);
+  });
+});
+
+describe('Gaussians made of a picture', () => {
+  it('are those of the CPU, anew for another picture, and a missing picture is named', async () => {
+    const generator = await Generator.open({ url: `${FIXTURES}picture.onnx` }, device, { onError: reportError });
+    const sink = (generator.sink = new ReadingSink(device));
+    let code = 'none';
+    try {
+      generator.request({});
+    } catch (error) {
+      code = (error as { code: string }).code;
+    }
+    assertEqual(code, 'argument/value');
+    const { tensor, pixels } = await tensorOf(24, 16, { width: 8, height: 8, dtype: 'float32' }, 'cover');
+    const ask = async (): Promise<void> => {
+      generator.request({ pictures: { image: tensor } });
+      await generator.idle;
+    };
+    await ask();
+    await ask();
+    assertEqual(sink.runs.length, 1, 'runs for one picture');
+    const rows = numbersOf(await sink.runs[0].tensors.gaussians, 'float32');
+    const planes = resampled(pixels, [24, 16], [8, 8], 'cover');
+    const colours = Array.from({ length: 64 }, (_, i) => [0, 1, 2].map((c) => rows[13 * i + 9 + c])).flat();
+    const expected = Array.from({ length: 64 }, (_, i) => [0, 1, 2].map((c) => planes[64 * c + i])).flat();
+    assert(relativeError(colours, expected) < 1e-5, `colours: ${relativeError(colours, expected)}`);
+    tensor.upload(await createImageBitmap(new ImageData(colourful(8, 8).fill(255), 8, 8)));
+    await ask();
+    const white = numbersOf(await sink.runs[1].tensors.gaussians, 'float32');
+    assertEqual([white[9], white[10], white[11]], [1, 1, 1], 'white');
+    generator.close();
+    tensor.destroy();
+  });
+});
+
+describe('a chain', () => {
+  for (const link of ['link-fixed.onnx', 'link.onnx']) {
+    it(`ball, then ${link}: the second takes what the first wrote, on the GPU`, async () => {
+      const urls = ['packed.onnx', link].map((name) => ({ url: FIXTURES + name }));
+      const generator = await Generator.open(urls, device, { onError: reportError });
+      const sink = (generator.sink = new ReadingSink(device));
+      const states = [
+        { timeSeconds: 0.4, controls: { lift: 0.25 } },
+        { timeSeconds: 1.1, controls: { lift: 0.25 } },
+        { timeSeconds: 1.1, controls: { lift: -1 } },
+      ];
+      for (const state of states) {
+        generator.request(state);
+        await generator.idle;
+      }
+      const isFixed = link === 'link-fixed.onnx';
+      // The other link has no control: for it the last two states are the same.
+      assertEqual([sink.runs.length, generator.models.length], [isFixed ? 3 : 2, 2], 'runs');
+      assertEqual(generator.kind, isFixed ? 'captured' : 'webgpu', 'kind');
+      for (const [i, run] of sink.runs.entries()) {
+        const { timeSeconds, controls } = states[i];
+        const ball = (await runOnCpu(`${FIXTURES}packed.onnx`, { timeSeconds })).gaussians.values;
+        const expected = ball.map((x, k) => (isFixed && k % 13 === 1 ? x + controls.lift : x));
+        const error = relativeError(numbersOf(await run.tensors.gaussians, 'float32').slice(0, 64 * 13), expected);
+        assert(run.rows === 64 && error < 1e-3, `run ${i}: ${run.rows} rows, relative error ${error}`);
+      }
+      generator.close();
+    });
+  }
+
+  it('makes no buffer and reads nothing back once it is warm', async () => {
+    const urls = ['packed.onnx', 'link-fixed.onnx', 'link-fixed.onnx'].map((name) => ({ url: FIXTURES + name }));
+    const generator = await Generator.open(urls, device, { onError: reportError });
+    const gaussians = await DynamicGaussians.create(device, generator.model.layout);
+    generator.sink = gaussians;
+    const at = async (timeSeconds: number): Promise<void> => {
+      generator.request({ timeSeconds });
+      await generator.idle;
+    };
+    for (let i = 0; i < 3; i++) await at(i);
+    const earlier = { ...calls };
+    for (let i = 3; i < 23; i++) await at(i);
+    assertEqual([generator.runs, { ...calls }], [23, earlier], 'runs and calls');
+    generator.close();
+    gaussians.destroy();
+  });
+
+  it('whose models do not fit is refused before the runtime is asked', async () => {
+    const cases: Readonly<Record<string, readonly string[]>> = {
+      'another activation': ['packed.onnx', 'link-logit.onnx'],
+      'another layout': ['split.onnx', 'link-fixed.onnx'],
+      'rows that may change into rows that may not': ['link.onnx', 'link-fixed.onnx'],
+      'the wrong way round': ['link-fixed.onnx', 'packed.onnx'],
+      'two that make Gaussians': ['packed.onnx', 'packed.onnx'],
+      'a picture in the end': ['packed.onnx', 'post.onnx'],
+      'a live count that gets lost': ['faulty-values.onnx', 'link-fixed.onnx'],
+    };
+    for (const [name, files] of Object.entries(cases)) {
+      const urls = files.map((file) => ({ url: FIXTURES + file }));
+      assertEqual(await codeOf(Generator.open(urls, device)), 'contract/chain', name);
+    }
+  });
+});

@@ -1,0 +1,237 @@
+/** Post-processors, chains and pictures in <gaussian-splat>. */
+import '@gaussian-splat/element';
+import { GaussianSplatElement, type ElementError } from '@gaussian-splat/element';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  devices,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from '../../element/browser/support/harness.js';
+import { screenOf, type Rgb } from '../../element/browser/support/screen.js';
+import { calls, FIXTURES, RUNTIME } from './support.js';
+
+GaussianSplatElement.runtimeLocation = RUNTIME;
+
+const BALL = `${FIXTURES}packed.onnx`;
+const STYLE = 'width: 120px; height: 100px; background: white';
+
+/** The colours of all pixels on the screen. */
+async function colorsOf(element: GaussianSplatElement): Promise<Rgb[]> {
+  const screen = await screenOf(element);
+  const { clientWidth: width, clientHeight: height } = element;
+  return Array.from({ length: width * height }, (_, i) => screen.at(i % width, Math.floor(i / width)));
+}
+
+/** Mean of all channels over the picture on the screen, 0..255, and how many pixels the scene covers. */
+async function lightOf(element: GaussianSplatElement): Promise<{ mean: number; covered: number }> {
+  const sums = (await colorsOf(element)).map(([r, g, b]) => r + g + b);
+  const mean = sums.reduce((total, sum) => total + sum, 0) / sums.length / 3;
+  return { mean, covered: sums.filter((sum) => sum < 700).length };
+}
+
+/** Waits until the picture's light fulfils a condition. */
+async function untilLight(
+  element: GaussianSplatElement,
+  holds: (mean: number) => boolean,
+  what: string,
+): Promise<void> {
+  const end = performance.now() + 20_000;
+  for (;;) {
+    const { mean } = await lightOf(element);
+    if (holds(mean)) return;
+    assert(performance.now() < end, `waited for ${what}, found ${mean}`);
+    await delay(100);
+  }
+}
+
+describe('a post-processor in the element', () => {
+  for (const [name, src] of [
+    ['post.onnx', BALL],
+    ['post-fixed.onnx', COMPASS],
+  ] as const) {
+    it(`${name} on ${src.split('/').at(-1)}: darkens what is drawn, leaves the page's ground, and goes again`, async () => {
+      const element = await showLoaded({ src }, STYLE);
+      const plain = await lightOf(element);
+      element.setAttribute('control-gain', '0');
+      element.setAttribute('postprocess', FIXTURES + name);
+      await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker picture');
+      const dark = await lightOf(element);
+      assert(dark.covered > 0.5 * plain.covered, `${plain.covered} pixels were covered, now ${dark.covered}`);
+      assertEqual((await screenOf(element)).at(1, 1), [255, 255, 255], 'the ground of the page');
+      element.setAttribute('control-gain', '1');
+      await untilLight(element, (mean) => Math.abs(mean - plain.mean) < 1.5, 'the picture as it was');
+      element.setAttribute('control-gain', '0');
+      await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker picture');
+      element.removeAttribute('postprocess');
+      await untilLight(element, (mean) => Math.abs(mean - plain.mean) < 0.5, 'the plain picture');
+    });
+  }
+
+  it('at rest runs once, and then neither draws nor runs', async () => {
+    const element = await showLoaded(
+      { src: COMPASS, postprocess: `${FIXTURES}post-fixed.onnx`, 'control-gain': '0' },
+      STYLE,
+    );
+    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    await delay(300);
+    const { createBuffer, mapAsync, createBindGroup } = calls;
+    await delay(1000);
+    assertEqual(
+      [calls.createBuffer, calls.mapAsync, calls.createBindGroup],
+      [createBuffer, mapAsync, createBindGroup],
+      'calls at rest',
+    );
+  });
+
+  it('that is slow does not hold up the camera, and shows its picture when it rests', async () => {
+    const element = await showLoaded(
+      { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },
+      STYLE,
+    );
+    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    let moves = 0;
+    element.addEventListener('camera-change', () => moves++);
+    for (let i = 0; i < 20; i++) {
+      element.setAttribute('camera-orbit', `${5 * i}deg 75deg auto`);
+      element.jumpCameraToGoal();
+      await frames(1);
+    }
+    await frames(2);
+    assert(moves >= 10, `${moves} frames were drawn while it ran`);
+    const settled = await lightOf(element);
+    await untilLight(element, (mean) => mean < 250, `the processed picture again (${settled.mean})`);
+  });
+
+  it('is that of the new size after the element has got one', async () => {
+    const element = await showLoaded({ src: COMPASS, postprocess: `${FIXTURES}post.onnx`, 'control-gain': '0' }, STYLE);
+    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    const before = await lightOf(element);
+    element.style.cssText = 'width: 200px; height: 160px; background: white';
+    await delay(300);
+    await untilLight(element, (mean) => Math.abs(mean - before.mean) < 12, 'the processed picture, larger');
+  });
+
+  it('that makes no numbers leaves the frame as it is drawn', async () => {
+    const element = await showLoaded({ src: COMPASS }, STYLE);
+    const plain = await lightOf(element);
+    element.setAttribute('postprocess', `${FIXTURES}post-nan.onnx`);
+    await delay(1500);
+    const after = await lightOf(element);
+    assert(Math.abs(after.mean - plain.mean) < 0.5, `${plain.mean}, then ${after.mean}`);
+  });
+
+  for (const [name, url, reason] of [
+    ['that is missing', '/net/status/404?x.onnx', 'network/status'],
+    ['that makes Gaussians', BALL, 'contract/chain'],
+  ] as const) {
+    it(`${name}: ${reason}, and frames as they are drawn`, async () => {
+      const element = await showLoaded({ src: COMPASS }, STYLE);
+      const plain = await lightOf(element);
+      const event = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
+      element.setAttribute('postprocess', url);
+      assertEqual((await event).detail.reason, reason);
+      element.setAttribute('camera-orbit', '1deg 75deg auto');
+      await delay(300);
+      assert(element.loaded && Math.abs((await lightOf(element)).mean - plain.mean) < 1, 'the picture stays');
+    });
+  }
+
+  it('is back after the device was lost', async () => {
+    const element = await showLoaded(
+      { src: COMPASS, postprocess: `${FIXTURES}post-fixed.onnx`, 'control-gain': '0' },
+      STYLE,
+    );
+    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    const restored = nextEvent(element, 'contextrestored');
+    devices[devices.length - 1].destroy();
+    await restored;
+    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+  });
+});
+
+describe('a chain in the element', () => {
+  it('is one scene, whose controls are those of all its models', async () => {
+    const element = await showLoaded({ src: BALL, chain: `${FIXTURES}link-fixed.onnx` }, STYLE);
+    const middle = async (): Promise<number> =>
+      (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 700)?.y ?? NaN;
+    const before = await middle();
+    element.setAttribute('control-lift', '0.5');
+    await delay(700);
+    const after = await middle();
+    // The scene's y points down.
+    assert(after > before + 3, `middle at ${before}, then ${after}`);
+    assertEqual(element.duration, 6.2831853, 'duration');
+  });
+
+  it('that does not fit: contract/chain, and without it the scene is shown', async () => {
+    const element = show({ src: BALL, chain: `${FIXTURES}link-logit.onnx` });
+    const { detail } = await nextEvent<CustomEvent<ElementError>>(element, 'error');
+    assertEqual([detail.code, detail.reason], ['contract', 'contract/chain']);
+    element.removeAttribute('chain');
+    await element.updateComplete;
+    await element.ready;
+    assert(element.loaded, String(element.error?.message));
+  });
+});
+
+describe('a picture as a control', () => {
+  /** Red and blue halves. */
+  async function picture(left: string, right: string): Promise<string> {
+    const canvas = new OffscreenCanvas(16, 16);
+    const context = canvas.getContext('2d');
+    assert(context, 'a 2D context');
+    context.fillStyle = left;
+    context.fillRect(0, 0, 8, 16);
+    context.fillStyle = right;
+    context.fillRect(8, 0, 8, 16);
+    return URL.createObjectURL(await canvas.convertToBlob());
+  }
+
+  it('by URL, by image, by ImageBitmap; a wrong one is named and the last stays', async () => {
+    const url = await picture('red', 'blue');
+    const errors: string[] = [];
+    const element = await showLoaded({ src: `${FIXTURES}picture.onnx`, 'control-image': url }, STYLE);
+    const count = async (channel: number): Promise<number> => {
+      return (await colorsOf(element)).filter(
+        (color) => color[channel] > 60 + Math.max(...color.filter((_, other) => other !== channel)),
+      ).length;
+    };
+    assert((await count(0)) > 100 && (await count(2)) > 100, `${await count(0)} red, ${await count(2)} blue`);
+    const image = new Image();
+    image.src = await picture('lime', 'red');
+    element.controls = { image };
+    await until(() => image.complete, 'the image');
+    const untilCounts = async (holds: (counts: number[]) => boolean, what: string): Promise<void> => {
+      const end = performance.now() + 10_000;
+      for (;;) {
+        const counts = [await count(0), await count(1), await count(2)];
+        if (holds(counts)) return;
+        assert(performance.now() < end, `waited for ${what}, found ${counts.join()}`);
+        await delay(100);
+      }
+    };
+    element.addEventListener('generator-error', ({ detail }) => errors.push(detail.reason));
+    await untilCounts(([red, green, blue]) => red > 100 && green > 100 && blue < 20, 'green and red');
+    assertEqual(errors, [], 'errors');
+    const event = nextEvent<CustomEvent<ElementError>>(element, 'generator-error');
+    element.controls = { image: '/net/status/404' };
+    assertEqual((await event).detail.reason, 'network/status');
+    assert(element.loaded && (await count(1)) > 100, 'the last picture stays');
+    const bytes = await (await fetch(await picture('blue', 'blue'))).blob();
+    element.controls = { image: await createImageBitmap(bytes) };
+    await untilCounts(([, green, blue]) => blue > 200 && green < 20, 'blue');
+  });
+
+  it('missing: the input is named', async () => {
+    const element = show({ src: `${FIXTURES}picture.onnx` });
+    const { detail } = await nextEvent<CustomEvent<ElementError>>(element, 'error');
+    assertEqual(detail.reason, 'argument/value');
+    assert(detail.message.includes('control-image'), detail.message);
+  });
+});
