@@ -134,7 +134,7 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
   const choosing = acquiring.then(({ device }) => chooseVariants(device));
   const loading = options.loader.load(request, abort.signal, options.onProgress);
   try {
-    const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(ignore)]);
+    const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(unlessWrong)]);
     options.signal.throwIfAborted();
     options.beforeUpload();
     return await upload(lease, scene, options.signal);
@@ -194,6 +194,11 @@ function outOfMemory(cause: GPUError): GaussianSplatError {
     remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
     cause,
   });
+}
+
+/** That no variant draws the right image ends the loading; that none could be timed does not. */
+function unlessWrong(error: unknown): void {
+  if (error instanceof GaussianSplatError && error.code === 'unsupported/wrong-image') throw error;
 }
 
 function ignore(): void {

@@ -1,3 +1,4 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { packGaussians } from '../pack/pack.js';
@@ -38,6 +39,7 @@ const MEASURABLE = 1.5;
  * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a known answer are out, the
  * others are timed on small scenes. Takes a few tenths of a second the first time on an adapter; then the choice is kept in `store`, and
  * only its answer is checked again.
+ * @throws GaussianSplatError `unsupported/wrong-image` if no variant gives the known answer.
  */
 export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): Promise<Variants> {
   return perDevice(device, 'choice', async () => {
@@ -56,9 +58,25 @@ async function probe(device: GPUDevice): Promise<Variants> {
   for (const candidate of candidatesFor(device, threads)) {
     if (await isRight(device, candidate)) candidates.push(candidate);
   }
-  if (candidates.length === 0) return SAFE;
+  if (candidates.length === 0) return giveUp(device);
   return chooseFastest(device, candidates);
 }
+
+/** A wrong picture is worse than none. A lost device draws none, and says so itself. */
+async function giveUp(device: GPUDevice): Promise<Variants> {
+  const isLost = await Promise.race([device.lost.then(() => true), settled().then(() => false)]);
+  if (isLost) return SAFE;
+  const { vendor = '', architecture = '', description = '' } = device.adapterInfo ?? {};
+  throw new GaussianSplatError('unsupported/wrong-image', {
+    where: `the graphics adapter ${[vendor, architecture, description].filter(Boolean).join(' ') || '(unnamed)'}`,
+    expected: 'the known picture of 64 spheres',
+    found: 'another picture from every variant of the renderer',
+    remedy: 'update the browser and the graphics driver, and report it with this message',
+  });
+}
+
+/** Lets promises that are settled already have their turn. */
+const settled = (): Promise<void> => new Promise((resolve) => setTimeout(resolve, 0));
 
 async function chooseThreads(device: GPUDevice): Promise<Variants['threads']> {
   // A processor in disguise, by its own account.
