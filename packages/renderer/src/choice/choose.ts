@@ -58,8 +58,9 @@ async function probe(device: GPUDevice): Promise<Variants> {
   for (const candidate of candidatesFor(device, threads)) {
     if (await isRight(device, candidate)) candidates.push(candidate);
   }
-  if (candidates.length === 0) return giveUp(device);
-  return chooseFastest(device, candidates);
+  if (candidates.length > 0) return chooseFastest(device, candidates);
+  for (const candidate of lastResorts(threads)) if (await isRight(device, candidate)) return candidate;
+  return giveUp(device);
 }
 
 /** A wrong picture is worse than none. A lost device draws none, and says so itself. */
@@ -95,6 +96,17 @@ function candidatesFor(device: GPUDevice, threads: Variants['threads']): Variant
   const canBlend = device.features.has('float32-blendable');
   // Tiles are made of barriers, which is what a processor in disguise is worst at: ten times slower, and seconds to compile.
   return [quads, ...(canBlend ? [precise] : []), ...(threads === 'parallel' ? [tiles] : [])];
+}
+
+/** However slow, if it is right: what was no candidate for its speed, and then the other way to share the work. */
+function lastResorts(threads: Variants['threads']): Variants[] {
+  const other = threads === 'serial' ? 'parallel' : 'serial';
+  const variants = (rasterizer: Variants['rasterizer'], threads: Variants['threads']): Variants => ({
+    rasterizer,
+    accumulation: 'rgba16float',
+    threads,
+  });
+  return [variants('tiles', threads), variants('quads', other), variants('tiles', other)];
 }
 
 const isRight = async (device: GPUDevice, variants: Variants): Promise<boolean> => {
