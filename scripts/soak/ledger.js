@@ -41,14 +41,17 @@ for (const level of ['warn', 'error']) {
   console[level] = (...words) => faults.push(`console.${level}: ${words.join(' ')}`);
 }
 
-/** Bytes of our own objects and of others' (ONNX Runtime) on all living devices, and where ours are. */
+/** Made once for a device and kept as long as it lives: which of them there are depends on what was tried on it. */
+const OF_DEVICE = /^gs\.(sort\.pass_\d|rasterize\.indices)$/;
+
+/** Bytes of our own objects, of those that belong to the device, and of others' (ONNX Runtime); and where ours are. */
 export function ledger() {
-  const sum = { own: 0, others: 0, byLabel: {} };
+  const sum = { own: 0, device: 0, others: 0, byLabel: {} };
   for (const { objects } of devices) {
     for (const [{ label }, bytes] of objects) {
-      const isOwn = label.startsWith('gs.');
-      sum[isOwn ? 'own' : 'others'] += bytes;
-      if (isOwn) sum.byLabel[label] = (sum.byLabel[label] ?? 0) + bytes;
+      const kind = OF_DEVICE.test(label) ? 'device' : label.startsWith('gs.') ? 'own' : 'others';
+      sum[kind] += bytes;
+      if (kind === 'own') sum.byLabel[label] = (sum.byLabel[label] ?? 0) + bytes;
     }
   }
   return sum;

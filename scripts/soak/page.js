@@ -21,6 +21,8 @@ const SOURCES = [
 ];
 const QUALITIES = ['reference', 'default', 'balanced', 'fast'];
 const events = {};
+/** How often the anchor has lost its device, and has come back. */
+let [lost, restored] = [0, 0];
 
 function addElement(share) {
   if (walk.children.length >= MOST) return;
@@ -79,15 +81,24 @@ async function settle() {
   walk.replaceChildren();
   let last = '';
   // Until the books stand still: releases, restorations and late loads take a while.
-  for (let still = 0, tries = 0; still < 6 && tries < 300; tries++) {
+  for (let still = 0, tries = 0; still < 6 && tries < 600; tries++) {
     await delay(100);
+    // What has been handed to the GPU process must have come back, too.
+    await Promise.all(devices.map(({ device }) => device.queue.onSubmittedWorkDone().catch(() => undefined)));
     const anchor = document.querySelector('#anchor');
     const now = JSON.stringify([ledger(), anchor?.loaded, devices.length]);
-    still = now === last && anchor?.loaded ? still + 1 : 0;
+    // Between the two events a lost anchor still counts as loaded, and shows its last picture.
+    const isThere = anchor.loaded && lost === restored;
+    still = now === last && isThere ? still + 1 : 0;
     last = now;
   }
   const anchor = document.querySelector('#anchor');
-  return { loaded: anchor.loaded, error: anchor.error?.message, devices: devices.length, ledger: ledger() };
+  return {
+    loaded: anchor.loaded && lost === restored,
+    error: anchor.error?.message,
+    devices: devices.length,
+    ledger: ledger(),
+  };
 }
 
 async function start() {
@@ -96,6 +107,8 @@ async function start() {
   anchor.setAttribute('loading', 'eager');
   anchor.setAttribute('src', '/scenes/skull.spz');
   anchor.setAttribute('interpolation-decay', '0');
+  anchor.addEventListener('contextlost', () => lost++);
+  anchor.addEventListener('contextrestored', () => restored++);
   document.body.append(anchor);
   await anchor.ready;
   return settle();

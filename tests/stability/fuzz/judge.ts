@@ -11,9 +11,10 @@ import { cameraOfRecipe, cloudOfRecipe, type SceneRecipe } from '../support/rand
 
 /**
  * Why a picture may be under 59 dB: `threshold`, pixels in which a splat is within rounding of a rule's limit or of another splat's depth, where
- * float32 and float64 may rightly decide otherwise; `float16`, rounding of the blend target. `none` is a fault.
+ * float32 and float64 may rightly decide otherwise; `stop`, quads cannot end a pixel whose next splat would leave less than 1e-4 of the light, as the
+ * reference does, so that up to 0.5 % of another colour is added to what is nearly opaque; `float16`, rounding of the blend target. `none` is a fault.
  */
-export type Cause = 'fine' | 'threshold' | 'float16' | 'none';
+export type Cause = 'fine' | 'threshold' | 'stop' | 'float16' | 'none';
 
 export interface Verdict {
   /** dB over covered pixels. */
@@ -54,12 +55,19 @@ export async function judge(recipe: SceneRecipe, { device, precise, rasterizer }
   }
   const sure = surePixels(cloud, camera, mode, oracle);
   const withoutThresholds = overPixels(pixels, oracle, sure);
-  if (withoutThresholds >= FINE) return { decibels, withoutThresholds, cause: 'threshold', notFinite: 0 };
-  const isRounded = precise !== undefined && rasterizer === 'quads';
+  const verdict = (cause: Cause): Verdict => ({ decibels, withoutThresholds, cause, notFinite: 0 });
+  if (withoutThresholds >= FINE) return verdict('threshold');
+  if (rasterizer === 'tiles') return verdict('none');
+  const endless = renderOracle(cloud, camera, { rules: ENDLESS, mode });
+  if (overPixels(pixels, endless, sure) >= FINE) return verdict('stop');
+  if (precise === undefined) return verdict('none');
   const options = { rasterizer, mode, turning, accumulation: 'rgba32float', threads: 'serial' } as const;
-  const better = isRounded ? overPixels(await draw(precise, cloud, camera, options), oracle, sure) : 0;
-  return { decibels, withoutThresholds, cause: better >= FINE ? 'float16' : 'none', notFinite: 0 };
+  const better = overPixels(await draw(precise, cloud, camera, options), endless, sure);
+  return verdict(better >= FINE ? 'float16' : 'none');
 }
+
+/** The rules without an end to pixels. */
+const ENDLESS: Rules = { ...RULES.gsplat, minTransmittance: 0, stopsAtEquality: false };
 
 /** [pixels] 1 where no rounding decides and a splat is seen, by whichever image. */
 function surePixels(cloud: GaussianCloud, camera: Camera, mode: Mode, oracle: OracleImage): Uint8Array {

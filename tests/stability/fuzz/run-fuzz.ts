@@ -54,7 +54,7 @@ const tally: Tally = {
   notFinite: 0,
   worst: Infinity,
   worstExplained: Infinity,
-  causes: { fine: 0, threshold: 0, float16: 0, none: 0 },
+  causes: { fine: 0, threshold: 0, stop: 0, float16: 0, none: 0 },
 };
 let isLost = false;
 void subject.device.lost.then(() => (isLost = true));
