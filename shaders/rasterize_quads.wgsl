@@ -13,6 +13,9 @@
 struct RasterView {
   // Pixels.
   viewport: vec2f,
+  // Which part of the splats to draw, counted from the farthest, of how many.
+  slice: u32,
+  slices: u32,
 }
 
 struct Quad {
@@ -47,7 +50,8 @@ fn quad_corner(s: ProjectedSplat, opacity: f32, corner: vec2f) -> vec2f {
 @vertex
 fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) instance: u32) -> Quad {
   let rank = instance * QUAD_BATCH + vertex_index / 4u;
-  if (rank >= plan.visible) {
+  let share = (plan.visible + raster.slices - 1u) / raster.slices;
+  if (rank >= plan.visible || rank / share != raster.slice) {
     return Quad(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), 0.0);
   }
   let s = splats[order[plan.visible - 1u - rank]];

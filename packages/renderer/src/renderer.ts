@@ -14,7 +14,7 @@ import { writeStruct } from './gpu/struct.js';
 import { leversOf, type Levers, type Quality } from './levers.js';
 import { PageTable } from './page-table.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
-import type { AccumulationFormat, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import type { AccumulationFormat, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
 import { maxPairs, TilesRasterizer } from './rasterizers/tiles.js';
 import { maxVisible, Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
@@ -162,9 +162,9 @@ export class Renderer {
     table.look(drawn, this.levers, isOrdered);
     const serving = isOrdered ? depthOrder : undefined;
     recordProjection(encoder, { stages: this.#stages, bindings, scratch, depthOrder: serving, timer });
-    this.#paint(encoder, target, drawn, isOrdered, background, timer);
-    const isWatched = monitor.record(encoder, scratch.plan, this.#rasterizer.pairPlan);
-    this.#device.queue.submit([encoder.finish()]);
+    const last = this.#paint(encoder, target, drawn, isOrdered, background, timer);
+    const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
+    this.#device.queue.submit([last.finish()]);
     if (isWatched) monitor.read();
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
     if (this.levers.sortAngle <= STILL) depthOrder.settle();
@@ -233,19 +233,35 @@ export class Renderer {
     isOrdered: boolean,
     background: readonly [number, number, number, number],
     timer: PassTimer | undefined,
-  ): void {
+  ): GPUCommandEncoder {
     const order = isOrdered ? 'identity' : 'sorted';
     const isFullSize = camera.width === target.width && camera.height === target.height;
     if (isFullSize && target.isStorable && this.#rasterizer.finishes(target.format)) {
       this.#rasterizer.record(encoder, { surface: target, order, background, timer });
-      return;
+      return encoder;
     }
     const { texture, compose } = this.#accumulationOf(camera.width, camera.height);
     const scale = [camera.width / target.width, camera.height / target.height];
     writeStruct(layouts.Compose, { background, scale }, this.#composeBytes);
     this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
-    this.#rasterizer.record(encoder, { surface: texture, order, timer });
-    this.#compose.record(encoder, compose, target.view, target.format, timer);
+    const last = this.#recordSlices(encoder, { surface: texture, order, timer });
+    this.#compose.record(last, compose, target.view, target.format, timer);
+    return last;
+  }
+
+  /** Records the painting, in several submissions where that is asked for. @returns the encoder to go on with */
+  #recordSlices(encoder: GPUCommandEncoder, painting: Painting): GPUCommandEncoder {
+    const count = this.#rasterizer.canSlice ? Math.ceil(this.levers.submissions) : 1;
+    let current = encoder;
+    for (let index = 0; index < count; index++) {
+      // What comes before the painting is a submission of its own, too.
+      if (count > 1) {
+        this.#device.queue.submit([current.finish()]);
+        current = this.#device.createCommandEncoder({ label: `gs.frame.${index}` });
+      }
+      this.#rasterizer.record(current, { ...painting, slice: { index, count } });
+    }
+    return current;
   }
 
   #targetOf({ target, targetFormat, camera }: FrameRequest): Target {

@@ -42,6 +42,11 @@ export interface Painting {
    */
   readonly background?: readonly [number, number, number, number];
   readonly timer?: PassTimer;
+  /**
+   * Paints one part of the splats only, the farthest first, over what the parts before have left in the surface. Only for rasterizers that can
+   * slice their work.
+   */
+  readonly slice?: { readonly index: number; readonly count: number };
 }
 
 /**
@@ -50,6 +55,8 @@ export interface Painting {
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
+  /** Whether the work of an image can be recorded in slices, for submissions that stay short. */
+  readonly canSlice: boolean;
   /** Bytes of GPU memory held. */
   readonly byteLength: number;
   /** `Plan` of the pairs of splat and bin, where there are pairs. */

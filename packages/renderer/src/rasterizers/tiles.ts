@@ -66,6 +66,8 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
  */
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
+  /** Tiles stop where nothing behind can be seen: their work is bounded by what is. */
+  readonly canSlice = false;
   readonly #device: GPUDevice;
   readonly #overrides: Overrides;
   readonly #memory: GpuMemory;
