@@ -25,6 +25,8 @@ export interface Services {
   readonly frameScheduler: FrameScheduler;
   /** How long a removed element keeps its scene, ms. */
   readonly releaseDelay: number;
+  /** Bytes of GPU memory that one scene may take; null for what suits the device. */
+  readonly memoryBudget: number | null;
   /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
 }
@@ -120,6 +122,7 @@ export class Stage {
         if (clear) this.#view.clear();
         else this.#view.pause();
       },
+      memoryBudget: () => services().memoryBudget ?? defaultMemoryBudget(),
       live: () => ({
         runtimeLocation: services().runtimeLocation,
         state: () => this.#liveState(),
@@ -218,6 +221,12 @@ const FIRST_SIZE = [300, 150] as const;
 /** The worker has a base URL of its own, so it is given whole ones. What is no URL stays as it is, and fails there. */
 function absoluteUrl(src: string): string {
   return URL.canParse(src, document.baseURI) ? new URL(src, document.baseURI).href : src;
+}
+
+/** The GPU's share of a device is known to nobody; half of the memory is what shared memory can spare. Browsers round it, and end at 8 GB or more. */
+function defaultMemoryBudget(): number | undefined {
+  const { deviceMemory } = navigator as { deviceMemory?: number };
+  return deviceMemory === undefined ? undefined : deviceMemory * 2 ** 29;
 }
 
 const prefersReducedMotion = (): boolean => matchMedia('(prefers-reduced-motion: reduce)').matches;

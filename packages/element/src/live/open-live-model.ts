@@ -29,7 +29,10 @@ export async function openLiveModel(
   try {
     const { layout, contract: found } = generator.model;
     for (const note of generator.model.notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
-    gaussians = await DynamicGaussians.create(device, layout, { antialiased: found.antialiased });
+    gaussians = await DynamicGaussians.create(device, layout, {
+      antialiased: found.antialiased,
+      memoryBudget: request.memoryBudget,
+    });
     generator.sink = gaussians;
     generator.request(toState(request.state(), found, request.camera(declaredBounds(found))));
     await generator.idle;
