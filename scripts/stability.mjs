@@ -2,7 +2,7 @@
  * `npm run stability`: every row of the catalogue at full length, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
  * `-- --report` also writes docs/stability.md, its charts and the demo's copies; `-- --peers` puts the peers through the rows that a page can.
  */
-import { existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { ensureChromium } from './lib/chromium.mjs';
@@ -36,25 +36,35 @@ if (values.report) {
   const { writeReport } = await import('./stability/report.mjs');
   const peers = join(cache, 'peers.json');
   writeReport({
-    lines: readFileSync(figures, 'utf8')
-      .trim()
-      .split('\n')
-      .map((line) => JSON.parse(line)),
+    lines: readLines(figures),
     peers: existsSync(peers) ? JSON.parse(readFileSync(peers, 'utf8')) : undefined,
   });
 }
 process.exit(status);
 
 function runRows() {
-  rmSync(figures, { force: true });
+  const fresh = join(cache, 'figures-new.jsonl');
+  rmSync(fresh, { force: true });
   const env = {
     ...gpuEnvironment(),
     STABILITY: values.fast ? 'fast' : 'full',
-    STABILITY_FIGURES: figures,
+    STABILITY_FIGURES: fresh,
     STABILITY_ROWS: positionals[0] ?? '',
   };
   const args = ['--import', 'tsx', '--test', '--test-reporter', 'spec', 'tests/stability/catalogue.test.ts'];
-  return run(process.execPath, args, { env });
+  const status = run(process.execPath, args, { env });
+  // Rows that were not run keep the figures of their last run.
+  const lines = readLines(fresh);
+  const rows = new Set(lines.map(({ row }) => row));
+  const kept = readLines(figures).filter(({ row }) => !rows.has(row));
+  writeFileSync(figures, [...kept, ...lines].map((line) => `${JSON.stringify(line)}\n`).join(''));
+  return status;
+}
+
+function readLines(file) {
+  if (!existsSync(file)) return [];
+  const lines = readFileSync(file, 'utf8').split('\n').filter(Boolean);
+  return lines.map((line) => JSON.parse(line));
 }
 
 function runBrowserRows() {

@@ -49,6 +49,8 @@ const server = await serve({
 });
 const browser = await chromium.launch({ executablePath: findChromium(), args: SWIFTSHADER_FLAGS });
 const failures = [];
+/** What the page complained of since the last epoch, and did not have to expect. */
+const faults = [];
 try {
   const report = await soak(await browser.newPage({ viewport: { width: 800, height: 600 } }));
   console.log(JSON.stringify(report, null, 2));
@@ -97,11 +99,11 @@ async function soak(page) {
     if (!now.state.loaded) failures.push(`the anchor is not loaded: ${now.state.error}`);
     if (differing > 0) failures.push(`${differing} colour values of the anchor differ`);
     const grown = now.state.ledger.own - base.state.ledger.own;
-    if (grown !== 0)
-      failures.push(
-        `${grown} bytes in the ledger: ${JSON.stringify(now.state.ledger.byLabel)} against ${JSON.stringify(base.state.ledger.byLabel)}`,
-      );
-    for (const fault of now.faults) failures.push(fault);
+    if (grown !== 0) {
+      const detail = changes(base.state.ledger.byLabel, now.state.ledger.byLabel);
+      failures.push(`${grown} bytes in the ledger: ${detail}`);
+    }
+    failures.push(...faults.splice(0));
     console.error(
       `${epochs.at(-1).minutes.toFixed(1)} min, ${performed} actions, heap ${(now.heap / 2 ** 20).toFixed(2)} MiB, ours ${now.state.ledger.own} bytes, ${differing} differing`,
     );
@@ -138,11 +140,10 @@ async function look(page, devtools) {
   await devtools.send('HeapProfiler.collectGarbage');
   await devtools.send('HeapProfiler.collectGarbage');
   const { usedSize } = await devtools.send('Runtime.getHeapUsage');
-  const faults = (await page.evaluate(() => window.soak.faults())).filter(
-    (text) => !EXPECTED.some((p) => p.test(text)),
-  );
+  const seen = await page.evaluate(() => window.soak.faults());
+  faults.push(...seen.filter((text) => !EXPECTED.some((pattern) => pattern.test(text))));
   const picture = PNG.sync.read(await page.screenshot({ clip: ANCHOR }));
-  return { state, heap: usedSize, faults, picture };
+  return { state, heap: usedSize, picture };
 }
 
 function changes(before, after) {

@@ -91,7 +91,7 @@ function figuresTable(figures) {
   const cells = figures.map(
     (figure) => `| ${cell(figure.what)} | ${shown(figure.value)} ${figure.unit} | ${limit(figure)} |`,
   );
-  return ['| what | measured | limit |', '|---|---|---|', ...cells].join('\n');
+  return ['| what | measured | limit | recipe |', '|---|---|---|---|', ...cells].join('\n');
 }
 
 function peersTable({ rows, adapter }) {

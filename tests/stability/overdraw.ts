@@ -13,7 +13,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
-import { compareImage, notFinite, RASTERIZERS, truth, THREADS } from './support/pictures.js';
+import { compareImage, differingBytes, notFinite, RASTERIZERS, truth, THREADS } from './support/pictures.js';
 import { holds, note, sized } from './support/row.js';
 
 const random = seededRandom(9);
@@ -56,3 +56,54 @@ for (const rasterizer of RASTERIZERS) {
     gaussians.destroy();
   });
 }
+
+/** Milliseconds of every submission of a device's queue, from when the one before it was done. */
+function timeSubmissions(device: GPUDevice): { readonly times: Promise<number>[]; stop(): void } {
+  const { queue } = device;
+  const submit = queue.submit.bind(queue);
+  const times: Promise<number>[] = [];
+  let before: Promise<number> = Promise.resolve(performance.now());
+  queue.submit = (commands) => {
+    const start = performance.now();
+    submit(commands);
+    const previous = before;
+    const done = queue.onSubmittedWorkDone().then(() => performance.now());
+    before = done;
+    times.push(Promise.all([previous, done]).then(([earlier, now]) => now - Math.max(earlier, start)));
+    return undefined;
+  };
+  return { times, stop: () => void Reflect.deleteProperty(queue, 'submit') };
+}
+
+test('the painting of a frame, divided into many submissions, is the same to the byte, and none is long', async () => {
+  const device = await nodeDevice();
+  const width = sized(320, 1920);
+  const cloud = fullScreen(sized(600, 2_000));
+  const camera = cameraAt([0, 0, -1], [0, 0, 0], { width, height: Math.round((width * 9) / 16) });
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const images: Float32Array[] = [];
+  const longest: number[] = [];
+  for (const submissions of [1, 64]) {
+    const renderer = new Renderer(device, { threads: THREADS, rasterizer: 'quads', submissions });
+    await capture(device, renderer, { gaussians, camera });
+    const watch = timeSubmissions(device);
+    images.push(await capture(device, renderer, { gaussians, camera }));
+    const times = await Promise.all(watch.times);
+    watch.stop();
+    longest.push(Math.max(...times));
+    assert.ok(times.length >= submissions, `${times.length} submissions`);
+    note(
+      'S9',
+      `${cloud.count} full-screen splats, ${width} across, in ${submissions}: longest submission`,
+      longest.at(-1)!,
+      { unit: 'ms' },
+    );
+    renderer.destroy();
+  }
+  holds('S9', '64 submissions against one: differing bytes', differingBytes(images[0], images[1]), {
+    atMost: 0,
+    unit: 'bytes',
+  });
+  holds('S9', 'longest of 64 submissions over the one', longest[1] / longest[0], { atMost: 0.5, unit: 'times' });
+  gaussians.destroy();
+});

@@ -26,7 +26,7 @@ export function note(row: string, what: string, value: number, limit: Limit): vo
   console.log(`${row.padEnd(4)} ${what.padEnd(58)} ${shown} ${limit.unit}`);
   const file = process.env.STABILITY_FIGURES;
   // JSON has no infinity: equal images have one.
-  const figure = { row, what, value: Number.isFinite(value) ? value : String(value), ...limit };
+  const figure = { row, what, value: Number.isFinite(value) ? value : String(value), ...limit, isFull };
   if (file) appendFileSync(file, `${JSON.stringify(figure)}\n`);
 }
 
