@@ -34,8 +34,8 @@ export interface Subject {
 }
 
 const FINE = 59;
-/** Relative rounding of alpha: 14 bits of the covariance's root, squared and times an exponent of up to 11. */
-const ALPHA_ROUNDING = 2e-3;
+/** Relative rounding of alpha: 14 bits of the covariance's root, twice, times an exponent of up to 5.5. */
+const ALPHA_ROUNDING = 5e-4;
 /** Transmittance is a product of all that lies in front. */
 const LIGHT_ROUNDING = 2e-2;
 /** float32 depths from a matrix product, and keys of 24 bits over the visible range. */
