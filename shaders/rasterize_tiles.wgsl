@@ -8,10 +8,15 @@
 // Slot, and the tiles of the bin that the splat touches: bin by bin, in depth order.
 @group(0) @binding(2) var<storage, read> pairs: array<vec2u>;
 @group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
-@group(0) @binding(4) var image: texture_storage_2d<rgba16float, write>;
+// How far one could see in each tile when the splats were culled, and how far one did see.
+@group(0) @binding(4) var<storage, read> occlusion: array<u32>;
+@group(0) @binding(5) var<storage, read_write> last_depths: array<u32>;
+@group(0) @binding(6) var image: texture_storage_2d<rgba16float, write>;
 
 // A pixel is finished before a splat that would take its transmittance to this or below.
 override transmittance_min: f32 = 1e-4;
+// A pixel with this transmittance or less hides what lies behind from the next frame.
+override occluded_below: f32 = 0.01;
 // True to write premultiplied colour over the background, false for colour and transmittance.
 override is_final: bool = false;
 
@@ -40,6 +45,9 @@ var<workgroup> paints: array<vec4u, TILE_THREADS>;
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
+// Bits of the depth of the splat that left the last pixel of the tile hardly transparent, and 1 if there are pixels that still are.
+var<workgroup> seen_depth: atomic<u32>;
+var<workgroup> is_transparent: atomic<u32>;
 
 // 32 neighbouring threads paint a block of 8 x 4 pixels, so that they skip a splat together.
 fn pixel_in_tile(lane: u32) -> vec2u {
@@ -101,8 +109,23 @@ fn load_splat(k: u32, tile_corner: vec2f) {
   paints[k] = vec4u(bitcast<u32>(inverse_sigma_v), s.paint.yz, bitcast<u32>(power));
 }
 
+// Least float16 with all its digits: depths below it, or above the greatest, are not known well enough.
+const HALF_MIN = 6.104e-5;
+
+// Notes how far one sees through a pixel, and the first thread how far one saw in the tile. One that is transparent, or became opaque
+// only beyond the depth up to which its splats are complete, is opened. Has barriers.
+fn note_depth(tile: u32, lane: u32, is_seen_through: bool, last_seen: u32) {
+  atomicMax(&seen_depth, bitcast<u32>(unpack2x16float(last_seen).y));
+  if (is_seen_through) { atomicStore(&is_transparent, 1u); }
+  workgroupBarrier();
+  if (lane != 0u) { return; }
+  let depth = bitcast<f32>(atomicLoad(&seen_depth));
+  let is_known = depth > HALF_MIN && depth < HALF_MAX && depth <= bitcast<f32>(occlusion[tile]);
+  last_depths[tile] = select(OPEN, bitcast<u32>(depth), is_known && atomicLoad(&is_transparent) == 0u);
+}
+
 @compute @workgroup_size(TILE_THREADS)
-fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lane: u32) {
+fn main(@builtin(workgroup_id) tile: vec3u, @builtin(num_workgroups) tiles: vec3u, @builtin(local_invocation_index) lane: u32) {
   let corner = tile.xy * TILE;
   let pixel = corner + pixel_in_tile(lane);
   let center = vec2f(pixel) + 0.5;
@@ -116,6 +139,8 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
   var color = vec3f(0.0);
   var transmittance = 1.0;
   var finished = any(center > view.viewport);
+  // Blue and depth of the last splat that was blended while the pixel was transparent.
+  var last_seen = 0u;
   var start = range.x;
   loop {
     var waiting = workgroupUniformLoad(&queued);
@@ -152,6 +177,8 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
       let power = bitcast<f32>(paint.w) - u * u - v * v;
       if (power < power_min) { continue; }
       let alpha = min(ALPHA_MAX, exp2(power));
+      // The last one to be blended while the pixel is transparent is the one that ends it.
+      if (transmittance > occluded_below) { last_seen = paint.z; }
       let remaining = transmittance * (1.0 - alpha);
       if (remaining <= transmittance_min) {
         finished = true;
@@ -180,7 +207,10 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) lan
       if (j * TILE_THREADS + lane < left) { queue[j * TILE_THREADS + lane] = moved[j]; }
     }
   }
-  if (any(center > view.viewport)) { return; }
+  let is_outside = any(center > view.viewport);
+  let is_seen_through = !is_outside && !finished && transmittance > occluded_below;
+  note_depth(tile.y * tiles.x + tile.x, lane, is_seen_through, last_seen);
+  if (is_outside) { return; }
   var result = vec4f(color, transmittance);
   if (is_final) { result = vec4f(color, 1.0 - transmittance) + transmittance * view.background; }
   textureStore(image, pixel, result);

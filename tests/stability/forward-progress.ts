@@ -40,16 +40,16 @@ test('no loop waits', () => {
   });
 });
 
-for (const threads of ['parallel', 'serial'] as const) {
-  test(`the sort ends, ${threads}`, async () => {
+for (const name of ['shared8', 'shared4', 'serial'] as const) {
+  test(`the sort ends, ${name}`, async () => {
     const device = await nodeDevice();
     const count = sized(12, 300) * constants.SORT_BLOCK + 17;
     const random = randomSource(14);
     const keys = Uint32Array.from({ length: count }, () => Math.floor(random() * 0x1_0000_0000));
     await runCase(device, {
-      name: threads,
+      name,
       async run(bench) {
-        const stage = new SortStage(device, 'indices', threads);
+        const stage = new SortStage(device, name);
         const plan = bench.buffer(planFor(count));
         const order = [bench.buffer(4 * count), bench.buffer(4 * count)] as const;
         const bindings = stage.bind({
@@ -62,7 +62,7 @@ for (const threads of ['parallel', 'serial'] as const) {
         const start = performance.now();
         bench.compute((pass) => stage.record(pass, bindings, plan));
         checkEqual(await bench.read(order[0]), stableOrder(keys), 'order');
-        note('S14', `${count} keys, ${threads}, with reading back`, performance.now() - start, { unit: 'ms' });
+        note('S14', `${count} keys, ${name}, with reading back`, performance.now() - start, { unit: 'ms' });
       },
     });
   });

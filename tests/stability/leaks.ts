@@ -29,7 +29,10 @@ const packed = packGaussians(cloud);
 const written = writeTensors(cloud, SPEC);
 
 async function cycle(device: GPUDevice, i: number): Promise<number> {
-  const renderer = new Renderer(device, { threads: THREADS, rasterizer: i % 8 === 0 ? 'tiles' : 'quads' });
+  const renderer = new Renderer(device, {
+    threads: THREADS,
+    rasterizer: i % 8 === 0 ? sized('quads', 'tiles') : 'quads',
+  });
   const scene =
     i % 3 === 2 ? await DynamicGaussians.create(device, written.layout) : await GaussianBuffers.upload(device, packed);
   const tensors: Record<string, GPUBuffer> = {};

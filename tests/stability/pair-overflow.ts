@@ -26,7 +26,7 @@ test('ten times the room, at once', async () => {
       // In the file's order from near to far, so that the prefix that fits is known.
       position: [random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), 0.001 * i],
       scale: 60,
-      opacity: random.uniform(0.002, 0.06),
+      opacity: random.uniform(0.1, 0.5),
       color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)],
     })),
   );

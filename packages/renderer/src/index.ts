@@ -11,5 +11,6 @@ export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 export { Renderer, type FrameRequest, type RendererOptions } from './renderer.js';
 export type { FrameStatistics } from './statistics.js';
+export type { SortName } from './stages/sort.js';
 export type { Threads } from './stages/threads.js';
 export type { Variants } from './variants.js';

@@ -12,6 +12,7 @@ import { GpuMemory } from './gpu/memory.js';
 import type { PassTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
 import { leversOf, type Levers, type Quality } from './levers.js';
+import { Occlusion } from './occlusion.js';
 import { PageTable } from './page-table.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
 import type { AccumulationFormat, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
@@ -94,6 +95,7 @@ export class Renderer {
   readonly #stages: Stages;
   readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
+  readonly #occlusion: Occlusion;
   readonly #onIncomplete: () => void;
   readonly #memory: GpuMemory;
   readonly #composeUniform: GPUBuffer;
@@ -112,9 +114,10 @@ export class Renderer {
     this.levers = settle(device, leversOf(options));
     this.#onIncomplete = options.onIncomplete ?? (() => undefined);
     const overrides = overridesOf(this.levers);
-    this.#stages = makeStages(device, overrides, this.levers.threads);
+    this.#stages = makeStages(device, overrides, this.levers);
     this.#compose = new ComposeStage(device);
     this.#rasterizer = makeRasterizer(device, this.levers, overrides);
+    this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
@@ -138,8 +141,9 @@ export class Renderer {
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
     const { table, scratch, bindings, depthOrder } = this.#resources ?? {};
-    const parts = [this.#memory, table, scratch, bindings, depthOrder, this.#rasterizer, this.#accumulation?.texture];
-    return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    const parts = [this.#memory, table, scratch, bindings, depthOrder, this.#rasterizer, this.#occlusion];
+    const { texture } = this.#accumulation ?? {};
+    return [...parts, texture].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
   /**
@@ -153,19 +157,27 @@ export class Renderer {
     requireTextureSize(this.#device, camera);
     const target = this.#targetOf(request);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
-    const resources = this.#resourcesFor(scenes);
-    const { table, scratch, bindings, depthOrder, monitor } = resources;
     const drawn = scaled(camera, this.levers.resolutionScale);
+    const resources = this.#resourcesFor(scenes, this.#occlusion.fit(drawn));
+    const { table, scratch, bindings, depthOrder, monitor } = resources;
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer);
-    table.look(drawn, this.levers, isOrdered);
-    const serving = isOrdered ? depthOrder : undefined;
-    recordProjection(encoder, { stages: this.#stages, bindings, scratch, depthOrder: serving, timer });
+    this.#occlusion.prepare(encoder, drawn, table.version);
+    table.look(drawn, this.levers, isOrdered, this.#occlusion.tiles);
+    recordProjection(encoder, {
+      stages: this.#stages,
+      bindings,
+      scratch,
+      occlusion: this.#occlusion,
+      depthOrder: isOrdered ? depthOrder : undefined,
+      timer,
+    });
     const last = this.#paint(encoder, target, drawn, isOrdered, background, timer);
     const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
     this.#device.queue.submit([last.finish()]);
     if (isWatched) monitor.read();
+    if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
     if (this.levers.sortAngle <= STILL) depthOrder.settle();
   }
@@ -183,8 +195,9 @@ export class Renderer {
    */
   async isComplete(): Promise<boolean> {
     if (this.#resources === undefined) return true;
+    const mayLack = this.#occlusion.mayLack;
     const { visible, overflow, pairs, pairOverflow } = await this.readStatistics();
-    if (overflow + pairOverflow === 0) return true;
+    if (overflow + pairOverflow === 0) return !mayLack;
     this.#resources?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
     return false;
   }
@@ -195,6 +208,7 @@ export class Renderer {
     this.#accumulation?.texture.destroy();
     this.#accumulation = undefined;
     this.#rasterizer.destroy();
+    this.#occlusion.destroy();
     this.#memory.destroy();
   }
 
@@ -276,11 +290,12 @@ export class Renderer {
     return { view, format: target.format, isStorable, width, height };
   }
 
-  #resourcesFor(scenes: readonly GaussianScene[]): Resources {
+  #resourcesFor(scenes: readonly GaussianScene[], mustRebind: boolean): Resources {
     const current = this.#resources;
     if (current?.table.holds(scenes)) {
       // The monitor has asked for other room.
-      if (current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs) this.#rebind(current.table);
+      const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
+      if (mustRebind || hasOtherRoom) this.#rebind(current.table);
       return this.#resources!;
     }
     this.#releaseResources();
@@ -299,18 +314,19 @@ export class Renderer {
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
   #rebind(table: PageTable): void {
     const capacity = this.#capacity!;
-    const depthOrder = this.#resources?.depthOrder ?? new DepthOrder(this.#device, table, this.levers.threads);
+    const depthOrder = this.#resources?.depthOrder ?? new DepthOrder(this.#device, table, this.levers.sort);
     this.#resources?.scratch.destroy();
     this.#resources?.bindings.destroy();
     this.#resources?.monitor.destroy();
     const pages = table.pages.length;
     const scratch = new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
-    const { depthKeyBits } = this.levers;
+    const { depthKeyBits, sort } = this.levers;
     const { plan, splats, order, keys } = scratch;
     this.#rasterizer.bind({
       plan,
       splats,
-      orders: { sorted: order[sortedIn(depthKeyBits)], identity: keys[0] },
+      occlusion: this.#occlusion,
+      orders: { sorted: order[sortedIn(sort, depthKeyBits)], identity: keys[0] },
       capacity: capacity.visible,
       pairCapacity: capacity.pairs,
     });
@@ -323,7 +339,12 @@ export class Renderer {
     this.#resources = {
       table,
       scratch,
-      bindings: new FrameBindings(this.#device, this.#stages, table, scratch, depthKeyBits),
+      bindings: new FrameBindings(this.#device, this.#stages, {
+        table,
+        scratch,
+        occlusion: this.#occlusion.depths,
+        keyBits: depthKeyBits,
+      }),
       depthOrder,
       monitor,
     };
@@ -336,6 +357,7 @@ export class Renderer {
     bindings?.destroy();
     depthOrder?.release();
     monitor?.destroy();
+    this.#occlusion.forget();
     this.#resources = undefined;
     this.#lastAxis = undefined;
   }
@@ -353,8 +375,13 @@ export class Renderer {
 
 const isTexture = (target: GPUTexture | GPUTextureView): target is GPUTexture => 'createView' in target;
 
-function overridesOf({ alphaMin, minContribution, transmittanceMin }: Levers): Overrides {
-  return { alpha_min: alphaMin, min_contribution: minContribution, transmittance_min: transmittanceMin };
+function overridesOf({ alphaMin, minContribution, transmittanceMin, occludedBelow }: Levers): Overrides {
+  return {
+    alpha_min: alphaMin,
+    min_contribution: minContribution,
+    transmittance_min: transmittanceMin,
+    occluded_below: occludedBelow,
+  };
 }
 
 /** The same view with fewer pixels. */
@@ -388,10 +415,10 @@ function requireTextureSize(device: GPUDevice, { width, height }: Camera): void 
 
 function makeRasterizer(
   device: GPUDevice,
-  { rasterizer, accumulation, threads }: Variants,
+  { rasterizer, accumulation, sort, bins }: Levers & Variants,
   overrides: Overrides,
 ): Rasterizer {
-  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, threads);
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, { sort, bins });
   requireBlendable(device, accumulation);
   return new QuadsRasterizer(device, accumulation, overrides);
 }

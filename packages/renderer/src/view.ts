@@ -22,6 +22,7 @@ export type CameraValues = Omit<
   | 'antialiased'
   | 'key_bits'
   | 'is_ordered'
+  | 'occlusion_tiles'
 >;
 
 /**

@@ -17,6 +17,8 @@ export interface RasterizerInputs {
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
   readonly orders: Readonly<Record<OrderKind, GPUBuffer>>;
+  /** How far one sees in each tile, and where to write how far one saw: see `Occlusion`. */
+  readonly occlusion: { readonly depths: GPUBuffer; readonly lastDepths: GPUBuffer };
   /** Most splats that can be visible. */
   readonly capacity: number;
   /** Pairs of splat and bin for which there shall be room. */
