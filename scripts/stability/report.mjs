@@ -98,7 +98,7 @@ function peersTable({ rows, adapter }) {
   const names = rows[0].results.map(({ subject }) => subject);
   const lines = [
     '## The same rows, with peers\n',
-    `Same splats, same views, same criterion, in one page of Chromium (${adapter || 'SwiftShader'}), after rounding to 8 bits. Fails are in bold.\n`,
+    `Same splats, same views, same criterion, in one page of Chromium (${adapter || 'SwiftShader'}), after rounding to 8 bits. Fails are in bold. The first row is no failure but a measure: a peer's default picture is that far from the reference on any scene, by its own\nrules of falloff and dilation; what a row adds is the difference to it. Our limits hold for the reference picture, which peers do not aim at.\n`,
     `| row | at least | ${names.join(' | ')} |`,
     `|---|---|${names.map(() => '---').join('|')}|`,
     ...rows.map(({ row, title, least, results }) => {
