@@ -15,7 +15,14 @@ import { leversOf, type Levers, type Quality } from './levers.js';
 import { Occlusion } from './occlusion.js';
 import { PageTable } from './page-table.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
-import type { AccumulationFormat, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import type {
+  AccumulationFormat,
+  FrameNotes,
+  Painting,
+  Rasterizer,
+  RasterizerName,
+  Surface,
+} from './rasterizers/rasterizer.js';
 import { maxPairs, TilesRasterizer } from './rasterizers/tiles.js';
 import { maxVisible, Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
@@ -46,6 +53,10 @@ export interface FrameRequest {
   readonly targetFormat?: GPUTextureFormat;
   /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
   readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
+  /**
+   * What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it.
+   */
+  readonly notes?: FrameNotes;
   /** Notes when each pass ran. */
   readonly timer?: PassTimer;
 }
@@ -152,9 +163,10 @@ export class Renderer {
    * need a larger buffer than the device allows.
    */
   render(request: FrameRequest): void {
-    const { camera, background = TRANSPARENT, timer } = request;
+    const { camera, background = TRANSPARENT, notes, timer } = request;
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
+    if (notes) requireNotes(this.#rasterizer);
     const target = this.#targetOf(request);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
     const drawn = scaled(camera, this.levers.resolutionScale);
@@ -162,7 +174,7 @@ export class Renderer {
     const { table, scratch, bindings, depthOrder, monitor } = resources;
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer);
+    const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer, notes !== undefined);
     this.#occlusion.prepare(encoder, drawn, table.version);
     table.look(drawn, this.levers, isOrdered, this.#occlusion.tiles);
     recordProjection(encoder, {
@@ -173,7 +185,13 @@ export class Renderer {
       depthOrder: isOrdered ? depthOrder : undefined,
       timer,
     });
-    const last = this.#paint(encoder, target, drawn, isOrdered, background, timer);
+    const last = this.#paint(
+      encoder,
+      target,
+      drawn,
+      { order: isOrdered ? 'identity' : 'sorted', notes, timer },
+      background,
+    );
     const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
     this.#device.queue.submit([last.finish()]);
     if (isWatched) monitor.read();
@@ -222,6 +240,7 @@ export class Renderer {
     { depthOrder, table }: Resources,
     camera: Camera,
     timer: PassTimer | undefined,
+    isAskedFor: boolean,
   ): boolean {
     const { sortAngle } = this.levers;
     const axis = axisOf(camera);
@@ -232,7 +251,8 @@ export class Renderer {
       this.#turningFrames = 0;
       return true;
     }
-    if (isStill && depthOrder.isPossible && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL)) {
+    const isUseful = isAskedFor || (isStill && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL));
+    if (isUseful && depthOrder.isPossible) {
       depthOrder.record(encoder, camera, timer);
       return true;
     }
@@ -244,22 +264,20 @@ export class Renderer {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    isOrdered: boolean,
+    how: Pick<Painting, 'order' | 'notes' | 'timer'>,
     background: readonly [number, number, number, number],
-    timer: PassTimer | undefined,
   ): GPUCommandEncoder {
-    const order = isOrdered ? 'identity' : 'sorted';
     const isFullSize = camera.width === target.width && camera.height === target.height;
     if (isFullSize && target.isStorable && this.#rasterizer.finishes(target.format)) {
-      this.#rasterizer.record(encoder, { surface: target, order, background, timer });
+      this.#rasterizer.record(encoder, { ...how, surface: target, background });
       return encoder;
     }
     const { texture, compose } = this.#accumulationOf(camera.width, camera.height);
     const scale = [camera.width / target.width, camera.height / target.height];
     writeStruct(layouts.Compose, { background, scale }, this.#composeBytes);
     this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
-    const last = this.#recordSlices(encoder, { surface: texture, order, timer });
-    this.#compose.record(last, compose, target.view, target.format, timer);
+    const last = this.#recordSlices(encoder, { ...how, surface: texture });
+    this.#compose.record(last, compose, target.view, target.format, how.timer);
     return last;
   }
 
@@ -326,6 +344,7 @@ export class Renderer {
       plan,
       splats,
       occlusion: this.#occlusion,
+      survivors: order[0],
       orders: { sorted: order[sortedIn(sort, depthKeyBits)], identity: keys[0] },
       capacity: capacity.visible,
       pairCapacity: capacity.pairs,
@@ -421,6 +440,16 @@ function makeRasterizer(
   if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, { sort, bins });
   requireBlendable(device, accumulation);
   return new QuadsRasterizer(device, accumulation, overrides);
+}
+
+function requireNotes({ name, takesNotes }: Rasterizer): void {
+  if (takesNotes) return;
+  throw new GaussianSplatError('unsupported/limits', {
+    where: 'FrameRequest.notes',
+    expected: 'a renderer with the rasterizer tiles',
+    found: name,
+    remedy: "make the renderer with { rasterizer: 'tiles' }",
+  });
 }
 
 function requireBlendable(device: GPUDevice, format: AccumulationFormat): void {

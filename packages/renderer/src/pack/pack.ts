@@ -55,7 +55,7 @@ export function packGaussians(given: GaussianCloud, options: PackOptions = {}): 
   validateCloud(given);
   const cloud = recentred(given);
   const { shDegree, antialiased, origin } = cloud;
-  const kept = mortonOrder(cloud.positions, usableIndices(cloud));
+  const kept = packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
@@ -65,6 +65,11 @@ export function packGaussians(given: GaussianCloud, options: PackOptions = {}): 
     sh: packSh(cloud, kept, shPrecision),
     chunks: boundChunks(cloud, kept),
   };
+}
+
+/** Index in the cloud of each packed splat. */
+export function packedOrder(cloud: GaussianCloud): Uint32Array {
+  return mortonOrder(cloud.positions, usableIndices(cloud));
 }
 
 function usableIndices(cloud: GaussianCloud): Uint32Array {

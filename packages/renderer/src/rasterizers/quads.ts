@@ -12,6 +12,7 @@ const WHOLE = { index: 0, count: 1 } as const;
 export class QuadsRasterizer implements Rasterizer {
   readonly name = 'quads';
   readonly canSlice = true;
+  readonly takesNotes = false;
   readonly #device: GPUDevice;
   readonly #program: Program;
   readonly #pipeline: GPURenderPipeline;

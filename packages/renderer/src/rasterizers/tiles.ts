@@ -6,17 +6,27 @@ import {
   constants,
   layouts,
   rasterizeTiles,
+  rasterizeTilesNoting,
   scan,
 } from '../generated/shaders.js';
 import type { Levers } from '../levers.js';
 import type { Variants } from '../variants.js';
 import { gridOf, withBins, type BinSize, type Grid } from './bins.js';
-import { BUFFER_USAGE, ComputeKernel, kernelOf, perDevice, specialise, type Overrides } from '../gpu/kernel.js';
+import {
+  BUFFER_USAGE,
+  TEXTURE_USAGE,
+  ComputeKernel,
+  kernelOf,
+  perDevice,
+  specialise,
+  type Overrides,
+  type ShaderDescription,
+} from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
-import type { OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
+import type { FrameNotes, OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
 
 const { TILE, PREFIX_THREADS, SORT_BLOCK, DIGITS } = constants;
 /** A slot, and a mask of tiles. */
@@ -64,6 +74,7 @@ export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
   /** Tiles stop where nothing behind can be seen: their work is bounded by what is. */
   readonly canSlice = false;
+  readonly takesNotes = true;
   readonly #device: GPUDevice;
   readonly #overrides: Overrides;
   readonly #memory: GpuMemory;
@@ -75,6 +86,8 @@ export class TilesRasterizer implements Rasterizer {
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
   #bound: GridBindings | undefined;
+  /** Where notes go that nobody asked for. */
+  #nowhere: Required<FrameNotes> | undefined;
 
   constructor(device: GPUDevice, overrides: Overrides, { sort, bins }: Pick<Levers & Variants, 'sort' | 'bins'>) {
     this.#device = device;
@@ -106,7 +119,7 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = this.#allocate(inputs);
   }
 
-  record(encoder: GPUCommandEncoder, { surface, order, background, timer }: Painting): void {
+  record(encoder: GPUCommandEncoder, { surface, order, background, notes, timer }: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const { plan } = this.#inputs;
     const buffers = this.#buffers;
@@ -134,14 +147,18 @@ export class TilesRasterizer implements Rasterizer {
       format,
       bins: bound.grid.size,
       isFinal: background !== undefined,
+      isNoting: notes !== undefined,
       overrides: this.#overrides,
     });
-    const image = this.#imageBindings(kernel, bound, surface.view);
+    const image = notes
+      ? this.#bindNoting(kernel, bound, surface.view, notes)
+      : this.#imageBindings(kernel, bound, surface.view);
     kernel.dispatchGrid(paint, image, Math.ceil(width / TILE), Math.ceil(height / TILE));
     paint.end();
   }
 
   destroy(): void {
+    this.#nowhere?.depth.destroy();
     this.#memory.destroy();
   }
 
@@ -211,17 +228,46 @@ export class TilesRasterizer implements Rasterizer {
   #imageBindings(kernel: RasterizeKernel, bound: GridBindings, image: GPUTextureView): GPUBindGroup {
     const known = bound.rasterize.get(image);
     if (known) return known;
-    const made = kernel.bind({
-      view: this.#view,
-      splats: this.#inputs!.splats,
-      pairs: this.#buffers!.pairs[sortedIn(this.#sort.name, bound.grid.bits)],
-      ranges: bound.ranges,
-      occlusion: this.#inputs!.occlusion.depths,
-      last_depths: this.#inputs!.occlusion.lastDepths,
-      image,
-    });
+    const made = kernel.bind(this.#painted(bound, image));
     bound.rasterize.set(image, made);
     return made;
+  }
+
+  #painted(bound: GridBindings, image: GPUTextureView) {
+    const { splats, occlusion } = this.#inputs!;
+    return {
+      view: this.#view,
+      splats,
+      pairs: this.#buffers!.pairs[sortedIn(this.#sort.name, bound.grid.bits)],
+      ranges: bound.ranges,
+      occlusion: occlusion.depths,
+      last_depths: occlusion.lastDepths,
+      image,
+    };
+  }
+
+  /** Bound anew for each frame: notes are not for every frame. */
+  #bindNoting(
+    kernel: RasterizeKernel,
+    bound: GridBindings,
+    image: GPUTextureView,
+    { contributions, depth }: FrameNotes,
+  ): GPUBindGroup {
+    this.#nowhere ??= {
+      contributions: this.#memory.buffer('gs.rasterize.no_contributions', 4, BUFFER_USAGE.storage),
+      depth: this.#device.createTexture({
+        label: 'gs.rasterize.no_depth',
+        size: [1, 1],
+        format: 'r32float',
+        usage: TEXTURE_USAGE.storageBinding,
+      }),
+    };
+    return (kernel as unknown as ComputeKernel<typeof rasterizeTilesNoting>).bind({
+      ...this.#painted(bound, image),
+      survivors: this.#inputs!.survivors,
+      contributions: contributions ?? this.#nowhere.contributions,
+      depths: (depth ?? this.#nowhere.depth).createView(),
+    });
   }
 
   #writeView(
@@ -261,21 +307,24 @@ interface RasterizeVariant {
   readonly format: GPUTextureFormat;
   readonly bins: BinSize;
   readonly isFinal: boolean;
+  readonly isNoting: boolean;
   readonly overrides: Overrides;
 }
 
-function rasterizeKernel(device: GPUDevice, { format, bins, isFinal, overrides }: RasterizeVariant): RasterizeKernel {
+function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
+  const { format, bins, isFinal, isNoting, overrides } = variant;
+  const shader: ShaderDescription = isNoting ? rasterizeTilesNoting : rasterizeTiles;
   const { alpha_min, transmittance_min, occluded_below } = overrides;
   const constants = { alpha_min, transmittance_min, occluded_below, is_final: isFinal ? 1 : 0 };
-  return perDevice(device, `rasterize tiles ${format} ${bins} ${JSON.stringify(constants)}`, () => {
+  return perDevice(device, `${shader.name} ${format} ${bins} ${JSON.stringify(constants)}`, () => {
     const { image } = rasterizeTiles.bindings;
     const writing = specialise(
-      withBins(rasterizeTiles, bins),
+      withBins(shader, bins),
       format,
       `texture_storage_2d<${image.format}`,
       `texture_storage_2d<${format}`,
     );
-    const bindings = { ...rasterizeTiles.bindings, image: { ...image, format } };
+    const bindings = { ...shader.bindings, image: { ...image, format } };
     return new ComputeKernel(device, { ...writing, bindings } as unknown as typeof rasterizeTiles, constants);
   });
 }
