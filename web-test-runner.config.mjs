@@ -11,6 +11,9 @@ import { typescript } from './tests/element/browser/support/typescript.mjs';
 
 const otherOrigin = await startOtherOrigin();
 
+/** `npm run stability` runs whole recipes. */
+const isFull = process.env.STABILITY === 'full';
+
 const HIGH_DENSITY = 'tests/element/browser/high-density.test.ts';
 
 export default {
@@ -24,8 +27,10 @@ export default {
   concurrency: 1,
   concurrentBrowsers: 1,
   browserStartTimeout: 60_000,
-  testsFinishTimeout: 240_000,
-  testFramework: { config: { ui: 'bdd', timeout: 60_000 } },
+  testsFinishTimeout: isFull ? 1_800_000 : 240_000,
+  testFramework: { config: { ui: 'bdd', timeout: isFull ? 900_000 : 60_000 } },
+  testRunnerHtml: (framework) =>
+    `<!doctype html><html><body><script>STABILITY = ${JSON.stringify(process.env.STABILITY ?? 'fast')}</script><script type="module" src="${framework}"></script></body></html>`,
   browsers: [chromium(1)],
   middleware: [hostileServer(otherOrigin)],
   plugins: [typescript(), pageCommands()],

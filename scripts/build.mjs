@@ -29,6 +29,7 @@ async function buildDemo() {
     if (name !== 'dist' && name !== 'bench') cpSync(join(from, name), join(to, name), { recursive: true });
   }
   cpSync(join(root, 'packages/element/cdn'), join(to, 'cdn'), { recursive: true });
+  cpSync(join(root, 'docs/stability'), join(to, 'stability/data'), { recursive: true });
   // Its packages were not there when this script started on a fresh clone.
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));

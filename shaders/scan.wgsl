@@ -10,6 +10,8 @@ struct Scan { length: u32 }
 const PER_THREAD = 16u;
 
 var<workgroup> step_total: u32;
+// Sum up to and including each thread.
+var<workgroup> ends: array<u32, PREFIX_THREADS>;
 
 @compute @workgroup_size(PREFIX_THREADS)
 fn main(@builtin(local_invocation_index) lane: u32) {
@@ -22,16 +24,19 @@ fn main(@builtin(local_invocation_index) lane: u32) {
       // Written in every round: a compiler was seen to keep a variable of the loop body from one round to the next.
       own[k] = 0u;
       if (first + k < scan.length) { own[k] = values[first + k]; }
-      sum += own[k];
+      sum = add_saturating(sum, own[k]);
     }
     let inclusive = inclusive_sum(sum, lane, PREFIX_THREADS);
     if (lane == PREFIX_THREADS - 1u) { step_total = inclusive; }
-    var running = carry + inclusive - sum;
+    ends[lane] = inclusive;
+    workgroupBarrier();
+    // Not the difference of two sums: both may have stopped.
+    var running = add_saturating(carry, select(ends[max(lane, 1u) - 1u], 0u, lane == 0u));
     for (var k = 0u; k < PER_THREAD; k++) {
       if (first + k < scan.length) { values[first + k] = running; }
-      running += own[k];
+      running = add_saturating(running, own[k]);
     }
-    carry += workgroupUniformLoad(&step_total);
+    carry = add_saturating(carry, workgroupUniformLoad(&step_total));
   }
   if (lane == 0u) { values[scan.length] = carry; }
 }

@@ -3,6 +3,12 @@ const PREFIX_THREADS = 256u;
 
 var<workgroup> ladder: array<u32, 2u * PREFIX_THREADS>;
 
+// Sums stop at the largest number: one that wrapped around would look like room for everything.
+fn add_saturating(a: u32, b: u32) -> u32 {
+  let sum = a + b;
+  return select(sum, 0xffffffffu, sum < a);
+}
+
 // Sum of `own` over all threads of the same row up to and including this one; rows are `width` threads wide (a power of
 // two). Must be called by all threads. Ends with a barrier after which another call may follow.
 fn inclusive_sum(own: u32, lane: u32, width: u32) -> u32 {
@@ -12,7 +18,7 @@ fn inclusive_sum(own: u32, lane: u32, width: u32) -> u32 {
   for (var reach = 1u; reach < width; reach *= 2u) {
     ladder[side + lane] = sum;
     workgroupBarrier();
-    if (column >= reach) { sum += ladder[side + lane - reach]; }
+    if (column >= reach) { sum = add_saturating(sum, ladder[side + lane - reach]); }
     side = PREFIX_THREADS - side;
   }
   workgroupBarrier();

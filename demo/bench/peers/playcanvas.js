@@ -47,6 +47,12 @@ window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
       }
       return readPixels(state.device, state.texture);
     },
+    /** The next frame, whatever is not up to date yet. */
+    async snapshot(view) {
+      subject.draw(view, false);
+      await subject.finish();
+      return readPixels(state.device, state.texture);
+    },
     facts: async () => ({
       rounded: true,
       errors: state.errors,

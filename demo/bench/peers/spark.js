@@ -52,6 +52,11 @@ window.openSubject = async ({ ply, parity, antialiased, width, height }) => {
       draw(view);
       return readGl(gl);
     },
+    /** The next frame, in whatever order there is. */
+    async snapshot(view) {
+      draw(view);
+      return readGl(gl);
+    },
     facts: async () => {
       const { blurAmount, preBlurAmount, sortRadial, enableLod, maxStdDev, minAlpha, activeSplats } = spark;
       const { clipXY, accumExtSplats } = spark;

@@ -35,8 +35,11 @@ export type ErrorCode =
   | 'unsupported/no-webgpu'
   | 'unsupported/no-adapter'
   | 'unsupported/limits'
+  /** Every variant of the renderer fails its known answer on this device: its shader compiler or driver errs. */
+  | 'unsupported/wrong-image'
   /** The scene needs more GPU memory than a buffer or the device may hold. */
   | 'out-of-memory/buffer-limit'
+  | 'out-of-memory/budget'
   | 'out-of-memory/allocation'
   /** The GPU device was lost and could not be brought back. */
   | 'device-lost/unrecoverable'

@@ -76,6 +76,11 @@ export class GaussianSplatElement extends LitElement {
   static frameScheduler = new FrameScheduler();
   /** How long a removed element keeps its scene, in milliseconds: moving it within the page costs nothing. */
   static releaseDelay = 1_000;
+  /**
+   * Bytes of GPU memory that one scene may take; a larger one is refused with `out-of-memory/budget` before any of it is allocated. null, the
+   * default: half of the memory that the browser says the device has (`navigator.deviceMemory`), no limit where it does not say.
+   */
+  static memoryBudget: number | null = null;
   /** Folder of the files of onnxruntime-web 1.30.0, which generators need; null for `onnxruntime/` beside the bundle. */
   static runtimeLocation: string | null = null;
 

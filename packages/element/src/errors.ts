@@ -44,6 +44,8 @@ export function visitorMessage({ code, reason }: ElementError): string {
     case 'unsupported/no-adapter':
     case 'unsupported/limits':
       return 'This 3D scene needs WebGPU, and this browser found no graphics adapter for it: switch on hardware acceleration or update the graphics driver.';
+    case 'unsupported/wrong-image':
+      return 'This 3D scene cannot be drawn correctly here: update the browser or the graphics driver.';
     default:
       return VISITOR_MESSAGES[code];
   }

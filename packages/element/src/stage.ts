@@ -26,6 +26,8 @@ export interface Services {
   readonly frameScheduler: FrameScheduler;
   /** How long a removed element keeps its scene, ms. */
   readonly releaseDelay: number;
+  /** Bytes of GPU memory that one scene may take; null for what suits the device. */
+  readonly memoryBudget: number | null;
   /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
 }
@@ -133,6 +135,7 @@ export class Stage {
         if (clear) this.#view.clear();
         else this.#view.pause();
       },
+      memoryBudget: () => services().memoryBudget ?? defaultMemoryBudget(),
       live: () => ({
         runtimeLocation: services().runtimeLocation,
         state: () => this.#liveState(),
@@ -251,5 +254,10 @@ function absoluteUrl(src: string): string {
 
 const absoluteUrls = (urls: string | null): readonly string[] =>
   (urls ?? '').split(/\s+/).filter(Boolean).map(absoluteUrl);
+/** The GPU's share of a device is known to nobody; half of the memory is what shared memory can spare. Browsers round it, and end at 8 GB or more. */
+function defaultMemoryBudget(): number | undefined {
+  const { deviceMemory } = navigator as { deviceMemory?: number };
+  return deviceMemory === undefined ? undefined : deviceMemory * 2 ** 29;
+}
 
 const prefersReducedMotion = (): boolean => matchMedia('(prefers-reduced-motion: reduce)').matches;

@@ -10,7 +10,7 @@ import { pageCapacity } from './gaussian-buffers.js';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { GpuMemory, requireBudget, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS } from './pack/pack.js';
@@ -23,6 +23,8 @@ import { ingestValues, TensorPlaces } from './tensor-places.js';
 export interface DynamicGaussiansOptions {
   /** True if the model was trained with opacity compensation for the dilation. Default false. */
   readonly antialiased?: boolean;
+  /** Bytes of GPU memory that the scene may take; default no limit but the device's. */
+  readonly memoryBudget?: number;
 }
 
 const ORIGIN: Vector3 = [0, 0, 0];
@@ -88,14 +90,16 @@ export class DynamicGaussians implements GaussianScene {
   /**
    * Allocates room for what a generator can write at most.
    * @param layout as core's `gaussianLayout` finds it
-   * @throws GaussianSplatError `out-of-memory/allocation` if the device has no room.
+   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated, `out-of-memory/allocation` if the device has no room.
    */
-  static create(
+  static async create(
     device: GPUDevice,
     layout: GaussianLayout,
     options: DynamicGaussiansOptions = {},
   ): Promise<DynamicGaussians> {
     const what = `generated scene of up to ${layout.capacity} splats`;
+    const bytesPerRow = 4 * (GEOMETRY_WORDS + shWords(layout.shDegree ?? 0, 'float16'));
+    requireBudget(what, bytesPerRow * layout.capacity, options.memoryBudget);
     return withMemoryCheck(device, what, () => new DynamicGaussians(device, layout, options));
   }
 

@@ -2,10 +2,15 @@ import type { ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { GpuMemory, requireBudget, withMemoryCheck } from './gpu/memory.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
 import { shWords, type ShPrecision } from './pack/sh.js';
+
+export interface UploadOptions {
+  /** Bytes of GPU memory that the scene may take; default no limit but the device's. */
+  readonly memoryBudget?: number;
+}
 
 /** Gaussians on the GPU, ready for any {@link Renderer} of the same device. */
 export class GaussianBuffers implements GaussianScene {
@@ -42,10 +47,17 @@ export class GaussianBuffers implements GaussianScene {
 
   /**
    * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for.
-   * @throws GaussianSplatError `out-of-memory/allocation` if the device has no room.
+   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated, `out-of-memory/allocation` if the device has no room.
    */
-  static upload(device: GPUDevice, packed: PackedGaussians): Promise<GaussianBuffers> {
-    return withMemoryCheck(device, `scene of ${packed.count} splats`, () => new GaussianBuffers(device, packed));
+  static async upload(
+    device: GPUDevice,
+    packed: PackedGaussians,
+    { memoryBudget }: UploadOptions = {},
+  ): Promise<GaussianBuffers> {
+    const what = `scene of ${packed.count} splats`;
+    const { geometry, sh, chunks } = packed;
+    requireBudget(what, geometry.byteLength + sh.byteLength + chunks.byteLength, memoryBudget);
+    return withMemoryCheck(device, what, () => new GaussianBuffers(device, packed));
   }
 
   /** Bytes of GPU memory held. */

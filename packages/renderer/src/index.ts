@@ -2,7 +2,7 @@ export { capture } from './capture.js';
 export { chooseVariants, type ChoiceOptions, type ChoiceStore } from './choice/choose.js';
 export { deviceDescriptor } from './device.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
-export { GaussianBuffers } from './gaussian-buffers.js';
+export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 export type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 export { PassTimer, type PassTime } from './gpu/pass-timer.js';
 export { QUALITIES, type Levers, type Quality } from './levers.js';

@@ -26,6 +26,11 @@ export interface Levers {
    * are spread over the logarithm of the visible depths.
    */
   readonly depthKeyBits: 16 | 24 | 32;
+  /**
+   * Submissions that the painting of a frame is divided into, where the rasterizer can (quads): the picture is the same, but none runs as long, which matters
+   * where drivers stop what takes them too long. 1 to 256.
+   */
+  readonly submissions: number;
   /** Radians that the camera may turn before an order of all splats is made anew. */
   readonly sortAngle: number;
   /**
@@ -52,6 +57,7 @@ const EXACT: Levers = {
   sort: 'auto',
   accumulation: 'auto',
   depthKeyBits: 24,
+  submissions: 1,
   sortAngle: 2e-5,
   occludedBelow: 0,
   transmittanceMin: 1e-4,
@@ -82,6 +88,7 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
 };
 
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
+  submissions: [1, 256],
   sortAngle: [0, Math.PI],
   transmittanceMin: [0, 1],
   occludedBelow: [0, 1],

@@ -185,9 +185,15 @@ export class Renderer {
       depthOrder: isOrdered ? depthOrder : undefined,
       timer,
     });
-    this.#paint(encoder, target, drawn, { order: isOrdered ? 'identity' : 'sorted', notes, timer }, background);
-    const isWatched = monitor.record(encoder, scratch.plan, this.#rasterizer.pairPlan);
-    this.#device.queue.submit([encoder.finish()]);
+    const last = this.#paint(
+      encoder,
+      target,
+      drawn,
+      { order: isOrdered ? 'identity' : 'sorted', notes, timer },
+      background,
+    );
+    const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
+    this.#device.queue.submit([last.finish()]);
     if (isWatched) monitor.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
@@ -260,18 +266,34 @@ export class Renderer {
     camera: Camera,
     how: Pick<Painting, 'order' | 'notes' | 'timer'>,
     background: readonly [number, number, number, number],
-  ): void {
+  ): GPUCommandEncoder {
     const isFullSize = camera.width === target.width && camera.height === target.height;
     if (isFullSize && target.isStorable && this.#rasterizer.finishes(target.format)) {
       this.#rasterizer.record(encoder, { ...how, surface: target, background });
-      return;
+      return encoder;
     }
     const { texture, compose } = this.#accumulationOf(camera.width, camera.height);
     const scale = [camera.width / target.width, camera.height / target.height];
     writeStruct(layouts.Compose, { background, scale }, this.#composeBytes);
     this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
-    this.#rasterizer.record(encoder, { ...how, surface: texture });
-    this.#compose.record(encoder, compose, target.view, target.format, how.timer);
+    const last = this.#recordSlices(encoder, { ...how, surface: texture });
+    this.#compose.record(last, compose, target.view, target.format, how.timer);
+    return last;
+  }
+
+  /** Records the painting, in several submissions where that is asked for. @returns the encoder to go on with */
+  #recordSlices(encoder: GPUCommandEncoder, painting: Painting): GPUCommandEncoder {
+    const count = this.#rasterizer.canSlice ? Math.ceil(this.levers.submissions) : 1;
+    let current = encoder;
+    for (let index = 0; index < count; index++) {
+      // What comes before the painting is a submission of its own, too.
+      if (count > 1) {
+        this.#device.queue.submit([current.finish()]);
+        current = this.#device.createCommandEncoder({ label: `gs.frame.${index}` });
+      }
+      this.#rasterizer.record(current, { ...painting, slice: { index, count } });
+    }
+    return current;
   }
 
   #targetOf({ target, targetFormat, camera }: FrameRequest): Target {

@@ -5,6 +5,9 @@ import type { StructValues } from './gpu/struct.js';
 /** Part of the half field of view that the Jacobian's clamp allows beyond the image: INRIA's 1.3 is 1 + this. */
 const CLAMP_MARGIN = 0.3;
 
+/** WGSL lets compilers assume that there is no infinity: a far plane at infinity is as far as float32 goes. */
+const MAX_FLOAT32 = 3.4028234663852886e38;
+
 type ViewValues = StructValues<typeof layouts.View>;
 
 /** The fields of the WGSL `View` that depend on the camera and on the origin of the Gaussians. */
@@ -43,7 +46,7 @@ export function cameraValues(camera: Camera, origin: Vector3): CameraValues {
     jacobian_min: [-cx / fx - marginX, -cy / fy - marginY],
     jacobian_max: [(width - cx) / fx + marginX, (height - cy) / fy + marginY],
     near,
-    far,
+    far: Math.min(far, MAX_FLOAT32),
     stretch: stretchOf(worldToCamera),
   };
 }

@@ -19,6 +19,8 @@ export interface SceneOptions {
   readonly show: (scene: GpuScene, isNew: boolean) => Promise<void>;
   /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
   readonly hide: (clear: boolean) => void;
+  /** Bytes of GPU memory that the scene may take. */
+  readonly memoryBudget: () => number | undefined;
   /** What a generator needs to know beyond the request. */
   readonly live: OpenOptions['live'];
   readonly onProgress: (loaded: number, total: number | undefined) => void;
@@ -31,6 +33,10 @@ export interface SceneOptions {
 const MAX_FAILURES = 2;
 /** Pause before the second try, ms: a GPU process that has just crashed needs a moment. */
 const RETRY_DELAY_MS = 1_000;
+
+/** How many more submissions a frame is divided into after each loss, and where that ends: the picture is the same. */
+const SUBMISSIONS_GROWTH = 4;
+const MOST_SUBMISSIONS = 64;
 
 /**
  * Life of the element's scene: load, replace (the latest request wins), recover after the loss of the device, release.
@@ -46,6 +52,8 @@ export class SceneController implements ReactiveController {
   #running = new AbortController();
   #releaseTimer: ReturnType<typeof setTimeout> | undefined;
   #waiters: (() => void)[] = [];
+  /** Grows with every loss of the device: a frame that ran too long for the driver may have been the cause. */
+  #submissions = 1;
 
   constructor(host: ReactiveControllerHost, options: SceneOptions) {
     this.#host = host;
@@ -80,6 +88,7 @@ export class SceneController implements ReactiveController {
     if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
     if (!isSame(request, this.#request)) {
       this.#abort();
+      this.#submissions = 1;
       this.#request = request;
       this.#setState('waiting');
     }
@@ -124,6 +133,7 @@ export class SceneController implements ReactiveController {
   /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
   async #restore(request: SceneRequest): Promise<void> {
     this.#abort();
+    this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
     const { signal } = this.#running;
     this.#drop(false);
     this.#options.onContext('contextlost');
@@ -145,6 +155,7 @@ export class SceneController implements ReactiveController {
       } catch (error) {
         if (signal.aborted) return;
         if (!isDeviceFailure(error, isNew)) return this.fail(error);
+        this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
         if (++failures >= MAX_FAILURES) return this.fail(unrecoverable(error));
         await delay(RETRY_DELAY_MS);
@@ -159,11 +170,11 @@ export class SceneController implements ReactiveController {
     isNew: boolean,
     onProgress: (loaded: number, total: number | undefined) => void,
   ): Promise<void> {
-    const { device, loader, show, live } = this.#options;
+    const { device, loader, show, live, memoryBudget } = this.#options;
     const beforeUpload = (): void => this.#drop(false);
     const scene = await openGpuScene(request, {
       ...{ device: device(), loader: loader() },
-      ...{ signal, onProgress, beforeUpload, live },
+      ...{ signal, onProgress, beforeUpload, live, memoryBudget: memoryBudget(), submissions: this.#submissions },
     });
     if (signal.aborted) return scene.destroy();
     this.#scene = scene;

@@ -29,14 +29,16 @@ export class GpuScene {
   #renderer: Renderer;
   #quality: Quality = 'default';
   #filter: FrameFilter | undefined;
+  readonly #submissions: number;
   readonly #lease: DeviceLease;
   #destroyed = false;
 
-  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, live?: LiveModel) {
+  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, submissions: number, live?: LiveModel) {
     this.#lease = lease;
     this.live = live;
     this.gaussians = gaussians;
     this.bounds = bounds;
+    this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
   }
 
@@ -81,7 +83,7 @@ export class GpuScene {
       this.#filter?.invalidate();
       this.onIncomplete();
     };
-    return new Renderer(this.device, { quality: this.#quality, onIncomplete });
+    return new Renderer(this.device, { quality: this.#quality, submissions: this.#submissions, onIncomplete });
   }
 
   /** Encodes and submits one frame. */
@@ -129,8 +131,12 @@ export interface OpenOptions {
   readonly onProgress: ProgressListener;
   /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. */
   readonly beforeUpload: () => void;
+  /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
+  readonly memoryBudget: number | undefined;
+  /** Submissions that the painting of a frame is divided into. */
+  readonly submissions: number;
   /** What a generator needs to know beyond the request. */
-  readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials'>;
+  readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }
 
 /** Device and file at the same time, then the upload. Rejects with GaussianSplatError or the signal's reason. */
@@ -147,10 +153,10 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
   const choosing = acquiring.then(({ device }) => chooseVariants(device));
   const loading = options.loader.load(request, abort.signal, options.onProgress);
   try {
-    const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(ignore)]);
+    const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(unlessWrong)]);
     options.signal.throwIfAborted();
     options.beforeUpload();
-    return await upload(lease, scene, options.signal);
+    return await upload(lease, scene, options);
   } catch (error) {
     abort.abort(error);
     acquiring.then((lease) => lease.release(), ignore);
@@ -169,7 +175,7 @@ function isGenerator({ url, contract }: SceneRequest): boolean {
 }
 
 async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
-  const { signal, onProgress, beforeUpload } = options;
+  const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
   const opening = import('../live/open-live-model.js');
   const acquiring = options.device.acquire();
   opening.catch(ignore);
@@ -179,22 +185,26 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
     const { openLiveModel } = await opening;
     const { url, chain = [], contract, credentials } = request;
     const live = await openLiveModel(
-      { ...options.live(), url, chain, contract, credentials },
+      { ...options.live(), url, chain, contract, credentials, memoryBudget },
       lease.device,
       signal,
       onProgress,
     );
     beforeUpload();
-    return new GpuScene(lease, live.gaussians, live.bounds, live);
+    return new GpuScene(lease, live.gaussians, live.bounds, submissions, live);
   } catch (error) {
     lease.release();
     throw error;
   }
 }
 
-async function upload(lease: DeviceLease, { packed, bounds }: LoadedScene, signal: AbortSignal): Promise<GpuScene> {
-  const gaussians = await GaussianBuffers.upload(lease.device, packed);
-  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds);
+async function upload(
+  lease: DeviceLease,
+  { packed, bounds }: LoadedScene,
+  { signal, memoryBudget, submissions }: OpenOptions,
+): Promise<GpuScene> {
+  const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
+  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds, submissions);
   gaussians.destroy();
   throw signal.reason;
 }
@@ -207,6 +217,11 @@ function outOfMemory(cause: GPUError): GaussianSplatError {
     remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
     cause,
   });
+}
+
+/** That no variant draws the right image ends the loading; that none could be timed does not. */
+function unlessWrong(error: unknown): void {
+  if (error instanceof GaussianSplatError && error.code === 'unsupported/wrong-image') throw error;
 }
 
 function ignore(): void {

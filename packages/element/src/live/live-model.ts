@@ -40,6 +40,8 @@ export interface LiveRequest {
   /** Address of a contract, its JSON text, or the contract itself; null for that of the model or beside it. */
   readonly contract: unknown;
   readonly credentials: RequestCredentials;
+  /** Bytes of GPU memory that the Gaussians may take; undefined for no limit but the device's. */
+  readonly memoryBudget: number | undefined;
   /** Folder of the runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
   readonly state: () => LiveState;

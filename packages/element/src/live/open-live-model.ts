@@ -31,7 +31,10 @@ export async function openLiveModel(
   try {
     const { models, model } = generator;
     for (const { notes, url } of models) for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
-    gaussians = await DynamicGaussians.create(device, model.layout, { antialiased: model.contract.antialiased });
+    gaussians = await DynamicGaussians.create(device, model.layout, {
+      antialiased: model.contract.antialiased,
+      memoryBudget: request.memoryBudget,
+    });
     generator.sink = gaussians;
     const { onInput: onChange, onError } = listeners;
     const { credentials } = request;

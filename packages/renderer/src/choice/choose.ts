@@ -1,3 +1,4 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { FrameClock } from './frame-clock.js';
 import { perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
@@ -40,6 +41,7 @@ const MEASURABLE = 1.5;
  * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a known answer are out, the
  * others are timed on small scenes. Takes a few tenths of a second the first time on an adapter; then the choice is kept in `store`, and
  * only its answer is checked again.
+ * @throws GaussianSplatError `unsupported/wrong-image` if no variant gives the known answer.
  */
 export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): Promise<Variants> {
   return perDevice(device, 'choice', async () => {
@@ -58,9 +60,26 @@ async function probe(device: GPUDevice): Promise<Variants> {
   for (const candidate of candidatesFor(device, sort)) {
     if (await isRight(device, candidate)) candidates.push(candidate);
   }
-  if (candidates.length === 0) return SAFE;
-  return chooseFastest(device, candidates);
+  if (candidates.length > 0) return chooseFastest(device, candidates);
+  for (const candidate of lastResorts(sort)) if (await isRight(device, candidate)) return candidate;
+  return giveUp(device);
 }
+
+/** A wrong picture is worse than none. A lost device draws none, and says so itself. */
+async function giveUp(device: GPUDevice): Promise<Variants> {
+  const isLost = await Promise.race([device.lost.then(() => true), settled().then(() => false)]);
+  if (isLost) return SAFE;
+  const { vendor = '', architecture = '', description = '' } = device.adapterInfo ?? {};
+  throw new GaussianSplatError('unsupported/wrong-image', {
+    where: `the graphics adapter ${[vendor, architecture, description].filter(Boolean).join(' ') || '(unnamed)'}`,
+    expected: 'the known picture of 64 spheres',
+    found: 'another picture from every variant of the renderer',
+    remedy: 'update the browser and the graphics driver, and report it with this message',
+  });
+}
+
+/** Lets promises that are settled already have their turn. */
+const settled = (): Promise<void> => new Promise((resolve) => setTimeout(resolve, 0));
 
 /** The fastest way to sort, of those that sort rightly. */
 async function chooseSort(device: GPUDevice): Promise<SortName> {
@@ -83,6 +102,18 @@ function candidatesFor(device: GPUDevice, sort: SortName): Variants[] {
   const canBlend = device.features.has('float32-blendable');
   // Tiles are made of barriers, which is what a processor in disguise is worst at: ten times slower, and seconds to compile.
   return [quads, ...(canBlend ? [precise] : []), ...(threads === 'parallel' ? [tiles] : [])];
+}
+
+/** However slow, if it is right: what was no candidate for its speed, and then the other way to share the work. */
+function lastResorts(sort: SortName): Variants[] {
+  const variants = (rasterizer: Variants['rasterizer'], sort: SortName): Variants => ({
+    rasterizer,
+    accumulation: 'rgba16float',
+    threads: sort === 'serial' ? 'serial' : 'parallel',
+    sort,
+  });
+  const other = sort === 'serial' ? SAFE.sort : 'serial';
+  return [variants('tiles', sort), variants('quads', other), variants('tiles', other)];
 }
 
 const isRight = (device: GPUDevice, variants: Variants): Promise<boolean> =>

@@ -1,4 +1,4 @@
-import { lookAt, type Camera, type GaussianCloud } from '@gaussian-splat/core';
+import { eyeOf, lookAt, multiply, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { capture } from '../capture.js';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { constants } from '../generated/shaders.js';
@@ -13,7 +13,7 @@ const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
 /** True if a renderer with these options draws the image that the mathematics ask for. */
 export async function givesKnownAnswer(device: GPUDevice, options: RendererOptions): Promise<boolean> {
   const cloud = sphereCloud(SPLATS, 1);
-  const camera = probeCamera(48, 32);
+  const camera = shearedCamera(48, 32);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud, { sh: 'float16' }));
   const renderer = new Renderer(device, options);
   try {
@@ -31,6 +31,13 @@ export function probeCamera(width: number, height: number): Camera {
   const worldToCamera = lookAt([1.2, -0.8, -2.6], [0.1, 0.05, 0], [0.1, -1, 0.2]);
   const focal = 1.1 * width;
   return { width, height, fx: focal, fy: focal, cx: width / 2, cy: height / 2, worldToCamera, near: 0.2, far: 100 };
+}
+
+/** The same, sheared: spheres become leaning ellipses, so that a lost slope shows, too. */
+function shearedCamera(width: number, height: number): Camera {
+  const camera = probeCamera(width, height);
+  const shear = [1, 0.7, 0, 0, 0, 0.6, 0.2, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+  return { ...camera, worldToCamera: multiply(shear, camera.worldToCamera) };
 }
 
 /** Splats that are spheres, of random place, size, opacity and view-dependent colour; the same on every machine. */
@@ -84,28 +91,36 @@ interface Sphere {
 }
 
 function projectSphere({ positions, scales, opacities, sh }: GaussianCloud, i: number, camera: Camera): Sphere {
-  const { fx, fy, cx, cy, worldToCamera: m } = camera;
+  const { width, height, fx, fy, cx, cy, worldToCamera: m } = camera;
   const [px, py, pz] = positions.subarray(3 * i, 3 * i + 3);
   const [x, y, z] = [0, 4, 8].map((r) => m[r] * px + m[r + 1] * py + m[r + 2] * pz + m[r + 3]);
-  const [tx, ty] = [x / z, y / z];
-  const variance = scales[3 * i] ** 2;
-  // The direction from the eye in world axes: the camera's rows, transposed.
-  const [dx, dy, dz] = [0, 1, 2].map((c) => (m[c] * x + m[4 + c] * y + m[8 + c] * z) / Math.hypot(x, y, z));
+  // The Jacobian follows a centre to 1.3 times the edge of the image, which is centred here.
+  const [tx, ty] = [clamp(x / z, (0.65 * width) / fx), clamp(y / z, (0.65 * height) / fy)];
+  const radius = scales[3 * i];
+  const rowX = [0, 1, 2].map((c) => ((m[c] - tx * m[8 + c]) * fx * radius) / z);
+  const rowY = [0, 1, 2].map((c) => ((m[4 + c] - ty * m[8 + c]) * fy * radius) / z);
+  const eye = eyeOf(m);
+  const toSplat = [px - eye[0], py - eye[1], pz - eye[2]];
+  const [dx, dy, dz] = toSplat.map((v) => v / Math.hypot(...toSplat));
   const color = [0, 1, 2].map((channel) => {
     const [a, b, c, d] = [0, 3, 6, 9].map((k) => sh[12 * i + k + channel]);
     return Math.max(0, 0.5 + SH_C0 * a + SH_C1 * (-dy * b + dz * c - dx * d));
   });
   return {
-    x: fx * tx + cx,
-    y: fy * ty + cy,
+    x: (fx * x) / z + cx,
+    y: (fy * y) / z + cy,
     depth: z,
-    xx: (fx / z) ** 2 * variance * (1 + tx * tx) + DILATION,
-    xy: ((fx * fy) / (z * z)) * variance * tx * ty,
-    yy: (fy / z) ** 2 * variance * (1 + ty * ty) + DILATION,
+    xx: product(rowX, rowX) + DILATION,
+    xy: product(rowX, rowY),
+    yy: product(rowY, rowY) + DILATION,
     opacity: opacities[i],
     color,
   };
 }
+
+const clamp = (value: number, most: number): number => Math.min(most, Math.max(-most, value));
+
+const product = (a: readonly number[], b: readonly number[]): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 function alphaAt({ x, y, xx, xy, yy, opacity }: Sphere, atX: number, atY: number): number {
   const [dx, dy] = [atX - x, atY - y];

@@ -3,6 +3,7 @@ import { constants, layouts } from '../generated/shaders.js';
 import { boundChunks } from './chunks.js';
 import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
+import { recentred } from './recentre.js';
 import { choosePrecision, packSh, type ShPrecision } from './sh.js';
 
 /** How {@link packGaussians} lays out a cloud. */
@@ -50,8 +51,9 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
  * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
-export function packGaussians(cloud: GaussianCloud, options: PackOptions = {}): PackedGaussians {
-  validateCloud(cloud);
+export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
+  validateCloud(given);
+  const cloud = recentred(given);
   const { shDegree, antialiased, origin } = cloud;
   const kept = packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;

@@ -6,9 +6,12 @@ import type { AccumulationFormat, OrderKind, Painting, Rasterizer, RasterizerInp
 
 type Program = ShaderProgram<typeof rasterizeQuads>;
 
+const WHOLE = { index: 0, count: 1 } as const;
+
 /** Hardware quads, back to front, blended into a float texture. */
 export class QuadsRasterizer implements Rasterizer {
   readonly name = 'quads';
+  readonly canSlice = true;
   readonly takesNotes = false;
   readonly #device: GPUDevice;
   readonly #program: Program;
@@ -54,14 +57,25 @@ export class QuadsRasterizer implements Rasterizer {
     this.#bindings = { sorted: bindTo(orders.sorted), identity: bindTo(orders.identity) };
   }
 
-  record(encoder: GPUCommandEncoder, { surface, order, timer }: Painting): void {
+  record(encoder: GPUCommandEncoder, { surface, order, timer, slice = WHOLE }: Painting): void {
     const { view, width, height } = surface;
-    writeStruct(layouts.RasterView, { viewport: [width, height] }, this.#uniformBytes);
+    writeStruct(
+      layouts.RasterView,
+      { viewport: [width, height], slice: slice.index, slices: slice.count },
+      this.#uniformBytes,
+    );
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
     const pass = encoder.beginRenderPass({
       label: 'gs.rasterize',
       // Nothing painted yet: black, and all light still to come from behind.
-      colorAttachments: [{ view, clearValue: { r: 0, g: 0, b: 0, a: 1 }, loadOp: 'clear', storeOp: 'store' }],
+      colorAttachments: [
+        {
+          view,
+          clearValue: { r: 0, g: 0, b: 0, a: 1 },
+          loadOp: slice.index === 0 ? 'clear' : 'load',
+          storeOp: 'store',
+        },
+      ],
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
     if (this.#plan !== undefined && this.#bindings !== undefined) {

@@ -62,6 +62,11 @@ export interface Painting {
    */
   readonly background?: readonly [number, number, number, number];
   readonly timer?: PassTimer;
+  /**
+   * Paints one part of the splats only, the farthest first, over what the parts before have left in the surface. Only for rasterizers that can
+   * slice their work.
+   */
+  readonly slice?: { readonly index: number; readonly count: number };
 }
 
 /**
@@ -70,6 +75,8 @@ export interface Painting {
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
+  /** Whether the work of an image can be recorded in slices, for submissions that stay short. */
+  readonly canSlice: boolean;
   /** True if it can take {@link FrameNotes}. */
   readonly takesNotes: boolean;
   /** Bytes of GPU memory held. */

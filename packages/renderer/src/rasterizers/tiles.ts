@@ -75,6 +75,8 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
  */
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
+  /** Tiles stop where nothing behind can be seen: their work is bounded by what is. */
+  readonly canSlice = false;
   readonly takesNotes = true;
   readonly #device: GPUDevice;
   readonly #overrides: Overrides;

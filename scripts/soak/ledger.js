@@ -1,0 +1,58 @@
+/** Watches every device of the page: what lives on it, what it complains of. Must run before anybody asks for a device. */
+
+const BYTES_PER_PIXEL = { rgba8unorm: 4, bgra8unorm: 4, rgba16float: 8, rgba32float: 16 };
+
+/** Living devices, newest last, each with its living objects and their bytes. */
+export const devices = [];
+/** Everything that went wrong: validation, uncaught errors, warnings. */
+export const faults = [];
+
+const requestDevice = GPUAdapter.prototype.requestDevice;
+GPUAdapter.prototype.requestDevice = async function watched(descriptor) {
+  const device = await requestDevice.call(this, descriptor);
+  const entry = { device, objects: new Map() };
+  devices.push(entry);
+  device.addEventListener('uncapturederror', ({ error }) => faults.push(`GPU: ${error.message}`));
+  device.lost.then(() => devices.splice(devices.indexOf(entry), 1));
+  return device;
+};
+
+function watch(name, bytesOf) {
+  const create = GPUDevice.prototype[name];
+  GPUDevice.prototype[name] = function counting(descriptor) {
+    const made = create.call(this, descriptor);
+    devices.find(({ device }) => device === this)?.objects.set(made, bytesOf(descriptor, made));
+    return made;
+  };
+}
+watch('createBuffer', ({ size }) => size);
+watch('createTexture', (_, { format, width, height }) => (BYTES_PER_PIXEL[format] ?? 4) * width * height);
+for (const { prototype } of [GPUBuffer, GPUTexture]) {
+  const destroy = prototype.destroy;
+  prototype.destroy = function counting() {
+    for (const { objects } of devices) objects.delete(this);
+    return destroy.call(this);
+  };
+}
+
+addEventListener('error', ({ message }) => faults.push(`uncaught: ${message}`));
+addEventListener('unhandledrejection', ({ reason }) => faults.push(`unhandled: ${reason}`));
+for (const level of ['warn', 'error']) {
+  console[level] = (...words) => faults.push(`console.${level}: ${words.join(' ')}`);
+}
+
+/** Made once for a device and kept as long as it lives: which of them there are depends on what was tried on it. */
+const OF_DEVICE = /^gs\.(sort\.pass_\d|rasterize\.indices)$/;
+
+/** Bytes of our own objects, of those that belong to the device, and of others' (ONNX Runtime); and where ours are. */
+export function ledger() {
+  const sum = { own: 0, device: 0, others: 0, byLabel: {} };
+  for (const { objects } of devices) {
+    for (const [{ label }, bytes] of objects) {
+      const kind = OF_DEVICE.test(label) ? 'device' : label.startsWith('gs.') ? 'own' : 'others';
+      sum[kind] += bytes;
+      if (kind === 'own') sum.byLabel[label] = (sum.byLabel[label] ?? 0) + bytes;
+    }
+  }
+  return sum;
+}

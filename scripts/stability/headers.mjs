@@ -1,0 +1,31 @@
+/** What the files of the catalogue say about themselves: number, title, who fails and how that was seen, what passes. */
+import { readdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { root } from '../lib/run.mjs';
+
+const FOLDERS = ['tests/stability', 'tests/stability/browser'];
+
+/** All rows in the order of their numbers. Throws for a file whose header lacks a part. */
+export function readHeaders() {
+  const rows = FOLDERS.flatMap((folder) =>
+    readdirSync(join(root, folder))
+      .filter((name) => name.endsWith('.ts') && !['catalogue.test.ts', 'support.ts'].includes(name))
+      .map((name) => readHeader(`${folder}/${name}`))
+      .filter(Boolean),
+  );
+  const order = ({ id }) => parseFloat(id.slice(1)) + (id.endsWith('b') ? 0.5 : 0);
+  return rows.sort((a, b) => order(a) - order(b));
+}
+
+function readHeader(file) {
+  const [, comment] = /^\/\*\*([\s\S]*?)\*\//.exec(readFileSync(join(root, file), 'utf8')) ?? [];
+  const text = (comment ?? '').replace(/^ \* ?/gm, '').trim();
+  const [, id, title] = /^(S\d+b?)\. (.+?)\.?$/m.exec(text) ?? [];
+  if (id === undefined) return undefined;
+  const part = (name) => {
+    const [, found] = new RegExp(`^${name}: ([\\s\\S]*?)(?:\\n\\n|$)`, 'm').exec(text) ?? [];
+    if (found === undefined) throw new Error(`${file}: its header does not say "${name}:"`);
+    return found.replace(/\s+/g, ' ');
+  };
+  return { file, id, title, fails: part('Who fails'), passes: part('Passes') };
+}

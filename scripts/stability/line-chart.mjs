@@ -1,0 +1,69 @@
+/** Small line charts as SVG that read on light and dark pages. */
+import { scaleLinear, scaleLog } from 'd3-scale';
+
+const WIDTH = 560;
+const HEIGHT = 300;
+const MARGIN = { top: 34, right: 16, bottom: 44, left: 54 };
+const COLORS = ['#2166ac', '#b2182b', '#1b7837', '#762a83'];
+/** dB that stand for equal images. */
+const MOST = 130;
+
+const escape = (text) =>
+  String(text).replace(/[&<>"]/g, (c) => ({ '&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;' })[c]);
+
+/**
+ * @param curves {{name: string, points: [number, number][]}[]}
+ * @param options.marks {{x: number, name: string}[]} vertical lines
+ * @param options.line {{y: number, name: string}} a horizontal one
+ */
+export function lineChart(curves, { title, x: xTitle, y: yTitle, log = false, marks = [], line }) {
+  const points = curves.flatMap((curve) => curve.points);
+  const xs = points.map(([x]) => x);
+  const ys = [...points.map(([, y]) => Math.min(MOST, y)), ...(line ? [line.y] : [])];
+  const x = (log ? scaleLog() : scaleLinear())
+    .domain([Math.min(...xs), Math.max(...xs)])
+    .range([MARGIN.left, WIDTH - MARGIN.right]);
+  const y = scaleLinear()
+    .domain([Math.min(...ys) - 3, Math.max(...ys) + 3])
+    .range([HEIGHT - MARGIN.bottom, MARGIN.top]);
+  const text = (at, down, words, more = '') =>
+    `<text x="${at.toFixed(1)}" y="${down.toFixed(1)}" ${more}>${escape(words)}</text>`;
+  const parts = [
+    `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${HEIGHT}" width="${WIDTH}" height="${HEIGHT}" font-family="system-ui, sans-serif" font-size="11" role="img" aria-label="${escape(title)}">`,
+    `<rect width="100%" height="100%" fill="#fff"/>`,
+    text(MARGIN.left, 16, title, 'font-size="13" font-weight="bold" fill="#111"'),
+    ...y
+      .ticks(6)
+      .map(
+        (tick) =>
+          `<path d="M${MARGIN.left} ${y(tick)}H${WIDTH - MARGIN.right}" stroke="#ddd"/>${text(MARGIN.left - 6, y(tick) + 4, tick, 'text-anchor="end" fill="#444"')}`,
+      ),
+    ...(log ? xs.filter((v, i) => xs.indexOf(v) === i) : x.ticks(8)).map((tick) =>
+      text(x(tick), HEIGHT - MARGIN.bottom + 16, shortNumber(tick), 'text-anchor="middle" fill="#444"'),
+    ),
+    text((MARGIN.left + WIDTH - MARGIN.right) / 2, HEIGHT - 8, xTitle, 'text-anchor="middle" fill="#111"'),
+    text(0, 0, yTitle, `transform="translate(14 ${HEIGHT / 2}) rotate(-90)" text-anchor="middle" fill="#111"`),
+    ...marks.map(
+      (mark) =>
+        `<path d="M${x(mark.x)} ${MARGIN.top}V${HEIGHT - MARGIN.bottom}" stroke="#999" stroke-dasharray="2 3"/>${text(x(mark.x) + 3, HEIGHT - MARGIN.bottom - 6, mark.name, 'fill="#666"')}`,
+    ),
+    ...(line
+      ? [
+          `<path d="M${MARGIN.left} ${y(line.y)}H${WIDTH - MARGIN.right}" stroke="#111" stroke-dasharray="5 3"/>${text(WIDTH - MARGIN.right, y(line.y) - 4, line.name, 'text-anchor="end" fill="#111"')}`,
+        ]
+      : []),
+    ...curves.flatMap((curve, i) => {
+      const color = COLORS[i % COLORS.length];
+      const places = curve.points.map(([a, b]) => [x(a), y(Math.min(MOST, b))]);
+      return [
+        `<path d="M${places.map((p) => p.map((v) => v.toFixed(1)).join(' ')).join('L')}" fill="none" stroke="${color}" stroke-width="2"/>`,
+        ...places.map(([a, b]) => `<circle cx="${a.toFixed(1)}" cy="${b.toFixed(1)}" r="3" fill="${color}"/>`),
+        text(WIDTH - MARGIN.right, MARGIN.top - 6 + 13 * (i + 1), curve.name, `text-anchor="end" fill="${color}"`),
+      ];
+    }),
+    '</svg>',
+  ];
+  return `${parts.join('\n')}\n`;
+}
+
+const shortNumber = (value) => (value >= 1e4 ? value.toExponential(0).replace('e+', 'e') : String(value));

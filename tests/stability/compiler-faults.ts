@@ -1,0 +1,96 @@
+/**
+ * S16. Shader compilers that err.
+ *
+ * Who fails: whoever trusts them: Firefox on Direct3D 12 transposed matrices read through a pointer (PlayCanvas #9148), naga refused storage pointers (#8784,
+ * #8450): a wrong picture, or none.
+ *
+ * Passes: shaders are broken on purpose, one after another: the variant concerned fails its known answer and the next takes over with the right picture; where
+ * no variant is right, that is an error with a code instead of a wrong picture.
+ */
+import { test } from 'node:test';
+import assert from 'node:assert/strict';
+import {
+  capture,
+  chooseVariants,
+  GaussianBuffers,
+  packGaussians,
+  Renderer,
+  type Variants,
+} from '@gaussian-splat/renderer';
+import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
+import { offCentre } from '../support/scenes.js';
+import { faultyDevice, fullDevice, type Miscompilation } from './support/devices.js';
+import { compareImage, resized, truth } from './support/pictures.js';
+import { fullTest, holds, note, sized } from './support/row.js';
+
+/** What a compiler does to a stage, and what must be chosen in its place. */
+const FAULTS: readonly { name: string; fault: Miscompilation; expected: Partial<Variants> }[] = [
+  {
+    name: 'the sort that needs no barriers loses a digit',
+    fault: { shader: /sort_count_serial/, from: 'DIGITS - 1u', to: '127u' },
+    expected: { threads: 'parallel' },
+  },
+  {
+    name: 'quads are painted without their slope',
+    fault: { shader: /rasterize_quads/, from: 'offset.y - slope * offset.x', to: 'offset.y' },
+    expected: { rasterizer: 'tiles' },
+  },
+];
+
+async function drawAsChosen(device: GPUDevice): Promise<number> {
+  const { cloud, cameras } = offCentre();
+  const camera = resized(cameras[0], 96);
+  const renderer = await Renderer.create(device);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const { psnr } = compareImage(await capture(device, renderer, { gaussians, camera }), truth(cloud, camera));
+  renderer.destroy();
+  gaussians.destroy();
+  return psnr;
+}
+
+// The second alone in npm test: with barriers SwiftShader is slow.
+for (const { name, fault, expected } of sized(FAULTS.slice(1), FAULTS)) {
+  test(name, async () => {
+    const { device, befallen } = await faultyDevice([fault]);
+    const chosen = await chooseVariants(device, { store: null });
+    assert.ok(befallen.length > 0, 'the shader was broken');
+    for (const [lever, value] of Object.entries(expected)) assert.equal(chosen[lever as keyof Variants], value, lever);
+    holds('S16', `${name}: the variant that takes over`, await drawAsChosen(device), { atLeast: 59, unit: 'dB' });
+    device.destroy();
+  });
+}
+
+fullTest('a choice that was kept from an earlier visit is tried again, and dropped', async () => {
+  const { device } = await faultyDevice([FAULTS[1].fault]);
+  const kept = JSON.stringify({ rasterizer: 'quads', accumulation: 'rgba16float', threads: 'parallel' });
+  const store = { getItem: () => kept, setItem: () => undefined };
+  assert.equal((await chooseVariants(device, { store })).rasterizer, 'tiles');
+  device.destroy();
+});
+
+test('matrices transposed in every variant: an error, not a wrong picture', async () => {
+  const { device, befallen } = await faultyDevice([
+    { shader: /gs\./, from: 'view.local_to_camera * vec4f', to: 'transpose(view.local_to_camera) * vec4f' },
+  ]);
+  await assert.rejects(chooseVariants(device, { store: null }), { code: 'unsupported/wrong-image' });
+  await assert.rejects(
+    Renderer.create(device),
+    { code: 'unsupported/wrong-image' },
+    'and again, without a second probe',
+  );
+  assert.ok(befallen.includes('gs.project'), befallen.join());
+  device.destroy();
+});
+
+test('the known answer takes little time', async () => {
+  const device = await fullDevice();
+  const variants = { rasterizer: 'quads', accumulation: 'rgba16float', threads: 'serial' } as const;
+  assert.ok(await givesKnownAnswer(device, variants));
+  let best = Infinity;
+  for (let i = 0; i < sized(3, 10); i++) {
+    const start = performance.now();
+    await givesKnownAnswer(device, variants);
+    best = Math.min(best, performance.now() - start);
+  }
+  note('S16', 'known answer of 64 splats, pipelines made', best, { unit: 'ms' });
+});

@@ -1,0 +1,89 @@
+/**
+ * S7. Scenes far from the origin of the world.
+ *
+ * Who fails: Spark #287, #294 and #356, GaussianSplats3D #336, Cesium #12925: splats jump and jitter by the steps of float32 (6 cm at 1,000 km).
+ * Seen there, and in the float32 curve of the chart below, whose positions are merely rounded to float32.
+ *
+ * Passes: 59 dB or more to the picture of the same scene at the origin, a million units away, while the camera pans by a pixel a frame; also for files
+ * whose float32 coordinates are that large.
+ */
+import { test } from 'node:test';
+import type { Camera, GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { toRgba } from '../oracle/oracle.js';
+import { psnr } from '../support/metrics.js';
+import { nodeDevice } from '../support/node-device.js';
+import { movedBy, offCentre, type Scene } from '../support/scenes.js';
+import { draw, RASTERIZERS, resized, truth } from './support/pictures.js';
+import { chart, holds, note, sized } from './support/row.js';
+
+const FAR: Vector3 = [1_000_000, -2_345_678.9, 1_234_567.8];
+const base = offCentre();
+const scene: Scene = { ...base, cameras: [resized({ ...base.cameras[0], cx: 180, cy: 135 }, 120)] };
+
+/** The camera moved aside so that what is 3 units away moves by a number of pixels. */
+function panned(camera: Camera, pixels: number): Camera {
+  const worldToCamera = Array.from(camera.worldToCamera);
+  worldToCamera[3] -= (3 * pixels) / camera.fx;
+  return { ...camera, worldToCamera };
+}
+
+for (const rasterizer of RASTERIZERS) {
+  test(`a million units away, panning, ${rasterizer}`, async () => {
+    const device = await nodeDevice();
+    let worst = Infinity;
+    const frames = rasterizer === 'quads' ? sized(5, 100) : sized(2, 20);
+    for (let frame = 0; frame < frames; frame++) {
+      const near = { ...scene, cameras: [panned(scene.cameras[0], frame)] };
+      const far = movedBy(near, FAR);
+      const [here, there] = [
+        await draw(device, near.cloud, near.cameras[0], { rasterizer }),
+        await draw(device, far.cloud, far.cameras[0], { rasterizer }),
+      ];
+      worst = Math.min(worst, psnr(here, there, { channels: 4 }));
+    }
+    holds('S7', `origin 1e6 away, ${frames} panned frames, ${rasterizer}, worst`, worst, { atLeast: 59, unit: 'dB' });
+  });
+}
+
+/** The cloud as a file of float32 coordinates has it when the scene lies at `offset`, and the same moved back, exactly. */
+function asFloat32File(cloud: GaussianCloud, offset: Vector3): { far: GaussianCloud; near: GaussianCloud } {
+  const far = cloud.positions.map((x, i) => x + offset[i % 3]);
+  const near = far.map((x, i) => x - offset[i % 3]);
+  return { far: { ...cloud, positions: far }, near: { ...cloud, positions: near } };
+}
+
+test('float32 coordinates of a million', async () => {
+  const device = await nodeDevice();
+  const offset: Vector3 = [1_000_000, -2_000_000, 1_000_000];
+  const { far, near } = asFloat32File(scene.cloud, offset);
+  let worst = Infinity;
+  for (let frame = 0; frame < sized(4, 100); frame++) {
+    const camera = panned(scene.cameras[0], frame + 0.37);
+    const away = movedBy({ ...scene, cloud: far, cameras: [camera] }, offset).cameras[0];
+    const [here, there] = [await draw(device, near, camera), await draw(device, far, away)];
+    worst = Math.min(worst, psnr(here, there, { channels: 4 }));
+  }
+  holds('S7', 'float32 coordinates of 1e6, panned frames, worst', worst, { atLeast: 59, unit: 'dB' });
+});
+
+test('error against distance', async () => {
+  const device = await nodeDevice();
+  const camera = scene.cameras[0];
+  const expected = truth(scene.cloud, camera);
+  const options = { mask: expected.contributors, channels: 4 };
+  const curves: { ours: [number, number][]; rounded: [number, number][] } = { ours: [], rounded: [] };
+  for (let exponent = 1; exponent <= 8; exponent += sized(7, 1)) {
+    const distance = 10 ** exponent;
+    const offset: Vector3 = [distance, distance, distance];
+    const far = movedBy({ ...scene, cameras: [camera] }, offset);
+    const ours = psnr(await draw(device, far.cloud, far.cameras[0]), toRgba(expected), options);
+    curves.ours.push([distance, ours]);
+    // What remains if positions are float32 numbers of the world, in all else exact.
+    const rounded = truth(asFloat32File(scene.cloud, offset).near, camera);
+    curves.rounded.push([distance, psnr(toRgba(rounded), toRgba(expected), options)]);
+    holds('S7', `${distance} units away: ours`, ours, { atLeast: 59, unit: 'dB' });
+    note('S7', `${distance} units away: positions rounded to float32`, curves.rounded.at(-1)![1], { unit: 'dB' });
+  }
+  chart('S7', 'ours', curves.ours);
+  chart('S7', 'positions in float32', curves.rounded);
+});

@@ -1,0 +1,80 @@
+/**
+ * S10. More pairs of splat and tile than there is room for.
+ *
+ * Who fails: PlayCanvas' tile renderers #8574 (missing tiles after a jump) and #8586 (writes beyond the buffer end in tile 0), 16-bit tile numbers over
+ * 5,000 pixels; brush needed a sentinel.
+ *
+ * Passes: with ten times the room demanded, the frame has no corrupt pixel: it is that of the nearest splats that fit; what was left out is counted;
+ * the next frame has room for all.
+ */
+import { test } from 'node:test';
+import assert from 'node:assert/strict';
+import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { cloudOf, repeat } from '../support/clouds.js';
+import { nodeDevice } from '../support/node-device.js';
+import { seededRandom } from '../support/random.js';
+import { cameraAt } from '../support/scenes.js';
+import { compareImage, differingBytes, notFinite, truth, THREADS } from './support/pictures.js';
+import { holds } from './support/row.js';
+
+test('ten times the room, at once', async () => {
+  const device = await nodeDevice();
+  const random = seededRandom(10);
+  const count = 11_000;
+  const cloud = cloudOf(
+    repeat(count, (i) => ({
+      // In the file's order from near to far, so that the prefix that fits is known.
+      position: [random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), 0.001 * i],
+      scale: 60,
+      opacity: random.uniform(0.1, 0.5),
+      color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)],
+    })),
+  );
+  // 8 x 8 bins of 128 x 64 pixels.
+  const camera = cameraAt([0, 0, -1], [0, 0, 0], { width: 1024, height: 512 });
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device, { threads: THREADS, rasterizer: 'tiles' });
+  const texture = device.createTexture({ size: [1024, 512], format: 'rgba32float', usage: 0x10 | 0x1 | 0x8 });
+  renderer.render({ gaussians, camera, target: texture });
+  const first = await readImage(device, texture);
+  const { pairs, pairOverflow } = await renderer.readStatistics();
+  holds('S10', 'pairs demanded over pairs with room', (pairs + pairOverflow) / pairs, { atLeast: 9, unit: 'times' });
+  assert.equal(notFinite(first), 0);
+  // The nearest splats hide the rest long before the room ends: the frame that lacks nine tenths is whole.
+  const small = { ...camera, width: 64, height: 32, fx: camera.fx / 16, fy: camera.fy / 16, cx: 32, cy: 16 };
+  const whole = truth(cloud, small);
+  const close = compareImage(sampled(first, 1024, 512, 16), whole);
+  holds('S10', 'the frame that lacked room, against the whole picture', close.psnr, { atLeast: 40, unit: 'dB' });
+  const next = await capture(device, renderer, { gaussians, camera });
+  assert.equal((await renderer.readStatistics()).pairOverflow, 0, 'the next frame has room');
+  const fresh = new Renderer(device, { threads: THREADS, rasterizer: 'tiles' });
+  const again = await capture(device, fresh, { gaussians, camera });
+  holds('S10', 'the next frame against one with room from the start: differing bytes', differingBytes(next, again), {
+    atMost: 0,
+    unit: 'bytes',
+  });
+  for (const one of [renderer, fresh, gaussians, texture]) one.destroy();
+});
+
+async function readImage(device: GPUDevice, texture: GPUTexture): Promise<Float32Array> {
+  const { width, height } = texture;
+  const staging = device.createBuffer({ size: 16 * width * height, usage: 0x1 | 0x8 });
+  const encoder = device.createCommandEncoder();
+  encoder.copyTextureToBuffer({ texture }, { buffer: staging, bytesPerRow: 16 * width }, [width, height]);
+  device.queue.submit([encoder.finish()]);
+  await staging.mapAsync(0x1);
+  const pixels = new Float32Array(staging.getMappedRange().slice(0));
+  staging.destroy();
+  return pixels;
+}
+
+/** Mean of blocks of pixels: the scene has no detail of that size. */
+function sampled(pixels: Float32Array, width: number, height: number, block: number): Float32Array {
+  const out = new Float32Array((4 * width * height) / block ** 2);
+  for (let i = 0; i < pixels.length; i++) {
+    const [pixel, channel] = [i >> 2, i & 3];
+    const [x, y] = [Math.floor((pixel % width) / block), Math.floor(pixel / width / block)];
+    out[4 * (y * (width / block) + x) + channel] += pixels[i] / block ** 2;
+  }
+  return out;
+}

@@ -1,0 +1,45 @@
+/** Devices of Dawn other than the common one: with features and limits of choice, or with a compiler that errs. */
+import { deviceDescriptor } from '@gaussian-splat/renderer';
+import { requestNodeAdapter } from '../../../scripts/lib/node-gpu.mjs';
+
+let full: Promise<GPUDevice> | undefined;
+
+/** One device with all that the renderer can use: blending in float32 where the adapter has it. */
+export function fullDevice(): Promise<GPUDevice> {
+  full ??= requestNodeAdapter().then((adapter) => adapter.requestDevice(deviceDescriptor(adapter)));
+  return full;
+}
+
+/** A new device with exactly these optional features, as far as the adapter has them, and default limits. */
+export async function deviceWith(features: readonly GPUFeatureName[]): Promise<GPUDevice> {
+  const adapter = await requestNodeAdapter();
+  return adapter.requestDevice({ requiredFeatures: features.filter((feature) => adapter.features.has(feature)) });
+}
+
+/** A change that a faulty compiler might make. */
+export interface Miscompilation {
+  /** Label of the shaders that it befalls, for example `gs.project`; their variants too. */
+  readonly shader: RegExp;
+  readonly from: string;
+  readonly to: string;
+}
+
+/** A new device whose compiler errs in the given ways. `befallen` lists the labels of the shaders that were changed. */
+export async function faultyDevice(
+  faults: readonly Miscompilation[],
+): Promise<{ device: GPUDevice; befallen: string[] }> {
+  const adapter = await requestNodeAdapter();
+  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  const befallen: string[] = [];
+  const compile = device.createShaderModule.bind(device);
+  device.createShaderModule = (descriptor) => {
+    let { code } = descriptor;
+    for (const { shader, from, to } of faults) {
+      if (!shader.test(descriptor.label ?? '') || !code.includes(from)) continue;
+      code = code.replaceAll(from, to);
+      befallen.push(descriptor.label ?? '');
+    }
+    return compile({ ...descriptor, code });
+  };
+  return { device, befallen };
+}
