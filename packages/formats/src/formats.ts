@@ -1,4 +1,5 @@
 import { asciiOf, startsWith } from './bytes.js';
+import { looksLikeKsplat } from './ksplat/header.js';
 import type { SceneFormat } from './scene-format.js';
 
 /** Text that tells a compressed PLY from a plain one; it stands within the first lines of every such header. */
@@ -9,6 +10,14 @@ const isPly = (bytes: Uint8Array): boolean => /^ply[ \t]*[\r\n]/.test(asciiOf(by
 const isCompressedPly = (bytes: Uint8Array): boolean =>
   isPly(bytes) && COMPRESSED_PLY_MARK.test(asciiOf(bytes, 0, HEADER_SAMPLE));
 const isGzip = (bytes: Uint8Array): boolean => startsWith(bytes, [0x1f, 0x8b]);
+/** A description in JSON with a key that no other has. Keys come in any order, so the sample is long. */
+const isJsonWith =
+  (key: RegExp) =>
+  (bytes: Uint8Array): boolean =>
+    /^(\u00ef\u00bb\u00bf)?\s*\{/.test(asciiOf(bytes, 0, 64)) && key.test(asciiOf(bytes, 0, HEADER_SAMPLE));
+const isLodMeta = isJsonWith(/"lodLevels"\s*:/);
+const isSogMeta = isJsonWith(/"means"\s*:/);
+const isGltf = isJsonWith(/"asset"\s*:\s*\{[^}]*"version"/);
 const isNgsp = (bytes: Uint8Array): boolean => startsWith(bytes, 'NGSP');
 
 /** All formats that `readScene` reads; the first whose signature fits wins. */
@@ -37,6 +46,47 @@ export const sceneFormats: readonly SceneFormat[] = [
     // Versions 1 to 3 are gzip files; what else may be inside is the reader's to say.
     hasSignature: (bytes) => isNgsp(bytes) || isGzip(bytes),
     load: async () => (await import('./readers/spz.js')).readSpz,
+  },
+  {
+    name: 'zip',
+    title: 'ZIP archive of a scene (.sog bundles too)',
+    extensions: ['.sog', '.zip'],
+    mimeTypes: ['application/zip', 'application/x-zip-compressed'],
+    hasSignature: (bytes) => startsWith(bytes, 'PK\x03\x04'),
+    load: async () => (await import('./readers/zip.js')).readZip,
+  },
+  {
+    name: 'lod',
+    title: 'streamed SOG (lod-meta.json)',
+    extensions: ['.json'],
+    mimeTypes: ['application/json'],
+    hasSignature: isLodMeta,
+    load: async () => (await import('./readers/lod.js')).readLod,
+  },
+  {
+    name: 'sog',
+    title: 'SOG (meta.json)',
+    extensions: ['.json'],
+    mimeTypes: ['application/json'],
+    hasSignature: isSogMeta,
+    load: async () => (await import('./readers/sog.js')).readSog,
+  },
+  {
+    name: 'gltf',
+    title: 'glTF with KHR_gaussian_splatting',
+    extensions: ['.glb', '.gltf'],
+    mimeTypes: ['model/gltf-binary', 'model/gltf+json'],
+    hasSignature: (bytes) => startsWith(bytes, 'glTF') || isGltf(bytes),
+    load: async () => (await import('./readers/gltf.js')).readGltf,
+  },
+  {
+    name: 'ksplat',
+    title: '.ksplat (GaussianSplats3D)',
+    extensions: ['.ksplat'],
+    mimeTypes: [],
+    hasSignature: looksLikeKsplat,
+    isSignatureWeak: true,
+    load: async () => (await import('./readers/ksplat.js')).readKsplat,
   },
   {
     name: 'splat',

@@ -2,6 +2,7 @@ import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-sp
 import { grouped } from './bytes.js';
 import { extensionOf, findFormat } from './detect.js';
 import { diagnoseExtension, diagnoseSigned, diagnoseUnknown } from './diagnose.js';
+import type { OpenPart } from './scene-format.js';
 
 export interface ReadSceneOptions {
   /** File name or URL: what error messages call the file, and whose extension tells formats without a signature. */
@@ -10,11 +11,23 @@ export interface ReadSceneOptions {
   readonly contentType?: string;
   /** Aborts between the steps of reading; the promise then rejects with the signal's reason. */
   readonly signal?: AbortSignal;
+  /**
+   * Opens the other files of a scene of several files (SOG folders, streamed SOG, glTF with buffers of their own); `openPartAt` makes one
+   * for an address. Archives need none.
+   */
+  readonly openPart?: OpenPart;
+  /** Level of detail that is read of a streamed scene, 0 (default) the finest. */
+  readonly level?: number;
+  /**
+   * Called, if the scene is large and its format allows, with some of its splats, spread over all of it and larger to stand
+   * for the rest, before the whole is read. Reading goes on once the promise fulfils.
+   */
+  readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
 
 /**
- * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4 or .splat; the format is told from the
- * content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
+ * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4, SOG version 1 and 2, streamed SOG, glTF with
+ * `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is told from the content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
  *
  * @param bytes the whole file. It is not changed, and the cloud does not refer to it.
  * @returns the splats in the shape and frame that `GaussianCloud` documents. Splats with values that cannot be drawn
@@ -23,7 +36,7 @@ export interface ReadSceneOptions {
  * `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
  */
 export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
-  const { name = 'scene', contentType = '', signal } = options;
+  const { name = 'scene', contentType = '', signal, openPart, level, onPreview } = options;
   signal?.throwIfAborted();
   if (bytes.length === 0) throw emptyFile(name);
   const format = findFormat(bytes, name, contentType);
@@ -32,10 +45,21 @@ export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {
   }
   const read = await format.load();
   signal?.throwIfAborted();
-  const cloud = keepUsable(await read({ bytes, name, signal }));
+  const cloud = keepUsable(await read({ bytes, name, signal, openPart, level, onPreview: usable(onPreview) }));
   signal?.throwIfAborted();
   if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
   return cloud;
+}
+
+/** Passes on previews that have something to show. */
+function usable(onPreview: ReadSceneOptions['onPreview']): ReadSceneOptions['onPreview'] {
+  return (
+    onPreview &&
+    ((preview) => {
+      const cloud = keepUsable(preview);
+      if (cloud.count > 0) return onPreview(cloud);
+    })
+  );
 }
 
 function emptyFile(name: string): GaussianSplatError {

@@ -1,7 +1,8 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
 import { boundsOf, GaussianSplatError } from '@gaussian-splat/core';
-import { fetchScene, readScene } from '@gaussian-splat/formats';
+import { fetchScene, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
+import { ProgressSum } from './progress-sum.js';
 import type { LoadedScene, ProgressListener, SceneRequest } from './protocol.js';
 
 /** Milliseconds between two progress reports: chunks may arrive by the thousand. */
@@ -18,8 +19,11 @@ export async function loadScene(
 ): Promise<LoadedScene> {
   try {
     const { url, credentials } = request;
-    const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress: throttled(onProgress) });
-    const cloud = await readScene(bytes, { name: fileName(url), signal });
+    const name = fileName(url);
+    const progress = new ProgressSum(throttled(onProgress), mayHaveParts(name));
+    const options = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, onProgress: progress.add() });
+    const bytes = await fetchScene(url, options());
+    const cloud = await readScene(bytes, { name, signal, openPart: openPartAt(url, options) });
     signal.throwIfAborted();
     return { packed: packGaussians(cloud, { sh: request.sh }), bounds: boundsOf(cloud) };
   } catch (error) {
@@ -37,6 +41,11 @@ function fileName(url: string): string {
   const { protocol, pathname, hash } = new URL(url);
   const name = protocol === 'blob:' && hash !== '' ? hash.slice(1) : (pathname.split('/').pop() ?? '');
   return decodeURIComponentSafely(name) || url;
+}
+
+/** True where the file that the address names is the smaller part of the scene. */
+function mayHaveParts(name: string): boolean {
+  return /\.(json|gltf)$/i.test(name);
 }
 
 function decodeURIComponentSafely(text: string): string {
