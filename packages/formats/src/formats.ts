@@ -24,6 +24,7 @@ const isNgsp = (bytes: Uint8Array): boolean => startsWith(bytes, 'NGSP');
 export const sceneFormats: readonly SceneFormat[] = [
   {
     name: 'compressed-ply',
+    readsPrefix: true,
     title: 'compressed PLY (PlayCanvas, SuperSplat)',
     extensions: ['.compressed.ply', '.ply'],
     mimeTypes: [],
@@ -32,6 +33,7 @@ export const sceneFormats: readonly SceneFormat[] = [
   },
   {
     name: 'ply',
+    readsPrefix: true,
     title: 'PLY (INRIA 3D Gaussian Splatting)',
     extensions: ['.ply'],
     mimeTypes: ['model/ply', 'application/ply', 'application/x-ply'],
@@ -40,6 +42,7 @@ export const sceneFormats: readonly SceneFormat[] = [
   },
   {
     name: 'spz',
+    readsPrefix: true,
     title: 'SPZ (Niantic)',
     extensions: ['.spz'],
     mimeTypes: ['model/spz', 'application/spz', 'application/x-spz'],
@@ -81,6 +84,7 @@ export const sceneFormats: readonly SceneFormat[] = [
   },
   {
     name: 'ksplat',
+    readsPrefix: true,
     title: '.ksplat (GaussianSplats3D)',
     extensions: ['.ksplat'],
     mimeTypes: [],
@@ -90,6 +94,7 @@ export const sceneFormats: readonly SceneFormat[] = [
   },
   {
     name: 'splat',
+    readsPrefix: true,
     title: '.splat (antimatter15)',
     extensions: ['.splat'],
     mimeTypes: ['model/splat', 'application/x-splat'],

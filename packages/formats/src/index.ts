@@ -2,5 +2,5 @@ export { detectFormat } from './detect.js';
 export { fetchScene, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './formats.js';
 export { openPartAt } from './open-part.js';
-export { readScene, type ReadSceneOptions } from './read-scene.js';
+export { readPrefix, readScene, type ReadSceneOptions } from './read-scene.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource } from './scene-format.js';

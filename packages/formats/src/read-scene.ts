@@ -2,7 +2,8 @@ import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-sp
 import { grouped } from './bytes.js';
 import { extensionOf, findFormat } from './detect.js';
 import { diagnoseExtension, diagnoseSigned, diagnoseUnknown } from './diagnose.js';
-import type { OpenPart } from './scene-format.js';
+import { previewWanted, samplePreview } from './preview.js';
+import type { OpenPart, SceneSource } from './scene-format.js';
 
 export interface ReadSceneOptions {
   /** File name or URL: what error messages call the file, and whose extension tells formats without a signature. */
@@ -45,21 +46,49 @@ export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {
   }
   const read = await format.load();
   signal?.throwIfAborted();
-  const cloud = keepUsable(await read({ bytes, name, signal, openPart, level, onPreview: usable(onPreview) }));
+  let hasPreview = false;
+  const preview = async (part: GaussianCloud): Promise<void> => {
+    hasPreview = true;
+    const drawable = keepUsable(part);
+    if (drawable.count > 0) await onPreview?.(drawable);
+    signal?.throwIfAborted();
+  };
+  const source: SceneSource = { bytes, name, signal, openPart, level, onPreview: onPreview && preview };
+  const whole = await read(source);
+  signal?.throwIfAborted();
+  // Checking and packing all splats takes longer than reading them, so that a preview is worth its while even now.
+  if (!hasPreview && previewWanted(source, whole.count)) await preview(samplePreview(whole));
+  const cloud = keepUsable(whole);
   signal?.throwIfAborted();
   if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
   return cloud;
 }
 
-/** Passes on previews that have something to show. */
-function usable(onPreview: ReadSceneOptions['onPreview']): ReadSceneOptions['onPreview'] {
-  return (
-    onPreview &&
-    ((preview) => {
-      const cloud = keepUsable(preview);
-      if (cloud.count > 0) return onPreview(cloud);
-    })
-  );
+/**
+ * Reads what can be seen of a file that is still arriving: the splats that are whole (PLY, compressed PLY, .splat, .ksplat), or all splats
+ * without their view-dependent colours once these are all that is missing (SPZ, compressed PLY).
+ *
+ * @param bytes the first bytes of the file.
+ * @returns the splats in the order of the file, or undefined if there are none yet or the format cannot be read in part. Never throws for
+ * what the bytes are: `readScene` says what is wrong once the file is whole.
+ */
+export async function readPrefix(
+  bytes: Uint8Array,
+  options: ReadSceneOptions = {},
+): Promise<GaussianCloud | undefined> {
+  const { name = 'scene', contentType = '', signal } = options;
+  signal?.throwIfAborted();
+  const format = bytes.length === 0 ? undefined : findFormat(bytes, name, contentType);
+  if (!format?.readsPrefix) return undefined;
+  const read = await format.load();
+  try {
+    const cloud = keepUsable(await read({ bytes, name, signal, isPrefix: true }));
+    return cloud.count > 0 ? cloud : undefined;
+  } catch (error) {
+    signal?.throwIfAborted();
+    if (error instanceof GaussianSplatError) return undefined;
+    throw error;
+  }
 }
 
 function emptyFile(name: string): GaussianSplatError {

@@ -8,6 +8,8 @@ export interface SceneSource {
   readonly name: string;
   /** Readers that wait or work long call `throwIfAborted()` between steps. */
   readonly signal?: AbortSignal;
+  /** True if `bytes` are only the first of the file: the splats that are whole are read, attributes that are missing left out. */
+  readonly isPrefix?: boolean;
   /** Opens the files that a scene of several files names; absent where there is only the one. */
   readonly openPart?: OpenPart;
   /** Which level of a scene with levels of detail is read: 0 is the finest. */
@@ -44,6 +46,8 @@ export interface SceneFormat {
   readonly mimeTypes: readonly string[];
   /** True if the first bytes of the file prove this format. Absent where the format has no signature. */
   readonly hasSignature?: (bytes: Uint8Array) => boolean;
+  /** True if the reader can read a file whose end is missing: see `readPrefix`. */
+  readonly readsPrefix?: boolean;
   /** True if the first bytes may be damaged and the name still be right: a reader then says what is wrong. */
   readonly isSignatureWeak?: boolean;
   /** Loads the reader; a dynamic import, so that a page fetches only the readers it needs. */

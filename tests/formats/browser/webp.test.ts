@@ -1,5 +1,5 @@
 /** Our decoder of lossless WebP against Chromium's, byte for byte, on real images; and their times. */
-type Decoder = typeof import('../../../packages/formats/dist/webp/decode.js');
+import type * as Decoder from '../../../packages/formats/dist/webp/decode.js';
 
 /** Not part of the package's surface, so it is taken from where the build puts it. */
 const BUILT: string = '/packages/formats/dist/webp/decode.js';
@@ -35,9 +35,9 @@ async function decodeInBrowser(file: Uint8Array<ArrayBuffer>): Promise<Uint8Arra
 }
 
 describe('lossless WebP', () => {
-  let decodeWebp: Decoder['decodeWebp'];
+  let decodeWebp: typeof Decoder.decodeWebp;
   before(async () => {
-    ({ decodeWebp } = (await import(BUILT)) as Decoder);
+    ({ decodeWebp } = (await import(BUILT)) as typeof Decoder);
   });
 
   for (const name of IMAGES) {

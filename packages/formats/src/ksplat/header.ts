@@ -57,8 +57,8 @@ export function looksLikeKsplat(bytes: Uint8Array): boolean {
   return sections >= 1 && sections <= maxSections && splats <= maxSplats && view.getUint16(20, true) <= 2;
 }
 
-/** Reads and checks all headers: every section lies within the file. */
-export function parseKsplatHeader(bytes: Uint8Array, name: string): KsplatHeader {
+/** Reads and checks all headers: every section lies within the file, or is shortened to what is there (`isPrefix`). */
+export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = false): KsplatHeader {
   if (bytes.length < HEADER_BYTES) throw cut(bytes, name, HEADER_BYTES, 'a header');
   const view = viewOf(bytes);
   const where = (byte: number): string => `${name}, byte ${grouped(byte)} of the .ksplat header`;
@@ -66,7 +66,10 @@ export function parseKsplatHeader(bytes: Uint8Array, name: string): KsplatHeader
   if (major !== 0 || minor < 1) throw damaged(where(0), 'version 0.1', `${major}.${minor}`, 'decode/unsupported');
   const level = view.getUint16(20, true);
   if (level > 2) throw damaged(where(20), 'a compression level from 0 to 2', String(level), 'decode/header');
-  const sections = parseSections(bytes, name, level as KsplatHeader['level']);
+  const sections = parseSections(bytes, name, level as KsplatHeader['level']).map((section) =>
+    isPrefix ? shortened(section, bytes.length) : section,
+  );
+  if (!isPrefix) sections.forEach((section) => requireRoom(section, bytes, name));
   const count = sections.reduce((sum, section) => sum + section.count, 0);
   if (count === 0) throw noSplats(where(16));
   const range = [view.getFloat32(36, true) || -1.5, view.getFloat32(40, true) || 1.5] as const;
@@ -115,8 +118,6 @@ function parseSection(
   const bucketsAt = start + 4 * partialBuckets;
   const splatsAt = bucketsAt + bucketStride * bucketCount;
   const end = splatsAt + bytesPerSplat * maxCount;
-  const needed = splatsAt + bytesPerSplat * count;
-  if (needed > bytes.length) throw cut(bytes, name, needed, `${grouped(count)} splats of ${bytesPerSplat} bytes`);
   const positionRange = word(24) || DEFAULT_RANGE;
   const positionStep = view.getFloat32(header + 16, true) / 2 / positionRange;
   const section = {
@@ -124,6 +125,16 @@ function parseSection(
     ...{ fullBuckets, partialSizesAt: start, partialBuckets, positionStep, positionRange },
   };
   return { section, end };
+}
+
+function requireRoom({ count, splatsAt, bytesPerSplat }: KsplatSection, bytes: Uint8Array, name: string): void {
+  const end = splatsAt + bytesPerSplat * count;
+  if (end > bytes.length) throw cut(bytes, name, end, `${grouped(count)} splats of ${bytesPerSplat} bytes`);
+}
+
+function shortened(section: KsplatSection, fileBytes: number): KsplatSection {
+  const count = Math.floor((fileBytes - section.splatsAt) / section.bytesPerSplat);
+  return { ...section, count: Math.max(0, Math.min(section.count, count)) };
 }
 
 function cut(bytes: Uint8Array, name: string, needed: number, what: string): GaussianSplatError {

@@ -9,8 +9,8 @@ import type { SceneSource } from '../scene-format.js';
  * 0 in float32, at 1 and 2 with 16-bit positions within buckets and float16, at 2 with coefficients in bytes. Sections
  * of a lower degree than the highest get zeros.
  */
-export function readKsplat({ bytes, name, signal }: SceneSource): GaussianCloud {
-  const header = parseKsplatHeader(bytes, name);
+export function readKsplat({ bytes, name, signal, isPrefix = false }: SceneSource): GaussianCloud {
+  const header = parseKsplatHeader(bytes, name, isPrefix);
   const cloud = allocateCloud(header.count, header.degree, name);
   let first = 0;
   for (const section of header.sections) {
