@@ -37,6 +37,8 @@ export type ErrorCode =
   | 'unsupported/limits'
   /** The scene needs more GPU memory than a buffer or the device may hold. */
   | 'out-of-memory/buffer-limit'
+  /** The scene needs more GPU memory than the page has set aside for scenes. */
+  | 'out-of-memory/budget'
   | 'out-of-memory/allocation'
   /** The GPU device was lost and could not be brought back. */
   | 'device-lost/unrecoverable'

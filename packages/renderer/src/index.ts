@@ -13,3 +13,4 @@ export { Renderer, type FrameRequest, type RendererOptions } from './renderer.js
 export type { FrameStatistics } from './statistics.js';
 export type { Threads } from './stages/threads.js';
 export type { Variants } from './variants.js';
+export { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
