@@ -10,7 +10,7 @@ export interface ViewOptions {
 }
 
 /** Distances from the middle of the subject, in its radii: from close by to all of it in view. */
-const DISTANCES = [1.15, 1.6, 2.2, 3.2];
+const DISTANCES = [1.5, 1.9, 2.4, 3.2];
 /** Height of the eye above the subject, radians: from a little below to well above. */
 const ELEVATIONS: readonly [number, number] = [-0.35, 1.1];
 

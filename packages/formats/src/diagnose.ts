@@ -51,6 +51,12 @@ const SIGNED_KINDS: readonly ForeignKind[] = [
     ),
     remedy: CHECK_URL,
   },
+  {
+    code: 'decode/unsupported',
+    found: 'the manifest of a sequence, which names many scenes',
+    remedy: 'read it with parseSequence, and its frames one by one',
+    fits: (_, text) => isJson(text) && /"gaussianSplatSequence"\s*:/.test(text),
+  },
   foreign('a JSON text', (_, text) => isJson(text), true),
   foreign('a PNG image', (bytes) => startsWith(bytes, '\x89PNG')),
   foreign('a JPEG image', (bytes) => startsWith(bytes, '\xff\xd8\xff')),
