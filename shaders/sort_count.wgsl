@@ -1,4 +1,4 @@
-// First third of a stable radix sort pass: how often each 8-bit digit occurs in each block of keys.
+// First third of a stable radix sort pass: how often each digit occurs in each block of keys.
 #import shared/plan
 #import shared/group
 #import shared/sort
@@ -19,7 +19,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     atomicAdd(&histogram[digit_of(keys[i], digit_pass.shift)], 1u);
   }
   workgroupBarrier();
-  if (block_id < plan.sort_blocks) {
+  if (lane < DIGITS && block_id < plan.sort_blocks) {
     counts[lane * plan.sort_blocks + block_id] = atomicLoad(&histogram[lane]);
   }
 }

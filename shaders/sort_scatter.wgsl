@@ -1,22 +1,12 @@
 // Last third: every key moves to its place. Within a block keys are ranked 256 at a time by a bitmap for each digit,
 // which needs no subgroups, keeps equal digits in order (stable), and waits for no other workgroup.
-#import shared/sort_scatter
-#import shared/prefix
+#import shared/sort_places
 
 const WORDS = SORT_THREADS / 32u;
 
-// Where the next key with a digit goes.
-var<workgroup> next: array<u32, DIGITS>;
 // Bit t of [word][digit]: thread 32·word + t of this round has the digit. Threads that walk over digits side by side
 // then touch neighbouring words.
 var<workgroup> members: array<atomic<u32>, DIGITS * WORDS>;
-
-// next[digit] = keys with smaller digits + keys with this digit in earlier blocks.
-fn find_first_places(block_id: u32, lane: u32) {
-  let own = digit_totals[lane];
-  next[lane] = inclusive_sum(own, lane, DIGITS) - own + block_offsets[lane * plan.sort_blocks + block_id];
-  workgroupBarrier();
-}
 
 @compute @workgroup_size(SORT_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {

@@ -35,17 +35,23 @@ async function chosen() {
 /** Frames of the path over which the compared views are spread: ten seconds. The measured frames are its first ones. */
 const PATH_FRAMES = 600;
 
-/** `count` of the path's cameras, evenly spaced. */
-const spread = (cameras, count) =>
-  Array.from({ length: count }, (_, i) => cameras[Math.floor((i * cameras.length) / count)]);
+/** Frames that lead to a compared view, so that what a renderer keeps from frame to frame shows in it. */
+const LEAD_IN = 6;
 
-async function judge(subjects, entry, cameras, references) {
+/** `count` of the path's cameras, evenly spaced, each with the cameras that lead to it. */
+const spread = (cameras, count) =>
+  Array.from({ length: count }, (_, i) => {
+    const at = LEAD_IN + Math.floor((i * (cameras.length - LEAD_IN)) / count);
+    return { camera: cameras[at], before: cameras.slice(at - LEAD_IN, at) };
+  });
+
+async function judge(subjects, entry, moments, references) {
   let subject;
   try {
     subject = await subjects.open(entry);
     const views = [];
-    for (const [i, camera] of cameras.entries()) {
-      views.push(compareImages(await subject.capture(camera), references.images[i], camera));
+    for (const [i, { camera, before }] of moments.entries()) {
+      views.push(compareImages(await subject.capture(camera, before), references.images[i], camera));
       const { ignoredOptions = [] } = await subject.facts();
       // An option that nobody reads would show the default's figures under another name.
       if (ignoredOptions.length > 0)
@@ -72,7 +78,7 @@ async function collect(run) {
   const references = await makeReferences({
     device: gpu.device,
     scene,
-    cameras: views,
+    cameras: views.map(({ camera }) => camera),
     kind,
     onProgress: showProgress,
   });

@@ -1,6 +1,7 @@
 // Two scales of screen tiles. A bin is a block of 8 x 4 tiles of 16 x 16 pixels: splats are listed for each bin, in depth
 // order, and a mask of 32 bits says which of the bin's tiles each of them touches.
-const TILE = 16u;
+#import shared/occlusion
+
 const BIN_COLUMNS = 8u;
 const BIN_ROWS = 4u;
 const TILES_PER_BIN = BIN_COLUMNS * BIN_ROWS;

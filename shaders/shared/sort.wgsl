@@ -7,7 +7,8 @@ struct SortPass {
 }
 
 const SORT_THREADS = 256u;
-// One digit a thread.
+// At most one digit a thread. Variants with digits of 4 bits replace both numbers.
+const DIGIT_BITS = 8u;
 const DIGITS = 256u;
 
 fn digit_of(key: u32, shift: u32) -> u32 {

@@ -43,12 +43,16 @@ export class OwnRenderer {
     return this.#device.queue.onSubmittedWorkDone();
   }
 
-  /** One view over black, before any rounding to 8 bits: [height, width, 4] premultiplied float32. */
-  async capture(camera) {
+  /**
+   * One view over black, before any rounding to 8 bits: [height, width, 4] premultiplied float32.
+   * @param before cameras that lead to it: the view is then shown as that frame of the movement, not as a still image
+   */
+  async capture(camera, before = []) {
     const target = makeTarget(this.#device, PRECISE, camera, this.#scale);
     try {
-      do this.#drawInto(target, camera);
-      while (!(await this.#renderer.isComplete()));
+      for (const step of before) await this.#drawWhole(target, step);
+      if (before.length > 0) this.#drawInto(target, camera);
+      else await this.#drawWhole(target, camera);
       return await readPixels(this.#device, target.texture);
     } finally {
       target.destroy();
@@ -74,6 +78,19 @@ export class OwnRenderer {
     this.#renderer.destroy();
     this.#timer?.destroy();
     this.#target.destroy();
+  }
+
+  /** Draws until there was room for everything. */
+  async #drawWhole(target, camera) {
+    this.#drawInto(target, camera);
+    for (let tries = 0; tries < 3 && !(await this.#hadRoom()); tries++) this.#drawInto(target, camera);
+  }
+
+  async #hadRoom() {
+    const { overflow, pairOverflow } = await this.#renderer.readStatistics();
+    if (overflow + pairOverflow === 0) return true;
+    // Asking makes room.
+    return this.#renderer.isComplete();
   }
 
   #drawInto({ drawn, view, upscaler }, camera, timer) {

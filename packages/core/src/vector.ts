@@ -32,16 +32,21 @@ export function multiply(a: Matrix4, b: Matrix4): Float64Array {
 
 /** Position of the eye in world units: the point that an affine world-to-camera matrix maps to the origin. */
 export function eyeOf(worldToCamera: Matrix4): Vector3 {
-  const m = worldToCamera;
+  const m = inverse(worldToCamera);
+  return [m[3], m[7], m[11]];
+}
+
+/** The inverse of an affine matrix. */
+export function inverse(m: Matrix4): Float64Array {
   const rows: [Vector3, Vector3, Vector3] = [
     [m[0], m[1], m[2]],
     [m[4], m[5], m[6]],
     [m[8], m[9], m[10]],
   ];
-  // Solves A·eye = -t by Cramer's rule, so that sheared and scaled views keep their true centre.
-  const t: Vector3 = [-m[3], -m[7], -m[11]];
+  // By Cramer's rule: sheared and scaled matrices have an inverse too.
   const determinant = dot(rows[0], cross(rows[1], rows[2]));
-  const inverse = (a: Vector3, b: Vector3): Vector3 => scale(cross(a, b), 1 / determinant);
-  const [c0, c1, c2] = [inverse(rows[1], rows[2]), inverse(rows[2], rows[0]), inverse(rows[0], rows[1])];
-  return add(add(scale(c0, t[0]), scale(c1, t[1])), scale(c2, t[2]));
+  const column = (a: Vector3, b: Vector3): Vector3 => scale(cross(a, b), 1 / determinant);
+  const [c0, c1, c2] = [column(rows[1], rows[2]), column(rows[2], rows[0]), column(rows[0], rows[1])];
+  const moved = add(add(scale(c0, -m[3]), scale(c1, -m[7])), scale(c2, -m[11]));
+  return Float64Array.from([0, 1, 2].flatMap((i) => [c0[i], c1[i], c2[i], moved[i]]).concat(0, 0, 0, 1));
 }

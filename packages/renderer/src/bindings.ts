@@ -10,7 +10,7 @@ import { ProjectStage } from './stages/project.js';
 import { ScanStage } from './stages/scan.js';
 import { SortStage } from './stages/sort.js';
 import { thinBlocks, ThinStage } from './stages/thin.js';
-import type { Threads } from './stages/threads.js';
+import type { Variants } from './variants.js';
 import { constants } from './generated/shaders.js';
 
 /** The stages before the rasterizer; each is a shader of the same name. */
@@ -25,7 +25,11 @@ export interface Stages {
   readonly sort: SortStage;
 }
 
-export function makeStages(device: GPUDevice, { alpha_min, min_contribution }: Overrides, threads: Threads): Stages {
+export function makeStages(
+  device: GPUDevice,
+  { alpha_min, min_contribution }: Overrides,
+  { threads, sort }: Pick<Variants, 'threads' | 'sort'>,
+): Stages {
   return {
     cullChunks: new CullChunksStage(device),
     cull: new CullStage(device, { alpha_min, min_contribution }, threads),
@@ -34,7 +38,7 @@ export function makeStages(device: GPUDevice, { alpha_min, min_contribution }: O
     compact: new CompactStage(device),
     thin: new ThinStage(device),
     project: new ProjectStage(device),
-    sort: new SortStage(device, 'indices', threads),
+    sort: new SortStage(device, sort),
   };
 }
 
@@ -45,6 +49,15 @@ interface PageBindings {
   readonly cull: GPUBindGroup;
   readonly compact: GPUBindGroup;
   readonly project: GPUBindGroup;
+}
+
+/** What {@link FrameBindings} binds the stages to. */
+export interface FrameBuffers {
+  readonly table: PageTable;
+  readonly scratch: Scratch;
+  /** How far one sees: see {@link Occlusion}. */
+  readonly occlusion: GPUBuffer;
+  readonly keyBits: number;
 }
 
 /** Everything that the stages before the rasterizer are bound to, for one page table and one capacity. */
@@ -68,13 +81,13 @@ export class FrameBindings {
   };
   #thinned: { order: GPUBuffer; thin: ReturnType<ThinStage['bind']>; plan: GPUBindGroup } | undefined;
 
-  constructor(device: GPUDevice, stages: Stages, table: PageTable, scratch: Scratch, keyBits: number) {
+  constructor(device: GPUDevice, stages: Stages, { table, scratch, occlusion, keyBits }: FrameBuffers) {
     this.#device = device;
     this.#stages = stages;
     this.#table = table;
     this.#scratch = scratch;
     const memory = (this.#memory = new GpuMemory(device));
-    this.pages = bindPages(stages, table, scratch);
+    this.pages = bindPages(stages, table, scratch, occlusion);
     const { groupOffsets, plan, keys, order, digitCounts, digitTotals } = scratch;
     const count = table.pages.length;
     const { storage, uniform } = BUFFER_USAGE;
@@ -138,7 +151,7 @@ export class FrameBindings {
   }
 }
 
-function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBindings[] {
+function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion: GPUBuffer): PageBindings[] {
   const { chunkList, chunkArgs, visibleBits, groupOffsets, gathered, plan, splats, keys, order } = scratch;
   // The sort needs its first order buffer only after `project` has read the survivors from it.
   const survivors = order[0];
@@ -154,7 +167,7 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
         chunk_args: chunkArgs,
         group_counts: groupOffsets,
       }),
-      cull: stages.cull.bind({ ...chunk, gaussians, group_counts: groupOffsets, gathered }),
+      cull: stages.cull.bind({ ...chunk, gaussians, group_counts: groupOffsets, gathered, occlusion }),
       compact: stages.compact.bind({ ...chunk, group_offsets: groupOffsets, survivors }),
       project: stages.project.bind({ view, gaussians, sh: page.sh, survivors, plan, gathered, splats, keys: keys[0] }),
     };

@@ -5,8 +5,7 @@ import { GpuMemory } from './gpu/memory.js';
 import type { PassTimer } from './gpu/pass-timer.js';
 import type { PageTable } from './page-table.js';
 import { OrderKeysStage } from './stages/order-keys.js';
-import { SortStage } from './stages/sort.js';
-import type { Threads } from './stages/threads.js';
+import { SortStage, type SortName } from './stages/sort.js';
 
 const KEY_BITS = 32;
 const { SORT_BLOCK, DIGITS, CULL_GROUP } = constants;
@@ -32,11 +31,11 @@ export class DepthOrder {
   /** Needed while sorting only. */
   #working: GpuMemory | undefined;
 
-  constructor(device: GPUDevice, table: PageTable, threads: Threads) {
+  constructor(device: GPUDevice, table: PageTable, sort: SortName) {
     this.#device = device;
     this.#table = table;
     this.#keys = new OrderKeysStage(device);
-    this.#sort = new SortStage(device, 'indices', threads);
+    this.#sort = new SortStage(device, sort);
     this.#memory = new GpuMemory(device);
     this.length = CULL_GROUP * table.groups;
   }

@@ -1,6 +1,7 @@
 import type { FrameBindings, Stages } from './bindings.js';
 import type { DepthOrder } from './depth-order.js';
 import type { PassTimer } from './gpu/pass-timer.js';
+import type { Occlusion } from './occlusion.js';
 import type { Scratch } from './scratch.js';
 
 /** What the stages before the rasterizer need, bound and allocated beforehand. */
@@ -8,6 +9,7 @@ export interface Frame {
   readonly stages: Stages;
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
+  readonly occlusion: Occlusion;
   /** An order of all splats that serves the camera; without it the visible splats are sorted. */
   readonly depthOrder?: DepthOrder;
   readonly timer?: PassTimer;
@@ -22,6 +24,7 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): void
   bindings.reset();
   encoder.clearBuffer(scratch.gathered);
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
+  frame.occlusion.record(pass);
   cull(pass, frame);
   if (frame.depthOrder) listInDepthOrder(pass, frame, frame.depthOrder);
   else listInFileOrder(pass, frame);

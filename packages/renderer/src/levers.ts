@@ -1,5 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import type { BinSize } from './rasterizers/bins.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
+import type { SortName } from './stages/sort.js';
 import type { Threads } from './stages/threads.js';
 
 /**
@@ -14,6 +16,13 @@ export interface Levers {
   /** How stages share their work; the image is the same. `auto`: see {@link Renderer.create}. */
   readonly threads: 'auto' | Threads;
   /**
+   * Size of the lists that tiles read: `coarse` ones for blocks of 128 x 64 pixels, `fine` ones for 64 x 32, which cost another pass to make.
+   * The image is the same. `auto`: by the number of splats.
+   */
+  readonly bins: 'auto' | BinSize;
+  /** How keys are sorted; the order is the same. `auto`: see {@link Renderer.create}. */
+  readonly sort: 'auto' | SortName;
+  /**
    * Precision in which quads are blended and images kept. `auto`: see {@link Renderer.create}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
    * feature `float32-blendable`.
    */
@@ -25,6 +34,11 @@ export interface Levers {
   readonly depthKeyBits: 16 | 24 | 32;
   /** Radians that the camera may turn before an order of all splats is made anew. */
   readonly sortAngle: number;
+  /**
+   * Tiles leave out splats behind what took all pixels of their tiles to this transmittance or less in the last frame; 0 leaves out
+   * none. While the camera moves a tile can lack for one frame what has just come into sight.
+   */
+  readonly occludedBelow: number;
   /** Tiles finish a pixel before the splat that would leave it this transmittance or less. */
   readonly transmittanceMin: number;
   /** A splat paints a pixel only with at least this alpha. */
@@ -41,9 +55,12 @@ export interface Levers {
 const EXACT: Levers = {
   rasterizer: 'auto',
   threads: 'auto',
+  sort: 'auto',
+  bins: 'auto',
   accumulation: 'auto',
   depthKeyBits: 24,
   sortAngle: 2e-5,
+  occludedBelow: 0,
   transmittanceMin: 1e-4,
   alphaMin: 1 / 255,
   minContribution: 0,
@@ -59,15 +76,22 @@ export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
  * `reference` 75 dB, `default` 59 dB (no error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB.
  */
 export const QUALITIES: Readonly<Record<Quality, Levers>> = {
-  reference: { ...EXACT, rasterizer: 'tiles', accumulation: 'rgba32float', depthKeyBits: 32, sortAngle: 0 },
+  reference: {
+    ...EXACT,
+    rasterizer: 'tiles',
+    accumulation: 'rgba32float',
+    depthKeyBits: 32,
+    sortAngle: 0,
+  },
   default: EXACT,
-  balanced: { ...EXACT, transmittanceMin: 1 / 255, alphaMin: 1.1 / 255, depthKeyBits: 16 },
-  fast: { ...EXACT, transmittanceMin: 1 / 100, alphaMin: 1.25 / 255, depthKeyBits: 16 },
+  balanced: { ...EXACT, occludedBelow: 0.03, transmittanceMin: 1 / 255, alphaMin: 1.1 / 255, depthKeyBits: 16 },
+  fast: { ...EXACT, occludedBelow: 0.1, transmittanceMin: 1 / 100, alphaMin: 1.25 / 255, depthKeyBits: 16 },
 };
 
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
   sortAngle: [0, Math.PI],
   transmittanceMin: [0, 1],
+  occludedBelow: [0, 1],
   alphaMin: [1 / 255, 1],
   minContribution: [0, Infinity],
   shDegree: [0, 3],

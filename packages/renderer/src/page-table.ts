@@ -64,8 +64,18 @@ export class PageTable {
   }
 
   /** Points every page at a camera, for the commands that are submitted next. */
-  look(camera: Camera, { shDegree, depthKeyBits }: Levers, isOrdered: boolean): void {
-    const shared = { sh_cap: shDegree, key_bits: depthKeyBits, is_ordered: isOrdered ? 1 : 0 };
+  look(
+    camera: Camera,
+    { shDegree, depthKeyBits }: Levers,
+    isOrdered: boolean,
+    occlusionTiles: readonly [number, number],
+  ): void {
+    const shared = {
+      sh_cap: shDegree,
+      key_bits: depthKeyBits,
+      is_ordered: isOrdered ? 1 : 0,
+      occlusion_tiles: occlusionTiles,
+    };
     let page = 0;
     for (const scene of this.#scenes) {
       const values = cameraValues(camera, scene.origin);

@@ -12,9 +12,17 @@ import { GpuMemory } from './gpu/memory.js';
 import type { PassTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
 import { leversOf, type Levers, type Quality } from './levers.js';
+import { Occlusion } from './occlusion.js';
 import { PageTable } from './page-table.js';
 import { QuadsRasterizer } from './rasterizers/quads.js';
-import type { AccumulationFormat, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import type {
+  AccumulationFormat,
+  FrameNotes,
+  Painting,
+  Rasterizer,
+  RasterizerName,
+  Surface,
+} from './rasterizers/rasterizer.js';
 import { maxPairs, TilesRasterizer } from './rasterizers/tiles.js';
 import { maxVisible, Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
@@ -45,6 +53,10 @@ export interface FrameRequest {
   readonly targetFormat?: GPUTextureFormat;
   /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
   readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
+  /**
+   * What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it.
+   */
+  readonly notes?: FrameNotes;
   /** Notes when each pass ran. */
   readonly timer?: PassTimer;
 }
@@ -94,6 +106,7 @@ export class Renderer {
   readonly #stages: Stages;
   readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
+  readonly #occlusion: Occlusion;
   readonly #onIncomplete: () => void;
   readonly #memory: GpuMemory;
   readonly #composeUniform: GPUBuffer;
@@ -112,9 +125,10 @@ export class Renderer {
     this.levers = settle(device, leversOf(options));
     this.#onIncomplete = options.onIncomplete ?? (() => undefined);
     const overrides = overridesOf(this.levers);
-    this.#stages = makeStages(device, overrides, this.levers.threads);
+    this.#stages = makeStages(device, overrides, this.levers);
     this.#compose = new ComposeStage(device);
     this.#rasterizer = makeRasterizer(device, this.levers, overrides);
+    this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
@@ -138,8 +152,9 @@ export class Renderer {
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
     const { table, scratch, bindings, depthOrder } = this.#resources ?? {};
-    const parts = [this.#memory, table, scratch, bindings, depthOrder, this.#rasterizer, this.#accumulation?.texture];
-    return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    const parts = [this.#memory, table, scratch, bindings, depthOrder, this.#rasterizer, this.#occlusion];
+    const { texture } = this.#accumulation ?? {};
+    return [...parts, texture].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
   /**
@@ -148,24 +163,33 @@ export class Renderer {
    * need a larger buffer than the device allows.
    */
   render(request: FrameRequest): void {
-    const { camera, background = TRANSPARENT, timer } = request;
+    const { camera, background = TRANSPARENT, notes, timer } = request;
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
+    if (notes) requireNotes(this.#rasterizer);
     const target = this.#targetOf(request);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
-    const resources = this.#resourcesFor(scenes);
-    const { table, scratch, bindings, depthOrder, monitor } = resources;
     const drawn = scaled(camera, this.levers.resolutionScale);
+    const resources = this.#resourcesFor(scenes, this.#occlusion.fit(drawn));
+    const { table, scratch, bindings, depthOrder, monitor } = resources;
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer);
-    table.look(drawn, this.levers, isOrdered);
-    const serving = isOrdered ? depthOrder : undefined;
-    recordProjection(encoder, { stages: this.#stages, bindings, scratch, depthOrder: serving, timer });
-    this.#paint(encoder, target, drawn, isOrdered, background, timer);
+    const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer, notes !== undefined);
+    this.#occlusion.prepare(encoder, drawn, table.version);
+    table.look(drawn, this.levers, isOrdered, this.#occlusion.tiles);
+    recordProjection(encoder, {
+      stages: this.#stages,
+      bindings,
+      scratch,
+      occlusion: this.#occlusion,
+      depthOrder: isOrdered ? depthOrder : undefined,
+      timer,
+    });
+    this.#paint(encoder, target, drawn, { order: isOrdered ? 'identity' : 'sorted', notes, timer }, background);
     const isWatched = monitor.record(encoder, scratch.plan, this.#rasterizer.pairPlan);
     this.#device.queue.submit([encoder.finish()]);
     if (isWatched) monitor.read();
+    if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
     if (this.levers.sortAngle <= STILL) depthOrder.settle();
   }
@@ -183,8 +207,9 @@ export class Renderer {
    */
   async isComplete(): Promise<boolean> {
     if (this.#resources === undefined) return true;
+    const mayLack = this.#occlusion.mayLack;
     const { visible, overflow, pairs, pairOverflow } = await this.readStatistics();
-    if (overflow + pairOverflow === 0) return true;
+    if (overflow + pairOverflow === 0) return !mayLack;
     this.#resources?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
     return false;
   }
@@ -195,6 +220,7 @@ export class Renderer {
     this.#accumulation?.texture.destroy();
     this.#accumulation = undefined;
     this.#rasterizer.destroy();
+    this.#occlusion.destroy();
     this.#memory.destroy();
   }
 
@@ -208,6 +234,7 @@ export class Renderer {
     { depthOrder, table }: Resources,
     camera: Camera,
     timer: PassTimer | undefined,
+    isAskedFor: boolean,
   ): boolean {
     const { sortAngle } = this.levers;
     const axis = axisOf(camera);
@@ -218,7 +245,8 @@ export class Renderer {
       this.#turningFrames = 0;
       return true;
     }
-    if (isStill && depthOrder.isPossible && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL)) {
+    const isUseful = isAskedFor || (isStill && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL));
+    if (isUseful && depthOrder.isPossible) {
       depthOrder.record(encoder, camera, timer);
       return true;
     }
@@ -230,22 +258,20 @@ export class Renderer {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    isOrdered: boolean,
+    how: Pick<Painting, 'order' | 'notes' | 'timer'>,
     background: readonly [number, number, number, number],
-    timer: PassTimer | undefined,
   ): void {
-    const order = isOrdered ? 'identity' : 'sorted';
     const isFullSize = camera.width === target.width && camera.height === target.height;
     if (isFullSize && target.isStorable && this.#rasterizer.finishes(target.format)) {
-      this.#rasterizer.record(encoder, { surface: target, order, background, timer });
+      this.#rasterizer.record(encoder, { ...how, surface: target, background });
       return;
     }
     const { texture, compose } = this.#accumulationOf(camera.width, camera.height);
     const scale = [camera.width / target.width, camera.height / target.height];
     writeStruct(layouts.Compose, { background, scale }, this.#composeBytes);
     this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
-    this.#rasterizer.record(encoder, { surface: texture, order, timer });
-    this.#compose.record(encoder, compose, target.view, target.format, timer);
+    this.#rasterizer.record(encoder, { ...how, surface: texture });
+    this.#compose.record(encoder, compose, target.view, target.format, how.timer);
   }
 
   #targetOf({ target, targetFormat, camera }: FrameRequest): Target {
@@ -260,11 +286,12 @@ export class Renderer {
     return { view, format: target.format, isStorable, width, height };
   }
 
-  #resourcesFor(scenes: readonly GaussianScene[]): Resources {
+  #resourcesFor(scenes: readonly GaussianScene[], mustRebind: boolean): Resources {
     const current = this.#resources;
     if (current?.table.holds(scenes)) {
       // The monitor has asked for other room.
-      if (current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs) this.#rebind(current.table);
+      const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
+      if (mustRebind || hasOtherRoom) this.#rebind(current.table);
       return this.#resources!;
     }
     this.#releaseResources();
@@ -283,18 +310,20 @@ export class Renderer {
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
   #rebind(table: PageTable): void {
     const capacity = this.#capacity!;
-    const depthOrder = this.#resources?.depthOrder ?? new DepthOrder(this.#device, table, this.levers.threads);
+    const depthOrder = this.#resources?.depthOrder ?? new DepthOrder(this.#device, table, this.levers.sort);
     this.#resources?.scratch.destroy();
     this.#resources?.bindings.destroy();
     this.#resources?.monitor.destroy();
     const pages = table.pages.length;
     const scratch = new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
-    const { depthKeyBits } = this.levers;
+    const { depthKeyBits, sort } = this.levers;
     const { plan, splats, order, keys } = scratch;
     this.#rasterizer.bind({
       plan,
       splats,
-      orders: { sorted: order[sortedIn(depthKeyBits)], identity: keys[0] },
+      occlusion: this.#occlusion,
+      survivors: order[0],
+      orders: { sorted: order[sortedIn(sort, depthKeyBits)], identity: keys[0] },
       capacity: capacity.visible,
       pairCapacity: capacity.pairs,
     });
@@ -307,7 +336,12 @@ export class Renderer {
     this.#resources = {
       table,
       scratch,
-      bindings: new FrameBindings(this.#device, this.#stages, table, scratch, depthKeyBits),
+      bindings: new FrameBindings(this.#device, this.#stages, {
+        table,
+        scratch,
+        occlusion: this.#occlusion.depths,
+        keyBits: depthKeyBits,
+      }),
       depthOrder,
       monitor,
     };
@@ -320,6 +354,7 @@ export class Renderer {
     bindings?.destroy();
     depthOrder?.release();
     monitor?.destroy();
+    this.#occlusion.forget();
     this.#resources = undefined;
     this.#lastAxis = undefined;
   }
@@ -337,8 +372,13 @@ export class Renderer {
 
 const isTexture = (target: GPUTexture | GPUTextureView): target is GPUTexture => 'createView' in target;
 
-function overridesOf({ alphaMin, minContribution, transmittanceMin }: Levers): Overrides {
-  return { alpha_min: alphaMin, min_contribution: minContribution, transmittance_min: transmittanceMin };
+function overridesOf({ alphaMin, minContribution, transmittanceMin, occludedBelow }: Levers): Overrides {
+  return {
+    alpha_min: alphaMin,
+    min_contribution: minContribution,
+    transmittance_min: transmittanceMin,
+    occluded_below: occludedBelow,
+  };
 }
 
 /** The same view with fewer pixels. */
@@ -372,12 +412,22 @@ function requireTextureSize(device: GPUDevice, { width, height }: Camera): void 
 
 function makeRasterizer(
   device: GPUDevice,
-  { rasterizer, accumulation, threads }: Variants,
+  { rasterizer, accumulation, sort, bins }: Levers & Variants,
   overrides: Overrides,
 ): Rasterizer {
-  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, threads);
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, { sort, bins });
   requireBlendable(device, accumulation);
   return new QuadsRasterizer(device, accumulation, overrides);
+}
+
+function requireNotes({ name, takesNotes }: Rasterizer): void {
+  if (takesNotes) return;
+  throw new GaussianSplatError('unsupported/limits', {
+    where: 'FrameRequest.notes',
+    expected: 'a renderer with the rasterizer tiles',
+    found: name,
+    remedy: "make the renderer with { rasterizer: 'tiles' }",
+  });
 }
 
 function requireBlendable(device: GPUDevice, format: AccumulationFormat): void {

@@ -19,6 +19,7 @@ export type CameraValues = Omit<
   | 'antialiased'
   | 'key_bits'
   | 'is_ordered'
+  | 'occlusion_tiles'
 >;
 
 /**

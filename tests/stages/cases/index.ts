@@ -1,6 +1,7 @@
 import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
 import { ingestCases } from './ingest.js';
+import { occlusionCases } from './occlusion.js';
 import { orderCases } from './order.js';
 import { projectionCases } from './projection.js';
 import { scanCases } from './scan.js';
@@ -11,6 +12,7 @@ export const stageCases: readonly StageCase[] = [
   ...projectionCases,
   ...compactCases,
   ...orderCases,
+  ...occlusionCases,
   ...sortCases,
   ...ingestCases,
 ];

@@ -82,7 +82,15 @@ export const orderCases: readonly StageCase[] = [
       const camera = cameraAt([1, 2, -3], [0, 0, 1], { width: 64, height: 48 });
       const packed = packGaussians(cloud);
       const bytes = new ArrayBuffer(layouts.View.size);
-      const flags = { sh_degree: 0, sh_cap: 3, sh_encoding: 0, antialiased: 0, key_bits: 32, is_ordered: 1 };
+      const flags = {
+        sh_degree: 0,
+        sh_cap: 3,
+        sh_encoding: 0,
+        antialiased: 0,
+        key_bits: 32,
+        is_ordered: 1,
+        occlusion_tiles: [0, 0],
+      };
       const firstGroup = 2;
       const page = { splat_count: packed.count, page: 0, first_group: firstGroup };
       writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...flags, ...page }, bytes);

@@ -25,10 +25,16 @@ function uploadScene(
   bench: Bench,
   packed: PackedGaussians,
   camera: Camera,
+  occlusionTiles: readonly [number, number] = [0, 0],
 ): { view: GPUBuffer; gaussians: GPUBuffer; sh: GPUBuffer; chunks: GPUBuffer } {
   const bytes = new ArrayBuffer(layouts.View.size);
   const page = { splat_count: packed.count, page: 0, first_group: 0 };
-  const flags = { antialiased: packed.antialiased ? 1 : 0, key_bits: 32, is_ordered: 0 };
+  const flags = {
+    antialiased: packed.antialiased ? 1 : 0,
+    key_bits: 32,
+    is_ordered: 0,
+    occlusion_tiles: occlusionTiles,
+  };
   const sh = { sh_degree: packed.shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[packed.shPrecision] };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...sh, ...flags }, bytes);
   return {
@@ -39,13 +45,16 @@ function uploadScene(
   };
 }
 
+const NO_OCCLUSION = { tiles: [0, 0], depths: new Uint32Array(1) } as const;
+
 /** Visibility flags of all splats, how many were refused as unusable, and how many chunks were looked into. */
-async function cullOnGpu(
+export async function cullOnGpu(
   bench: Bench,
   packed: PackedGaussians,
   camera: Camera,
+  occlusion: { readonly tiles: readonly [number, number]; readonly depths: Uint32Array } = NO_OCCLUSION,
 ): Promise<{ visible: boolean[]; unusable: number; chunksSeen: number }> {
-  const { view, gaussians, chunks } = uploadScene(bench, packed, camera);
+  const { view, gaussians, chunks } = uploadScene(bench, packed, camera, occlusion.tiles);
   const groups = cullGroups(packed.count);
   // What `cull` does not write must come from `cull_chunks`: garbage would show.
   const bits = bench.buffer(new Uint32Array(WORDS_PER_GROUP * groups).fill(0xffffffff));
@@ -55,7 +64,7 @@ async function cullOnGpu(
   const shared = { view, chunk_list: bench.buffer(4 * groups), visible_bits: bits, group_counts: counts };
   const [chunkStage, stage] = [new CullChunksStage(bench.device), new CullStage(bench.device)];
   const chunkBindings = chunkStage.bind({ ...shared, chunks, chunk_args: chunkArgs });
-  const bindings = stage.bind({ ...shared, gaussians, gathered });
+  const bindings = stage.bind({ ...shared, gaussians, gathered, occlusion: bench.buffer(occlusion.depths) });
   bench.compute((pass) => {
     chunkStage.record(pass, chunkBindings, packed.count);
     stage.record(pass, bindings, chunkArgs, 0);

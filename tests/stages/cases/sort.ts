@@ -1,4 +1,12 @@
-import { constants, layouts, SortStage } from '@gaussian-splat/renderer/stages';
+import {
+  canSort,
+  constants,
+  layouts,
+  SORT_NAMES,
+  sortedIn,
+  SortStage,
+  type SortName,
+} from '@gaussian-splat/renderer/stages';
 import { check, checkEqual, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
 
 /** The twin: indices of the keys in ascending order, equal keys in the order they came. */
@@ -20,7 +28,12 @@ function planFor(count: number): Uint32Array {
 }
 
 /** Sorts on the GPU; the buffers hold more than the keys, and what lies beyond must stay. */
-async function sortOnGpu(bench: Bench, keys: Uint32Array): Promise<{ keys: Uint32Array; order: Uint32Array }> {
+async function sortOnGpu(
+  bench: Bench,
+  keys: Uint32Array,
+  name: SortName = 'shared8',
+  keyBits = 32,
+): Promise<{ keys: Uint32Array; order: Uint32Array }> {
   const beyond = 64;
   const padded = new Uint32Array(keys.length + beyond).fill(0xdeadbeef);
   padded.set(keys);
@@ -31,16 +44,18 @@ async function sortOnGpu(bench: Bench, keys: Uint32Array): Promise<{ keys: Uint3
   ];
   const keyBuffers = pair(padded);
   const order = pair(new Uint32Array(padded.length).fill(0xdeadbeef));
-  const stage = new SortStage(bench.device);
-  const bindings = stage.bind({
+  const stage = new SortStage(bench.device, name);
+  const buffers = {
     plan,
     keys: keyBuffers,
     values: order,
     digitCounts: bench.buffer(4 * constants.DIGITS * Math.max(1, Math.ceil(keys.length / constants.SORT_BLOCK))),
     digitTotals: bench.buffer(4 * constants.DIGITS),
-  });
+  };
+  const bindings = stage.bind(buffers, keyBits);
   bench.compute((pass) => stage.record(pass, bindings, plan));
-  const result = { keys: await bench.read(keyBuffers[0]), order: await bench.read(order[0]) };
+  const side = sortedIn(name, keyBits);
+  const result = { keys: await bench.read(keyBuffers[side]), order: await bench.read(order[side]) };
   const rest = result.order.subarray(keys.length);
   check(
     rest.every((word) => word === 0xdeadbeef),
@@ -49,9 +64,9 @@ async function sortOnGpu(bench: Bench, keys: Uint32Array): Promise<{ keys: Uint3
   return result;
 }
 
-async function checkSort(bench: Bench, keys: Uint32Array): Promise<void> {
+async function checkSort(bench: Bench, keys: Uint32Array, name?: SortName, keyBits?: number): Promise<void> {
   const expected = sortTwin(keys);
-  const sorted = await sortOnGpu(bench, keys);
+  const sorted = await sortOnGpu(bench, keys, name, keyBits);
   checkEqual(sorted.order, expected, 'order');
   checkEqual(
     sorted.keys,
@@ -75,6 +90,27 @@ export const sortCases: StageCase[] = [
         bench,
         fill(size, () => Math.floor(random() * 0x1_0000_0000)),
       );
+    },
+  })),
+  ...SORT_NAMES.map((name) => ({
+    name: `sort ${name}: keys of 4 to 32 bits, many of them equal, blocks not full`,
+    run: async (bench: Bench) => {
+      if (!canSort(bench.device, name)) {
+        check(name.startsWith('subgroup'), `${name} needs nothing special`);
+        return;
+      }
+      for (const [keyBits, size] of [
+        [4, 2 * block + 9],
+        [7, 1000],
+        [12, 3 * block],
+        [24, block + 1],
+        [32, 2 * block + 300],
+      ]) {
+        const random = randomSource(keyBits);
+        const most = 2 ** keyBits;
+        const keys = fill(size, (i) => (i % 3 === 0 ? most - 1 : Math.floor(random() * most)));
+        await checkSort(bench, keys, name, keyBits);
+      }
     },
   })),
   {

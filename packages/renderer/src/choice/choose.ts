@@ -4,6 +4,7 @@ import { packGaussians } from '../pack/pack.js';
 import { Renderer } from '../renderer.js';
 import { remember, SAFE, type Variants } from '../variants.js';
 import { givesKnownAnswer, probeCamera, sphereCloud } from './known-answer.js';
+import { canSort, SORT_NAMES, type SortName } from '../stages/sort.js';
 import { sortsRight, timeSort } from './sort-probe.js';
 
 /** Where a choice is kept between visits: `localStorage`, or anything like it. */
@@ -18,7 +19,7 @@ export interface ChoiceOptions {
 }
 
 /** Changes whenever a variant does, so that old choices are made anew. */
-const VERSION = 1;
+const VERSION = 2;
 
 /** Scenes of the probe: until one candidate is left, or the time is up. */
 const ROUNDS = [
@@ -42,7 +43,7 @@ const MEASURABLE = 1.5;
 export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): Promise<Variants> {
   return perDevice(device, 'choice', async () => {
     const store = options.store === undefined ? pageStore() : options.store;
-    const kept = readChoice(store, keyFor(device));
+    const kept = readChoice(store, device);
     const variants = kept !== undefined && (await isRight(device, kept)) ? kept : await probe(device);
     remember(device, variants);
     writeChoice(store, keyFor(device), variants);
@@ -51,39 +52,47 @@ export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): 
 }
 
 async function probe(device: GPUDevice): Promise<Variants> {
-  const threads = await chooseThreads(device);
+  const sort = await chooseSort(device);
   const candidates: Variants[] = [];
-  for (const candidate of candidatesFor(device, threads)) {
+  for (const candidate of candidatesFor(device, sort)) {
     if (await isRight(device, candidate)) candidates.push(candidate);
   }
   if (candidates.length === 0) return SAFE;
   return chooseFastest(device, candidates);
 }
 
-async function chooseThreads(device: GPUDevice): Promise<Variants['threads']> {
+/** The fastest way to sort, of those that sort rightly. */
+async function chooseSort(device: GPUDevice): Promise<SortName> {
   // A processor in disguise, by its own account.
   if (device.adapterInfo?.isFallbackAdapter && (await sortsRight(device, 'serial'))) return 'serial';
-  const times = { parallel: Infinity, serial: Infinity };
-  for (const threads of ['parallel', 'serial'] as const) {
-    if (await sortsRight(device, threads)) times[threads] = await timeSort(device, threads);
+  let best: { readonly name: SortName; readonly time: number } = { name: SAFE.sort, time: Infinity };
+  for (const name of SORT_NAMES) {
+    if (!canSort(device, name) || !(await isValid(device, () => sortsRight(device, name)))) continue;
+    const time = await timeSort(device, name);
+    if (time < best.time) best = { name, time };
   }
-  return times.serial < times.parallel ? 'serial' : 'parallel';
+  return best.name;
 }
 
-function candidatesFor(device: GPUDevice, threads: Variants['threads']): Variants[] {
-  const quads: Variants = { rasterizer: 'quads', accumulation: 'rgba16float', threads };
-  const tiles: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads };
+function candidatesFor(device: GPUDevice, sort: SortName): Variants[] {
+  const threads = sort === 'serial' ? 'serial' : 'parallel';
+  const quads: Variants = { rasterizer: 'quads', accumulation: 'rgba16float', threads, sort };
+  const tiles: Variants = { ...quads, rasterizer: 'tiles' };
   const precise: Variants = { ...quads, accumulation: 'rgba32float' };
   const canBlend = device.features.has('float32-blendable');
   // Tiles are made of barriers, which is what a processor in disguise is worst at: ten times slower, and seconds to compile.
   return [quads, ...(canBlend ? [precise] : []), ...(threads === 'parallel' ? [tiles] : [])];
 }
 
-const isRight = async (device: GPUDevice, variants: Variants): Promise<boolean> => {
+const isRight = (device: GPUDevice, variants: Variants): Promise<boolean> =>
+  isValid(device, () => givesKnownAnswer(device, variants));
+
+/** Whether an answer is right, and WebGPU had nothing to say against the way to it. */
+async function isValid(device: GPUDevice, answer: () => Promise<boolean>): Promise<boolean> {
   device.pushErrorScope('validation');
-  const isAnswer = await givesKnownAnswer(device, variants).catch(() => false);
+  const isAnswer = await answer().catch(() => false);
   return (await device.popErrorScope().catch(() => undefined)) === null && isAnswer;
-};
+}
 
 async function chooseFastest(device: GPUDevice, candidates: readonly Variants[]): Promise<Variants> {
   let left = candidates.map((variants) => ({ variants, time: 0 }));
@@ -155,14 +164,19 @@ function pageStore(): ChoiceStore | null {
   }
 }
 
-function readChoice(store: ChoiceStore | null, key: string): Variants | undefined {
+function readChoice(store: ChoiceStore | null, device: GPUDevice): Variants | undefined {
   try {
-    const { rasterizer, accumulation, threads } = JSON.parse(store?.getItem(key) ?? '{}') as Partial<Variants>;
+    const { rasterizer, accumulation, threads, sort } = JSON.parse(
+      store?.getItem(keyFor(device)) ?? '{}',
+    ) as Partial<Variants>;
     const isKnown =
       (rasterizer === 'quads' || rasterizer === 'tiles') &&
       (accumulation === 'rgba16float' || accumulation === 'rgba32float') &&
-      (threads === 'parallel' || threads === 'serial');
-    return isKnown ? { rasterizer, accumulation, threads } : undefined;
+      (threads === 'parallel' || threads === 'serial') &&
+      sort !== undefined &&
+      SORT_NAMES.includes(sort) &&
+      canSort(device, sort);
+    return isKnown ? { rasterizer, accumulation, threads, sort } : undefined;
   } catch {
     return undefined;
   }

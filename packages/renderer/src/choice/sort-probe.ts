@@ -1,24 +1,23 @@
 import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE, dispatchGrid } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
-import { sortedIn, SortStage } from '../stages/sort.js';
-import type { Threads } from '../stages/threads.js';
+import { sortedIn, SortStage, type SortName } from '../stages/sort.js';
 
 /** Keys of a probe: several blocks, the last one not full. */
 const COUNT = 3 * constants.SORT_BLOCK + 1234;
 const KEY_BITS = 24;
 
 /** True if the variant puts random keys, many of them equal, in the order that they should have. */
-export async function sortsRight(device: GPUDevice, threads: Threads): Promise<boolean> {
+export async function sortsRight(device: GPUDevice, name: SortName): Promise<boolean> {
   const keys = probeKeys();
   const expected = Uint32Array.from(keys.keys()).sort((a, b) => keys[a] - keys[b] || a - b);
-  const { order } = await sort(device, threads, keys);
+  const { order } = await sort(device, name, keys);
   return expected.every((index, rank) => order[rank] === index);
 }
 
 /** Milliseconds that the variant takes, waited for. */
-export async function timeSort(device: GPUDevice, threads: Threads): Promise<number> {
-  return (await sort(device, threads, probeKeys())).time;
+export async function timeSort(device: GPUDevice, name: SortName): Promise<number> {
+  return (await sort(device, name, probeKeys())).time;
 }
 
 function probeKeys(): Uint32Array<ArrayBuffer> {
@@ -29,7 +28,7 @@ function probeKeys(): Uint32Array<ArrayBuffer> {
 
 async function sort(
   device: GPUDevice,
-  threads: Threads,
+  name: SortName,
   keys: Uint32Array<ArrayBuffer>,
 ): Promise<{ order: Uint32Array; time: number }> {
   const memory = new GpuMemory(device);
@@ -43,7 +42,7 @@ async function sort(
   const digitCounts = buffer(4 * constants.DIGITS * blocks);
   const digitTotals = buffer(4 * constants.DIGITS);
   const staging = memory.buffer('gs.probe', 4 * COUNT, mapRead | copyDestination);
-  const stage = new SortStage(device, 'indices', threads);
+  const stage = new SortStage(device, name);
   const bindings = stage.bind({ plan, keys: keyBuffers, values, digitCounts, digitTotals }, KEY_BITS);
   let time = Infinity;
   try {
@@ -56,7 +55,7 @@ async function sort(
       const pass = encoder.beginComputePass({ label: 'gs.probe' });
       stage.record(pass, bindings, plan);
       pass.end();
-      encoder.copyBufferToBuffer(values[sortedIn(KEY_BITS)], 0, staging, 0, 4 * COUNT);
+      encoder.copyBufferToBuffer(values[sortedIn(name, KEY_BITS)], 0, staging, 0, 4 * COUNT);
       device.queue.submit([encoder.finish()]);
       await device.queue.onSubmittedWorkDone();
       time = Math.min(time, performance.now() - before);

@@ -53,7 +53,7 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
 export function packGaussians(cloud: GaussianCloud, options: PackOptions = {}): PackedGaussians {
   validateCloud(cloud);
   const { shDegree, antialiased, origin } = cloud;
-  const kept = mortonOrder(cloud.positions, usableIndices(cloud));
+  const kept = packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
@@ -63,6 +63,11 @@ export function packGaussians(cloud: GaussianCloud, options: PackOptions = {}): 
     sh: packSh(cloud, kept, shPrecision),
     chunks: boundChunks(cloud, kept),
   };
+}
+
+/** Index in the cloud of each packed splat. */
+export function packedOrder(cloud: GaussianCloud): Uint32Array {
+  return mortonOrder(cloud.positions, usableIndices(cloud));
 }
 
 function usableIndices(cloud: GaussianCloud): Uint32Array {

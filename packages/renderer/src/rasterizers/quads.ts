@@ -9,6 +9,7 @@ type Program = ShaderProgram<typeof rasterizeQuads>;
 /** Hardware quads, back to front, blended into a float texture. */
 export class QuadsRasterizer implements Rasterizer {
   readonly name = 'quads';
+  readonly takesNotes = false;
   readonly #device: GPUDevice;
   readonly #program: Program;
   readonly #pipeline: GPURenderPipeline;

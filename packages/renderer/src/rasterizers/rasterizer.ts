@@ -17,6 +17,10 @@ export interface RasterizerInputs {
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
   readonly orders: Readonly<Record<OrderKind, GPUBuffer>>;
+  /** How far one sees in each tile, and where to write how far one saw: see `Occlusion`. */
+  readonly occlusion: { readonly depths: GPUBuffer; readonly lastDepths: GPUBuffer };
+  /** Numbers of the visible splats by slot, for frames whose order is `identity`. */
+  readonly survivors: GPUBuffer;
   /** Most splats that can be visible. */
   readonly capacity: number;
   /** Pairs of splat and bin for which there shall be room. */
@@ -32,8 +36,24 @@ export interface Surface {
   readonly height: number;
 }
 
+/** What a frame tells about itself on the way, besides its image. */
+export interface FrameNotes {
+  /**
+   * One word for each splat, in the order of `packedOrder`, pages filled up to whole chunks of 256: the bits of the largest weight, alpha times
+   * transmittance, that the splat has had in any pixel. Weights of earlier frames stay where they are larger: clear the buffer for those
+   * of one frame. Usage: storage.
+   */
+  readonly contributions?: GPUBuffer;
+  /**
+   * Receives the camera depth of each pixel, in world units to 11 bits: that of the splat that leaves it half transparent or less, 0 where none does.
+   * A texture of the target's size, format `r32float`, usage STORAGE_BINDING.
+   */
+  readonly depth?: GPUTexture;
+}
+
 /** One frame to draw. */
 export interface Painting {
+  readonly notes?: FrameNotes;
   readonly surface: Surface;
   readonly order: OrderKind;
   /**
@@ -50,6 +70,8 @@ export interface Painting {
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
+  /** True if it can take {@link FrameNotes}. */
+  readonly takesNotes: boolean;
   /** Bytes of GPU memory held. */
   readonly byteLength: number;
   /** `Plan` of the pairs of splat and bin, where there are pairs. */

@@ -6,26 +6,31 @@ import {
   constants,
   layouts,
   rasterizeTiles,
+  rasterizeTilesNoting,
   scan,
 } from '../generated/shaders.js';
-import { BUFFER_USAGE, ComputeKernel, kernelOf, perDevice, specialise, type Overrides } from '../gpu/kernel.js';
+import type { Levers } from '../levers.js';
+import type { Variants } from '../variants.js';
+import { gridOf, withBins, type BinSize, type Grid } from './bins.js';
+import {
+  BUFFER_USAGE,
+  TEXTURE_USAGE,
+  ComputeKernel,
+  kernelOf,
+  perDevice,
+  specialise,
+  type Overrides,
+  type ShaderDescription,
+} from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
-import type { Threads } from '../stages/threads.js';
-import type { OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
+import type { FrameNotes, OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
 
-const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, SORT_BLOCK, DIGITS } = constants;
+const { TILE, PREFIX_THREADS, SORT_BLOCK, DIGITS } = constants;
 /** A slot, and a mask of tiles. */
 const PAIR_BYTES = 8;
-
-/** Bins across and down of an image, and the bits of a bin's number. */
-interface Grid {
-  readonly columns: number;
-  readonly rows: number;
-  readonly bits: number;
-}
 
 /** Buffers whose size follows the scene. */
 interface PairBuffers {
@@ -41,6 +46,7 @@ interface PairBuffers {
 /** What is bound for one scene and one number of bins. */
 interface GridBindings {
   readonly grid: Grid;
+  readonly kernels: Kernels;
   readonly ranges: GPUBuffer;
   readonly listing: Readonly<Record<OrderKind, { readonly count: GPUBindGroup; readonly emit: GPUBindGroup }>>;
   readonly scan: GPUBindGroup;
@@ -58,7 +64,7 @@ const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
 /**
- * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 128 x 64 pixels: counted,
+ * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 128 x 64 or 64 x 32 pixels: counted,
  * written, and sorted by bin with a stable sort that keeps the depth order. Tiles of 16 x 16 pixels then walk their bin's
  * list front to back and stop when all their pixels are opaque.
  *
@@ -66,10 +72,11 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
  */
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
+  readonly takesNotes = true;
   readonly #device: GPUDevice;
   readonly #overrides: Overrides;
   readonly #memory: GpuMemory;
-  readonly #kernels: ReturnType<typeof makeKernels>;
+  readonly #bins: 'auto' | BinSize;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
@@ -77,13 +84,15 @@ export class TilesRasterizer implements Rasterizer {
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
   #bound: GridBindings | undefined;
+  /** Where notes go that nobody asked for. */
+  #nowhere: Required<FrameNotes> | undefined;
 
-  constructor(device: GPUDevice, overrides: Overrides, threads: Threads) {
+  constructor(device: GPUDevice, overrides: Overrides, { sort, bins }: Pick<Levers & Variants, 'sort' | 'bins'>) {
     this.#device = device;
     this.#overrides = overrides;
     this.#memory = new GpuMemory(device);
-    this.#kernels = makeKernels(device, overrides);
-    this.#sort = new SortStage(device, 'pairs', threads);
+    this.#bins = bins;
+    this.#sort = new SortStage(device, sort, 'pairs');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
     this.#scanLength = this.#memory.buffer('gs.rasterize.scan_length', 16, usage);
@@ -108,7 +117,7 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = this.#allocate(inputs);
   }
 
-  record(encoder: GPUCommandEncoder, { surface, order, background, timer }: Painting): void {
+  record(encoder: GPUCommandEncoder, { surface, order, background, notes, timer }: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const { plan } = this.#inputs;
     const buffers = this.#buffers;
@@ -117,7 +126,7 @@ export class TilesRasterizer implements Rasterizer {
     encoder.clearBuffer(buffers.groupPairs);
     encoder.clearBuffer(bound.ranges);
 
-    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = this.#kernels;
+    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = bound.kernels;
     const listing = bound.listing[order];
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
     count.dispatchIndirect(bin, listing.count, plan, planOffsets.visible);
@@ -132,13 +141,22 @@ export class TilesRasterizer implements Rasterizer {
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
     const { format, width, height } = surface;
-    const kernel = rasterizeKernel(this.#device, format, this.#overrides, background !== undefined);
-    const image = this.#imageBindings(kernel, bound, surface.view);
+    const kernel = rasterizeKernel(this.#device, {
+      format,
+      bins: bound.grid.size,
+      isFinal: background !== undefined,
+      isNoting: notes !== undefined,
+      overrides: this.#overrides,
+    });
+    const image = notes
+      ? this.#bindNoting(kernel, bound, surface.view, notes)
+      : this.#imageBindings(kernel, bound, surface.view);
     kernel.dispatchGrid(paint, image, Math.ceil(width / TILE), Math.ceil(height / TILE));
     paint.end();
   }
 
   destroy(): void {
+    this.#nowhere?.depth.destroy();
     this.#memory.destroy();
   }
 
@@ -172,26 +190,25 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #gridFor({ width, height }: Surface, inputs: RasterizerInputs, buffers: PairBuffers): GridBindings {
-    const columns = Math.ceil(width / BIN_WIDTH);
-    const rows = Math.ceil(height / BIN_HEIGHT);
-    const current = this.#bound;
-    if (current?.grid.columns === columns && current.grid.rows === rows) return current;
-    if (current) this.#memory.free(current.ranges);
-    const bits = Math.ceil(Math.log2(columns * rows));
+    const grid = gridOf(width, height, this.#bins, inputs.pairCapacity);
+    const { size, columns, rows } = grid;
+    const { grid: known, ranges: old } = this.#bound ?? {};
+    if (known?.size === size && known.columns === columns && known.rows === rows) return this.#bound!;
+    if (old) this.#memory.free(old);
     const { storage, copyDestination } = BUFFER_USAGE;
     const ranges = this.#memory.buffer('gs.bin.ranges', 8 * columns * rows, storage | copyDestination);
-    this.#bound = { grid: { columns, rows, bits }, ranges, ...this.#bindings(inputs, buffers, bits, ranges) };
+    const kernels = makeKernels(this.#device, this.#overrides, size);
+    this.#bound = { grid, ranges, kernels, ...this.#bindings(inputs, buffers, { grid, ranges, kernels }) };
     return this.#bound;
   }
 
   #bindings(
     { plan, splats, orders }: RasterizerInputs,
     { rects, groupPairs, plan: pairPlan, bins, pairs, digitCounts, digitTotals }: PairBuffers,
-    bits: number,
-    ranges: GPUBuffer,
-  ): Omit<GridBindings, 'grid' | 'ranges'> {
+    { grid: { bits }, ranges, kernels }: Pick<GridBindings, 'grid' | 'ranges' | 'kernels'>,
+  ): Omit<GridBindings, 'grid' | 'ranges' | 'kernels'> {
     const view = this.#view;
-    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = this.#kernels;
+    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = kernels;
     const listing = (order: GPUBuffer): GridBindings['listing'][OrderKind] => {
       const shared = { view, plan, splats, order, rects, group_pairs: groupPairs };
       return { count: count.bind(shared), emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }) };
@@ -201,7 +218,7 @@ export class TilesRasterizer implements Rasterizer {
       scan: scanKernel.bind({ values: groupPairs, scan: this.#scanLength }),
       plan: planKernel.bind({ view, group_pairs: groupPairs, pair_plan: pairPlan }),
       sort: this.#sort.bind({ plan: pairPlan, keys: bins, values: pairs, digitCounts, digitTotals }, bits),
-      findRanges: findRanges.bind({ pair_plan: pairPlan, bins: bins[sortedIn(bits)], ranges }),
+      findRanges: findRanges.bind({ pair_plan: pairPlan, bins: bins[sortedIn(this.#sort.name, bits)], ranges }),
       rasterize: new WeakMap(),
     };
   }
@@ -209,15 +226,46 @@ export class TilesRasterizer implements Rasterizer {
   #imageBindings(kernel: RasterizeKernel, bound: GridBindings, image: GPUTextureView): GPUBindGroup {
     const known = bound.rasterize.get(image);
     if (known) return known;
-    const made = kernel.bind({
-      view: this.#view,
-      splats: this.#inputs!.splats,
-      pairs: this.#buffers!.pairs[sortedIn(bound.grid.bits)],
-      ranges: bound.ranges,
-      image,
-    });
+    const made = kernel.bind(this.#painted(bound, image));
     bound.rasterize.set(image, made);
     return made;
+  }
+
+  #painted(bound: GridBindings, image: GPUTextureView) {
+    const { splats, occlusion } = this.#inputs!;
+    return {
+      view: this.#view,
+      splats,
+      pairs: this.#buffers!.pairs[sortedIn(this.#sort.name, bound.grid.bits)],
+      ranges: bound.ranges,
+      occlusion: occlusion.depths,
+      last_depths: occlusion.lastDepths,
+      image,
+    };
+  }
+
+  /** Bound anew for each frame: notes are not for every frame. */
+  #bindNoting(
+    kernel: RasterizeKernel,
+    bound: GridBindings,
+    image: GPUTextureView,
+    { contributions, depth }: FrameNotes,
+  ): GPUBindGroup {
+    this.#nowhere ??= {
+      contributions: this.#memory.buffer('gs.rasterize.no_contributions', 4, BUFFER_USAGE.storage),
+      depth: this.#device.createTexture({
+        label: 'gs.rasterize.no_depth',
+        size: [1, 1],
+        format: 'r32float',
+        usage: TEXTURE_USAGE.storageBinding,
+      }),
+    };
+    return (kernel as unknown as ComputeKernel<typeof rasterizeTilesNoting>).bind({
+      ...this.#painted(bound, image),
+      survivors: this.#inputs!.survivors,
+      contributions: contributions ?? this.#nowhere.contributions,
+      depths: (depth ?? this.#nowhere.depth).createView(),
+    });
   }
 
   #writeView(
@@ -238,34 +286,43 @@ export function maxPairs(device: GPUDevice): number {
   return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / PAIR_BYTES);
 }
 
-function makeKernels(device: GPUDevice, { alpha_min }: Overrides) {
+type Kernels = ReturnType<typeof makeKernels>;
+
+function makeKernels(device: GPUDevice, { alpha_min }: Overrides, size: BinSize) {
   return {
-    count: kernelOf(device, binCount, { alpha_min }),
+    count: kernelOf(device, withBins(binCount, size), { alpha_min }),
     scan: kernelOf(device, scan),
     plan: kernelOf(device, binPlan),
-    emit: kernelOf(device, binEmit, { alpha_min }),
+    emit: kernelOf(device, withBins(binEmit, size), { alpha_min }),
     findRanges: kernelOf(device, binRanges),
   };
 }
 
 type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
 
-function rasterizeKernel(
-  device: GPUDevice,
-  format: GPUTextureFormat,
-  { alpha_min, transmittance_min }: Overrides,
-  isFinal: boolean,
-): RasterizeKernel {
-  const overrides = { alpha_min, transmittance_min, is_final: isFinal ? 1 : 0 };
-  return perDevice(device, `rasterize tiles ${format} ${JSON.stringify(overrides)}`, () => {
+/** What one pipeline of `rasterize_tiles` is made for. */
+interface RasterizeVariant {
+  readonly format: GPUTextureFormat;
+  readonly bins: BinSize;
+  readonly isFinal: boolean;
+  readonly isNoting: boolean;
+  readonly overrides: Overrides;
+}
+
+function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
+  const { format, bins, isFinal, isNoting, overrides } = variant;
+  const shader: ShaderDescription = isNoting ? rasterizeTilesNoting : rasterizeTiles;
+  const { alpha_min, transmittance_min, occluded_below } = overrides;
+  const constants = { alpha_min, transmittance_min, occluded_below, is_final: isFinal ? 1 : 0 };
+  return perDevice(device, `${shader.name} ${format} ${bins} ${JSON.stringify(constants)}`, () => {
     const { image } = rasterizeTiles.bindings;
     const writing = specialise(
-      rasterizeTiles,
+      withBins(shader, bins),
       format,
       `texture_storage_2d<${image.format}`,
       `texture_storage_2d<${format}`,
     );
-    const bindings = { ...rasterizeTiles.bindings, image: { ...image, format } };
-    return new ComputeKernel(device, { ...writing, bindings } as unknown as typeof rasterizeTiles, overrides);
+    const bindings = { ...shader.bindings, image: { ...image, format } };
+    return new ComputeKernel(device, { ...writing, bindings } as unknown as typeof rasterizeTiles, constants);
   });
 }

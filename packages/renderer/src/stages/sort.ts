@@ -7,6 +7,7 @@ import {
   sortScanSerial,
   sortScatter,
   sortScatterSerial,
+  sortScatterSubgroups,
 } from '../generated/shaders.js';
 import {
   BUFFER_USAGE,
@@ -18,7 +19,6 @@ import {
 } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
-import type { Threads } from './threads.js';
 
 /** The buffers that {@link SortStage} works on. */
 export interface SortBuffers {
@@ -39,44 +39,73 @@ interface SortPass {
   readonly scatter: GPUBindGroup;
 }
 
-const { DIGITS, DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP } = constants;
-const DIGIT_BITS = Math.log2(DIGITS);
+const { DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP, SORT_THREADS } = constants;
 const MAX_KEY_BITS = 32;
 
+/**
+ * How keys are sorted; the result is the same. `shared8` and `shared4` rank keys by bitmaps in workgroup memory, with digits of 8 or 4 bits;
+ * `subgroup8` and `subgroup4` by votes of subgroups; `serial` has one thread for a block of keys.
+ */
+export type SortName = 'shared8' | 'shared4' | 'subgroup8' | 'subgroup4' | 'serial';
+
+export const SORT_NAMES: readonly SortName[] = ['shared8', 'shared4', 'subgroup8', 'subgroup4', 'serial'];
+
+const digitBits = (name: SortName): 4 | 8 => (name.endsWith('4') ? 4 : 8);
+
 /** Passes that keys of so many bits take. */
-const passCount = (keyBits: number): number => Math.max(1, Math.ceil(keyBits / DIGIT_BITS));
+const passCount = (name: SortName, keyBits: number): number => Math.max(1, Math.ceil(keyBits / digitBits(name)));
+
+/** Bytes of workgroup memory for the counts of all subgroups: with the rest, under WebGPU's default limit of 16 KB. */
+const MOST_COUNTS = 8192;
+
+/** Subgroups that a workgroup of the sort can have on a device. */
+function subgroupsOf(device: GPUDevice): number {
+  const least = device.adapterInfo?.subgroupMinSize ?? 4;
+  return SORT_THREADS / Math.max(4, least);
+}
+
+/** True if the device has what the variant needs. */
+export function canSort(device: GPUDevice, name: SortName): boolean {
+  if (!name.startsWith('subgroup')) return true;
+  return device.features.has('subgroups') && 4 * 2 ** digitBits(name) * subgroupsOf(device) <= MOST_COUNTS;
+}
 
 /** What moves along with a key: its index, or two words of the caller's. */
 export type SortValues = 'indices' | 'pairs';
 
 /** Which of the two key and value buffers holds the result for keys of so many bits: the first (0) or the second (1). */
-export const sortedIn = (keyBits: number): 0 | 1 => (passCount(keyBits) % 2 === 0 ? 0 : 1);
+export const sortedIn = (name: SortName, keyBits: number): 0 | 1 => (passCount(name, keyBits) % 2 === 0 ? 0 : 1);
 
 /**
- * Stable least-significant-digit radix sort of keys of up to 32 bits: for each 8 bits a pass of count, scan, scatter.
+ * Stable least-significant-digit radix sort of keys of up to 32 bits: for each digit a pass of count, scan, scatter.
  * Counts are reduced and scanned between dispatches, so no workgroup ever waits for another.
  */
 export class SortStage {
+  readonly name: SortName;
   readonly #count: ComputeKernel<typeof sortCount> | ComputeKernel<typeof sortCountSerial>;
   readonly #scan: ComputeKernel<typeof sortScan> | ComputeKernel<typeof sortScanSerial>;
   readonly #scanGroups: number;
   readonly #scatter: ComputeKernel<typeof sortScatter> | ComputeKernel<typeof sortScatterSerial>;
   readonly #passUniforms: readonly GPUBuffer[];
 
-  constructor(device: GPUDevice, moving: SortValues = 'indices', threads: Threads = 'parallel') {
-    const isSerial = threads === 'serial';
-    this.#count = isSerial ? kernelOf(device, sortCountSerial) : kernelOf(device, sortCount);
-    this.#scan = isSerial ? kernelOf(device, sortScanSerial) : kernelOf(device, sortScan);
-    this.#scanGroups = DIGITS / (isSerial ? DIGITS_PER_SERIAL_GROUP : DIGITS_PER_GROUP);
-    this.#scatter = isSerial
-      ? kernelOf(device, movingShader(sortScatterSerial, moving))
-      : kernelOf(device, movingShader(sortScatter, moving));
-    this.#passUniforms = perDevice(device, `sort passes ${moving}`, () => makePassUniforms(device, moving));
+  constructor(device: GPUDevice, name: SortName = 'shared8', moving: SortValues = 'indices') {
+    this.name = name;
+    const isSerial = name === 'serial';
+    const bits = digitBits(name);
+    this.#count = isSerial ? kernelOf(device, sortCountSerial) : kernelOf(device, withDigits(sortCount, bits));
+    this.#scan = isSerial ? kernelOf(device, sortScanSerial) : kernelOf(device, withDigits(sortScan, bits));
+    this.#scanGroups = Math.ceil(2 ** bits / (isSerial ? DIGITS_PER_SERIAL_GROUP : DIGITS_PER_GROUP));
+    this.#scatter = kernelOf(device, movingShader(scatterShader(device, name), moving)) as ComputeKernel<
+      typeof sortScatter
+    >;
+    this.#passUniforms = perDevice(device, `sort passes ${moving} ${bits}`, () =>
+      makePassUniforms(device, moving, bits),
+    );
   }
 
   /** @param keyBits how many of the lowest bits of a key count; the others must be 0 or are ignored. */
   bind({ plan, keys, values, digitCounts, digitTotals }: SortBuffers, keyBits = MAX_KEY_BITS): readonly SortPass[] {
-    return this.#passUniforms.slice(0, passCount(keyBits)).map((uniform, index) => {
+    return this.#passUniforms.slice(0, passCount(this.name, keyBits)).map((uniform, index) => {
       const [from, to] = index % 2 === 0 ? [0, 1] : [1, 0];
       return {
         count: this.#count.bind({ digit_pass: uniform, plan, keys: keys[from], counts: digitCounts }),
@@ -106,12 +135,28 @@ export class SortStage {
 
 export type SortBindings = ReturnType<SortStage['bind']>;
 
+function scatterShader(device: GPUDevice, name: SortName): ShaderDescription {
+  if (name === 'serial') return sortScatterSerial;
+  const bits = digitBits(name);
+  if (!name.startsWith('subgroup')) return withDigits(sortScatter, bits);
+  const count = subgroupsOf(device);
+  const sized = specialise(sortScatterSubgroups, `${count}`, 'const SUBGROUPS = 8u', `const SUBGROUPS = ${count}u`);
+  const { code, ...rest } = withDigits(sized, bits);
+  return { ...rest, code: `enable subgroups;\n${code}` };
+}
+
+function withDigits<S extends ShaderDescription>(shader: S, bits: 4 | 8): S {
+  if (bits === 8) return shader;
+  const narrower = specialise(shader, '4 bits', 'const DIGIT_BITS = 8u', `const DIGIT_BITS = ${bits}u`);
+  return specialise(narrower, 'digits', 'const DIGITS = 256u', `const DIGITS = ${2 ** bits}u`);
+}
+
 function movingShader<S extends ShaderDescription>(shader: S, moving: SortValues): S {
   return moving === 'indices' ? shader : specialise(shader, 'pairs', 'alias Value = u32', 'alias Value = vec2u');
 }
 
-function makePassUniforms(device: GPUDevice, moving: SortValues): GPUBuffer[] {
-  return Array.from({ length: MAX_KEY_BITS / DIGIT_BITS }, (_, index) => {
+function makePassUniforms(device: GPUDevice, moving: SortValues, bits: number): GPUBuffer[] {
+  return Array.from({ length: MAX_KEY_BITS / bits }, (_, index) => {
     const buffer = device.createBuffer({
       label: `gs.sort.pass_${index}`,
       size: 16,
@@ -119,7 +164,7 @@ function makePassUniforms(device: GPUDevice, moving: SortValues): GPUBuffer[] {
       mappedAtCreation: true,
     });
     const makesIndices = index === 0 && moving === 'indices';
-    const values = { shift: index * DIGIT_BITS, makes_indices: makesIndices ? 1 : 0 };
+    const values = { shift: index * bits, makes_indices: makesIndices ? 1 : 0 };
     writeStruct(layouts.SortPass, values, buffer.getMappedRange());
     buffer.unmap();
     return buffer;
