@@ -3,7 +3,7 @@ import { readFileSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
-import { dealtViewsAround, dealViews, economise, Studio } from '@gaussian-splat/economise';
+import { dealtViewsAround, dealViews, economise, GpuScorer, Studio } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
@@ -14,6 +14,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
                   ten are held out, one is for the search. Default: 86 views around the subject, 6 of them held out
+  --scorer NAME   what measures contributions: gpu (the compute rasterizer), cpu, or auto (default): gpu where there is one
   --report FILE   the figures as JSON
 `;
 
@@ -29,7 +30,14 @@ function parseOptions(args) {
     parsed = parseArgs({
       args,
       allowPositionals: true,
-      options: { 'min-db': text, out: text, views: text, report: text, help: { type: 'boolean' } },
+      options: {
+        'min-db': text,
+        out: text,
+        views: text,
+        report: text,
+        scorer: { ...text, default: 'auto' },
+        help: { type: 'boolean' },
+      },
     });
   } catch (error) {
     throw new UsageError(error.message);
@@ -42,7 +50,10 @@ function parseOptions(args) {
   if (values.out === undefined) throw new UsageError('--out is missing');
   const [scene, out] = [resolve(from, positionals[0]), resolve(from, values.out)];
   if (scene === out) throw new UsageError('--out: expected another file than SCENE, which is never changed');
-  return { scene, out, minDecibels, views: values.views, report: values.report };
+  const { views, report, scorer } = values;
+  if (!['auto', 'gpu', 'cpu'].includes(scorer))
+    throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
+  return { scene, out, minDecibels, views, report, scorer };
 }
 
 function readViews(path, bounds) {
@@ -53,16 +64,19 @@ function readViews(path, bounds) {
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report }) {
+async function main({ scene, out, minDecibels, views: viewsFile, report, scorer }) {
   const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
   const cloud = await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart });
   const adapter = await requestNodeAdapter();
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   const views = readViews(viewsFile, boundsOf(cloud));
-  const studio = new Studio(device);
+  // SwiftShader is a processor in disguise, slower than plain code on the same.
+  const isGpu = scorer === 'auto' ? !/swiftshader/i.test(adapter.info.description) : scorer === 'gpu';
+  const gpu = isGpu ? await GpuScorer.create(device, cloud) : undefined;
+  const studio = new Studio(device, 'default');
   const start = performance.now();
   const result = await economise(cloud, {
-    ...{ minDecibels, name: out, views, studio },
+    ...{ minDecibels, name: out, views, studio, scorer: gpu?.score },
     onStep: (step) => console.log(`${((performance.now() - start) / 1000).toFixed(0).padStart(5)} s  ${step}`),
   });
   writeFileSync(out, result.bytes);

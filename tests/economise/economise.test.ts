@@ -11,6 +11,7 @@ import {
   economical,
   economise,
   encodingsFor,
+  GpuScorer,
   meanSquare,
   parseEconomy,
   reduce,
@@ -52,6 +53,24 @@ test("the CPU's images are the renderer's", async () => {
     const found = decibels(meanSquare(image, theirs[k]));
     assert.ok(found >= 55, `view ${k}: ${found} dB`);
   }
+});
+
+test('the compute rasterizer finds the contributions that the CPU finds', async () => {
+  const gpu = await GpuScorer.create(await nodeDevice(), scene);
+  const cpu = cpuScorer(scene);
+  for (const view of viewsAround(boundsOf(scene), 2, SIZE)) {
+    const [theirs, ours] = [await gpu.score(view), await cpu(view)];
+    let [worst, sum, energies, expected] = [0, 0, 0, 0];
+    for (let i = 0; i < scene.count; i++) {
+      const difference = Math.abs(theirs.peak[i] - ours.peak[i]);
+      [worst, sum] = [Math.max(worst, difference), sum + difference];
+      [energies, expected] = [energies + theirs.energy[i], expected + ours.energy[i]];
+    }
+    assert.ok(worst < 0.02 && sum / scene.count < 1e-3, `worst ${worst}, mean ${sum / scene.count}`);
+    // Estimated from peak and size, as if nothing stood before any part of a splat.
+    assert.ok(energies > 0.7 * expected && energies < 5 * expected, `${energies} where the CPU finds ${expected}`);
+  }
+  gpu.destroy();
 });
 
 test('splats that nobody sees contribute nothing, and go without a trace', async () => {

@@ -1,5 +1,6 @@
 export { cpuPainter, cpuScorer } from './cpu-raster.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
+export { GpuScorer } from './gpu-scorer.js';
 export { contributionOfShare, economical, parseEconomy, type EconomyShare } from './mask.js';
 export { decibels, meanSquare, Studio, type Image, type Painter } from './measure.js';
 export { reduce, type Cut, type ReducedCloud } from './reduce.js';
