@@ -77,5 +77,8 @@ function numbered(pattern: string, count: unknown, fail: Fail): string[] {
     fail('count', `1 to ${grouped(MAX_FRAMES)} frames`, count);
   }
   const first = Number(digits);
-  return Array.from({ length: count as number }, (_, k) => before + String(first + k).padStart(digits.length, '0') + behind);
+  return Array.from(
+    { length: count as number },
+    (_, k) => before + String(first + k).padStart(digits.length, '0') + behind,
+  );
 }
