@@ -29,7 +29,7 @@ test('the benchmark page measures a list in one report', { timeout: 180_000 }, a
   assert.equal(half.rasterizer, 'tiles');
   if (report.environment.timestamps) {
     assert.ok(ours.span.p50 > 0 && playcanvas.span.p50 > 0);
-    assert.ok('upscale' in half.stages && 'rasterize' in ours.stages);
+    assert.ok('compose' in half.stages && 'rasterize' in ours.stages);
     assert.ok(ours.span.p50 <= ours.wall.p95, 'the GPU is not busy for longer than anybody waits');
   }
   await assert.rejects(runPage('bench/index.html', { ...SMALL, paths: 'nowhere' }), /path: expected orbit/);

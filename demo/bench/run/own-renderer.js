@@ -1,9 +1,7 @@
 /** Our renderer as a subject (see measure.js): one configuration of it, drawing into an off-screen texture. */
 import { PassTimer, Renderer } from '@gaussian-splat/renderer';
-import { scaledCamera } from '../scene/paths.js';
 import { watchOptions } from './levers.js';
 import { readPixels } from './read-pixels.js';
-import { Upscaler } from './upscale.js';
 
 const DISPLAY = 'rgba8unorm';
 const PRECISE = 'rgba32float';
@@ -12,7 +10,6 @@ export class OwnRenderer {
   #device;
   #renderer;
   #gaussians;
-  #scale;
   #timer;
   #target;
   #unread;
@@ -22,13 +19,12 @@ export class OwnRenderer {
    * @param configuration {{options, resolutionScale, width, height}}
    */
   constructor(device, { buffers, ignored = [] }, { options, resolutionScale, width, height }) {
-    const watched = watchOptions(options);
+    const watched = watchOptions(resolutionScale === 1 ? options : { resolutionScale, ...options });
     this.#device = device;
     this.#gaussians = buffers;
-    this.#scale = resolutionScale;
     this.#renderer = new Renderer(device, watched.options);
     this.#unread = () => [...watched.unread(), ...ignored];
-    this.#target = makeTarget(device, DISPLAY, { width, height }, resolutionScale);
+    this.#target = makeTarget(device, DISPLAY, { width, height });
     if (device.features.has('timestamp-query')) {
       this.#timer = new PassTimer(device);
       this.readTimes = () => this.#timer.read();
@@ -48,12 +44,12 @@ export class OwnRenderer {
    * @param before cameras that lead to it: the view is then shown as that frame of the movement, not as a still image
    */
   async capture(camera, before = []) {
-    const target = makeTarget(this.#device, PRECISE, camera, this.#scale);
+    const target = makeTarget(this.#device, PRECISE, camera);
     try {
       for (const step of before) await this.#drawWhole(target, step);
       if (before.length > 0) this.#drawInto(target, camera);
       else await this.#drawWhole(target, camera);
-      return await readPixels(this.#device, target.texture);
+      return await readPixels(this.#device, target);
     } finally {
       target.destroy();
     }
@@ -93,35 +89,12 @@ export class OwnRenderer {
     return this.#renderer.isComplete();
   }
 
-  #drawInto({ drawn, view, upscaler }, camera, timer) {
-    this.#renderer.render({
-      gaussians: this.#gaussians,
-      camera: this.#scale === 1 ? camera : scaledCamera(camera, this.#scale),
-      target: drawn,
-      timer,
-    });
-    upscaler?.draw(view, timer);
+  #drawInto(target, camera, timer) {
+    this.#renderer.render({ gaussians: this.#gaussians, camera, target, timer });
   }
 }
 
-/** The texture that shows the image and, at another resolution scale, the one that it is drawn into first. */
-function makeTarget(device, format, { width, height }, scale) {
-  const usage =
-    GPUTextureUsage.RENDER_ATTACHMENT |
-    GPUTextureUsage.COPY_SRC |
-    GPUTextureUsage.TEXTURE_BINDING |
-    GPUTextureUsage.STORAGE_BINDING;
-  const texture = device.createTexture({ label: 'bench.target', size: [width, height], format, usage });
-  const smaller = scaledCamera({ width, height, fx: 1, fy: 1, cx: 0, cy: 0 }, scale);
-  const drawn =
-    scale === 1
-      ? texture
-      : device.createTexture({ label: 'bench.drawn', size: [smaller.width, smaller.height], format, usage });
-  const upscaler = scale === 1 ? undefined : new Upscaler(device, format, drawn, { width, height });
-  const destroy = () => {
-    upscaler?.destroy();
-    drawn.destroy();
-    texture.destroy();
-  };
-  return { texture, drawn, format, view: texture.createView(), upscaler, destroy };
+function makeTarget(device, format, { width, height }) {
+  const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.STORAGE_BINDING;
+  return device.createTexture({ label: 'bench.target', size: [width, height], format, usage });
 }

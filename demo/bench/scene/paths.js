@@ -61,11 +61,3 @@ export function camerasAlong({ path, width, height, frames, radius }) {
     }),
   }));
 }
-
-/** The same view at another resolution. */
-export function scaledCamera(camera, scale) {
-  const width = Math.max(1, Math.round(camera.width * scale));
-  const height = Math.max(1, Math.round(camera.height * scale));
-  const [sx, sy] = [width / camera.width, height / camera.height];
-  return { ...camera, width, height, fx: camera.fx * sx, fy: camera.fy * sy, cx: camera.cx * sx, cy: camera.cy * sy };
-}
