@@ -48,7 +48,8 @@ const ROUNDING_SHARE = 0.6;
 const DROP_SHARE = 0.5;
 /** How much of what is left is used at first; it shrinks until the figure is met. */
 const FIRST_FILLING = 0.95;
-const SHRINK = 0.75;
+/** Bounds on that shrinking in one step. */
+const SHRINK: readonly [number, number] = [0.3, 0.9];
 const MAX_TRIES = 8;
 const CONTRIBUTION_RANGE: readonly [number, number] = [1e-4, 0.3];
 const PRICE_RANGE: readonly [number, number] = [1e-16, 1e-8];
@@ -74,7 +75,7 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   const target = meanSquareOf(minDecibels);
   const { encoding, rounding } = await chooseEncoding(cloud, scores, encodings, target, errorOf, options);
   const curves = curvesOf(cloud, scores, errorOf);
-  for (let tries = 0, filling = FIRST_FILLING; tries < MAX_TRIES; tries++, filling *= SHRINK) {
+  for (let tries = 0, filling = FIRST_FILLING; tries < MAX_TRIES; tries++) {
     const budget = filling * (target - rounding);
     onStep(`searching thresholds, ${Math.round(100 * filling)} % of the error that is allowed`);
     const hasColour = cloud.shDegree > 0;
@@ -88,6 +89,7 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
     const found = errors(await studio.draw(written, views.heldOut), unseen);
     onStep(`held-out views: ${decibels(mean(found)).toFixed(2)} dB`);
     if (mean(found) <= target) return summary(cloud, reduced, cut, bytes, encoding, found);
+    filling *= Math.min(SHRINK[1], Math.max(SHRINK[0], (0.97 * target) / mean(found)));
   }
   throw unreachable(options, 'less, whatever was kept');
 }
