@@ -9,6 +9,7 @@ const MAY_IMPORT = {
   renderer: ['core'],
   generator: ['core'],
   check: ['core', 'generator'],
+  economise: ['core', 'formats', 'renderer'],
   element: ['core', 'formats', 'generator', 'renderer'],
 };
 

@@ -16,7 +16,9 @@ must(process.execPath, [
 await buildDemo();
 
 function projects() {
-  return ['core', 'formats', 'renderer', 'generator', 'check', 'element'].map((name) => `packages/${name}`);
+  return ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element'].map(
+    (name) => `packages/${name}`,
+  );
 }
 
 /** demo/dist is the whole site: any static host can serve it. */

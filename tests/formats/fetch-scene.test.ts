@@ -29,9 +29,30 @@ const ROUTES: Readonly<Record<string, RequestListener>> = {
     response.writeHead(200, { 'Content-Length': CONTENT.length });
     response.write(CONTENT.subarray(0, 100_000));
   },
+  // Breaks after every 70,000 bytes, and knows ranges.
+  '/resumable': ranged('"a"'),
+  // Changes between two requests.
+  '/changing': ranged(() => `"${requests++}"`),
   '/private': (_, response) => response.writeHead(403).end('no'),
   '/failing': (_, response) => response.writeHead(503).end(),
 };
+
+let requests = 0;
+
+/** Answers ranges, and breaks every connection after 70,000 bytes. */
+function ranged(tag: string | (() => string)): RequestListener {
+  return (request, response) => {
+    const from = Number(/^bytes=(\d+)-$/.exec(request.headers.range ?? '')?.[1] ?? 0);
+    const rest = CONTENT.subarray(from);
+    response.writeHead(from > 0 ? 206 : 200, {
+      'Content-Length': rest.length,
+      ETag: typeof tag === 'string' ? tag : tag(),
+      ...(from > 0 && { 'Content-Range': `bytes ${from}-${CONTENT.length - 1}/${CONTENT.length}` }),
+    });
+    if (rest.length <= 70_000) return void response.end(rest);
+    response.write(rest.subarray(0, 70_000), () => setTimeout(() => response.destroy(), 20));
+  };
+}
 
 let server: Server;
 let base: string;
@@ -109,6 +130,25 @@ test('no server, and text that is no URL', async () => {
 
 test('a connection that breaks says how much came', async () => {
   await expectFailure(`${base}/broken`, 'network/interrupted', /byte 100,000: expected 300,000 bytes/);
+});
+
+test('a connection that breaks is taken up where it stopped', async () => {
+  const seen: number[] = [];
+  const options = { retries: 4, onArrival: (bytes: Uint8Array) => void seen.push(bytes.length) };
+  assertSameNumbers(await fetchScene(`${base}/resumable`, options), CONTENT);
+  assert.ok(
+    seen.every((length, k) => length > (seen[k - 1] ?? 0)),
+    'bytes only ever become more',
+  );
+  await assert.rejects(fetchScene(`${base}/resumable`, { retries: 2 }), /network\/interrupted/);
+});
+
+test('a file that has changed meanwhile is not patched together', async () => {
+  await expectFailure(
+    `${base}/changing`,
+    'network/interrupted',
+    /300,000 bytes, found the end of the connection after/,
+  );
 });
 
 test('where the HTTP stack hides a break, the length tells', async (context) => {

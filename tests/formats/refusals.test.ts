@@ -1,5 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { zipSync } from 'fflate';
 import { detectFormat, readScene, sceneFormats } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { expectRefusal } from './support/expect.js';
@@ -19,16 +20,19 @@ const KINDS: readonly (readonly [what: string, bytes: Uint8Array, code: string, 
     /git lfs pull/,
   ],
   ['JSON', text('{"error": "not found"}'), 'decode/unknown-format', /JSON text: "\{/],
-  ['a SOG description', text('{"version": 2, "means": {}}'), 'decode/unsupported', /SOG/],
-  ['a streamed SOG description', text('{"lodLevels": 7}'), 'decode/unsupported', /streamed SOG/],
-  ['glTF', text('{"asset": {"version": "2.0"}}'), 'decode/unsupported', /glTF/],
-  ['GLB', text('glTF\x02\0\0\0'), 'decode/unsupported', /GLB.*Convert it to SPZ or PLY/],
-  ['ZIP', text('PK\x03\x04 readme.txt'), 'decode/unknown-format', /ZIP archive/],
-  ['a SOG bundle', text('PK\x03\x04 means_l.webp'), 'decode/unsupported', /SOG bundle/],
+  ['a SOG description without a count', text('{"version": 2, "means": {}}'), 'decode/header', /count.*nothing/],
+  ['a SOG description of the future', text('{"version": 3, "means": {}}'), 'decode/unsupported', /SOG version 1 or 2/],
+  ['a streamed SOG description without files', text('{"lodLevels": 7}'), 'decode/header', /filenames.*found nothing/],
+  ['glTF without splats', text('{"asset": {"version": "2.0"}}'), 'decode/not-splats', /KHR_gaussian_splatting/],
+  ['glTF 1', text('{"asset": {"version": "1.0"}}'), 'decode/unsupported', /glTF 2/],
+  ['a GLB that is cut', text('glTF\x02\0\0\0'), 'decode/truncated', /20 bytes, found 8/],
+  ['a ZIP that is cut', text('PK\x03\x04 readme.txt'), 'decode/truncated', /directory of a ZIP file/],
+  ['ZIP', zipSync({ 'readme.txt': text('x') }), 'decode/unknown-format', /ZIP archive with "readme.txt"/],
   ['PNG', Uint8Array.of(0x89, 0x50, 0x4e, 0x47), 'decode/unknown-format', /PNG/],
   ['JPEG', Uint8Array.of(0xff, 0xd8, 0xff, 0xe0), 'decode/unknown-format', /JPEG/],
   ['text', text('Hello, world\n'), 'decode/unknown-format', /a text: "Hello/],
-  ['ksplat', new Uint8Array(100), 'decode/unsupported', /\.ksplat/, 'a/scene.ksplat?x'],
+  ['a ksplat that is cut', new Uint8Array(100), 'decode/truncated', /4,096/, 'a/scene.ksplat?x'],
+  ['a .rad scene', new Uint8Array(100), 'decode/unsupported', /\.rad/, 'a/scene.rad'],
   ['bytes', Uint8Array.of(7, 7, 7), 'decode/unknown-format', /bytes that begin with 07 07 07/],
   ['a PLY that is no PLY', text('plyers of the game'), 'decode/unknown-format', /a text/, 'x.ply'],
 ];
@@ -51,11 +55,9 @@ test('real files of other kinds are refused by name', { skip: needsSharedData },
       'decode/corrupt',
       /1,240,000 .* version 1, found 1,333,000, the length of version 2/,
     ],
-    ['formats/playbot3.glb', 'decode/unsupported', /GLB/],
-    ['formats/playbot3.c1.sh2.ksplat', 'decode/unsupported', /ksplat/],
-    ['scenes/massa.sog', 'decode/unsupported', /SOG bundle/],
-    ['scenes/logo-sog-v1/meta.json', 'decode/unsupported', /SOG/],
-    ['scenes/playbot-streamed/lod-meta.json', 'decode/unsupported', /streamed SOG/],
+    ['scenes/logo-sog-v1/meta.json', 'decode/unsupported', /a way to open the other files/],
+    ['scenes/playbot-streamed/lod-meta.json', 'decode/unsupported', /a way to open the other files/],
+    ['avatars/rigged-gltf/BrainStem.glb', 'decode/not-splats', /KHR_gaussian_splatting/],
     ['generators/octree-gs/color_mlp.onnx', 'decode/unsupported', /ONNX model/],
     ['reference/skull_01_classic.png', 'decode/unknown-format', /PNG/],
     ['photos/skull/images/01.jpg', 'decode/unknown-format', /JPEG/],
@@ -76,6 +78,11 @@ test('content speaks before the name', { skip: needsSharedData }, async () => {
     ['formats/playbot3.niantic-v2.spz', 'spz'],
     ['formats/playbot3.pc-v4.spz', 'spz'],
     ['scenes/plant.splat', 'splat'],
+    ['formats/playbot3.glb', 'gltf'],
+    ['formats/playbot3.c1.sh2.ksplat', 'ksplat'],
+    ['scenes/massa.sog', 'zip'],
+    ['scenes/logo-sog-v1/meta.json', 'sog'],
+    ['scenes/playbot-streamed/lod-meta.json', 'lod'],
   ];
   for (const [file, format] of files) {
     for (const name of [file, 'scene', 'scene.ply', 'scene.spz', 'scene.png']) {
@@ -87,10 +94,12 @@ test('content speaks before the name', { skip: needsSharedData }, async () => {
 });
 
 test('the registry names every format once and its loaders give readers', async () => {
-  assert.deepEqual(sceneFormats.map(({ name }) => name).sort(), ['compressed-ply', 'ply', 'splat', 'spz']);
+  assert.deepEqual(sceneFormats.map(({ name }) => name).sort(), [
+    ...['compressed-ply', 'gltf', 'ksplat', 'lod', 'ply', 'sog', 'splat', 'spz', 'zip'],
+  ]);
   for (const { extensions, mimeTypes, load } of sceneFormats) {
     for (const extension of extensions) assert.match(extension, /^(\.[a-z]+)+$/);
-    for (const type of mimeTypes) assert.match(type, /^[a-z]+\/[a-z-]+$/);
+    for (const type of mimeTypes) assert.match(type, /^[a-z]+\/[a-z+-]+$/);
     assert.equal(typeof (await load()), 'function');
   }
 });

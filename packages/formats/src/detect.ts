@@ -19,7 +19,7 @@ export function detectFormat(bytes: Uint8Array, name = '', contentType = ''): Sc
 export function findFormat(bytes: Uint8Array, name: string, contentType: string): SceneFormat | undefined {
   const signed = sceneFormats.find(({ hasSignature }) => hasSignature?.(bytes));
   if (signed || bytes.length === 0 || isForeign(bytes)) return signed;
-  const unsigned = sceneFormats.filter(({ hasSignature }) => !hasSignature);
+  const unsigned = sceneFormats.filter(({ hasSignature, isSignatureWeak }) => !hasSignature || isSignatureWeak);
   const extension = extensionOf(name);
   const mimeType = contentType.split(';')[0].trim().toLowerCase();
   return (

@@ -1,5 +1,5 @@
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
-import { asciiOf, grouped, quote, startsWith, viewOf } from './bytes.js';
+import { asciiOf, grouped, quote, startsWith } from './bytes.js';
 
 /** A kind of file that is recognised only to say what it is. */
 interface ForeignKind {
@@ -13,7 +13,7 @@ interface ForeignKind {
 
 const CONVERT = 'convert it to SPZ or PLY, for example with splat-transform or SuperSplat';
 const CHECK_URL = 'check the address of the scene; the server sent something else';
-const NOT_A_SCENE = 'give the address of a scene file: .ply, .compressed.ply, .spz or .splat';
+const NOT_A_SCENE = 'give the address of a scene file: .ply, .compressed.ply, .spz, .sog, .splat, .ksplat or .glb';
 
 const unread = (found: string, fits: ForeignKind['fits']): ForeignKind => ({
   code: 'decode/unsupported',
@@ -51,13 +51,13 @@ const SIGNED_KINDS: readonly ForeignKind[] = [
     ),
     remedy: CHECK_URL,
   },
-  unread('the meta.json of a SOG scene', (_, text) => isJson(text) && /"means"\s*:/.test(text)),
-  unread('the lod-meta.json of a streamed SOG scene', (_, text) => isJson(text) && /"lodLevels"\s*:/.test(text)),
-  unread('a glTF scene', (_, text) => isJson(text) && /"asset"\s*:/.test(text)),
+  {
+    code: 'decode/unsupported',
+    found: 'the manifest of a sequence, which names many scenes',
+    remedy: 'read it with parseSequence, and its frames one by one',
+    fits: (_, text) => isJson(text) && /"gaussianSplatSequence"\s*:/.test(text),
+  },
   foreign('a JSON text', (_, text) => isJson(text), true),
-  unread('a binary glTF scene (GLB)', (bytes) => startsWith(bytes, 'glTF')),
-  unread('a SOG bundle (ZIP)', (bytes, text) => startsWith(bytes, 'PK\x03\x04') && /meta\.json|\.webp/.test(text)),
-  foreign('a ZIP archive', (bytes) => startsWith(bytes, 'PK\x03\x04')),
   foreign('a PNG image', (bytes) => startsWith(bytes, '\x89PNG')),
   foreign('a JPEG image', (bytes) => startsWith(bytes, '\xff\xd8\xff')),
   foreign('a WebP image', (bytes) => startsWith(bytes, 'RIFF') && startsWith(bytes, 'WEBP', 8)),
@@ -74,16 +74,11 @@ const UNSIGNED_KINDS: readonly ForeignKind[] = [
     remedy: NOT_A_SCENE,
     fits: (bytes) => isOnnx(bytes),
   },
-  unread('a .ksplat scene', (bytes) => isKsplat(bytes)),
   foreign('a text', (_, text) => /^[\t\n\r -~]+$/.test(text), true),
 ];
 
 /** Formats told by the name where the content has no signature. */
 const UNREAD_EXTENSIONS: ReadonlyMap<string, string> = new Map([
-  ['.ksplat', 'a .ksplat scene'],
-  ['.sog', 'a SOG scene'],
-  ['.glb', 'a binary glTF scene (GLB)'],
-  ['.gltf', 'a glTF scene'],
   ['.rad', 'a .rad scene'],
   ['.lcc', 'an LCC scene'],
 ]);
@@ -91,14 +86,6 @@ const UNREAD_EXTENSIONS: ReadonlyMap<string, string> = new Map([
 /** What an ONNX file begins with: field 1 (IR version) and then field 2 (producer) or 7 (graph) of its protobuf. */
 function isOnnx(bytes: Uint8Array): boolean {
   return bytes.length > 8 && bytes[0] === 8 && bytes[1] > 0 && bytes[1] < 32 && [0x12, 0x3a].includes(bytes[2]);
-}
-
-/** Header of mkkellogg's SplatBuffer: version 0.1, sections, splats and compression level in range. */
-function isKsplat(bytes: Uint8Array): boolean {
-  if (bytes.length < 4096 || bytes[0] !== 0 || bytes[1] !== 1) return false;
-  const view = viewOf(bytes);
-  const [maxSections, sections, maxSplats, splats] = [4, 8, 12, 16].map((at) => view.getUint32(at, true));
-  return sections >= 1 && sections <= maxSections && splats <= maxSplats && view.getUint16(20, true) <= 2;
 }
 
 const SAMPLE_BYTES = 1024;
@@ -154,7 +141,7 @@ function refusal(kind: ForeignKind, name: string, bytes: Uint8Array | undefined)
   const start = bytes && kind.isText ? `: ${quote(sampleText(bytes).trim(), 40)}` : '';
   return new GaussianSplatError(kind.code, {
     where: bytes ? `${name} (${grouped(bytes.length)} bytes), byte 0` : name,
-    expected: 'a Gaussian splat scene (PLY, compressed PLY, SPZ or .splat)',
+    expected: 'a Gaussian splat scene (PLY, compressed PLY, SPZ, SOG, .splat, .ksplat or glTF)',
     found: kind.found + start,
     remedy: kind.remedy,
   });

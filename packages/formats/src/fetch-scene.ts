@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { GrowingBytes, grouped, quote } from './bytes.js';
+import { quote } from './bytes.js';
+import { Download } from './download.js';
 
 export interface FetchSceneOptions {
   /** `cors` (default) or `same-origin`; answers to `no-cors` requests cannot be read. */
@@ -13,13 +14,21 @@ export interface FetchSceneOptions {
    * the length of a compressed transfer, which is another number than that of the bytes that arrive.
    */
   readonly onProgress?: (loadedBytes: number, totalBytes: number | undefined) => void;
+  /**
+   * Called after every chunk with all bytes so far, which stay as they are, and the total as above. The download goes on when the
+   * promise fulfils.
+   */
+  readonly onArrival?: (bytes: Uint8Array, totalBytes: number | undefined) => void | Promise<void>;
+  /** How often a download that broke off is taken up again where it stopped, if the server can do that; default 3. */
+  readonly retries?: number;
 }
 
-/** Largest Content-Length that is believed at once; longer files grow into place. */
-const MAX_RESERVED_BYTES = 2 ** 28;
+/** Pause before a download is taken up again the first time, ms; it doubles each time. */
+const RETRY_DELAY_MS = 250;
 
 /**
- * Downloads a file with true progress.
+ * Downloads a file with true progress. A connection that breaks off is taken up again where it stopped, by a range request, as
+ * long as each try brings bytes and the file is still the same.
  *
  * @param url absolute, or relative to the page or worker script (which in a worker made from a blob has no address:
  * resolve the URL before).
@@ -27,53 +36,20 @@ const MAX_RESERVED_BYTES = 2 ** 28;
  * `network/status` or `network/interrupted`; the reason of `signal`, usually a DOMException named AbortError.
  */
 export async function fetchScene(url: string | URL, options: FetchSceneOptions = {}): Promise<Uint8Array> {
-  const { mode = 'cors', credentials = 'same-origin', signal, onProgress } = options;
   const address = parseUrl(url);
-  const response = await fetch(address, { mode, credentials, signal }).catch((cause: unknown) => {
-    signal?.throwIfAborted();
-    throw unreachable(address, cause);
-  });
-  if (!response.ok) {
-    await response.body?.cancel().catch(() => {});
-    throw badStatus(address, response);
+  const download = new Download(address, options);
+  await download.start();
+  for (let retries = options.retries ?? 3; ; retries--) {
+    try {
+      await download.read();
+      return download.bytes;
+    } catch (error) {
+      if (retries <= 0 || !download.canResume) throw error;
+      await delay(RETRY_DELAY_MS * 2 ** ((options.retries ?? 3) - retries), options.signal);
+      // Whatever goes wrong now, what is to be told is that the connection broke.
+      if (!(await download.resume())) throw error;
+    }
   }
-  const total = lengthOf(response);
-  const body = new GrowingBytes(Math.min(total ?? 65_536, MAX_RESERVED_BYTES));
-  await readBody(response, body, total, address, options, onProgress);
-  return body.view();
-}
-
-async function readBody(
-  response: Response,
-  body: GrowingBytes,
-  total: number | undefined,
-  address: URL,
-  { signal }: FetchSceneOptions,
-  onProgress: FetchSceneOptions['onProgress'],
-): Promise<void> {
-  const reader = response.body?.getReader();
-  for (;;) {
-    const chunk = await reader?.read().catch((cause: unknown) => {
-      signal?.throwIfAborted();
-      throw interrupted(address, body.length, total, cause);
-    });
-    if (!chunk || chunk.done) break;
-    body.append(chunk.value);
-    // Across origins a Content-Encoding is hidden from scripts; a body longer than announced gives it away.
-    const isWithin = total !== undefined && body.length <= total;
-    onProgress?.(body.length, isWithin ? total : undefined);
-  }
-  // Some HTTP stacks end a broken connection without an error. Across origins the length may be that of an encoding.
-  const isExact = total !== undefined && response.type !== 'cors';
-  if (isExact && body.length < total) throw interrupted(address, body.length, total, undefined);
-}
-
-/** Length of the body in bytes if the headers tell it. */
-function lengthOf({ headers }: Response): number | undefined {
-  const encoding = headers.get('Content-Encoding');
-  const length = headers.get('Content-Length');
-  const isPlain = encoding === null || /^\s*(identity)?\s*$/i.test(encoding);
-  return isPlain && length !== null && /^\d+$/.test(length) ? Number(length) : undefined;
 }
 
 function parseUrl(url: string | URL): URL {
@@ -100,48 +76,17 @@ function parseUrl(url: string | URL): URL {
     : address;
 }
 
-function unreachable(address: URL, cause: unknown): GaussianSplatError {
-  return new GaussianSplatError('network/unreachable', {
-    where: label(address),
-    expected: 'an answer from the server',
-    found: `none that may be read (${(cause as Error)?.message ?? 'unknown cause'})`,
-    remedy:
-      'check the address and the connection; if the scene is on another server, that server must send ' +
-      '"Access-Control-Allow-Origin", and a page on https cannot load from http',
-    cause,
+/** Waits, or rejects with the signal's reason. */
+function delay(ms: number, signal: AbortSignal | undefined): Promise<void> {
+  return new Promise((resolve, reject) => {
+    const give = (): void => {
+      clearTimeout(timer);
+      reject(signal?.reason);
+    };
+    const timer = setTimeout(() => {
+      signal?.removeEventListener('abort', give);
+      resolve();
+    }, ms);
+    signal?.addEventListener('abort', give, { once: true });
   });
-}
-
-const REMEDIES: ReadonlyMap<number, string> = new Map([
-  [401, 'log in, or set crossorigin="use-credentials" if the server needs cookies'],
-  [403, 'give the file public read access, or set crossorigin="use-credentials" if the server needs cookies'],
-  [404, 'check the path and the spelling, capital letters included'],
-  [410, 'use another address; the file was removed'],
-  [429, 'try again later; the server limits the number of requests'],
-]);
-
-function badStatus(address: URL, { status, statusText }: Response): GaussianSplatError {
-  const remedy =
-    status >= 500 ? 'try again later or look into the log of the server' : 'check the address of the scene';
-  return new GaussianSplatError('network/status', {
-    where: label(address),
-    expected: 'HTTP status 200',
-    found: `HTTP status ${status}${statusText ? ` (${statusText})` : ''}`,
-    remedy: REMEDIES.get(status) ?? remedy,
-  });
-}
-
-function interrupted(address: URL, loaded: number, total: number | undefined, cause: unknown): GaussianSplatError {
-  return new GaussianSplatError('network/interrupted', {
-    where: `${label(address)}, byte ${grouped(loaded)}`,
-    expected: total === undefined ? 'the rest of the file' : `${grouped(total)} bytes`,
-    found: `the end of the connection after ${grouped(loaded)} bytes`,
-    remedy: 'load the scene again; the connection broke off',
-    cause,
-  });
-}
-
-/** The address for messages, short where it carries its data along. */
-function label({ href }: URL): string {
-  return href.length > 200 ? `${href.slice(0, 200)}...` : href;
 }

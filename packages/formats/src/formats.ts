@@ -1,4 +1,5 @@
 import { asciiOf, startsWith } from './bytes.js';
+import { looksLikeKsplat } from './ksplat/header.js';
 import type { SceneFormat } from './scene-format.js';
 
 /** Text that tells a compressed PLY from a plain one; it stands within the first lines of every such header. */
@@ -9,12 +10,21 @@ const isPly = (bytes: Uint8Array): boolean => /^ply[ \t]*[\r\n]/.test(asciiOf(by
 const isCompressedPly = (bytes: Uint8Array): boolean =>
   isPly(bytes) && COMPRESSED_PLY_MARK.test(asciiOf(bytes, 0, HEADER_SAMPLE));
 const isGzip = (bytes: Uint8Array): boolean => startsWith(bytes, [0x1f, 0x8b]);
+/** A description in JSON with a key that no other has. Keys come in any order, so the sample is long. */
+const isJsonWith =
+  (key: RegExp) =>
+  (bytes: Uint8Array): boolean =>
+    /^(\u00ef\u00bb\u00bf)?\s*\{/.test(asciiOf(bytes, 0, 64)) && key.test(asciiOf(bytes, 0, HEADER_SAMPLE));
+const isLodMeta = isJsonWith(/"lodLevels"\s*:/);
+const isSogMeta = isJsonWith(/"means"\s*:/);
+const isGltf = isJsonWith(/"asset"\s*:\s*\{[^}]*"version"/);
 const isNgsp = (bytes: Uint8Array): boolean => startsWith(bytes, 'NGSP');
 
 /** All formats that `readScene` reads; the first whose signature fits wins. */
 export const sceneFormats: readonly SceneFormat[] = [
   {
     name: 'compressed-ply',
+    readsPrefix: true,
     title: 'compressed PLY (PlayCanvas, SuperSplat)',
     extensions: ['.compressed.ply', '.ply'],
     mimeTypes: [],
@@ -23,6 +33,7 @@ export const sceneFormats: readonly SceneFormat[] = [
   },
   {
     name: 'ply',
+    readsPrefix: true,
     title: 'PLY (INRIA 3D Gaussian Splatting)',
     extensions: ['.ply'],
     mimeTypes: ['model/ply', 'application/ply', 'application/x-ply'],
@@ -31,6 +42,7 @@ export const sceneFormats: readonly SceneFormat[] = [
   },
   {
     name: 'spz',
+    readsPrefix: true,
     title: 'SPZ (Niantic)',
     extensions: ['.spz'],
     mimeTypes: ['model/spz', 'application/spz', 'application/x-spz'],
@@ -39,7 +51,50 @@ export const sceneFormats: readonly SceneFormat[] = [
     load: async () => (await import('./readers/spz.js')).readSpz,
   },
   {
+    name: 'zip',
+    title: 'ZIP archive of a scene (.sog bundles too)',
+    extensions: ['.sog', '.zip'],
+    mimeTypes: ['application/zip', 'application/x-zip-compressed'],
+    hasSignature: (bytes) => startsWith(bytes, 'PK\x03\x04'),
+    load: async () => (await import('./readers/zip.js')).readZip,
+  },
+  {
+    name: 'lod',
+    title: 'streamed SOG (lod-meta.json)',
+    extensions: ['.json'],
+    mimeTypes: ['application/json'],
+    hasSignature: isLodMeta,
+    load: async () => (await import('./readers/lod.js')).readLod,
+  },
+  {
+    name: 'sog',
+    title: 'SOG (meta.json)',
+    extensions: ['.json'],
+    mimeTypes: ['application/json'],
+    hasSignature: isSogMeta,
+    load: async () => (await import('./readers/sog.js')).readSog,
+  },
+  {
+    name: 'gltf',
+    title: 'glTF with KHR_gaussian_splatting',
+    extensions: ['.glb', '.gltf'],
+    mimeTypes: ['model/gltf-binary', 'model/gltf+json'],
+    hasSignature: (bytes) => startsWith(bytes, 'glTF') || isGltf(bytes),
+    load: async () => (await import('./readers/gltf.js')).readGltf,
+  },
+  {
+    name: 'ksplat',
+    readsPrefix: true,
+    title: '.ksplat (GaussianSplats3D)',
+    extensions: ['.ksplat'],
+    mimeTypes: [],
+    hasSignature: looksLikeKsplat,
+    isSignatureWeak: true,
+    load: async () => (await import('./readers/ksplat.js')).readKsplat,
+  },
+  {
     name: 'splat',
+    readsPrefix: true,
     title: '.splat (antimatter15)',
     extensions: ['.splat'],
     mimeTypes: ['model/splat', 'application/x-splat'],

@@ -1,5 +1,7 @@
 export { detectFormat } from './detect.js';
 export { fetchScene, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './formats.js';
-export { readScene, type ReadSceneOptions } from './read-scene.js';
-export type { SceneFormat, SceneFormatName, SceneReader, SceneSource } from './scene-format.js';
+export { openPartAt } from './open-part.js';
+export { readPrefix, readScene, type ReadSceneOptions } from './read-scene.js';
+export { frameAt, isSequence, parseSequence, type SceneSequence } from './sequence.js';
+export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource } from './scene-format.js';

@@ -2,6 +2,8 @@ import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-sp
 import { grouped } from './bytes.js';
 import { extensionOf, findFormat } from './detect.js';
 import { diagnoseExtension, diagnoseSigned, diagnoseUnknown } from './diagnose.js';
+import { previewWanted, samplePreview } from './preview.js';
+import type { OpenPart, SceneSource } from './scene-format.js';
 
 export interface ReadSceneOptions {
   /** File name or URL: what error messages call the file, and whose extension tells formats without a signature. */
@@ -10,11 +12,23 @@ export interface ReadSceneOptions {
   readonly contentType?: string;
   /** Aborts between the steps of reading; the promise then rejects with the signal's reason. */
   readonly signal?: AbortSignal;
+  /**
+   * Opens the other files of a scene of several files (SOG folders, streamed SOG, glTF with buffers of their own); `openPartAt` makes one
+   * for an address. Archives need none.
+   */
+  readonly openPart?: OpenPart;
+  /** Level of detail that is read of a streamed scene, 0 (default) the finest. */
+  readonly level?: number;
+  /**
+   * Called, if the scene is large and its format allows, with some of its splats, spread over all of it and larger to stand
+   * for the rest, before the whole is read. Reading goes on once the promise fulfils.
+   */
+  readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
 
 /**
- * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4 or .splat; the format is told from the
- * content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
+ * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4, SOG version 1 and 2, streamed SOG, glTF with
+ * `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is told from the content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
  *
  * @param bytes the whole file. It is not changed, and the cloud does not refer to it.
  * @returns the splats in the shape and frame that `GaussianCloud` documents. Splats with values that cannot be drawn
@@ -23,7 +37,7 @@ export interface ReadSceneOptions {
  * `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
  */
 export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
-  const { name = 'scene', contentType = '', signal } = options;
+  const { name = 'scene', contentType = '', signal, openPart, level, onPreview } = options;
   signal?.throwIfAborted();
   if (bytes.length === 0) throw emptyFile(name);
   const format = findFormat(bytes, name, contentType);
@@ -32,10 +46,49 @@ export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {
   }
   const read = await format.load();
   signal?.throwIfAborted();
-  const cloud = keepUsable(await read({ bytes, name, signal }));
+  let hasPreview = false;
+  const preview = async (part: GaussianCloud): Promise<void> => {
+    hasPreview = true;
+    const drawable = keepUsable(part);
+    if (drawable.count > 0) await onPreview?.(drawable);
+    signal?.throwIfAborted();
+  };
+  const source: SceneSource = { bytes, name, signal, openPart, level, onPreview: onPreview && preview };
+  const whole = await read(source);
+  signal?.throwIfAborted();
+  // Checking and packing all splats takes longer than reading them, so that a preview is worth its while even now.
+  if (!hasPreview && previewWanted(source, whole.count)) await preview(samplePreview(whole));
+  const cloud = keepUsable(whole);
   signal?.throwIfAborted();
   if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
   return cloud;
+}
+
+/**
+ * Reads what can be seen of a file that is still arriving: the splats that are whole (PLY, compressed PLY, .splat, .ksplat), or all splats
+ * without their view-dependent colours once these are all that is missing (SPZ, compressed PLY).
+ *
+ * @param bytes the first bytes of the file.
+ * @returns the splats in the order of the file, or undefined if there are none yet or the format cannot be read in part. Never throws for
+ * what the bytes are: `readScene` says what is wrong once the file is whole.
+ */
+export async function readPrefix(
+  bytes: Uint8Array,
+  options: ReadSceneOptions = {},
+): Promise<GaussianCloud | undefined> {
+  const { name = 'scene', contentType = '', signal } = options;
+  signal?.throwIfAborted();
+  const format = bytes.length === 0 ? undefined : findFormat(bytes, name, contentType);
+  if (!format?.readsPrefix) return undefined;
+  const read = await format.load();
+  try {
+    const cloud = keepUsable(await read({ bytes, name, signal, isPrefix: true }));
+    return cloud.count > 0 ? cloud : undefined;
+  } catch (error) {
+    signal?.throwIfAborted();
+    if (error instanceof GaussianSplatError) return undefined;
+    throw error;
+  }
 }
 
 function emptyFile(name: string): GaussianSplatError {

@@ -8,7 +8,23 @@ export interface SceneSource {
   readonly name: string;
   /** Readers that wait or work long call `throwIfAborted()` between steps. */
   readonly signal?: AbortSignal;
+  /** True if `bytes` are only the first of the file: the splats that are whole are read, attributes that are missing left out. */
+  readonly isPrefix?: boolean;
+  /** Opens the files that a scene of several files names; absent where there is only the one. */
+  readonly openPart?: OpenPart;
+  /** Which level of a scene with levels of detail is read: 0 is the finest. */
+  readonly level?: number;
+  /** Called with a part of the splats that stands for all, before the whole is read. See `ReadSceneOptions.onPreview`. */
+  readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }
+
+/**
+ * Opens another file of the same scene.
+ *
+ * @param path as the scene writes it: relative to the scene's own file, `/` between folders, not URL-encoded.
+ * @returns the whole file.
+ */
+export type OpenPart = (path: string) => Promise<Uint8Array>;
 
 /**
  * Reads one file format into a cloud. A reader checks every size against the bytes present before it allocates, throws
@@ -17,7 +33,7 @@ export interface SceneSource {
  */
 export type SceneReader = (source: SceneSource) => GaussianCloud | Promise<GaussianCloud>;
 
-export type SceneFormatName = 'ply' | 'compressed-ply' | 'spz' | 'splat';
+export type SceneFormatName = 'ply' | 'compressed-ply' | 'spz' | 'splat' | 'ksplat' | 'sog' | 'lod' | 'gltf' | 'zip';
 
 /** A file format that `readScene` reads: what it is called, how it is recognised, and where its reader is. */
 export interface SceneFormat {
@@ -30,6 +46,10 @@ export interface SceneFormat {
   readonly mimeTypes: readonly string[];
   /** True if the first bytes of the file prove this format. Absent where the format has no signature. */
   readonly hasSignature?: (bytes: Uint8Array) => boolean;
+  /** True if the reader can read a file whose end is missing: see `readPrefix`. */
+  readonly readsPrefix?: boolean;
+  /** True if the first bytes may be damaged and the name still be right: a reader then says what is wrong. */
+  readonly isSignatureWeak?: boolean;
   /** Loads the reader; a dynamic import, so that a page fetches only the readers it needs. */
   readonly load: () => Promise<SceneReader>;
 }

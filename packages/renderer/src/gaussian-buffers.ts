@@ -3,6 +3,7 @@ import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, requireBudget, withMemoryCheck } from './gpu/memory.js';
+import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
 import { shWords, type ShPrecision } from './pack/sh.js';
@@ -26,6 +27,7 @@ export class GaussianBuffers implements GaussianScene {
   readonly pages: readonly GaussianPage[];
   readonly version = 0;
   readonly #memory: GpuMemory;
+  readonly #reservation: Reservation;
 
   private constructor(device: GPUDevice, packed: PackedGaussians) {
     ({
@@ -36,18 +38,22 @@ export class GaussianBuffers implements GaussianScene {
       origin: this.origin,
       droppedCount: this.droppedCount,
     } = packed);
+    const { count, shDegree, shPrecision } = packed;
+    const bytes = count * bytesPerSplat(shDegree, shPrecision);
+    this.#reservation = MemoryLedger.of(device).reserve(`scene of ${count} splats`, bytes);
     this.#memory = new GpuMemory(device);
     try {
       this.pages = uploadPages(device, packed, this.#memory);
     } catch (error) {
-      this.#memory.destroy();
+      this.destroy();
       throw error;
     }
   }
 
   /**
    * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for.
-   * @throws GaussianSplatError `out-of-memory/budget` before anything is allocated, `out-of-memory/allocation` if the device has no room.
+   * @throws GaussianSplatError `out-of-memory/budget`, before anything is allocated, if the scene is larger than `memoryBudget` or than what the
+   * device's {@link MemoryLedger} has left for all scenes; `out-of-memory/allocation` if the device has no room.
    */
   static async upload(
     device: GPUDevice,
@@ -66,6 +72,7 @@ export class GaussianBuffers implements GaussianScene {
   }
 
   destroy(): void {
+    this.#reservation.release();
     this.#memory.destroy();
   }
 }

@@ -16,3 +16,4 @@ export type { FrameStatistics } from './statistics.js';
 export type { SortName } from './stages/sort.js';
 export type { Threads } from './stages/threads.js';
 export type { Variants } from './variants.js';
+export { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';

@@ -1,8 +1,10 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
-import { boundsOf, GaussianSplatError } from '@gaussian-splat/core';
-import { fetchScene, readScene } from '@gaussian-splat/formats';
+import { boundsOf, GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { fetchScene, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
-import type { LoadedScene, ProgressListener, SceneRequest } from './protocol.js';
+import { PreviewSchedule } from './preview-schedule.js';
+import { ProgressSum } from './progress-sum.js';
+import type { LoadedScene, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
 
 /** Milliseconds between two progress reports: chunks may arrive by the thousand. */
 const PROGRESS_INTERVAL_MS = 50;
@@ -15,13 +17,23 @@ export async function loadScene(
   request: SceneRequest,
   signal: AbortSignal,
   onProgress: ProgressListener,
+  onPreview?: PreviewListener,
 ): Promise<LoadedScene> {
   try {
     const { url, credentials } = request;
-    const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress: throttled(onProgress) });
-    const cloud = await readScene(bytes, { name: fileName(url), signal });
+    const name = fileName(url);
+    const progress = new ProgressSum(throttled(onProgress), mayHaveParts(name));
+    const options = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, onProgress: progress.add() });
+    const pack = (cloud: GaussianCloud): LoadedScene => ({
+      packed: packGaussians(cloud, { sh: request.sh }),
+      bounds: boundsOf(cloud),
+    });
+    const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
+    const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
+    const openPart = openPartAt(url, options);
+    const cloud = await readScene(bytes, { name, signal, openPart, onPreview: previews?.onPreview });
     signal.throwIfAborted();
-    return { packed: packGaussians(cloud, { sh: request.sh }), bounds: boundsOf(cloud) };
+    return pack(cloud);
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(request.url));
@@ -37,6 +49,11 @@ function fileName(url: string): string {
   const { protocol, pathname, hash } = new URL(url);
   const name = protocol === 'blob:' && hash !== '' ? hash.slice(1) : (pathname.split('/').pop() ?? '');
   return decodeURIComponentSafely(name) || url;
+}
+
+/** True where the file that the address names is the smaller part of the scene. */
+function mayHaveParts(name: string): boolean {
+  return /\.(json|gltf)$/i.test(name);
 }
 
 function decodeURIComponentSafely(text: string): string {

@@ -22,14 +22,21 @@ export interface LoadedScene {
   readonly bounds: Bounds;
 }
 
+/**
+ * Called with a part of a scene that is still loading, ready for upload: fewer splats, or splats without their view-dependent colours.
+ * Each preview replaces the one before.
+ */
+export type PreviewListener = (preview: LoadedScene) => void;
+
 export type ProgressListener = (loaded: number, total: number | undefined) => void;
 
 export type PageMessage =
-  | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest }
+  | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest; readonly wantsPreviews: boolean }
   | { readonly type: 'cancel'; readonly id: number };
 
 export type WorkerMessage =
   | { readonly type: 'ready' }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }
+  | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
   | { readonly type: 'scene'; readonly id: number; readonly scene: LoadedScene }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };

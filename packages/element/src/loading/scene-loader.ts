@@ -1,5 +1,12 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { LoadedScene, PageMessage, ProgressListener, SceneRequest, WorkerMessage } from './protocol.js';
+import type {
+  LoadedScene,
+  PageMessage,
+  PreviewListener,
+  ProgressListener,
+  SceneRequest,
+  WorkerMessage,
+} from './protocol.js';
 import { spawnSceneWorker } from './spawn-worker.js';
 
 /** An unused worker is kept this long: pages with several elements load one scene after another. */
@@ -9,6 +16,7 @@ interface Pending {
   readonly resolve: (scene: LoadedScene) => void;
   readonly reject: (reason: unknown) => void;
   readonly onProgress: ProgressListener;
+  readonly onPreview: PreviewListener | undefined;
 }
 
 /** Loads scenes in one worker for the whole page, started on the first load and ended when idle. */
@@ -30,14 +38,21 @@ export class SceneLoader {
   /**
    * Fetches, reads and packs a scene. Rejects with GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or
    * with the signal's reason as soon as that is aborted.
+   *
+   * @param onPreview called with what can be shown of a large scene before it is whole; never after the promise has settled.
    */
-  async load(request: SceneRequest, signal: AbortSignal, onProgress: ProgressListener): Promise<LoadedScene> {
+  async load(
+    request: SceneRequest,
+    signal: AbortSignal,
+    onProgress: ProgressListener,
+    onPreview?: PreviewListener,
+  ): Promise<LoadedScene> {
     signal.throwIfAborted();
     clearTimeout(this.#idleTimer);
     const worker = await (this.#worker ??= this.#start());
     signal.throwIfAborted();
-    if (worker === null) return this.#loadHere(request, signal, onProgress);
-    return this.#loadThere(worker, request, signal, onProgress);
+    if (worker === null) return this.#loadHere(request, signal, onProgress, onPreview);
+    return this.#loadThere(worker, request, signal, onProgress, onPreview);
   }
 
   async #loadThere(
@@ -45,6 +60,7 @@ export class SceneLoader {
     request: SceneRequest,
     signal: AbortSignal,
     onProgress: ProgressListener,
+    onPreview: PreviewListener | undefined,
   ): Promise<LoadedScene> {
     const id = this.#nextId++;
     const post = (message: PageMessage): void => worker.postMessage(message);
@@ -54,9 +70,9 @@ export class SceneLoader {
       reject(signal.reason);
     };
     clearTimeout(this.#idleTimer);
-    this.#pending.set(id, { resolve, reject, onProgress });
+    this.#pending.set(id, { resolve, reject, onProgress, onPreview });
     signal.addEventListener('abort', cancel, { once: true });
-    post({ type: 'load', id, request });
+    post({ type: 'load', id, request, wantsPreviews: onPreview !== undefined });
     try {
       return await promise;
     } finally {
@@ -67,9 +83,14 @@ export class SceneLoader {
   }
 
   /** The worker's code on the page's own thread: slower for the page, but it works under any policy. */
-  async #loadHere(request: SceneRequest, signal: AbortSignal, onProgress: ProgressListener): Promise<LoadedScene> {
+  async #loadHere(
+    request: SceneRequest,
+    signal: AbortSignal,
+    onProgress: ProgressListener,
+    onPreview: PreviewListener | undefined,
+  ): Promise<LoadedScene> {
     const { loadScene } = await import('./scene-worker.js');
-    return loadScene(request, signal, onProgress);
+    return loadScene(request, signal, onProgress, onPreview);
   }
 
   /** The running worker, or null where this page may have none. */
@@ -97,6 +118,7 @@ export class SceneLoader {
     if (message.type === 'ready') return;
     const pending = this.#pending.get(message.id);
     if (message.type === 'progress') pending?.onProgress(message.loaded, message.total);
+    else if (message.type === 'preview') pending?.onPreview?.(message.scene);
     else if (message.type === 'scene') pending?.resolve(message.scene);
     else pending?.reject(GaussianSplatError.fromData(message.error));
   }

@@ -4,7 +4,7 @@
  */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { loadScene } from './load-scene.js';
-import type { LoadedScene, PageMessage, WorkerMessage } from './protocol.js';
+import type { LoadedScene, PageMessage, PreviewListener, ProgressListener, WorkerMessage } from './protocol.js';
 
 export { loadScene };
 
@@ -25,13 +25,15 @@ function buffersOf(scene: LoadedScene): ArrayBuffer[] {
 function serve(scope: WorkerScope): void {
   const running = new Map<number, AbortController>();
 
-  async function load({ id, request }: Extract<PageMessage, { type: 'load' }>): Promise<void> {
+  async function load({ id, request, wantsPreviews }: Extract<PageMessage, { type: 'load' }>): Promise<void> {
     const abort = new AbortController();
     running.set(id, abort);
     try {
-      const scene = await loadScene(request, abort.signal, (loaded, total) =>
-        scope.postMessage({ type: 'progress', id, loaded, total }),
-      );
+      const onProgress: ProgressListener = (loaded, total) =>
+        scope.postMessage({ type: 'progress', id, loaded, total });
+      const onPreview: PreviewListener = (preview) =>
+        scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview));
+      const scene = await loadScene(request, abort.signal, onProgress, wantsPreviews ? onPreview : undefined);
       if (!abort.signal.aborted) scope.postMessage({ type: 'scene', id, scene }, buffersOf(scene));
     } catch (error) {
       // loadScene throws its own errors, or the reason of an abort, which nobody waits for.

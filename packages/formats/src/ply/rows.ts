@@ -32,11 +32,19 @@ export function openElement(source: SceneSource, header: PlyHeader, name: string
   for (const element of header.elements) {
     const rowBytes = fixedRowBytes(element, encoding);
     const data: ElementData = { source, encoding, element, start, rowBytes };
+    if (element.name === name && source.isPrefix && rowBytes !== undefined) return wholeRows(data, rowBytes);
     requireRoom(data);
     if (element.name === name) return data;
     start = endOf(data);
   }
   throw new Error(`no element ${name}: callers ask only for elements of the header`);
+}
+
+/** Of a file that is still arriving, the rows that are there. */
+function wholeRows(data: ElementData, rowBytes: number): ElementData {
+  const { element, source, start } = data;
+  const rows = Math.max(0, Math.floor((source.bytes.length - start) / Math.max(1, rowBytes)));
+  return { ...data, element: { ...element, count: Math.min(element.count, rows) } };
 }
 
 /** Copies properties of all rows into their targets. Throws `decode/truncated` or, for text, `decode/corrupt`. */

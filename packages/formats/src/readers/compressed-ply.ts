@@ -26,23 +26,25 @@ const CHUNK_FLOATS = 18;
  */
 export function readCompressedPly(source: SceneSource): GaussianCloud {
   const header = parsePlyHeader(source);
-  const { vertex, sh } = checkElements(source, header);
-  const degree = sh ? shDegreeOf(source, sh) : 0;
+  const { sh } = checkElements(source, header);
+  // Coefficients come after all splats; of a file that is still arriving they are left out.
+  const degree = sh && !source.isPrefix ? shDegreeOf(source, sh) : 0;
   const chunkBounds = readChunkBounds(source, header);
   const vertexData = openElement(source, header, 'vertex');
-  const words = new Uint32Array(4 * vertex.count);
+  const { count } = vertexData.element;
+  const words = new Uint32Array(4 * count);
   readColumns(
     vertexData,
     PACKED.map((property, offset) => ({ property, array: words, stride: 4, offset })),
   );
   source.signal?.throwIfAborted();
-  const cloud = allocateCloud(vertex.count, keptDegree(degree), source.name);
+  const cloud = allocateCloud(count, keptDegree(degree), source.name);
   unpackSplats(words, chunkBounds, cloud);
-  if (sh) readHarmonics(source, header, degree, cloud);
+  if (sh && !source.isPrefix) readHarmonics(source, header, degree, cloud);
   return cloud;
 }
 
-function checkElements(source: SceneSource, header: PlyHeader): { vertex: PlyElement; sh: PlyElement | undefined } {
+function checkElements(source: SceneSource, header: PlyHeader): { sh: PlyElement | undefined } {
   const element = (name: string): PlyElement | undefined => header.elements.find((found) => found.name === name);
   const fail = (where: string, expected: string, found: string): never => {
     throw new GaussianSplatError('decode/header', {
@@ -73,7 +75,7 @@ function checkElements(source: SceneSource, header: PlyHeader): { vertex: PlyEle
     fail(', element "sh"', `${grouped(vertex.count)} rows, one for each splat`, grouped(sh.count));
   }
   if (sh) require('sh', sh.properties.filter((p) => p.name.startsWith('f_rest_')).map((p) => p.name), 'uint8');
-  return { vertex, sh };
+  return { sh };
 }
 
 /** [chunks, 18] bounds; colours without bounds of their own span 0..1. */

@@ -16,7 +16,7 @@ export function readPly(source: SceneSource): GaussianCloud {
   const header = parsePlyHeader(source);
   const layout = findGaussians(source, header);
   const data = openElement(source, header, 'vertex');
-  const cloud = allocateCloud(layout.vertex.count, keptDegree(layout.degree), source.name);
+  const cloud = allocateCloud(data.element.count, keptDegree(layout.degree), source.name);
   cloud.antialiased = layout.antialiased;
   source.signal?.throwIfAborted();
   readAttributes(data, layout, cloud);

@@ -9,8 +9,9 @@ import type { SceneSource } from '../scene-format.js';
  * bytes, and the quaternion (w, x, y, z) in bytes as 128 + 128·q. There is no header and no view-dependent colour.
  */
 export function readSplat(source: SceneSource): GaussianCloud {
-  const { bytes, name } = source;
-  const count = Math.floor(bytes.length / SPLAT_BYTES);
+  const { name } = source;
+  const count = Math.floor(source.bytes.length / SPLAT_BYTES);
+  const bytes = source.isPrefix ? source.bytes.subarray(0, SPLAT_BYTES * count) : source.bytes;
   if (bytes.length % SPLAT_BYTES !== 0) {
     throw new GaussianSplatError('decode/truncated', {
       where: `${name}, byte ${grouped(bytes.length)} (end of the file)`,

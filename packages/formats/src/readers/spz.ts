@@ -1,11 +1,15 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { startsWith } from '../bytes.js';
 import { describeContent } from '../diagnose.js';
+import { PREVIEW_STEP, previewWanted, sparse } from '../preview.js';
 import type { SceneSource } from '../scene-format.js';
 import { Gunzip } from '../spz/gunzip.js';
 import {
+  bodyBytes,
+  bytesPerSplat,
   parseSpzHeader,
   requirePlausibleCount,
+  SPZ_ATTRIBUTES,
   SPZ_HEADER_BYTES,
   truncatedHeader,
   type SpzHeader,
@@ -20,9 +24,58 @@ import { unpackSplats } from '../spz/unpack.js';
  * that names the coordinate system; without it a file is in right-up-back and is turned into a cloud's frame.
  */
 export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
+  if (source.isPrefix) return readWithoutHarmonics(source);
   const { header, scene } = startsWith(source.bytes, 'NGSP') ? readPlain(source) : await readGzip(source);
   source.signal?.throwIfAborted();
+  if (previewWanted(source, header.count)) await source.onPreview?.(previewOf(header, scene, source.name));
   return unpackSplats(header, scene, source.name);
+}
+
+/** Every so many-th splat, without coefficients above the constant one. */
+function previewOf(header: SpzHeader, { attributes, axes }: PackedScene, name: string): GaussianCloud {
+  const sizes = bytesPerSplat(header.version, 0);
+  const count = Math.ceil(header.count / PREVIEW_STEP);
+  const taken = Object.fromEntries(
+    SPZ_ATTRIBUTES.map((attribute) => [attribute, everyNth(attributes[attribute], sizes[attribute], count)]),
+  ) as PackedScene['attributes'];
+  return sparse(unpackSplats({ ...header, count, degree: 0 }, { attributes: taken, axes }, name));
+}
+
+function everyNth(values: Uint8Array, size: number, count: number): Uint8Array {
+  const taken = new Uint8Array(size * count);
+  for (let i = 0; i < count; i++) {
+    for (let k = 0; k < size; k++) taken[size * i + k] = values[size * PREVIEW_STEP * i + k];
+  }
+  return taken;
+}
+
+/** The harmonics come last and are half of a file and more: all splats are there long before its end. */
+async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud> {
+  const { bytes, name } = source;
+  if (startsWith(bytes, 'NGSP')) {
+    const header = parseSpzHeader(bytes, name);
+    if (header.version === 4) {
+      const plain = { ...header, degree: 0 } as const;
+      requirePlausibleCount(plain, bytes.length, name);
+      return unpackSplats(plain, readStreams(source, header), name);
+    }
+    return unpackLegacy(bytes, header, name);
+  }
+  const gunzip = new Gunzip(source);
+  try {
+    const header = parseSpzHeader(await gunzip.upTo(SPZ_HEADER_BYTES), name);
+    // The count is not yet to be believed; what is inflated is bounded by the bytes that have arrived.
+    const end = SPZ_HEADER_BYTES + bodyBytes({ ...header, degree: 0 }, header.version);
+    return unpackLegacy(await gunzip.upTo(end), header, name);
+  } finally {
+    gunzip.close();
+  }
+}
+
+function unpackLegacy(file: Uint8Array, header: SpzHeader, name: string): GaussianCloud {
+  const plain = { ...header, degree: 0, hasExtensions: false } as const;
+  const body = file.subarray(0, SPZ_HEADER_BYTES + bodyBytes(plain, header.version));
+  return unpackSplats(plain, readLegacyBody(body, plain, name), name);
 }
 
 interface SpzParts {

@@ -24,6 +24,7 @@ export function readStreams(source: SceneSource, header: SpzHeader): PackedScene
   if (bytes.length < HEADER_BYTES) throw truncatedHeader(name, bytes.length, HEADER_BYTES);
   const sizes = bytesPerSplat(header.version, header.degree);
   const present = SPZ_ATTRIBUTES.filter((attribute) => sizes[attribute] > 0);
+  const wanted = source.isPrefix ? present.filter((attribute) => attribute !== 'harmonics') : present;
   const view = viewOf(bytes);
   const streamCount = bytes[15];
   const tableStart = view.getUint32(16, true);
@@ -35,7 +36,7 @@ export function readStreams(source: SceneSource, header: SpzHeader): PackedScene
   if (tableEnd > bytes.length) throw truncatedHeader(name, bytes.length, tableEnd);
   const attributes = { harmonics: new Uint8Array(0) } as Record<SpzAttribute, Uint8Array>;
   let at = tableEnd;
-  present.forEach((attribute, k) => {
+  wanted.forEach((attribute, k) => {
     source.signal?.throwIfAborted();
     const entry = tableStart + ENTRY_BYTES * k;
     const compressed = Number(view.getBigUint64(entry, true));

@@ -1,6 +1,7 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
 import { allocateCloud, expInPlace, keptDegree } from '../cloud.js';
+import { float16 } from '../float16.js';
 import { harmonicSigns, quaternionSigns, type AxisSigns } from './axes.js';
 import { bytesPerSplat, type SpzHeader } from './header.js';
 import type { PackedScene } from './streams.js';
@@ -39,15 +40,6 @@ function unpackFixedPositions(packed: Uint8Array, fractionalBits: number, axes: 
 function unpackHalfPositions(packed: Uint8Array, axes: AxisSigns, out: Float32Array): void {
   const view = viewOf(packed);
   for (let i = 0; i < out.length; i++) out[i] = axes[i % 3] * float16(view.getUint16(2 * i, true));
-}
-
-/** Value of an IEEE 754 half-precision number. */
-function float16(bits: number): number {
-  const sign = bits & 0x8000 ? -1 : 1;
-  const exponent = (bits >> 10) & 31;
-  const fraction = bits & 1023;
-  if (exponent === 31) return fraction ? NaN : sign * Infinity;
-  return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1024 + fraction) * 2 ** (exponent - 25);
 }
 
 /** Versions 1 and 2: x, y and z in bytes, -1..1; w is not negative and follows from the unit length. */

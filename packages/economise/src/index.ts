@@ -1,0 +1,10 @@
+export { cpuPainter, cpuScorer } from './cpu-raster.js';
+export { economise, type Economised, type EconomiseOptions } from './economise.js';
+export { GpuScorer } from './gpu-scorer.js';
+export { contributionOfShare, economical, parseEconomy, type EconomyShare } from './mask.js';
+export { decibels, meanSquare, Studio, type Image, type Painter } from './measure.js';
+export { reduce, type Cut, type ReducedCloud } from './reduce.js';
+export { scoreSplats, type Scores } from './score.js';
+export type { ContributionScorer } from './scorer.js';
+export { dealtViewsAround, dealViews, viewsAround, type DealtViews, type ViewOptions } from './views.js';
+export { encodingsFor, type Encoding } from './write/index.js';

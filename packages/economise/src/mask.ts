@@ -1,0 +1,29 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { reduce, type ReducedCloud } from './reduce.js';
+import type { Scores } from './score.js';
+
+/**
+ * How much of a scene is shown: a share of its splats in 0..1, the most seen ones, or `null` for all. The scene itself is never
+ * changed, so that every choice can be taken back.
+ */
+export type EconomyShare = number | null;
+
+/** Reads the `economy` attribute: a number in 0..1 or a percentage is a share; anything else is all. */
+export function parseEconomy(text: string | null): EconomyShare {
+  const match = /^\s*(\d*\.?\d+)\s*(%?)\s*$/.exec(text ?? '');
+  if (!match) return null;
+  const share = Number(match[1]) / (match[2] ? 100 : 1);
+  return share > 0 && share < 1 ? share : null;
+}
+
+/** The contribution that a splat needs to be among the given share of those that paint anything at all. */
+export function contributionOfShare({ contribution }: Pick<Scores, 'contribution'>, share: EconomyShare): number {
+  if (share === null) return 0;
+  const sorted = contribution.slice().sort();
+  return sorted[Math.min(sorted.length - 1, Math.floor((1 - share) * sorted.length))];
+}
+
+/** The splats of a scene that are shown at a share. */
+export function economical(cloud: GaussianCloud, scores: Scores, share: EconomyShare): ReducedCloud {
+  return reduce(cloud, scores, { minContribution: contributionOfShare(scores, share), colourPrice: 0 });
+}

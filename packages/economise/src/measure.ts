@@ -1,0 +1,58 @@
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { capture, GaussianBuffers, packGaussians, Renderer, type Quality } from '@gaussian-splat/renderer';
+
+/** An image, [height, width, 4] premultiplied red, green, blue and alpha in float32. */
+export type Image = Float32Array;
+
+/** Draws clouds. */
+export interface Painter {
+  /** The images of a cloud in all views. */
+  draw(cloud: GaussianCloud, views: readonly Camera[]): Promise<Image[]>;
+}
+
+/** Draws clouds with the project's renderer. */
+export class Studio implements Painter {
+  readonly #device: GPUDevice;
+  readonly #renderer: Renderer;
+
+  /** @param quality of the images that clouds are compared by. */
+  constructor(device: GPUDevice, quality: Quality = 'reference') {
+    this.#device = device;
+    this.#renderer = new Renderer(device, { quality });
+  }
+
+  async draw(cloud: GaussianCloud, views: readonly Camera[]): Promise<Image[]> {
+    const packed = packGaussians(cloud, { sh: 'float16' });
+    const gaussians = await GaussianBuffers.upload(this.#device, packed);
+    try {
+      const images: Image[] = [];
+      for (const camera of views) {
+        images.push(await capture(this.#device, this.#renderer, { gaussians, camera }));
+      }
+      return images;
+    } finally {
+      gaussians.destroy();
+    }
+  }
+
+  destroy(): void {
+    this.#renderer.destroy();
+  }
+}
+
+/** Mean squared difference of the three colours, peak 1, over the pixels that the reference covers. */
+export function meanSquare(image: Image, reference: Image): number {
+  let sum = 0;
+  let pixels = 0;
+  for (let i = 0; i < reference.length; i += 4) {
+    if (reference[i + 3] === 0) continue;
+    pixels++;
+    for (let channel = i; channel < i + 3; channel++) sum += (image[channel] - reference[channel]) ** 2;
+  }
+  return pixels === 0 ? 0 : sum / (3 * pixels);
+}
+
+export const decibels = (meanSquare: number): number => -10 * Math.log10(meanSquare);
+export const meanSquareOf = (decibels: number): number => 10 ** (-decibels / 10);
+export const mean = (values: readonly number[]): number =>
+  values.reduce((sum, value) => sum + value, 0) / values.length;

@@ -1,0 +1,12 @@
+import type { Camera } from '@gaussian-splat/core';
+
+/** What each splat of a cloud contributes to one image. */
+export interface Contributions {
+  /** [N] the largest weight, alpha times transmittance in 0..1, in any pixel; 0 for splats that paint nothing. */
+  readonly peak: Float32Array;
+  /** [N] the sum of the squares of the weights in all pixels, over the number of pixels of the image. */
+  readonly energy: Float32Array;
+}
+
+/** Measures an image. The caller may keep the arrays until the next call. */
+export type ContributionScorer = (camera: Camera) => Contributions | Promise<Contributions>;

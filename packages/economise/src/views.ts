@@ -1,0 +1,71 @@
+import { DEFAULT_FAR, lookAt, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
+
+export interface ViewOptions {
+  readonly width?: number;
+  readonly height?: number;
+  /** Vertical field of view, radians. */
+  readonly fovYRadians?: number;
+  /** Another number gives other views, none of which is among the first. */
+  readonly seed?: number;
+}
+
+/** Distances from the middle of the subject, in its radii: from close by to all of it in view. */
+const DISTANCES = [1.5, 1.9, 2.4, 3.2];
+/** Height of the eye above the subject, radians: from a little below to well above. */
+const ELEVATIONS: readonly [number, number] = [-0.35, 1.1];
+
+/**
+ * Views around a subject for scenes that come without cameras: evenly spread around it, at several heights and distances, looking
+ * at points near its middle. Up is -y, as in captures.
+ */
+export function viewsAround(bounds: Bounds, count: number, options: ViewOptions = {}): Camera[] {
+  const { width = 480, height = 270, fovYRadians = 0.7, seed = 0 } = options;
+  const { center, radius } = bounds;
+  const f = height / (2 * Math.tan(fovYRadians / 2));
+  return Array.from({ length: count }, (_, k) => {
+    // Additive sequences with irrational steps: no two sets of views share one, and every set covers all of it.
+    const at = (step: number): number => ((k + 0.5 + 97 * seed) * step) % 1;
+    const azimuth = 2 * Math.PI * at(0.6180339887);
+    const elevation = ELEVATIONS[0] + (ELEVATIONS[1] - ELEVATIONS[0]) * at(0.7548776662);
+    const distance = radius * DISTANCES[(k + seed) % DISTANCES.length];
+    const eye: Vector3 = [
+      center[0] + distance * Math.cos(elevation) * Math.sin(azimuth),
+      center[1] - distance * Math.sin(elevation),
+      center[2] - distance * Math.cos(elevation) * Math.cos(azimuth),
+    ];
+    const aside = (step: number): number => 0.3 * radius * (at(step) - 0.5);
+    const target: Vector3 = [
+      center[0] + aside(0.5698402909),
+      center[1] + aside(0.3247179572),
+      center[2] + aside(0.4142135623),
+    ];
+    return {
+      ...{ width, height, fx: f, fy: f, cx: width / 2, cy: height / 2 },
+      worldToCamera: lookAt(eye, target, [0, -1, 0]),
+      near: radius / 100,
+      far: DEFAULT_FAR,
+    };
+  });
+}
+
+/** Views dealt out by what they are for. */
+export interface DealtViews {
+  /** Splats are scored by what they contribute here. */
+  readonly scored: readonly Camera[];
+  /** How much may go is found here. */
+  readonly searched: readonly Camera[];
+  /** Nothing but the result is measured here. */
+  readonly heldOut: readonly Camera[];
+}
+
+/** Deals views out: of ten that follow one another, one is for the search, two are held out, and splats are scored in the rest. */
+export function dealViews(views: readonly Camera[]): DealtViews {
+  const of = (...places: number[]): Camera[] => views.filter((_, k) => places.includes(k % 10));
+  return { scored: of(0, 1, 3, 4, 5, 6, 8), searched: of(2), heldOut: of(7, 9) };
+}
+
+/** Views around a subject, for scenes without cameras: 72 to score in, 8 to search in, 6 held out. */
+export function dealtViewsAround(bounds: Bounds, options: Omit<ViewOptions, 'seed'> = {}): DealtViews {
+  const around = (count: number, seed: number): Camera[] => viewsAround(bounds, count, { ...options, seed });
+  return { scored: around(72, 0), searched: around(8, 1), heldOut: around(6, 2) };
+}

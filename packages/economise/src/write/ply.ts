@@ -1,0 +1,45 @@
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+
+/** Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals. */
+export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
+  const { count, shDegree, positions, origin, sh, opacities, scales, rotations, antialiased } = cloud;
+  const coefficients = shCoefficientCount(shDegree);
+  const names = [
+    ...['x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2'],
+    ...Array.from({ length: 3 * (coefficients - 1) }, (_, k) => `f_rest_${k}`),
+    ...['opacity', 'scale_0', 'scale_1', 'scale_2', 'rot_0', 'rot_1', 'rot_2', 'rot_3'],
+  ];
+  const lines = [
+    'ply',
+    'format binary_little_endian 1.0',
+    ...(antialiased ? ['comment SplatRenderMode: mip'] : []),
+    `element vertex ${count}`,
+    ...names.map((name) => `property float ${name}`),
+    'end_header',
+  ];
+  const header = new TextEncoder().encode(`${lines.join('\n')}\n`);
+  const bytes = new Uint8Array(header.length + 4 * names.length * count);
+  bytes.set(header);
+  const view = new DataView(bytes.buffer, header.length);
+  let at = 0;
+  const put = (value: number): void => {
+    view.setFloat32(at, value, true);
+    at += 4;
+  };
+  for (let i = 0; i < count; i++) {
+    for (let k = 0; k < 3; k++) put(positions[3 * i + k] + origin[k]);
+    for (let k = 0; k < 3; k++) put(sh[3 * coefficients * i + k]);
+    for (let channel = 0; channel < 3; channel++) {
+      for (let k = 1; k < coefficients; k++) put(sh[3 * (coefficients * i + k) + channel]);
+    }
+    put(logit(opacities[i]));
+    for (let k = 0; k < 3; k++) put(Math.log(scales[3 * i + k]));
+    for (let k = 0; k < 4; k++) put(rotations[4 * i + k]);
+  }
+  return bytes;
+}
+
+/** Opacity 1 has an infinite logit; 30 is as near as float32 comes. */
+function logit(opacity: number): number {
+  return Math.min(30, Math.max(-30, Math.log(opacity / (1 - opacity))));
+}

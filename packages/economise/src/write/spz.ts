@@ -1,0 +1,92 @@
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+
+/** How precisely an SPZ is written. */
+export interface SpzOptions {
+  /** Bits of each coefficient above the constant one, 2 to 8; fewer compress better. */
+  readonly shBits: number;
+}
+
+const COLOUR_SCALE = 0.15;
+const MAX_FRACTIONAL_BITS = 20;
+
+/** Signs on the way to right, up, back; for quaternions (x, y, z), and for coefficients of degrees 1 to 3. */
+const AXIS_SIGNS = [1, -1, -1];
+const QUATERNION_SIGNS = [1, -1, -1];
+const HARMONIC_SIGNS = [-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1];
+
+/** Writes SPZ version 3 (Niantic), with as many bits after the point of the coordinates as 24 bits allow. */
+export async function writeSpz(cloud: GaussianCloud, options: SpzOptions): Promise<Uint8Array<ArrayBuffer>> {
+  const { count, shDegree, antialiased } = cloud;
+  const coefficients = shCoefficientCount(shDegree) - 1;
+  const fractionalBits = fractionalBitsOf(cloud);
+  const body = new Uint8Array(16 + count * (20 + 3 * coefficients));
+  const view = new DataView(body.buffer);
+  // "NGSP", version, count.
+  [0x5053474e, 3, count].forEach((value, k) => view.setUint32(4 * k, value, true));
+  body.set([shDegree, fractionalBits, antialiased ? 1 : 0, 0], 12);
+  let at = 16;
+  at = packPositions(cloud, 2 ** fractionalBits, body, at);
+  at = packColours(cloud, body, at);
+  for (const scale of cloud.scales) body[at++] = byte(16 * (Math.log(scale) + 10));
+  for (let i = 0; i < count; i++, at += 4) view.setUint32(at, packRotation(cloud.rotations, 4 * i), true);
+  packHarmonics(cloud, options.shBits, body, at);
+  return gzip(body);
+}
+
+const byte = (value: number): number => Math.min(255, Math.max(0, Math.round(value)));
+
+function fractionalBitsOf({ positions, origin }: GaussianCloud): number {
+  let largest = 1e-9;
+  positions.forEach((value, k) => (largest = Math.max(largest, Math.abs(value + origin[k % 3]))));
+  return Math.min(MAX_FRACTIONAL_BITS, Math.max(0, Math.floor(Math.log2((2 ** 23 - 1) / largest))));
+}
+
+function packPositions({ positions, origin }: GaussianCloud, unit: number, out: Uint8Array, at: number): number {
+  positions.forEach((value, k) => {
+    const fixed = Math.round(AXIS_SIGNS[k % 3] * (value + origin[k % 3]) * unit);
+    out.set([fixed & 255, (fixed >> 8) & 255, (fixed >> 16) & 255], at + 3 * k);
+  });
+  return at + 3 * positions.length;
+}
+
+function packColours({ count, opacities, sh, shDegree }: GaussianCloud, out: Uint8Array, at: number): number {
+  const stride = 3 * shCoefficientCount(shDegree);
+  for (let i = 0; i < count; i++) out[at++] = byte(255 * opacities[i]);
+  for (let i = 0; i < count; i++) {
+    for (let k = 0; k < 3; k++) out[at++] = byte(255 * (0.5 + COLOUR_SCALE * sh[stride * i + k]));
+  }
+  return at;
+}
+
+/** Two bits for the largest of (x, y, z, w), then a sign and nine bits of magnitude for each of the others. */
+function packRotation(rotations: Float32Array, at: number): number {
+  const q = [1, 2, 3, 0].map((k, n) => rotations[at + k] * (QUATERNION_SIGNS[n] ?? 1));
+  const largest = q.reduce((best, value, k) => (Math.abs(value) > Math.abs(q[best]) ? k : best), 0);
+  const flip = q[largest] < 0;
+  let word = largest;
+  for (let k = 0; k < 4; k++) {
+    if (k === largest) continue;
+    const isNegative = q[k] < 0 !== flip;
+    const magnitude = Math.min(511, Math.round(511 * Math.SQRT2 * Math.abs(q[k])));
+    word = (word << 10) | (isNegative ? 512 : 0) | magnitude;
+  }
+  return word >>> 0;
+}
+
+function packHarmonics({ count, sh, shDegree }: GaussianCloud, bits: number, out: Uint8Array, at: number): void {
+  const numbers = shCoefficientCount(shDegree);
+  const step = 2 ** (8 - bits);
+  for (let i = 0; i < count; i++) {
+    for (let k = 1; k < numbers; k++) {
+      for (let channel = 0; channel < 3; channel++) {
+        const value = 128 + 128 * HARMONIC_SIGNS[k - 1] * sh[3 * (numbers * i + k) + channel];
+        out[at++] = byte(128 + step * Math.round((value - 128) / step));
+      }
+    }
+  }
+}
+
+async function gzip(bytes: Uint8Array<ArrayBuffer>): Promise<Uint8Array<ArrayBuffer>> {
+  const stream = new Blob([bytes]).stream().pipeThrough(new CompressionStream('gzip'));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}

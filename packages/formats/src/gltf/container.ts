@@ -1,0 +1,55 @@
+import { asciiOf, grouped, startsWith, viewOf } from '../bytes.js';
+import { damaged } from '../damaged.js';
+import { parseJson, show } from '../sog/meta.js';
+
+export type Json = Record<string, unknown>;
+
+/** A glTF file taken apart. */
+export interface GltfFile {
+  readonly json: Json;
+  /** The binary chunk of a GLB: the first buffer. */
+  readonly binary: Uint8Array | undefined;
+}
+
+const MAX_JSON_BYTES = 1 << 26;
+const HEADER_BYTES = 12;
+
+/** Takes a GLB, or a glTF in JSON, apart. */
+export function openContainer(bytes: Uint8Array, name: string): GltfFile {
+  const file = startsWith(bytes, 'glTF')
+    ? openGlb(bytes, name)
+    : { json: parseJson(bytes, name, MAX_JSON_BYTES), binary: undefined };
+  const { asset } = file.json;
+  const version = typeof asset === 'object' && asset !== null ? (asset as Json).version : undefined;
+  if (typeof version !== 'string' || !version.startsWith('2.')) {
+    throw damaged(`${name}, asset.version`, 'glTF 2.x', show(version), 'decode/unsupported');
+  }
+  return file;
+}
+
+function openGlb(bytes: Uint8Array, name: string): GltfFile {
+  const where = (byte: number): string => `${name}, byte ${grouped(byte)}`;
+  const view = viewOf(bytes);
+  const need = (end: number): void => {
+    if (end > bytes.length) {
+      throw damaged(
+        `${where(bytes.length)} (end of the file)`,
+        `${grouped(end)} bytes`,
+        grouped(bytes.length),
+        'decode/truncated',
+      );
+    }
+  };
+  need(HEADER_BYTES + 8);
+  const version = view.getUint32(4, true);
+  if (version !== 2) throw damaged(where(4), 'version 2 of GLB', grouped(version), 'decode/unsupported');
+  need(view.getUint32(8, true));
+  const jsonEnd = HEADER_BYTES + 8 + view.getUint32(HEADER_BYTES, true);
+  if (asciiOf(bytes, 16, 20) !== 'JSON') throw damaged(where(16), 'a chunk of JSON', 'another', 'decode/header');
+  need(jsonEnd);
+  const json = parseJson(bytes.subarray(HEADER_BYTES + 8, jsonEnd), `${name}, JSON of the GLB`, MAX_JSON_BYTES);
+  if (jsonEnd + 8 > bytes.length) return { json, binary: undefined };
+  const binaryEnd = jsonEnd + 8 + view.getUint32(jsonEnd, true);
+  need(binaryEnd);
+  return { json, binary: bytes.subarray(jsonEnd + 8, binaryEnd) };
+}

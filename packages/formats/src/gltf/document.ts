@@ -1,0 +1,154 @@
+import { grouped } from '../bytes.js';
+import { damaged } from '../damaged.js';
+import type { OpenPart } from '../scene-format.js';
+import { isObject, show } from '../sog/meta.js';
+import type { GltfFile, Json } from './container.js';
+
+/** Reads components of the types that glTF has. */
+const COMPONENTS: ReadonlyMap<unknown, { bytes: number; max: number; get: (view: DataView, at: number) => number }> =
+  new Map([
+    [5120, { bytes: 1, max: 127, get: (view: DataView, at: number) => view.getInt8(at) }],
+    [5121, { bytes: 1, max: 255, get: (view: DataView, at: number) => view.getUint8(at) }],
+    [5122, { bytes: 2, max: 32_767, get: (view: DataView, at: number) => view.getInt16(at, true) }],
+    [5123, { bytes: 2, max: 65_535, get: (view: DataView, at: number) => view.getUint16(at, true) }],
+    [5125, { bytes: 4, max: 4_294_967_295, get: (view: DataView, at: number) => view.getUint32(at, true) }],
+    [5126, { bytes: 4, max: 1, get: (view: DataView, at: number) => view.getFloat32(at, true) }],
+  ]);
+const WIDTHS: ReadonlyMap<unknown, number> = new Map([
+  ['SCALAR', 1],
+  ['VEC2', 2],
+  ['VEC3', 3],
+  ['VEC4', 4],
+]);
+
+/** Numbers of an accessor. */
+export interface AccessorData {
+  readonly count: number;
+  /** Numbers of one element. */
+  readonly width: number;
+  /** [count, width], normalised where the accessor says so. */
+  readonly values: Float32Array;
+}
+
+/** Access to the parts of a glTF file by number, every one checked before it is used. */
+export class GltfDocument {
+  readonly json: Json;
+  readonly name: string;
+  readonly #binary: Uint8Array | undefined;
+  readonly #open: OpenPart;
+  readonly #buffers = new Map<number, Promise<Uint8Array>>();
+
+  constructor({ json, binary }: GltfFile, name: string, open: OpenPart) {
+    this.json = json;
+    this.name = name;
+    this.#binary = binary;
+    this.#open = open;
+  }
+
+  /** Throws `decode/header`. */
+  fail(path: string, expected: string, found: unknown): never {
+    throw damaged(`${this.name}, ${path}`, expected, show(found), 'decode/header');
+  }
+
+  /** Element `index` of an array of objects at the top of the file. */
+  item(list: string, index: unknown): Json {
+    const array = this.json[list];
+    const found: unknown = Array.isArray(array) && this.isIndex(index) ? array[index] : undefined;
+    return isObject(found) ? found : this.fail(`${list}[${String(index)}]`, 'an object', found);
+  }
+
+  isIndex(value: unknown): value is number {
+    return Number.isSafeInteger(value) && (value as number) >= 0;
+  }
+
+  /** Number of elements that an accessor announces; what it takes in bytes is checked when it is read. */
+  accessorCount(index: unknown): number {
+    const { count } = this.item('accessors', index);
+    return this.isIndex(count) ? count : this.fail(`accessors[${String(index)}].count`, 'a whole number', count);
+  }
+
+  async readAccessor(index: unknown): Promise<AccessorData> {
+    const accessor = this.item('accessors', index);
+    const path = `accessors[${String(index)}]`;
+    const component =
+      COMPONENTS.get(accessor.componentType) ??
+      this.fail(`${path}.componentType`, '5120 to 5126', accessor.componentType);
+    const width = WIDTHS.get(accessor.type) ?? this.fail(`${path}.type`, 'SCALAR to VEC4', accessor.type);
+    if (accessor.sparse !== undefined) {
+      throw damaged(`${this.name}, ${path}`, 'an accessor without "sparse"', 'a sparse one', 'decode/unsupported');
+    }
+    const count = this.accessorCount(index);
+    const view = this.item('bufferViews', accessor.bufferView);
+    const bytes = await this.readView(accessor.bufferView);
+    const { byteOffset = 0 } = accessor;
+    const { byteStride = width * component.bytes } = view;
+    const isStride = this.isIndex(byteStride) && byteStride >= width * component.bytes && byteStride <= 252;
+    if (!this.isIndex(byteOffset) || !isStride) {
+      return this.fail(path, 'an offset and a stride that fit', { byteOffset, byteStride });
+    }
+    const end = count === 0 ? 0 : byteOffset + (count - 1) * byteStride + width * component.bytes;
+    if (end > bytes.length) {
+      throw damaged(`${this.name}, ${path}`, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/corrupt');
+    }
+    const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    const values = new Float32Array(count * width);
+    for (let i = 0; i < count; i++) {
+      const at = byteOffset + i * byteStride;
+      for (let k = 0; k < width; k++) values[i * width + k] = component.get(data, at + k * component.bytes);
+    }
+    // The lowest signed integer stands for -1 as well as the one above it.
+    if (accessor.normalized === true) values.forEach((value, i) => (values[i] = Math.max(-1, value / component.max)));
+    return { count, width, values };
+  }
+
+  /** The bytes of a buffer view. */
+  async readView(index: unknown): Promise<Uint8Array> {
+    const view = this.item('bufferViews', index);
+    const { buffer, byteOffset = 0, byteLength } = view;
+    const path = `bufferViews[${String(index)}]`;
+    if (!this.isIndex(buffer) || !this.isIndex(byteOffset) || !this.isIndex(byteLength)) {
+      return this.fail(path, 'a buffer, an offset and a length', { buffer, byteOffset, byteLength });
+    }
+    const loading = this.#buffers.get(buffer) ?? this.#loadBuffer(buffer);
+    this.#buffers.set(buffer, loading);
+    const bytes = await loading;
+    if (byteOffset + byteLength > bytes.length) {
+      throw damaged(
+        `${this.name}, ${path}`,
+        `${grouped(byteOffset + byteLength)} bytes`,
+        grouped(bytes.length),
+        'decode/truncated',
+      );
+    }
+    return bytes.subarray(byteOffset, byteOffset + byteLength);
+  }
+
+  async #loadBuffer(index: number): Promise<Uint8Array> {
+    const { uri } = this.item('buffers', index);
+    if (uri === undefined) {
+      if (index === 0 && this.#binary) return this.#binary;
+      return this.fail(`buffers[${index}]`, 'an address, or the binary chunk of a GLB', uri);
+    }
+    if (typeof uri !== 'string') return this.fail(`buffers[${index}].uri`, 'an address', uri);
+    if (uri.startsWith('data:')) return this.#decodeDataUri(uri, index);
+    return this.#open(decodeSafely(uri));
+  }
+
+  #decodeDataUri(uri: string, index: number): Uint8Array {
+    const match = /^data:[^,]*;base64,/.exec(uri.slice(0, 200));
+    try {
+      if (match) return Uint8Array.from(atob(uri.slice(match[0].length)), (c) => c.charCodeAt(0));
+    } catch {
+      // Said below.
+    }
+    return this.fail(`buffers[${index}].uri`, 'base64', uri.slice(0, 40));
+  }
+}
+
+function decodeSafely(uri: string): string {
+  try {
+    return decodeURIComponent(uri);
+  } catch {
+    return uri;
+  }
+}

@@ -1,0 +1,84 @@
+import type { Json } from './container.js';
+import type { GltfDocument } from './document.js';
+import { isObject } from '../sog/meta.js';
+
+/** 3 x 4 affine map, row by row: [a b c tx, d e f ty, g h i tz]. */
+export type Affine = readonly number[];
+
+/** A mesh at its place in the scene. */
+export interface PlacedMesh {
+  readonly mesh: number;
+  readonly toScene: Affine;
+}
+
+const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
+
+/** A scene may show the same mesh many times; more than this is no scene of splats. */
+const MAX_PLACES = 10_000;
+const MAX_DEPTH = 1_000;
+
+/** The meshes of the default scene (of all nodes where there is none), each with the product of its nodes' transforms. */
+export function placedMeshes(document: GltfDocument): PlacedMesh[] {
+  const placed: PlacedMesh[] = [];
+  const open = rootNodes(document).map((node) => ({ node, parent: IDENTITY, depth: 0 }));
+  for (let visited = 0; open.length > 0; visited++) {
+    if (visited > MAX_PLACES) document.fail('nodes', `at most ${MAX_PLACES} nodes`, 'more');
+    const { node, parent, depth } = open.pop()!;
+    if (depth > MAX_DEPTH) document.fail('nodes', 'a tree', 'nodes that contain themselves');
+    const json = document.item('nodes', node);
+    const toScene = multiply(parent, localTransform(json, document));
+    if (document.isIndex(json.mesh)) placed.push({ mesh: json.mesh, toScene });
+    if (Array.isArray(json.children)) {
+      for (const child of [...json.children].reverse()) open.push({ node: child, parent: toScene, depth: depth + 1 });
+    }
+  }
+  return placed;
+}
+
+function rootNodes(document: GltfDocument): unknown[] {
+  const { scenes, scene = 0, nodes } = document.json;
+  if (Array.isArray(scenes) && scenes.length > 0) {
+    const { nodes: roots } = document.item('scenes', scene);
+    return Array.isArray(roots) ? [...roots].reverse() : [];
+  }
+  if (!Array.isArray(nodes)) return [];
+  const children = new Set(
+    nodes.flatMap((node) => (isObject(node) && Array.isArray(node.children) ? node.children : [])),
+  );
+  return nodes
+    .map((_, index) => index)
+    .filter((index) => !children.has(index))
+    .reverse();
+}
+
+function localTransform(node: Json, document: GltfDocument): Affine {
+  const numbers = (key: string, fallback: readonly number[]): readonly number[] => {
+    const value = node[key] ?? fallback;
+    const isFine = Array.isArray(value) && value.length === fallback.length && value.every((n) => Number.isFinite(n));
+    return isFine ? (value as number[]) : document.fail(`nodes, ${key}`, `${fallback.length} numbers`, value);
+  };
+  if (node.matrix !== undefined) {
+    const m = numbers('matrix', new Array(16).fill(0));
+    return [m[0], m[4], m[8], m[12], m[1], m[5], m[9], m[13], m[2], m[6], m[10], m[14]];
+  }
+  const [x, y, z, w] = numbers('rotation', [0, 0, 0, 1]);
+  const [tx, ty, tz] = numbers('translation', [0, 0, 0]);
+  const [sx, sy, sz] = numbers('scale', [1, 1, 1]);
+  return [
+    ...[(1 - 2 * (y * y + z * z)) * sx, 2 * (x * y - w * z) * sy, 2 * (x * z + w * y) * sz, tx],
+    ...[2 * (x * y + w * z) * sx, (1 - 2 * (x * x + z * z)) * sy, 2 * (y * z - w * x) * sz, ty],
+    ...[2 * (x * z - w * y) * sx, 2 * (y * z + w * x) * sy, (1 - 2 * (x * x + y * y)) * sz, tz],
+  ];
+}
+
+/** First `b`, then `a`. */
+export function multiply(a: Affine, b: Affine): Affine {
+  const product: number[] = [];
+  for (let row = 0; row < 12; row += 4) {
+    for (let column = 0; column < 4; column++) {
+      const sum = a[row] * b[column] + a[row + 1] * b[4 + column] + a[row + 2] * b[8 + column];
+      product.push(column === 3 ? sum + a[row + 3] : sum);
+    }
+  }
+  return product;
+}

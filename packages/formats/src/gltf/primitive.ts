@@ -1,0 +1,130 @@
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { grouped } from '../bytes.js';
+import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
+import { damaged } from '../damaged.js';
+import { isObject, show } from '../sog/meta.js';
+import { readSpz } from '../readers/spz.js';
+import { transformCloud } from '../transform/transform-cloud.js';
+import type { Json } from './container.js';
+import type { GltfDocument } from './document.js';
+
+const EXTENSION = 'KHR_gaussian_splatting';
+/** Its name while it was a draft, and the later one. */
+const SPZ_EXTENSIONS = [`${EXTENSION}_compression_spz_2`, `${EXTENSION}_compression_spz`];
+
+/** From a cloud's frame (right, down, forward) to left, up, forward, which the extension says SPZ is unpacked to for glTF. */
+const SPZ_TO_GLTF = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
+
+/** True if a primitive holds splats. */
+export function isSplats(primitive: unknown): primitive is Json {
+  return isObject(primitive) && isObject(primitive.extensions) && isObject(primitive.extensions[EXTENSION]);
+}
+
+/** Reads a primitive with `KHR_gaussian_splatting` into a cloud in the frame of its node. */
+export async function readPrimitive(
+  document: GltfDocument,
+  primitive: Json,
+  path: string,
+  signal: AbortSignal | undefined,
+): Promise<GaussianCloud> {
+  const splats = (primitive.extensions as Json)[EXTENSION] as Json;
+  requireKnown(document, splats, path);
+  const compression = isObject(splats.extensions) ? splats.extensions : {};
+  const spz = SPZ_EXTENSIONS.map((name) => compression[name]).find(isObject);
+  if (spz) return readCompressed(document, spz, path, signal);
+  if (Object.keys(compression).length > 0) {
+    throw unsupported(
+      document,
+      path,
+      'splats that are not compressed, or compressed as SPZ',
+      Object.keys(compression)[0],
+    );
+  }
+  return readAttributes(document, primitive, path);
+}
+
+function requireKnown(document: GltfDocument, splats: Json, path: string): void {
+  const { kernel = 'ellipse', colorSpace = 'srgb_rec709_display' } = splats;
+  if (kernel !== 'ellipse') throw unsupported(document, path, 'the kernel "ellipse"', show(kernel));
+  if (colorSpace !== 'srgb_rec709_display') {
+    throw unsupported(document, path, 'colours encoded as sRGB ("srgb_rec709_display")', show(colorSpace));
+  }
+}
+
+function unsupported(document: GltfDocument, path: string, expected: string, found: string): Error {
+  return damaged(`${document.name}, ${path}, ${EXTENSION}`, expected, found, 'decode/unsupported');
+}
+
+async function readCompressed(
+  document: GltfDocument,
+  { bufferView }: Json,
+  path: string,
+  signal: AbortSignal | undefined,
+): Promise<GaussianCloud> {
+  const bytes = await document.readView(bufferView);
+  const cloud = await readSpz({ bytes, name: `${document.name}, ${path}, SPZ`, signal });
+  transformCloud(cloud, SPZ_TO_GLTF);
+  return cloud;
+}
+
+async function readAttributes(document: GltfDocument, primitive: Json, path: string): Promise<GaussianCloud> {
+  const attributes = isObject(primitive.attributes) ? primitive.attributes : {};
+  const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`];
+  const count = document.accessorCount(attributes.POSITION);
+  const read = async (name: string, index: unknown, width: number): Promise<Float32Array> => {
+    if (index === undefined)
+      return document.fail(`${path}, attributes`, `an attribute ${name}`, Object.keys(attributes));
+    const data = await document.readAccessor(index);
+    if (data.count !== count || data.width !== width) {
+      const found = `${grouped(data.count)} of ${data.width} numbers`;
+      return document.fail(`${path}, ${name}`, `${grouped(count)} of ${width} numbers`, found);
+    }
+    return data.values;
+  };
+  // Positions come first: they are there, or there is no file long enough for what is allocated below.
+  const positions = await read('POSITION', attributes.POSITION, 3);
+  const cloud = allocateCloud(count, degreeOf(own), document.name);
+  cloud.positions.set(positions);
+  cloud.scales.set(await read('SCALE', own('SCALE'), 3));
+  cloud.opacities.set(await read('OPACITY', own('OPACITY'), 1));
+  toWFirst(await read('ROTATION', own('ROTATION'), 4), cloud.rotations);
+  await readColours(cloud, own, attributes, read);
+  return cloud;
+}
+
+function degreeOf(own: (name: string) => unknown): ShDegree {
+  const bands = [1, 2, 3] as const;
+  return bands.findLast((degree) => own(`SH_DEGREE_${degree}_COEF_0`) !== undefined) ?? 0;
+}
+
+/** glTF writes quaternions (x, y, z, w). */
+function toWFirst(source: Float32Array, out: Float32Array): void {
+  for (let i = 0; i < out.length; i += 4) {
+    out[i] = source[i + 3];
+    out.set(source.subarray(i, i + 3), i + 1);
+  }
+}
+
+async function readColours(
+  cloud: DraftCloud,
+  own: (name: string) => unknown,
+  attributes: Json,
+  read: (name: string, index: unknown, width: number) => Promise<Float32Array>,
+): Promise<void> {
+  const stride = 3 * shCoefficientCount(cloud.shDegree);
+  const put = (values: Float32Array, coefficient: number, width: number, map = (x: number): number => x): void => {
+    for (let i = 0; i < cloud.count; i++) {
+      for (let k = 0; k < 3; k++) cloud.sh[i * stride + 3 * coefficient + k] = map(values[i * width + k]);
+    }
+  };
+  const constant = own('SH_DEGREE_0_COEF_0');
+  if (constant !== undefined || attributes.COLOR_0 === undefined)
+    put(await read('SH_DEGREE_0_COEF_0', constant, 3), 0, 3);
+  else put(await read('COLOR_0', attributes.COLOR_0, 4), 0, 4, (colour) => (colour - 0.5) / SH_C0);
+  for (let degree = 1; degree <= cloud.shDegree; degree++) {
+    for (let k = 0; k < 2 * degree + 1; k++) {
+      const name = `SH_DEGREE_${degree}_COEF_${k}`;
+      put(await read(name, own(name), 3), degree * degree + k, 3);
+    }
+  }
+}

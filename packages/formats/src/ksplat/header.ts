@@ -1,0 +1,156 @@
+import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
+import { grouped, viewOf } from '../bytes.js';
+import { damaged } from '../damaged.js';
+
+export const HEADER_BYTES = 4096;
+const SECTION_HEADER_BYTES = 1024;
+
+/** How the numbers of each compression level are stored: bytes of one coordinate, scale or quaternion component, and of one coefficient. */
+const LEVELS = [
+  { number: 4, coefficient: 4 },
+  { number: 2, coefficient: 2 },
+  { number: 2, coefficient: 1 },
+] as const;
+
+/** Positions of levels 1 and 2 are 16-bit offsets of this range, where the section does not say otherwise. */
+const DEFAULT_RANGE = 32_767;
+const COEFFICIENTS = [0, 9, 24, 45];
+
+/** One section: its splats lie in buckets, cubes whose centres positions are relative to. */
+export interface KsplatSection {
+  readonly count: number;
+  readonly degree: ShDegree;
+  readonly bytesPerSplat: number;
+  /** Byte of the first splat. */
+  readonly splatsAt: number;
+  /** Byte of the first bucket's centre, three float32. */
+  readonly bucketsAt: number;
+  readonly bucketStride: number;
+  readonly bucketCount: number;
+  /** Splats of each full bucket; these come first. */
+  readonly bucketSize: number;
+  readonly fullBuckets: number;
+  /** Byte of the number of splats, uint32, of each bucket that is not full. */
+  readonly partialSizesAt: number;
+  readonly partialBuckets: number;
+  /** World units of one step of a position, and the step of a bucket's centre. */
+  readonly positionStep: number;
+  readonly positionRange: number;
+}
+
+export interface KsplatHeader {
+  readonly level: 0 | 1 | 2;
+  /** Splats of all sections. */
+  readonly count: number;
+  /** The highest degree of all sections. */
+  readonly degree: ShDegree;
+  /** What the bytes 0 and 255 of the coefficients of level 2 stand for. */
+  readonly coefficientRange: readonly [number, number];
+  readonly sections: readonly KsplatSection[];
+}
+
+/** True if the first bytes are those of mkkellogg's SplatBuffer: version 0.1, counts and level within their ranges. */
+export function looksLikeKsplat(bytes: Uint8Array): boolean {
+  if (bytes.length < HEADER_BYTES || bytes[0] !== 0 || bytes[1] !== 1) return false;
+  const view = viewOf(bytes);
+  const [maxSections, sections, maxSplats, splats] = [4, 8, 12, 16].map((at) => view.getUint32(at, true));
+  return sections >= 1 && sections <= maxSections && splats <= maxSplats && view.getUint16(20, true) <= 2;
+}
+
+/** Reads and checks all headers: every section lies within the file, or is shortened to what is there (`isPrefix`). */
+export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = false): KsplatHeader {
+  if (bytes.length < HEADER_BYTES) throw cut(bytes, name, HEADER_BYTES, 'a header');
+  const view = viewOf(bytes);
+  const where = (byte: number): string => `${name}, byte ${grouped(byte)} of the .ksplat header`;
+  const [major, minor] = [bytes[0], bytes[1]];
+  if (major !== 0 || minor < 1) throw damaged(where(0), 'version 0.1', `${major}.${minor}`, 'decode/unsupported');
+  const level = view.getUint16(20, true);
+  if (level > 2) throw damaged(where(20), 'a compression level from 0 to 2', String(level), 'decode/header');
+  const sections = parseSections(bytes, name, level as KsplatHeader['level']).map((section) =>
+    isPrefix ? shortened(section, bytes.length) : section,
+  );
+  if (!isPrefix) sections.forEach((section) => requireRoom(section, bytes, name));
+  const count = sections.reduce((sum, section) => sum + section.count, 0);
+  if (count === 0) throw noSplats(where(16));
+  const range = [view.getFloat32(36, true) || -1.5, view.getFloat32(40, true) || 1.5] as const;
+  const degree = Math.max(...sections.map((section) => section.degree)) as ShDegree;
+  return { level: level as KsplatHeader['level'], count, degree, coefficientRange: range, sections };
+}
+
+function parseSections(bytes: Uint8Array, name: string, level: 0 | 1 | 2): KsplatSection[] {
+  const view = viewOf(bytes);
+  const maxSections = view.getUint32(4, true);
+  const sectionCount = Math.min(maxSections, view.getUint32(8, true));
+  const dataStart = HEADER_BYTES + SECTION_HEADER_BYTES * maxSections;
+  if (dataStart > bytes.length) throw cut(bytes, name, dataStart, `${grouped(maxSections)} section headers`);
+  const sections: KsplatSection[] = [];
+  let at = dataStart;
+  for (let k = 0; k < sectionCount; k++) {
+    const { section, end } = parseSection(bytes, name, HEADER_BYTES + SECTION_HEADER_BYTES * k, at, level);
+    sections.push(section);
+    at = end;
+  }
+  return sections;
+}
+
+function parseSection(
+  bytes: Uint8Array,
+  name: string,
+  header: number,
+  start: number,
+  level: 0 | 1 | 2,
+): { section: KsplatSection; end: number } {
+  const view = viewOf(bytes);
+  const word = (offset: number): number => view.getUint32(header + offset, true);
+  const where = `${name}, byte ${grouped(header)}, a .ksplat section header`;
+  const [count, maxCount, bucketSize, bucketCount] = [word(0), word(4), word(8), word(12)];
+  const bucketStride = view.getUint16(header + 20, true);
+  const [fullBuckets, partialBuckets] = [word(32), word(36)];
+  const degree = view.getUint16(header + 40, true);
+  if (degree > 3) throw damaged(where, 'a degree of spherical harmonics from 0 to 3', String(degree), 'decode/header');
+  if (count > maxCount) throw damaged(where, `at most ${grouped(maxCount)} splats`, grouped(count), 'decode/header');
+  if (level > 0 && (fullBuckets + partialBuckets > bucketCount || (bucketCount > 0 && bucketStride < 12))) {
+    const found = `${grouped(fullBuckets)} full and ${grouped(partialBuckets)} other buckets of ${bucketStride} bytes`;
+    throw damaged(where, `${grouped(bucketCount)} buckets of 12 bytes or more`, found, 'decode/header');
+  }
+  const { number, coefficient } = LEVELS[level];
+  const bytesPerSplat = 10 * number + 4 + COEFFICIENTS[degree] * coefficient;
+  const bucketsAt = start + 4 * partialBuckets;
+  const splatsAt = bucketsAt + bucketStride * bucketCount;
+  const end = splatsAt + bytesPerSplat * maxCount;
+  const positionRange = word(24) || DEFAULT_RANGE;
+  const positionStep = view.getFloat32(header + 16, true) / 2 / positionRange;
+  const section = {
+    ...{ count, degree: degree as ShDegree, bytesPerSplat, splatsAt, bucketsAt, bucketStride, bucketCount, bucketSize },
+    ...{ fullBuckets, partialSizesAt: start, partialBuckets, positionStep, positionRange },
+  };
+  return { section, end };
+}
+
+function requireRoom({ count, splatsAt, bytesPerSplat }: KsplatSection, bytes: Uint8Array, name: string): void {
+  const end = splatsAt + bytesPerSplat * count;
+  if (end > bytes.length) throw cut(bytes, name, end, `${grouped(count)} splats of ${bytesPerSplat} bytes`);
+}
+
+function shortened(section: KsplatSection, fileBytes: number): KsplatSection {
+  const count = Math.floor((fileBytes - section.splatsAt) / section.bytesPerSplat);
+  return { ...section, count: Math.max(0, Math.min(section.count, count)) };
+}
+
+function cut(bytes: Uint8Array, name: string, needed: number, what: string): GaussianSplatError {
+  return new GaussianSplatError('decode/truncated', {
+    where: `${name}, byte ${grouped(bytes.length)} (end of the file)`,
+    expected: `${what}, which end at byte ${grouped(needed)}`,
+    found: `${grouped(bytes.length)} bytes`,
+    remedy: 'download or export the file again; it is incomplete or its header is damaged',
+  });
+}
+
+function noSplats(where: string): GaussianSplatError {
+  return new GaussianSplatError('decode/empty', {
+    where,
+    expected: '1 splat or more',
+    found: '0',
+    remedy: 'export the scene again; this file is empty',
+  });
+}

@@ -1,0 +1,44 @@
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { allocateCloud, type DraftCloud } from './cloud.js';
+
+/** Splats `first` to `first + count` of a cloud. */
+export interface CloudPart {
+  readonly cloud: GaussianCloud;
+  readonly first: number;
+  readonly count: number;
+}
+
+/** One cloud of parts of several, of the highest degree of them; lower degrees get zeros. All have the origin of the first. */
+export function mergeClouds(parts: readonly CloudPart[], name: string): DraftCloud {
+  const count = parts.reduce((sum, part) => sum + part.count, 0);
+  const degree = parts.reduce<ShDegree>((most, { cloud }) => (cloud.shDegree > most ? cloud.shDegree : most), 0);
+  const merged = allocateCloud(count, degree, name);
+  merged.origin = parts[0]?.cloud.origin ?? [0, 0, 0];
+  merged.antialiased = parts.some(({ cloud }) => cloud.antialiased);
+  let at = 0;
+  for (const part of parts) {
+    copyPart(part, merged, at);
+    at += part.count;
+  }
+  return merged;
+}
+
+function copyPart({ cloud, first, count }: CloudPart, to: DraftCloud, at: number): void {
+  const end = first + count;
+  to.positions.set(cloud.positions.subarray(3 * first, 3 * end), 3 * at);
+  for (let axis = 0; axis < 3; axis++) {
+    const shift = cloud.origin[axis] - to.origin[axis];
+    if (shift !== 0) for (let i = at; i < at + count; i++) to.positions[3 * i + axis] += shift;
+  }
+  to.scales.set(cloud.scales.subarray(3 * first, 3 * end), 3 * at);
+  to.rotations.set(cloud.rotations.subarray(4 * first, 4 * end), 4 * at);
+  to.opacities.set(cloud.opacities.subarray(first, end), at);
+  const [from, stride] = [3 * shCoefficientCount(cloud.shDegree), 3 * shCoefficientCount(to.shDegree)];
+  if (from === stride) {
+    to.sh.set(cloud.sh.subarray(from * first, from * end), stride * at);
+  } else {
+    for (let i = 0; i < count; i++) {
+      to.sh.set(cloud.sh.subarray(from * (first + i), from * (first + i + 1)), stride * (at + i));
+    }
+  }
+}

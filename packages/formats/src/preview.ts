@@ -1,0 +1,45 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import type { SceneSource } from './scene-format.js';
+
+/** A preview has every so many-th splat. */
+export const PREVIEW_STEP = 16;
+/** Smaller scenes are read as fast as a preview would be. */
+const MIN_SPLATS = 50_000;
+
+/** True if somebody wants a preview of a scene of so many splats, and the scene is large enough for one to be worth its time. */
+export function previewWanted({ onPreview }: SceneSource, count: number): boolean {
+  return onPreview !== undefined && count >= MIN_SPLATS;
+}
+
+/** Every so many-th splat of a cloud, without coefficients above the constant one, larger to stand for the rest. */
+export function samplePreview(cloud: GaussianCloud): GaussianCloud {
+  const count = Math.ceil(cloud.count / PREVIEW_STEP);
+  const take = (values: Float32Array, stride: number, size: number): Float32Array => {
+    const taken = new Float32Array(size * count);
+    for (let i = 0; i < count; i++) {
+      const from = stride * PREVIEW_STEP * i;
+      for (let k = 0; k < size; k++) taken[size * i + k] = values[from + k];
+    }
+    return taken;
+  };
+  return sparse({
+    ...cloud,
+    count,
+    positions: take(cloud.positions, 3, 3),
+    scales: take(cloud.scales, 3, 3),
+    rotations: take(cloud.rotations, 4, 4),
+    opacities: take(cloud.opacities, 1, 1),
+    sh: take(cloud.sh, cloud.sh.length / Math.max(1, cloud.count), 3),
+    shDegree: 0,
+  });
+}
+
+/**
+ * Makes a selection stand for the whole: `kept` of `all` splats, each larger by the square root of what it stands for, so that they
+ * cover the same area. Works in place.
+ */
+export function sparse<T extends GaussianCloud>(cloud: T, share = 1 / PREVIEW_STEP): T {
+  const factor = Math.sqrt(1 / share);
+  for (let i = 0; i < cloud.scales.length; i++) cloud.scales[i] *= factor;
+  return cloud;
+}

@@ -1,0 +1,29 @@
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import type { SceneSource } from '../scene-format.js';
+import { parseSogMeta } from '../sog/meta.js';
+import { readSogImages } from '../sog/read-sog.js';
+
+/** `meta.json` and the names that lead to it; what a server appends stays. */
+const LAST_PART = /[^/]*$/;
+
+/**
+ * Reads a SOG scene (PlayCanvas), versions 1 and 2, from its `meta.json`: attributes quantised into the pixels of lossless WebP
+ * images, coefficients above the constant one in a palette. Bundles (`.sog`) are ZIP files, which `readers/zip.ts` opens.
+ */
+export async function readSog(source: SceneSource): Promise<GaussianCloud> {
+  const meta = parseSogMeta(source.bytes, source.name);
+  return readSogImages(meta, source.openPart ?? noParts(source.name), source);
+}
+
+/** What is said where only the description is at hand. */
+export function noParts(name: string): (path: string) => Promise<never> {
+  return (path) =>
+    Promise.reject(
+      new GaussianSplatError('decode/unsupported', {
+        where: `${name}, ${path}`,
+        expected: 'a way to open the other files of the scene',
+        found: 'only this one file',
+        remedy: `load it by its address, or pack the folder into one file, ${name.replace(LAST_PART, 'scene.sog')}`,
+      }),
+    );
+}

@@ -1,0 +1,72 @@
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { quote } from '../bytes.js';
+import { findFormat } from '../detect.js';
+import type { SceneSource } from '../scene-format.js';
+import { Archive } from '../zip/archive.js';
+
+/** Main files of scenes of several files, in the order in which they are looked for: an index names descriptions. */
+const DESCRIPTIONS = ['lod-meta.json', 'meta.json'];
+const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
+
+/**
+ * Reads a ZIP file with one scene in it: a SOG bundle (`.sog`), a streamed SOG scene, glTF with its buffers, or one file of any
+ * other format. The scene that lies least deep counts. Archives within archives are bundles and are read one deep.
+ */
+export async function readZip(source: SceneSource): Promise<GaussianCloud> {
+  const { name, bytes } = source;
+  const archive = new Archive(bytes, name);
+  const path = mainFile(archive.paths, name);
+  const folder = path.slice(0, path.lastIndexOf('/') + 1);
+  const inner = archive.open(path);
+  const format = findFormat(inner, path, '');
+  if (!format || (format.name === 'zip' && source.openPart === WITHIN)) throw noScene(name, archive.paths, path);
+  const read = await format.load();
+  const openPart =
+    format.name === 'zip' ? WITHIN : async (part: string): Promise<Uint8Array> => archive.open(folder + part);
+  return read({ ...source, bytes: inner, name: `${name}, ${path}`, openPart });
+}
+
+/** Marks an archive within an archive. */
+const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
+
+function mainFile(paths: readonly string[], name: string): string {
+  const shallowest = (candidates: readonly string[]): string[] => {
+    const depth = Math.min(...candidates.map(depthOf));
+    return candidates.filter((path) => depthOf(path) === depth);
+  };
+  for (const description of DESCRIPTIONS) {
+    const found = paths.filter((path) => path.split('/').pop() === description);
+    if (found.length > 0) return shallowest(found)[0];
+  }
+  const scenes = shallowest(paths.filter((path) => SCENE_FILE.test(path)));
+  if (scenes.length === 1) return scenes[0];
+  // glTF names its other files, scenes among them.
+  const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
+  if (gltf.length === 1) return gltf[0];
+  throw scenes.length === 0 ? noScene(name, paths, undefined) : severalScenes(name, scenes);
+}
+
+const depthOf = (path: string): number => path.split('/').length;
+
+function noScene(name: string, paths: readonly string[], path: string | undefined): GaussianSplatError {
+  return new GaussianSplatError('decode/unknown-format', {
+    where: path === undefined ? name : `${name}, ${path}`,
+    expected: 'a ZIP archive with a Gaussian splat scene in it',
+    found: path === undefined ? `a ZIP archive with ${listed(paths)}` : 'a file that is none',
+    remedy: 'give the address of a scene file, or of an archive of one: .ply, .spz, .splat, .ksplat, .sog, .glb',
+  });
+}
+
+function severalScenes(name: string, scenes: readonly string[]): GaussianSplatError {
+  return new GaussianSplatError('decode/unsupported', {
+    where: name,
+    expected: 'one scene in the archive',
+    found: `${scenes.length} scenes: ${listed(scenes)}`,
+    remedy: 'pack each scene by itself; for scenes that follow one another in time, serve the files and a manifest',
+  });
+}
+
+function listed(paths: readonly string[]): string {
+  const shown = paths.slice(0, 4).map((path) => quote(path, 40));
+  return paths.length === 0 ? 'no files' : shown.join(', ') + (paths.length > 4 ? ` and ${paths.length - 4} more` : '');
+}

@@ -1,0 +1,155 @@
+import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
+import { asciiOf, grouped, quote } from '../bytes.js';
+import { damaged } from '../damaged.js';
+
+/** A value of each byte 0..255, for each channel of a plane. */
+export type ByteTable = readonly Float32Array[];
+
+/** The description of a SOG scene, of either version. */
+export interface SogMeta {
+  readonly version: 1 | 2;
+  readonly count: number;
+  readonly antialiased: boolean;
+  readonly means: {
+    readonly mins: readonly number[];
+    readonly maxs: readonly number[];
+    readonly files: readonly string[];
+  };
+  /** Logarithms of the scales. */
+  readonly scales: { readonly values: ByteTable; readonly files: readonly string[] };
+  readonly quats: { readonly files: readonly string[] };
+  /** Constant coefficients; version 1 has opacities as logits in a fourth table, version 2 has opacities in bytes. */
+  readonly sh0: { readonly values: ByteTable; readonly files: readonly string[] };
+  readonly shN?: {
+    /** Undefined where only the width of the centroids tells it (version 1). */
+    readonly degree: ShDegree | undefined;
+    readonly paletteSize: number;
+    readonly values: Float32Array;
+    readonly files: readonly string[];
+  };
+}
+
+/** A description has a few codebooks of 256 numbers; a larger file is none. */
+const MAX_META_BYTES = 1 << 20;
+/** Labels have 16 bits. */
+const MAX_PALETTE = 65_536;
+
+type Json = Record<string, unknown>;
+
+/** Reads and checks the `meta.json` of a SOG scene of version 1 (which does not say so) or 2. */
+export function parseSogMeta(bytes: Uint8Array, name: string): SogMeta {
+  const json = parseJson(bytes, name, MAX_META_BYTES);
+  const fail = (path: string, expected: string, found: unknown): never => {
+    throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
+  };
+  const version = json.version ?? 1;
+  if (version !== 1 && version !== 2) {
+    throw damaged(`${name}, version`, 'SOG version 1 or 2', show(version), 'decode/unsupported');
+  }
+  const part = (key: string): Json => {
+    const value = json[key];
+    return isObject(value) ? value : fail(key, 'an object', value);
+  };
+  const numbers = (key: string, field: string, count: number): number[] => {
+    const value = part(key)[field];
+    const isFine = Array.isArray(value) && value.length >= count && value.every((n) => Number.isFinite(n));
+    return isFine ? (value as number[]) : fail(`${key}.${field}`, `${count} numbers`, value);
+  };
+  const files = (key: string, count: number): string[] => {
+    const value = part(key).files;
+    const isFine =
+      Array.isArray(value) && value.length >= count && value.every((f) => typeof f === 'string' && f !== '');
+    return isFine ? (value as string[]) : fail(`${key}.files`, `${count} file names`, value);
+  };
+  const shape = part('means').shape;
+  const count = version === 2 ? json.count : Array.isArray(shape) ? shape[0] : undefined;
+  if (!Number.isSafeInteger(count) || (count as number) < 0) fail('count', 'the number of splats', count);
+  if (count === 0) throw noSplats(name);
+  const codebook = (key: string): Float32Array => tableOf(numbers(key, 'codebook', 1));
+  const between = (key: string, channels: number): Float32Array[] => {
+    const [mins, maxs] = [numbers(key, 'mins', channels), numbers(key, 'maxs', channels)];
+    return Array.from({ length: channels }, (_, k) => ramp(mins[k], maxs[k]));
+  };
+  const isFirst = version === 1;
+  return {
+    version,
+    count: count as number,
+    antialiased: json.antialias === true,
+    means: { mins: numbers('means', 'mins', 3), maxs: numbers('means', 'maxs', 3), files: files('means', 2) },
+    scales: { values: isFirst ? between('scales', 3) : repeated(codebook('scales'), 3), files: files('scales', 1) },
+    quats: { files: files('quats', 1) },
+    sh0: { values: isFirst ? between('sh0', 4) : repeated(codebook('sh0'), 3), files: files('sh0', 1) },
+    shN: json.shN === undefined || json.shN === null ? undefined : harmonics(),
+  };
+
+  function harmonics(): SogMeta['shN'] {
+    const shN = part('shN');
+    if (isFirst) {
+      const [min, max] = [shN.mins, shN.maxs];
+      if (!Number.isFinite(min) || !Number.isFinite(max)) fail('shN.mins and shN.maxs', 'a number each', [min, max]);
+      const values = ramp(min as number, max as number);
+      return { degree: undefined, paletteSize: MAX_PALETTE, values, files: files('shN', 2) };
+    }
+    const { bands, count: paletteSize } = shN;
+    if (bands === 0) return undefined;
+    if (bands !== 1 && bands !== 2 && bands !== 3) return fail('shN.bands', '1, 2 or 3', bands);
+    if (!Number.isInteger(paletteSize) || (paletteSize as number) < 1 || (paletteSize as number) > MAX_PALETTE) {
+      fail('shN.count', `1 to ${grouped(MAX_PALETTE)} entries of the palette`, paletteSize);
+    }
+    return { degree: bands, paletteSize: paletteSize as number, values: codebook('shN'), files: files('shN', 2) };
+  }
+}
+
+/** Parses JSON of a scene. Throws `decode/corrupt` with the position that the parser names. */
+export function parseJson(bytes: Uint8Array, name: string, maxBytes: number): Json {
+  if (bytes.length > maxBytes) {
+    throw damaged(name, `a description of at most ${grouped(maxBytes)} bytes`, grouped(bytes.length));
+  }
+  let value: unknown;
+  try {
+    value = JSON.parse(new TextDecoder().decode(bytes));
+  } catch (cause) {
+    const isCut = !/\}\s*$/.test(asciiOf(bytes, Math.max(0, bytes.length - 64)));
+    const code = isCut ? 'decode/truncated' : 'decode/corrupt';
+    throw damaged(
+      `${name} (${grouped(bytes.length)} bytes)`,
+      'JSON',
+      (cause as Error).message.slice(0, 200),
+      code,
+      cause,
+    );
+  }
+  if (!isObject(value)) throw damaged(name, 'a JSON object', show(value));
+  return value;
+}
+
+export function isObject(value: unknown): value is Json {
+  return typeof value === 'object' && value !== null && !Array.isArray(value);
+}
+
+/** A JSON value for error messages. */
+export function show(value: unknown): string {
+  return value === undefined ? 'nothing' : quote(JSON.stringify(value) ?? String(value), 80);
+}
+
+/** Codebooks are padded to 256 entries with their last. */
+function tableOf(values: readonly number[]): Float32Array {
+  return Float32Array.from({ length: 256 }, (_, byte) => values[Math.min(byte, values.length - 1)]);
+}
+
+function ramp(min: number, max: number): Float32Array {
+  return Float32Array.from({ length: 256 }, (_, byte) => min + ((max - min) * byte) / 255);
+}
+
+function repeated(table: Float32Array, channels: number): Float32Array[] {
+  return Array.from({ length: channels }, () => table);
+}
+
+function noSplats(name: string): GaussianSplatError {
+  return new GaussianSplatError('decode/empty', {
+    where: `${name}, count`,
+    expected: '1 splat or more',
+    found: '0',
+    remedy: 'export the scene again; this file is empty',
+  });
+}

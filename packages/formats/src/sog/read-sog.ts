@@ -1,0 +1,108 @@
+import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
+import { grouped } from '../bytes.js';
+import { allocateCloud, DEGREE_OF_REST_COUNT, type DraftCloud } from '../cloud.js';
+import { damaged } from '../damaged.js';
+import type { OpenPart, SceneSource } from '../scene-format.js';
+import { PREVIEW_STEP, previewWanted, sparse } from '../preview.js';
+import type { WebpImage } from '../webp/decode.js';
+import type { SogMeta } from './meta.js';
+import { Planes } from './planes.js';
+import {
+  PALETTE_ROW,
+  unpackColours,
+  unpackHarmonics,
+  unpackMeans,
+  unpackQuats,
+  unpackScales,
+  type Palette,
+  type Selection,
+} from './unpack.js';
+
+/**
+ * Splats that one byte of the images may stand for. Images of a single colour have no bytes at all, so that a file of 200 bytes
+ * could announce a thousand million splats; real scenes need 3 bytes and more for each.
+ */
+const MAX_SPLATS_PER_BYTE = 16;
+const FREE_SPLATS = 65_536;
+/** Pixels of the largest palette: 1024 rows of 64 entries of 15 coefficients. */
+const MAX_PALETTE_PIXELS = 1024 * PALETTE_ROW * 15;
+
+interface GeometryPlanes {
+  readonly low: Uint32Array;
+  readonly high: Uint32Array;
+  readonly scales: Uint32Array;
+  readonly quats: Uint32Array;
+  readonly sh0: Uint32Array;
+}
+
+/** Reads the images that a `meta.json` names. */
+export async function readSogImages(meta: SogMeta, open: OpenPart, source: SceneSource): Promise<GaussianCloud> {
+  const { name, signal } = source;
+  const images = new Planes(open, name, signal);
+  const { count } = meta;
+  // On their way early, but decoded only after what a preview needs.
+  const harmonics = meta.shN?.files.slice(0, 2).map((file) => images.load(file));
+  // The other images are awaited first, and may fail first.
+  harmonics?.forEach((file) => file.catch(() => undefined));
+  const planes = await decodeGeometry(images, meta, name);
+  if (previewWanted(source, count))
+    await source.onPreview?.(sparse(unpackGeometry(planes, meta, PREVIEW_STEP, 0, name)));
+  if (!meta.shN || !harmonics) return unpackGeometry(planes, meta, 1, 0, name);
+  const palette = images.decode(await harmonics[0], meta.shN.files[0], MAX_PALETTE_PIXELS);
+  const degree = checkDegree(meta, palette.width, name);
+  const labels = images.decodePlane(await harmonics[1], meta.shN.files[1], count);
+  const cloud = unpackGeometry(planes, meta, 1, degree, name);
+  unpackHarmonics(labels, paletteOf(meta.shN, palette), cloud);
+  return cloud;
+}
+
+/** The images without which there is nothing to see, all downloaded before the first is decoded. */
+async function decodeGeometry(images: Planes, meta: SogMeta, name: string): Promise<GeometryPlanes> {
+  const files = [...meta.means.files.slice(0, 2), meta.scales.files[0], meta.quats.files[0], meta.sh0.files[0]];
+  const loaded = await Promise.all(files.map((file) => images.load(file)));
+  const bytes = loaded.reduce((sum, file) => sum + file.length, 0);
+  const most = FREE_SPLATS + MAX_SPLATS_PER_BYTE * bytes;
+  if (meta.count > most) {
+    throw damaged(
+      `${name}, count`,
+      `at most ${grouped(most)} splats in ${grouped(bytes)} bytes`,
+      grouped(meta.count),
+      'decode/header',
+    );
+  }
+  const [low, high, scales, quats, sh0] = files.map((file, k) => images.decodePlane(loaded[k], file, meta.count));
+  return { low, high, scales, quats, sh0 };
+}
+
+/** Every `step`-th splat, without coefficients above the constant one. */
+function unpackGeometry(
+  planes: GeometryPlanes,
+  meta: SogMeta,
+  step: number,
+  degree: ShDegree,
+  name: string,
+): DraftCloud {
+  const selection: Selection = { count: Math.ceil(meta.count / step), step };
+  const cloud = allocateCloud(selection.count, degree, name);
+  cloud.antialiased = meta.antialiased;
+  unpackMeans(planes.low, planes.high, meta.means, selection, cloud.positions);
+  unpackScales(planes.scales, meta.scales, selection, cloud.scales);
+  unpackQuats(planes.quats, selection, cloud.rotations);
+  unpackColours(planes.sh0, meta.sh0, selection, cloud);
+  return cloud;
+}
+
+/** The degree, which version 1 tells by the palette's width alone. */
+function checkDegree({ shN }: SogMeta, width: number, name: string): ShDegree {
+  const found = DEGREE_OF_REST_COUNT.get(width / PALETTE_ROW);
+  const expected = shN?.degree ?? found;
+  if (found === undefined || found === 4 || found === 0 || found !== expected) {
+    const widths = expected ? `${PALETTE_ROW * ((expected + 1) ** 2 - 1)}` : '192, 512 or 960';
+    throw damaged(`${name}, ${shN?.files[0]}`, `a palette ${widths} pixels wide`, String(width));
+  }
+  return found;
+}
+
+function paletteOf({ paletteSize, values }: NonNullable<SogMeta['shN']>, image: WebpImage): Palette {
+  return { pixels: image.pixels, size: Math.min(paletteSize, PALETTE_ROW * image.height), values };
+}

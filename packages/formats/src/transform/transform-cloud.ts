@@ -1,0 +1,95 @@
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import {
+  determinant,
+  matrixOfQuaternion,
+  multiply3,
+  orthogonalFactor,
+  quaternionOfMatrix,
+  symmetricEigen,
+  transposed,
+  type Matrix3,
+} from './linear.js';
+import { shRotation } from './sh-rotation.js';
+
+/** Relative difference from a rotation with one scale up to which a matrix counts as one. */
+const SIMILARITY = 1e-6;
+
+/**
+ * Moves a cloud by an affine map, in place: centres, covariances, and the directions of the spherical harmonics, which turn with the
+ * map's rotation. Maps that flatten everything leave splats without extent, which readers drop.
+ *
+ * @param map [3, 4], row by row: linear part and translation.
+ */
+export function transformCloud(cloud: GaussianCloud, map: readonly number[]): void {
+  const linear = [map[0], map[1], map[2], map[4], map[5], map[6], map[8], map[9], map[10]];
+  movePositions(cloud.positions, linear, [map[3], map[7], map[11]]);
+  const volume = determinant(linear);
+  if (!Number.isFinite(volume) || Math.abs(volume) < 1e-36) {
+    cloud.scales.fill(0);
+    return;
+  }
+  const turn = orthogonalFactor(linear);
+  const scale = Math.cbrt(Math.abs(volume));
+  const isSimilar = linear.every((value, k) => Math.abs(value - scale * turn[k]) <= SIMILARITY * scale);
+  if (isSimilar) turnShapes(cloud, turn, scale);
+  else deformShapes(cloud, linear);
+  turnHarmonics(cloud, turn);
+}
+
+function movePositions(positions: Float32Array, m: Matrix3, [tx, ty, tz]: readonly number[]): void {
+  for (let i = 0; i < positions.length; i += 3) {
+    const [x, y, z] = [positions[i], positions[i + 1], positions[i + 2]];
+    positions[i] = m[0] * x + m[1] * y + m[2] * z + tx;
+    positions[i + 1] = m[3] * x + m[4] * y + m[5] * z + ty;
+    positions[i + 2] = m[6] * x + m[7] * y + m[8] * z + tz;
+  }
+}
+
+/** A mirrored ellipsoid is a turned one: -1 times a reflection is a rotation, and an ellipsoid is its own mirror image in its centre. */
+function turnShapes({ count, scales, rotations }: GaussianCloud, turn: Matrix3, scale: number): void {
+  const sign = Math.sign(determinant(turn));
+  const [w, x, y, z] = quaternionOfMatrix(turn.map((value) => sign * value));
+  for (let i = 0; i < count; i++) {
+    const [a, b, c, d] = rotations.subarray(4 * i, 4 * i + 4);
+    rotations[4 * i] = w * a - x * b - y * c - z * d;
+    rotations[4 * i + 1] = w * b + x * a + y * d - z * c;
+    rotations[4 * i + 2] = w * c - x * d + y * a + z * b;
+    rotations[4 * i + 3] = w * d + x * c - y * b + z * a;
+  }
+  for (let k = 0; k < scales.length; k++) scales[k] *= scale;
+}
+
+/** Covariances M·Σ·Mᵀ, taken apart into rotation and scales again. */
+function deformShapes({ count, scales, rotations }: GaussianCloud, m: Matrix3): void {
+  for (let i = 0; i < count; i++) {
+    const q = rotations.subarray(4 * i, 4 * i + 4);
+    const norm = Math.hypot(q[0], q[1], q[2], q[3]);
+    if (!(norm > 0)) continue;
+    const axes = multiply3(m, matrixOfQuaternion(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm));
+    const root = axes.map((value, k) => value * scales[3 * i + (k % 3)]);
+    const { values, vectors } = symmetricEigen(multiply3(root, transposed(root)));
+    if (!values.every(Number.isFinite)) continue;
+    values.forEach((value, k) => (scales[3 * i + k] = Math.sqrt(Math.max(0, value))));
+    rotations.set(quaternionOfMatrix(vectors), 4 * i);
+  }
+}
+
+function turnHarmonics({ count, sh, shDegree }: GaussianCloud, turn: Matrix3): void {
+  const stride = 3 * shCoefficientCount(shDegree);
+  const old = new Float64Array(21);
+  for (let band = 1; band <= shDegree; band++) {
+    const matrix = shRotation(band as 1 | 2 | 3, turn);
+    const size = 2 * band + 1;
+    for (let i = 0; i < count; i++) {
+      const at = i * stride + 3 * band * band;
+      for (let k = 0; k < 3 * size; k++) old[k] = sh[at + k];
+      for (let row = 0; row < size; row++) {
+        for (let channel = 0; channel < 3; channel++) {
+          let sum = 0;
+          for (let k = 0; k < size; k++) sum += matrix[row * size + k] * old[3 * k + channel];
+          sh[at + 3 * row + channel] = sum;
+        }
+      }
+    }
+  }
+}

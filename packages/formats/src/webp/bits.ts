@@ -1,0 +1,37 @@
+import { WebpError } from './webp-error.js';
+
+/** Zeros behind the stream, so that a read of 32 bits at its end stays within the array. */
+const PADDING = 8;
+
+/** Reads bits, least significant first. */
+export class BitReader {
+  readonly bytes: Uint8Array;
+  /** Bits read so far. The decoder's inner loop keeps a copy of its own and writes it back. */
+  position = 0;
+  /** Bits of the stream. */
+  readonly length: number;
+
+  constructor(stream: Uint8Array) {
+    this.bytes = new Uint8Array(stream.length + PADDING);
+    this.bytes.set(stream);
+    this.length = 8 * stream.length;
+  }
+
+  /** The next `count` bits, 0 to 24, as a number. */
+  read(count: number): number {
+    const value = window32(this.bytes, this.position) & ((1 << count) - 1);
+    this.position += count;
+    if (this.position > this.length) throw cut();
+    return value;
+  }
+}
+
+/** At least 25 bits from a bit position on; what lies behind is zeros. */
+export function window32(bytes: Uint8Array, position: number): number {
+  const at = position >>> 3;
+  return (bytes[at] | (bytes[at + 1] << 8) | (bytes[at + 2] << 16) | (bytes[at + 3] << 24)) >>> (position & 7);
+}
+
+export function cut(): WebpError {
+  return new WebpError('an image that is cut', 'cut');
+}

@@ -1,0 +1,72 @@
+import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
+import { constants } from './generated/shaders.js';
+import { CHUNK_NUMBERS } from './pack/chunks.js';
+import { GEOMETRY_WORDS } from './pack/pack.js';
+import { shWords, type ShPrecision } from './pack/sh.js';
+
+/** GPU memory that one splat of a scene takes, in bytes, before a single one is uploaded. */
+export function bytesPerSplat(shDegree: ShDegree, shPrecision: ShPrecision): number {
+  return 4 * (GEOMETRY_WORDS + shWords(shDegree, shPrecision)) + (4 * CHUNK_NUMBERS) / constants.CULL_GROUP;
+}
+
+/** Bytes that somebody holds; given back once. */
+export interface Reservation {
+  readonly label: string;
+  readonly bytes: number;
+  release(): void;
+}
+
+/**
+ * What the scenes on a device hold, and how much they may. WebGPU tells nobody how much memory a GPU has: without a budget everything
+ * is let through, and the device itself refuses.
+ */
+export class MemoryLedger {
+  /** Most bytes that all scenes of the device together may hold. */
+  budgetBytes = Infinity;
+  readonly #held = new Set<Reservation>();
+
+  /** The ledger of a device; all scenes on it share one. */
+  static of(device: GPUDevice): MemoryLedger {
+    const known = LEDGERS.get(device);
+    if (known) return known;
+    const ledger = new MemoryLedger();
+    LEDGERS.set(device, ledger);
+    return ledger;
+  }
+
+  /** What is held, by whom. */
+  get entries(): readonly Pick<Reservation, 'label' | 'bytes'>[] {
+    return [...this.#held].map(({ label, bytes }) => ({ label, bytes }));
+  }
+
+  get bytes(): number {
+    let sum = 0;
+    for (const { bytes } of this.#held) sum += bytes;
+    return sum;
+  }
+
+  /**
+   * Sets bytes aside before they are allocated.
+   * @throws GaussianSplatError `out-of-memory/budget` if that is more than the budget leaves.
+   */
+  reserve(label: string, bytes: number): Reservation {
+    const left = this.budgetBytes - this.bytes;
+    if (bytes > left) throw overBudget(label, bytes, left, this.budgetBytes);
+    const reservation: Reservation = { label, bytes, release: () => void this.#held.delete(reservation) };
+    this.#held.add(reservation);
+    return reservation;
+  }
+}
+
+const LEDGERS = new WeakMap<GPUDevice, MemoryLedger>();
+
+function overBudget(label: string, bytes: number, left: number, budget: number): GaussianSplatError {
+  const megabytes = (value: number): string => `${(value / 1e6).toFixed(1)} MB`;
+  return new GaussianSplatError('out-of-memory/budget', {
+    where: label,
+    expected: `at most ${megabytes(Math.max(0, left))}, what is left of a budget of ${megabytes(budget)}`,
+    found: megabytes(bytes),
+    remedy:
+      'show a smaller scene (npm run economise makes one), remove other scenes, or raise MemoryLedger.budgetBytes',
+  });
+}

@@ -1,0 +1,107 @@
+/** The work behind `npm run economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
+import { readFileSync, statSync, writeFileSync } from 'node:fs';
+import { dirname, join, resolve } from 'node:path';
+import { parseArgs } from 'node:util';
+import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
+import { dealtViewsAround, dealViews, economise, GpuScorer, Studio } from '@gaussian-splat/economise';
+import { readScene } from '@gaussian-splat/formats';
+import { deviceDescriptor } from '@gaussian-splat/renderer';
+import { requestNodeAdapter } from './lib/node-gpu.mjs';
+
+const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options]
+
+  --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
+  --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
+  --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
+                  ten are held out, one is for the search. Default: 86 views around the subject, 6 of them held out
+  --scorer NAME   what measures contributions: gpu (the compute rasterizer), cpu, or auto (default): gpu where there is one
+  --report FILE   the figures as JSON
+`;
+
+class UsageError extends Error {}
+
+/** Folder that a person's relative paths start from: npm itself runs scripts in the project's root. */
+const from = process.env.INIT_CWD ?? process.cwd();
+
+function parseOptions(args) {
+  const text = { type: 'string' };
+  let parsed;
+  try {
+    parsed = parseArgs({
+      args,
+      allowPositionals: true,
+      options: {
+        'min-db': text,
+        out: text,
+        views: text,
+        report: text,
+        scorer: { ...text, default: 'auto' },
+        help: { type: 'boolean' },
+      },
+    });
+  } catch (error) {
+    throw new UsageError(error.message);
+  }
+  const { values, positionals } = parsed;
+  if (values.help) return undefined;
+  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
+  const minDecibels = Number(values['min-db']);
+  if (!(minDecibels >= 10 && minDecibels <= 100)) throw new UsageError('--min-db: expected a number from 10 to 100');
+  if (values.out === undefined) throw new UsageError('--out is missing');
+  const [scene, out] = [resolve(from, positionals[0]), resolve(from, values.out)];
+  if (scene === out) throw new UsageError('--out: expected another file than SCENE, which is never changed');
+  const { views, report, scorer } = values;
+  if (!['auto', 'gpu', 'cpu'].includes(scorer))
+    throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
+  return { scene, out, minDecibels, views, report, scorer };
+}
+
+function readViews(path, bounds) {
+  if (path === undefined) return dealtViewsAround(bounds);
+  const { views } = JSON.parse(readFileSync(resolve(from, path), 'utf8'));
+  const dealt = dealViews(views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`)));
+  if (dealt.heldOut.length > 0) return dealt;
+  throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
+}
+
+async function main({ scene, out, minDecibels, views: viewsFile, report, scorer }) {
+  const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
+  const cloud = await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart });
+  const adapter = await requestNodeAdapter();
+  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  const views = readViews(viewsFile, boundsOf(cloud));
+  // SwiftShader is a processor in disguise, slower than plain code on the same.
+  const isGpu = scorer === 'auto' ? !/swiftshader/i.test(adapter.info.description) : scorer === 'gpu';
+  const gpu = isGpu ? await GpuScorer.create(device, cloud) : undefined;
+  const studio = new Studio(device, 'default');
+  const start = performance.now();
+  const result = await economise(cloud, {
+    ...{ minDecibels, name: out, views, studio, scorer: gpu?.score },
+    onStep: (step) => console.log(`${((performance.now() - start) / 1000).toFixed(0).padStart(5)} s  ${step}`),
+  });
+  writeFileSync(out, result.bytes);
+  const { splats, coefficients } = result;
+  const share = ({ before, after }) => `${((100 * after) / Math.max(1, before)).toFixed(1)} %`;
+  const [oldBytes, newBytes] = [statSync(scene).size, result.bytes.length];
+  console.log(`
+asked        ${minDecibels.toFixed(2)} dB
+found        ${result.decibels.toFixed(2)} dB in ${views.heldOut.length} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
+splats       ${splats.after} of ${splats.before} (${share(splats)})
+SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficients)}); splats by degree ${result.degrees.join(', ')}
+bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}`);
+  const figures = { ...result, bytes: newBytes, minDecibels };
+  if (report) writeFileSync(resolve(from, report), JSON.stringify(figures, null, 2));
+}
+
+try {
+  const options = parseOptions(process.argv.slice(2));
+  if (options === undefined) console.log(USAGE);
+  else await main(options);
+  // Dawn keeps Node alive.
+  process.exit(0);
+} catch (error) {
+  if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
+  else if (error instanceof GaussianSplatError || error.code === 'ENOENT') console.error(error.message);
+  else console.error(error);
+  process.exit(error instanceof UsageError ? 2 : 1);
+}

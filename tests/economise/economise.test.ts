@@ -1,0 +1,173 @@
+/** What the economiser measures, chooses and writes. Images are drawn on the CPU, but for one that the renderer is held against. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import {
+  cpuPainter,
+  cpuScorer,
+  dealtViewsAround,
+  dealViews,
+  decibels,
+  economical,
+  economise,
+  encodingsFor,
+  GpuScorer,
+  meanSquare,
+  parseEconomy,
+  reduce,
+  scoreSplats,
+  Studio,
+  viewsAround,
+} from '@gaussian-splat/economise';
+import { readPrefix, readScene } from '@gaussian-splat/formats';
+import { smallCloud } from '../formats/support/small-cloud.js';
+import { nodeDevice } from '../support/node-device.js';
+
+const SIZE = { width: 120, height: 80 };
+
+/** A closed ball of opaque splats with others inside that nobody can see, and colours that depend on the view for some. */
+function ball(): GaussianCloud {
+  const count = 900;
+  const cloud = smallCloud(count, 2, 4);
+  for (let i = 0; i < count; i++) {
+    const p = cloud.positions.subarray(3 * i, 3 * i + 3);
+    const radius = (i % 3 === 0 ? 0.4 : 1) / Math.hypot(...p);
+    p.forEach((value, k) => (p[k] = value * radius));
+    cloud.scales.fill(0.16, 3 * i, 3 * i + 3);
+    cloud.opacities[i] = 0.98;
+    if (i % 2 === 0) cloud.sh.fill(0, 27 * i + 3, 27 * i + 27);
+  }
+  return cloud;
+}
+
+const scene = ball();
+const views = dealtViewsAround(boundsOf(scene), SIZE);
+const scored = scoreSplats(scene, views.scored.slice(0, 24), cpuScorer(scene));
+
+test("the CPU's images are the renderer's", async () => {
+  const studio = new Studio(await nodeDevice(), 'default');
+  const two = viewsAround(boundsOf(scene), 2, SIZE);
+  const [ours, theirs] = [await cpuPainter.draw(scene, two), await studio.draw(scene, two)];
+  studio.destroy();
+  for (const [k, image] of ours.entries()) {
+    const found = decibels(meanSquare(image, theirs[k]));
+    assert.ok(found >= 55, `view ${k}: ${found} dB`);
+  }
+});
+
+test('the compute rasterizer finds the contributions that the CPU finds', async () => {
+  const gpu = await GpuScorer.create(await nodeDevice(), scene);
+  const cpu = cpuScorer(scene);
+  for (const view of viewsAround(boundsOf(scene), 2, SIZE)) {
+    const [theirs, ours] = [await gpu.score(view), await cpu(view)];
+    let [worst, sum, energies, expected] = [0, 0, 0, 0];
+    for (let i = 0; i < scene.count; i++) {
+      const difference = Math.abs(theirs.peak[i] - ours.peak[i]);
+      [worst, sum] = [Math.max(worst, difference), sum + difference];
+      [energies, expected] = [energies + theirs.energy[i], expected + ours.energy[i]];
+    }
+    assert.ok(worst < 0.02 && sum / scene.count < 1e-3, `worst ${worst}, mean ${sum / scene.count}`);
+    // Estimated from peak and size, as if nothing stood before any part of a splat.
+    assert.ok(energies > 0.7 * expected && energies < 5 * expected, `${energies} where the CPU finds ${expected}`);
+  }
+  gpu.destroy();
+});
+
+test('splats that nobody sees contribute nothing, and go without a trace', async () => {
+  const scores = await scored;
+  const median = (of: Float32Array): number => of.slice().sort()[of.length >> 1];
+  const inside = scores.contribution.filter((_, i) => i % 3 === 0);
+  const outside = scores.contribution.filter((_, i) => i % 3 !== 0);
+  assert.ok(median(inside) < 1 / 255, `inside: ${median(inside)}`);
+  assert.ok(median(outside) > 0.1, `outside: ${median(outside)}`);
+  const { cloud } = reduce(scene, scores, { minContribution: 1 / 255, colourPrice: 0 });
+  assert.ok(cloud.count < 0.75 * scene.count, `${cloud.count} of ${scene.count}`);
+  const before = await cpuPainter.draw(scene, views.heldOut);
+  const now = await cpuPainter.draw(cloud, views.heldOut);
+  const errors = now.map((image, k) => meanSquare(image, before[k]));
+  const found = decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
+  assert.ok(found > 50, `${found} dB`);
+});
+
+test('degrees go where colour does not depend on the view, at any price', async () => {
+  const { degrees, cloud } = reduce(scene, await scored, { minContribution: 0.2, colourPrice: 1e-14 });
+  assert.ok(degrees.filter((degree) => degree === 0).length >= 0.4 * cloud.count, 'half of them have no such colour');
+  assert.ok(degrees.filter((degree) => degree === 2).length >= 0.3 * cloud.count, 'the others keep it');
+});
+
+test('the most seen come first', async () => {
+  const scores = await scored;
+  const { cloud } = reduce(scene, scores, { minContribution: 0, colourPrice: 0 });
+  const half = { ...cloud, count: 450 };
+  const radius = (c: GaussianCloud, i: number): number => Math.hypot(...c.positions.subarray(3 * i, 3 * i + 3));
+  const shell = Array.from({ length: half.count }, (_, i) => radius(cloud, i)).filter((r) => r > 0.9).length;
+  assert.equal(shell, 450);
+});
+
+for (const name of ['a.glb', 'a.ply', 'a.spz']) {
+  test(`${name}: what is written is read again`, async () => {
+    const reduced = reduce(scene, await scored, { minContribution: 0.05, colourPrice: 1e-12 });
+    const encoding = encodingsFor(name).at(-1)!;
+    const read = await readScene(await encoding.write(reduced), { name });
+    assert.equal(read.count, reduced.cloud.count);
+    const [before, now] = [reduced.cloud, read];
+    const images = [await cpuPainter.draw(before, views.heldOut), await cpuPainter.draw(now, views.heldOut)];
+    const found = decibels(meanSquare(images[1][0], images[0][0]));
+    assert.ok(found >= (name === 'a.spz' ? 38 : 70), `${name}: ${found} dB`);
+  });
+}
+
+test('the asked figure is met in views that had no say, with less than there was', async () => {
+  const studio = cpuPainter;
+  const result = await economise(scene, { minDecibels: 50, name: 'a.glb', views, studio });
+  assert.ok(result.decibels >= 50, `${result.decibels} dB`);
+  assert.ok(result.splats.after <= 0.75 * result.splats.before, `${result.splats.after} splats`);
+  assert.ok(result.coefficients.after <= 0.5 * result.coefficients.before, `${result.coefficients.after} coefficients`);
+  assert.equal((await readScene(result.bytes, { name: 'a.glb' })).count, result.splats.after);
+});
+
+test('a format that cannot reach the figure is refused with what it can', async () => {
+  const options = { minDecibels: 70, name: 'a.spz', views, studio: cpuPainter };
+  await assert.rejects(economise(scene, options), /70 dB or more.*at most \d+\.\d dB, with every splat kept/);
+  assert.throws(() => encodingsFor('a.obj'), /\.spz, \.glb, \.ply/);
+});
+
+test('the attribute: shares, and nothing else', async () => {
+  for (const [text, share] of [
+    ['0.6', 0.6],
+    [' 25% ', 0.25],
+    ['1', null],
+    ['0', null],
+    ['-0.5', null],
+    ['half', null],
+    [null, null],
+  ] as const) {
+    assert.equal(parseEconomy(text), share, String(text));
+  }
+  const scores = await scored;
+  assert.equal(economical(scene, scores, null).cloud.count, scene.count);
+  const some = economical(scene, scores, 0.4).cloud.count;
+  assert.ok(Math.abs(some - 0.4 * scene.count) < 2, `${some} splats`);
+});
+
+test('views are dealt out without sharing one', () => {
+  const all = viewsAround(boundsOf(scene), 40);
+  const { scored: a, searched: b, heldOut: c } = dealViews(all);
+  assert.deepEqual([a.length, b.length, c.length], [28, 4, 8]);
+  assert.equal(new Set([...a, ...b, ...c]).size, 40);
+});
+
+test('a file in this order is a coarse picture while it arrives', async () => {
+  const reduced = reduce(scene, await scored, { minContribution: 0, colourPrice: 0 });
+  const bytes = await encodingsFor('a.ply')[0].write(reduced);
+  const part = await readPrefix(bytes.subarray(0, Math.floor(0.6 * bytes.length)), { name: 'a.ply' });
+  assert.ok(part && part.count > 500 && part.count < 560, `${part?.count}`);
+  const [whole, coarse] = [await cpuPainter.draw(scene, views.heldOut), await cpuPainter.draw(part, views.heldOut)];
+  const found = decibels(meanSquare(coarse[0], whole[0]));
+  assert.ok(found > 20, `${found} dB with 60 % of the file`);
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});

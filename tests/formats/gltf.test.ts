@@ -1,0 +1,153 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
+import { shBasis } from '../oracle/sh.js';
+import { seededRandom } from '../support/random.js';
+import { assertAtMost, assertSameCloud, expectRefusal, largestDifference } from './support/expect.js';
+import { buildGltf, writeGlb } from './support/gltf-writer.js';
+import { smallCloud } from './support/small-cloud.js';
+import { rawSplats } from './support/splats.js';
+import { writeSpz } from './support/spz-writer.js';
+
+const read = (...[meshes, nodes, roots]: Parameters<typeof buildGltf>): Promise<GaussianCloud> => {
+  const { json, buffer } = buildGltf(meshes, nodes, roots);
+  return readScene(writeGlb(json, buffer), { name: 'a.glb' });
+};
+
+/** Covariance of a splat, [3, 3]. */
+function covariance({ rotations, scales }: GaussianCloud, i: number): number[] {
+  const [w, x, y, z] = rotations.subarray(4 * i, 4 * i + 4);
+  const r = [
+    ...[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+    ...[2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+    ...[2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+  ];
+  return Array.from({ length: 9 }, (_, k) => {
+    const [a, b] = [Math.floor(k / 3), k % 3];
+    return [0, 1, 2].reduce((sum, axis) => sum + r[3 * a + axis] * r[3 * b + axis] * scales[3 * i + axis] ** 2, 0);
+  });
+}
+
+const transform = (m: readonly number[], s: readonly number[]): number[] => {
+  const product = (a: readonly number[], b: readonly number[], f = (r: number, c: number) => b[3 * r + c]): number[] =>
+    Array.from({ length: 9 }, (_, k) =>
+      [0, 1, 2].reduce((sum, j) => sum + a[3 * Math.floor(k / 3) + j] * f(j, k % 3), 0),
+    );
+  return product(product(m, s), m, (row, column) => m[3 * column + row]);
+};
+
+/** Colour of a splat in a direction, before 0.5 is added. */
+const colour = ({ sh, shDegree }: GaussianCloud, i: number, direction: Vector3): number[] => {
+  const basis = shBasis(shDegree, direction);
+  return [0, 1, 2].map((c) => basis.reduce((sum, y, k) => sum + y * sh[3 * basis.length * i + 3 * k + c], 0));
+};
+
+const FLIP = [-1, 0, 0, 0, -1, 0, 0, 0, 1];
+
+test('without transforms: right, down and forward', async () => {
+  const cloud = smallCloud(20, 3);
+  const found = await read([[{ cloud }]], [{ mesh: 0 }], [0]);
+  const turned = cloud.positions.map((value, k) => (k % 3 === 2 ? value : -value));
+  assertAtMost(largestDifference(found.positions, turned), 0, 'positions');
+  assert.deepEqual([found.shDegree, found.count], [3, 20]);
+});
+
+for (const [what, node, linear] of [
+  ['turned and scaled alike', { rotation: [0.1, 0.7, -0.2, 0.678232998], scale: [1.7, 1.7, 1.7] }, undefined],
+  ['mirrored', { scale: [-1, 1, 1] }, [-1, 0, 0, 0, 1, 0, 0, 0, 1]],
+  ['stretched', { scale: [3, 1, 0.5] }, [3, 0, 0, 0, 1, 0, 0, 0, 0.5]],
+  ['sheared', { matrix: [1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0.2, 2, 0, 4, 5, 6, 1] }, [1, 0.5, 0, 0, 1, 0.2, 0, 0, 2]],
+] as const) {
+  test(`a node that is ${what} moves covariances and turns colours`, async () => {
+    const cloud = smallCloud(12, 3, 5);
+    const found = await read([[{ cloud }]], [{ children: [1] }, { mesh: 0, ...node }], [0]);
+    const isSheared = what === 'stretched' || what === 'sheared';
+    const m = linear ?? rotationTimes(node.rotation, 1.7);
+    const toCloud = Array.from({ length: 9 }, (_, k) => FLIP[4 * Math.floor(k / 3)] * m[k]);
+    const random = seededRandom(9);
+    for (let i = 0; i < cloud.count; i++) {
+      assertAtMost(
+        largestDifference(covariance(found, i), transform(toCloud, covariance(cloud, i))),
+        3e-6,
+        'covariance',
+      );
+      if (isSheared) continue;
+      // What is seen in a turned direction is what was seen in the old one.
+      const d = random.direction();
+      const size = Math.cbrt(Math.abs(determinant(toCloud)));
+      const turned = [0, 1, 2].map((r) => [0, 1, 2].reduce((sum, k) => sum + (toCloud[3 * r + k] * d[k]) / size, 0));
+      assertAtMost(
+        largestDifference(colour(found, i, turned as unknown as Vector3), colour(cloud, i, d)),
+        1e-5,
+        'colour',
+      );
+    }
+  });
+}
+
+function rotationTimes([x, y, z, w]: readonly number[], scale: number): number[] {
+  return [
+    ...[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+    ...[2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+    ...[2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+  ].map((value) => scale * value);
+}
+
+function determinant(m: readonly number[]): number {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+test('primitives of mixed degree and meshes in several places become one cloud', async () => {
+  const [a, b] = [smallCloud(5, 2, 1), smallCloud(7, 0, 2)];
+  const nodes = [{ mesh: 0 }, { mesh: 0, translation: [10, 0, 0] }];
+  const found = await read([[{ cloud: a }, { cloud: b }]], nodes, [0, 1]);
+  assert.deepEqual([found.count, found.shDegree], [24, 2]);
+  assert.deepEqual(Array.from(found.sh.subarray(27 * 5 + 3, 27 * 6)), new Array(24).fill(0));
+  assertAtMost(Math.abs(found.positions[36] - (found.positions[0] - 10)), 1e-5, 'the second place');
+});
+
+test('SPZ inside is the same scene as the SPZ file', async () => {
+  const spz = writeSpz(rawSplats(9, 1), { version: 2 });
+  const found = await read([[{ cloud: smallCloud(1, 0), spz }]], [{ mesh: 0 }], [0]);
+  const direct = await readScene(spz, { name: 'a.spz' });
+  assertAtMost(largestDifference(found.positions, direct.positions), 1e-6, 'positions');
+  assertAtMost(largestDifference(found.sh, direct.sh), 1e-5, 'colours');
+});
+
+test('JSON with a buffer of its own, and with one written as text', async () => {
+  const cloud = smallCloud(6, 1);
+  const { json, buffer } = buildGltf([[{ cloud }]], [{ mesh: 0 }], [0]);
+  const inside = await readScene(writeGlb(json, buffer), { name: 'a.glb' });
+  const text = (uri: string): Uint8Array =>
+    Buffer.from(JSON.stringify({ ...json, buffers: [{ uri, byteLength: buffer.length }] }));
+  const embedded = `data:application/octet-stream;base64,${buffer.toString('base64')}`;
+  assertSameCloud(await readScene(text(embedded), { name: 'a.gltf' }), inside);
+  const openPart = async (path: string): Promise<Uint8Array> => (assert.equal(path, 'a b.bin'), new Uint8Array(buffer));
+  assertSameCloud(await readScene(text('a%20b.bin'), { name: 'a.gltf', openPart }), inside);
+});
+
+test('what the extension allows and we do not draw is refused by name', async () => {
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(2, 0) }]], [{ mesh: 0 }], [0]);
+  type Splats = { extensions: { KHR_gaussian_splatting: Record<string, unknown> } };
+  const changed = (change: (splats: Splats['extensions']['KHR_gaussian_splatting']) => void): Uint8Array => {
+    const copy = structuredClone(json) as { meshes: { primitives: Splats[] }[] };
+    change(copy.meshes[0].primitives[0].extensions.KHR_gaussian_splatting);
+    return writeGlb(copy as Record<string, unknown>, buffer);
+  };
+  const linear = changed((splats) => (splats.colorSpace = 'lin_rec709_display'));
+  await expectRefusal(linear, 'decode/unsupported', /srgb_rec709_display.*lin_rec709/, { name: 'a.glb' });
+  const other = changed((splats) => (splats.extensions = { EXT_other: {} }));
+  await expectRefusal(other, 'decode/unsupported', /EXT_other/, { name: 'a.glb' });
+  const loop = writeGlb({ ...json, nodes: [{ children: [0] }] }, buffer);
+  await expectRefusal(loop, 'decode/header', /nodes that contain themselves/, { name: 'a.glb' });
+  const copies = Array.from({ length: 9000 }, () => ({ mesh: 0 }));
+  assert.equal(
+    (
+      await readScene(writeGlb({ ...json, nodes: copies, scenes: [{ nodes: copies.map((_, k) => k) }] }, buffer), {
+        name: 'a',
+      })
+    ).count,
+    18_000,
+  );
+});

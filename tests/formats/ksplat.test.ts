@@ -1,0 +1,43 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { readScene } from '@gaussian-splat/formats';
+import { assertAtMost, expectRefusal, largestDifference, largestRotationError } from './support/expect.js';
+import { writeKsplat } from './support/ksplat-writer.js';
+import { smallCloud } from './support/small-cloud.js';
+
+const BOUNDS = [
+  { position: 0, scale: 0, rotation: 1e-6, colour: 0.5 / 255 / 0.28 },
+  { position: 1e-4, scale: 2e-4, rotation: 1e-6, colour: 0.5 / 255 / 0.28 },
+  { position: 1e-4, scale: 2e-4, rotation: 1e-6, colour: 1.5 / 255 / 0.28 },
+] as const;
+
+for (const level of [0, 1, 2] as const) {
+  for (const degree of [0, 1, 2, 3] as const) {
+    test(`level ${level}, degree ${degree}: every attribute to the bits of the format`, async () => {
+      const cloud = smallCloud(23, degree);
+      const bound = BOUNDS[level];
+      const read = await readScene(writeKsplat(cloud, { level }), { name: 'a' });
+      assert.deepEqual([read.count, read.shDegree, read.droppedCount], [23, degree, 0]);
+      assertAtMost(largestDifference(read.positions, cloud.positions), bound.position, 'positions');
+      assertAtMost(largestDifference(read.scales, cloud.scales), bound.scale, 'scales');
+      assertAtMost(largestRotationError(read, cloud), bound.rotation, 'rotations');
+      assertAtMost(largestDifference(read.opacities, cloud.opacities), 0.51 / 255, 'opacities');
+      assertAtMost(largestDifference(read.sh, cloud.sh), bound.colour, 'colours');
+    });
+  }
+}
+
+test('headers that announce more than the file has are refused before anything is allocated', async () => {
+  const file = writeKsplat(smallCloud(23, 1), { level: 1 });
+  const changed = (at: number, value: number): Uint8Array => {
+    const copy = Uint8Array.from(file);
+    new DataView(copy.buffer).setUint32(at, value, true);
+    return copy;
+  };
+  await expectRefusal(changed(4, 0xffffffff), 'decode/truncated', /section headers/, { name: 'a.ksplat' });
+  const many = changed(4096, 0x7fffffff);
+  new DataView(many.buffer).setUint32(4100, 0x7fffffff, true);
+  await expectRefusal(many, 'decode/truncated', /2,147,483,647 splats/, { name: 'a.ksplat' });
+  await expectRefusal(changed(4096 + 32, 0xffff), 'decode/header', /buckets/, { name: 'a.ksplat' });
+  await expectRefusal(changed(4096 + 40, 9), 'decode/header', /degree/, { name: 'a.ksplat' });
+});

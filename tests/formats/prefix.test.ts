@@ -1,0 +1,62 @@
+/** Files that are still arriving: what is there is read, and it is the same as in the whole file. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { shCoefficientCount } from '@gaussian-splat/core';
+import { readPrefix, readScene } from '@gaussian-splat/formats';
+import { needsSharedData, sharedFile } from '../support/data.js';
+import { assertSameNumbers } from './support/expect.js';
+
+const HALF = 0.5;
+const FILES: readonly [file: string, share: number, splats: [number, number], degree: number][] = [
+  ['formats/playbot3.ply', HALF, [15_400, 15_500], 2],
+  ['formats/playbot3.compressed.ply', 0.3, [20_000, 24_000], 0],
+  ['formats/playbot3.compressed.ply', 0.9, [31_000, 31_000], 0],
+  ['formats/playbot3.c1.sh2.ksplat', HALF, [14_000, 16_000], 2],
+  ['scenes/plant.splat', HALF, [7_003, 7_003], 0],
+  ['formats/playbot3.niantic-v3.spz', 0.95, [31_000, 31_000], 0],
+  ['formats/playbot3.niantic-v4.spz', 0.95, [31_000, 31_000], 0],
+];
+
+for (const [name, share, [least, most], degree] of FILES) {
+  test(`${name}, the first ${100 * share} %`, { skip: needsSharedData }, async () => {
+    const file = sharedFile(name);
+    const whole = await readScene(file, { name });
+    const part = await readPrefix(file.subarray(0, Math.floor(share * file.length)), { name });
+    assert.ok(part, 'there are splats');
+    assert.ok(part.count >= least && part.count <= most, `${part.count} splats`);
+    assert.equal(part.shDegree, degree);
+    assertSameNumbers(part.positions, whole.positions.subarray(0, 3 * part.count), 'positions');
+    assertSameNumbers(part.opacities, whole.opacities.subarray(0, part.count), 'opacities');
+    const [own, stride] = [3 * shCoefficientCount(part.shDegree), 3 * shCoefficientCount(whole.shDegree)];
+    const expected = Array.from(
+      { length: own * part.count },
+      (_, k) => whole.sh[stride * Math.floor(k / own) + (k % own)],
+    );
+    assertSameNumbers(part.sh, expected, 'colours');
+  });
+}
+
+test(
+  'too little to show, and formats that cannot be read in part, give nothing',
+  { skip: needsSharedData },
+  async () => {
+    for (const name of ['formats/playbot3.ply', 'formats/playbot3.niantic-v3.spz', 'formats/playbot3.c0.sh2.ksplat']) {
+      assert.equal(await readPrefix(sharedFile(name).subarray(0, 1000), { name }), undefined, name);
+    }
+    assert.equal(await readPrefix(sharedFile('scenes/massa.sog').subarray(0, 500_000), { name: 'a.sog' }), undefined);
+    assert.equal(await readPrefix(new Uint8Array(0)), undefined);
+  },
+);
+
+test('a large scene is previewed before it is whole', { skip: needsSharedData }, async () => {
+  const folder = 'scenes/playbot-streamed/1_0/';
+  const openPart = async (path: string): Promise<Uint8Array> => sharedFile(folder + path);
+  const previews: [count: number, degree: number][] = [];
+  const cloud = await readScene(sharedFile(`${folder}meta.json`), {
+    name: 'meta.json',
+    openPart,
+    onPreview: ({ count, shDegree }) => void previews.push([count, shDegree]),
+  });
+  assert.deepEqual([cloud.count, cloud.shDegree], [250_000, 2]);
+  assert.deepEqual(previews, [[15_625, 0]]);
+});

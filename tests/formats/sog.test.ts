@@ -1,0 +1,81 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { zipSync } from 'fflate';
+import { readScene } from '@gaussian-splat/formats';
+import { assertAtMost, coefficient, expectRefusal, largestDifference, largestRotationError } from './support/expect.js';
+import { smallCloud } from './support/small-cloud.js';
+import { writeSog, writeSogV1, type SogFiles } from './support/sog-writer.js';
+
+const cloud = smallCloud(300, 2);
+const bundle = (files: SogFiles): Uint8Array => zipSync(files, { level: 6 });
+const folder =
+  (files: SogFiles) =>
+  async (path: string): Promise<Uint8Array> =>
+    files[path] ?? Promise.reject(new Error(`no ${path}`));
+
+test('version 2, bundle and folder, give every attribute to the bits of the format', async () => {
+  const files = writeSog(cloud);
+  const read = await readScene(bundle(files), { name: 'a.sog' });
+  assert.deepEqual([read.count, read.shDegree, read.droppedCount], [300, 2, 0]);
+  assertAtMost(largestDifference(read.positions, cloud.positions), (2 * Math.log(3) * 1.5) / 65_535, 'positions');
+  assertAtMost(largestRotationError(read, cloud), 3e-5, 'rotations');
+  assertAtMost(largestDifference(read.opacities, cloud.opacities), 0.5 / 255 + 1e-6, 'opacities');
+  assertAtMost(largestDifference(read.sh, cloud.sh), 0.02, 'colours');
+  const logs = (values: Float32Array): number[] => Array.from(values, Math.log);
+  assertAtMost(largestDifference(logs(read.scales), logs(cloud.scales)), 0.1, 'logarithms of scales');
+  const unpacked = await readScene(files['meta.json'], { name: 'meta.json', openPart: folder(files) });
+  assert.deepEqual(unpacked, read);
+});
+
+test('version 1 gives every attribute to the bits of the format', async () => {
+  const files = writeSogV1(cloud);
+  const read = await readScene(files['meta.json'], { name: 'meta.json', openPart: folder(files) });
+  assert.deepEqual([read.count, read.shDegree], [300, 0]);
+  assertAtMost(largestRotationError(read, cloud), 3e-5, 'rotations');
+  assertAtMost(largestDifference(read.opacities, cloud.opacities), 0.01, 'opacities');
+  assertAtMost(largestDifference(read.sh, coefficient(cloud, 0)), 0.5 * (2 / 255) + 1e-5, 'colours');
+});
+
+test('images and descriptions that contradict each other are refused by name', async () => {
+  const files = writeSog(cloud);
+  const meta = JSON.parse(new TextDecoder().decode(files['meta.json'])) as Record<string, Record<string, unknown>>;
+  const changed = (change: (m: typeof meta) => unknown): Uint8Array => {
+    const copy = structuredClone(meta);
+    change(copy);
+    return bundle({ ...files, 'meta.json': new TextEncoder().encode(JSON.stringify(copy)) });
+  };
+  const cases: [string, Uint8Array, string, RegExp][] = [
+    [
+      'more splats than pixels',
+      changed((m) => Object.assign(m, { count: 1000 })),
+      'decode/corrupt',
+      /1,000 pixels, one/,
+    ],
+    ['a billion splats', changed((m) => Object.assign(m, { count: 1e9 })), 'decode/header', /at most .* splats in/],
+    ['a missing image', changed((m) => (m.sh0.files = ['x.webp'])), 'decode/corrupt', /"x.webp"/],
+    ['another degree', changed((m) => (m.shN.bands = 3)), 'decode/corrupt', /palette 960 pixels wide, found 512/],
+    ['no codebook', changed((m) => delete m.scales.codebook), 'decode/header', /scales.codebook/],
+    ['a lossy image', bundle({ ...files, 'sh0.webp': lossy() }), 'decode/unsupported', /lossy/],
+    [
+      'a huge image',
+      bundle({ ...files, 'quats.webp': huge() }),
+      'decode/corrupt',
+      /at most .* pixels, found 16384 x 16384/,
+    ],
+  ];
+  for (const [what, file, code, message] of cases) {
+    const error = await expectRefusal(file, code, message, { name: 'a.sog' });
+    assert.ok(error, what);
+  }
+});
+
+function lossy(): Uint8Array {
+  return new Uint8Array(Buffer.from('RIFF\x16\0\0\0WEBPVP8 \x0a\0\0\0\0\0\0\0\0\0\0\0\0\0', 'latin1'));
+}
+
+/** Announces 16384 x 16384 pixels of one colour, for which no bits are needed. */
+function huge(): Uint8Array {
+  return new Uint8Array(
+    Buffer.from('RIFF\x20\0\0\0WEBPVP8L\x10\0\0\0\x2f\xff\xff\xff\x1f\0\0\0\0\0\0\0\0\0\0\0', 'latin1'),
+  );
+}

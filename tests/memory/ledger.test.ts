@@ -1,0 +1,49 @@
+/** The ledger of GPU memory: what it declares is what is allocated, and it refuses before anything is. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { bytesPerSplat, GaussianBuffers, MemoryLedger, packGaussians } from '@gaussian-splat/renderer';
+import { smallCloud } from '../formats/support/small-cloud.js';
+import { nodeDevice } from '../support/node-device.js';
+
+test('what is declared is what the buffers take', async () => {
+  const device = await nodeDevice();
+  const ledger = MemoryLedger.of(device);
+  for (const degree of [0, 1, 2, 3] as const) {
+    for (const sh of ['int8', 'float16'] as const) {
+      const gaussians = await GaussianBuffers.upload(device, packGaussians(smallCloud(512, degree), { sh }));
+      assert.equal(gaussians.byteLength, 512 * bytesPerSplat(degree, sh));
+      assert.equal(ledger.bytes, gaussians.byteLength);
+      gaussians.destroy();
+      gaussians.destroy();
+      assert.equal(ledger.bytes, 0);
+    }
+  }
+});
+
+test('a scene beyond the budget is refused before the device hears of it', async () => {
+  const device = await nodeDevice();
+  const ledger = MemoryLedger.of(device);
+  const packed = packGaussians(smallCloud(512, 1), { sh: 'int8' });
+  ledger.budgetBytes = 1.5 * 512 * bytesPerSplat(1, 'int8');
+  const first = await GaussianBuffers.upload(device, packed);
+  const created: string[] = [];
+  const createBuffer = device.createBuffer.bind(device);
+  device.createBuffer = (descriptor) => (created.push(descriptor.label ?? ''), createBuffer(descriptor));
+  await assert.rejects(GaussianBuffers.upload(device, packed), (error: unknown) => {
+    assert.ok(error instanceof GaussianSplatError);
+    assert.equal(error.code, 'out-of-memory/budget');
+    assert.match(error.message, /scene of 512 splats: expected at most 0\.0 MB.*npm run economise/);
+    return true;
+  });
+  assert.deepEqual(created, []);
+  device.createBuffer = createBuffer;
+  first.destroy();
+  (await GaussianBuffers.upload(device, packed)).destroy();
+  ledger.budgetBytes = Infinity;
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
