@@ -10,16 +10,18 @@ import onnx
 from .arrays import AnyArray
 from .contract import DType, Facts, GaussianOutputs, Input, Layout, gaussian_contract, metadata
 from .errors import ExportError
-from .graph import Graph, Tensor
+from .graph import Graph, Tensor, Weights
 from .pieces.covariance import covariance_of_scale_and_rotation
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a generator is written. float16 halves what it writes and needs the device feature shader-f16."""
+    """How a generator is written. dtype float16 halves what it writes and needs the device feature shader-f16; weights
+    `compact` halves the file, and nothing else: tables are float32 again when the session is made."""
 
     layout: Layout = "packed"
     dtype: DType = "float32"
+    weights: Weights = "float32"
 
 
 @dataclass(frozen=True)

@@ -89,8 +89,8 @@ def export_classic(
     """A generator of the cloud's Gaussians, activated: opacities 0..1, covariances in world units squared."""
     options = options or Options()
     cloud = usable(cloud)
-    graph = Graph("classic")
-    positions = graph.constant(cloud.positions, "positions")
+    graph = Graph("classic", options.weights)
+    positions = graph.constant(cloud.positions, "positions", errors="even")
     sh = graph.constant(cloud.sh, "sh")
     inputs = []
     seen = None
@@ -100,7 +100,9 @@ def export_classic(
         seen = harmonics.colour(direction_and_distance(positions, camera)[0], sh)
     gaussians = Gaussians(
         positions=positions,
-        covariances=graph.constant(covariances(np.exp(np.float64(cloud.log_scales)), cloud.rotations), "covariances"),
+        covariances=graph.constant(
+            covariances(np.exp(np.float64(cloud.log_scales)), cloud.rotations), "covariances", "none"
+        ),
         opacities=graph.constant(sigmoid(cloud.opacity_logits), "opacities"),
         colors=seen,
         sh=sh if seen is None else None,
