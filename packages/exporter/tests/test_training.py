@@ -169,8 +169,8 @@ def test_feed_forward(views: Path, tmp_path: Path, count: int) -> None:
         torch.manual_seed(0)
         with torch.no_grad():
             targets = range(0, 16, 4)
-            pairs = [feed_forward.attempt(each, scene, feed_forward.neighbours(scene, i)[:count], [i]) for i in targets]
-            return sum(float(losses.loss_of(found[0], wanted[0])) for found, wanted in pairs)
+            tried = [feed_forward.attempt(each, scene, feed_forward.neighbours(scene, i)[:count], [i]) for i in targets]
+            return sum(float(losses.loss_of(t.found[0], t.wanted[0])) for t in tried)
 
     assert loss(models[1]) < 0.9 * loss(models[0])
     model = models[1]

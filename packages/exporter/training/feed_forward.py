@@ -34,6 +34,8 @@ NEAREST = 1e-3
 OPAQUE, SLIM = 1.0, -1.5
 # Share of the training during which rates rise.
 WARM_UP = 0.03
+# How much opacities count besides the pictures.
+COVERAGE_WEIGHT = 0.1
 NEIGHBOURS = 5
 # How many pictures are drawn from what one step made.
 TARGETS = 3
@@ -162,6 +164,23 @@ def shares(intrinsics: Tensor, width: int, height: int) -> Tensor:
     return torch.stack([k[0, 0] / width, k[1, 1] / height, k[0, 2] / width, k[1, 2] / height])
 
 
+@dataclass
+class Attempt:
+    """Targets (T,4,H,W) as drawn and as they are; opacities (N) and how covered the pixel of each Gaussian is (N)."""
+
+    found: Tensor
+    wanted: Tensor
+    opacities: Tensor
+    coverage: Tensor
+
+    def loss(self) -> Tensor:
+        """Of the pictures, and of opacities that are not what their own pixel is: a sigmoid that has come to its end
+        passes no other gradient on."""
+        drawn = torch.stack([loss_of(*both) for both in zip(self.found, self.wanted, strict=True)]).mean()
+        opacities = self.opacities.clamp(1e-6, 1 - 1e-6)
+        return drawn + COVERAGE_WEIGHT * F.binary_cross_entropy(opacities, self.coverage)
+
+
 FIELDS = ("pictures", "views", "intrinsics")
 Recolour = Callable[[Tensor], Tensor]
 
@@ -173,15 +192,16 @@ def untouched(pictures: Tensor) -> Tensor:
 
 def attempt(
     model: Generator, views: Views, given: list[int], targets: list[int], recolour: Recolour = untouched
-) -> tuple[Tensor, Tensor]:
-    """The targets (T,4,H,W) as drawn from the given views, and as they are; both recoloured."""
+) -> Attempt:
+    """The targets as drawn from the given views, and as they are; both recoloured."""
     _, _, height, width = views.pictures.shape
     images = [recolour(views.pictures[i : i + 1])[:, :3] for i in given]
     world = torch.linalg.inv(views.views[given[0]])
     pose = views.views[given[1]] @ world if len(given) == 2 else None
     splats = model(images, shares(views.intrinsics[given[0]], width, height), pose)
     cameras = [Camera(views.views[t] @ world, views.intrinsics[t], width, height) for t in targets]
-    return pictures(splats, cameras), recolour(views.pictures[targets])
+    coverage = views.pictures[given, 3].flatten()
+    return Attempt(pictures(splats, cameras), recolour(views.pictures[targets]), splats.opacities, coverage)
 
 
 def neighbours(views: Views, target: int) -> list[int]:
@@ -218,7 +238,7 @@ def train(
     depths = {"depths": sizes.pop("depths")} if "depths" in sizes else {}
     model = Generator(Shape(width, height, views, *depth_range(scenes), **depths), **sizes)
     model = model.to(scenes[0].pictures.device)
-    optimizer = torch.optim.Adam(model.parameters(), lr=6e-4)
+    optimizer = torch.optim.Adam(model.parameters(), lr=3e-4)
     near = [[neighbours(scene, i) for i in range(len(scene.pictures))] for scene in scenes]
     for step, progress in enumerate(pace):
         which = int(rng.integers(len(scenes)))
@@ -230,8 +250,7 @@ def train(
         # opacities are learned at once, and depths from the others.
         others = [given[0], *[i for i in near[which][target] if i not in given and i not in held]]
         recolour = random_tint(rng) if jitter else untouched
-        found, wanted = attempt(model, scene, given, [target, *others][:TARGETS], recolour)
-        loss = torch.stack([loss_of(*both) for both in zip(found, wanted, strict=True)]).mean()
+        loss = attempt(model, scene, given, [target, *others][:TARGETS], recolour).loss()
         optimizer.zero_grad(set_to_none=True)
         decayed([optimizer], progress, 0.03)
         optimizer.param_groups[0]["lr"] *= min(1.0, (progress + 1e-3) / WARM_UP)
@@ -259,8 +278,8 @@ def held_out(model: Generator, scene: Views) -> float:
     """Mean PSNR of held-out targets, on black."""
     scores = []
     for target in split(len(scene.pictures))[1]:
-        found, wanted = attempt(model, scene, pair_around(scene, target, model.shape.views), [target])
-        scores.append(psnr(found[0, :3], wanted[0, :3]))
+        tried = attempt(model, scene, pair_around(scene, target, model.shape.views), [target])
+        scores.append(psnr(tried.found[0, :3], tried.wanted[0, :3]))
     return float(np.mean(scores))
 
 
@@ -268,8 +287,8 @@ def held_out(model: Generator, scene: Views) -> float:
 def show(path: Path, model: Generator, scenes: list[Views]) -> None:
     """A held-out target of each scene, and, with its pictures and cameras, the two views that it was drawn from."""
     target = HELD_OUT_EVERY // 2
-    pairs = [attempt(model, s, pair_around(s, target, model.shape.views), [target]) for s in scenes]
-    sheet(path.with_suffix(".png"), [wanted[0] for _, wanted in pairs], [found[0] for found, _ in pairs])
+    tried = [attempt(model, s, pair_around(s, target, model.shape.views), [target]) for s in scenes]
+    sheet(path.with_suffix(".png"), [t.wanted[0] for t in tried], [t.found[0] for t in tried])
     rows = [[*pair_around(s, target, model.shape.views), target] for s in scenes]
     picked = [torch.cat([getattr(s, name)[r] for s, r in zip(scenes, rows, strict=True)]) for name in FIELDS]
     Views(*picked, {}).save(path.with_suffix(".npz"))
