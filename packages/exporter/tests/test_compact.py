@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import onnx
 import pytest
 
 from gaussian_exporter.conformance import check_outputs
@@ -42,6 +43,16 @@ def test_what_is_constant_or_zero_stays_so(errors: Errors) -> None:
     graph.output("out", graph.constant(table, "table", errors=errors) * 1.0)
     found = run(graph.model({}), {})["out"]
     assert np.array_equal(found, table.astype(np.float32))
+
+
+def test_what_the_web_cannot_cast_is_found() -> None:
+    table = onnx.numpy_helper.from_array(np.zeros((4, 4), np.uint16), "table")
+    nodes = [onnx.helper.make_node("Cast", ["table"], ["out"], name="cast", to=onnx.TensorProto.FLOAT)]
+    out = onnx.helper.make_tensor_value_info("out", onnx.TensorProto.FLOAT, [4, 4])
+    opset = onnx.helper.make_opsetid("", 17)
+    model = onnx.helper.make_model(onnx.helper.make_graph(nodes, "g", [], [out], [table]), opset_imports=[opset])
+    model.ir_version = 8
+    assert [(finding.kind, finding.operator) for finding in gpu_findings(model)] == [("failure", "Cast")]
 
 
 def test_small_tables_and_numbers_too_large_for_16_bits_stay_float32() -> None:

@@ -195,7 +195,9 @@ class Graph:
         low, high = columns.min(0), columns.max(0)
         step = np.where(high > low, (high - low) / 65535, 1)
         whole = np.round((columns - low) / step).astype(np.uint16).reshape(array.shape)
-        wide = self._widened(self._initializer(whole, name))
+        # Upper and lower bytes: builds of the runtime for the web cannot turn uint16 into float32.
+        upper, lower = (whole >> 8).astype(np.uint8), (whole & 255).astype(np.uint8)
+        wide = self._widened(self._initializer(upper, name)) * 256 + self._widened(self._initializer(lower, name))
         return wide * self._initializer(step.astype(np.float32), name) + self._initializer(low.astype(np.float32), name)
 
     def _widened(self, stored: Tensor) -> Tensor:
