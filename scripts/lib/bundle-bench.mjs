@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import { build } from 'esbuild';
 import { root } from './run.mjs';
 
-const ENTRIES = ['bench', 'frontier', 'quality/oracle-worker', 'peers/playcanvas', 'peers/spark'];
+const ENTRIES = ['bench', 'frontier', 'generators', 'quality/oracle-worker', 'peers/playcanvas', 'peers/spark'];
 
 /** @param folder where the pages go, for example demo/dist/bench. */
 export async function bundleBench(folder) {
