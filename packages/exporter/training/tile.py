@@ -1,6 +1,6 @@
 """A trained model, larger: python tile.py scaffold|hexplane CHECKPOINT COUNT OUT.onnx
 
-For measuring time only: anchors or Gaussians of the checkpoint are repeated, moved aside, until there are COUNT of them.
+For measuring time only: anchors or Gaussians of the checkpoint are repeated, moved aside, until there are COUNT.
 """
 
 from __future__ import annotations
