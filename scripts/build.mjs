@@ -36,14 +36,16 @@ async function buildDemo() {
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));
   const { build } = await import('esbuild');
-  await build({
-    entryPoints: [join(from, 'check/check.js')],
-    outfile: join(to, 'check/check.js'),
-    allowOverwrite: true,
-    bundle: true,
-    format: 'esm',
-    minify: true,
-    logLevel: 'warning',
-  });
+  for (const script of ['check/check.js', 'examples/examples.js']) {
+    await build({
+      entryPoints: [join(from, script)],
+      outfile: join(to, script),
+      allowOverwrite: true,
+      bundle: true,
+      format: 'esm',
+      minify: true,
+      logLevel: 'warning',
+    });
+  }
   if (!existsSync(join(to, 'index.html'))) throw new Error('demo/index.html is missing');
 }

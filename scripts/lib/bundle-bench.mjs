@@ -5,7 +5,15 @@ import { join } from 'node:path';
 import { build } from 'esbuild';
 import { root } from './run.mjs';
 
-const ENTRIES = ['bench', 'frontier', 'stability', 'quality/oracle-worker', 'peers/playcanvas', 'peers/spark'];
+const ENTRIES = [
+  'bench',
+  'frontier',
+  'generators',
+  'stability',
+  'quality/oracle-worker',
+  'peers/playcanvas',
+  'peers/spark',
+];
 
 /** @param folder where the pages go, for example demo/dist/bench. */
 export async function bundleBench(folder) {

@@ -1,8 +1,8 @@
-"""Trains an avatar on a body that pose and shape drive: python avatar.py BODY OUT [--steps 6000] [--count 13380]
+"""Trains an avatar on a body that pose and shape drive: python avatar.py BODY OUT [--steps 12000] [--count 40000]
 
 BODY is the folder of MakeHuman's files (CC0). There are no photographs of this body: the pictures to learn from are
-drawn from its own mesh, coloured and lit by `Painted`, as a dense cloud of discs in random poses and shapes.
-OUT/avatar.npz is what `gaussian-export avatar` reads.
+drawn from its own mesh by `painted.py`, in random poses and shapes. OUT/avatar.npz is what `gaussian-export avatar`
+reads.
 """
 
 from __future__ import annotations
@@ -14,15 +14,24 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from common import Record, device, loss_of, options, psnr, seed
-from makehuman import Body, read_body
+from common import Pace, Record, Views, device, fit, options, seed
+from losses import loss_of, psnr
+from makehuman import PARTS, Body, read_body
+from painted import Painted, interpolated, surface_points
 from rasterizer import Camera, Splats, picture, rotation_matrices
+from show import sheet
 
 SIZE = 512
 SH_C0 = 0.28209479177387814
-SKIN, CLOTH = (0.80, 0.62, 0.52), (0.22, 0.33, 0.48)
-LIGHT = (-0.4, -0.7, -0.6)
 HELD_OUT = 16
+# Pictures to learn from, and points on the surface that make them.
+BANK, SAMPLES = 640, 6_000_000
+# Standard deviation of each joint's turn about each axis, radians, by the beginning of its name.
+BENDS = {"root": 0.0, "pelvis": 0.1, "spine": 0.12, "neck": 0.2, "head": 0.2, "clavicle": 0.1, "upperarm": 0.45}
+BENDS |= {"lowerarm": 0.4, "hand": 0.25, "thigh": 0.4, "calf": 0.4, "foot": 0.2, "ball": 0.1}
+OTHER_BEND = 0.2
+# How much more densely than the rest some parts are covered.
+FAVOUR = {"head": 3.0, "hand": 2.0, "eye": 6.0}
 
 
 def axis_angle_matrices(pose: Tensor) -> Tensor:
@@ -61,18 +70,22 @@ class Rig(nn.Module):
 class Avatar(nn.Module):
     """Gaussians on the body's surface, at rest."""
 
-    def __init__(self, body: Body, chosen: np.ndarray):
-        """One Gaussian at each chosen vertex."""
+    def __init__(self, body: Body, count: int, rng: np.random.Generator):
+        """`count` Gaussians all over it."""
         super().__init__()
         self.rig = Rig(body)
-        start = torch.tensor(body.vertices[chosen], dtype=torch.float32)
-        self.positions = nn.Parameter(start)
-        self.log_scales = nn.Parameter(torch.full((len(chosen), 3), float(np.log(0.6 / len(chosen) ** 0.5))))
-        self.rotations = nn.Parameter(torch.randn(len(chosen), 4))
-        self.opacity_logits = nn.Parameter(torch.full((len(chosen), 1), 2.0))
-        self.colors = nn.Parameter(torch.full((len(chosen), 3), 0.5))
-        self.register_buffer("weights", torch.tensor(body.weights[chosen], dtype=torch.float32))
-        self.register_buffer("directions", torch.tensor(body.directions[chosen], dtype=torch.float32))
+        chosen, share = surface_points(body, count, rng, favour_of(body))
+
+        def at(values: np.ndarray) -> Tensor:
+            return torch.tensor(interpolated(body, values, chosen, share), dtype=torch.float32)
+
+        self.positions = nn.Parameter(at(body.vertices))
+        self.log_scales = nn.Parameter(torch.full((count, 3), float(np.log(0.6 / count**0.5))))
+        self.rotations = nn.Parameter(torch.randn(count, 4))
+        self.opacity_logits = nn.Parameter(torch.full((count, 1), 2.0))
+        self.colors = nn.Parameter(torch.full((count, 3), 0.5))
+        self.register_buffer("weights", at(body.weights))
+        self.register_buffer("directions", at(body.directions))
 
     def forward(self, pose: Tensor, shape: Tensor) -> Splats:
         """The Gaussians in a pose (J,3) and shape (B)."""
@@ -98,48 +111,36 @@ class Avatar(nn.Module):
         np.savez(folder / "avatar.npz", **plain, parents=self.rig.parents, joint_names=self.rig.names)
 
 
-class Painted(nn.Module):
-    """The body to learn from: a disc on each triangle, dressed below the neck, lit at rest."""
-
-    def __init__(self, body: Body):
-        """One flat Gaussian for each triangle."""
-        super().__init__()
-        self.rig = Rig(body)
-        corners = body.vertices[body.triangles]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(normal, axis=1, keepdims=True)
-        normal = normal / np.maximum(area, 1e-12)
-        axes = np.stack([np.cross(normal, np.roll(normal, 1, 1) + np.array([0, 0, 1e-3])), normal], 1)
-        first = axes[:, 0] / np.maximum(np.linalg.norm(axes[:, 0], axis=1, keepdims=True), 1e-12)
-        second = np.cross(normal, first)
-        half = np.sqrt(area)[:, :, None] * np.stack([first, second, normal * 0.05], 2) * 0.45
-        middle = corners.mean(1)
-        height = (middle[:, 1] - middle[:, 1].min()) / np.ptp(middle[:, 1])
-        dressed = ((height > 0.2) & (height < 0.93) & (np.abs(middle[:, 0]) < 0.45))[:, None]
-        colour = np.where(dressed, CLOTH, SKIN)
-        towards = -np.array(LIGHT) / np.linalg.norm(LIGHT)
-        lit = 0.35 + 0.65 * np.abs(normal @ towards)[:, None]
-        weights, moves = body.weights[body.triangles].mean(1), body.directions[body.triangles].mean(1)
-        named = {"middle": middle, "spread": half, "colour": colour * lit, "weights": weights, "moves": moves}
-        for name, value in named.items():
-            self.register_buffer(name, torch.tensor(value, dtype=torch.float32))
-
-    @torch.no_grad()
-    def forward(self, pose: Tensor, shape: Tensor) -> Splats:
-        """The discs in a pose and shape."""
-        placed, blend = self.rig(self.middle, self.weights, self.moves, pose, shape)
-        half = blend @ self.spread
-        return Splats(placed, half @ half.mT, self.colour, torch.full_like(placed[:, 0], 0.99))
+def favour_of(body: Body) -> np.ndarray:
+    """How much more densely than by its area each triangle (T) is covered."""
+    result = np.ones(len(body.triangles))
+    weights = body.weights[body.triangles].mean(1)
+    for begin, factor in FAVOUR.items():
+        carried = weights[:, [name.startswith(begin) for name in body.names]].sum(1) > 0.5
+        result[carried] = factor
+    result[body.parts[body.triangles[:, 0]] == list(PARTS).index("eye")] = FAVOUR["eye"]
+    return result
 
 
-def random_case(rng: np.random.Generator, body: Body, where: str, size: int) -> tuple[Tensor, Tensor, Camera]:
-    """A pose (J,3) near rest, a shape (B), and a camera that looks at the whole body from somewhere around it."""
-    pose = torch.tensor(rng.normal(size=(len(body.parents), 3)) * 0.25, dtype=torch.float32)
-    pose[0] = 0
-    shape = torch.tensor(rng.uniform(0, 0.3, body.directions.shape[2]), dtype=torch.float32)
-    middle = (body.vertices.min(0) + body.vertices.max(0)) / 2
+def bends(body: Body) -> np.ndarray:
+    """Standard deviations (J,1)."""
+    found = [next((v for k, v in BENDS.items() if name.lower().startswith(k)), OTHER_BEND) for name in body.names]
+    return np.array(found)[:, None]
+
+
+Case = tuple[Tensor, Tensor, Camera]
+
+
+def random_case(rng: np.random.Generator, body: Body, where: str, size: int, near: bool) -> Case:
+    """A pose (J,3) near rest, a shape (B), and a camera that looks at the body from somewhere around it, with `near`
+    sometimes at a part of it."""
+    pose = torch.tensor(rng.normal(size=(len(body.parents), 3)) * bends(body), dtype=torch.float32)
+    shape = torch.tensor(rng.uniform(0, 0.6, body.directions.shape[2]), dtype=torch.float32)
+    middle, distance = (body.vertices.min(0) + body.vertices.max(0)) / 2, 3.2
+    if near and rng.random() < 0.5:
+        middle, distance = body.vertices[rng.integers(len(body.vertices))], 2.0
     angle, rise = rng.uniform(0, 2 * np.pi), rng.uniform(-0.3, 0.5)
-    eye = middle + 3.2 * np.array([np.sin(angle) * np.cos(rise), -np.sin(rise), -np.cos(angle) * np.cos(rise)])
+    eye = middle + distance * np.array([np.sin(angle) * np.cos(rise), -np.sin(rise), -np.cos(angle) * np.cos(rise)])
     forward = (middle - eye) / np.linalg.norm(middle - eye)
     right = np.cross([0, 1, 0], forward)
     right /= np.linalg.norm(right)
@@ -151,37 +152,76 @@ def random_case(rng: np.random.Generator, body: Body, where: str, size: int) -> 
     return pose.to(where), shape.to(where), camera
 
 
-def train(body: Body, steps: int, count: int, number: int, size: int) -> tuple[Avatar, float]:
-    """The model, and its PSNR in poses and shapes that it was not trained on."""
+class Truth(nn.Module):
+    """The mesh in any pose and shape."""
+
+    def __init__(self, body: Body, samples: int, rng: np.random.Generator):
+        """`samples`: points on the surface."""
+        super().__init__()
+        self.rig, self.painted = Rig(body), Painted(body, samples, rng)
+        for name in ("vertices", "weights", "directions"):
+            self.register_buffer(name, torch.tensor(getattr(body, name), dtype=torch.float32))
+
+    @torch.no_grad()
+    def forward(self, case: Case) -> Tensor:
+        """The picture (4,H,W)."""
+        pose, shape, camera = case
+        placed, _ = self.rig(self.vertices, self.weights, self.directions, pose, shape)
+        drawn: Tensor = self.painted(placed, camera)
+        return drawn
+
+
+Pairs = list[tuple[Tensor, Tensor]]
+
+
+def held_out_cases(body: Body, where: str, size: int) -> list[Case]:
+    """What is measured on: the whole body, in poses and shapes of their own."""
+    return [random_case(np.random.default_rng(10_000 + i), body, where, size, near=False) for i in range(HELD_OUT)]
+
+
+def train(
+    body: Body, pace: Pace, count: int, number: int, size: int, bank: int = BANK, samples: int = SAMPLES
+) -> tuple[Avatar, Pairs]:
+    """The model, and pictures (4,H,W) as drawn and as they should be, in poses and shapes that it did not see."""
     rng, where = seed(number), device()
-    chosen = np.sort(rng.choice(len(body.vertices), min(count, len(body.vertices)), replace=False))
-    model, truth = Avatar(body, chosen).to(where), Painted(body).to(where)
+    model, truth = Avatar(body, count, rng).to(where), Truth(body, samples, rng).to(where)
     rates = {"positions": 2e-4, "log_scales": 5e-3, "rotations": 2e-3, "opacity_logits": 3e-2, "colors": 5e-3}
-    optimizer = torch.optim.Adam([{"params": [getattr(model, name)], "lr": rate} for name, rate in rates.items()])
-    schedule = torch.optim.lr_scheduler.ExponentialLR(optimizer, 0.05 ** (1 / steps))
-    held = [random_case(np.random.default_rng(10_000 + i), body, where, size) for i in range(HELD_OUT)]
-    for step in range(steps):
-        pose, shape, camera = random_case(rng, body, where, size)
-        loss = loss_of(picture(model(pose, shape), camera), picture(truth(pose, shape), camera))
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        optimizer.step()
-        schedule.step()
-        if step % 500 == 0 or step == steps - 1:
-            print(f"step {step}: loss {loss.item():.4f}", flush=True)
+    groups = [{"params": [getattr(model, name)], "lr": rate} for name, rate in rates.items()]
+    cases = [random_case(rng, body, where, size, near=True) for _ in range(bank)]
+    pictures = [(truth(case) * 255).round().byte() for case in cases]
+    print(f"{bank} pictures to learn from", flush=True)
+
+    def loss_at(index: int, progress: float) -> Tensor:
+        pose, shape, camera = cases[index]
+        return loss_of(picture(model(pose, shape), camera), pictures[index] / 255)
+
+    fit(range(bank), loss_at, [torch.optim.Adam(groups, eps=1e-15)], pace, rng)
     with torch.no_grad():
-        pictures = [(picture(model(p, s), c)[:3], picture(truth(p, s), c)[:3]) for p, s, c in held]
-    return model, float(np.mean([psnr(found, wanted) for found, wanted in pictures]))
+        return model, [(picture(model(*case[:2]), case[2]), truth(case)) for case in held_out_cases(body, where, size)]
+
+
+def scores_of(pairs: Pairs) -> dict[str, float]:
+    """Mean PSNR on black, and inside the body's outline only."""
+    whole = [psnr(found[:3], wanted[:3]) for found, wanted in pairs]
+    inside = [psnr(found[:3, wanted[3] > 0.5], wanted[:3, wanted[3] > 0.5]) for found, wanted in pairs]
+    return {"held_out_psnr": float(np.mean(whole)), "outline_psnr": float(np.mean(inside))}
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     """The command."""
-    given = options(__doc__ or "", 6_000, argv, "body")
+    given = options(__doc__ or "", 12_000, argv, "body")
     record = Record(given)
-    body = read_body(given.body)
-    model, score = train(body, given.steps, given.count or len(body.vertices), given.seed, SIZE)
+    body, pace = read_body(given.body), Pace(given.steps, given.seconds)
+    model, pairs = train(body, pace, given.count or 40_000, given.seed, SIZE)
     model.save(given.out)
-    record.write(held_out_psnr=score, gaussians=len(model.positions), joints=len(body.parents))
+    counts = {"gaussians": len(model.positions), "joints": len(body.parents)}
+    record.write(**scores_of(pairs), steps=pace.done, **counts)
+    found, wanted = zip(*pairs[:6], strict=True)
+    sheet(given.out / "held-out.png", wanted, found)
+    poses, shapes, cameras = zip(*held_out_cases(body, device(), SIZE)[:6], strict=True)
+    extra = {"poses": torch.stack(poses), "shapes": torch.stack(shapes)}
+    views, intrinsics = torch.stack([c.view for c in cameras]), torch.stack([c.intrinsics for c in cameras])
+    Views(torch.stack(wanted), views, intrinsics, extra).save(given.out / "held-out.npz")
 
 
 if __name__ == "__main__":

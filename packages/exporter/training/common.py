@@ -1,4 +1,4 @@
-"""What every trainer does alike: pictures with their cameras, held-out views, the record of a training."""
+"""What every trainer does alike: pictures with their cameras, held-out views, the loop, the record of a training."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rasterizer import Camera, Splats, picture
+from losses import psnr
+from rasterizer import Camera
 
 HELD_OUT_EVERY = 8
 
@@ -22,7 +23,8 @@ HELD_OUT_EVERY = 8
 @dataclass
 class Views:
     """Pictures (V,4,H,W), premultiplied, 0..1, with cameras: view matrices (V,4,4), intrinsics (V,3,3) in pixels. What
-    else changes from one picture to the next lies in `extra`, by name: times (V), poses (V,J,3), shapes (V,B)."""
+    else changes from one picture to the next lies in `extra`, by name: times (V), poses (V,J,3), shapes (V,B); of
+    photographs also valid and doubtful (V,1,H,W), see `losses.Photograph`."""
 
     pictures: Tensor
     views: Tensor
@@ -66,48 +68,84 @@ def seed(number: int) -> np.random.Generator:
     return np.random.default_rng(number)
 
 
-def psnr(found: Tensor, wanted: Tensor) -> float:
-    """Decibels between pictures in 0..1."""
-    return float(-10 * torch.log10((found.clamp(0, 1) - wanted).square().mean() + 1e-12))
+class Pace:
+    """How far a training has come, from 0 to 1: by its steps, or by the clock where that runs out first, so that a
+    rented machine is given back with a finished model. `done` counts the steps that were taken."""
+
+    def __init__(self, steps: int, seconds: float | None = None):
+        """`seconds` begin with the first step."""
+        self.steps, self.seconds, self.done = steps, seconds, 0
+
+    def __iter__(self) -> Iterator[float]:
+        """The progress at the beginning of each step."""
+        started = time.time()
+        while True:
+            late = 0.0 if self.seconds is None else (time.time() - started) / self.seconds
+            progress = max(self.done / self.steps, late)
+            if progress >= 1:
+                return
+            yield progress
+            self.done += 1
+
+    def part(self, share: float) -> Pace:
+        """A pace for this share of it."""
+        return Pace(max(int(self.steps * share), 1), None if self.seconds is None else self.seconds * share)
 
 
-def loss_of(found: Tensor, wanted: Tensor) -> Tensor:
-    """L1 over a random background, so that only coverage that is right looks right."""
-    background = torch.rand(3, 1, 1, device=found.device)
-    difference = found[:3] + background * (1 - found[3:]) - wanted[:3] - background * (1 - wanted[3:])
-    return difference.abs().mean()
+Optimizers = Sequence[torch.optim.Optimizer]
 
 
-Show = Callable[[int], Splats]
+def decayed(optimizers: Optimizers, progress: float, decay: float) -> None:
+    """Sets each group's rate to its share of what it began with: a group's own `decay`, or this one, at the end."""
+    for optimizer in optimizers:
+        for group in optimizer.param_groups:
+            first = group.setdefault("first_lr", group["lr"])
+            group["lr"] = first * group.get("decay", decay) ** progress
 
 
 def fit(
-    views: Views,
-    show: Show,
-    optimizer: torch.optim.Optimizer,
-    steps: int,
+    trained: Sequence[int],
+    loss_at: Callable[[int, float], Tensor],
+    optimizers: Optimizers,
+    pace: Pace,
     rng: np.random.Generator,
     decay: float = 0.05,
+    after: Callable[[int, float], None] | None = None,
 ) -> None:
-    """Trains on all pictures that are not held out, in random order; learning rates end at `decay` of their start."""
-    trained, _ = split(len(views.pictures))
-    schedule = torch.optim.lr_scheduler.ExponentialLR(optimizer, decay ** (1 / steps))
-    for step in range(steps):
-        index = int(rng.choice(trained))
-        loss = loss_of(picture(show(index), views.camera(index)), views.pictures[index])
-        optimizer.zero_grad(set_to_none=True)
+    """Trains on pictures in random order, each once before any comes again. `loss_at` takes a picture's number and the
+    progress; `after`, with the step and the progress, sees gradients before they are cleared."""
+    order: list[int] = []
+    for step, progress in enumerate(pace):
+        order = order or rng.permutation(np.asarray(trained)).tolist()
+        loss = loss_at(order.pop(), progress)
+        decayed(optimizers, progress, decay)
         loss.backward()
-        optimizer.step()
-        schedule.step()
-        if step % 1000 == 0 or step == steps - 1:
-            print(f"step {step}: loss {loss.item():.4f}", flush=True)
+        for optimizer in optimizers:
+            optimizer.step()
+        if after is not None:
+            after(step, progress)
+        for optimizer in optimizers:
+            optimizer.zero_grad(set_to_none=True)
+        if step % 1000 == 0:
+            print(f"step {step}, {progress:.0%}: loss {loss.item():.4f}", flush=True)
+
+
+Draw = Callable[[int], Tensor]
 
 
 @torch.no_grad()
-def held_out_psnr(views: Views, show: Show) -> float:
-    """Mean over held-out pictures, on black."""
+def held_out_psnr(views: Views, draw: Draw) -> float:
+    """Mean over held-out pictures, on black; `draw` gives one as (4,H,W)."""
     _, held = split(len(views.pictures))
-    scores = [psnr(picture(show(i), views.camera(i))[:3], views.pictures[i, :3]) for i in held]
+    return float(np.mean([psnr(draw(i)[:3], views.pictures[i, :3]) for i in held]))
+
+
+@torch.no_grad()
+def outline_psnr(views: Views, draw: Draw) -> float:
+    """As held_out_psnr, inside the scene's outline only: black around it is no merit."""
+    _, held = split(len(views.pictures))
+    inside = [views.pictures[i, 3] > 0.5 for i in held]
+    scores = [psnr(draw(i)[:3, m], views.pictures[i, :3, m]) for i, m in zip(held, inside, strict=True) if m.any()]
     return float(np.mean(scores))
 
 
@@ -117,10 +155,23 @@ def options(description: str, steps: int, argv: Sequence[str] | None, *positiona
     for name in positional:
         parser.add_argument(name, type=Path)
     parser.add_argument("out", type=Path, help="folder for the checkpoint and record.json")
-    parser.add_argument("--steps", type=int, default=steps)
-    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, help="how many anchors, Gaussians or channels; each trainer has its own")
+    add_pace(parser, steps)
     return parser.parse_args(argv)
+
+
+def add_pace(parser: argparse.ArgumentParser, steps: int) -> None:
+    """Options that say how long to train."""
+    parser.add_argument("--steps", type=int, default=steps)
+    parser.add_argument("--seconds", type=float, help="end after these, with all rates brought down, steps or no steps")
+    parser.add_argument("--seed", type=int, default=0)
+
+
+def plain(value: object) -> object:
+    """An option as the record keeps it: of paths the last part only."""
+    if isinstance(value, list):
+        return [plain(each) for each in value]
+    return value.name if isinstance(value, Path) else value
 
 
 class Record:
@@ -130,7 +181,7 @@ class Record:
         """Starts the clock."""
         self._facts: dict[str, object] = {
             "trainer": Path(sys.modules["__main__"].__file__ or "").name,
-            "options": {key: str(value) if isinstance(value, Path) else value for key, value in vars(given).items()},
+            "options": {key: plain(value) for key, value in vars(given).items()},
         }
         self._out: Path = given.out
         self._started = time.time()

@@ -1,4 +1,4 @@
-"""Trains a 4DGS: python hexplane.py VIEWS.npz POINTS.npy OUT [--steps 15000] [--count 20000]
+"""Trains a 4DGS: python hexplane.py VIEWS.npz POINTS.npy OUT [--steps 15000] [--count 30000]
 
 VIEWS hold `times` in 0..1. The first fifth of the steps finds the resting Gaussians, the rest their motion, too.
 Gaussians are neither grown nor pruned. OUT is the folder that `gaussian-export hexplane` reads.
@@ -14,14 +14,18 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from common import Record, Views, device, fit, held_out_psnr, load_views, options, seed
+from common import Pace, Record, Views, device, fit, held_out_psnr, load_views, options, outline_psnr, seed, split
+from losses import loss_of
 from ply import write_ply
-from rasterizer import Splats, covariances
+from rasterizer import Splats, covariances, picture
+from show import held_out_sheet
 
 PLANES = list(combinations(range(4), 2))
 SH_C0 = 0.28209479177387814
 CHANNELS, WIDTH = 16, 64
 RESOLUTIONS, TIMES = (32, 64), 25
+# Planes are to be smooth, and those of time to change evenly.
+SMOOTH_WEIGHT, EVEN_WEIGHT = 2e-4, 2e-3
 
 
 class Moving(nn.Module):
@@ -86,6 +90,19 @@ class Moving(nn.Module):
         opacities = torch.sigmoid(self.opacity_logits[:, 0])
         return Splats(moved(self.positions, self.pos_deform), full, colors, opacities)
 
+    def roughness(self) -> Tensor:
+        """What planes should have little of: steps between neighbours, and, along time, changes of steps."""
+        total = torch.zeros((), device=self.positions.device)
+        for planes in self.grids:
+            for plane, (_, second) in zip(planes, PLANES, strict=True):
+                across, down = plane.diff(dim=3), plane.diff(dim=2)
+                total = total + SMOOTH_WEIGHT * across.square().mean()
+                if second == 3:
+                    total = total + EVEN_WEIGHT * down.diff(dim=2).square().mean()
+                else:
+                    total = total + SMOOTH_WEIGHT * down.square().mean()
+        return total
+
     def save(self, folder: Path) -> None:
         """In the layout of 4DGaussians."""
         inner = folder / "point_cloud" / "iteration_1"
@@ -107,26 +124,49 @@ class Moving(nn.Module):
         (folder / "cfg_args").write_text("Namespace(no_do=True, no_dshs=True, sh_degree=0)")
 
 
-def train(views: Views, points: np.ndarray, steps: int, count: int, number: int) -> tuple[Moving, float]:
-    """The model, and its PSNR on held-out views."""
+def start_points(points: np.ndarray, count: int, rng: np.random.Generator) -> tuple[np.ndarray, float]:
+    """`count` places near the points, more than one at a point if there are too few, and how far apart they are."""
+    few = points[rng.permutation(len(points))[:2000]]
+    gaps = np.linalg.norm(few[:, None] - few[None], axis=2) + 1e9 * np.eye(len(few))
+    spacing = float(np.median(gaps.min(1))) * (len(few) / max(len(points), 1)) ** 0.5
+    chosen = points[rng.choice(len(points), count, replace=count > len(points))]
+    return chosen + rng.normal(size=chosen.shape) * spacing * 0.3, spacing
+
+
+def train(views: Views, points: np.ndarray, pace: Pace, count: int, number: int) -> tuple[Moving, dict[str, float]]:
+    """The model, and its PSNR on held-out views, each of which is also a time of its own."""
     rng = seed(number)
-    chosen = rng.choice(len(points), min(count, len(points)), replace=False)
-    spacing = float(np.ptp(points, 0).max()) / len(chosen) ** 0.5 / 2
-    model = Moving(torch.tensor(points[chosen], dtype=torch.float32), spacing).to(views.pictures.device)
+    start, spacing = start_points(points, count, rng)
+    model = Moving(torch.tensor(start, dtype=torch.float32), spacing).to(views.pictures.device)
     resting = [
-        {"params": [model.positions], "lr": 1.6e-4},
-        {"params": [model.log_scales], "lr": 5e-3},
-        {"params": [model.rotations], "lr": 1e-3},
-        {"params": [model.opacity_logits], "lr": 3e-2},
-        {"params": [model.dc], "lr": 1e-2},
+        {"params": [model.positions], "lr": 1.6e-4, "decay": 0.02},
+        {"params": [model.log_scales], "lr": 5e-3, "decay": 0.2},
+        {"params": [model.rotations], "lr": 2e-3, "decay": 0.2},
+        {"params": [model.opacity_logits], "lr": 3e-2, "decay": 0.2},
+        {"params": [model.dc], "lr": 1e-2, "decay": 0.1},
     ]
-    first = max(steps // 5, 1)
-    fit(views, lambda i: model(None), torch.optim.Adam(resting), first, rng, decay=0.5)
     heads = [p for name, p in model.named_parameters() if "deform" in name or name.startswith("feature_out")]
-    moving = [{"params": list(model.grids.parameters()), "lr": 1e-2}, {"params": heads, "lr": 1e-3}]
+    moving = [
+        {"params": list(model.grids.parameters()), "lr": 1e-2, "decay": 0.05},
+        {"params": heads, "lr": 1e-3, "decay": 0.05},
+    ]
     times = views.extra["times"][:, None]
-    fit(views, lambda i: model(times[i]), torch.optim.Adam([*resting, *moving]), steps, rng)
-    return model, held_out_psnr(views, lambda i: model(times[i]))
+    trained, _ = split(len(views.pictures))
+    still = torch.optim.Adam(resting, eps=1e-15)
+    optimizers = [still, torch.optim.Adam(moving, eps=1e-15)]
+
+    def rest_loss(index: int, progress: float) -> Tensor:
+        return loss_of(picture(model(None), views.camera(index)), views.pictures[index])
+
+    def draw(index: int) -> Tensor:
+        return picture(model(times[index]), views.camera(index))
+
+    first = pace.part(0.08)
+    fit(trained, rest_loss, [still], first, rng, decay=1.0)
+    rest = Pace(max(pace.steps - first.done, 1), None if pace.seconds is None else pace.seconds * 0.92)
+    fit(trained, lambda i, _: loss_of(draw(i), views.pictures[i]) + model.roughness(), optimizers, rest, rng)
+    pace.done = first.done + rest.done
+    return model, {"held_out_psnr": held_out_psnr(views, draw), "outline_psnr": outline_psnr(views, draw)}
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -134,9 +174,12 @@ def main(argv: Sequence[str] | None = None) -> None:
     given = options(__doc__ or "", 15_000, argv, "views", "points")
     record = Record(given)
     views, points = load_views(given.views, device()), np.load(given.points)
-    model, score = train(views, points, given.steps, given.count or 20_000, given.seed)
+    pace = Pace(given.steps, given.seconds)
+    model, scores = train(views, points, pace, given.count or 30_000, given.seed)
     model.save(given.out)
-    record.write(held_out_psnr=score, gaussians=len(model.positions))
+    record.write(**scores, steps=pace.done, gaussians=len(model.positions))
+    times = views.extra["times"][:, None]
+    held_out_sheet(given.out / "held-out", views, lambda i: picture(model(times[i]), views.camera(i)))
 
 
 if __name__ == "__main__":

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-# Vertices of the body itself; the rest are helpers for clothes and joints.
-BODY = 13380
+# Vertices of the body itself and of the eyeballs, first and one past the last; the rest are helpers for hair, clothes
+# and joints.
+PARTS = {"skin": [(0, 13380)], "eye": [(14598, 14670), (14670, 14742)]}
 # Units of the files are decimetres, y up; the trainers' frame is metres, y down, facing -z (OpenCV's camera at -z).
 TO_METRES = np.array([0.1, -0.1, -0.1])
 
@@ -19,7 +20,7 @@ TO_METRES = np.array([0.1, -0.1, -0.1])
 @dataclass
 class Body:
     """vertices (V,3) metres, y down; triangles (T,3); weights (V,J); joints (J,3); parents first; directions (V,3,B)
-    and joint_directions (J,3,B) of the targets."""
+    and joint_directions (J,3,B) of the targets; parts (V): which of PARTS a vertex belongs to, as an index."""
 
     vertices: np.ndarray
     triangles: np.ndarray
@@ -29,6 +30,7 @@ class Body:
     names: list[str]
     directions: np.ndarray
     joint_directions: np.ndarray
+    parts: np.ndarray
 
 
 def read_body(folder: Path, rig: str = "game_engine") -> Body:
@@ -36,7 +38,14 @@ def read_body(folder: Path, rig: str = "game_engine") -> Body:
     lines = (folder / "3dobjs_base.obj").read_text().splitlines()
     every = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float) * TO_METRES
     faces = [[int(c.split("/")[0]) - 1 for c in line.split()[1:]] for line in lines if line.startswith("f ")]
-    triangles = [[f[0], f[i], f[i + 1]] for f in faces if max(f) < BODY for i in range(1, len(f) - 1)]
+    number, parts = np.full(len(every), -1), np.full(len(every), -1)
+    for index, ranges in enumerate(PARTS.values()):
+        for first, end in ranges:
+            parts[first:end] = index
+    used = np.nonzero(parts >= 0)[0]
+    number[used] = np.arange(len(used))
+    shown = [f for f in faces if (number[f] >= 0).all()]
+    triangles = [[f[0], f[i], f[i + 1]] for f in shown for i in range(1, len(f) - 1)]
     bones = json.loads((folder / f"rigs_standard_rig.{rig}.json").read_text())
     groups = json.loads((folder / "mesh_metadata_basemesh_vertex_groups.json").read_text())
     names = parents_first(bones)
@@ -44,24 +53,25 @@ def read_body(folder: Path, rig: str = "game_engine") -> Body:
     for row, name in enumerate(names):
         picked = head_vertices(bones[name]["head"], groups)
         heads[row, picked] = 1 / len(picked)
-    weights = np.zeros((BODY, len(names)))
+    weights = np.zeros((len(every), len(names)))
     listed = json.loads((folder / f"rigs_standard_weights.{rig}.json").read_text())["weights"]
     for column, name in enumerate(names):
         for vertex, weight in listed.get(name, []):
-            if vertex < BODY:
-                weights[vertex, column] = weight
+            weights[vertex, column] = weight
+    weights = weights[used]
     weights[weights.sum(1) == 0, 0] = 1
     targets = [read_target(path, len(every)) for path in sorted(folder.glob("*.target.gz"))]
     moves = np.stack(targets, 2) if targets else np.zeros((len(every), 3, 0))
     return Body(
-        every[:BODY],
-        np.array(triangles),
+        every[used],
+        number[np.array(triangles)],
         weights / weights.sum(1, keepdims=True),
         heads @ every,
         [names.index(bones[name]["parent"]) if bones[name]["parent"] else -1 for name in names],
         names,
-        moves[:BODY],
+        moves[used],
         np.einsum("jv,vcb->jcb", heads, moves),
+        parts[used],
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -55,10 +56,17 @@ def covariances(scales: Tensor, quaternions: Tensor) -> Tensor:
 
 def picture(splats: Splats, camera: Camera) -> Tensor:
     """Premultiplied colour and alpha (4,H,W)."""
-    return with_gsplat(splats, camera) if splats.positions.is_cuda else summed(splats, camera)
+    return pictures(splats, [camera])[0]
 
 
-def with_gsplat(splats: Splats, camera: Camera) -> Tensor:
+def pictures(splats: Splats, cameras: Sequence[Camera]) -> Tensor:
+    """The same Gaussians for cameras of one size (C,4,H,W)."""
+    if splats.positions.is_cuda:
+        return with_gsplat(splats, cameras)
+    return torch.stack([summed(splats, camera) for camera in cameras])
+
+
+def with_gsplat(splats: Splats, cameras: Sequence[Camera]) -> Tensor:
     """By gsplat's CUDA rasterizer."""
     from gsplat import rasterization
 
@@ -69,14 +77,14 @@ def with_gsplat(splats: Splats, camera: Camera) -> Tensor:
         covars=splats.covariances,
         opacities=splats.opacities,
         colors=splats.colors,
-        viewmats=camera.view[None],
-        Ks=camera.intrinsics[None],
-        width=camera.width,
-        height=camera.height,
+        viewmats=torch.stack([camera.view for camera in cameras]),
+        Ks=torch.stack([camera.intrinsics for camera in cameras]),
+        width=cameras[0].width,
+        height=cameras[0].height,
         near_plane=NEAR,
         packed=False,
     )
-    return torch.cat([colour[0], alpha[0]], -1).permute(2, 0, 1)
+    return torch.cat([colour, alpha], -1).permute(0, 3, 1, 2)
 
 
 def summed(splats: Splats, camera: Camera) -> Tensor:

@@ -1,7 +1,8 @@
-"""Trains a Scaffold-GS: python scaffold.py VIEWS.npz POINTS.npy OUT [--steps 15000] [--count 20000]
+"""Trains a Scaffold-GS: python scaffold.py VIEWS.npz POINTS.npy OUT [--steps 15000] [--count 16000]
 
-POINTS (N,3) lie on or near the surface; anchors are the voxels they fall into, `count` of them at most. Anchors are
-neither grown nor pruned. OUT is the folder that `gaussian-export scaffold` reads.
+POINTS (N,3) lie on or near the surface; anchors are the voxels they fall into. Until half of the training, anchors that
+nobody sees are dropped and new ones made where Gaussians are pulled most, up to `count`. OUT is the folder that
+`gaussian-export scaffold` reads.
 """
 
 from __future__ import annotations
@@ -13,12 +14,20 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from common import Record, Views, device, fit, held_out_psnr, load_views, options, seed
+from anchors import Watch, free_cells, replace_rows
+from common import Optimizers, Pace, Record, Views, device, fit, held_out_psnr, load_views, options, seed, split
+from photographs import Exposures, photograph, photograph_psnr
 from ply import write_ply
-from rasterizer import Splats, covariances
+from rasterizer import Splats, covariances, picture
+from show import held_out_sheet
 
 FEATURES = 32
 OFFSETS = 5
+ROWS = ["anchors", "features", "offsets", "log_scales"]
+# Growth: between these shares of the training, once in so many steps.
+GROW_FROM, GROW_UNTIL, GROW_EVERY = 0.03, 0.5, 100
+LEAST_OPACITY = 0.005
+VOLUME_WEIGHT = 0.01
 
 
 class Scaffold(nn.Module):
@@ -67,7 +76,7 @@ class Scaffold(nn.Module):
             "scale_": self.log_scales,
         }
         write_ply(inner / "point_cloud.ply", groups)
-        networks = {name: getattr(self, name).state_dict() for name in ("opacity_mlp", "cov_mlp", "color_mlp")}
+        networks = {name: getattr(self, name).cpu().state_dict() for name in ("opacity_mlp", "cov_mlp", "color_mlp")}
         torch.save(networks, inner / "checkpoints.pth")
         k, features = self.offsets.shape[1], self.features.shape[1]
         (folder / "cfg_args").write_text(f"Namespace(feat_dim={features}, n_offsets={k}, appearance_dim=0)")
@@ -81,16 +90,92 @@ def voxels(points: np.ndarray, count: int) -> tuple[Tensor, float]:
     return torch.tensor(cells * width, dtype=torch.float32), width
 
 
-def train(views: Views, points: np.ndarray, steps: int, count: int, number: int) -> tuple[Scaffold, float]:
+def optimizers_of(model: Scaffold, exposures: Exposures) -> list[torch.optim.Optimizer]:
+    """Adam, with rates of the paper's kind; all decay."""
+    groups = [
+        {"params": [model.anchors], "lr": 1e-5},
+        {"params": [model.offsets], "lr": 1e-2, "decay": 0.01},
+        {"params": [model.features], "lr": 7.5e-3, "decay": 0.2},
+        {"params": [model.log_scales], "lr": 7e-3, "decay": 0.2},
+        {"params": list(model.opacity_mlp.parameters()), "lr": 2e-3, "decay": 0.01},
+        {"params": list(model.cov_mlp.parameters()), "lr": 4e-3, "decay": 0.1},
+        {"params": list(model.color_mlp.parameters()), "lr": 8e-3, "decay": 0.01},
+    ]
+    return [torch.optim.Adam(groups, eps=1e-15), torch.optim.Adam(exposures.parameters(), lr=2e-3)]
+
+
+class Growth:
+    """Drops anchors that are not seen, makes new ones where Gaussians are pulled most."""
+
+    def __init__(self, model: Scaffold, optimizers: Optimizers, voxel: float, most: int):
+        """`voxel`: no two new anchors share a voxel this wide."""
+        self.model, self.optimizers, self.voxel, self.most = model, optimizers, voxel, most
+        self.watch, self.last = self.fresh(), 0.0
+
+    def fresh(self) -> Watch:
+        """Begins to watch anew."""
+        return Watch(*self.model.offsets.shape[:2], self.model.anchors.device)
+
+    def after(self, splats: Splats, step: int, progress: float) -> None:
+        """After each step."""
+        if progress > GROW_UNTIL or splats.positions.grad is None:
+            return
+        self.watch.note(splats.positions.grad, splats.opacities)
+        if step % GROW_EVERY == GROW_EVERY - 1 and progress > GROW_FROM:
+            self.change(splats, progress)
+            self.watch = self.fresh()
+
+    @torch.no_grad()
+    def change(self, splats: Splats, progress: float) -> None:
+        """One round; the count grows evenly until GROW_UNTIL."""
+        model = self.model
+        kept = torch.nonzero(self.watch.alive(LEAST_OPACITY))[:, 0]
+        room = self.most - len(kept)
+        since, self.last = progress - self.last, progress
+        share = since / max(GROW_UNTIL - progress, since)
+        wanted = self.watch.wanted()[: 8 * room]
+        # Voxels shrink as training goes on: coarse structure first.
+        width = self.voxel * (4 if progress < GROW_UNTIL / 3 else 2 if progress < GROW_UNTIL * 2 / 3 else 1)
+        chosen = free_cells(splats.positions.detach()[wanted], model.anchors[kept], width, max(room, 0))
+        parents = wanted[chosen[: int(np.ceil(room * share))]]
+        owner = torch.div(parents, model.offsets.shape[1], rounding_mode="floor")
+        size = torch.full((len(parents), 6), float(np.log(width)), device=parents.device)
+        added = {
+            "anchors": splats.positions.detach()[parents],
+            "features": model.features[owner],
+            "offsets": torch.randn(len(parents), *model.offsets.shape[1:], device=parents.device) * 0.3,
+            "log_scales": torch.minimum(model.log_scales[owner], size),
+        }
+        replace_rows(model, ROWS, kept, added, self.optimizers)
+
+
+def train(views: Views, points: np.ndarray, pace: Pace, count: int, number: int) -> tuple[Scaffold, dict[str, float]]:
     """The model, and its PSNR on held-out views."""
     rng = seed(number)
-    model = Scaffold(*voxels(points, count)).to(views.pictures.device)
+    anchors, width = voxels(points, max(count // 2, 1))
+    model = Scaffold(anchors, width).to(views.pictures.device)
+    exposures = Exposures(len(views.pictures)).to(views.pictures.device)
+    optimizers = optimizers_of(model, exposures)
+    growth = Growth(model, optimizers, width / 4, count)
     eyes = [views.camera(i).position for i in range(len(views.pictures))]
-    slow = [{"params": [model.anchors], "lr": 1e-5}, {"params": [model.offsets], "lr": 5e-3}]
-    networks = [p for name in ("opacity_mlp", "cov_mlp", "color_mlp") for p in getattr(model, name).parameters()]
-    fast = [{"params": [model.features, model.log_scales], "lr": 7e-3}, {"params": networks, "lr": 4e-3}]
-    fit(views, lambda i: model(eyes[i]), torch.optim.Adam([*slow, *fast]), steps, rng)
-    return model, held_out_psnr(views, lambda i: model(eyes[i]))
+    latest: list[Splats] = []
+
+    def loss_at(index: int, progress: float) -> Tensor:
+        splats = model(eyes[index])
+        splats.positions.retain_grad()
+        latest[:] = [splats]
+        drawn = exposures.exposed(picture(splats, views.camera(index)), index)
+        volume = torch.exp(model.log_scales[:, 3:]).prod(1).mean()
+        return photograph(views, index).loss(drawn) + VOLUME_WEIGHT * volume
+
+    def draw(index: int) -> Tensor:
+        return picture(model(eyes[index]), views.camera(index))
+
+    trained, _ = split(len(views.pictures))
+    fit(trained, loss_at, optimizers, pace, rng, after=lambda step, progress: growth.after(latest[0], step, progress))
+    alive = torch.stack([model(eye).opacities > 1 / 255 for eye in eyes[:8]]).any(0).float().mean().item()
+    scores = {"held_out_psnr": photograph_psnr(views, draw), "whole_picture_psnr": held_out_psnr(views, draw)}
+    return model, {**scores, "share_ever_visible": round(alive, 3)}
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -98,9 +183,12 @@ def main(argv: Sequence[str] | None = None) -> None:
     given = options(__doc__ or "", 15_000, argv, "views", "points")
     record = Record(given)
     views, points = load_views(given.views, device()), np.load(given.points)
-    model, score = train(views, points, given.steps, given.count or 20_000, given.seed)
+    pace = Pace(given.steps, given.seconds)
+    model, scores = train(views, points, pace, given.count or 16_000, given.seed)
+    record.write(**scores, steps=pace.done, anchors=len(model.anchors), gaussians=len(model.anchors) * OFFSETS)
+    cameras = [views.camera(i) for i in range(len(views.pictures))]
+    held_out_sheet(given.out / "held-out", views, lambda i: picture(model(cameras[i].position), cameras[i]))
     model.save(given.out)
-    record.write(held_out_psnr=score, anchors=len(model.anchors), gaussians=len(model.anchors) * OFFSETS)
 
 
 if __name__ == "__main__":

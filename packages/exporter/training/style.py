@@ -1,4 +1,4 @@
-"""Trains a post-processor: python style.py VIEWS.npz OUT [--kind oil|denoise] [--steps 8000] [--count 16]
+"""Trains a post-processor: python style.py OUT VIEWS.npz [VIEWS.npz ...] [--kind oil|denoise]
 
 `oil` imitates a Kuwahara filter, which takes hundreds of reads for each pixel, with a small network; `denoise` takes
 added noise off. `--count` is the number of channels, a multiple of 4. No weights of anybody else are needed. OUT is the
@@ -17,11 +17,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-from common import Record, device, load_views, psnr, seed, split
+from common import Pace, Record, add_pace, decayed, device, load_views, seed, split
+from losses import psnr
+from show import sheet
 
 RADIUS = 6
 NOISE = 0.08
-CROP = 256
+CROP, BATCH = 128, 8
 
 
 class Filter(nn.Module):
@@ -80,50 +82,75 @@ def pair(kind: str, image: Tensor) -> tuple[Tensor, Tensor]:
     return (image + NOISE * torch.randn_like(image)).clamp(0, 1), image
 
 
-def train(pictures: Tensor, kind: str, steps: int, channels: int, number: int) -> tuple[Filter, dict[str, float]]:
-    """The network; its PSNR on held-out pictures, and what leaving them as they are would score."""
+def backed(pictures: Tensor, backgrounds: Tensor) -> Tensor:
+    """Premultiplied pictures (B,4,H,W) over plain backgrounds (B,3): black around a scene teaches little."""
+    return pictures[:, :3] + (1 - pictures[:, 3:]) * backgrounds[:, :, None, None]
+
+
+def train(
+    scenes: list[Tensor], kind: str, pace: Pace, channels: int, number: int, halvings: int = 1
+) -> tuple[Filter, dict[str, float]]:
+    """The network of pictures (V,4,H,W), a tensor for each size; its PSNR on held-out ones, and what leaving them as
+    they are would score."""
     rng = seed(number)
-    model = Filter("picture" if kind == "oil" else "noise", channels).to(pictures.device)
-    optimizer = torch.optim.Adam(model.parameters(), lr=1e-3)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)
-    trained, held = split(len(pictures))
-    rows, columns = (side // 2 * 2 for side in pictures.shape[2:])
-    height, width = min(CROP, rows), min(CROP, columns)
-    for step in range(steps):
+    where = scenes[0].device
+    # What is taken off the picture is learned for both: a sigmoid never reaches white.
+    model = Filter("noise", channels, halvings).to(where)
+    optimizer = torch.optim.Adam(model.parameters(), lr=2e-3)
+    for step, progress in enumerate(pace):
+        pictures = scenes[int(rng.integers(len(scenes)))]
+        trained, _ = split(len(pictures))
+        rows, columns = (side // 2 * 2 for side in pictures.shape[2:])
+        height, width = min(CROP, rows), min(CROP, columns)
         top, left = int(rng.integers(0, rows - height + 1)), int(rng.integers(0, columns - width + 1))
-        index = rng.choice(trained, min(4, len(trained)))
+        index = rng.choice(trained, min(BATCH, len(trained)))
         image = pictures[index, :, top : top + height, left : left + width]
-        given, wanted = pair(kind, image)
+        given, wanted = pair(kind, backed(image, torch.rand(len(index), 3, device=where)))
         loss = (model(given) - wanted).abs().mean()
         optimizer.zero_grad(set_to_none=True)
+        decayed([optimizer], progress, 0.01)
         loss.backward()
         optimizer.step()
-        schedule.step()
-        if step % 500 == 0 or step == steps - 1:
-            print(f"step {step}: loss {loss.item():.4f}", flush=True)
-    with torch.no_grad():
-        pairs = [pair(kind, pictures[i : i + 1, :, :rows, :columns]) for i in held]
-        score = float(np.mean([psnr(model(given), wanted) for given, wanted in pairs]))
-        untouched = float(np.mean([psnr(given, wanted) for given, wanted in pairs]))
-    return model, {"held_out_psnr": score, "untouched_psnr": untouched}
+        if step % 1000 == 0:
+            print(f"step {step}, {progress:.0%}: loss {loss.item():.4f}", flush=True)
+    return model, measured(model, kind, scenes)
+
+
+@torch.no_grad()
+def measured(model: Filter, kind: str, scenes: list[Tensor]) -> dict[str, float]:
+    """PSNR of held-out pictures over white, filtered and as they are."""
+    found, untouched = [], []
+    for pictures in scenes:
+        rows, columns = (side // 2 * 2 for side in pictures.shape[2:])
+        for i in split(len(pictures))[1]:
+            whole = backed(pictures[i : i + 1, :, :rows, :columns], torch.ones(1, 3, device=pictures.device))
+            given, wanted = pair(kind, whole)
+            found.append(psnr(model(given), wanted))
+            untouched.append(psnr(given, wanted))
+    return {"held_out_psnr": float(np.mean(found)), "untouched_psnr": float(np.mean(untouched))}
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("views", type=Path)
     parser.add_argument("out", type=Path)
+    parser.add_argument("views", type=Path, nargs="+")
     parser.add_argument("--kind", choices=("oil", "denoise"), default="oil")
-    parser.add_argument("--steps", type=int, default=8_000)
     parser.add_argument("--count", type=int, default=16)
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--halvings", type=int, default=1, help="0 keeps every pixel, at four times the work")
+    add_pace(parser, 8_000)
     given = parser.parse_args(argv)
-    record = Record(given)
-    views = load_views(given.views, device())
-    model, scores = train(views.pictures[:, :3], given.kind, given.steps, given.count, given.seed)
-    height, width = views.pictures.shape[2:]
+    record, pace = Record(given), Pace(given.steps, given.seconds)
+    scenes = [load_views(path, device()).pictures for path in given.views]
+    model, scores = train(scenes, given.kind, pace, given.count, given.seed, given.halvings)
+    height, width = scenes[0].shape[2:]
     model.save(given.out, width // 4 * 4, height // 4 * 4)
-    record.write(**scores)
+    record.write(**scores, steps=pace.done)
+    with torch.no_grad():
+        held = [backed(s[4:5], torch.ones(1, 3, device=s.device)) for s in scenes if s.shape == scenes[0].shape]
+        pairs = [pair(given.kind, picture) for picture in held]
+        shown = [model(noisy)[0] for noisy, _ in pairs]
+    sheet(given.out / "held-out.png", [wanted[0] for _, wanted in pairs], shown)
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ from .families.feed_forward import export_feed_forward
 from .families.hexplane import export_hexplane
 from .families.image_filter import export_image_filter
 from .families.scaffold import export_scaffold
+from .graph import Weights
 from .outputs import Options, save
 from .placement import gpu_findings
 
@@ -72,6 +73,7 @@ def add_common(family: Command) -> None:
     facts.add_argument("--fps", type=float)
     written = family.add_argument_group("output")
     written.add_argument("--layout", choices=get_args(Layout), help="default: packed, or split with float16")
+    written.add_argument("--weights", choices=get_args(Weights), default="float32", help="compact: in 16 bits")
     written.add_argument("--dtype", choices=get_args(DType), default="float32", help="float16 needs shader-f16")
 
 
@@ -93,7 +95,7 @@ def facts_of(given: argparse.Namespace) -> Facts:
 def export(given: argparse.Namespace) -> None:
     """Reads the checkpoint, writes the file, and reports on it."""
     _, _, build = FAMILIES[given.family]
-    model = build(given, facts_of(given), Options(given.layout, given.dtype))
+    model = build(given, facts_of(given), Options(given.layout, given.dtype, given.weights))
     size = save(model, str(given.out))
     shapes = ", ".join(f"{o.name} {[d.dim_value for d in o.type.tensor_type.shape.dim]}" for o in model.graph.output)
     print(f"{given.out}: {size:,} bytes, {len(model.graph.node)} nodes, writes {shapes}")

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
 from math import prod
+from typing import Literal
 
 import numpy as np
 import onnx
@@ -24,7 +25,13 @@ IR_VERSION = 8
 # A WebGPU device of default limits binds 8 storage buffers to a shader: 7 inputs and one output.
 MOST_CONCAT_INPUTS = 7
 
+# Tables of fewer numbers stay float32 also in compact files: there is little to save.
+LEAST_COMPACT = 4096
+
 Shape = tuple[int, ...]
+# How large tables lie in a file: as float32, or in 16 bits.
+Weights = Literal["float32", "compact"]
+Errors = Literal["relative", "even", "none"]
 Number = float | int
 
 
@@ -140,9 +147,10 @@ def wrong_shape(operator: str, expected: str, found: str) -> ExportError:
 class Graph:
     """One ONNX graph being built. Inputs first, then operators on tensors, then outputs, then `model`."""
 
-    def __init__(self, name: str):
-        """`name` is the graph's name inside the file."""
+    def __init__(self, name: str, weights: Weights = "float32"):
+        """`name` is the graph's name inside the file; `weights`: how large tables of numbers lie in it."""
         self.name = name
+        self._weights = weights
         self._nodes: list[onnx.NodeProto] = []
         self._inputs: list[onnx.ValueInfoProto] = []
         self._outputs: list[onnx.ValueInfoProto] = []
@@ -154,8 +162,16 @@ class Graph:
         self._inputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, shape))
         return Tensor(self, name, shape)
 
-    def constant(self, value: AnyArray | Sequence[Number], name: str = "constant") -> Tensor:
-        """Numbers baked into the file as float32. Equal arrays are stored once. Not finite numbers are refused."""
+    def constant(
+        self, value: AnyArray | Sequence[Number], name: str = "constant", errors: Errors = "relative"
+    ) -> Tensor:
+        """Numbers baked into the file as float32. Equal arrays are stored once. Not finite numbers are refused.
+
+        With `weights="compact"` large tables are stored in 16 bits and become float32 when the session is made: as
+        float16 where errors may be `relative`; as whole numbers between each column's least and greatest where they
+        must be alike everywhere (`even`: places, and shares that sum to 1); not at all if they would do harm (`none`:
+        covariances of needles are not positive definite any more).
+        """
         array = np.ascontiguousarray(np.asarray(value, np.float32))
         if not np.isfinite(array).all():
             raise ExportError(
@@ -165,7 +181,27 @@ class Graph:
                 found=f"{int((~np.isfinite(array)).sum())} of {array.size} not finite",
                 remedy="training diverged or the file is damaged; export an earlier checkpoint",
             )
-        return self._initializer(array, name)
+        if self._weights == "float32" or errors == "none" or array.size < LEAST_COMPACT:
+            return self._initializer(array, name)
+        return self._evenly_spaced(array, name) if errors == "even" else self._halved(array, name)
+
+    def _halved(self, array: AnyArray, name: str) -> Tensor:
+        if np.abs(array).max() > np.finfo(np.float16).max:
+            return self._initializer(array, name)
+        return self._widened(self._initializer(array.astype(np.float16), name))
+
+    def _evenly_spaced(self, array: AnyArray, name: str) -> Tensor:
+        columns = array.reshape(-1, array.shape[-1]).astype(np.float64)
+        low, high = columns.min(0), columns.max(0)
+        step = np.where(high > low, (high - low) / 65535, 1)
+        whole = np.round((columns - low) / step).astype(np.uint16).reshape(array.shape)
+        # Upper and lower bytes: builds of the runtime for the web cannot turn uint16 into float32.
+        upper, lower = (whole >> 8).astype(np.uint8), (whole & 255).astype(np.uint8)
+        wide = self._widened(self._initializer(upper, name)) * 256 + self._widened(self._initializer(lower, name))
+        return wide * self._initializer(step.astype(np.float32), name) + self._initializer(low.astype(np.float32), name)
+
+    def _widened(self, stored: Tensor) -> Tensor:
+        return self.node("Cast", [stored], stored.shape, to=TensorProto.FLOAT)
 
     def scalar(self, value: Number) -> Tensor:
         """One number, without axes."""

@@ -10,18 +10,20 @@ import onnx
 from .arrays import AnyArray
 from .contract import DType, Facts, GaussianOutputs, Input, Layout, Shape, gaussian_contract, metadata
 from .errors import ExportError
-from .graph import Graph, Tensor
+from .graph import Graph, Tensor, Weights
 from .pieces.covariance import covariance_of_scale_and_rotation
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a generator is written. float16 halves what it writes and needs the device feature shader-f16. The default
-    layout is packed in float32, and split in float16: there scales and rotations take the place of covariances, since
-    float16 makes those of needles and discs indefinite."""
+    """How a generator is written. dtype float16 halves what it writes and needs the device feature shader-f16. The
+    default layout is packed in float32, and split in float16: there scales and rotations take the place of covariances,
+    since float16 makes those of needles and discs indefinite. Weights `compact` halve the file, and nothing else:
+    tables are float32 again when the session is made."""
 
     layout: Layout | None = None
     dtype: DType = "float32"
+    weights: Weights = "float32"
 
     @property
     def writes_axes(self) -> bool:

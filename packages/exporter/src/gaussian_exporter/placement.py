@@ -100,6 +100,7 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
         # What hangs on constants alone is computed once, when the session is made.
         if node.input and all(name in values.constants or not name for name in node.input):
             values.constants.update(node.output)
+            found += _of_constants(node, values)
             continue
         found += [finding for rule in _RULES for finding in rule(node, opset, values)]
     return found
@@ -118,6 +119,13 @@ def _of_file(model: onnx.ModelProto, opset: int, values: _Values) -> Iterator[Fi
         if values.types.get(value.name) == TensorProto.FLOAT16:
             reason = f"{value.name} is float16, which needs shader-f16 (Chromium hides it on NVIDIA under Linux)"
             yield Finding("failure", value.name, "type", reason, "offer a float32 file, too")
+
+
+def _of_constants(node: onnx.NodeProto, values: _Values) -> Iterator[Finding]:
+    kind = values.types.get(node.input[0])
+    if node.op_type == "Cast" and kind in (TensorProto.UINT16, TensorProto.INT16, TensorProto.UINT32):
+        reason = f"{node.input[0]} is {helper.tensor_dtype_to_np_dtype(kind)}, which builds for the web cannot cast"
+        yield Finding("failure", node.name, "Cast", reason, "store uint8 (two of them for 16 bits), float16 or int32")
 
 
 def _kernel(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:

@@ -60,19 +60,20 @@ def export_avatar(
     camera has from the limb's own frame. `bounds` are those of the rest pose.
     """
     check(avatar)
-    graph = Graph("avatar")
+    options = options or Options()
+    graph = Graph("avatar", options.weights)
     quaternions = pose_format == "quaternion"
     given = graph.input("pose", len(avatar.parents), 4 if quaternions else 3)
     rotations = rotation_matrix(given) if quaternions else rotation_of_axis_angle(given)
     inputs = [pose("pose", avatar.joint_names, avatar.parents, quaternions)]
     positions, joints = blended(avatar, graph, rotations, inputs)
     frames = posed_joints(rotations, relative_to_parent(joints, avatar.parents), avatar.parents)
-    carried = graph.constant(avatar.weights, "weights") @ skinning_matrices(frames, joints)
+    carried = graph.constant(avatar.weights, "weights", errors="even") @ skinning_matrices(frames, joints)
     translation = graph.input("translation", 3)
     inputs.append(control("translation", 0.0, -10.0, 10.0))
     gaussians = skinned(avatar, graph, positions, carried, translation, inputs)
     bounds = avatar.positions.min(0), avatar.positions.max(0)
-    return finish(graph, gaussians, inputs, bounds, facts, options or Options())
+    return finish(graph, gaussians, inputs, bounds, facts, options)
 
 
 def check(avatar: Avatar) -> None:
@@ -111,7 +112,7 @@ def _demand(holds: bool, where: str, expected: str, found: str) -> None:
 
 def blended(avatar: Avatar, graph: Graph, rotations: Tensor, inputs: list[Input]) -> tuple[Tensor, Tensor]:
     """Positions (N,3) and joints (J,3) at rest, of this shape, expression and pose. Adds the inputs it needs."""
-    positions = graph.constant(avatar.positions, "positions")
+    positions = graph.constant(avatar.positions, "positions", errors="even")
     joints = graph.constant(avatar.joints, "joints")
     if avatar.shape_directions is not None and avatar.joint_directions is not None:
         count = avatar.shape_directions.shape[2]

@@ -89,8 +89,8 @@ def export_classic(
     """A generator of the cloud's Gaussians, activated: opacities 0..1, covariances in world units squared."""
     options = options or Options()
     cloud = usable(cloud)
-    graph = Graph("classic")
-    positions = graph.constant(cloud.positions, "positions")
+    graph = Graph("classic", options.weights)
+    positions = graph.constant(cloud.positions, "positions", errors="even")
     sh = graph.constant(cloud.sh, "sh")
     inputs = []
     seen = None
@@ -103,7 +103,7 @@ def export_classic(
     axes = options.writes_axes
     gaussians = Gaussians(
         positions=positions,
-        covariances=None if axes else graph.constant(covariances(scales, cloud.rotations), "covariances"),
+        covariances=None if axes else graph.constant(covariances(scales, cloud.rotations), "covariances", "none"),
         scales=graph.constant(scales, "scales") if axes else None,
         rotations=graph.constant(turns, "rotations") if axes else None,
         opacities=graph.constant(sigmoid(cloud.opacity_logits), "opacities"),

@@ -87,7 +87,8 @@ def export_feed_forward(model: FeedForward, facts: Facts, options: Options | Non
     axes) to the second's.
     """
     check(model)
-    graph = Graph("feed_forward")
+    options = options or Options()
+    graph = Graph("feed_forward", options.weights)
     pictures = [graph.input(name, 1, 3, model.height, model.width) for name in ("image", "image_2")[: model.views]]
     focal, principal = graph.input("focal_length", 2), graph.input("principal_point", 2)
     camera = Camera(focal.part(0, 1), focal.part(1, 2), principal.part(0, 1), principal.part(1, 2))
@@ -95,7 +96,7 @@ def export_feed_forward(model: FeedForward, facts: Facts, options: Options | Non
     inputs.append(control("focal_length", [1.0, model.width / model.height], 0.1, 20.0))
     inputs.append(control("principal_point", 0.5, -1.0, 2.0))
     found = gaussians(model, graph, pictures, camera, inputs)
-    return finish(graph, found, inputs, reach(model), facts, options or Options())
+    return finish(graph, found, inputs, reach(model), facts, options)
 
 
 def check(model: FeedForward) -> None:

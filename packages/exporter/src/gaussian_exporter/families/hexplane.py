@@ -49,14 +49,16 @@ class Deformation:
 def export_hexplane(
     cloud: Cloud, deformation: Deformation, facts: Facts, options: Options | None = None
 ) -> onnx.ModelProto:
-    """A generator of the cloud's Gaussians at a time from 0 to 1. `bounds` are those of the resting positions."""
+    """A generator of the cloud's Gaussians at a time from 0 to 1."""
     cloud = usable(cloud)
     check(cloud, deformation)
-    graph = Graph("hexplane")
+    options = options or Options()
+    graph = Graph("hexplane", options.weights)
     time = graph.input("time", 1)
     hidden = mlp(features(cloud, deformation, graph, time), deformation.trunk, "trunk").unary("Relu")
-    bounds = cloud.positions.min(0), cloud.positions.max(0)
-    return finish(graph, move(cloud, deformation, hidden), [normalized_time()], bounds, facts, options or Options())
+    return finish(
+        graph, move(cloud, deformation, hidden), [normalized_time()], reach(cloud, deformation), facts, options
+    )
 
 
 def check(cloud: Cloud, deformation: Deformation) -> None:
@@ -87,13 +89,49 @@ def plane_coordinates(cloud: Cloud, deformation: Deformation) -> Doubles:
     return result
 
 
+def reach(cloud: Cloud, deformation: Deformation) -> tuple[Doubles, Doubles]:
+    """Corners around all centres at all times: at the planes' own times, between which features run straight, and a
+    hundredth of the scene wider for what the network bends on the way."""
+    low, high = cloud.positions.min(0).astype(np.float64), cloud.positions.max(0).astype(np.float64)
+    if deformation.position is None:
+        return low, high
+    at = plane_coordinates(cloud, deformation)
+    steps = max(planes[PLANES.index((0, TIME))].shape[1] for planes in deformation.resolutions)
+    still = [
+        np.prod([sample_plane(planes[i], at[:, a], at[:, b]) for i, (a, b) in enumerate(PLANES) if b != TIME], 0)
+        for planes in deformation.resolutions
+    ]
+    for time in np.linspace(0, 1, steps):
+        now = np.concatenate([at, np.full((len(at), 1), time)], 1)
+        moving = [
+            np.prod([sample_plane(planes[i], now[:, a], now[:, b]) for i, (a, b) in enumerate(PLANES) if b == TIME], 0)
+            for planes in deformation.resolutions
+        ]
+        x = np.concatenate([a * b for a, b in zip(still, moving, strict=True)], 1)
+        hidden = np.maximum(applied(deformation.trunk, x), 0)
+        rest = cloud.positions * (applied(deformation.mask, hidden) if deformation.mask else 1)
+        placed = rest + applied(deformation.position, hidden)
+        low, high = np.minimum(low, placed.min(0)), np.maximum(high, placed.max(0))
+    slack = 0.01 * (high - low)
+    return low - slack, high + slack
+
+
+def applied(layers: Sequence[Linear], x: Doubles) -> Doubles:
+    """What the graph's `mlp` computes, on numbers."""
+    for index, layer in enumerate(layers):
+        x = (np.maximum(x, 0) if index else x) @ layer.weight.T.astype(np.float64) + layer.bias
+    return x
+
+
 def features(cloud: Cloud, deformation: Deformation, graph: Graph, time: Tensor) -> Tensor:
     """The planes' features (N, sum of C)."""
     at = plane_coordinates(cloud, deformation)
     count = len(at)
     column = time.reshape(1, 1).expand(count, 1)
     grids = [
-        graph.concat([graph.constant(at[:, [axis]], f"coordinate_{'xyz'[axis]}"), column], 1).reshape(1, count, 1, 2)
+        graph.concat([graph.constant(at[:, [axis]], f"coordinate_{'xyz'[axis]}", errors="even"), column], 1).reshape(
+            1, count, 1, 2
+        )
         for axis in range(TIME)
     ]
     columns = []
@@ -124,7 +162,7 @@ def move(cloud: Cloud, deformation: Deformation, hidden: Tensor) -> Gaussians:
     mask = mlp(hidden, deformation.mask, "mask") if deformation.mask else None
 
     def moved(rest: Floats, head: Sequence[Linear] | None, name: str) -> Tensor:
-        still = graph.constant(rest, name)
+        still = graph.constant(rest, name, errors="even" if name == "positions" else "relative")
         if head is None:
             return still
         return mlp(hidden, head, f"{name}_head") + (still if mask is None or name == "rotations" else still * mask)

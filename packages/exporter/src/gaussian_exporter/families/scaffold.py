@@ -67,10 +67,11 @@ class Scaffold:
 def export_scaffold(model: Scaffold, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
     """A generator of M*k Gaussians, k consecutive rows for each anchor, from the camera's position."""
     check(model)
-    graph = Graph("scaffold" if model.levels is None else "octree")
+    options = options or Options()
+    graph = Graph("scaffold" if model.levels is None else "octree", options.weights)
     camera = graph.input("camera_position", 3)
     inputs = [camera_position()]
-    anchors = graph.constant(model.anchors, "anchors")
+    anchors = graph.constant(model.anchors, "anchors", errors="even")
     seen = direction_and_distance(anchors, camera)
     decoded = decode(model, graph, *seen)
     opacity = decoded["opacity"].unary("Tanh")
@@ -79,7 +80,7 @@ def export_scaffold(model: Scaffold, facts: Facts, options: Options | None = Non
         inputs.append(control("resolution_scale", 1.0, 0.25, 16.0, "coarseness"))
         opacity = opacity * presence(model.levels, anchors, camera, resolution)
     gaussians = place(model, graph, anchors, opacity, decoded)
-    return finish(graph, gaussians, inputs, reach(model), facts, options or Options())
+    return finish(graph, gaussians, inputs, reach(model), facts, options)
 
 
 def check(model: Scaffold) -> None:

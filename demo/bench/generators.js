@@ -1,0 +1,73 @@
+/** The page that times generators alone: sessions of ONNX Runtime on one device, runs back to back, nothing drawn. */
+import { GeneratorSession, openModel, setRuntimeLocation } from '@gaussian-splat/generator';
+import { deviceDescriptor } from '@gaussian-splat/renderer';
+import { sendReport } from './run/report.js';
+
+const query = new URLSearchParams(location.search);
+const RUNS = Number(query.get('runs') ?? 60);
+const WARM_UP = 5;
+const WALKER = '../generators/walker/model.onnx';
+const DEFAULT_MODELS = `../generators/skull/model.onnx,../generators/plant/model.onnx,${WALKER},${WALKER}*10`;
+
+setRuntimeLocation(new URL('../cdn/onnxruntime/', document.baseURI).href);
+
+/** A state that differs from one run to the next in whatever a model may depend on. */
+function stateAt(run, model) {
+  const turn = (2 * Math.PI * run) / RUNS;
+  const [c, s] = [Math.cos(turn), Math.sin(turn)];
+  const joints = model.contract.inputs.pose?.joints?.length ?? 0;
+  return {
+    camera: {
+      ...{ width: 1920, height: 1080, fx: 1500, fy: 1500, cx: 960, cy: 540, near: 0.1, far: 100 },
+      worldToCamera: [c, 0, s, 0, 0, 1, 0, 0, -s, 0, c, 3, 0, 0, 0, 1],
+    },
+    timeSeconds: ((model.contract.duration ?? 1) * run) / RUNS,
+    ...(joints > 0 && { pose: Float32Array.from({ length: 3 * joints }, (_, i) => 0.2 * Math.sin(turn + i)) }),
+  };
+}
+
+/** Milliseconds for one run of every instance, first after the other, on a queue that is never waited for between. */
+async function measure(device, url, instances) {
+  const model = await openModel({ url: new URL(url, document.baseURI).href });
+  const fallbacks = [];
+  const sessions = Array.from(
+    { length: instances },
+    () => new GeneratorSession(model, device, (r) => fallbacks.push(r)),
+  );
+  const runAll = async (run) => {
+    for (const session of sessions) await session.run(session.bind(stateAt(run, model)), () => undefined);
+  };
+  for (let run = 0; run < WARM_UP; run++) await runAll(run + 0.5);
+  await device.queue.onSubmittedWorkDone();
+  const started = performance.now();
+  for (let run = 0; run < RUNS; run++) await runAll(run);
+  const submitted = performance.now();
+  await device.queue.onSubmittedWorkDone();
+  const ended = performance.now();
+  const kind = sessions[0].kind;
+  await Promise.all(sessions.map((session) => session.release()));
+  return {
+    ...{ url, instances, rows: model.contract.nMax, kind, fallbacks },
+    millisecondsPerRun: (ended - started) / RUNS,
+    ofWhichSubmitting: (submitted - started) / RUNS,
+  };
+}
+
+const figures = document.getElementById('figures');
+const report = { kind: 'generators', runs: RUNS, results: [] };
+try {
+  const adapter = await navigator.gpu.requestAdapter({ powerPreference: 'high-performance' });
+  const { vendor, architecture, description } = adapter.info;
+  report.gpu = { vendor, architecture, description };
+  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  for (const asked of (query.get('models') ?? DEFAULT_MODELS).split(',')) {
+    const [url, instances = '1'] = asked.split('*');
+    const result = await measure(device, url, Number(instances));
+    report.results.push(result);
+    figures.textContent += `${asked}: ${result.rows} Gaussians, ${result.millisecondsPerRun.toFixed(2)} ms a run, ${result.kind}\n`;
+  }
+} catch (error) {
+  report.error = String(error.stack ?? error);
+  figures.textContent += report.error;
+}
+await sendReport(report, query.get('report'));

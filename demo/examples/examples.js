@@ -1,0 +1,100 @@
+/** The page of trained examples: what each costs, read from its own files, and handles for time, pose and shape. */
+import { openUrl, readOnnxHeader, resolveContract } from '@gaussian-splat/core';
+import { poseOf, walkingPose } from './poses.js';
+
+const PACES_PER_SECOND = 0.9;
+const folderOf = (name) => new URL(`../generators/${name}/`, document.baseURI);
+const exampleOf = (name) => document.querySelector(`[data-example="${name}"]`);
+
+/** Contract and size of a model, from its header alone, and the record of its training. */
+async function readFacts(name) {
+  const source = await openUrl(new URL('model.onnx', folderOf(name)));
+  const header = await readOnnxHeader(source);
+  const response = await fetch(new URL('record.json', folderOf(name)));
+  return { bytes: source.size, contract: resolveContract({ header }).contract, record: await response.json() };
+}
+
+/** Fills the card: bytes, Gaussians, accuracy, training, licence. */
+function showCost(list, { bytes, contract, record }) {
+  const inside = record.outline_psnr ? `; ${record.outline_psnr.toFixed(1)} dB inside the outline` : '';
+  const rows = [
+    ['File', `${(bytes / 1e6).toFixed(2)} MB`],
+    ...(contract.nMax ? [['Gaussians', contract.nMax.toLocaleString('en')]] : []),
+    ['Held-out PSNR', `${record.held_out_psnr.toFixed(1)} dB${inside}`],
+    ['Trained', `${Math.round(record.seconds)} s on one ${record.device}, ${record.steps.toLocaleString('en')} steps`],
+    ['Licence', `${contract.license}. ${contract.attribution}`],
+  ];
+  const cells = rows.flatMap((row) =>
+    row.map((text, column) => Object.assign(document.createElement(column === 0 ? 'dt' : 'dd'), { textContent: text })),
+  );
+  list.replaceChildren(...cells);
+}
+
+/** Play, pause and a slider that follows. */
+function conductPlant(card) {
+  const element = card.querySelector('gaussian-splat');
+  const [button, slider] = [card.querySelector('[data-play]'), card.querySelector('[data-time]')];
+  button.addEventListener('click', async () => {
+    if (!element.paused) return element.pause();
+    await element.play().catch((error) => (button.title = error.message));
+  });
+  for (const type of ['play', 'pause']) {
+    element.addEventListener(type, () => {
+      button.textContent = element.paused ? 'Play' : 'Pause';
+      button.setAttribute('aria-pressed', String(!element.paused));
+    });
+  }
+  element.addEventListener('timeupdate', () => (slider.value = element.currentTime));
+  slider.addEventListener('input', () => {
+    element.pause();
+    element.currentTime = slider.valueAsNumber;
+  });
+}
+
+/** Sliders for a pose, a button that walks. */
+function conductWalker(card, joints) {
+  const element = card.querySelector('gaussian-splat');
+  const sliders = [...card.querySelectorAll('[data-handle]')];
+  const [button, shape] = [card.querySelector('[data-walk]'), card.querySelector('[data-shape]')];
+  let frame = 0;
+  const pose = () => {
+    const handles = Object.fromEntries(sliders.map((each) => [each.dataset.handle, each.valueAsNumber]));
+    element.pose = poseOf(joints, handles);
+  };
+  const stop = () => {
+    cancelAnimationFrame(frame);
+    frame = 0;
+    button.textContent = 'Walk';
+    button.setAttribute('aria-pressed', 'false');
+  };
+  const step = (milliseconds) => {
+    element.pose = walkingPose(joints, (milliseconds / 1000) * PACES_PER_SECOND);
+    frame = requestAnimationFrame(step);
+  };
+  button.addEventListener('click', () => {
+    if (frame !== 0) return stop();
+    frame = requestAnimationFrame(step);
+    button.textContent = 'Stand';
+    button.setAttribute('aria-pressed', 'true');
+  });
+  for (const slider of sliders) {
+    slider.addEventListener('input', () => {
+      stop();
+      pose();
+    });
+  }
+  shape.addEventListener('input', () => element.setAttribute('control-shape', shape.value));
+  pose();
+}
+
+conductPlant(exampleOf('plant'));
+for (const card of document.querySelectorAll('[data-example]')) {
+  const name = card.dataset.example;
+  readFacts(name).then(
+    (facts) => {
+      showCost(card.querySelector('.cost'), facts);
+      if (name === 'walker') conductWalker(card, facts.contract.inputs.pose.joints);
+    },
+    (error) => (card.querySelector('.cost').textContent = error.message),
+  );
+}

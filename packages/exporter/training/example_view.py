@@ -1,0 +1,54 @@
+"""Makes the picture that a shipped example is held against: python example_view.py HELD_OUT.npz INDEX OUT [--size 256]
+
+HELD_OUT is what a trainer left beside its record. OUT/view.png has the picture, on black; its alpha is 255 where the
+picture counts (inside the outline, nothing in the way, no doubt) and 0 elsewhere. OUT/view.json has the camera, as `npm
+run render` takes it, and the time, pose or shape. Needs OpenCV.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+
+def view_of(archive: dict[str, np.ndarray], index: int, size: int) -> tuple[np.ndarray, dict[str, object]]:
+    """The picture (size,size,4) as bytes, blue first, and what view.json holds."""
+    picture = archive["pictures"][index]
+    counts = picture[3] > 250
+    if "valid" in archive:
+        counts &= (archive["valid"][index, 0] > 0) & (archive["doubtful"][index, 0] == 0)
+    small = cv2.resize(picture[:3].transpose(1, 2, 0), (size, size), interpolation=cv2.INTER_AREA)
+    # A scaled pixel counts only if all of it did.
+    whole = cv2.resize(counts.astype(np.float32), (size, size), interpolation=cv2.INTER_AREA) > 0.999
+    k = archive["intrinsics"][index].astype(float)
+    k[:2] *= size / picture.shape[2]
+    facts: dict[str, object] = {"width": size, "height": size, "K": k.round(6).tolist()}
+    facts["worldToCamera"] = archive["views"][index].astype(float).round(7).tolist()
+    for plural, name in (("times", "time"), ("poses", "pose"), ("shapes", "shape")):
+        if plural in archive:
+            facts[name] = np.asarray(archive[plural][index], float).round(6).tolist()
+    return np.dstack([small[..., ::-1], whole.astype(np.uint8) * 255]), facts
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("held_out", type=Path)
+    parser.add_argument("index", type=int)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--size", type=int, default=256)
+    given = parser.parse_args(argv)
+    with np.load(given.held_out) as archive:
+        picture, facts = view_of(dict(archive), given.index, given.size)
+    given.out.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(given.out / "view.png"), picture)
+    (given.out / "view.json").write_text(json.dumps(facts, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,7 @@
+import { assertShown, open } from './support.js';
+
+describe('the page of trained examples', () => {
+  it('the skull runs on the GPU, is drawn, and tells what it costs', async () => {
+    await assertShown(await open('skull'), 79_995);
+  }).timeout(230_000);
+});

@@ -1,0 +1,70 @@
+/** The page of trained examples as it is built. Each has a test file of its own: SwiftShader on a busy machine is slow. */
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { assert, assertEqual, nextEvent, until } from '../../../element/browser/support/harness.js';
+import { screenOf } from '../../../element/browser/support/screen.js';
+
+const PATIENCE_MS = 200_000;
+
+async function openPage(): Promise<Document> {
+  const frame = document.createElement('iframe');
+  frame.src = '/demo/dist/examples/index.html';
+  frame.style.cssText = 'position: fixed; inset: 0 auto auto 0; border: 0; width: 360px; height: 360px';
+  const loaded = nextEvent(frame, 'load');
+  document.body.append(frame);
+  await loaded;
+  return frame.contentDocument!;
+}
+
+/** An example that is on show, and why it could not run on the GPU, if so. */
+export interface OpenExample {
+  readonly page: Document;
+  readonly card: HTMLElement;
+  readonly element: GaussianSplatElement;
+  readonly fallbacks: readonly string[];
+}
+
+/** Opens the page, brings an example into sight, and waits until it is on show. */
+export async function open(name: string): Promise<OpenExample> {
+  const page = await openPage();
+  const card = page.querySelector<HTMLElement>(`[data-example="${name}"]`)!;
+  const element = card.querySelector<GaussianSplatElement>('gaussian-splat')!;
+  const fallbacks: string[] = [];
+  element.addEventListener('generator-fallback', (event) =>
+    fallbacks.push(String((event as CustomEvent).detail.reason)),
+  );
+  element.scrollIntoView({ block: 'center' });
+  await until(() => element.loaded || element.error !== null, `${name} on show`, PATIENCE_MS);
+  assertEqual(element.error?.message, undefined, name);
+  await until(() => card.querySelector('.cost')!.childElementCount > 0, `${name}: its cost`);
+  return { page, card, element, fallbacks };
+}
+
+/** Waits until another picture is on show. The page lies in the window's corner: places in both are the same. */
+export async function changes(element: GaussianSplatElement, act: () => void, what: string): Promise<void> {
+  const before = await screenOf(element);
+  act();
+  const deadline = performance.now() + PATIENCE_MS;
+  while ((await screenOf(element)).differences(before, 10) < 100) {
+    assert(performance.now() < deadline, `${what}: the picture is still the same`);
+    await new Promise((resolve) => setTimeout(resolve, 200));
+  }
+}
+
+export const slide = (card: HTMLElement, selector: string, value: number): void => {
+  const slider = card.querySelector<HTMLInputElement>(selector)!;
+  slider.value = String(value);
+  slider.dispatchEvent(new Event('input', { bubbles: true }));
+};
+
+/** Runs on the GPU, is drawn, and tells what it costs. */
+export async function assertShown({ card, element, fallbacks }: OpenExample, gaussians: number): Promise<void> {
+  assertEqual([element.statistics?.splats, fallbacks], [gaussians, []]);
+  // The page behind is lighter than that.
+  const dark = (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 560)?.count ?? 0;
+  const covered = dark / (element.clientWidth * element.clientHeight);
+  assert(covered > 0.01 && covered < 0.9, `${covered} of the pixels are covered`);
+  const words = card.querySelector('.cost')!.textContent!;
+  for (const part of [' MB', gaussians.toLocaleString('en'), ' dB', 'NVIDIA H200', 'Licence']) {
+    assert(words.includes(part), `${part} in ${words}`);
+  }
+}

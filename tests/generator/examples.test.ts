@@ -1,0 +1,137 @@
+/**
+ * The trained examples of demo/generators: each keeps the contract, header and values, and what it writes on the CPU, drawn by
+ * our renderer, is as near to a picture that it was not trained on as its view.json says.
+ */
+import assert from 'node:assert/strict';
+import { existsSync, readdirSync, readFileSync } from 'node:fs';
+import { after, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import * as ort from 'onnxruntime-web';
+import { PNG } from 'pngjs';
+import { checkModel } from '@gaussian-splat/check';
+import {
+  bytesSource,
+  cameraFromCalibration,
+  gaussianLayout,
+  readOnnxHeader,
+  resolveContract,
+} from '@gaussian-splat/core';
+import { bindInputs, type GeneratorState } from '@gaussian-splat/generator';
+import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
+import { nodeDevice } from '../support/node-device.js';
+
+const root = fileURLToPath(new URL('../../demo/generators/', import.meta.url));
+const names = readdirSync(root).filter((name) => existsSync(`${root}${name}/model.onnx`));
+/** Decibels by which a picture may be farther from the photograph than it was when the example was made. */
+const TOLERANCE_DB = 0.1;
+const MOST_BYTES = 8e6;
+/** GPUBufferUsage.STORAGE and COPY_DST: Node has no such global. */
+const STORAGE_AND_COPY = 0x80 | 0x8;
+
+/** What `example_view.py` wrote, and how near the example came to it. */
+interface View {
+  readonly width: number;
+  readonly height: number;
+  readonly K: number[][];
+  readonly worldToCamera: number[][];
+  readonly time?: number;
+  readonly pose?: number[][];
+  readonly shape?: number[];
+  readonly fitGain: boolean;
+  readonly psnr: number;
+}
+
+const read = (path: string): Uint8Array<ArrayBuffer> => new Uint8Array(readFileSync(root + path));
+const readJson = (path: string): unknown => JSON.parse(readFileSync(root + path, 'utf8'));
+
+test('there are examples of every kind that is said to ship', () => {
+  const listed = readFileSync(`${root}README.md`, 'utf8');
+  assert.ok(names.length >= 4, names.join());
+  for (const name of names) assert.ok(listed.includes(`[${name}]`), `README.md has no row for ${name}`);
+});
+
+for (const name of names) {
+  test(`${name}: keeps the contract, in its header and in what it writes`, { timeout: 240_000 }, async () => {
+    const report = await checkModel(`${root}${name}/model.onnx`, { run: true });
+    assert.deepEqual(report.faults, []);
+    assert.deepEqual(report.warnings, []);
+    assert.ok(read(`${name}/model.onnx`).length <= MOST_BYTES);
+    const record = readJson(`${name}/record.json`) as Record<string, number>;
+    assert.ok(record.held_out_psnr > 20 && record.steps > 1000, 'trained, and measured on what it has not seen');
+  });
+
+  if (!existsSync(`${root}${name}/view.json`)) continue;
+  test(
+    `${name}: draws a view that it has not seen as well as on the day it was made`,
+    { timeout: 240_000 },
+    async () => {
+      const view = readJson(`${name}/view.json`) as View;
+      const drawn = await drawView(name, view);
+      const wanted = PNG.sync.read(Buffer.from(read(`${name}/view.png`)));
+      const decibels = outlinePsnr(drawn, wanted.data, view.fitGain);
+      console.log(`${name}`.padEnd(10), `${decibels.toFixed(2)} dB`);
+      assert.ok(Math.abs(decibels - view.psnr) < TOLERANCE_DB, `${decibels} dB, ${view.psnr} when it was made`);
+    },
+  );
+}
+
+/** Runs the example on the CPU for a view's camera, time, pose and shape, and draws what it writes: RGBA, premultiplied. */
+async function drawView(name: string, view: View): Promise<Float32Array> {
+  const bytes = read(`${name}/model.onnx`);
+  const header = await readOnnxHeader(bytesSource(bytes));
+  const { contract } = resolveContract({ header });
+  const camera = cameraFromCalibration(view, `${name}/view.json`);
+  const state: GeneratorState = {
+    camera,
+    timeSeconds: (view.time ?? 0) * (contract.duration ?? 0),
+    ...(view.pose && { pose: view.pose.flat() }),
+    ...(view.shape && { shape: view.shape }),
+  };
+  const written = await run(bytes, bindInputs(header, contract, state));
+  const device = await nodeDevice();
+  const layout = gaussianLayout(header, contract);
+  assert.ok(layout, 'a model that writes Gaussians');
+  const gaussians = await DynamicGaussians.create(device, layout, { antialiased: contract.antialiased });
+  const buffer = device.createBuffer({ size: written.byteLength, usage: STORAGE_AND_COPY });
+  device.queue.writeBuffer(buffer, 0, written);
+  gaussians.ingest({ gaussians: buffer }, gaussians.count);
+  const renderer = new Renderer(device);
+  const pixels = await capture(device, renderer, { gaussians, camera });
+  renderer.destroy();
+  gaussians.destroy();
+  buffer.destroy();
+  return pixels;
+}
+
+async function run(model: Uint8Array, inputs: ReturnType<typeof bindInputs>): Promise<Float32Array<ArrayBuffer>> {
+  ort.env.logLevel = 'error';
+  ort.env.wasm.numThreads = 1;
+  const session = await ort.InferenceSession.create(model, { executionProviders: ['wasm'], logSeverityLevel: 3 });
+  const feeds: Record<string, ort.Tensor> = {};
+  for (const [name, { data, dims }] of Object.entries(inputs)) {
+    feeds[name] = new ort.Tensor('float32', data as Float32Array, dims);
+  }
+  const { gaussians } = await session.run(feeds);
+  const written = new Float32Array(gaussians.data as Float32Array);
+  await session.release();
+  return written;
+}
+
+/** Decibels over the pixels that count, on black; with `fitGain` after the best gain for each channel, as of photographs. */
+function outlinePsnr(drawn: Float32Array, wanted: Uint8Array, fitGain: boolean): number {
+  const counted = Array.from({ length: wanted.length / 4 }, (_, i) => 4 * i).filter((i) => wanted[i + 3] === 255);
+  let squares = 0;
+  for (let channel = 0; channel < 3; channel++) {
+    const found = counted.map((i) => drawn[i + channel]);
+    const target = counted.map((i) => wanted[i + channel] / 255);
+    const sum = (a: number[], b: number[]): number => a.reduce((total, x, i) => total + x * b[i], 0);
+    const gain = fitGain ? sum(found, target) / sum(found, found) : 1;
+    found.forEach((x, i) => (squares += (Math.min(Math.max(x * gain, 0), 1) - target[i]) ** 2));
+  }
+  return -10 * Math.log10(squares / (3 * counted.length));
+}
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
