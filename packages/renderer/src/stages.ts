@@ -14,6 +14,7 @@ export { CullChunksStage, cullGroups, CullStage } from './stages/cull.js';
 export { IngestStage } from './stages/ingest.js';
 export { OrderKeysStage } from './stages/order-keys.js';
 export { PlanStage } from './stages/plan.js';
+export { ProbeDepthStage } from './stages/probe-depth.js';
 export { ProjectStage } from './stages/project.js';
 export { ScanStage } from './stages/scan.js';
 export { sortedIn, SortStage, type SortBuffers } from './stages/sort.js';

@@ -2,6 +2,7 @@ import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
 import { ingestCases } from './ingest.js';
 import { orderCases } from './order.js';
+import { probeCases } from './probe.js';
 import { projectionCases } from './projection.js';
 import { scanCases } from './scan.js';
 import { sortCases } from './sort.js';
@@ -11,6 +12,7 @@ export const stageCases: readonly StageCase[] = [
   ...projectionCases,
   ...compactCases,
   ...orderCases,
+  ...probeCases,
   ...sortCases,
   ...ingestCases,
 ];
