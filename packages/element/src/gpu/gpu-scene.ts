@@ -5,6 +5,8 @@ import {
   Renderer,
   type FrameRequest,
   type GaussianScene,
+  type ProbeAnswer,
+  type ProbePoint,
   type Quality,
 } from '@gaussian-splat/renderer';
 import type { LiveModel, LiveRequest } from '../live/live-model.js';
@@ -96,6 +98,11 @@ export class GpuScene {
     const error = await refusal;
     if (error !== null) throw outOfMemory(error);
     await device.queue.onSubmittedWorkDone().catch(() => undefined);
+  }
+
+  /** Looks into the last frame: see {@link Renderer.probeDepth}. */
+  probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
+    return this.#renderer.probeDepth(points);
   }
 
   /** Frees the GPU memory and lets go of the device. */
