@@ -92,7 +92,7 @@ const quality = keywordGrammar<Quality>(['default', ...(Object.keys(QUALITIES) a
 const reveal = keywordGrammar<Reveal>(['auto', 'manual']);
 const navigation = keywordGrammar<Navigation>(['orbit', 'fly']);
 const interactionPrompt = keywordGrammar<InteractionPrompt>(['auto', 'none']);
-const interactionPromptStyle = keywordGrammar<InteractionPromptStyle>(['wiggle', 'basic']);
+const interactionPromptStyle = keywordGrammar<InteractionPromptStyle>(['basic', 'wiggle']);
 const milliseconds = (fallback: number): AttributeGrammar<number> =>
   numberGrammar(fallback, 0, 'milliseconds, 0 or more');
 const interpolationDecay = milliseconds(50);

@@ -162,7 +162,9 @@ export class GaussianSplatElement extends ViewingMethods {
     super.connectedCallback();
     // Names of controls are the model's: no list of observed attributes can hold them.
     this.#controlObserver ??= new MutationObserver((records) => {
-      if (records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) this.requestUpdate();
+      if (!records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) return;
+      this.requestUpdate();
+      this.stage.requestFrame();
     });
     this.#controlObserver.observe(this, { attributes: true });
   }
@@ -185,8 +187,9 @@ export class GaussianSplatElement extends ViewingMethods {
     if (changed.has('time')) this.#seekToAttribute();
   }
 
-  protected override updated(): void {
+  protected override updated(changed: PropertyValues<this>): void {
     this.stage.setSource(this.src, this.contract);
+    if (changed.size > 0) this.stage.requestFrame();
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
     // Through the style object, which a strict Content-Security-Policy allows, and not the attribute, which it refuses.

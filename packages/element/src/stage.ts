@@ -138,7 +138,10 @@ export class Stage {
     this.#src = src;
     this.#contract = contract;
     this.#requestScene();
-    // A changed attribute may concern the picture, for example its pixel ratio.
+  }
+
+  /** Asks for a frame: a changed attribute may concern the picture, for example its pixel ratio. */
+  requestFrame(): void {
     this.#view.requestFrame();
   }
 

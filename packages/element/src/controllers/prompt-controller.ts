@@ -79,7 +79,7 @@ export class PromptController implements ReactiveController, Mover {
       this.#start = undefined;
       this.#turned = 0;
       this.#set('shown');
-      this.#options.requestFrame();
+      if (this.#options.wiggles()) this.#options.requestFrame();
     }, this.#options.thresholdMs());
   }
 
