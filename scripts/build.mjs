@@ -1,4 +1,4 @@
-/** `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, and the demo as a static site. */
+/** `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, what editors know of the element, and the demo as a static site. */
 import { cpSync, existsSync, mkdirSync, readdirSync, rmSync } from 'node:fs';
 import { join } from 'node:path';
 import { ensureDependencies } from './lib/prepare.mjs';
@@ -13,10 +13,18 @@ must(process.execPath, [
   'packages/element/rollup.config.mjs',
   '--silent',
 ]);
+describeElement();
 await buildDemo();
 
 function projects() {
   return ['core', 'formats', 'renderer', 'generator', 'check', 'element'].map((name) => `packages/${name}`);
+}
+
+/** What editors and tools know of the element, from its sources. */
+function describeElement() {
+  const analyzer = join(root, 'node_modules/@custom-elements-manifest/analyzer/cem.js');
+  const config = 'custom-elements-manifest.config.mjs';
+  must(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], { cwd: join(root, 'packages/element') });
 }
 
 /** demo/dist is the whole site: any static host can serve it. */

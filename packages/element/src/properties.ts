@@ -1,18 +1,9 @@
-import type { Quality } from '@gaussian-splat/renderer';
 import { LitElement, type PropertyDeclarations } from 'lit';
-import type {
-  InteractionPrompt,
-  InteractionPromptStyle,
-  Loading,
-  Navigation,
-  Reveal,
-  TouchAction,
-} from './attributes.js';
 import type { SpokenStrings } from './camera/spoken.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { ControlValues, Numbers } from './live/values.js';
 
-/** The attributes of `<gaussian-splat>` and their properties. What their text means is in attributes.ts. */
+/** The attributes of `<gaussian-splat>` and their properties, keywords written out for editors. What their text means is in attributes.ts. */
 // The interface below only gives inherited methods their types: nothing in it could be missing at run time.
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class SplatProperties extends LitElement {
@@ -64,7 +55,7 @@ export class SplatProperties extends LitElement {
   /** Text alternative. Absent: the host's `aria-label`, else "3D scene". Empty: the scene is decorative. */
   declare alt: string | null;
   /** `lazy`, the default, loads once the element is in sight; `eager` at once. */
-  declare loading: Loading | null;
+  declare loading: 'lazy' | 'eager' | null;
   /** Lets people orbit, pan and zoom with mouse, touch and keyboard. */
   declare cameraControls: boolean;
   /** `"theta phi radius"`; default `0deg 75deg auto`. Where the camera goes: see {@link getCameraOrbit}. */
@@ -84,7 +75,7 @@ export class SplatProperties extends LitElement {
   /** Time constant of the camera's motion in milliseconds; default 50. 0, or a wish for less motion, jumps. */
   declare interpolationDecay: number | string | null;
   /** One-finger moves that stay the page's; default `pan-y`, so that pages scroll. */
-  declare touchAction: TouchAction | null;
+  declare touchAction: 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation' | null;
   /** Leaves wheel and pinch to the page. */
   declare disableZoom: boolean;
   /** Keeps the camera's target where it is. */
@@ -94,7 +85,7 @@ export class SplatProperties extends LitElement {
   /** Most drawn pixels for one CSS pixel; default no limit. */
   declare maxPixelRatio: number | string | null;
   /** Accuracy against speed: `reference`, `default`, `balanced` or `fast`. */
-  declare quality: Quality | null;
+  declare quality: 'default' | 'reference' | 'balanced' | 'fast' | null;
   /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
   declare contract: string | object | null;
   /** Seconds: where the scene's time is put whenever this changes. See {@link currentTime} for where it is. */
@@ -106,9 +97,9 @@ export class SplatProperties extends LitElement {
   /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
   declare controls: ControlValues | null;
   /** `auto`, the default: the poster gives way as soon as the scene can be drawn. `manual`: when {@link dismissPoster} or a click says so. */
-  declare reveal: Reveal | null;
+  declare reveal: 'auto' | 'manual' | null;
   /** `orbit`, the default, turns around the target; `fly` looks around and flies by W, A, S, D, Q and E. */
-  declare navigation: Navigation | null;
+  declare navigation: 'orbit' | 'fly' | null;
   /** Turns the camera around the scene while nobody touches it; not for people who want less motion. */
   declare autoRotate: boolean;
   /** Rest before it turns, in milliseconds; default 3000. */
@@ -116,9 +107,9 @@ export class SplatProperties extends LitElement {
   /** How fast it turns, such as `30deg`; default `5.625deg`. */
   declare rotationPerSecond: string | null;
   /** `auto`, the default, shows people who have not touched the scene that they can; `none` does not. */
-  declare interactionPrompt: InteractionPrompt | null;
+  declare interactionPrompt: 'auto' | 'none' | null;
   /** `basic`, the default, stands still; `wiggle` moves the camera to and fro once. */
-  declare interactionPromptStyle: InteractionPromptStyle | null;
+  declare interactionPromptStyle: 'basic' | 'wiggle' | null;
   /** Rest before the prompt is shown, in milliseconds; default 3000. */
   declare interactionPromptThreshold: number | string | null;
   /** Keeps the camera's target where it is on a double click, which otherwise picks the point to turn around. */
