@@ -88,7 +88,11 @@ export class Stage {
     this.playback = new PlaybackController({
       loops: options.loops,
       requestFrame: () => this.#view.requestFrame(),
-      dispatch: (type) => this.#dispatch(new Event(type)),
+      dispatch: (type) => {
+        this.#dispatch(new Event(type));
+        // Custom states tell of them, too.
+        if (type === 'play' || type === 'pause') host.requestUpdate();
+      },
     });
     this.#view = this.#createView();
     this.scene = this.#createScene();

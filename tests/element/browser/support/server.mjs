@@ -84,6 +84,10 @@ const ANSWERS = {
     context.body = context.status === 200 ? createReadStream(path) : 'absent';
   },
 
+  'soak-cycles'(context) {
+    context.body = process.env.SOAK_CYCLES ?? '100';
+  },
+
   'other-origin'(context, _rest, otherOrigin) {
     context.body = otherOrigin;
   },
