@@ -10,6 +10,7 @@ const MAY_IMPORT = {
   generator: ['core'],
   check: ['core', 'generator'],
   element: ['core', 'formats', 'generator', 'renderer'],
+  react: ['element'],
 };
 
 /** The packages that may load ONNX Runtime. */

@@ -16,8 +16,13 @@ must(process.execPath, [
 describeElement();
 await buildDemo();
 
+/** Folders of the demo that frameworks build with their own tools. */
+function apps() {
+  return ['react', 'vue'];
+}
+
 function projects() {
-  return ['core', 'formats', 'renderer', 'generator', 'check', 'element'].map((name) => `packages/${name}`);
+  return ['core', 'formats', 'renderer', 'generator', 'check', 'element', 'react'].map((name) => `packages/${name}`);
 }
 
 /** What editors and tools know of the element, from its sources. */
@@ -34,7 +39,7 @@ async function buildDemo() {
   rmSync(to, { recursive: true, force: true });
   mkdirSync(to, { recursive: true });
   for (const name of readdirSync(from)) {
-    if (name !== 'dist' && name !== 'bench') cpSync(join(from, name), join(to, name), { recursive: true });
+    if (!['dist', 'bench', ...apps()].includes(name)) cpSync(join(from, name), join(to, name), { recursive: true });
   }
   cpSync(join(root, 'packages/element/cdn'), join(to, 'cdn'), { recursive: true });
   // Its packages were not there when this script started on a fresh clone.
@@ -50,5 +55,9 @@ async function buildDemo() {
     minify: true,
     logLevel: 'warning',
   });
+  for (const app of apps()) {
+    const config = join(from, app, 'vite.config.mjs');
+    must(process.execPath, ['node_modules/vite/bin/vite.js', 'build', '--config', config, '--logLevel', 'warn']);
+  }
   if (!existsSync(join(to, 'index.html'))) throw new Error('demo/index.html is missing');
 }

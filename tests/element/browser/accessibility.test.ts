@@ -86,7 +86,14 @@ describe('axe finds nothing in the element', () => {
   });
 });
 
-const PAGES = ['index.html', 'check/index.html', 'bench/index.html', 'bench/frontier.html'];
+const PAGES = [
+  'index.html',
+  'check/index.html',
+  'bench/index.html',
+  'bench/frontier.html',
+  'react/index.html',
+  'vue/index.html',
+];
 
 describe('axe finds nothing on the demo', () => {
   it('knows all of its pages', async () => {
@@ -106,7 +113,7 @@ describe('axe finds nothing on the demo', () => {
         const loaded = nextEvent(frame, 'load');
         document.body.append(frame);
         await loaded;
-        await delay(300);
+        await delay(600);
         const page = frame.contentDocument;
         assert(page, 'a page');
         assertEqual(await violations(page), []);

@@ -3,11 +3,12 @@
  * (a CDN) a one-line module of the page's origin imports it.
  */
 export function spawnSceneWorker(): Worker {
-  const script = new URL('./scene-worker.js', import.meta.url);
-  if (script.origin !== location.origin) return spawnFromElsewhere(script);
-  const trusted = isOwnModule(script) ? trustedUrl(script.href) : null;
+  const here = new URL(import.meta.url);
+  const script = new URL('./scene-worker.js', here);
+  if (isOwnModule(here) && script.origin !== location.origin) return spawnFromElsewhere(script);
+  const trusted = isOwnModule(here) ? trustedUrl(script.href) : null;
   if (trusted !== null) return new Worker(trusted, { type: 'module' });
-  // Written out in full, since bundlers look for exactly this expression.
+  // Written out in full, and nowhere else, since bundlers look for exactly this expression.
   return new Worker(new URL('./scene-worker.js', import.meta.url), { type: 'module' });
 }
 
@@ -21,8 +22,8 @@ function spawnFromElsewhere(script: URL): Worker {
   return worker;
 }
 
-/** False where a bundler has given the file another name: then only the bundler's own expression finds the worker. */
-const isOwnModule = (script: URL): boolean => script.pathname.endsWith('/scene-worker.js');
+/** False where a bundler has put this module into a file of its own: then only its own expression finds the worker. */
+const isOwnModule = ({ pathname }: URL): boolean => /\/(spawn-worker|gaussian-splat\.min)\.js$/.test(pathname);
 
 /** Trusted Types, which TypeScript's types of the page do not know yet. */
 interface TrustedTypes {
