@@ -11,6 +11,7 @@ const MAY_IMPORT = {
   check: ['core', 'generator'],
   economise: ['core', 'formats', 'renderer'],
   element: ['core', 'formats', 'generator', 'renderer'],
+  react: ['element'],
 };
 
 /** The packages that may load ONNX Runtime. */

@@ -1,4 +1,4 @@
-/** `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, and the demo as a static site. */
+/** `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, what editors know of the element, and the demo as a static site. */
 import { cpSync, existsSync, mkdirSync, readdirSync, rmSync } from 'node:fs';
 import { join } from 'node:path';
 import { ensureDependencies } from './lib/prepare.mjs';
@@ -13,12 +13,25 @@ must(process.execPath, [
   'packages/element/rollup.config.mjs',
   '--silent',
 ]);
+describeElement();
 await buildDemo();
 
+/** Folders of the demo that frameworks build with their own tools. */
+function apps() {
+  return ['react', 'vue'];
+}
+
 function projects() {
-  return ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element'].map(
+  return ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react'].map(
     (name) => `packages/${name}`,
   );
+}
+
+/** What editors and tools know of the element, from its sources. */
+function describeElement() {
+  const analyzer = join(root, 'node_modules/@custom-elements-manifest/analyzer/cem.js');
+  const config = 'custom-elements-manifest.config.mjs';
+  must(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], { cwd: join(root, 'packages/element') });
 }
 
 /** demo/dist is the whole site: any static host can serve it. */
@@ -28,7 +41,7 @@ async function buildDemo() {
   rmSync(to, { recursive: true, force: true });
   mkdirSync(to, { recursive: true });
   for (const name of readdirSync(from)) {
-    if (name !== 'dist' && name !== 'bench') cpSync(join(from, name), join(to, name), { recursive: true });
+    if (!['dist', 'bench', ...apps()].includes(name)) cpSync(join(from, name), join(to, name), { recursive: true });
   }
   cpSync(join(root, 'packages/element/cdn'), join(to, 'cdn'), { recursive: true });
   cpSync(join(root, 'docs/stability'), join(to, 'stability/data'), { recursive: true });
@@ -46,6 +59,10 @@ async function buildDemo() {
       minify: true,
       logLevel: 'warning',
     });
+  }
+  for (const app of apps()) {
+    const config = join(from, app, 'vite.config.mjs');
+    must(process.execPath, ['node_modules/vite/bin/vite.js', 'build', '--config', config, '--logLevel', 'warn']);
   }
   if (!existsSync(join(to, 'index.html'))) throw new Error('demo/index.html is missing');
 }

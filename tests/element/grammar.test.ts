@@ -29,6 +29,13 @@ const ABSENT: RawAttributes = {
   up: null,
   maxPixelRatio: null,
   quality: null,
+  reveal: null,
+  navigation: null,
+  autoRotateDelay: null,
+  rotationPerSecond: null,
+  interactionPrompt: null,
+  interactionPromptStyle: null,
+  interactionPromptThreshold: null,
 };
 
 test('orbits', () => {

@@ -56,7 +56,7 @@ test('the README names every attribute, and no other', async () => {
   const readme = readFileSync(`${root}packages/element/README.md`, 'utf8');
   const [, table] = /## Attributes([^]*?)\n## /.exec(readme) ?? [];
   const named = [...table.matchAll(/^\|([^|]*)\|/gm)].flatMap(([, cell]) =>
-    [...cell.matchAll(/`([a-z-]+)`/g)].map(([, name]) => name),
+    [...cell.matchAll(/`([a-z0-9-]+)`/g)].map(([, name]) => name),
   );
   assert.deepEqual(named.sort(), [...GaussianSplatElement.observedAttributes].sort());
 });

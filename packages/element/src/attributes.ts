@@ -1,5 +1,6 @@
 /** Attributes of `<gaussian-splat>` that carry more than a word: their grammars and defaults, in one place. */
 import {
+  angleGrammar,
   fieldOfViewGrammar,
   keywordGrammar,
   numberGrammar,
@@ -17,6 +18,18 @@ export type Loading = 'lazy' | 'eager';
 
 /** One-finger moves that stay the page's. */
 export type TouchAction = 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation';
+
+/** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
+export type Reveal = 'auto' | 'manual';
+
+/** Whether people are shown how to move the camera. */
+export type InteractionPrompt = 'auto' | 'none';
+
+/** `wiggle` turns the camera to and fro with the prompt; `basic` stands still. */
+export type InteractionPromptStyle = 'wiggle' | 'basic';
+
+/** What the camera does under a person's hands: turn around its target, or fly. */
+export type Navigation = 'orbit' | 'fly';
 
 /** An attribute's raw value: text, or what a property was given instead. */
 export type Raw = string | number | null | undefined;
@@ -37,6 +50,13 @@ export interface RawAttributes {
   readonly up: Raw;
   readonly maxPixelRatio: Raw;
   readonly quality: Raw;
+  readonly reveal: Raw;
+  readonly navigation: Raw;
+  readonly autoRotateDelay: Raw;
+  readonly rotationPerSecond: Raw;
+  readonly interactionPrompt: Raw;
+  readonly interactionPromptStyle: Raw;
+  readonly interactionPromptThreshold: Raw;
 }
 
 /** All of them, read. */
@@ -51,6 +71,16 @@ export interface Attributes {
   readonly maxPixelRatio: number;
   /** The renderer's mix of accuracy and speed. */
   readonly quality: Quality;
+  readonly reveal: Reveal;
+  readonly navigation: Navigation;
+  /** Rest before the camera turns by itself, ms. */
+  readonly autoRotateDelay: number;
+  /** Radians. */
+  readonly rotationPerSecond: number;
+  readonly interactionPrompt: InteractionPrompt;
+  readonly interactionPromptStyle: InteractionPromptStyle;
+  /** Rest before the prompt is shown, ms. */
+  readonly interactionPromptThreshold: number;
 }
 
 const orbit = orbitGrammar('0deg 75deg auto');
@@ -59,7 +89,15 @@ const crossorigin = keywordGrammar(['anonymous', 'use-credentials']);
 const loading = keywordGrammar<Loading>(['lazy', 'eager']);
 const touchAction = keywordGrammar<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']);
 const quality = keywordGrammar<Quality>(['default', ...(Object.keys(QUALITIES) as Quality[])]);
-const interpolationDecay = numberGrammar(50, 0, 'milliseconds, 0 or more');
+const reveal = keywordGrammar<Reveal>(['auto', 'manual']);
+const navigation = keywordGrammar<Navigation>(['orbit', 'fly']);
+const interactionPrompt = keywordGrammar<InteractionPrompt>(['auto', 'none']);
+const interactionPromptStyle = keywordGrammar<InteractionPromptStyle>(['basic', 'wiggle']);
+const milliseconds = (fallback: number): AttributeGrammar<number> =>
+  numberGrammar(fallback, 0, 'milliseconds, 0 or more');
+const interpolationDecay = milliseconds(50);
+const threeSeconds = milliseconds(3_000);
+const rotationPerSecond = angleGrammar('5.625deg');
 // Far below any ratio in use, so that 0 is refused but thumbnails of pixels are not.
 const maxPixelRatio = numberGrammar(Infinity, 1 / 64, 'drawn pixels for each CSS pixel, above 0');
 
@@ -74,6 +112,13 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
     touchAction: read('touch-action', raw.touchAction, touchAction),
     maxPixelRatio: read('max-pixel-ratio', raw.maxPixelRatio, maxPixelRatio),
     quality: read('quality', raw.quality, quality),
+    reveal: read('reveal', raw.reveal, reveal),
+    navigation: read('navigation', raw.navigation, navigation),
+    autoRotateDelay: read('auto-rotate-delay', raw.autoRotateDelay, threeSeconds),
+    rotationPerSecond: read('rotation-per-second', raw.rotationPerSecond, rotationPerSecond),
+    interactionPrompt: read('interaction-prompt', raw.interactionPrompt, interactionPrompt),
+    interactionPromptStyle: read('interaction-prompt-style', raw.interactionPromptStyle, interactionPromptStyle),
+    interactionPromptThreshold: read('interaction-prompt-threshold', raw.interactionPromptThreshold, threeSeconds),
     camera: {
       orbit: read('camera-orbit', raw.cameraOrbit, orbit),
       target: read('camera-target', raw.cameraTarget, targetGrammar),

@@ -15,6 +15,11 @@ export interface LoadDetail {
   readonly url: string;
 }
 
+export interface VisibilityDetail {
+  /** Whether any part of the element is in the viewport. */
+  readonly visible: boolean;
+}
+
 export interface FallbackDetail {
   /** Why the generator does not run on the GPU, for people. */
   readonly reason: string;
@@ -30,11 +35,15 @@ export interface GaussianSplatEventMap {
   error: CustomEvent<ElementError>;
   /** The camera has moved; at most once a frame. */
   'camera-change': CustomEvent<CameraChangeDetail>;
+  /** The poster has given way to the scene. */
+  'poster-dismissed': Event;
+  /** The element has come into sight, or left it. */
+  'model-visibility': CustomEvent<VisibilityDetail>;
   /** A run of the generator failed; the last good frame stays, and the next change tries again. */
   'generator-error': CustomEvent<ElementError>;
   /** The generator runs on the CPU, because of the reason given. */
   'generator-fallback': CustomEvent<FallbackDetail>;
-  /** Time of a scene that moves: as of HTMLMediaElement. */
+  /** Loading and time, as of HTMLMediaElement. */
   play: Event;
   playing: Event;
   pause: Event;
@@ -45,6 +54,10 @@ export interface GaussianSplatEventMap {
   ratechange: Event;
   durationchange: Event;
   loadedmetadata: Event;
+  loadstart: Event;
+  loadeddata: Event;
+  canplay: Event;
+  emptied: Event;
   /** The GPU device was lost. The element recovers by itself. */
   contextlost: Event;
   /** The picture is back after a loss. */

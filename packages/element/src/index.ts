@@ -8,11 +8,41 @@ export type {
   FallbackDetail,
   GaussianSplatEventMap,
   LoadDetail,
+  VisibilityDetail,
 } from './events.js';
 export { GaussianSplatElement, type SceneStatistics } from './element.js';
-export { CameraOrbit, CameraTarget, FieldOfView } from './camera/values.js';
+export type { PictureOptions } from './viewing.js';
+export type {
+  InteractionPrompt,
+  InteractionPromptStyle,
+  Loading,
+  Navigation,
+  Reveal,
+  TouchAction,
+} from './attributes.js';
+export type { SpokenStrings, ViewName } from './camera/spoken.js';
+export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
+export type { HotspotPlace } from './controllers/hotspot-controller.js';
+export type { SceneBox } from './scene-queries.js';
+export { SceneTimeRanges } from './time-ranges.js';
 export type { ControlValues, Numbers, Picture } from './live/values.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
+
+/** What a page may put into `globalThis.GaussianSplatElement` before this module runs: statics of the class. */
+export type GaussianSplatConfiguration = Partial<
+  Pick<typeof GaussianSplatElement, 'runtimeLocation' | 'urlModifier' | 'releaseDelay' | 'sharedDevice'>
+>;
+
+const CONFIGURABLE = ['runtimeLocation', 'urlModifier', 'releaseDelay', 'sharedDevice'] as const;
+
+/** Script tags without a build step cannot set statics before the first element is upgraded. */
+function configure(): void {
+  const given = (globalThis as { GaussianSplatElement?: GaussianSplatConfiguration }).GaussianSplatElement;
+  if (typeof given !== 'object' || given === null) return;
+  for (const name of CONFIGURABLE) if (given[name] !== undefined) Reflect.set(GaussianSplatElement, name, given[name]);
+}
+
+configure();
 
 // Two copies of this module on one page, or a server without custom elements, must not fail.
 if (globalThis.customElements && !customElements.get('gaussian-splat')) {

@@ -1,10 +1,14 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
-import type { CameraAction } from './camera/gestures.js';
+import { Behaviours } from './behaviours.js';
+import type { SpokenStrings } from './camera/spoken.js';
 import { CameraController } from './controllers/camera-controller.js';
+import { HotspotController } from './controllers/hotspot-controller.js';
+import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController } from './controllers/playback-controller.js';
 import { InputController, type InputOptions } from './controllers/input-controller.js';
+import { RevealController } from './controllers/reveal-controller.js';
 import { SceneController } from './controllers/scene-controller.js';
 import { SizeController } from './controllers/size-controller.js';
 import { ViewController } from './controllers/view-controller.js';
@@ -18,6 +22,7 @@ import type { LiveListeners, LiveState } from './live/live-model.js';
 import { PostController } from './live/post-controller.js';
 import type { SceneRequest } from './loading/protocol.js';
 import type { SceneLoader } from './loading/scene-loader.js';
+import { SceneQueries } from './scene-queries.js';
 
 /** What elements share. */
 export interface Services {
@@ -30,6 +35,8 @@ export interface Services {
   readonly memoryBudget: number | null;
   /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
+  /** Rewrites the addresses of scenes before they are fetched. */
+  readonly urlModifier: ((url: string) => string) | null;
 }
 
 /** What is to be shown, as the element's attributes have it. */
@@ -47,10 +54,17 @@ export interface StageOptions {
   readonly input: () => InputOptions;
   readonly services: () => Services;
   readonly loops: () => boolean;
+  readonly autoplays: () => boolean;
+  readonly autoRotates: () => boolean;
+  /** A double click picks the point to turn around. */
+  readonly retargets: () => boolean;
+  readonly strings: () => SpokenStrings;
   readonly liveValues: () => Omit<LiveState, 'timeSeconds'>;
   /** Parts of the shadow tree, once they are rendered. */
   readonly canvas: () => HTMLCanvasElement | null;
   readonly surface: () => HTMLElement | null;
+  readonly hotspotLayer: () => HTMLElement | null;
+  readonly warn: (sentence: string) => void;
 }
 
 /**
@@ -61,6 +75,10 @@ export class Stage {
   readonly camera: CameraController;
   readonly scene: SceneController;
   readonly playback: PlaybackController;
+  readonly reveal: RevealController;
+  readonly behaviours: Behaviours;
+  readonly hotspots: HotspotController;
+  readonly queries: SceneQueries;
   /** Share of the bytes that have arrived, 0..1; null while their number is not known. */
   progress: number | null = null;
   readonly #host: ReactiveControllerHost & HTMLElement;
@@ -71,6 +89,7 @@ export class Stage {
   readonly #post: PostController;
   #source: Source = { src: null, contract: null, chain: null, postprocess: null };
   #lastFault = '';
+  #drawnFrom: Camera | undefined;
 
   constructor(host: ReactiveControllerHost & HTMLElement, options: StageOptions) {
     this.#host = host;
@@ -81,22 +100,65 @@ export class Stage {
     this.playback = new PlaybackController({
       loops: options.loops,
       requestFrame: () => this.#view.requestFrame(),
-      dispatch: (type) => this.#dispatch(new Event(type)),
+      dispatch: (type) => {
+        this.#dispatch(new Event(type));
+        // Custom states tell of them, too.
+        if (type === 'play' || type === 'pause') host.requestUpdate();
+      },
     });
     this.#view = this.#createView();
     this.#post = this.#createPost();
     this.scene = this.#createScene();
-    new InputController(host, options.surface, options.input, (action) => this.#act(action));
+    this.reveal = new RevealController(host, {
+      mode: () => options.attributes().reveal,
+      isReady: () => this.scene.state === 'ready',
+      onDismissed: () => this.#onRevealed(),
+    });
+    this.behaviours = this.#createBehaviours();
+    this.hotspots = new HotspotController(host, {
+      layer: options.hotspotLayer,
+      viewerFrame: () => this.camera.viewerFrame,
+      scale: () => this.camera.bounds.radius,
+      probe: async (points) => (await this.scene.scene?.probe(points)) ?? [],
+      warn: options.warn,
+    });
+    this.queries = new SceneQueries({
+      camera: this.camera,
+      scene: () => this.scene.scene,
+      drawnFrom: () => this.#drawnFrom,
+      element: host,
+    });
+    new InputController(host, options.surface, options.input, {
+      act: (action) => this.behaviours.act(action),
+      pick: (x, y) => void this.#retarget(x, y),
+      togglePlayback: () => this.#togglePlayback(),
+    });
     // Put back after a while, an eager element loads again though nothing has come into sight.
-    host.addController({ hostConnected: () => this.#requestScene() });
+    host.addController({ hostConnected: () => this.#requestScene(), hostUpdated: () => this.reveal.settle() });
+  }
+
+  /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
+  drawNow(): HTMLCanvasElement | null {
+    return this.#view.drawNow();
+  }
+
+  /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */
+  async updateFraming(): Promise<void> {
+    const { scene } = this.scene;
+    if (scene === null) return;
+    const bounds = (await scene.live?.gaussians.readBounds()) ?? scene.bounds;
+    if (this.scene.scene === scene) this.camera.frame(bounds);
   }
 
   /** The scene to show. Called after every update; only changes act. */
   setSource(source: Source): void {
     this.#source = source;
-    this.#post.want(absoluteUrls(source.postprocess));
+    this.#post.want(this.#urlsOf(source.postprocess));
     this.#requestScene();
-    // A changed attribute may concern the picture, for example its pixel ratio.
+  }
+
+  /** Asks for a frame: a changed attribute may concern the picture, for example its pixel ratio. */
+  requestFrame(): void {
     this.#view.requestFrame();
   }
 
@@ -111,8 +173,16 @@ export class Stage {
       maxPixelRatio: () => attributes().maxPixelRatio,
       quality: () => attributes().quality,
       decayMs: () => (prefersReducedMotion() ? 0 : attributes().interpolationDecay),
+      beforeFrame: (now) => this.behaviours.advance(now),
+      afterFrame: (camera) => {
+        this.#drawnFrom = camera;
+        this.hotspots.frameDrawn(camera);
+      },
       onFrame: (scene, camera, now) => this.#advance(scene, camera, now),
-      onCameraChange: (source) => this.#dispatch(new CustomEvent('camera-change', { detail: { source } })),
+      onCameraChange: (source) => {
+        this.behaviours.announcer.cameraMoved();
+        this.#dispatch(new CustomEvent('camera-change', { detail: { source } }));
+      },
       onError: (error) => this.scene.fail(error),
     });
   }
@@ -132,6 +202,7 @@ export class Stage {
       hide: (clear) => {
         this.#post.attach(null);
         if (clear) this.playback.setDuration(NaN);
+        if (clear) this.#drawnFrom = undefined;
         if (clear) this.#view.clear();
         else this.#view.pause();
       },
@@ -147,7 +218,9 @@ export class Stage {
         listeners: this.#liveListeners(),
       }),
       onProgress: (loaded, total) => this.#onProgress(loaded, total),
-      onLoad: (url) => this.#dispatch(new CustomEvent('load', { detail: { url } })),
+      onStart: () => this.#dispatch(new Event('loadstart')),
+      onLoad: (url) => this.#onLoad(url),
+      onEmptied: () => this.#dispatch(new Event('emptied')),
       onError: (error) => this.#dispatch(new CustomEvent('error', { detail: error })),
       onContext: (type) => this.#dispatch(new Event(type)),
     });
@@ -171,14 +244,66 @@ export class Stage {
     const sh = quality === 'reference' ? 'float16' : 'auto';
     const { src, contract, chain } = this.#source;
     const request: SceneRequest | null = src
-      ? { url: absoluteUrl(src), credentials, sh, contract, chain: absoluteUrls(chain) }
+      ? { url: this.#urlOf(src), credentials, sh, contract, chain: this.#urlsOf(chain) }
       : null;
-    if (this.#host.isConnected) this.scene.want(request, loading === 'eager' || this.#visibility.isVisible);
+    const mayStart = loading === 'eager' || (this.#visibility.isVisible && this.reveal.mayReveal);
+    if (this.#host.isConnected) this.scene.want(request, mayStart);
+  }
+
+  #urlOf(src: string): string {
+    const url = absoluteUrl(src);
+    return this.#options.services().urlModifier?.(url) ?? url;
+  }
+
+  #urlsOf(urls: string | null): readonly string[] {
+    return (urls ?? '')
+      .split(/\s+/)
+      .filter(Boolean)
+      .map((url) => this.#urlOf(url));
+  }
+
+  #createBehaviours(): Behaviours {
+    const { attributes, autoRotates, strings, surface, input } = this.#options;
+    return new Behaviours(this.#host, this.camera, {
+      attributes,
+      hasControls: () => input().enabled,
+      autoRotates,
+      strings,
+      isOnShow: () => !this.reveal.isCovered && this.#visibility.isVisible,
+      surface,
+      requestFrame: () => this.#view.requestFrame(),
+    });
+  }
+
+  #onLoad(url: string): void {
+    for (const type of ['loadeddata', 'canplay'] as const) this.#dispatch(new Event(type));
+    this.#dispatch(new CustomEvent('load', { detail: { url } }));
+  }
+
+  #onRevealed(): void {
+    this.#dispatch(new Event('poster-dismissed'));
+    const mayPlay = this.playback.canPlay && this.playback.paused && !prefersReducedMotion();
+    if (this.#options.autoplays() && mayPlay) this.playback.play();
+  }
+
+  /** A player's controls around the element have keys of their own. */
+  #togglePlayback(): boolean {
+    if (!this.playback.canPlay || this.#host.slot === 'media') return false;
+    if (this.playback.paused) this.playback.play();
+    else this.playback.pause();
+    return true;
+  }
+
+  async #retarget(clientX: number, clientY: number): Promise<void> {
+    const point = await this.queries.positionFromPoint(clientX, clientY);
+    if (point !== null && this.#options.retargets()) this.camera.aimAt([point.x, point.y, point.z]);
   }
 
   #onVisibility(): void {
     this.#requestScene();
     if (!this.#visibility.isVisible) this.playback.suspend();
+    this.#dispatch(new CustomEvent('model-visibility', { detail: { visible: this.#visibility.isVisible } }));
+    this.#host.requestUpdate();
     this.#view.requestFrame();
   }
 
@@ -231,14 +356,6 @@ export class Stage {
     this.#dispatch(new CustomEvent('generator-error', { detail: error }));
   }
 
-  #act(action: CameraAction): void {
-    const { camera } = this;
-    if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
-    else if (action.type === 'zoom') camera.zoomBy(action.factor);
-    else if (action.type === 'pan') camera.panBy(action.right, action.up);
-    else camera.reset('user-interaction');
-  }
-
   #dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void {
     this.#host.dispatchEvent(event);
   }
@@ -252,12 +369,8 @@ function absoluteUrl(src: string): string {
   return URL.canParse(src, document.baseURI) ? new URL(src, document.baseURI).href : src;
 }
 
-const absoluteUrls = (urls: string | null): readonly string[] =>
-  (urls ?? '').split(/\s+/).filter(Boolean).map(absoluteUrl);
 /** The GPU's share of a device is known to nobody; half of the memory is what shared memory can spare. Browsers round it, and end at 8 GB or more. */
 function defaultMemoryBudget(): number | undefined {
   const { deviceMemory } = navigator as { deviceMemory?: number };
   return deviceMemory === undefined ? undefined : deviceMemory * 2 ** 29;
 }
-
-const prefersReducedMotion = (): boolean => matchMedia('(prefers-reduced-motion: reduce)').matches;

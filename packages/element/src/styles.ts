@@ -49,6 +49,70 @@ export const styles = css`
     height: 100%;
     object-fit: var(--poster-fit, cover);
   }
+  .poster ::slotted(*),
+  [part='poster-button'] {
+    pointer-events: auto;
+  }
+  [part='poster-button'] {
+    display: block;
+    width: 100%;
+    height: 100%;
+    padding: 0;
+    border: 0;
+    background: none;
+    cursor: pointer;
+  }
+  [part='poster-button']:focus-visible {
+    outline: auto;
+    outline-offset: -2px;
+  }
+  .covered canvas {
+    visibility: hidden;
+  }
+  .hotspot {
+    position: absolute;
+    top: 0;
+    left: 0;
+    opacity: var(--max-hotspot-opacity, 1);
+    transition: opacity 0.3s;
+  }
+  .hotspot ::slotted(*) {
+    pointer-events: auto;
+  }
+  .hotspot.hidden {
+    opacity: var(--min-hotspot-opacity, 0.25);
+  }
+  .hotspot.hidden ::slotted(*) {
+    pointer-events: none;
+  }
+  .hotspot.hidden:focus-within {
+    opacity: var(--max-hotspot-opacity, 1);
+  }
+  .prompt {
+    display: var(--interaction-prompt-display, flex);
+    align-items: center;
+    justify-content: center;
+  }
+  [part='prompt'] {
+    padding: 10px;
+    border-radius: 50%;
+    line-height: 0;
+    background: var(--interaction-prompt-background, rgb(0 0 0 / 0.45));
+    color: var(--interaction-prompt-color, rgb(255 255 255));
+  }
+  [part='prompt'].wiggle {
+    animation: wiggle 4.5s;
+  }
+  @keyframes wiggle {
+    12.5%,
+    62.5% {
+      transform: translateX(-24px);
+    }
+    37.5%,
+    87.5% {
+      transform: translateX(24px);
+    }
+  }
   .gone {
     opacity: 0;
     visibility: hidden;
@@ -100,8 +164,12 @@ export const styles = css`
     white-space: nowrap;
   }
   @media (prefers-reduced-motion: reduce) {
-    .poster {
+    .poster,
+    .hotspot {
       transition: none;
+    }
+    [part='prompt'] {
+      animation: none;
     }
   }
 `;

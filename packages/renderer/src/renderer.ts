@@ -4,6 +4,7 @@ import { FrameBindings, makeStages, type Stages } from './bindings.js';
 import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
 import { ContentWatch } from './content-watch.js';
 import { angleBetween, axisOf, DepthOrder } from './depth-order.js';
+import { probe, type ProbeAnswer, type ProbePoint } from './depth-probe.js';
 import { recordProjection } from './frame.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
@@ -118,6 +119,8 @@ export class Renderer {
   #lastAxis: Vector3 | undefined;
   #turningFrames = 0;
   readonly #content = new ContentWatch();
+  /** Whether the slots of the last frame are in depth order themselves; undefined before there is one. */
+  #lastIsOrdered: boolean | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
@@ -194,6 +197,7 @@ export class Renderer {
     );
     const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
     this.#device.queue.submit([last.finish()]);
+    this.#lastIsOrdered = isOrdered;
     if (isWatched) monitor.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
@@ -218,6 +222,20 @@ export class Renderer {
     if (overflow + pairOverflow === 0) return !mayLack;
     this.#resources?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
     return false;
+  }
+
+  /**
+   * Looks into the last frame at single points of it: how opaque it is there, where its surface lies, what hides a given depth. The same
+   * for all rasterizers. Reads back from the GPU: for clicks and labels, not for every frame. Rejects if the device is lost meanwhile.
+   * @returns an answer for each point; none before the first frame.
+   */
+  async probeDepth(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
+    if (this.#resources === undefined || this.#lastIsOrdered === undefined) return [];
+    const { plan, splats, order, keys } = this.#resources.scratch;
+    const { depthKeyBits, resolutionScale, sort } = this.levers;
+    const nearToFar = this.#lastIsOrdered ? keys[0] : order[sortedIn(sort, depthKeyBits)];
+    const drawn = points.map(({ x, y, depth }) => ({ x: x * resolutionScale, y: y * resolutionScale, depth }));
+    return probe(this.#device, { plan, splats, order: nearToFar }, drawn, overridesOf(this.levers));
   }
 
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
@@ -350,6 +368,7 @@ export class Renderer {
       pairCapacity: capacity.pairs,
     });
     this.#hasOtherPairs = false;
+    this.#lastIsOrdered = undefined;
     const monitor = new CapacityMonitor(this.#device, capacity, this.#mostFor(table), (wished, overflowed) => {
       this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
       this.#capacity = wished;
@@ -378,6 +397,7 @@ export class Renderer {
     monitor?.destroy();
     this.#occlusion.forget();
     this.#resources = undefined;
+    this.#lastIsOrdered = undefined;
     this.#lastAxis = undefined;
   }
 

@@ -17,6 +17,7 @@ export { IngestStage } from './stages/ingest.js';
 export { OcclusionDepthsStage } from './stages/occlusion-depths.js';
 export { OrderKeysStage } from './stages/order-keys.js';
 export { PlanStage } from './stages/plan.js';
+export { ProbeDepthStage } from './stages/probe-depth.js';
 export { ProjectStage } from './stages/project.js';
 export { ScanStage } from './stages/scan.js';
 export { canSort, SORT_NAMES, sortedIn, SortStage, type SortBuffers, type SortName } from './stages/sort.js';

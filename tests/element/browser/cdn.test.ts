@@ -18,8 +18,8 @@ describe('the CDN build', () => {
       GaussianSplatElement: typeof GaussianSplatElement;
     };
     assert(customElements.get('gaussian-splat') === Class, "the element is the build's");
-    for (const src of [COMPASS, COMPASS.replace('.splat', '.ply')]) {
-      const element = show({ src });
+    // At the same time: a worker that is not used for a while ends.
+    for (const element of [show({ src: COMPASS }), show({ src: COMPASS.replace('.splat', '.ply') })]) {
       await element.ready;
       assert(element.loaded, element.error?.message ?? 'not loaded');
       assert((await screenOf(element)).middleOf(isRed), 'the scene is seen');
@@ -38,5 +38,49 @@ describe('the CDN build', () => {
     assertEqual((data.warnings as string[]).length, 1, `warnings ${JSON.stringify(data.warnings)}`);
     assert(/worker-src/.test(String(data.warnings)), String(data.warnings));
     assertEqual(data.violations, ['worker-src'], 'violations of the policy');
+  });
+
+  /** What a page in a frame has to say about itself. */
+  async function reportOf(address: string): Promise<Record<string, unknown>> {
+    const frame = document.createElement('iframe');
+    const answer = nextEvent<MessageEvent<Record<string, unknown>>>(window, 'message', 60_000);
+    frame.src = address;
+    frame.style.cssText = 'width: 400px; height: 300px';
+    document.body.append(frame);
+    return (await answer).data;
+  }
+
+  it('under the policy of the README, Trusted Types included, violates nothing and keeps its worker', async () => {
+    const report = await reportOf('/net/secure-page');
+    assertEqual([report.loaded, report.error, report.prompt], [true, undefined, true], 'loaded, error, prompt');
+    assertEqual([report.violations, report.warnings], [[], []], 'violations and warnings');
+  });
+
+  it("runs a generator there with 'wasm-unsafe-eval', and nothing more", async () => {
+    const report = await reportOf('/net/secure-page?generator');
+    assertEqual([report.loaded, report.error], [true, undefined], 'loaded');
+    assertEqual(report.violations, [], 'violations');
+  });
+
+  it('is one tag with integrity on a page of another origin, generators included, without isolation', async () => {
+    const report = await reportOf('/net/cdn-page');
+    assertEqual(
+      [report.loaded, report.errors],
+      [
+        [true, true],
+        [null, null],
+      ],
+      'loaded',
+    );
+    assertEqual(report.isolated, false, 'cross-origin isolated');
+    const other = await (await fetch('/net/other-origin')).text();
+    const scripts = report.scripts as string[];
+    assert(scripts.length >= 4, `scripts: ${scripts.join(' ')}`);
+    assertEqual(
+      scripts.filter((name) => !name.startsWith(other)),
+      [],
+      'scripts from elsewhere',
+    );
+    console.log(`navigation to defined: ${Math.round(Number(report.definedMs))} ms`);
   });
 });

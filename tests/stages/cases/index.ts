@@ -3,6 +3,7 @@ import { compactCases } from './compact.js';
 import { ingestCases } from './ingest.js';
 import { occlusionCases } from './occlusion.js';
 import { orderCases } from './order.js';
+import { probeCases } from './probe.js';
 import { projectionCases } from './projection.js';
 import { scanCases } from './scan.js';
 import { sortCases } from './sort.js';
@@ -13,6 +14,7 @@ export const stageCases: readonly StageCase[] = [
   ...compactCases,
   ...orderCases,
   ...occlusionCases,
+  ...probeCases,
   ...sortCases,
   ...ingestCases,
 ];

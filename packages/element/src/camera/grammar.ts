@@ -94,6 +94,19 @@ function parseFieldOfView(text: string): AngleSetting | null {
   return angle === 'auto' || (angle !== null && angle > 0 && angle < Math.PI) ? angle : null;
 }
 
+/** An angle that is one, such as `30deg`: radians, or null. */
+const parsePlainAngle = (text: string): number | null => {
+  const angle = parseAngle(text.trim().toLowerCase());
+  return angle === 'auto' ? null : angle;
+};
+
+/** Three lengths, such as `1m 2cm 0`: metres, or null. Also what directions are written as. */
+export function parsePoint(text: string): readonly [x: number, y: number, z: number] | null {
+  const [x, y, z, ...rest] = terms(text).map(parseLength);
+  const isPoint = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' && rest.length === 0;
+  return isPoint ? [x, y, z] : null;
+}
+
 const ORBIT_FORM = '"theta phi radius" with deg or rad, deg or rad, m, cm, mm or %, each or all "auto"';
 const FIELD_OF_VIEW_FORM = 'an angle above 0deg and below 180deg with deg or rad, or "auto"';
 
@@ -110,6 +123,13 @@ export const fieldOfViewGrammar: AttributeGrammar<AngleSetting> = {
   fallback: 'auto',
   parse: parseFieldOfView,
 };
+
+/** `rotation-per-second`: radians. */
+export const angleGrammar = (fallback: string): AttributeGrammar<number> => ({
+  expected: 'an angle with deg or rad',
+  fallback,
+  parse: parsePlainAngle,
+});
 
 /** `camera-target`. */
 export const targetGrammar: AttributeGrammar<TargetSetting> = {

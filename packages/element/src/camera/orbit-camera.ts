@@ -1,5 +1,8 @@
 import { Damper } from './damper.js';
-import { orbitAxes, type Pose } from './orbit.js';
+import { eyeOfPose, orbitAxes, type Pose } from './orbit.js';
+
+/** What a motion keeps on course: the target that the camera turns around, or the eye of one that flies. */
+export type Pivot = 'target' | 'eye';
 
 /** Smallest and largest value that each part of a pose may take. */
 export interface PoseLimits {
@@ -8,6 +11,8 @@ export interface PoseLimits {
 }
 
 const KEYS = ['theta', 'phi', 'radius', 'x', 'y', 'z', 'fieldOfView'] as const;
+/** The parts of a pose that say where it is; the others say how it looks from there. */
+const PLACE = ['x', 'y', 'z'] as const;
 const everywhere = (value: number): Pose => ({
   theta: value,
   phi: value,
@@ -27,6 +32,7 @@ export class OrbitCamera {
   #goal: Pose;
   #limits: PoseLimits = { min: everywhere(-Infinity), max: everywhere(Infinity) };
   readonly #dampers = KEYS.map(() => new Damper());
+  #pivot: Pivot = 'target';
 
   constructor(pose: Pose) {
     this.#now = pose;
@@ -46,6 +52,18 @@ export class OrbitCamera {
   /** True while {@link step} still has something to do. */
   get moving(): boolean {
     return KEYS.some((key) => this.#now[key] !== this.#goal[key]);
+  }
+
+  get pivot(): Pivot {
+    return this.#pivot;
+  }
+
+  /** With `eye` a camera that looks around stays where it is also on the way to its goal. */
+  set pivot(pivot: Pivot) {
+    if (pivot === this.#pivot) return;
+    this.#pivot = pivot;
+    // Their velocities were those of another point.
+    for (const damper of this.#dampers) damper.stop();
   }
 
   /** Bounds of every goal from now on; the present goal is brought within them. */
@@ -83,13 +101,50 @@ export class OrbitCamera {
    */
   step(stepMs: number, decayMs: number): boolean {
     if (!this.moving) return false;
-    const now = { ...this.#now };
+    const from = this.#onCourse(this.#now);
+    const to = this.#onCourse(this.#goal);
+    const now = { ...from };
     KEYS.forEach((key, i) => {
-      const scale = key === 'theta' || key === 'phi' || key === 'fieldOfView' ? 1 : this.#goal.radius;
-      now[key] = this.#dampers[i].step(now[key], this.#goal[key], stepMs, decayMs, scale);
+      const scale = key === 'theta' || key === 'phi' || key === 'fieldOfView' ? 1 : to.radius;
+      now[key] = this.#dampers[i].step(from[key], to[key], stepMs, decayMs, scale);
     });
-    this.#now = now;
+    // At its end the motion is exactly at the goal: the way there and back through the eye would leave a rounding.
+    this.#now = KEYS.every((key) => now[key] === to[key]) ? this.#goal : this.#offCourse(now);
     return true;
+  }
+
+  /** The pose with the place of what is kept on course. */
+  #onCourse(pose: Pose): Pose {
+    if (this.#pivot === 'target') return pose;
+    const [x, y, z] = eyeOfPose(pose);
+    return { ...pose, x, y, z };
+  }
+
+  #offCourse(pose: Pose): Pose {
+    return this.#pivot === 'target' ? pose : withTargetAhead(pose);
+  }
+
+  /** Turns camera and goal alike around the target, without any damping: radians. */
+  turnBy(theta: number): void {
+    const before = this.#goal.theta;
+    this.setGoal({ theta: before + theta });
+    this.#now = { ...this.#now, theta: this.#now.theta + this.#goal.theta - before };
+  }
+
+  /** Turns the goal's view around its own eye by angles in radians. */
+  lookBy(theta: number, phi: number): void {
+    const [x, y, z] = eyeOfPose(this.#goal);
+    this.setGoal({ theta: this.#goal.theta + theta, phi: this.#goal.phi + phi });
+    this.setGoal(withTargetAhead({ ...this.#goal, x, y, z }));
+  }
+
+  /** Moves the goal along its own axes, eye and target alike: world units. */
+  moveBy(right: number, up: number, forward: number): void {
+    const goal = this.#goal;
+    const axes = orbitAxes(goal.theta, goal.phi);
+    const along = (axis: 0 | 1 | 2): number =>
+      right * axes.right[axis] + up * axes.up[axis] - forward * axes.backward[axis];
+    this.setGoal({ x: goal.x + along(0), y: goal.y + along(1), z: goal.z + along(2) });
   }
 
   /** Turns the goal around its target by angles in radians. */
@@ -110,8 +165,13 @@ export class OrbitCamera {
   panBy(right: number, up: number): void {
     const goal = this.#goal;
     const height = 2 * goal.radius * Math.tan(goal.fieldOfView / 2);
-    const axes = orbitAxes(goal.theta, goal.phi);
-    const along = (axis: 0 | 1 | 2): number => height * (right * axes.right[axis] + up * axes.up[axis]);
-    this.setGoal({ x: goal.x + along(0), y: goal.y + along(1), z: goal.z + along(2) });
+    this.moveBy(height * right, height * up, 0);
   }
+}
+
+/** A pose whose place is that of its eye, with that of its target instead. */
+function withTargetAhead(pose: Pose): Pose {
+  const { backward } = orbitAxes(pose.theta, pose.phi);
+  const [x, y, z] = PLACE.map((key, axis) => pose[key] - pose.radius * backward[axis]);
+  return { ...pose, x, y, z };
 }

@@ -79,6 +79,12 @@ export function orbitAxes(theta: number, phi: number): { right: Vector3; up: Vec
   };
 }
 
+/** Where the eye of a pose is, in viewer space. */
+export function eyeOfPose(pose: Pose): Vector3 {
+  const { backward } = orbitAxes(pose.theta, pose.phi);
+  return [pose.x + pose.radius * backward[0], pose.y + pose.radius * backward[1], pose.z + pose.radius * backward[2]];
+}
+
 /**
  * Distance at which a ball of the given radius just fits into the picture: radius / sin(half the smaller angle of view).
  * @param radius world units, above 0.
@@ -98,12 +104,7 @@ export const nearPlane = (bounds: Bounds): number => Math.min(0.2, bounds.radius
 export function cameraOfPose(pose: Pose, frame: ViewerFrame, width: number, height: number, near: number): Camera {
   const { right, up, backward } = orbitAxes(pose.theta, pose.phi);
   const negate = (v: Vector3): Vector3 => [-v[0], -v[1], -v[2]];
-  const eye: Vector3 = [
-    pose.x + pose.radius * backward[0],
-    pose.y + pose.radius * backward[1],
-    pose.z + pose.radius * backward[2],
-  ];
-  const eyeInScene = toScene(frame, eye);
+  const eyeInScene = toScene(frame, eyeOfPose(pose));
   const row = (axis: Vector3): number[] => {
     const inScene = toScene(frame, axis);
     return [...inScene, -dot(inScene, eyeInScene)];

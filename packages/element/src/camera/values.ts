@@ -37,6 +37,23 @@ export class CameraTarget {
   }
 }
 
+/** A point of the scene: metres in viewer space (y up, right-handed). */
+export class ScenePoint {
+  constructor(x: number, y: number, z: number) {
+    this.x = x;
+    this.y = y;
+    this.z = z;
+  }
+  readonly x: number;
+  readonly y: number;
+  readonly z: number;
+
+  /** A value for `data-position` of a hotspot, and for `camera-target`. */
+  toString(): string {
+    return `${this.x}m ${this.y}m ${this.z}m`;
+  }
+}
+
 /** Vertical field of view. */
 export class FieldOfView {
   constructor(radians: number) {

@@ -1,6 +1,6 @@
-import type { Bounds, Camera } from '@gaussian-splat/core';
-import { cameraOfPose, nearPlane, viewerFrame } from '../camera/orbit.js';
-import { OrbitCamera } from '../camera/orbit-camera.js';
+import type { Bounds, Camera, Vector3 } from '@gaussian-splat/core';
+import { cameraOfPose, nearPlane, viewerFrame, type ViewerFrame } from '../camera/orbit.js';
+import { OrbitCamera, type Pivot } from '../camera/orbit-camera.js';
 import { limitsOf, poseOf, type CameraSettings } from '../camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
 import type { CameraChangeSource } from '../events.js';
@@ -48,6 +48,21 @@ export class CameraController {
 
   get fieldOfView(): FieldOfView {
     return new FieldOfView(this.#camera.now.fieldOfView);
+  }
+
+  /** Rotation from the scene's frame to viewer space, in which orbit and target are. */
+  get viewerFrame(): ViewerFrame {
+    return viewerFrame(this.#settings.up);
+  }
+
+  /** Bounds of the scene that was framed last, in the scene's own frame. */
+  get bounds(): Bounds {
+    return this.#bounds;
+  }
+
+  /** What stays on course while a person moves: see {@link OrbitCamera.pivot}. */
+  set pivot(pivot: Pivot) {
+    this.#camera.pivot = pivot;
   }
 
   get isMoving(): boolean {
@@ -119,6 +134,18 @@ export class CameraController {
     this.#moveByUser();
   }
 
+  /** A person looks around from where the camera is, angles in radians. */
+  lookBy(theta: number, phi: number): void {
+    this.#camera.lookBy(theta, phi);
+    this.#moveByUser();
+  }
+
+  /** A person flies: world units along the camera's own axes. */
+  moveBy(right: number, up: number, forward: number): void {
+    this.#camera.moveBy(right, up, forward);
+    this.#moveByUser();
+  }
+
   /** A person changes the distance by a factor. */
   zoomBy(factor: number): void {
     this.#userDistance = true;
@@ -130,6 +157,20 @@ export class CameraController {
   panBy(right: number, up: number): void {
     this.#camera.panBy(right, up);
     this.#moveByUser();
+  }
+
+  /** A person picks another point to turn around: viewer space. */
+  aimAt([x, y, z]: Vector3): void {
+    this.#camera.setGoal({ x, y, z });
+    this.#moveByUser();
+  }
+
+  /** The element itself turns the camera, radians; nothing is damped. */
+  turnBy(theta: number): void {
+    this.#camera.turnBy(theta);
+    this.#source = 'automatic';
+    this.#jumped = true;
+    this.#onChange();
   }
 
   /**

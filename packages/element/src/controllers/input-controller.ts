@@ -20,6 +20,15 @@ export interface InputOptions {
   readonly touchAction: string;
 }
 
+/** What the controller tells. */
+export interface InputListener {
+  readonly act: (action: CameraAction) => void;
+  /** A double click, in CSS pixels of the page. */
+  readonly pick: (clientX: number, clientY: number) => void;
+  /** The space bar; false if it means nothing here. */
+  readonly togglePlayback: () => boolean;
+}
+
 const LEFT_BUTTON = 0;
 const RIGHT_BUTTON = 2;
 
@@ -32,7 +41,7 @@ interface Pointer extends Point {
 
 /** Listens to mouse, pen, touch, wheel and keys on the picture, and turns them into camera actions. */
 export class InputController implements ReactiveController {
-  readonly #act: (action: CameraAction) => void;
+  readonly #listener: InputListener;
   readonly #options: () => InputOptions;
   readonly #surfaceOf: () => HTMLElement | null;
   readonly #pointers = new Map<number, Pointer>();
@@ -48,11 +57,11 @@ export class InputController implements ReactiveController {
     host: ReactiveControllerHost,
     surfaceOf: () => HTMLElement | null,
     options: () => InputOptions,
-    act: (action: CameraAction) => void,
+    listener: InputListener,
   ) {
     this.#surfaceOf = surfaceOf;
     this.#options = options;
-    this.#act = act;
+    this.#listener = listener;
     host.addController(this);
   }
 
@@ -89,6 +98,7 @@ export class InputController implements ReactiveController {
       surface.addEventListener(type, this.#onUp, { signal });
     }
     surface.addEventListener('keydown', this.#onKey, { signal });
+    surface.addEventListener('dblclick', this.#onDoubleClick, { signal });
     surface.addEventListener('contextmenu', this.#onContextMenu, { signal });
     surface.addEventListener('touchmove', this.#onTouchMove, { signal, passive: false });
     return listening;
@@ -154,9 +164,12 @@ export class InputController implements ReactiveController {
 
   readonly #onKey = (event: KeyboardEvent): void => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.key === ' ' && !event.repeat && this.#listener.togglePlayback()) return event.preventDefault();
     const action = keyOf(event.key, event.shiftKey);
     if (action !== null && this.#perform(action)) event.preventDefault();
   };
+
+  readonly #onDoubleClick = (event: MouseEvent): void => this.#listener.pick(event.clientX, event.clientY);
 
   readonly #onWheel = (event: WheelEvent): void => {
     event.preventDefault();
@@ -181,7 +194,7 @@ export class InputController implements ReactiveController {
   #perform(action: CameraAction): boolean {
     const { zoom, pan } = this.#options();
     if ((action.type === 'zoom' && !zoom) || (action.type === 'pan' && !pan)) return false;
-    this.#act(action);
+    this.#listener.act(action);
     return true;
   }
 }

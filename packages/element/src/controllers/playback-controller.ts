@@ -9,7 +9,11 @@ export type PlaybackEvent =
   | 'ended'
   | 'ratechange'
   | 'durationchange'
-  | 'loadedmetadata';
+  | 'loadedmetadata'
+  | 'loadstart'
+  | 'loadeddata'
+  | 'canplay'
+  | 'emptied';
 
 export interface PlaybackOptions {
   readonly loops: () => boolean;
@@ -40,6 +44,11 @@ export class PlaybackController {
   /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
   get duration(): number {
     return this.#duration;
+  }
+
+  /** True for a scene that moves. */
+  get canPlay(): boolean {
+    return !Number.isNaN(this.#duration);
   }
 
   get currentTime(): number {

@@ -24,7 +24,10 @@ export interface SceneOptions {
   /** What a generator needs to know beyond the request. */
   readonly live: OpenOptions['live'];
   readonly onProgress: (loaded: number, total: number | undefined) => void;
+  readonly onStart: () => void;
   readonly onLoad: (url: string) => void;
+  /** There is no scene any more. */
+  readonly onEmptied: () => void;
   readonly onError: (error: ElementError) => void;
   readonly onContext: (event: 'contextlost' | 'contextrestored') => void;
 }
@@ -122,6 +125,7 @@ export class SceneController implements ReactiveController {
       [loaded, total] = [nextLoaded, nextTotal];
       if (!signal.aborted) this.#options.onProgress(loaded, total);
     };
+    this.#options.onStart();
     report(0, undefined);
     await this.#attempt(request, signal, true, report);
     if (signal.aborted || this.#scene === null) return;
@@ -198,6 +202,7 @@ export class SceneController implements ReactiveController {
     this.#drop(true);
     this.#error = null;
     this.#setState('empty');
+    this.#options.onEmptied();
   }
 
   #drop(clear: boolean): void {

@@ -19,6 +19,10 @@ export interface ViewOptions {
   readonly quality: () => Quality;
   /** Time constant of the camera's motion, ms. */
   readonly decayMs: () => number;
+  /** Called once a frame before the camera steps: what moves it by itself does so now. */
+  readonly beforeFrame: (now: number) => void;
+  /** Called once a frame, after it was submitted, with the camera that it is drawn from. */
+  readonly afterFrame: (camera: Camera) => void;
   /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
   readonly onFrame: (scene: GpuScene, camera: Camera, now: number) => void;
   readonly onCameraChange: (source: CameraChangeSource) => void;
@@ -85,16 +89,35 @@ export class ViewController implements FrameClient {
     const pixels = size.pixelSize(maxPixelRatio(), scene.device.limits.maxTextureDimension2D);
     // Without a size nothing is drawn; the observer of the size asks again when there is one.
     if (pixels === null) return this.#finishUnseen();
+    this.#options.beforeFrame(now);
     const source = camera.step(now, decayMs());
     try {
       const request = this.#frameRequest(scene, pixels);
       this.#options.onFrame(scene, request.camera, now);
       this.#render(scene, request);
+      this.#options.afterFrame(request.camera);
     } catch (error) {
       return onError(error);
     }
     if (camera.isMoving) this.requestFrame();
     if (source !== null) onCameraChange(source);
+  }
+
+  /**
+   * Draws a frame within the running task, for those who read the canvas before it ends: afterwards a WebGPU canvas is blank to readers.
+   * @returns the canvas, or null where there is nothing to draw.
+   */
+  drawNow(): HTMLCanvasElement | null {
+    const scene = this.#scene;
+    const canvas = this.#options.canvasOf();
+    if (scene === null || scene.isLost || this.#first !== undefined || canvas === null) return null;
+    const pixels = this.#options.size.pixelSize(
+      this.#options.maxPixelRatio(),
+      scene.device.limits.maxTextureDimension2D,
+    );
+    if (pixels === null) return null;
+    this.#render(scene, this.#frameRequest(scene, pixels));
+    return canvas;
   }
 
   #render(scene: GpuScene, request: Frame): void {

@@ -1,5 +1,13 @@
 import { GaussianSplatError, type Bounds } from '@gaussian-splat/core';
-import { chooseVariants, GaussianBuffers, Renderer, type GaussianScene, type Quality } from '@gaussian-splat/renderer';
+import {
+  chooseVariants,
+  GaussianBuffers,
+  Renderer,
+  type GaussianScene,
+  type ProbeAnswer,
+  type ProbePoint,
+  type Quality,
+} from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { LiveModel, LiveRequest } from '../live/live-model.js';
 import type { LoadedScene, ProgressListener, SceneRequest } from '../loading/protocol.js';
@@ -110,6 +118,11 @@ export class GpuScene {
     const error = await refusal;
     if (error !== null) throw outOfMemory(error);
     await device.queue.onSubmittedWorkDone().catch(() => undefined);
+  }
+
+  /** Looks into the last frame: see {@link Renderer.probeDepth}. */
+  probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
+    return this.#renderer.probeDepth(points);
   }
 
   /** Frees the GPU memory and lets go of the device. */

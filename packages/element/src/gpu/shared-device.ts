@@ -12,25 +12,51 @@ export interface DeviceLease {
   release(): void;
 }
 
-/** One device, and the number of leases that keep it. */
+/** One device, and the leases that keep it. */
 class DeviceSession {
-  users = 0;
   isLost = false;
   isClosed = false;
   readonly device: GPUDevice;
-  readonly lost: Promise<GPUDeviceLostInfo>;
-
+  /** Whom a loss is told. Not by one promise for all: it would hold on to everybody who ever waited for it. */
+  readonly #listeners = new Set<(info: GPUDeviceLostInfo) => void>();
   readonly #isKept: boolean;
+  #info: GPUDeviceLostInfo | undefined;
+  #users = 0;
 
   constructor(device: GPUDevice, isKept: boolean) {
     this.device = device;
     this.#isKept = isKept;
-    this.lost = new Promise((resolve) => {
-      void device.lost.then((info) => {
-        this.isLost = true;
-        if (!this.isClosed) resolve(info);
-      });
+    void device.lost.then((info) => {
+      this.isLost = true;
+      this.#info = info;
+      if (this.isClosed) return;
+      for (const tell of this.#listeners) tell(info);
+      this.#listeners.clear();
     });
+  }
+
+  /** A share in the device; the last one to be given back calls `onUnused`. */
+  lease(onUnused: () => void): DeviceLease {
+    let tell: (info: GPUDeviceLostInfo) => void = () => undefined;
+    const lost = new Promise<GPUDeviceLostInfo>((resolve) => (tell = resolve));
+    if (this.#info) tell(this.#info);
+    this.#users++;
+    this.#listeners.add(tell);
+    let released = false;
+    const isLost = (): boolean => this.isLost;
+    return {
+      device: this.device,
+      lost,
+      get isLost() {
+        return isLost();
+      },
+      release: () => {
+        if (released) return;
+        released = true;
+        this.#listeners.delete(tell);
+        if (--this.#users === 0) onUnused();
+      },
+    };
   }
 
   close(): void {
@@ -68,8 +94,10 @@ export class SharedDevice {
     }
     // Its last user may have closed it while we waited.
     if (session.isClosed) return this.acquire();
-    session.users++;
-    return this.#lease(session, opening);
+    return session.lease(() => {
+      this.#forget(opening);
+      session.close();
+    });
   }
 
   #open(): Promise<DeviceSession> {
@@ -81,24 +109,6 @@ export class SharedDevice {
 
   #forget(opening: Promise<DeviceSession>): void {
     if (this.#session === opening) this.#session = null;
-  }
-
-  #lease(session: DeviceSession, opening: Promise<DeviceSession>): DeviceLease {
-    let released = false;
-    return {
-      device: session.device,
-      lost: session.lost,
-      get isLost() {
-        return session.isLost;
-      },
-      release: () => {
-        if (released) return;
-        released = true;
-        if (--session.users > 0) return;
-        this.#forget(opening);
-        session.close();
-      },
-    };
   }
 }
 

@@ -3,15 +3,50 @@
  * (a CDN) a one-line module of the page's origin imports it.
  */
 export function spawnSceneWorker(): Worker {
-  const script = new URL('./scene-worker.js', import.meta.url);
-  // Written out in full, since bundlers look for exactly this expression.
-  if (script.origin === location.origin)
-    return new Worker(new URL('./scene-worker.js', import.meta.url), { type: 'module' });
+  const here = new URL(import.meta.url);
+  const script = new URL('./scene-worker.js', here);
+  if (isOwnModule(here) && script.origin !== location.origin) return spawnFromElsewhere(script);
+  const trusted = isOwnModule(here) ? trustedUrl(script.href) : null;
+  if (trusted !== null) return new Worker(trusted, { type: 'module' });
+  // Written out in full, and nowhere else, since bundlers look for exactly this expression.
+  return new Worker(new URL('./scene-worker.js', import.meta.url), { type: 'module' });
+}
+
+function spawnFromElsewhere(script: URL): Worker {
   const url = URL.createObjectURL(new Blob([`import ${JSON.stringify(script.href)};`], { type: 'text/javascript' }));
-  const worker = new Worker(url, { type: 'module' });
+  const worker = new Worker(trustedUrl(url) ?? url, { type: 'module' });
   // The URL is only needed until the script has been fetched, which its first message or its failure tells.
   const revoke = (): void => URL.revokeObjectURL(url);
   worker.addEventListener('message', revoke, { once: true });
   worker.addEventListener('error', revoke, { once: true });
   return worker;
+}
+
+/** False where a bundler has put this module into a file of its own: then only its own expression finds the worker. */
+const isOwnModule = ({ pathname }: URL): boolean => /\/(spawn-worker|gaussian-splat\.min)\.js$/.test(pathname);
+
+/** Trusted Types, which TypeScript's types of the page do not know yet. */
+interface TrustedTypes {
+  createPolicy(
+    name: string,
+    rules: { createScriptURL: (url: string) => string },
+  ): { createScriptURL(url: string): string };
+}
+
+let policy: ReturnType<TrustedTypes['createPolicy']> | null | undefined;
+
+/** An address that pages with `require-trusted-types-for 'script'` accept; null where there is no such thing, or the page refuses the policy. */
+function trustedUrl(url: string): string | null {
+  const { trustedTypes } = globalThis as { trustedTypes?: TrustedTypes };
+  if (policy === undefined) policy = trustedTypes ? createPolicy(trustedTypes) : null;
+  return policy?.createScriptURL(url) ?? null;
+}
+
+function createPolicy(trustedTypes: TrustedTypes): ReturnType<TrustedTypes['createPolicy']> | null {
+  try {
+    // Only addresses that are made in this file come here.
+    return trustedTypes.createPolicy('gaussian-splat', { createScriptURL: (url) => url });
+  } catch {
+    return null;
+  }
 }

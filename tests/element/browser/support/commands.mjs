@@ -12,11 +12,18 @@ export function pageCommands() {
 
 const ACTIONS = {
   /** Touch points of one event: [] lifts all fingers. */
-  'send-touch': (page, { type, points }) => devtools(page, 'Input.dispatchTouchEvent', { type, touchPoints: points }),
+  'send-touch': (page, { type, points }) =>
+    devtools(page, 'Input.dispatchTouchEvent', { type, touchPoints: points }).then(() => true),
 
   'turn-wheel': async (page, { x, y, deltaY }) => {
     await page.mouse.move(x, y);
     await page.mouse.wheel(0, deltaY);
+  },
+
+  /** Bytes that scripts hold after a full collection of garbage. */
+  'heap-size': async (page) => {
+    await devtools(page, 'HeapProfiler.collectGarbage');
+    return (await devtools(page, 'Runtime.getHeapUsage')).usedSize;
   },
 
   /** The picture that the browser composes for a rectangle in CSS pixels: a PNG as base64. */
@@ -28,5 +35,5 @@ const sessions = new WeakMap();
 
 async function devtools(page, method, parameters) {
   if (!sessions.has(page)) sessions.set(page, await page.context().newCDPSession(page));
-  await sessions.get(page).send(method, parameters);
+  return sessions.get(page).send(method, parameters);
 }

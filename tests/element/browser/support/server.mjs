@@ -1,4 +1,5 @@
 /** Servers as the web has them: slow, broken, lying, strict, and elsewhere. */
+import { createHash } from 'node:crypto';
 import { createReadStream, existsSync, readFileSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { extname, join, normalize } from 'node:path';
@@ -118,6 +119,10 @@ const ANSWERS = {
     context.body = context.status === 200 ? createReadStream(path) : 'absent';
   },
 
+  'soak-cycles'(context) {
+    context.body = process.env.SOAK_CYCLES ?? '100';
+  },
+
   'other-origin'(context, _rest, otherOrigin) {
     context.body = otherOrigin;
   },
@@ -134,6 +139,40 @@ const ANSWERS = {
       <gaussian-splat src="/tests/element/browser/fixtures/compass.ply" loading="eager" camera-controls></gaussian-splat>`;
   },
 
+  /** The policy that the README recommends, Trusted Types included; `?generator` adds what WebAssembly needs. */
+  'secure-page'(context) {
+    const wasm = 'generator' in context.query ? " 'wasm-unsafe-eval'" : '';
+    context.set(
+      'Content-Security-Policy',
+      `default-src 'none'; script-src 'self'${wasm}; worker-src 'self'; connect-src 'self'; img-src 'self'; style-src 'self'; ` +
+        "require-trusted-types-for 'script'; trusted-types lit-html gaussian-splat",
+    );
+    context.type = 'text/html';
+    const src = wasm ? '/tests/fixtures/generators/packed.onnx' : '/tests/element/browser/fixtures/compass.ply';
+    context.body = `<!doctype html><title>Secure</title>
+      <script src="/net/strict-script" type="module"></script>
+      <gaussian-splat src="${src}" loading="eager" camera-controls interaction-prompt-threshold="0" auto-rotate></gaussian-splat>`;
+  },
+
+  /** A page as the README has it: one script tag from another origin, with its integrity. */
+  'cdn-page'(context, _rest, otherOrigin) {
+    const script = readFileSync(join(root, 'packages/element/cdn/gaussian-splat.min.js'));
+    const integrity = `sha384-${createHash('sha384').update(script).digest('base64')}`;
+    context.type = 'text/html';
+    context.body = `<!doctype html><title>CDN</title>
+      <script type="module" src="${otherOrigin}/cdn/gaussian-splat.min.js" integrity="${integrity}" crossorigin></script>
+      <gaussian-splat src="/tests/element/browser/fixtures/compass.ply" loading="eager"></gaussian-splat>
+      <gaussian-splat src="/tests/fixtures/generators/packed.onnx" loading="eager"></gaussian-splat>
+      <script type="module">
+        await customElements.whenDefined('gaussian-splat');
+        const elements = [...document.querySelectorAll('gaussian-splat')];
+        const definedMs = performance.now();
+        await Promise.all(elements.map(({ ready }) => ready));
+        parent.postMessage({ definedMs, loaded: elements.map(({ loaded }) => loaded), errors: elements.map(({ error }) => error?.message),
+          isolated: crossOriginIsolated, scripts: performance.getEntriesByType('resource').map(({ name }) => name).filter((name) => /[.](m?js|wasm)$/.test(name)) }, '*');
+      </script>`;
+  },
+
   'strict-script'(context) {
     context.type = 'text/javascript';
     context.body = `const seen = { warnings: [], violations: [] };
@@ -142,7 +181,10 @@ const ANSWERS = {
       await import('/packages/element/cdn/gaussian-splat.min.js');
       const element = document.querySelector('gaussian-splat');
       await element.ready;
-      parent.postMessage({ ...seen, loaded: element.loaded, error: element.error?.message }, '*');`;
+      await new Promise((resolve) => setTimeout(resolve, 200));
+      const workers = performance.getEntriesByType('resource').filter(({ name }) => name.endsWith('/scene-worker.js')).length;
+      parent.postMessage({ ...seen, loaded: element.loaded, error: element.error?.message, workers,
+        prompt: element.shadowRoot.querySelector('[part=prompt]') !== null }, '*');`;
   },
 };
 
@@ -156,7 +198,12 @@ function answerRaw(context, name, make) {
   setTimeout(() => res.destroy(), 100);
 }
 
-const TYPES = { '.js': 'text/javascript', '.ply': 'application/octet-stream' };
+const TYPES = {
+  '.js': 'text/javascript',
+  '.mjs': 'text/javascript',
+  '.wasm': 'application/wasm',
+  '.ply': 'application/octet-stream',
+};
 
 /**
  * A server of another origin, as a CDN is: /cdn/ and /fixtures/ with permission to be read, /closed/ without.

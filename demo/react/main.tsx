@@ -1,0 +1,76 @@
+/** A React app around the element: mount, unmount, another source, a ref, events, a property by reference, all under StrictMode. */
+import { GaussianSplat, type GaussianSplatElement } from '@gaussian-splat/react';
+import type {} from '@gaussian-splat/react/jsx';
+import { StrictMode, useRef, useState } from 'react';
+import { createRoot } from 'react-dom/client';
+
+const query = new URLSearchParams(location.search);
+/** The scenes that the app goes to and fro between. */
+const SCENES = [query.get('first') ?? '../scenes/skull.spz', query.get('second') ?? '../scenes/skull.spz#again'];
+/** Sliders of a generator: an object that must arrive as it is. */
+const CONTROLS = { smile: 0.4 };
+
+function App() {
+  const splat = useRef<GaussianSplatElement>(null);
+  const [isShown, setShown] = useState(true);
+  const [scene, setScene] = useState(0);
+  const [status, setStatus] = useState('waiting');
+  const [loads, setLoads] = useState(0);
+  const [moves, setMoves] = useState(0);
+  const [view, setView] = useState('');
+  const describe = () => {
+    const element = splat.current;
+    setView(
+      element ? `${element.getCameraOrbit()}, controls by reference: ${element.controls === CONTROLS}` : 'no element',
+    );
+  };
+  return (
+    <>
+      <h1>React</h1>
+      <p>
+        <button id="toggle" onClick={() => setShown(!isShown)}>
+          {isShown ? 'Take it away' : 'Bring it back'}
+        </button>{' '}
+        <button id="swap" onClick={() => setScene(1 - scene)}>
+          Another scene
+        </button>{' '}
+        <button id="view" onClick={describe}>
+          Where is the camera?
+        </button>
+      </p>
+      {isShown && (
+        <GaussianSplat
+          ref={splat}
+          src={SCENES[scene]}
+          alt="A scene in a React app"
+          loading="eager"
+          cameraControls
+          controls={CONTROLS}
+          style={{ width: 320, height: 240 }}
+          onLoad={({ detail }) => {
+            setStatus(`loaded ${detail.url}`);
+            setLoads((count) => count + 1);
+          }}
+          onError={({ detail }) => setStatus(`${detail.code}: ${detail.message}`)}
+          onCameraChange={() => setMoves((count) => count + 1)}
+        >
+          <button slot="hotspot-middle" data-position="0m 0m 0m">
+            The middle
+          </button>
+        </GaussianSplat>
+      )}
+      <p role="status">
+        <output id="status">{status}</output> <output id="loads">{loads}</output> <output id="moves">{moves}</output>
+      </p>
+      <p>
+        <output id="where">{view}</output>
+      </p>
+    </>
+  );
+}
+
+createRoot(document.getElementById('app')!).render(
+  <StrictMode>
+    <App />
+  </StrictMode>,
+);

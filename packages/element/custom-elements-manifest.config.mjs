@@ -1,0 +1,48 @@
+/**
+ * Describes the element for editors and tools: custom-elements.json from the sources' own comments, and from it custom
+ * data for VS Code and web-types for JetBrains. `npm run build` runs it.
+ */
+import { customElementJetBrainsPlugin } from 'custom-element-jet-brains-integration';
+import { customElementVsCodePlugin } from 'custom-element-vs-code-integration';
+
+/** What people import is the compiled module. */
+const published = (path) => path?.replace(/^src\//, 'dist/').replace(/\.ts$/, '.js');
+
+/** Keeps what pages may rely on: one class with all that it inherits from ours, and nothing private, protected or internal. */
+const publicOnly = {
+  name: 'public-only',
+  packageLinkPhase({ customElementsManifest: manifest }) {
+    manifest.modules = manifest.modules.filter(({ path }) => ENTRIES.includes(path));
+    for (const module of manifest.modules) {
+      module.path = published(module.path);
+      for (const { declaration } of module.exports ?? []) {
+        if (declaration.module) declaration.module = published(declaration.module);
+      }
+      for (const item of module.declarations ?? []) {
+        item.superclass = { name: 'LitElement', package: 'lit' };
+        item.members = item.members?.filter(isPublic);
+        for (const part of [...(item.members ?? []), ...(item.attributes ?? [])]) delete part.inheritedFrom;
+      }
+    }
+  },
+};
+
+const ENTRIES = ['src/index.ts', 'src/element.ts'];
+/** The life cycle of Lit and of the platform is inherited as well, and nobody's concern. */
+const LIFE_CYCLE = ['stage', 'connectedMoveCallback'];
+const isPublic = ({ name, privacy }) =>
+  !name.startsWith('#') && privacy !== 'private' && privacy !== 'protected' && !LIFE_CYCLE.includes(name);
+
+const files = { outdir: '.', packageJson: false };
+
+export default {
+  globs: ['src/index.ts', 'src/element.ts', 'src/viewing.ts', 'src/media.ts', 'src/properties.ts'],
+  outdir: '.',
+  litelement: true,
+  packagejson: false,
+  plugins: [
+    publicOnly,
+    customElementVsCodePlugin({ ...files, cssFileName: null, hideLogs: true }),
+    customElementJetBrainsPlugin({ ...files, hideLogs: true }),
+  ],
+};

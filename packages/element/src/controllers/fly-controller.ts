@@ -1,0 +1,95 @@
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import { MAX_MOVER_STEP_MS, type Mover } from './mover.js';
+
+export interface FlyOptions {
+  readonly enabled: () => boolean;
+  readonly surface: () => HTMLElement | null;
+  /** World units that count as one: the size of the scene. */
+  readonly scale: () => number;
+  readonly moveBy: (right: number, up: number, forward: number) => void;
+  readonly requestFrame: () => void;
+}
+
+type Direction = readonly [right: number, up: number, forward: number];
+
+/** By the keys' places, so that they lie under the left hand on every keyboard. */
+const DIRECTIONS: Readonly<Record<string, Direction>> = {
+  KeyW: [0, 0, 1],
+  KeyS: [0, 0, -1],
+  KeyD: [1, 0, 0],
+  KeyA: [-1, 0, 0],
+  KeyE: [0, 1, 0],
+  KeyQ: [0, -1, 0],
+};
+/** Sizes of the scene in a second. */
+const SPEED = 0.5;
+const FAST = 4;
+/** What a short press is worth at least, ms. */
+const FIRST_STEP_MS = 50;
+
+/** Flies while keys are held: W and S, A and D, Q and E; with Shift faster. */
+export class FlyController implements ReactiveController, Mover {
+  readonly #options: FlyOptions;
+  readonly #held = new Map<string, Direction>();
+  #isFast = false;
+  #lastStep: number | undefined;
+  #listening: AbortController | undefined;
+
+  constructor(host: ReactiveControllerHost, options: FlyOptions) {
+    this.#options = options;
+    host.addController(this);
+  }
+
+  hostUpdated(): void {
+    const surface = this.#options.surface();
+    if (!this.#options.enabled() || surface === null) return this.hostDisconnected();
+    if (this.#listening !== undefined) return;
+    this.#listening = new AbortController();
+    const { signal } = this.#listening;
+    surface.addEventListener('keydown', this.#onDown, { signal });
+    surface.addEventListener('keyup', this.#onUp, { signal });
+    surface.addEventListener('blur', this.#release, { signal });
+  }
+
+  hostDisconnected(): void {
+    this.#listening?.abort();
+    this.#listening = undefined;
+    this.#release();
+  }
+
+  advance(now: number): boolean {
+    if (this.#held.size === 0) return false;
+    const stepMs = this.#lastStep === undefined ? 0 : Math.min(MAX_MOVER_STEP_MS, now - this.#lastStep);
+    this.#lastStep = now;
+    const sum = (axis: 0 | 1 | 2): number => [...this.#held.values()].reduce((total, held) => total + held[axis], 0);
+    this.#move([sum(0), sum(1), sum(2)], stepMs);
+    return true;
+  }
+
+  #move([right, up, forward]: Direction, stepMs: number): void {
+    const way = (this.#options.scale() * SPEED * (this.#isFast ? FAST : 1) * stepMs) / 1000;
+    if (way > 0) this.#options.moveBy(way * right, way * up, way * forward);
+  }
+
+  readonly #onDown = (event: KeyboardEvent): void => {
+    const direction = DIRECTIONS[event.code];
+    if (direction === undefined || event.ctrlKey || event.altKey || event.metaKey) return;
+    event.preventDefault();
+    this.#isFast = event.shiftKey;
+    // A short press may be over before the next frame.
+    if (!event.repeat) this.#move(direction, FIRST_STEP_MS);
+    this.#held.set(event.code, direction);
+    this.#options.requestFrame();
+  };
+
+  readonly #onUp = (event: KeyboardEvent): void => {
+    this.#isFast = event.shiftKey;
+    this.#held.delete(event.code);
+    if (this.#held.size === 0) this.#lastStep = undefined;
+  };
+
+  readonly #release = (): void => {
+    this.#held.clear();
+    this.#lastStep = undefined;
+  };
+}

@@ -1,0 +1,222 @@
+import type { Camera } from '@gaussian-splat/core';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import { parsePoint } from '../camera/grammar.js';
+import { toScene, type ViewerFrame } from '../camera/orbit.js';
+import { project } from '../camera/projection.js';
+import { ScenePoint } from '../camera/values.js';
+
+export interface HotspotOptions {
+  /** Holds a box for each of {@link HotspotController.names}, in their order, once it is rendered. */
+  readonly layer: () => HTMLElement | null;
+  readonly viewerFrame: () => ViewerFrame;
+  /** World units: the size of the scene. */
+  readonly scale: () => number;
+  /** Looks into the last frame. Rejects if it is gone. */
+  readonly probe: (points: readonly ProbePoint[]) => Promise<readonly ProbeAnswer[]>;
+  readonly warn: (sentence: string) => void;
+}
+
+/** A label of the page at a point of the scene, as `queryHotspot` gives it. */
+export interface HotspotPlace {
+  /** Viewer space. */
+  readonly position: ScenePoint;
+  /** Direction away from the surface that it belongs to; null where the page gives none. */
+  readonly normal: ScenePoint | null;
+  /** CSS pixels from the element's left and top edge; null while it is behind the camera or nothing is drawn. */
+  readonly canvasPosition: { readonly x: number; readonly y: number } | null;
+  /** False where its normal points away from the camera. */
+  readonly facingCamera: boolean;
+  /** False where it faces away, is hidden by scenery, or is behind the camera. */
+  readonly visible: boolean;
+}
+
+type Point = readonly [x: number, y: number, z: number];
+
+interface Hotspot {
+  readonly elements: readonly HTMLElement[];
+  readonly position: Point | null;
+  readonly normal: Point | null;
+  x: number;
+  y: number;
+  depth: number;
+  facesCamera: boolean;
+  isOccluded: boolean;
+  isVisible: boolean | undefined;
+}
+
+const PREFIX = 'hotspot-';
+/** Less light than this from a hotspot, and scenery hides it. */
+const HIDDEN_BELOW = 0.5;
+/** A label on a surface is in front of it by this share of the scene's size: splats are thick. */
+const IN_FRONT = 0.03;
+/** Least time between two looks at what hides them while the camera moves, ms. */
+const PROBE_INTERVAL_MS = 100;
+
+/** Keeps children with `slot="hotspot-…"` at their points of the scene, and fades those that cannot be seen. */
+export class HotspotController implements ReactiveController {
+  readonly #host: ReactiveControllerHost & HTMLElement;
+  readonly #options: HotspotOptions;
+  #hotspots = new Map<string, Hotspot>();
+  #observer: MutationObserver | undefined;
+  #camera: Camera | undefined;
+  #isProbing = false;
+  #isStale = false;
+
+  constructor(host: ReactiveControllerHost & HTMLElement, options: HotspotOptions) {
+    this.#host = host;
+    this.#options = options;
+    host.addController(this);
+  }
+
+  /** Names of the slots that children ask for, each once. */
+  get names(): readonly string[] {
+    return [...this.#hotspots.keys()];
+  }
+
+  hostConnected(): void {
+    this.#observer = new MutationObserver(() => this.#collect());
+    const attributeFilter = ['slot', 'data-position', 'data-normal'];
+    this.#observer.observe(this.#host, { childList: true, subtree: true, attributeFilter });
+    this.#collect();
+  }
+
+  hostUpdated(): void {
+    this.#place();
+  }
+
+  hostDisconnected(): void {
+    this.#observer?.disconnect();
+  }
+
+  /** A frame was drawn from this camera. */
+  frameDrawn(camera: Camera): void {
+    this.#camera = camera;
+    if (this.#hotspots.size === 0) return;
+    this.#place();
+    void this.#look();
+  }
+
+  /** Where a hotspot is; null for a name that no child has, or one without a position. */
+  query(name: string): HotspotPlace | null {
+    const hotspot = this.#hotspots.get(name);
+    if (!hotspot?.position) return null;
+    const { position, normal, x, y, depth, facesCamera } = hotspot;
+    return {
+      position: new ScenePoint(...position),
+      normal: normal && new ScenePoint(...normal),
+      canvasPosition: depth > 0 ? { x, y } : null,
+      facingCamera: facesCamera,
+      visible: hotspot.isVisible ?? false,
+    };
+  }
+
+  #collect(): void {
+    const before = this.#hotspots;
+    const children = [...this.#host.children].filter(
+      (child): child is HTMLElement => child instanceof HTMLElement && child.slot.startsWith(PREFIX),
+    );
+    this.#hotspots = new Map(
+      [...groupBySlot(children)].map(([name, elements]) => [name, this.#read(elements, before.get(name))]),
+    );
+    if (before.size > 0 || this.#hotspots.size > 0) this.#host.requestUpdate();
+    void this.#look();
+  }
+
+  #read(elements: readonly HTMLElement[], before: Hotspot | undefined): Hotspot {
+    const [{ dataset, slot }] = elements;
+    const read = (name: string, text: string | undefined): Point | null => {
+      const point = text === undefined ? null : parsePoint(text);
+      if (text !== undefined && point === null)
+        this.#options.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in metres, found "${text}".`);
+      return point;
+    };
+    const position = read('data-position', dataset.position);
+    const normal = read('data-normal', dataset.normal);
+    const fresh = { x: 0, y: 0, depth: 0, facesCamera: true, isOccluded: false, isVisible: undefined };
+    return { ...fresh, ...before, elements, position, normal };
+  }
+
+  /** Moves the boxes to where the last frame has their points. */
+  #place(): void {
+    const layer = this.#options.layer();
+    const camera = this.#camera;
+    if (layer === null || camera === undefined || this.#hotspots.size === 0) return;
+    const { clientWidth, clientHeight } = this.#host;
+    [...this.#hotspots.values()].forEach((hotspot, i) => {
+      const box = layer.children[i] as HTMLElement | undefined;
+      if (box === undefined || hotspot.position === null) return;
+      const { x, y, depth } = project(camera, toScene(this.#options.viewerFrame(), hotspot.position));
+      hotspot.x = (x * clientWidth) / camera.width;
+      hotspot.y = (y * clientHeight) / camera.height;
+      hotspot.depth = depth > camera.near ? depth : 0;
+      hotspot.facesCamera = this.#facesCamera(hotspot, camera);
+      const isBehind = hotspot.depth === 0;
+      box.style.visibility = isBehind ? 'hidden' : '';
+      if (!isBehind) box.style.transform = `translate(${hotspot.x}px, ${hotspot.y}px) translate(-50%, -50%)`;
+      this.#show(hotspot, box);
+    });
+  }
+
+  #facesCamera({ position, normal }: Hotspot, { worldToCamera: m }: Camera): boolean {
+    if (normal === null || position === null) return true;
+    const frame = this.#options.viewerFrame();
+    const [n, p] = [toScene(frame, normal), toScene(frame, position)];
+    // In the camera's axes the eye is at 0, so the way from the eye to the point is the point itself.
+    const row = (r: number, v: Point, w: number): number =>
+      m[4 * r] * v[0] + m[4 * r + 1] * v[1] + m[4 * r + 2] * v[2] + w * m[4 * r + 3];
+    return [0, 1, 2].reduce((sum, r) => sum + row(r, n, 0) * row(r, p, 1), 0) < 0;
+  }
+
+  #show(hotspot: Hotspot, box: HTMLElement): void {
+    const isVisible = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
+    box.classList.toggle('hidden', !isVisible);
+    if (isVisible === hotspot.isVisible) return;
+    hotspot.isVisible = isVisible;
+    for (const element of hotspot.elements) {
+      const { visibilityAttribute } = element.dataset;
+      if (visibilityAttribute) element.toggleAttribute(`data-${visibilityAttribute}`, isVisible);
+      element.dispatchEvent(new CustomEvent('hotspot-visibility', { detail: { visible: isVisible } }));
+    }
+  }
+
+  /** Asks the GPU, beside the frames and not within them, what hides the hotspots; again if the camera moved meanwhile. */
+  async #look(): Promise<void> {
+    this.#isStale = true;
+    if (this.#isProbing) return;
+    this.#isProbing = true;
+    try {
+      while (this.#isStale && this.#host.isConnected) {
+        this.#isStale = false;
+        await this.#lookOnce();
+        await new Promise((resolve) => setTimeout(resolve, PROBE_INTERVAL_MS));
+      }
+    } catch {
+      // The frame is gone, with its scene or its device; the next one asks again.
+    } finally {
+      this.#isProbing = false;
+    }
+  }
+
+  async #lookOnce(): Promise<void> {
+    const { clientWidth, clientHeight } = this.#host;
+    const camera = this.#camera;
+    const asked = [...this.#hotspots.values()].filter(({ depth }) => depth > 0);
+    if (camera === undefined || asked.length === 0) return;
+    const margin = IN_FRONT * this.#options.scale();
+    const points = asked.map(({ x, y, depth }) => ({
+      x: (x * camera.width) / clientWidth,
+      y: (y * camera.height) / clientHeight,
+      depth: depth - margin,
+    }));
+    const answers = await this.#options.probe(points);
+    answers.forEach(({ transmittance }, i) => (asked[i].isOccluded = transmittance < HIDDEN_BELOW));
+    this.#place();
+  }
+}
+
+function groupBySlot(children: readonly HTMLElement[]): Map<string, HTMLElement[]> {
+  const groups = new Map<string, HTMLElement[]>();
+  for (const child of children) groups.set(child.slot, [...(groups.get(child.slot) ?? []), child]);
+  return groups;
+}

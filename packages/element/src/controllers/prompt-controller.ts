@@ -1,0 +1,92 @@
+import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import type { Mover } from './mover.js';
+
+export interface PromptOptions {
+  /** True where a prompt makes sense: the scene is on show, and people can move it. */
+  readonly mayShow: () => boolean;
+  /** Rest before it is shown, ms. */
+  readonly thresholdMs: () => number;
+  /** Whether the camera moves to and fro with it. */
+  readonly wiggles: () => boolean;
+  readonly turnBy: (theta: number) => void;
+  readonly requestFrame: () => void;
+}
+
+/** How far the camera goes to either side, radians. */
+const WIGGLE_ANGLE = Math.PI / 18;
+/** Once to and fro, twice over; then the prompt stands still: less than 5 s, so that nobody has to look for a way to stop it. */
+const WIGGLE_MS = 4_500;
+
+/** Turn of the camera at a moment of the wiggle, radians: 0 at its start and its end. */
+export function wiggleAt(elapsedMs: number): number {
+  if (elapsedMs <= 0 || elapsedMs >= WIGGLE_MS) return 0;
+  const share = elapsedMs / WIGGLE_MS;
+  return WIGGLE_ANGLE * Math.sin(4 * Math.PI * share) * Math.sin(Math.PI * share);
+}
+
+/** Shows people who have not touched the scene that they can. */
+export class PromptController implements ReactiveController, Mover {
+  readonly #host: ReactiveControllerHost;
+  readonly #options: PromptOptions;
+  #state: 'idle' | 'waiting' | 'shown' | 'done' = 'idle';
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #start: number | undefined;
+  #turned = 0;
+
+  constructor(host: ReactiveControllerHost, options: PromptOptions) {
+    this.#host = host;
+    this.#options = options;
+    host.addController(this);
+  }
+
+  get isShown(): boolean {
+    return this.#state === 'shown';
+  }
+
+  hostUpdated(): void {
+    const mayShow = this.#options.mayShow();
+    if (mayShow && this.#state === 'idle') this.#wait();
+    else if (!mayShow && (this.#state === 'waiting' || this.#state === 'shown')) this.reset();
+  }
+
+  hostDisconnected(): void {
+    if (this.#state !== 'done') this.#set('idle');
+  }
+
+  /** A person has moved the camera, and needs no prompt any more. */
+  dismiss(): void {
+    if (this.#state !== 'done') this.#set('done');
+  }
+
+  /** As if nobody had touched the scene yet. */
+  reset(): void {
+    this.#set('idle');
+  }
+
+  advance(now: number): boolean {
+    if (this.#state !== 'shown' || !this.#options.wiggles()) return false;
+    this.#start ??= now;
+    const elapsed = now - this.#start;
+    const turned = wiggleAt(elapsed);
+    if (turned !== this.#turned) this.#options.turnBy(turned - this.#turned);
+    this.#turned = turned;
+    return elapsed < WIGGLE_MS;
+  }
+
+  #wait(): void {
+    this.#state = 'waiting';
+    this.#timer = setTimeout(() => {
+      this.#start = undefined;
+      this.#turned = 0;
+      this.#set('shown');
+      if (this.#options.wiggles()) this.#options.requestFrame();
+    }, this.#options.thresholdMs());
+  }
+
+  #set(state: 'idle' | 'shown' | 'done'): void {
+    clearTimeout(this.#timer);
+    const changed = state !== this.#state;
+    this.#state = state;
+    if (changed) this.#host.requestUpdate();
+  }
+}

@@ -1,0 +1,80 @@
+import { SplatProperties } from './properties.js';
+import type { Stage } from './stage.js';
+import { SceneTimeRanges } from './time-ranges.js';
+
+/** What HTMLMediaElement.readyState says of a scene: nothing yet, or all there is. */
+const HAVE_NOTHING = 0;
+const HAVE_ENOUGH_DATA = 4;
+
+/** Time of a scene that moves, in the words of HTMLMediaElement: whatever drives a video drives it. */
+export abstract class MediaProperties extends SplatProperties {
+  /** @internal */
+  protected abstract readonly stage: Stage;
+  /** Fulfils when there is nothing left to wait for. */
+  abstract get ready(): Promise<void>;
+
+  /** Seconds into a scene that moves; setting it seeks. */
+  get currentTime(): number {
+    return this.stage.playback.currentTime;
+  }
+
+  set currentTime(seconds: number) {
+    this.stage.playback.currentTime = seconds;
+  }
+
+  /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
+  get duration(): number {
+    return this.stage.playback.duration;
+  }
+
+  get paused(): boolean {
+    return this.stage.playback.paused;
+  }
+
+  get ended(): boolean {
+    return this.stage.playback.ended;
+  }
+
+  /** True until the frame of the time that was set is on show. */
+  get seeking(): boolean {
+    return this.stage.playback.seeking;
+  }
+
+  /** Speed of the time; 1 is that of the clock, negative runs backwards. */
+  get playbackRate(): number {
+    return this.stage.playback.playbackRate;
+  }
+
+  set playbackRate(rate: number) {
+    this.stage.playback.playbackRate = rate;
+  }
+
+  /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is on show. */
+  get readyState(): number {
+    return this.stage.scene.state === 'ready' ? HAVE_ENOUGH_DATA : HAVE_NOTHING;
+  }
+
+  /** Times that can be sought: all of a scene with an end, none of others. */
+  get seekable(): SceneTimeRanges {
+    return new SceneTimeRanges(this.duration);
+  }
+
+  /** Times that need no more bytes: the same. */
+  get buffered(): SceneTimeRanges {
+    return new SceneTimeRanges(this.duration);
+  }
+
+  /**
+   * Lets the time run, once the scene is there. Frames are drawn as the page has them; the generator follows as fast as it can.
+   * @returns rejects with a `NotSupportedError` where there is no scene that moves.
+   */
+  async play(): Promise<void> {
+    await this.ready;
+    if (!this.stage.playback.canPlay) throw new DOMException('There is no scene that moves', 'NotSupportedError');
+    this.stage.playback.play();
+  }
+
+  pause(): void {
+    this.stage.playback.pause();
+  }
+}

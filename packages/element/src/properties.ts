@@ -1,0 +1,163 @@
+import { LitElement, type PropertyDeclarations } from 'lit';
+import type { SpokenStrings } from './camera/spoken.js';
+import type { GaussianSplatEventMap } from './events.js';
+import type { ControlValues, Numbers } from './live/values.js';
+
+/** The attributes of `<gaussian-splat>` and their properties, keywords written out for editors. What their text means is in attributes.ts. */
+// The interface below only gives inherited methods their types: nothing in it could be missing at run time.
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
+export class SplatProperties extends LitElement {
+  static override properties: PropertyDeclarations = {
+    src: {},
+    crossorigin: {},
+    poster: {},
+    alt: {},
+    loading: {},
+    cameraControls: { type: Boolean, attribute: 'camera-controls' },
+    cameraOrbit: { attribute: 'camera-orbit' },
+    cameraTarget: { attribute: 'camera-target' },
+    fieldOfView: { attribute: 'field-of-view' },
+    minCameraOrbit: { attribute: 'min-camera-orbit' },
+    maxCameraOrbit: { attribute: 'max-camera-orbit' },
+    minFieldOfView: { attribute: 'min-field-of-view' },
+    maxFieldOfView: { attribute: 'max-field-of-view' },
+    interpolationDecay: { attribute: 'interpolation-decay' },
+    touchAction: { attribute: 'touch-action' },
+    disableZoom: { type: Boolean, attribute: 'disable-zoom' },
+    disablePan: { type: Boolean, attribute: 'disable-pan' },
+    up: {},
+    maxPixelRatio: { attribute: 'max-pixel-ratio' },
+    quality: {},
+    contract: {},
+    chain: {},
+    postprocess: {},
+    time: {},
+    pose: {},
+    loop: { type: Boolean },
+    controls: { attribute: false },
+    reveal: {},
+    navigation: {},
+    autoRotate: { type: Boolean, attribute: 'auto-rotate' },
+    autoRotateDelay: { attribute: 'auto-rotate-delay' },
+    rotationPerSecond: { attribute: 'rotation-per-second' },
+    interactionPrompt: { attribute: 'interaction-prompt' },
+    interactionPromptStyle: { attribute: 'interaction-prompt-style' },
+    interactionPromptThreshold: { attribute: 'interaction-prompt-threshold' },
+    disableTap: { type: Boolean, attribute: 'disable-tap' },
+    autoplay: { type: Boolean },
+    a11y: {},
+  };
+
+  /** URL of the scene file. */
+  declare src: string | null;
+  /** As of `<img>`: `use-credentials` sends cookies to other origins. */
+  declare crossorigin: 'anonymous' | 'use-credentials' | '' | null;
+  /** URL of an image shown until the scene is. */
+  declare poster: string | null;
+  /** Text alternative. Absent: the host's `aria-label`, else "3D scene". Empty: the scene is decorative. */
+  declare alt: string | null;
+  /** `lazy`, the default, loads once the element is in sight; `eager` at once. */
+  declare loading: 'lazy' | 'eager' | null;
+  /** Lets people orbit, pan and zoom with mouse, touch and keyboard. */
+  declare cameraControls: boolean;
+  /** `"theta phi radius"`; default `0deg 75deg auto`. Where the camera goes: see {@link getCameraOrbit}. */
+  declare cameraOrbit: string | null;
+  /** `"x y z"` in metres of viewer space (y up, right-handed); default `auto`, the middle of the scene. */
+  declare cameraTarget: string | null;
+  /** Vertical field of view, such as `45deg`; default `auto`. */
+  declare fieldOfView: string | null;
+  /** Least `camera-orbit`. */
+  declare minCameraOrbit: string | null;
+  /** Greatest `camera-orbit`. */
+  declare maxCameraOrbit: string | null;
+  /** Least `field-of-view`. */
+  declare minFieldOfView: string | null;
+  /** Greatest `field-of-view`. */
+  declare maxFieldOfView: string | null;
+  /** Time constant of the camera's motion in milliseconds; default 50. 0, or a wish for less motion, jumps. */
+  declare interpolationDecay: number | string | null;
+  /** One-finger moves that stay the page's; default `pan-y`, so that pages scroll. */
+  declare touchAction: 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation' | null;
+  /** Leaves wheel and pinch to the page. */
+  declare disableZoom: boolean;
+  /** Keeps the camera's target where it is. */
+  declare disablePan: boolean;
+  /** Axis of the scene's frame that points up; default `-y`, as trainers write it. */
+  declare up: 'x' | '-x' | 'y' | '-y' | 'z' | '-z' | null;
+  /** Most drawn pixels for one CSS pixel; default no limit. */
+  declare maxPixelRatio: number | string | null;
+  /** Accuracy against speed: `reference`, `default`, `balanced` or `fast`. */
+  declare quality: 'default' | 'reference' | 'balanced' | 'fast' | null;
+  /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
+  declare contract: string | object | null;
+  /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */
+  declare chain: string | null;
+  /** URL of a post-processor that makes the picture shown from the one drawn, or several with spaces between them. */
+  declare postprocess: string | null;
+  /** Seconds: where the scene's time is put whenever this changes. See {@link currentTime} for where it is. */
+  declare time: number | string | null;
+  /** Pose of a generator, flattened or nested, as its contract declares it: text, a list, a typed array. A new pose is a new object. */
+  declare pose: Numbers | null;
+  /** Starts again at the end. */
+  declare loop: boolean;
+  /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
+  declare controls: ControlValues | null;
+  /** `auto`, the default: the poster gives way as soon as the scene can be drawn. `manual`: when {@link dismissPoster} or a click says so. */
+  declare reveal: 'auto' | 'manual' | null;
+  /** `orbit`, the default, turns around the target; `fly` looks around and flies by W, A, S, D, Q and E. */
+  declare navigation: 'orbit' | 'fly' | null;
+  /** Turns the camera around the scene while nobody touches it; not for people who want less motion. */
+  declare autoRotate: boolean;
+  /** Rest before it turns, in milliseconds; default 3000. */
+  declare autoRotateDelay: number | string | null;
+  /** How fast it turns, such as `30deg`; default `5.625deg`. */
+  declare rotationPerSecond: string | null;
+  /** `auto`, the default, shows people who have not touched the scene that they can; `none` does not. */
+  declare interactionPrompt: 'auto' | 'none' | null;
+  /** `basic`, the default, stands still; `wiggle` moves the camera to and fro once. */
+  declare interactionPromptStyle: 'basic' | 'wiggle' | null;
+  /** Rest before the prompt is shown, in milliseconds; default 3000. */
+  declare interactionPromptThreshold: number | string | null;
+  /** Keeps the camera's target where it is on a double click, which otherwise picks the point to turn around. */
+  declare disableTap: boolean;
+  /** Plays a scene that moves as soon as it is on show; not for people who want less motion. */
+  declare autoplay: boolean;
+  /** Words for screen readers in place of the English ones: an object or its JSON, with the keys of {@link SpokenStrings}. */
+  declare a11y: SpokenStrings | string | null;
+
+  constructor() {
+    super();
+    // Boolean properties start as booleans: frameworks look at them to decide what a bare attribute means.
+    this.cameraControls = false;
+    this.disableZoom = false;
+    this.disablePan = false;
+    this.disableTap = false;
+    this.autoRotate = false;
+    this.autoplay = false;
+    this.loop = false;
+  }
+}
+
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
+export interface SplatProperties {
+  addEventListener<K extends keyof GaussianSplatEventMap>(
+    type: K,
+    listener: (this: this, event: GaussianSplatEventMap[K]) => unknown,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  removeEventListener<K extends keyof GaussianSplatEventMap>(
+    type: K,
+    listener: (this: this, event: GaussianSplatEventMap[K]) => unknown,
+    options?: boolean | EventListenerOptions,
+  ): void;
+  removeEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject,
+    options?: boolean | EventListenerOptions,
+  ): void;
+}

@@ -1,0 +1,65 @@
+import type { Camera } from '@gaussian-splat/core';
+import { toViewer } from './camera/orbit.js';
+import { unproject } from './camera/projection.js';
+import { ScenePoint } from './camera/values.js';
+import type { CameraController } from './controllers/camera-controller.js';
+import type { GpuScene } from './gpu/gpu-scene.js';
+
+/** A box in viewer space, its sides along the axes. */
+export interface SceneBox {
+  readonly min: ScenePoint;
+  readonly max: ScenePoint;
+}
+
+export interface QueryOptions {
+  readonly camera: CameraController;
+  readonly scene: () => GpuScene | null;
+  /** The camera of the last frame, in its pixels; undefined before there is one. */
+  readonly drawnFrom: () => Camera | undefined;
+  readonly element: HTMLElement;
+}
+
+/** Questions about the scene on show: where it is, and what lies under a point of the page. */
+export class SceneQueries {
+  readonly #options: QueryOptions;
+
+  constructor(options: QueryOptions) {
+    this.#options = options;
+  }
+
+  /** Box around nearly all of the scene; null while none is on show. */
+  get box(): SceneBox | null {
+    const { camera, scene } = this.#options;
+    const bounds = scene()?.bounds;
+    if (bounds === undefined) return null;
+    const [a, b] = [toViewer(camera.viewerFrame, bounds.min), toViewer(camera.viewerFrame, bounds.max)];
+    const corner = (pick: (p: number, q: number) => number): ScenePoint =>
+      new ScenePoint(pick(a[0], b[0]), pick(a[1], b[1]), pick(a[2], b[2]));
+    return { min: corner(Math.min), max: corner(Math.max) };
+  }
+
+  /**
+   * The visible surface under a point of the page, read back from the GPU beside the frames.
+   * @param clientX CSS pixels, as of a MouseEvent.
+   * @returns null beside the scene, where it is more transparent than not, or if the frame is gone meanwhile.
+   */
+  async positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
+    const { camera, scene, drawnFrom, element } = this.#options;
+    const [drawn, gpuScene] = [drawnFrom(), scene()];
+    const { left, top } = element.getBoundingClientRect();
+    if (drawn === undefined || gpuScene === null || element.clientWidth === 0) return null;
+    const x = ((clientX - left - element.clientLeft) * drawn.width) / element.clientWidth;
+    const y = ((clientY - top - element.clientTop) * drawn.height) / element.clientHeight;
+    if (!(x >= 0 && y >= 0 && x < drawn.width && y < drawn.height)) return null;
+    try {
+      const [answer] = await gpuScene.probe([{ x, y }]);
+      if (!answer || answer.depth === null) return null;
+      const point = unproject(drawn, { x, y, depth: answer.depth });
+      return new ScenePoint(...toViewer(camera.viewerFrame, point));
+    } catch (error) {
+      // A device that was lost meanwhile has nothing more to say, and its loss is told elsewhere.
+      if (gpuScene.isLost || gpuScene.isDestroyed) return null;
+      throw error;
+    }
+  }
+}

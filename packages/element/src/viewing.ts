@@ -1,0 +1,113 @@
+import type { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
+import type { HotspotPlace } from './controllers/hotspot-controller.js';
+import { MediaProperties } from './media.js';
+import type { SceneBox } from './scene-queries.js';
+
+/** A picture to take. */
+export interface PictureOptions {
+  /** Default `image/png`. */
+  readonly mimeType?: string;
+  /** 0..1, for formats that lose some. */
+  readonly qualityArgument?: number;
+}
+
+/** What scripts ask of the picture: its poster, its camera, what lies under a point of it, and the picture itself. */
+export abstract class ViewingMethods extends MediaProperties {
+  /** Attributes count at once for those who call a method right after setting one. */
+  protected abstract applyAttributes(): void;
+
+  /** True while the poster does not cover the scene. */
+  get revealed(): boolean {
+    return !this.stage.reveal.isCovered;
+  }
+
+  /** Lets the scene be seen as soon as it can be, and a lazy one be loaded: what `reveal="manual"` waits for. */
+  dismissPoster(): void {
+    this.stage.reveal.dismiss();
+  }
+
+  /** Covers the scene with its poster again. */
+  showPoster(): void {
+    this.stage.reveal.cover();
+  }
+
+  /** Where the camera is now; as a string, a value for `camera-orbit`. */
+  getCameraOrbit(): CameraOrbit {
+    return this.stage.camera.orbit;
+  }
+
+  /** What the camera looks at now; as a string, a value for `camera-target`. */
+  getCameraTarget(): CameraTarget {
+    return this.stage.camera.target;
+  }
+
+  /** Vertical field of view now; as a string, a value for `field-of-view`. */
+  getFieldOfView(): FieldOfView {
+    return this.stage.camera.fieldOfView;
+  }
+
+  /** Ends the camera's motion where it was going. */
+  jumpCameraToGoal(): void {
+    this.applyAttributes();
+    this.stage.camera.jumpToGoal();
+  }
+
+  /** Brings the camera back to where the attributes put it. */
+  resetCamera(): void {
+    this.applyAttributes();
+    this.stage.camera.reset('none');
+  }
+
+  /** Lets the interaction prompt come again, as if nobody had touched the scene. */
+  resetInteractionPrompt(): void {
+    this.stage.behaviours.prompt.reset();
+  }
+
+  /** Frames the scene as if it had just been loaded: for generators whose scene has grown or gone elsewhere. */
+  async updateFraming(): Promise<void> {
+    this.applyAttributes();
+    await this.stage.updateFraming();
+  }
+
+  /** Box around nearly all of the scene, in metres of viewer space; null while none is on show. */
+  getBoundingBox(): SceneBox | null {
+    return this.stage.queries.box;
+  }
+
+  /**
+   * The visible surface of the scene under a point of the page: what `data-position` and `camera-target` take. Asks the GPU, beside the
+   * frames; to about a thousandth of the distance.
+   * @param clientX CSS pixels, as of a MouseEvent.
+   * @returns null beside the scene, and where it is more transparent than not.
+   */
+  positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
+    return this.stage.queries.positionFromPoint(clientX, clientY);
+  }
+
+  /** Where the hotspot of a slot is now, for example `hotspot-door`; null if there is none with a position. */
+  queryHotspot(name: string): HotspotPlace | null {
+    return this.stage.hotspots.query(name);
+  }
+
+  /**
+   * The picture as it is now, drawn anew and read in the same task.
+   * @returns rejects with an `InvalidStateError` where no scene is on show.
+   */
+  async toBlob({ mimeType = 'image/png', qualityArgument }: PictureOptions = {}): Promise<Blob> {
+    const canvas = this.#drawnCanvas();
+    const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, mimeType, qualityArgument));
+    if (blob === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
+    return blob;
+  }
+
+  /** The same as a `data:` URL, at once. Throws an `InvalidStateError` where no scene is on show. */
+  toDataURL(mimeType = 'image/png', qualityArgument?: number): string {
+    return this.#drawnCanvas().toDataURL(mimeType, qualityArgument);
+  }
+
+  #drawnCanvas(): HTMLCanvasElement {
+    const canvas = this.stage.drawNow();
+    if (canvas === null) throw new DOMException('There is no scene on show to take a picture of', 'InvalidStateError');
+    return canvas;
+  }
+}

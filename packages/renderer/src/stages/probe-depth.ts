@@ -1,0 +1,19 @@
+import { probeDepth } from '../generated/shaders.js';
+import { kernelOf, type ComputeKernel, type Overrides, type Resources } from '../gpu/kernel.js';
+
+/** Opacity and depth under single points of the last frame; a workgroup a point. */
+export class ProbeDepthStage {
+  readonly #kernel: ComputeKernel<typeof probeDepth>;
+
+  constructor(device: GPUDevice, { alpha_min }: Overrides = {}) {
+    this.#kernel = kernelOf(device, probeDepth, alpha_min === undefined ? {} : { alpha_min });
+  }
+
+  bind(resources: Resources<typeof probeDepth>): GPUBindGroup {
+    return this.#kernel.bind(resources);
+  }
+
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, points: number): void {
+    this.#kernel.dispatch(pass, bindings, points);
+  }
+}

@@ -1,0 +1,14 @@
+/** `npm run lives [CYCLES]`: 500 (or so many) elements that come and go, 24 at once, 20 lost devices, in real Chromium. */
+import { build, ensureDependencies } from './lib/prepare.mjs';
+import { must } from './lib/run.mjs';
+
+ensureDependencies();
+build();
+must(
+  process.execPath,
+  [
+    'node_modules/@web/test-runner/dist/bin.js',
+    ...['--config', 'web-test-runner.config.mjs', '--files', 'tests/element/browser/lives.test.ts'],
+  ],
+  { env: { NODE_ENV: 'test', SOAK_CYCLES: process.argv[2] ?? '500' } },
+);

@@ -1,0 +1,83 @@
+// What lies under single points of the last frame: picking, and labels that scenery hides. One workgroup a point; each
+// lane walks one run of the splats, from near to far, so that a prefix product of 64 runs is all that is left to join.
+#import shared/splat
+#import shared/falloff
+#import shared/plan
+
+@group(0) @binding(0) var<storage, read> plan: Plan;
+@group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
+// Slots from near to far.
+@group(0) @binding(2) var<storage, read> order: array<u32>;
+@group(0) @binding(3) var<storage, read> points: array<ProbePoint>;
+@group(0) @binding(4) var<storage, read_write> answers: array<ProbeAnswer>;
+
+struct ProbePoint {
+  // Pixels of the image that was drawn.
+  pixel: vec2f,
+  // World units along the camera's axis.
+  depth: f32,
+  unused: f32,
+}
+
+struct ProbeAnswer {
+  // 1 - transmittance of all splats.
+  opacity: f32,
+  // Depth of the splat behind which less than half of the light is left; 0 where more than half passes all.
+  median_depth: f32,
+  // Transmittance of the splats in front of the point's depth.
+  in_front: f32,
+  unused: f32,
+}
+
+const PROBE_LANES = 64u;
+
+var<workgroup> runs: array<f32, PROBE_LANES>;
+var<workgroup> runs_in_front: array<f32, PROBE_LANES>;
+
+// Share of the light that a splat lets through at a pixel.
+fn passes(s: ProjectedSplat, pixel: vec2f) -> f32 {
+  let alpha = alpha_at(pixel - s.shape.xy, s.shape.z, s.shape.w, bitcast<f32>(s.paint.x), bitcast<f32>(s.paint.w));
+  return select(1.0, 1.0 - alpha, alpha >= alpha_min);
+}
+
+@compute @workgroup_size(PROBE_LANES)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let point = points[workgroup_id.x];
+  let length = (plan.visible + PROBE_LANES - 1u) / PROBE_LANES;
+  let first = min(lane * length, plan.visible);
+  let end = min(first + length, plan.visible);
+  var light = 1.0;
+  var light_in_front = 1.0;
+  for (var rank = first; rank < end; rank++) {
+    let s = splats[order[rank]];
+    let share = passes(s, point.pixel);
+    light *= share;
+    if (splat_depth(s) < point.depth) { light_in_front *= share; }
+  }
+  runs[lane] = light;
+  runs_in_front[lane] = light_in_front;
+  workgroupBarrier();
+  if (lane != 0u) { return; }
+  var in_front = 1.0;
+  for (var run = 0u; run < PROBE_LANES; run++) { in_front *= runs_in_front[run]; }
+  var total = 1.0;
+  var before = 1.0;
+  var crossing = PROBE_LANES;
+  for (var run = 0u; run < PROBE_LANES; run++) {
+    if (crossing == PROBE_LANES && total * runs[run] < 0.5) {
+      crossing = run;
+      before = total;
+    }
+    total *= runs[run];
+  }
+  var median = 0.0;
+  for (var rank = crossing * length; rank < min((crossing + 1u) * length, plan.visible); rank++) {
+    let s = splats[order[rank]];
+    before *= passes(s, point.pixel);
+    if (before < 0.5) {
+      median = splat_depth(s);
+      break;
+    }
+  }
+  answers[workgroup_id.x] = ProbeAnswer(1.0 - total, median, in_front, 0.0);
+}

@@ -1,0 +1,269 @@
+/** What goes on around the camera: posters, prompts, turning by itself, flying, speaking. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { emulateMedia, resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  submits,
+  until,
+} from './support/harness.js';
+import { isRed, screenOf } from './support/screen.js';
+
+const POSTER = 'data:image/gif;base64,R0lGODlhAQABAIAAAP///wAAACwAAAAAAQABAAACAkQBADs=';
+const partOf = (element: GaussianSplatElement, selector: string): HTMLElement | null =>
+  element.shadowRoot?.querySelector<HTMLElement>(selector) ?? null;
+const theta = (element: GaussianSplatElement): number => (element.getCameraOrbit().theta * 180) / Math.PI;
+
+/** Where the camera itself is, in viewer space. */
+function eyeOf(element: GaussianSplatElement): number[] {
+  const { theta, phi, radius } = element.getCameraOrbit();
+  const { x, y, z } = element.getCameraTarget();
+  const [sin, cos] = [Math.sin(phi), Math.cos(phi)];
+  return [x + radius * Math.sin(theta) * sin, y + radius * cos, z + radius * Math.cos(theta) * sin];
+}
+
+const distance = (a: readonly number[], b: readonly number[]): number =>
+  Math.hypot(...a.map((value, axis) => value - b[axis]));
+
+afterEach(async () => {
+  await resetMouse();
+  await emulateMedia({ reducedMotion: 'no-preference' });
+});
+
+describe('the poster', () => {
+  it('with reveal="manual" waits for a person: no byte, no device, one button', async () => {
+    const src = `${COMPASS}?manual`;
+    const element = show({ src, poster: POSTER, reveal: 'manual', 'camera-controls': '', alt: 'A compass' });
+    const fetched = (): number =>
+      performance.getEntriesByType('resource').filter(({ name }) => name.includes('?manual')).length;
+    await delay(400);
+    assertEqual([fetched(), element.loaded, element.revealed], [0, false, false], 'before the click');
+    const button = partOf(element, 'button');
+    assertEqual(button?.getAttribute('aria-label'), 'Show A compass');
+    let dismissed = 0;
+    element.addEventListener('poster-dismissed', () => dismissed++);
+    button?.click();
+    await nextEvent(element, 'load');
+    await until(() => dismissed > 0, 'poster-dismissed');
+    assertEqual([element.loaded, element.revealed, dismissed], [true, true, 1], 'after it');
+    assertEqual(element.shadowRoot?.activeElement?.id, 'view', 'the keyboard goes on in the scene');
+  });
+
+  it('covers a scene that was loaded eagerly until dismissPoster(), and again after showPoster()', async () => {
+    const element = await showLoaded({ reveal: 'manual', loading: 'eager' });
+    assert(!element.revealed, 'covered');
+    assertEqual((await screenOf(element)).middleOf(isRed), null, 'nothing is seen');
+    element.dismissPoster();
+    await nextEvent(element, 'poster-dismissed');
+    await delay(400);
+    assert((await screenOf(element)).middleOf(isRed), 'the scene is seen');
+    element.showPoster();
+    await element.updateComplete;
+    assertEqual((await screenOf(element)).middleOf(isRed), null, 'covered again');
+  });
+
+  it('gives way by itself otherwise', async () => {
+    const element = show({ src: COMPASS, poster: POSTER });
+    await nextEvent(element, 'poster-dismissed');
+    assert(element.loaded && element.revealed, 'revealed');
+  });
+});
+
+describe('the interaction prompt', () => {
+  const prompted = { 'camera-controls': '', 'interaction-prompt-threshold': '150' };
+
+  it('comes after a rest, costs no frame, and goes with the first touch', async () => {
+    const element = await showLoaded(prompted);
+    const before = submits;
+    await until(() => partOf(element, '[part=prompt]') !== null, 'the prompt');
+    await delay(300);
+    assert(submits - before <= 1, `${submits - before} submits`);
+    element.focus();
+    await sendKeys({ press: 'ArrowRight' });
+    await until(() => partOf(element, '[part=prompt]') === null, 'the prompt to go');
+    await delay(400);
+    assertEqual(partOf(element, '[part=prompt]'), null, 'it stays away');
+    element.resetInteractionPrompt();
+    await until(() => partOf(element, '[part=prompt]') !== null, 'the prompt after a reset');
+  });
+
+  it('does not come without controls, nor with interaction-prompt="none"', async () => {
+    const [plain, none] = [
+      await showLoaded({ 'interaction-prompt-threshold': '50' }),
+      await showLoaded({ ...prompted, 'interaction-prompt': 'none' }),
+    ];
+    await delay(500);
+    assertEqual([partOf(plain, '.prompt'), partOf(none, '.prompt')], [null, null]);
+  });
+
+  it('that wiggles moves the camera to and fro and leaves it where it was', async () => {
+    const element = await showLoaded({ ...prompted, 'interaction-prompt-style': 'wiggle' });
+    const seen: number[] = [];
+    const sources = new Set<string>();
+    element.addEventListener('camera-change', ({ detail }) => {
+      seen.push(theta(element));
+      sources.add(detail.source);
+    });
+    await until(() => seen.length > 0, 'the wiggle');
+    const moving = seen.length;
+    await delay(5_200);
+    const after = submits;
+    assert(Math.max(...seen) > 5 && Math.min(...seen) < -5, `from ${Math.min(...seen)} to ${Math.max(...seen)}`);
+    assert(seen.length > moving + 10, `${seen.length} frames`);
+    assert(Math.abs(theta(element)) < 1e-9, `theta ${theta(element)}`);
+    assertEqual([...sources], ['automatic'], 'sources');
+    await delay(300);
+    assertEqual(submits - after, 0, 'submits afterwards');
+  });
+
+  it('does not wiggle for people who want less motion', async () => {
+    await emulateMedia({ reducedMotion: 'reduce' });
+    const element = await showLoaded({ ...prompted, 'interaction-prompt-style': 'wiggle' });
+    let changes = 0;
+    element.addEventListener('camera-change', () => changes++);
+    await until(() => partOf(element, '[part=prompt].basic') !== null, 'the prompt');
+    await delay(500);
+    assertEqual(changes, 0, 'moves');
+  });
+});
+
+describe('auto-rotate', () => {
+  const rotating = { 'auto-rotate': '', 'auto-rotate-delay': '100', 'rotation-per-second': '60deg' };
+
+  it('turns after a rest, stops for a person, and goes on', async () => {
+    const element = await showLoaded({ ...rotating, 'camera-controls': '' });
+    const sources: string[] = [];
+    element.addEventListener('camera-change', ({ detail }) => sources.push(detail.source));
+    const start = performance.now();
+    await until(() => sources.length > 5, 'some frames');
+    const turned = theta(element);
+    const seconds = (performance.now() - start) / 1000;
+    assert(turned < -1 && turned > -60 * seconds - 10, `${turned} degrees in ${seconds} s`);
+    assertEqual([...new Set(sources)], ['automatic'], 'sources');
+    element.autoRotateDelay = 60_000;
+    await element.updateComplete;
+    await sendMouse({ type: 'move', position: [60, 50] });
+    await sendMouse({ type: 'down' });
+    await sendMouse({ type: 'move', position: [50, 50] });
+    await sendMouse({ type: 'up' });
+    await until(() => sources.at(-1) === 'user-interaction', 'the drag');
+    // The drag's own motion dies away first.
+    await delay(600);
+    element.jumpCameraToGoal();
+    await frames();
+    const rest = theta(element);
+    await delay(300);
+    assertEqual(theta(element), rest, 'theta at rest');
+    element.autoRotate = false;
+    await element.updateComplete;
+    element.autoRotate = true;
+    element.autoRotateDelay = 50;
+    await until(() => theta(element) < rest, 'to go on');
+  });
+
+  it('stands still for people who want less motion, and while the keyboard is on it', async () => {
+    await emulateMedia({ reducedMotion: 'reduce' });
+    const still = await showLoaded(rotating);
+    await delay(500);
+    assertEqual(theta(still), 0, 'reduced motion');
+    await emulateMedia({ reducedMotion: 'no-preference' });
+    still.remove();
+    const element = await showLoaded({ ...rotating, 'auto-rotate-delay': '400', 'camera-controls': '' });
+    await sendKeys({ press: 'Tab' });
+    assertEqual(element.shadowRoot?.activeElement?.id, 'view', 'focus');
+    await delay(900);
+    assertEqual(theta(element), 0, 'under the keyboard');
+  });
+});
+
+describe('fly', () => {
+  it('W moves the camera ahead, D to the right, and a drag looks around from where it is', async () => {
+    const element = await showLoaded({
+      ...{ navigation: 'fly', 'camera-controls': '', 'camera-orbit': '0deg 90deg 10m' },
+      ...{ 'interpolation-decay': '60', 'disable-tap': '' },
+    });
+    element.focus();
+    await sendKeys({ press: 'w' });
+    await until(() => eyeOf(element)[2] < 9.999, 'the way ahead');
+    await delay(800);
+    const ahead = eyeOf(element);
+    assert(Math.abs(ahead[0]) < 1e-9 && Math.abs(ahead[1]) < 1e-9, `straight on: ${ahead.join()}`);
+    await sendKeys({ press: 'd' });
+    await until(() => eyeOf(element)[0] > 1e-3, 'the way to the right');
+    await delay(800);
+    const from = eyeOf(element);
+    const strayed: number[] = [];
+    element.addEventListener('camera-change', () => strayed.push(distance(eyeOf(element), from)));
+    await sendMouse({ type: 'move', position: [60, 50] });
+    await sendMouse({ type: 'down' });
+    await sendMouse({ type: 'move', position: [90, 70] });
+    await sendMouse({ type: 'up' });
+    await until(() => strayed.length > 2, 'the look around');
+    await delay(800);
+    assert(theta(element) > 5, `the scene follows the pointer: ${theta(element)} degrees`);
+    assert(Math.max(...strayed) < 1e-9, `the eye stays: ${Math.max(...strayed)}`);
+    const orbit = String(element.getCameraOrbit());
+    const copy = await showLoaded({ 'camera-orbit': orbit, 'camera-target': String(element.getCameraTarget()) });
+    assert(distance(eyeOf(copy), eyeOf(element)) < 1e-9, 'the place survives its strings');
+  });
+
+  it('holds speed while a key is held, and stops with it', async () => {
+    const element = await showLoaded({ navigation: 'fly', 'camera-controls': '', 'interpolation-decay': '0' });
+    element.focus();
+    await sendKeys({ down: 's' });
+    await delay(500);
+    await sendKeys({ up: 's' });
+    await frames(3);
+    const place = eyeOf(element);
+    assert(place[2] > 0.2, `${place.join()}`);
+    await delay(300);
+    assertEqual(distance(eyeOf(element), place), 0, 'motion after the key');
+  });
+});
+
+describe('screen readers', () => {
+  const spoken = (element: GaussianSplatElement): string => partOf(element, '[role=status]')?.textContent ?? '?';
+
+  it('hear where the camera has gone while the scene has the focus, and not too often', async () => {
+    const element = await showLoaded({ 'camera-controls': '', 'camera-orbit': '0deg 90deg auto' });
+    const heard: string[] = [];
+    const status = partOf(element, '[role=status]');
+    assert(status, 'a live region');
+    new MutationObserver(() => heard.push(spoken(element))).observe(status, {
+      ...{ childList: true, characterData: true, subtree: true },
+    });
+    element.cameraOrbit = '90deg 90deg auto';
+    await delay(1_000);
+    assertEqual(heard, [], 'without focus');
+    element.focus();
+    for (let i = 0; i < 4; i++) await sendKeys({ press: 'ArrowRight' });
+    await until(() => heard.length > 0, 'words');
+    assertEqual(heard, ['View from back'], 'four turns, one sentence');
+    for (let i = 0; i < 3; i++) await sendKeys({ press: 'ArrowUp' });
+    await until(() => heard.length > 1, 'more words');
+    assertEqual(heard[1], 'View from upper back');
+    element.blur();
+    (element.shadowRoot?.activeElement as HTMLElement | null)?.blur();
+    await until(() => spoken(element) === '', 'silence');
+  });
+
+  it('hear the words of the page', async () => {
+    const element = await showLoaded({
+      ...{ 'camera-controls': '', 'interpolation-decay': '0', 'camera-orbit': '0deg 90deg auto' },
+      a11y: '{"right": "Blick von rechts", "interaction-prompt": "Ziehen"}',
+      'interaction-prompt-threshold': '50',
+    });
+    await until(() => partOf(element, '[part=prompt]')?.getAttribute('aria-label') === 'Ziehen', 'the prompt');
+    element.focus();
+    for (let i = 0; i < 4; i++) await sendKeys({ press: 'ArrowRight' });
+    await until(() => spoken(element) !== '', 'words');
+    assertEqual(spoken(element), 'Blick von rechts');
+  });
+});

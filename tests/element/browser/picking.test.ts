@@ -1,0 +1,265 @@
+/** Points of the scene: under a pointer, under a label, and the picture of all of them. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { GaussianSplatElement as ElementClass } from '@gaussian-splat/element';
+import { sendMouse } from '@web/test-runner-commands';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  submits,
+  until,
+} from './support/harness.js';
+import { isGreen, isRed, screenOf } from './support/screen.js';
+
+const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
+
+async function compass(attributes: Readonly<Record<string, string>> = {}): Promise<GaussianSplatElement> {
+  document.body.style.margin = '0';
+  return showLoaded({ 'camera-orbit': '0deg 90deg 8m', ...STILL, ...attributes }, 'width: 200px; height: 160px');
+}
+
+const near = (actual: number, expected: number, tolerance: number, what: string): void =>
+  assert(Math.abs(actual - expected) <= tolerance, `${what}: expected ${expected}, found ${actual}`);
+
+/** CSS pixels of the page where a point of viewer space lies, by the documented pinhole geometry for theta 0, phi 90 degrees. */
+function pageOf(element: GaussianSplatElement, [x, y, z]: readonly number[]): [number, number] {
+  const { radius } = element.getCameraOrbit();
+  const focal = 160 / 2 / Math.tan(element.getFieldOfView().radians / 2);
+  return [100 + (focal * x) / (radius - z), 80 - (focal * y) / (radius - z)];
+}
+
+function label(element: GaussianSplatElement, name: string, position: string, more: object = {}): HTMLElement {
+  const button = document.createElement('button');
+  button.slot = `hotspot-${name}`;
+  button.textContent = name;
+  Object.assign(button.dataset, { position, ...more });
+  element.append(button);
+  return button;
+}
+
+describe('positionFromPoint', () => {
+  it('finds the ball under the pointer, and nothing beside it', async () => {
+    const element = await compass();
+    const balls = [
+      [0, 0, 1],
+      [1, 0, 0],
+      [-1, 0, 0],
+      [0, 1, 0],
+    ];
+    for (const ball of balls) {
+      const point = await element.positionFromPoint(...pageOf(element, ball));
+      assert(point, `nothing at ${ball.join()}`);
+      // The depth is that of a splat's centre, to 11 bits.
+      [point.x, point.y, point.z].forEach((value, axis) =>
+        near(value, ball[axis], 0.02, `${ball.join()} axis ${axis}`),
+      );
+    }
+    assertEqual(await element.positionFromPoint(3, 3), null, 'beside the scene');
+    assertEqual(await element.positionFromPoint(-50, 900), null, 'beside the element');
+  });
+
+  it('reads from the GPU only when asked, and knows the frame that is on the screen', async () => {
+    const element = await compass();
+    await frames(3);
+    const before = submits;
+    element.cameraOrbit = '90deg 90deg 8m';
+    await nextEvent(element, 'camera-change');
+    assertEqual(submits - before, 1, 'submits for the frame');
+    const point = await element.positionFromPoint(100, 80);
+    near(point?.x ?? NaN, 1, 0.02, 'from the right, the red ball is in the middle');
+    assertEqual(submits - before, 2, 'submits with the question');
+  });
+
+  it('has no answer without a scene, and none after the device is gone', async () => {
+    const empty = show({}, 'width: 200px; height: 160px');
+    assertEqual(await empty.positionFromPoint(100, 80), null);
+    empty.remove();
+    const element = await compass();
+    const asked = element.positionFromPoint(100, 80);
+    element.src = null;
+    await asked;
+    await element.updateComplete;
+    assertEqual(await element.positionFromPoint(100, 80), null, 'of a scene that was taken away');
+  });
+
+  it('a double click picks the point to turn around, disable-tap keeps it', async () => {
+    const element = await compass({ 'camera-controls': '' });
+    const doubleClick = async (): Promise<void> => {
+      const [x, y] = pageOf(element, [1, 0, 0]);
+      const position: [number, number] = [Math.round(x), Math.round(y)];
+      const options = { bubbles: true, clientX: position[0], clientY: position[1] };
+      element.shadowRoot?.querySelector('#view')?.dispatchEvent(new MouseEvent('dblclick', options));
+      await sendMouse({ type: 'move', position });
+      await delay(300);
+    };
+    element.disableTap = true;
+    await element.updateComplete;
+    await doubleClick();
+    near(element.getCameraTarget().x, 0, 1e-9, 'with disable-tap');
+    element.disableTap = false;
+    await element.updateComplete;
+    await doubleClick();
+    near(element.getCameraTarget().x, 1, 0.03, 'without');
+  });
+});
+
+describe('hotspots', () => {
+  it('stand at their points and move with the camera', async () => {
+    const element = await compass();
+    const button = label(element, 'red', '1m 0 0');
+    await frames(3);
+    const middleOf = (): [number, number] => {
+      const { left, top, width, height } = button.getBoundingClientRect();
+      return [left + width / 2, top + height / 2];
+    };
+    const [x, y] = pageOf(element, [1, 0, 0]);
+    near(middleOf()[0], x, 0.6, 'x');
+    near(middleOf()[1], y, 0.6, 'y');
+    element.cameraOrbit = '90deg 90deg 8m';
+    await nextEvent(element, 'camera-change');
+    await frames();
+    near(middleOf()[0], 100, 0.6, 'x from the right');
+    button.dataset.position = '0m 1m 0m';
+    await frames(3);
+    assert(middleOf()[1] < 70, `the label of the top: ${middleOf().join()}`);
+    const place = element.queryHotspot('hotspot-red');
+    assertEqual([place?.position.y, place?.normal, element.queryHotspot('hotspot-none')], [1, null, null]);
+  });
+
+  it('fade where scenery hides them, and come back', async () => {
+    const element = await compass();
+    const [front, back] = [
+      label(element, 'front', '0m 0m 1m'),
+      label(element, 'back', '0m 0m -1m', { visibilityAttribute: 'visible' }),
+    ];
+    const opacity = (button: HTMLElement): number =>
+      Number(getComputedStyle(button.assignedSlot?.parentElement ?? button).opacity);
+    const seen: boolean[] = [];
+    back.addEventListener('hotspot-visibility', (event) => seen.push((event as CustomEvent).detail.visible));
+    await until(() => opacity(back) < 0.3 && opacity(front) > 0.95, 'the label behind the white ball to fade');
+    assert(!back.hasAttribute('data-visible') && front.matches(':not([data-visible])'), 'attributes');
+    element.cameraOrbit = '180deg 90deg 8m';
+    await until(() => opacity(back) > 0.95 && opacity(front) < 0.3, 'both to change places');
+    assert(back.hasAttribute('data-visible'), 'the attribute');
+    assertEqual(seen.at(-1), true, 'events');
+    element.style.setProperty('--min-hotspot-opacity', '0.6');
+    await until(() => Math.abs(opacity(front) - 0.6) < 0.01, 'the custom property');
+  });
+
+  it('with a normal that points away count as hidden, and those behind the camera are gone', async () => {
+    const element = await compass();
+    label(element, 'away', '0m 0m 1m', { normal: '0m 0m -1m' });
+    label(element, 'towards', '0m 0m 1m', { normal: '0m 0m 1m' });
+    const behind = label(element, 'behind', '0m 0m 20m');
+    await frames(4);
+    assertEqual(element.queryHotspot('hotspot-away')?.facingCamera, false);
+    assertEqual(element.queryHotspot('hotspot-towards')?.facingCamera, true);
+    assertEqual(element.queryHotspot('hotspot-behind')?.canvasPosition, null);
+    assertEqual(getComputedStyle(behind).visibility, 'hidden', 'behind the camera');
+    behind.focus();
+    assert(document.activeElement !== behind, 'what cannot be seen takes no focus');
+  });
+
+  it('cost nothing while nothing moves, and can be clicked', async () => {
+    const element = await compass({ 'camera-controls': '' });
+    const button = label(element, 'front', '0m 0m 1m');
+    let clicks = 0;
+    button.addEventListener('click', () => clicks++);
+    await delay(600);
+    const before = submits;
+    await delay(600);
+    assertEqual(submits - before, 0, 'submits');
+    const { left, top, width, height } = button.getBoundingClientRect();
+    await sendMouse({ type: 'click', position: [Math.round(left + width / 2), Math.round(top + height / 2)] });
+    assertEqual(clicks, 1, 'clicks');
+    button.remove();
+    await frames();
+    assertEqual(element.shadowRoot?.querySelectorAll('.hotspot').length, 0, 'boxes');
+  });
+});
+
+describe('pictures', () => {
+  it('toBlob() and toDataURL() hold what is on the screen', async () => {
+    const element = await compass({ 'camera-orbit': '30deg 70deg 8m' });
+    element.style.background = 'black';
+    const screen = await screenOf(element);
+    const sources = [URL.createObjectURL(await element.toBlob()), element.toDataURL()];
+    for (const source of sources) {
+      const image = new Image();
+      image.src = source;
+      image.style.cssText = 'display: block; width: 200px; height: 160px; background: black';
+      await image.decode();
+      assertEqual([image.naturalWidth, image.naturalHeight], [200, 160], 'size');
+      document.body.prepend(image);
+      const differing = (await screenOf(image)).differences(screen, 2);
+      image.remove();
+      assertEqual(differing, 0, 'differing colour values');
+    }
+    assert((await element.toBlob({ mimeType: 'image/webp', qualityArgument: 0.5 })).type === 'image/webp', 'webp');
+    assertEqual((await screenOf(element)).differences(screen), 0, 'the page afterwards');
+  });
+
+  it('are refused where there is no scene', async () => {
+    const element = show({});
+    const refusal = await element.toBlob().then(
+      () => 'none',
+      (error: Error) => error.name,
+    );
+    assertEqual(refusal, 'InvalidStateError');
+  });
+});
+
+describe('the scene as a whole', () => {
+  it('has a box in viewer space', async () => {
+    const element = await compass();
+    const box = element.getBoundingBox();
+    assert(box, 'a box');
+    for (const axis of ['x', 'y', 'z'] as const) {
+      assert(box.min[axis] <= -0.9 && box.min[axis] > -1.8, `min ${axis} ${box.min[axis]}`);
+      assert(box.max[axis] >= 0.9 && box.max[axis] < 1.8, `max ${axis} ${box.max[axis]}`);
+    }
+    assertEqual(show({}).getBoundingBox(), null, 'without a scene');
+  });
+
+  it('updateFraming() frames it anew', async () => {
+    const element = await compass({ 'camera-orbit': 'auto' });
+    const framed = String(element.getCameraOrbit());
+    element.cameraOrbit = '10deg 20deg 3m';
+    element.jumpCameraToGoal();
+    element.cameraOrbit = 'auto';
+    await element.updateFraming();
+    assertEqual(String(element.getCameraOrbit()), framed);
+  });
+
+  it('moveBefore() keeps the picture and the scene', async () => {
+    const element = await compass();
+    const parent = document.createElement('section');
+    document.body.append(parent);
+    const move = (parent as unknown as { moveBefore?: (node: Node, child: Node | null) => void }).moveBefore;
+    assert(move, 'this browser has moveBefore');
+    let events = 0;
+    for (const type of ['loadstart', 'load', 'emptied', 'contextlost']) element.addEventListener(type, () => events++);
+    move.call(parent, element, null);
+    await frames(3);
+    assertEqual([element.loaded, events], [true, 0]);
+    element.cameraOrbit = '90deg 90deg 8m';
+    await nextEvent(element, 'camera-change');
+    assert((await screenOf(element)).middleOf(isRed), 'it still draws');
+  });
+
+  it('urlModifier rewrites its address', async () => {
+    ElementClass.urlModifier = (url) => url.replace('compass', 'green');
+    try {
+      const element = await showLoaded({ src: COMPASS });
+      assert((await screenOf(element)).middleOf(isGreen), 'the other scene');
+    } finally {
+      ElementClass.urlModifier = null;
+    }
+  });
+});

@@ -1,0 +1,144 @@
+/** The manifest that editors, wrappers and the docs are made from, held against the element itself. */
+import assert from 'node:assert/strict';
+import { existsSync, readFileSync } from 'node:fs';
+import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import ts from 'typescript';
+import { GaussianSplatElement } from '@gaussian-splat/element/element.js';
+
+const folder = fileURLToPath(new URL('../../packages/element/', import.meta.url));
+const source = (name: string): string => readFileSync(`${folder}src/${name}`, 'utf8');
+
+interface Named {
+  readonly name: string;
+  readonly description?: string;
+}
+interface Declaration {
+  readonly tagName?: string;
+  readonly attributes: readonly (Named & { readonly type?: { readonly text: string } })[];
+  readonly members: readonly (Named & { readonly kind: string; readonly static?: boolean })[];
+  readonly events: readonly (Named & { readonly type?: { readonly text: string } })[];
+  readonly slots: readonly Named[];
+  readonly cssParts: readonly Named[];
+  readonly cssProperties: readonly Named[];
+  readonly cssStates: readonly Named[];
+}
+interface Manifest {
+  readonly modules: readonly {
+    readonly path: string;
+    readonly declarations: readonly Declaration[];
+    readonly exports: readonly { readonly kind: string; readonly name: string }[];
+  }[];
+}
+
+const path = `${folder}custom-elements.json`;
+const isBuilt = existsSync(path);
+const manifest = isBuilt ? (JSON.parse(readFileSync(path, 'utf8')) as Manifest) : undefined;
+const element = manifest?.modules
+  .flatMap(({ declarations }) => declarations)
+  .find((d) => d.tagName === 'gaussian-splat');
+const namesOf = (items: readonly Named[] = []): string[] => items.map(({ name }) => name).sort();
+const unique = (names: Iterable<string>): string[] => [...new Set(names)].sort();
+const matches = (text: string, pattern: RegExp): string[] =>
+  unique([...text.matchAll(pattern)].map(([, name]) => name));
+
+const check = (title: string, body: () => void | Promise<void>): void =>
+  void test(title, { skip: isBuilt ? false : 'no manifest: npm run build' }, body);
+
+check('defines gaussian-splat in modules that exist', () => {
+  assert.ok(element, 'an element');
+  for (const module of manifest?.modules ?? []) assert.ok(existsSync(folder + module.path), module.path);
+  const definitions = manifest?.modules.flatMap((module) =>
+    module.exports.filter(({ kind }) => kind === 'custom-element-definition').map(({ name }) => [module.path, name]),
+  );
+  assert.deepEqual(definitions, [['dist/index.js', 'gaussian-splat']]);
+});
+
+check('names the attributes that the element observes, each with a description', () => {
+  assert.deepEqual(namesOf(element?.attributes), [...GaussianSplatElement.observedAttributes].sort());
+  for (const { name, description } of element?.attributes ?? []) assert.ok(description, name);
+});
+
+check('names the events of the typed map, with their types, and every one that the sources dispatch', () => {
+  const file = ts.createSourceFile('events.ts', source('events.ts'), ts.ScriptTarget.Latest, true);
+  const map = file.statements.find(
+    (node): node is ts.InterfaceDeclaration =>
+      ts.isInterfaceDeclaration(node) && node.name.text === 'GaussianSplatEventMap',
+  );
+  const typed = new Map(
+    map?.members.filter(ts.isPropertySignature).map((m) => {
+      const name = ts.isStringLiteral(m.name) ? m.name.text : m.name.getText();
+      return [name, m.type?.getText() ?? ''] as const;
+    }),
+  );
+  assert.deepEqual(namesOf(element?.events), [...typed.keys()].sort());
+  for (const { name, type } of element?.events ?? []) assert.equal(type?.text, typed.get(name), name);
+  const dispatched = matches(source('stage.ts'), /new (?:Custom|Progress)?Event\('([a-z-]+)'/g);
+  assert.ok(dispatched.length > 5, dispatched.join());
+  for (const name of dispatched) assert.ok(typed.has(name), name);
+});
+
+check('names the slots, parts, custom properties and states that there are', () => {
+  const [template, styles] = [source('template.ts'), source('styles.ts')];
+  const slots = matches(template, /<slot name="([a-z-]+)"/g);
+  assert.deepEqual(namesOf(element?.slots), unique([...slots, 'hotspot-*']));
+  assert.deepEqual(namesOf(element?.cssParts), matches(template, /part="([a-z-]+)"/g));
+  assert.deepEqual(namesOf(element?.cssProperties), matches(styles, /var\((--[a-z-]+)/g));
+  const [, states] = /const STATES = \[([^\]]+)\]/.exec(source('element.ts')) ?? [];
+  assert.deepEqual(namesOf(element?.cssStates), matches(states, /'([a-z]+)'/g));
+});
+
+check('names members that exist, and no private one', () => {
+  const { prototype } = GaussianSplatElement;
+  const reactive = new Set([...GaussianSplatElement.elementProperties.keys()].map(String));
+  const members = element?.members ?? [];
+  assert.ok(members.length > 60, `${members.length} members`);
+  for (const { name, static: isStatic } of members) {
+    assert.ok(isStatic ? name in GaussianSplatElement : name in prototype || reactive.has(name), name);
+    assert.ok(!name.startsWith('#') && name !== 'stage', name);
+  }
+  for (const name of ['play', 'positionFromPoint', 'toBlob', 'cameraOrbit']) {
+    assert.ok(
+      members.some((member) => member.name === name),
+      name,
+    );
+  }
+});
+
+check('its keywords are those that the attributes take, the default first', async () => {
+  const { readAttributes } = (await import(`${folder}dist/attributes.js`)) as {
+    readAttributes: (raw: object, warn: (sentence: string) => void) => Record<string, unknown>;
+  };
+  const enumerated = (element?.attributes ?? [])
+    .map(({ name, type }) => ({ name, keywords: matches(type?.text ?? '', /'([a-z-]+)'/g) }))
+    .filter(({ keywords }) => keywords.length > 0);
+  assert.ok(enumerated.length >= 8, enumerated.map(({ name }) => name).join());
+  const camelCase = (name: string): string => name.replace(/-(.)/g, (_, letter: string) => letter.toUpperCase());
+  for (const { name, keywords } of enumerated) {
+    for (const keyword of keywords) {
+      const warnings: string[] = [];
+      readAttributes({ [camelCase(name)]: keyword }, (sentence) => warnings.push(sentence));
+      assert.deepEqual(warnings, [], `${name}="${keyword}"`);
+    }
+    const warnings: string[] = [];
+    readAttributes({ [camelCase(name)]: 'no-such-word' }, (sentence) => warnings.push(sentence));
+    assert.equal(warnings.length, 1, `${name}="no-such-word"`);
+    for (const keyword of matches(/one of ([a-z, -]+), found/.exec(warnings[0])?.[1] ?? '', /([a-z-]+)/g)) {
+      assert.ok(keywords.includes(keyword), `${name} takes ${keyword}, which the manifest does not know`);
+    }
+  }
+});
+
+check('custom data and web-types name the same attributes', () => {
+  const data = JSON.parse(readFileSync(`${folder}vscode.html-custom-data.json`, 'utf8')) as {
+    tags: { name: string; attributes: Named[] }[];
+  };
+  const types = JSON.parse(readFileSync(`${folder}web-types.json`, 'utf8')) as {
+    contributions: { html: { elements: { name: string; attributes: Named[] }[] } };
+  };
+  const observed = [...GaussianSplatElement.observedAttributes].sort();
+  for (const tags of [data.tags, types.contributions.html.elements]) {
+    const tag = tags.find(({ name }) => name === 'gaussian-splat');
+    assert.deepEqual(unique(namesOf(tag?.attributes)), observed);
+  }
+});

@@ -1,0 +1,88 @@
+/** Probing the last frame: as opaque as the image itself, at the depth where a wall stands, whatever drew it. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { capture, GaussianBuffers, packGaussians, Renderer, type RasterizerName } from '@gaussian-splat/renderer';
+import { cloudOf, repeat } from '../support/clouds.js';
+import { randomSource } from '../support/gpu.js';
+import { nodeDevice } from '../support/node-device.js';
+import { cameraAt } from '../support/scenes.js';
+
+/** 1500 balls of all opacities around the origin. */
+function randomCloud(): GaussianCloud {
+  const random = randomSource(11);
+  return cloudOf(
+    repeat(1500, () => ({
+      position: [4 * (random() - 0.5), 4 * (random() - 0.5), 4 * (random() - 0.5)],
+      scale: 0.02 + 0.15 * random(),
+      opacity: random(),
+      color: [random(), random(), random()],
+    })),
+  );
+}
+
+const RASTERIZERS: readonly RasterizerName[] = ['quads', 'tiles'];
+
+for (const rasterizer of RASTERIZERS) {
+  test(`${rasterizer}: the opacity of a point is the alpha of its pixel, in a frame that was sorted and in one that was not`, async () => {
+    const device = await nodeDevice();
+    const cloud = randomCloud();
+    const near = cameraAt([0, 0, -6], [0, 0, 0], { width: 96, height: 64 });
+    const turned = cameraAt([3, 1, -6], [0, 0, 0], { width: 96, height: 64 });
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+    const renderer = new Renderer(device, { rasterizer });
+    assert.deepEqual(
+      await renderer.probeDepth([{ x: 1, y: 1 }]),
+      [],
+      'before the first frame there is nothing to look into',
+    );
+    const random = randomSource(3);
+    for (const [i, camera] of [near, turned, turned].entries()) {
+      const pixels = await capture(device, renderer, { gaussians, camera });
+      const places = Array.from({ length: 64 }, () => ({
+        column: Math.floor(camera.width * random()),
+        row: Math.floor(camera.height * random()),
+      }));
+      const answers = await renderer.probeDepth(places.map(({ column, row }) => ({ x: column + 0.5, y: row + 0.5 })));
+      for (const [j, { opacity, depth, transmittance }] of answers.entries()) {
+        const alpha = pixels[4 * (places[j].row * camera.width + places[j].column) + 3];
+        assert.ok(Math.abs(opacity - alpha) < 4e-3, `frame ${i}, point ${j}: opacity ${opacity}, alpha ${alpha}`);
+        if (Math.abs(opacity - 0.5) > 1e-4)
+          assert.equal(depth === null, opacity < 0.5, `frame ${i}, point ${j}: depth ${depth} at opacity ${opacity}`);
+        assert.ok(Math.abs(transmittance - (1 - opacity)) < 1e-5, 'behind everything');
+      }
+    }
+    renderer.destroy();
+    gaussians.destroy();
+  });
+}
+
+test('a wall behind a veil: the depth is that of the wall, and only what is behind it is hidden', async () => {
+  const device = await nodeDevice();
+  const sheet = (z: number, opacity: number) =>
+    repeat(40 * 40, (i) => ({
+      position: [((i % 40) - 20) / 8, (Math.floor(i / 40) - 20) / 8, z] as const,
+      scale: [0.08, 0.08, 0.001] as const,
+      opacity,
+      color: [1, 1, 1] as const,
+    }));
+  const cloud = cloudOf([...sheet(3, 0.02), ...sheet(5, 0.9)]);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device);
+  // Camera at the origin, looking along +z.
+  const camera = { ...cameraAt([0, 0, 0], [0, 0, 1]), near: 0.1 };
+  await capture(device, renderer, { gaussians, camera });
+  const centre = { x: camera.width / 2, y: camera.height / 2 };
+  const [before, between, behind] = await renderer.probeDepth([2, 4, 6].map((depth) => ({ ...centre, depth })));
+  assert.ok(behind.depth !== null && Math.abs(behind.depth - 5) < 5 / 1024, `depth ${behind.depth}`);
+  assert.equal(before.transmittance, 1);
+  assert.ok(between.transmittance > 0.7 && between.transmittance < 1, `veil: ${between.transmittance}`);
+  assert.ok(behind.transmittance < 0.05, `wall: ${behind.transmittance}`);
+  renderer.destroy();
+  gaussians.destroy();
+});
+
+after(async () => {
+  (await nodeDevice()).destroy();
+  setImmediate(() => process.exit());
+});
