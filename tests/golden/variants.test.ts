@@ -22,22 +22,6 @@ test('serial and parallel stages draw the same bytes, moving and turning', async
   assert.ok((await renderers[1].readStatistics()).visible > 1000);
 });
 
-test('coarse and fine bins draw the same bytes', async () => {
-  const device = await nodeDevice();
-  const { cloud, cameras } = room();
-  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
-  const images: Buffer[] = [];
-  const pairs: number[] = [];
-  for (const bins of ['coarse', 'fine'] as const) {
-    const renderer = new Renderer(device, { rasterizer: 'tiles', bins });
-    images.push(Buffer.from((await capture(device, renderer, { gaussians, camera: cameras[0] })).buffer));
-    pairs.push((await renderer.readStatistics()).pairs);
-    renderer.destroy();
-  }
-  assert.deepEqual(images[0], images[1]);
-  assert.ok(pairs[1] > pairs[0], `${pairs.join(' and ')} pairs: the bins are not finer`);
-});
-
 test('every variant gives the known answer, and a wrong rule does not', async () => {
   const device = await nodeDevice();
   for (const threads of ['parallel', 'serial'] as const) {

@@ -1,5 +1,4 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { BinSize } from './rasterizers/bins.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 import type { SortName } from './stages/sort.js';
 import type { Threads } from './stages/threads.js';
@@ -15,11 +14,6 @@ export interface Levers {
   readonly rasterizer: 'auto' | RasterizerName;
   /** How stages share their work; the image is the same. `auto`: see {@link Renderer.create}. */
   readonly threads: 'auto' | Threads;
-  /**
-   * Size of the lists that tiles read: `coarse` ones for blocks of 128 x 64 pixels, `fine` ones for 64 x 32, which cost another pass to make.
-   * The image is the same. `auto`: by the number of splats.
-   */
-  readonly bins: 'auto' | BinSize;
   /** How keys are sorted; the order is the same. `auto`: see {@link Renderer.create}. */
   readonly sort: 'auto' | SortName;
   /**
@@ -61,7 +55,6 @@ const EXACT: Levers = {
   rasterizer: 'auto',
   threads: 'auto',
   sort: 'auto',
-  bins: 'auto',
   accumulation: 'auto',
   depthKeyBits: 24,
   submissions: 1,

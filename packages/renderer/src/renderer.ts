@@ -434,10 +434,10 @@ function requireTextureSize(device: GPUDevice, { width, height }: Camera): void 
 
 function makeRasterizer(
   device: GPUDevice,
-  { rasterizer, accumulation, sort, bins }: Levers & Variants,
+  { rasterizer, accumulation, sort }: Variants,
   overrides: Overrides,
 ): Rasterizer {
-  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, { sort, bins });
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, sort);
   requireBlendable(device, accumulation);
   return new QuadsRasterizer(device, accumulation, overrides);
 }

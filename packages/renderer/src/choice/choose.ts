@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { GaussianBuffers } from '../gaussian-buffers.js';
+import { FrameClock } from './frame-clock.js';
 import { perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { packGaussians } from '../pack/pack.js';
 import { Renderer } from '../renderer.js';
@@ -128,37 +129,27 @@ async function isValid(device: GPUDevice, answer: () => Promise<boolean>): Promi
 async function chooseFastest(device: GPUDevice, candidates: readonly Variants[]): Promise<Variants> {
   let left = candidates.map((variants) => ({ variants, time: 0 }));
   let spent = 0;
-  const latency = await timeNothing(device);
+  const clock = await FrameClock.on(device);
   for (const round of ROUNDS) {
     // Only what the GPU did counts: pipelines that had to be made first are of use later.
     const last = FRAMES * left.reduce((sum, { time }) => sum + time, 0);
     if (left.length === 1 || spent + GROWTH * last > BUDGET) break;
-    for (const candidate of left) candidate.time = (await timeFrames(device, candidate.variants, round)) - latency;
+    for (const candidate of left) candidate.time = await timeFrames(device, candidate.variants, round, clock);
     spent += FRAMES * left.reduce((sum, { time }) => sum + time, 0);
     left.sort((a, b) => a.time - b.time);
     const best = left[0].time;
     left = left.filter(({ time }) => best < MEASURABLE || time <= HOPELESS * best);
   }
+  clock.destroy();
   return left[0].variants;
 }
 
-/** Milliseconds until a GPU with nothing to do says so: browsers take some, and they say nothing of a candidate. */
-async function timeNothing(device: GPUDevice): Promise<number> {
-  let best = Infinity;
-  for (let i = 0; i < FRAMES; i++) {
-    const before = performance.now();
-    device.queue.submit([device.createCommandEncoder({ label: 'gs.probe' }).finish()]);
-    await device.queue.onSubmittedWorkDone();
-    best = Math.min(best, performance.now() - before);
-  }
-  return best;
-}
-
-/** Milliseconds of the fastest of a few frames of a turning camera, waited for. */
+/** Milliseconds of the fastest of a few frames of a turning camera. */
 async function timeFrames(
   device: GPUDevice,
   variants: Variants,
   { splats, width, height }: (typeof ROUNDS)[number],
+  clock: FrameClock,
 ): Promise<number> {
   const size = Math.cbrt(400 / splats);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(sphereCloud(splats, size)));
@@ -168,11 +159,9 @@ async function timeFrames(
   const camera = probeCamera(width, height);
   let best = Infinity;
   for (let frame = 0; frame < FRAMES; frame++) {
-    const before = performance.now();
-    renderer.render({ gaussians, camera, target });
-    await device.queue.onSubmittedWorkDone();
+    const time = await clock.time((timer) => renderer.render({ gaussians, camera, target, timer }));
     // The first frame also makes pipelines and orders everything.
-    if (frame > 0) best = Math.min(best, performance.now() - before);
+    if (frame > 0) best = Math.min(best, time);
   }
   target.destroy();
   renderer.destroy();

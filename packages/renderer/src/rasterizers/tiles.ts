@@ -9,9 +9,6 @@ import {
   rasterizeTilesNoting,
   scan,
 } from '../generated/shaders.js';
-import type { Levers } from '../levers.js';
-import type { Variants } from '../variants.js';
-import { gridOf, withBins, type BinSize, type Grid } from './bins.js';
 import {
   BUFFER_USAGE,
   TEXTURE_USAGE,
@@ -25,12 +22,19 @@ import {
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
-import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
+import { sortedIn, SortStage, type SortBindings, type SortName } from '../stages/sort.js';
 import type { FrameNotes, OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
 
-const { TILE, PREFIX_THREADS, SORT_BLOCK, DIGITS } = constants;
+const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, SORT_BLOCK, DIGITS } = constants;
 /** A slot, and a mask of tiles. */
 const PAIR_BYTES = 8;
+
+/** Bins across and down of an image, and the bits of a bin's number. */
+interface Grid {
+  readonly columns: number;
+  readonly rows: number;
+  readonly bits: number;
+}
 
 /** Buffers whose size follows the scene. */
 interface PairBuffers {
@@ -46,7 +50,6 @@ interface PairBuffers {
 /** What is bound for one scene and one number of bins. */
 interface GridBindings {
   readonly grid: Grid;
-  readonly kernels: Kernels;
   readonly ranges: GPUBuffer;
   readonly listing: Readonly<Record<OrderKind, { readonly count: GPUBindGroup; readonly emit: GPUBindGroup }>>;
   readonly scan: GPUBindGroup;
@@ -64,7 +67,7 @@ const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
 /**
- * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 128 x 64 or 64 x 32 pixels: counted,
+ * Compute shaders on two scales of tiles. Splats are listed, in depth order, for bins of 128 x 64 pixels: counted,
  * written, and sorted by bin with a stable sort that keeps the depth order. Tiles of 16 x 16 pixels then walk their bin's
  * list front to back and stop when all their pixels are opaque.
  *
@@ -78,7 +81,7 @@ export class TilesRasterizer implements Rasterizer {
   readonly #device: GPUDevice;
   readonly #overrides: Overrides;
   readonly #memory: GpuMemory;
-  readonly #bins: 'auto' | BinSize;
+  readonly #kernels: ReturnType<typeof makeKernels>;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
@@ -89,11 +92,11 @@ export class TilesRasterizer implements Rasterizer {
   /** Where notes go that nobody asked for. */
   #nowhere: Required<FrameNotes> | undefined;
 
-  constructor(device: GPUDevice, overrides: Overrides, { sort, bins }: Pick<Levers & Variants, 'sort' | 'bins'>) {
+  constructor(device: GPUDevice, overrides: Overrides, sort: SortName) {
     this.#device = device;
     this.#overrides = overrides;
     this.#memory = new GpuMemory(device);
-    this.#bins = bins;
+    this.#kernels = makeKernels(device, overrides);
     this.#sort = new SortStage(device, sort, 'pairs');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
@@ -128,7 +131,7 @@ export class TilesRasterizer implements Rasterizer {
     encoder.clearBuffer(buffers.groupPairs);
     encoder.clearBuffer(bound.ranges);
 
-    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = bound.kernels;
+    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = this.#kernels;
     const listing = bound.listing[order];
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
     count.dispatchIndirect(bin, listing.count, plan, planOffsets.visible);
@@ -145,7 +148,6 @@ export class TilesRasterizer implements Rasterizer {
     const { format, width, height } = surface;
     const kernel = rasterizeKernel(this.#device, {
       format,
-      bins: bound.grid.size,
       isFinal: background !== undefined,
       isNoting: notes !== undefined,
       overrides: this.#overrides,
@@ -192,25 +194,26 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #gridFor({ width, height }: Surface, inputs: RasterizerInputs, buffers: PairBuffers): GridBindings {
-    const grid = gridOf(width, height, this.#bins, inputs.pairCapacity);
-    const { size, columns, rows } = grid;
-    const { grid: known, ranges: old } = this.#bound ?? {};
-    if (known?.size === size && known.columns === columns && known.rows === rows) return this.#bound!;
-    if (old) this.#memory.free(old);
+    const columns = Math.ceil(width / BIN_WIDTH);
+    const rows = Math.ceil(height / BIN_HEIGHT);
+    const current = this.#bound;
+    if (current?.grid.columns === columns && current.grid.rows === rows) return current;
+    if (current) this.#memory.free(current.ranges);
+    const bits = Math.ceil(Math.log2(columns * rows));
     const { storage, copyDestination } = BUFFER_USAGE;
     const ranges = this.#memory.buffer('gs.bin.ranges', 8 * columns * rows, storage | copyDestination);
-    const kernels = makeKernels(this.#device, this.#overrides, size);
-    this.#bound = { grid, ranges, kernels, ...this.#bindings(inputs, buffers, { grid, ranges, kernels }) };
+    this.#bound = { grid: { columns, rows, bits }, ranges, ...this.#bindings(inputs, buffers, bits, ranges) };
     return this.#bound;
   }
 
   #bindings(
     { plan, splats, orders }: RasterizerInputs,
     { rects, groupPairs, plan: pairPlan, bins, pairs, digitCounts, digitTotals }: PairBuffers,
-    { grid: { bits }, ranges, kernels }: Pick<GridBindings, 'grid' | 'ranges' | 'kernels'>,
-  ): Omit<GridBindings, 'grid' | 'ranges' | 'kernels'> {
+    bits: number,
+    ranges: GPUBuffer,
+  ): Omit<GridBindings, 'grid' | 'ranges'> {
     const view = this.#view;
-    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = kernels;
+    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = this.#kernels;
     const listing = (order: GPUBuffer): GridBindings['listing'][OrderKind] => {
       const shared = { view, plan, splats, order, rects, group_pairs: groupPairs };
       return { count: count.bind(shared), emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }) };
@@ -288,14 +291,12 @@ export function maxPairs(device: GPUDevice): number {
   return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / PAIR_BYTES);
 }
 
-type Kernels = ReturnType<typeof makeKernels>;
-
-function makeKernels(device: GPUDevice, { alpha_min }: Overrides, size: BinSize) {
+function makeKernels(device: GPUDevice, { alpha_min }: Overrides) {
   return {
-    count: kernelOf(device, withBins(binCount, size), { alpha_min }),
+    count: kernelOf(device, binCount, { alpha_min }),
     scan: kernelOf(device, scan),
     plan: kernelOf(device, binPlan),
-    emit: kernelOf(device, withBins(binEmit, size), { alpha_min }),
+    emit: kernelOf(device, binEmit, { alpha_min }),
     findRanges: kernelOf(device, binRanges),
   };
 }
@@ -305,25 +306,19 @@ type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
 /** What one pipeline of `rasterize_tiles` is made for. */
 interface RasterizeVariant {
   readonly format: GPUTextureFormat;
-  readonly bins: BinSize;
   readonly isFinal: boolean;
   readonly isNoting: boolean;
   readonly overrides: Overrides;
 }
 
 function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
-  const { format, bins, isFinal, isNoting, overrides } = variant;
+  const { format, isFinal, isNoting, overrides } = variant;
   const shader: ShaderDescription = isNoting ? rasterizeTilesNoting : rasterizeTiles;
   const { alpha_min, transmittance_min, occluded_below } = overrides;
   const constants = { alpha_min, transmittance_min, occluded_below, is_final: isFinal ? 1 : 0 };
-  return perDevice(device, `${shader.name} ${format} ${bins} ${JSON.stringify(constants)}`, () => {
+  return perDevice(device, `${shader.name} ${format} ${JSON.stringify(constants)}`, () => {
     const { image } = rasterizeTiles.bindings;
-    const writing = specialise(
-      withBins(shader, bins),
-      format,
-      `texture_storage_2d<${image.format}`,
-      `texture_storage_2d<${format}`,
-    );
+    const writing = specialise(shader, format, `texture_storage_2d<${image.format}`, `texture_storage_2d<${format}`);
     const bindings = { ...shader.bindings, image: { ...image, format } };
     return new ComputeKernel(device, { ...writing, bindings } as unknown as typeof rasterizeTiles, constants);
   });
