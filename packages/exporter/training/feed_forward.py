@@ -238,7 +238,7 @@ def train(
     depths = {"depths": sizes.pop("depths")} if "depths" in sizes else {}
     model = Generator(Shape(width, height, views, *depth_range(scenes), **depths), **sizes)
     model = model.to(scenes[0].pictures.device)
-    optimizer = torch.optim.Adam(model.parameters(), lr=3e-4)
+    optimizer = torch.optim.Adam(model.parameters(), lr=6e-4)
     near = [[neighbours(scene, i) for i in range(len(scene.pictures))] for scene in scenes]
     for step, progress in enumerate(pace):
         which = int(rng.integers(len(scenes)))
