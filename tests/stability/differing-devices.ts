@@ -4,7 +4,7 @@
  * Who fails: nobody was named; float16 centres (web-splat, Visionary, WebSplatter) and atomically appended splats make pictures differ between devices and runs.
  *
  * Passes: two devices of one adapter agree to the byte; the picture of any adapter agrees with the one that SwiftShader has drawn, which is kept here, to 1/255 in 99.9 % of
- * all channels. Where llvmpipe is installed, `npm run stability` draws with it, too.
+ * all channels. With GAUSSIAN_SPLAT_GPU=system the row draws with the driver of the machine (llvmpipe, say).
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
