@@ -1,5 +1,6 @@
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
-import type { FrameRequest, Renderer } from './renderer.js';
+import type { FrameRequest } from './frame-request.js';
+import type { Renderer } from './renderer.js';
 
 /** Rows of a texture copy start at multiples of this many bytes. */
 const ROW_ALIGNMENT = 256;

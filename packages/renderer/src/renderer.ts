@@ -1,4 +1,4 @@
-import { GaussianSplatError, validateCamera, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { validateCamera, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { AccumulationTexture } from './accumulation.js';
 import { FrameBindings, makeStages, type Stages } from './bindings.js';
 import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
@@ -6,61 +6,27 @@ import { ContentWatch } from './content-watch.js';
 import { angleBetween, axisOf, DepthOrder } from './depth-order.js';
 import { probe, type ProbeAnswer, type ProbePoint } from './depth-probe.js';
 import { recordProjection } from './frame.js';
+import type { FrameRequest, RendererOptions } from './frame-request.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
-import { BUFFER_USAGE, TEXTURE_USAGE, type Overrides } from './gpu/kernel.js';
+import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import type { PassTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
-import { leversOf, type Levers, type Quality } from './levers.js';
+import { leversOf, overridesOf, type Levers } from './levers.js';
 import { Occlusion } from './occlusion.js';
 import { PageTable } from './page-table.js';
-import { QuadsRasterizer } from './rasterizers/quads.js';
-import type {
-  AccumulationFormat,
-  FrameNotes,
-  Painting,
-  Rasterizer,
-  RasterizerName,
-  Surface,
-} from './rasterizers/rasterizer.js';
-import { maxPairs, TilesRasterizer } from './rasterizers/tiles.js';
+import { makeRasterizer } from './rasterizers/make-rasterizer.js';
+import type { Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import { maxPairs } from './rasterizers/tiles.js';
+import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
 import { maxVisible, Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
 import { sortedIn } from './stages/sort.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
-
-/** A quality, and single levers that differ from it. */
-export interface RendererOptions extends Partial<Levers> {
-  /** Default: `default`. */
-  readonly quality?: Quality;
-  /**
-   * Called when a frame that was drawn lacked splats for want of room in the renderer's buffers. The next frame has the room: draw it.
-   */
-  readonly onIncomplete?: () => void;
-}
-
-/** One image to draw. */
-export interface FrameRequest {
-  /** One scene, or several that are sorted and blended together. Order decides between equal depths. */
-  readonly gaussians: GaussianScene | readonly GaussianScene[];
-  /** Its width and height must be those of the target. */
-  readonly camera: Camera;
-  /** A texture with the usage STORAGE_BINDING saves `tiles` a pass. */
-  readonly target: GPUTexture | GPUTextureView;
-  /** Format of a target that is a view: any colour format that WebGPU can render to. */
-  readonly targetFormat?: GPUTextureFormat;
-  /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
-  readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
-  /**
-   * What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it.
-   */
-  readonly notes?: FrameNotes;
-  /** Notes when each pass ran. */
-  readonly timer?: PassTimer;
-}
+import { scaled } from './view.js';
 
 /** What a set of scenes needs on the GPU between the stages. */
 interface Resources {
@@ -413,71 +379,3 @@ export class Renderer {
 }
 
 const isTexture = (target: GPUTexture | GPUTextureView): target is GPUTexture => 'createView' in target;
-
-function overridesOf({ alphaMin, minContribution, transmittanceMin, occludedBelow }: Levers): Overrides {
-  return {
-    alpha_min: alphaMin,
-    min_contribution: minContribution,
-    transmittance_min: transmittanceMin,
-    occluded_below: occludedBelow,
-  };
-}
-
-/** The same view with fewer pixels. */
-function scaled(camera: Camera, scale: number): Camera {
-  if (scale === 1) return camera;
-  const width = Math.max(1, Math.round(camera.width * scale));
-  const height = Math.max(1, Math.round(camera.height * scale));
-  const [x, y] = [width / camera.width, height / camera.height];
-  return { ...camera, width, height, fx: camera.fx * x, fy: camera.fy * y, cx: camera.cx * x, cy: camera.cy * y };
-}
-
-function missingFormat(): GaussianSplatError {
-  return new GaussianSplatError('argument/value', {
-    where: 'FrameRequest.targetFormat',
-    expected: 'the format of the target, which is a texture view',
-    found: 'undefined',
-    remedy: 'name the format, or give the texture itself',
-  });
-}
-
-function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
-  const limit = device.limits.maxTextureDimension2D;
-  if (Math.max(width, height) <= limit) return;
-  throw new GaussianSplatError('argument/camera', {
-    where: 'camera.width and camera.height',
-    expected: `at most ${limit} pixels each (maxTextureDimension2D of the device)`,
-    found: `${width}x${height}`,
-    remedy: 'draw a smaller image, or several parts of it by moving cx and cy',
-  });
-}
-
-function makeRasterizer(
-  device: GPUDevice,
-  { rasterizer, accumulation, sort }: Variants,
-  overrides: Overrides,
-): Rasterizer {
-  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, sort);
-  requireBlendable(device, accumulation);
-  return new QuadsRasterizer(device, accumulation, overrides);
-}
-
-function requireNotes({ name, takesNotes }: Rasterizer): void {
-  if (takesNotes) return;
-  throw new GaussianSplatError('unsupported/limits', {
-    where: 'FrameRequest.notes',
-    expected: 'a renderer with the rasterizer tiles',
-    found: name,
-    remedy: "make the renderer with { rasterizer: 'tiles' }",
-  });
-}
-
-function requireBlendable(device: GPUDevice, format: AccumulationFormat): void {
-  if (format !== 'rgba32float' || device.features.has('float32-blendable')) return;
-  throw new GaussianSplatError('unsupported/limits', {
-    where: 'RendererOptions.accumulation',
-    expected: 'a device with the feature float32-blendable',
-    found: 'a device without it',
-    remedy: 'ask for the feature with deviceDescriptor(adapter), or use rgba16float',
-  });
-}

@@ -60,3 +60,12 @@ function stretchOf(worldToCamera: ArrayLike<number>): number {
   const rowSum = (a: number): number => Math.abs(dot(a, 0)) + Math.abs(dot(a, 1)) + Math.abs(dot(a, 2));
   return Math.sqrt(Math.max(rowSum(0), rowSum(1), rowSum(2)));
 }
+
+/** The same view with fewer pixels. */
+export function scaled(camera: Camera, scale: number): Camera {
+  if (scale === 1) return camera;
+  const width = Math.max(1, Math.round(camera.width * scale));
+  const height = Math.max(1, Math.round(camera.height * scale));
+  const [x, y] = [width / camera.width, height / camera.height];
+  return { ...camera, width, height, fx: camera.fx * x, fy: camera.fy * y, cx: camera.cx * x, cy: camera.cy * y };
+}

@@ -3,7 +3,8 @@ import { capture } from '../capture.js';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { constants } from '../generated/shaders.js';
 import { packGaussians } from '../pack/pack.js';
-import { Renderer, type RendererOptions } from '../renderer.js';
+import type { RendererOptions } from '../frame-request.js';
+import { Renderer } from '../renderer.js';
 
 /** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
 const TOLERANCE = 0.02;

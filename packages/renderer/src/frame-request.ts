@@ -1,0 +1,35 @@
+import type { Camera } from '@gaussian-splat/core';
+import type { GaussianScene } from './gaussian-scene.js';
+import type { PassTimer } from './gpu/pass-timer.js';
+import type { Levers, Quality } from './levers.js';
+import type { FrameNotes } from './rasterizers/rasterizer.js';
+
+/** A quality, and single levers that differ from it. */
+export interface RendererOptions extends Partial<Levers> {
+  /** Default: `default`. */
+  readonly quality?: Quality;
+  /**
+   * Called when a frame that was drawn lacked splats for want of room in the renderer's buffers. The next frame has the room: draw it.
+   */
+  readonly onIncomplete?: () => void;
+}
+
+/** One image to draw. */
+export interface FrameRequest {
+  /** One scene, or several that are sorted and blended together. Order decides between equal depths. */
+  readonly gaussians: GaussianScene | readonly GaussianScene[];
+  /** Its width and height must be those of the target. */
+  readonly camera: Camera;
+  /** A texture with the usage STORAGE_BINDING saves `tiles` a pass. */
+  readonly target: GPUTexture | GPUTextureView;
+  /** Format of a target that is a view: any colour format that WebGPU can render to. */
+  readonly targetFormat?: GPUTextureFormat;
+  /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
+  readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
+  /**
+   * What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it.
+   */
+  readonly notes?: FrameNotes;
+  /** Notes when each pass ran. */
+  readonly timer?: PassTimer;
+}
