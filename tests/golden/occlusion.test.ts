@@ -47,12 +47,18 @@ const PATHS = {
   ],
 } as unknown as Record<string, (step: number) => [number[], number[]]>;
 
-for (const [path, move] of Object.entries(PATHS)) {
-  test(`${path}: few splats behind the wall are drawn, and balanced keeps its 42 dB in every frame`, async () => {
+// The levers of `balanced` and `fast`, with the figures that those are held to.
+for (const { path, occludedBelow, least } of [
+  { path: 'turning', occludedBelow: 0.03, least: 42 },
+  { path: 'strafing', occludedBelow: 0.03, least: 42 },
+  { path: 'turning', occludedBelow: 0.1, least: 36 },
+]) {
+  const move = PATHS[path];
+  test(`${path}, ${occludedBelow}: few splats behind the wall are drawn, and every frame keeps ${least} dB`, async () => {
     const device = await nodeDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(wallAndBeyond()));
     let redraws = 0;
-    const options: RendererOptions = { rasterizer: 'tiles', occludedBelow: 0.03, onIncomplete: () => redraws++ };
+    const options: RendererOptions = { rasterizer: 'tiles', occludedBelow, onIncomplete: () => redraws++ };
     const [some, all] = [new Renderer(device, options), new Renderer(device, { rasterizer: 'tiles' })];
     const frames = 5;
     for (let frame = 0; frame <= frames; frame++) {
@@ -62,11 +68,11 @@ for (const [path, move] of Object.entries(PATHS)) {
       const { visible } = await some.readStatistics();
       const expected = await readFrame(device, all, { gaussians, camera });
       const decibels = psnr(image, expected);
-      assert.ok(decibels >= (frame === 0 ? 100 : 42), `frame ${frame}: ${decibels} dB`);
+      assert.ok(decibels >= (frame === 0 ? 100 : least), `frame ${frame}: ${decibels} dB`);
       if (frame === 0) continue;
       const before = (await all.readStatistics()).visible;
       assert.ok(visible < 0.85 * before, `frame ${frame}: ${visible} of ${before} splats drawn`);
-      if (frame === frames) assert.ok(decibels >= 55, `at rest: ${decibels} dB`);
+      if (frame === frames && least === 42) assert.ok(decibels >= 55, `at rest: ${decibels} dB`);
       assert.equal(await some.isComplete(), frame === frames, `frame ${frame}`);
     }
     assert.equal(redraws, frames - 1, 'every frame that moved asks for another, one at rest does not');
@@ -90,18 +96,19 @@ test('a jump is drawn whole, and so is a scene whose content changed', async () 
   await readFrame(device, some, { gaussians, camera: front });
   const jumped = await readFrame(device, some, { gaussians, camera: behind });
   assert.ok(psnr(jumped, await readFrame(device, all, { gaussians, camera: behind })) >= 100);
-  await readFrame(device, some, { gaussians, camera: front });
-  const changed = { ...scene(gaussians), version: 7 };
-  await readFrame(device, some, { gaussians: changed, camera: front });
+  // One scene object, as a generator's: only its version tells that it holds other splats now.
+  const changing = { ...scene(gaussians), version: 1 };
+  const [here, there] = [0, 1].map((step) => cameraAlong(PATHS.strafing, step));
+  for (const camera of [here, there]) await readFrame(device, some, { gaussians: changing, camera });
+  assert.equal(await some.isComplete(), false, 'while it moved splats were left out');
+  changing.version++;
+  await readFrame(device, some, { gaussians: changing, camera: here });
   assert.equal(await some.isComplete(), true);
-  assert.equal((await some.readStatistics()).visible, (await statisticsOf(all, gaussians, front)).visible);
+  const { visible } = await some.readStatistics();
+  await readFrame(device, all, { gaussians, camera: here });
+  assert.equal(visible, (await all.readStatistics()).visible);
   [some, all].forEach((renderer) => renderer.destroy());
   gaussians.destroy();
-
-  async function statisticsOf(renderer: Renderer, of: GaussianBuffers, camera: Camera) {
-    await readFrame(device, renderer, { gaussians: of, camera });
-    return renderer.readStatistics();
-  }
 });
 
 /** The same content as a scene of its own. */
