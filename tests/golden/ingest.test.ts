@@ -182,7 +182,10 @@ test('ingest: a tensor that is missing or too small, or too many rows, is refuse
   gaussians.destroy();
 });
 
-// Dawn keeps Node alive.
-after(() => {
+// Dawn keeps Node alive; a process that ends while the GPU still works may crash.
+after(async () => {
+  const device = await nodeDevice();
+  await device.queue.onSubmittedWorkDone();
+  device.destroy();
   setImmediate(() => process.exit());
 });
