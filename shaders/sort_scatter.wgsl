@@ -14,15 +14,14 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   find_first_places(block_id, lane);
   let word = lane / 32u;
   let bit = 1u << (lane % 32u);
+  var coming = item_at(block_id * SORT_BLOCK + lane);
   for (var start = 0u; start < SORT_BLOCK; start += SORT_THREADS) {
     let i = block_id * SORT_BLOCK + start + lane;
     let is_key = i < plan.visible;
-    var key = 0u;
-    var value = Value(i);
-    if (is_key) {
-      key = keys_in[i];
-      if (digit_pass.makes_indices == 0u) { value = values_in[i]; }
-    }
+    let key = coming.key;
+    let value = coming.value;
+    // The next round's, which are on their way while this round ranks.
+    if (start + SORT_THREADS < SORT_BLOCK) { coming = item_at(i + SORT_THREADS); }
     let digit = digit_of(key, digit_pass.shift);
     if (is_key) { atomicOr(&members[word * DIGITS + digit], bit); }
     workgroupBarrier();

@@ -41,15 +41,14 @@ fn main(
   find_first_places(block_id, lane);
   let subgroup = lane / subgroup_size;
   let subgroups = SORT_THREADS / subgroup_size;
+  var coming = item_at(block_id * SORT_BLOCK + lane);
   for (var round = 0u; round < SORT_BLOCK / SORT_THREADS; round++) {
     let i = block_id * SORT_BLOCK + round * SORT_THREADS + lane;
     let is_key = i < plan.visible;
-    var key = 0u;
-    var value = Value(i);
-    if (is_key) {
-      key = keys_in[i];
-      if (digit_pass.makes_indices == 0u) { value = values_in[i]; }
-    }
+    let key = coming.key;
+    let value = coming.value;
+    // The next round's, which are on their way while this round ranks.
+    if (round + 1u < SORT_BLOCK / SORT_THREADS) { coming = item_at(i + SORT_THREADS); }
     let digit = digit_of(key, digit_pass.shift);
     let peers = peers_of(digit, is_key);
     let rank = ones(peers & threads_before(own));

@@ -8,6 +8,15 @@ const TILES_PER_BIN = BIN_COLUMNS * BIN_ROWS;
 const BIN_WIDTH = BIN_COLUMNS * TILE;
 const BIN_HEIGHT = BIN_ROWS * TILE;
 
+// Words of 32 bits with a bit for each of the 256 pairs that lie together in `tile_bits`.
+const PAIR_WORDS = 8u;
+
+// Where the bits of a tile (its number within the bin) for pairs 32·word ... 32·word + 31 lie in `tile_bits`: eight words of one tile side by
+// side, a sector of memory, then those of the next.
+fn tile_word(word: u32, tile_in_bin: u32) -> u32 {
+  return (word / PAIR_WORDS) * (PAIR_WORDS * TILES_PER_BIN) + tile_in_bin * PAIR_WORDS + word % PAIR_WORDS;
+}
+
 struct BinView {
   // Pixels.
   viewport: vec2f,

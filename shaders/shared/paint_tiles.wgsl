@@ -3,16 +3,19 @@
 // `keep_notes` and `note_pixel`.
 #import shared/bins
 #import shared/coverage
+#import shared/prefix
 
 @group(0) @binding(0) var<uniform> view: BinView;
 @group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
 // Slot, and the tiles of the bin that the splat touches: bin by bin, in depth order.
 @group(0) @binding(2) var<storage, read> pairs: array<vec2u>;
 @group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
+// Which pairs touch which tile: see tile_word.
+@group(0) @binding(4) var<storage, read> tile_bits: array<u32>;
 // How far one could see in each tile when the splats were culled, and how far one did see.
-@group(0) @binding(4) var<storage, read> occlusion: array<u32>;
-@group(0) @binding(5) var<storage, read_write> last_depths: array<u32>;
-@group(0) @binding(6) var image: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(5) var<storage, read> occlusion: array<u32>;
+@group(0) @binding(6) var<storage, read_write> last_depths: array<u32>;
+@group(0) @binding(7) var image: texture_storage_2d<rgba16float, write>;
 
 // A pixel is finished before a splat that would take its transmittance to this or below.
 override transmittance_min: f32 = 1e-4;
@@ -22,27 +25,28 @@ override occluded_below: f32 = 0.01;
 override is_final: bool = false;
 
 const TILE_THREADS = TILE * TILE;
-// Pairs that a thread looks at in one go, and words with a bit for each pair of all threads.
-const PAIRS_PER_THREAD = 2u;
-const HIT_WORDS = PAIRS_PER_THREAD * TILE_THREADS / 32u;
 const BATCH_WORDS = TILE_THREADS / 32u;
-// Blocks of 8 x 4 pixels, each painted by 32 threads.
-const BLOCKS = TILE_THREADS / 32u;
-// Splats that wait to be painted: those just found and, at most a batch, those left over from before.
-const QUEUE = (PAIRS_PER_THREAD + 1u) * TILE_THREADS;
+// A tile's blocks of pixels; neighbouring threads paint one, and skip what does not touch it together.
+const BLOCK_WIDTH = 4u;
+const BLOCK_HEIGHT = 4u;
+const BLOCK_COLUMNS = TILE / BLOCK_WIDTH;
+const BLOCK_ROWS = TILE / BLOCK_HEIGHT;
+const BLOCK_THREADS = BLOCK_WIDTH * BLOCK_HEIGHT;
+const BLOCKS = BLOCK_COLUMNS * BLOCK_ROWS;
 // sqrt(log2(e) / 2): in axes stretched by it a Gaussian is 2^-(u² + v²).
 const BASE_2_AXIS = 0.8493218002880191;
 
-// A bit for each pair just looked at that touches the tile.
-var<workgroup> hits: array<atomic<u32>, HIT_WORDS>;
-// Slots of the splats to paint, front to back.
-var<workgroup> queue: array<u32, QUEUE>;
-var<workgroup> queued: u32;
-// The splats at hand, a batch of the queue: centre, 1 / sigma_x in those axes, slope;
+// The window on the bin's pairs: a bit for each that touches the tile, and how many of these there are up to the end of each word.
+var<workgroup> window: array<u32, TILE_THREADS>;
+var<workgroup> found_upto: array<u32, TILE_THREADS>;
+var<workgroup> found: u32;
+// Slots of the splats at hand, a batch, front to back;
+var<workgroup> slots: array<u32, TILE_THREADS>;
+// centre, 1 / sigma_x in those axes, slope;
 var<workgroup> shapes: array<vec4f, TILE_THREADS>;
 // 1 / sigma_v in those axes, red and green, blue and depth, log2 of the opacity;
 var<workgroup> paints: array<vec4u, TILE_THREADS>;
-// for each block of 8 x 4 pixels of the tile a bit for each splat that touches it.
+// for each block of the tile a bit for each splat that touches it.
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
@@ -50,10 +54,14 @@ var<workgroup> is_open: u32;
 var<workgroup> seen_depth: atomic<u32>;
 var<workgroup> is_transparent: atomic<u32>;
 
-// 32 neighbouring threads paint a block of 8 x 4 pixels, so that they skip a splat together.
 fn pixel_in_tile(lane: u32) -> vec2u {
-  let own = lane / 32u;
-  return vec2u((own % 2u) * 8u + lane % 8u, (own / 2u) * 4u + (lane / 8u) % 4u);
+  let number = lane / BLOCK_THREADS;
+  let row = number / BLOCK_COLUMNS;
+  let column = number - row * BLOCK_COLUMNS;
+  let in_block = lane - number * BLOCK_THREADS;
+  let x = column * BLOCK_WIDTH + in_block % BLOCK_WIDTH;
+  let y = row * BLOCK_HEIGHT + in_block / BLOCK_WIDTH;
+  return vec2u(x, y);
 }
 
 // Notes splat k of the batch for the blocks of the tile that it touches.
@@ -61,53 +69,96 @@ fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
   let c = coverage_of(s);
   let word = k / 32u;
   let bit = 1u << (k % 32u);
-  for (var row = 0u; row < 4u; row++) {
-    let top = tile_corner.y + f32(row) * 4.0 + 0.5;
-    let range = band_range(c, top - 0.01, top + 3.01) + vec2f(-0.01, 0.01) - tile_corner.x;
+  let size = vec2f(f32(BLOCK_WIDTH), f32(BLOCK_HEIGHT));
+  for (var row = 0u; row < BLOCK_ROWS; row++) {
+    // From the first to the last row of pixel centres, and 0.01 px more: rounding must not lose a pixel on the rim.
+    let top = tile_corner.y + f32(row) * size.y + 0.5;
+    let range = band_range(c, top - 0.01, top + size.y - 0.99) + vec2f(-0.01, 0.01) - tile_corner.x;
     if (range.x > range.y) { continue; }
-    if (range.x <= 7.5 && range.y >= 0.5) { atomicOr(&block_hits[2u * row * BATCH_WORDS + word], bit); }
-    if (range.x <= 15.5 && range.y >= 8.5) { atomicOr(&block_hits[(2u * row + 1u) * BATCH_WORDS + word], bit); }
+    // Column k holds the pixel centres k·width + 0.5 ... (k + 1)·width - 0.5.
+    let first = max(ceil((range.x + 0.5) / size.x) - 1.0, 0.0);
+    let last = min(floor((range.y - 0.5) / size.x), f32(BLOCK_COLUMNS) - 1.0);
+    for (var column = first; column <= last; column += 1.0) {
+      atomicOr(&block_hits[(row * BLOCK_COLUMNS + u32(column)) * BATCH_WORDS + word], bit);
+    }
   }
 }
 
-// Adds the pairs from `start` on that touch the tile to the queue, in their order. Ends with a barrier.
-fn find_splats(start: u32, end: u32, tile_bit: u32, lane: u32) {
-  if (lane < HIT_WORDS) { atomicStore(&hits[lane], 0u); }
-  workgroupBarrier();
-  var slots: array<u32, PAIRS_PER_THREAD>;
-  var is_hit: array<bool, PAIRS_PER_THREAD>;
-  for (var j = 0u; j < PAIRS_PER_THREAD; j++) {
-    let i = start + j * TILE_THREADS + lane;
-    is_hit[j] = false;
-    if (i < end) {
-      let pair = pairs[i];
-      slots[j] = pair.x;
-      is_hit[j] = (pair.y & tile_bit) != 0u;
-      if (is_hit[j]) { atomicOr(&hits[(j * TILE_THREADS + lane) / 32u], 1u << (lane % 32u)); }
-    }
+// Moves the window to the words from `first` on. Ends with a barrier.
+fn move_window(first: u32, range: vec2u, tile_in_bin: u32, lane: u32) {
+  let word = first + lane;
+  var hits = 0u;
+  if (32u * word < range.y) {
+    hits = tile_bits[tile_word(word, tile_in_bin)];
+    // The first and the last word may hold pairs of other bins.
+    if (32u * word < range.x) { hits &= 0xffffffffu << (range.x - 32u * word); }
+    if (32u * word + 32u > range.y) { hits &= 0xffffffffu >> (32u * word + 32u - range.y); }
   }
+  let upto = inclusive_sum(countOneBits(hits), lane, TILE_THREADS);
+  window[lane] = hits;
+  found_upto[lane] = upto;
+  if (lane == TILE_THREADS - 1u) { found = upto; }
   workgroupBarrier();
-  let own_word = lane / 32u;
-  var place = queued;
-  for (var w = 0u; w < HIT_WORDS; w++) {
-    let word = atomicLoad(&hits[w]);
-    let j = w / (TILE_THREADS / 32u);
-    if (w % (TILE_THREADS / 32u) == own_word && is_hit[j]) {
-      queue[place + countOneBits(word & ((1u << (lane % 32u)) - 1u))] = slots[j];
-    }
-    place += countOneBits(word);
-  }
-  workgroupBarrier();
-  if (lane == 0u) { queued = place; }
 }
 
-fn load_splat(k: u32, tile_corner: vec2f) {
-  let s = splats[queue[k]];
+// The nth pair that the window found, counted from its first word.
+fn found_pair(nth: u32) -> u32 {
+  var word = 0u;
+  for (var step = TILE_THREADS / 2u; step > 0u; step /= 2u) {
+    if (found_upto[word + step - 1u] <= nth) { word += step; }
+  }
+  var bits = window[word];
+  var ahead = nth + countOneBits(bits) - found_upto[word];
+  var bit = 0u;
+  for (var width = 16u; width > 0u; width /= 2u) {
+    let below = countOneBits(bits & ((1u << width) - 1u));
+    if (ahead >= below) {
+      ahead -= below;
+      bits >>= width;
+      bit += width;
+    }
+  }
+  return 32u * word + bit;
+}
+
+fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
+  let s = splats[slot];
+  slots[k] = slot;
   hit_blocks(k, s, tile_corner);
   shapes[k] = s.shape * vec4f(1.0, 1.0, BASE_2_AXIS, 1.0);
   let inverse_sigma_v = bitcast<f32>(s.paint.x) * BASE_2_AXIS;
   let power = log2(bitcast<f32>(s.paint.w));
   paints[k] = vec4u(bitcast<u32>(inverse_sigma_v), s.paint.yz, bitcast<u32>(power));
+}
+
+struct Pixel {
+  color: vec3f,
+  transmittance: f32,
+  // Whether nothing behind can be seen, or there is nothing to paint.
+  finished: bool,
+  // Blue and depth of the last splat that was blended while the pixel was transparent.
+  last_seen: u32,
+}
+
+// Blends splat k of the batch, if there is one. Without a branch, which takes a third more time: where the splat does not reach, and
+// where the pixel is finished, it is blended with an alpha of 0.
+fn blend(pixel: ptr<function, Pixel>, k: u32, shape: vec4f, paint: vec4u, center: vec2f, is_there: bool) {
+  let offset = center - shape.xy;
+  let u = offset.x * shape.z;
+  let v = (offset.y - shape.w * offset.x) * bitcast<f32>(paint.x);
+  let power = bitcast<f32>(paint.w) - u * u - v * v;
+  let reaches = is_there && power >= log2(alpha_min) && !(*pixel).finished;
+  let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), reaches);
+  let before = (*pixel).transmittance;
+  // The last one to be blended while the pixel is transparent is the one that ends it.
+  (*pixel).last_seen = select((*pixel).last_seen, paint.z, reaches && before > occluded_below);
+  let remaining = before * (1.0 - alpha);
+  (*pixel).finished |= remaining <= transmittance_min;
+  let after = select(remaining, before, (*pixel).finished);
+  let weight = select(before * alpha, 0.0, (*pixel).finished);
+  note_blend(k, weight, before, after, paint.z);
+  (*pixel).color += weight * vec3f(unpack2x16float(paint.y), unpack2x16float(paint.z).x);
+  (*pixel).transmittance = after;
 }
 
 // Least float16 with all its digits: depths below it, or above the greatest, are not known well enough.
@@ -128,96 +179,78 @@ fn note_depth(tile: u32, lane: u32, is_seen_through: bool, last_seen: u32) {
 @compute @workgroup_size(TILE_THREADS)
 fn main(@builtin(workgroup_id) tile: vec3u, @builtin(num_workgroups) tiles: vec3u, @builtin(local_invocation_index) lane: u32) {
   let corner = tile.xy * TILE;
-  let pixel = corner + pixel_in_tile(lane);
-  let center = vec2f(pixel) + 0.5;
-  let own_block = lane / 32u;
+  let position = corner + pixel_in_tile(lane);
+  let center = vec2f(position) + 0.5;
+  let is_outside = any(center > view.viewport);
+  let own_block = lane / BLOCK_THREADS;
   let bin = tile.xy / vec2u(BIN_COLUMNS, BIN_ROWS);
   let in_bin = tile.xy % vec2u(BIN_COLUMNS, BIN_ROWS);
-  let tile_bit = 1u << (in_bin.y * BIN_COLUMNS + in_bin.x);
+  let tile_in_bin = in_bin.y * BIN_COLUMNS + in_bin.x;
   let range = ranges[bin.y * view.bins.x + bin.x];
-  let power_min = log2(alpha_min);
 
-  var color = vec3f(0.0);
-  var transmittance = 1.0;
-  var finished = any(center > view.viewport);
-  // Blue and depth of the last splat that was blended while the pixel was transparent.
-  var last_seen = 0u;
-  var start = range.x;
+  var pixel = Pixel(vec3f(0.0), 1.0, is_outside, 0u);
+  // First word of the window and the one behind it, and how many of the pairs found in it have been painted.
+  var first_word = range.x / 32u;
+  var next_word = first_word;
+  var in_window = 0u;
+  var painted = 0u;
   loop {
-    var waiting = workgroupUniformLoad(&queued);
-    while (waiting < TILE_THREADS && start < range.y) {
-      find_splats(start, range.y, tile_bit, lane);
-      start += PAIRS_PER_THREAD * TILE_THREADS;
-      waiting = workgroupUniformLoad(&queued);
-    }
-    let count = min(waiting, TILE_THREADS);
-    if (count == 0u) { break; }
-    if (lane < BLOCKS * BATCH_WORDS) { atomicStore(&block_hits[lane], 0u); }
+    for (var i = lane; i < BLOCKS * BATCH_WORDS; i += TILE_THREADS) { atomicStore(&block_hits[i], 0u); }
     if (lane == 0u) { atomicStore(&unfinished, 0u); }
-    workgroupBarrier();
-    if (lane < count) { load_splat(lane, vec2f(corner)); }
     clear_notes(lane);
     workgroupBarrier();
-
-    var word = 0u;
-    var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS]);
-    while (!finished) {
-      // The next splat of the batch that touches the block.
-      if (ahead == 0u) {
-        word++;
-        if (word == BATCH_WORDS) { break; }
-        ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
-        continue;
+    // Fills a batch, from as many windows as that takes.
+    var count = 0u;
+    while (count < TILE_THREADS) {
+      if (painted == in_window) {
+        if (32u * next_word >= range.y) { break; }
+        first_word = next_word;
+        next_word += TILE_THREADS;
+        move_window(first_word, range, tile_in_bin, lane);
+        in_window = workgroupUniformLoad(&found);
+        painted = 0u;
       }
-      let k = word * 32u + countTrailingZeros(ahead);
-      ahead &= ahead - 1u;
-      let shape = shapes[k];
-      let paint = paints[k];
-      let offset = center - shape.xy;
-      let u = offset.x * shape.z;
-      let v = (offset.y - shape.w * offset.x) * bitcast<f32>(paint.x);
-      let power = bitcast<f32>(paint.w) - u * u - v * v;
-      if (power < power_min) { continue; }
-      let alpha = min(ALPHA_MAX, exp2(power));
-      // The last one to be blended while the pixel is transparent is the one that ends it.
-      if (transmittance > occluded_below) { last_seen = paint.z; }
-      let remaining = transmittance * (1.0 - alpha);
-      if (remaining <= transmittance_min) {
-        finished = true;
-        continue;
+      let taken = min(in_window - painted, TILE_THREADS - count);
+      if (lane < taken) {
+        let pair = 32u * first_word + found_pair(painted + lane);
+        load_splat(count + lane, pairs[pair].x, vec2f(corner));
       }
-      let weight = transmittance * alpha;
-      note_blend(k, weight, transmittance, remaining, paint.z);
-      color += weight * vec3f(unpack2x16float(paint.y), unpack2x16float(paint.z).x);
-      transmittance = remaining;
+      painted += taken;
+      count += taken;
     }
-    if (!finished) { atomicStore(&unfinished, 1u); }
+    if (count == 0u) { break; }
     workgroupBarrier();
 
-    if (lane < count) { keep_notes(lane, queue[lane]); }
+    for (var word = 0u; word < BATCH_WORDS; word++) {
+      if (pixel.finished) { break; }
+      // Of these 32 splats those that touch the block, two at once: the second is read while the first is blended.
+      var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
+      while (ahead != 0u) {
+        let k = word * 32u + countTrailingZeros(ahead);
+        ahead &= ahead - 1u;
+        let is_pair = ahead != 0u;
+        let next = select(k, word * 32u + countTrailingZeros(ahead), is_pair);
+        ahead &= ahead - 1u;
+        let shape = shapes[k];
+        let paint = paints[k];
+        let next_shape = shapes[next];
+        let next_paint = paints[next];
+        blend(&pixel, k, shape, paint, center, true);
+        blend(&pixel, next, next_shape, next_paint, center, is_pair);
+      }
+    }
+    if (!pixel.finished) { atomicStore(&unfinished, 1u); }
+    workgroupBarrier();
 
-    // What is left over moves up: read by all before it is overwritten.
-    let left = waiting - count;
-    var moved: array<u32, PAIRS_PER_THREAD>;
-    for (var j = 0u; j < PAIRS_PER_THREAD; j++) {
-      moved[j] = 0u;
-      if (j * TILE_THREADS + lane < left) { moved[j] = queue[count + j * TILE_THREADS + lane]; }
-    }
-    if (lane == 0u) {
-      is_open = atomicLoad(&unfinished);
-      queued = left;
-    }
+    if (lane < count) { keep_notes(lane, slots[lane]); }
+    if (lane == 0u) { is_open = atomicLoad(&unfinished); }
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
-    for (var j = 0u; j < PAIRS_PER_THREAD; j++) {
-      if (j * TILE_THREADS + lane < left) { queue[j * TILE_THREADS + lane] = moved[j]; }
-    }
   }
-  let is_outside = any(center > view.viewport);
-  let is_seen_through = !is_outside && !finished && transmittance > occluded_below;
-  note_depth(tile.y * tiles.x + tile.x, lane, is_seen_through, last_seen);
+  let is_seen_through = !pixel.finished && pixel.transmittance > occluded_below;
+  note_depth(tile.y * tiles.x + tile.x, lane, is_seen_through, pixel.last_seen);
   if (is_outside) { return; }
-  note_pixel(pixel);
-  var result = vec4f(color, transmittance);
-  if (is_final) { result = vec4f(color, 1.0 - transmittance) + transmittance * view.background; }
-  textureStore(image, pixel, result);
+  note_pixel(position);
+  var result = vec4f(pixel.color, pixel.transmittance);
+  if (is_final) { result = vec4f(pixel.color, 1.0 - pixel.transmittance) + pixel.transmittance * view.background; }
+  textureStore(image, position, result);
 }

@@ -15,3 +15,18 @@
 
 // What moves along with a key.
 alias Value = u32;
+
+struct Item {
+  key: u32,
+  value: Value,
+}
+
+// Key number i and what moves along with it; nothing of meaning behind the last one.
+fn item_at(i: u32) -> Item {
+  var item = Item(0u, Value(i));
+  if (i < plan.visible) {
+    item.key = keys_in[i];
+    if (digit_pass.makes_indices == 0u) { item.value = values_in[i]; }
+  }
+  return item;
+}

@@ -21,7 +21,7 @@ import {
 } from '@gaussian-splat/economise';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 
 const SIZE = { width: 120, height: 80 };
 
@@ -167,7 +167,4 @@ test('a file in this order is a coarse picture while it arrives', async () => {
   assert.ok(found > 20, `${found} dB with 60 % of the file`);
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -18,7 +18,7 @@ import {
 } from '@gaussian-splat/core';
 import { bindInputs, type GeneratorState } from '@gaussian-splat/generator';
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 
 const root = fileURLToPath(new URL('../../demo/generators/', import.meta.url));
 const names = readdirSync(root).filter((name) => existsSync(`${root}${name}/model.onnx`));
@@ -131,7 +131,4 @@ function outlinePsnr(drawn: Float32Array, wanted: Uint8Array, fitGain: boolean):
   return -10 * Math.log10(squares / (3 * counted.length));
 }
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -8,7 +8,7 @@ import { renderOracle } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
 import { closeness, describeCloseness } from '../support/compare.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
 
 /** The image of a camera that has just turned: only then are the visible splats sorted by short keys. */
@@ -55,7 +55,4 @@ test('depth keys: inside a room', async () => {
   assertEnough(await sweep(name, cloud, cameras[1]));
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -9,7 +9,7 @@ import { referenceViews } from '../support/cameras.js';
 import { closeness, compareWithOracle, describeCloseness, renderCloud } from '../support/compare.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { psnr } from '../support/metrics.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 
 /** dB to the image of the PLY file that each format must keep, a little under what it was seen to keep. */
 const FORMATS: readonly { readonly file: string; readonly toPly: number; readonly level?: number }[] = [
@@ -61,7 +61,4 @@ test('captured scenes in SOG of both versions', { skip: needsSharedData }, async
   }
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

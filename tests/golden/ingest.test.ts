@@ -6,7 +6,7 @@ import { capture, DynamicGaussians, GaussianBuffers, packGaussians, Renderer } f
 import { mortonOrder } from '@gaussian-splat/renderer/stages';
 import { writeTensors, type TensorSpec, type WrittenTensors } from '../support/generator-tensors.js';
 import { psnr } from '../support/metrics.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { brightColors, edgeOnDiscs, hugeSplats, needles, opacityLadder, room } from '../support/scenes.js';
 
 const LIMIT_DB = 55;
@@ -182,10 +182,4 @@ test('ingest: a tensor that is missing or too small, or too many rows, is refuse
   gaussians.destroy();
 });
 
-// Dawn keeps Node alive; a process that ends while the GPU still works may crash.
-after(async () => {
-  const device = await nodeDevice();
-  await device.queue.onSubmittedWorkDone();
-  device.destroy();
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

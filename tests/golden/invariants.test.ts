@@ -7,7 +7,7 @@ import { renderOracle } from '../oracle/oracle.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, renderCloud } from '../support/compare.js';
 import { psnr } from '../support/metrics.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { randomSource } from '../support/gpu.js';
 import { cameraAt, equalDepthPlane, movedBy, offCentre, room, withHostileSplats } from '../support/scenes.js';
 
@@ -223,7 +223,4 @@ function spread(packed: PackedGaussians, count: number): PackedGaussians {
   return { ...packed, count, geometry, sh, chunks };
 }
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -5,7 +5,7 @@ import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { GaussianBuffers, packedOrder, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { toCamera, worldPosition } from '../oracle/projection.js';
 import { renderOracle } from '../oracle/oracle.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { room } from '../support/scenes.js';
 
@@ -115,7 +115,4 @@ test('quads refuse to take notes, by name', async () => {
   target.destroy();
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

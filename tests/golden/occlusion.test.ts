@@ -6,7 +6,7 @@ import { GaussianBuffers, packGaussians, Renderer, type RendererOptions } from '
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 
 const SIZE = { width: 192, height: 128 };
@@ -116,7 +116,4 @@ function scene({ count, shDegree, shPrecision, antialiased, origin, pages }: Gau
   return { count, shDegree, shPrecision, antialiased, origin, pages };
 }
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

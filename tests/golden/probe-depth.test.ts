@@ -5,7 +5,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer, type RasterizerName } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
 
 /** 1500 balls of all opacities around the origin. */
@@ -82,7 +82,4 @@ test('a wall behind a veil: the depth is that of the wall, and only what is behi
   gaussians.destroy();
 });
 
-after(async () => {
-  (await nodeDevice()).destroy();
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

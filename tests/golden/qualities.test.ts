@@ -7,7 +7,7 @@ import { readScene } from '@gaussian-splat/formats';
 import { readFileSync } from 'node:fs';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, describeCloseness } from '../support/compare.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { cameraAt, room } from '../support/scenes.js';
 
 /** dB against the oracle, worst view. */
@@ -46,7 +46,4 @@ for (const { name, cloud, camera } of views) {
   });
 }
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -6,7 +6,7 @@ import type { Mode } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
 import { compareWithOracle, describeCloseness, type Closeness } from '../support/compare.js';
 import { hasSharedData, needsSharedData, sharedFile } from '../support/data.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { proceduralScenes } from '../support/scenes.js';
 
 const MODES: readonly Mode[] = ['classic', 'antialiased'];
@@ -47,7 +47,4 @@ for (const makeScene of proceduralScenes) {
   }
 }
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

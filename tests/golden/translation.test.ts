@@ -5,7 +5,7 @@ import type { Camera } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer, type RendererOptions } from '@gaussian-splat/renderer';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, describeCloseness } from '../support/compare.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { notePasses } from '../support/passes.js';
 import { offCentre, room } from '../support/scenes.js';
 
@@ -100,7 +100,4 @@ test('several scenes keep their common order while the camera moves', async () =
   assert.ok((await moving.readStatistics()).visible > 1000);
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -4,7 +4,7 @@ import { after, test } from 'node:test';
 import { capture, chooseVariants, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
 
 test('serial and parallel stages draw the same bytes, moving and turning', async () => {
@@ -63,7 +63,4 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
   }
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -4,7 +4,7 @@ import { after, test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { bytesPerSplat, GaussianBuffers, MemoryLedger, packGaussians } from '@gaussian-splat/renderer';
 import { smallCloud } from '../formats/support/small-cloud.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 
 test('what is declared is what the buffers take', async () => {
   const device = await nodeDevice();
@@ -43,7 +43,4 @@ test('a scene beyond the budget is refused before the device hears of it', async
   ledger.budgetBytes = Infinity;
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -8,3 +8,13 @@ export function nodeDevice(): Promise<GPUDevice> {
   device ??= requestNodeAdapter().then((adapter) => adapter.requestDevice());
   return device;
 }
+
+/**
+ * For `after` of every file that uses the device: Dawn keeps Node alive, and a process that ends while the GPU still works was seen to crash.
+ */
+export async function endNodeDevice(): Promise<void> {
+  const used = await device;
+  await used?.queue.onSubmittedWorkDone();
+  used?.destroy();
+  setImmediate(() => process.exit());
+}

@@ -1,8 +1,8 @@
 import {
   binCount,
   binEmit,
+  binIndex,
   binPlan,
-  binRanges,
   constants,
   layouts,
   rasterizeTiles,
@@ -25,7 +25,7 @@ import { planOffsets } from '../scratch.js';
 import { sortedIn, SortStage, type SortBindings, type SortName } from '../stages/sort.js';
 import type { FrameNotes, OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
 
-const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, SORT_BLOCK, DIGITS } = constants;
+const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, PROJECT_GROUP, SORT_BLOCK, DIGITS } = constants;
 /** A slot, and a mask of tiles. */
 const PAIR_BYTES = 8;
 
@@ -55,7 +55,7 @@ interface GridBindings {
   readonly scan: GPUBindGroup;
   readonly plan: GPUBindGroup;
   readonly sort: SortBindings;
-  readonly findRanges: GPUBindGroup;
+  readonly index: GPUBindGroup;
   /** By the view of the image. */
   readonly rasterize: WeakMap<GPUTextureView, GPUBindGroup>;
 }
@@ -131,7 +131,7 @@ export class TilesRasterizer implements Rasterizer {
     encoder.clearBuffer(buffers.groupPairs);
     encoder.clearBuffer(bound.ranges);
 
-    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = this.#kernels;
+    const { count, scan: scanKernel, plan: planKernel, emit, index } = this.#kernels;
     const listing = bound.listing[order];
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
     count.dispatchIndirect(bin, listing.count, plan, planOffsets.visible);
@@ -139,7 +139,7 @@ export class TilesRasterizer implements Rasterizer {
     planKernel.dispatch(bin, bound.plan, 1);
     emit.dispatchIndirect(bin, listing.emit, plan, planOffsets.visible);
     this.#sort.record(bin, bound.sort, buffers.plan);
-    findRanges.dispatchIndirect(bin, bound.findRanges, buffers.plan, planOffsets.visible);
+    index.dispatchIndirect(bin, bound.index, buffers.plan, planOffsets.visible);
     bin.end();
     const paint = encoder.beginComputePass({
       label: 'gs.rasterize',
@@ -176,9 +176,11 @@ export class TilesRasterizer implements Rasterizer {
     const groups = Math.ceil(capacity / PREFIX_THREADS);
     const buffer = (name: string, bytes: number): GPUBuffer =>
       this.#memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination | indirect);
+    // `bin_index` writes its bits in whole groups.
+    const pairs = PROJECT_GROUP * Math.ceil(pairCapacity / PROJECT_GROUP);
     const two = (name: string, bytes: number): [GPUBuffer, GPUBuffer] => [
-      buffer(`${name}_a`, bytes * pairCapacity),
-      buffer(`${name}_b`, bytes * pairCapacity),
+      buffer(`${name}_a`, bytes * pairs),
+      buffer(`${name}_b`, bytes * pairs),
     ];
     const groupPairs = buffer('group_pairs', 4 * (groups + 1));
     this.#device.queue.writeBuffer(this.#scanLength, 0, Uint32Array.of(groupPairs.size / 4 - 1));
@@ -213,7 +215,8 @@ export class TilesRasterizer implements Rasterizer {
     ranges: GPUBuffer,
   ): Omit<GridBindings, 'grid' | 'ranges'> {
     const view = this.#view;
-    const { count, scan: scanKernel, plan: planKernel, emit, findRanges } = this.#kernels;
+    const sorted = sortedIn(this.#sort.name, bits);
+    const { count, scan: scanKernel, plan: planKernel, emit, index } = this.#kernels;
     const listing = (order: GPUBuffer): GridBindings['listing'][OrderKind] => {
       const shared = { view, plan, splats, order, rects, group_pairs: groupPairs };
       return { count: count.bind(shared), emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }) };
@@ -223,7 +226,13 @@ export class TilesRasterizer implements Rasterizer {
       scan: scanKernel.bind({ values: groupPairs, scan: this.#scanLength }),
       plan: planKernel.bind({ view, group_pairs: groupPairs, pair_plan: pairPlan }),
       sort: this.#sort.bind({ plan: pairPlan, keys: bins, values: pairs, digitCounts, digitTotals }, bits),
-      findRanges: findRanges.bind({ pair_plan: pairPlan, bins: bins[sortedIn(this.#sort.name, bits)], ranges }),
+      index: index.bind({
+        pair_plan: pairPlan,
+        bins: bins[sorted],
+        pairs: pairs[sorted],
+        ranges,
+        tile_bits: bins[1 - sorted]!,
+      }),
       rasterize: new WeakMap(),
     };
   }
@@ -238,11 +247,15 @@ export class TilesRasterizer implements Rasterizer {
 
   #painted(bound: GridBindings, image: GPUTextureView) {
     const { splats, occlusion } = this.#inputs!;
+    const { pairs, bins } = this.#buffers!;
+    const sorted = sortedIn(this.#sort.name, bound.grid.bits);
     return {
       view: this.#view,
       splats,
-      pairs: this.#buffers!.pairs[sortedIn(this.#sort.name, bound.grid.bits)],
+      pairs: pairs[sorted],
       ranges: bound.ranges,
+      // Once the pairs are sorted, what they were sorted from is free.
+      tile_bits: bins[1 - sorted]!,
       occlusion: occlusion.depths,
       last_depths: occlusion.lastDepths,
       image,
@@ -297,7 +310,7 @@ function makeKernels(device: GPUDevice, { alpha_min }: Overrides) {
     scan: kernelOf(device, scan),
     plan: kernelOf(device, binPlan),
     emit: kernelOf(device, binEmit, { alpha_min }),
-    findRanges: kernelOf(device, binRanges),
+    index: kernelOf(device, binIndex),
   };
 }
 
