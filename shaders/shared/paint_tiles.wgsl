@@ -151,7 +151,7 @@ fn blend(pixel: ptr<function, Pixel>, k: u32, shape: vec4f, paint: vec4u, center
   let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), reaches);
   let before = (*pixel).transmittance;
   // The last one to be blended while the pixel is transparent is the one that ends it.
-  (*pixel).last_seen = select((*pixel).last_seen, paint.z, reaches && before > occluded_below);
+  if (occluded_below > 0.0) { (*pixel).last_seen = select((*pixel).last_seen, paint.z, reaches && before > occluded_below); }
   let remaining = before * (1.0 - alpha);
   (*pixel).finished |= remaining <= transmittance_min;
   let after = select(remaining, before, (*pixel).finished);

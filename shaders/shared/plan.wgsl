@@ -34,6 +34,6 @@ struct PagePlan {
 }
 
 // Keys of one workgroup of the sort.
-const SORT_BLOCK = 4096u;
+const SORT_BLOCK = 2048u;
 // Quads drawn as one instance: instances of four vertices leave most lanes of a GPU idle.
 const QUAD_BATCH = 128u;
