@@ -16,11 +16,12 @@ async function readFacts(name) {
 
 /** Fills the card: bytes, Gaussians, accuracy, training, licence. */
 function showCost(list, { bytes, contract, record }) {
+  const unseen = record.unseen ? `; ${record.unseen.psnr.toFixed(1)} dB on a scene that it never saw` : '';
   const inside = record.outline_psnr ? `; ${record.outline_psnr.toFixed(1)} dB inside the outline` : '';
   const rows = [
     ['File', `${(bytes / 1e6).toFixed(2)} MB`],
     ...(contract.nMax ? [['Gaussians', contract.nMax.toLocaleString('en')]] : []),
-    ['Held-out PSNR', `${record.held_out_psnr.toFixed(1)} dB${inside}`],
+    ['Held-out PSNR', `${record.held_out_psnr.toFixed(1)} dB${inside}${unseen}`],
     ['Trained', `${Math.round(record.seconds)} s on one ${record.device}, ${record.steps.toLocaleString('en')} steps`],
     ['Licence', `${contract.license}. ${contract.attribution}`],
   ];
@@ -49,6 +50,22 @@ function conductPlant(card) {
     element.pause();
     element.currentTime = slider.valueAsNumber;
   });
+}
+
+/** Pairs of pictures, with what their cameras have to do with one another: `view.json` beside them. */
+async function conductPictures(card) {
+  const element = card.querySelector('gaussian-splat');
+  const buttons = [...card.querySelectorAll('[data-pair]')];
+  const choose = async (chosen) => {
+    const folder = new URL(chosen.dataset.pair, folderOf(card.dataset.example));
+    const view = await (await fetch(new URL('view.json', folder))).json();
+    const addresses = Object.entries(view.pictures).map(([name, file]) => [name, new URL(file, folder).href]);
+    element.controls = { ...Object.fromEntries(addresses), ...view.controls };
+    card.querySelectorAll('.given img').forEach((image, i) => (image.src = addresses[i][1]));
+    for (const button of buttons) button.setAttribute('aria-pressed', String(button === chosen));
+  };
+  for (const button of buttons) button.addEventListener('click', () => choose(button));
+  await choose(buttons[0]);
 }
 
 /** Sliders for a pose, a button that walks. */
@@ -88,6 +105,7 @@ function conductWalker(card, joints) {
 }
 
 conductPlant(exampleOf('plant'));
+conductPictures(exampleOf('statue')).catch((error) => console.error(error));
 for (const card of document.querySelectorAll('[data-example]')) {
   const name = card.dataset.example;
   readFacts(name).then(

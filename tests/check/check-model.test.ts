@@ -36,6 +36,7 @@ const FAULTS: Readonly<Record<string, readonly string[]>> = {
     'contract/opacity',
   ],
   'faulty-random.onnx': ['contract/not-deterministic'],
+  'faulty-instances.onnx': ['contract/instances'],
   'faulty-run.onnx': ['contract/run'],
   // From its first second on, which the sample of the last time reaches.
   'faulty-later.onnx': ['contract/run'],

@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import {
+  carriesContract,
   checkContract,
   contractReport,
   CONTRACT_METADATA_KEY,
@@ -18,7 +19,7 @@ const header = headerWith([tensor('time', [1])], [tensor('gaussians', [5, 13])],
   metadata: new Map([[CONTRACT_METADATA_KEY, named('metadata')]]),
 });
 
-test('sources in their order: explicit, sidecar, metadata, inference', () => {
+test('sources in their order: explicit, metadata, sidecar, inference', () => {
   const of = (sources: { explicit?: unknown; sidecar?: unknown }, from = header): string => {
     const { contract, source } = resolveContract({ header: from, ...sources });
     return `${source} ${contract.name}`;
@@ -26,15 +27,18 @@ test('sources in their order: explicit, sidecar, metadata, inference', () => {
   const sidecar = named('sidecar');
   assert.equal(of({ explicit: { ...PACKED, name: 'object' }, sidecar }), 'explicit object');
   assert.equal(of({ explicit: named('text') }), 'explicit text');
-  assert.equal(of({ sidecar }), 'sidecar sidecar');
+  assert.equal(of({ sidecar }), 'metadata metadata');
   assert.equal(of({}), 'metadata metadata');
+  const silent = { ...header, metadata: new Map<string, string>() };
+  assert.equal(of({ sidecar }, silent), 'sidecar sidecar');
+  assert.deepEqual([carriesContract(header), carriesContract(silent)], [true, false]);
   assert.equal(of({}, { ...header, metadata: new Map() }), 'inferred undefined');
 });
 
 test('a broken contract is never passed over, and the fault says where it lies', () => {
   const place = (sources: object): string => faultsOf(() => resolveContract({ header, ...sources }))[0].where;
   assert.equal(place({ explicit: '{', sidecar: named('x') }), 'contract');
-  assert.equal(place({ sidecar: '{' }), 'model.contract.json');
+  assert.equal(place({ sidecar: '{', header: { ...header, metadata: new Map() } }), 'model.contract.json');
   const metadata = new Map([[CONTRACT_METADATA_KEY, '{']]);
   assert.equal(place({ header: { ...header, metadata } }), `metadata ${CONTRACT_METADATA_KEY}`);
 });

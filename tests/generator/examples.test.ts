@@ -16,7 +16,7 @@ import {
   readOnnxHeader,
   resolveContract,
 } from '@gaussian-splat/core';
-import { bindInputs, type GeneratorState } from '@gaussian-splat/generator';
+import { bindInputs, type GeneratorState, type InputNumbers } from '@gaussian-splat/generator';
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 
@@ -37,6 +37,9 @@ interface View {
   readonly time?: number;
   readonly pose?: number[][];
   readonly shape?: number[];
+  /** Files of pictures that the example takes, by the names of its inputs. */
+  readonly pictures?: Readonly<Record<string, string>>;
+  readonly controls?: Readonly<Record<string, number[]>>;
   readonly fitGain: boolean;
   readonly psnr: number;
 }
@@ -46,7 +49,7 @@ const readJson = (path: string): unknown => JSON.parse(readFileSync(root + path,
 
 test('there are examples of every kind that is said to ship', () => {
   const listed = readFileSync(`${root}README.md`, 'utf8');
-  assert.ok(names.length >= 4, names.join());
+  assert.ok(names.length >= 6, names.join());
   for (const name of names) assert.ok(listed.includes(`[${name}]`), `README.md has no row for ${name}`);
 });
 
@@ -86,8 +89,10 @@ async function drawView(name: string, view: View): Promise<Float32Array> {
     timeSeconds: (view.time ?? 0) * (contract.duration ?? 0),
     ...(view.pose && { pose: view.pose.flat() }),
     ...(view.shape && { shape: view.shape }),
+    ...(view.controls && { controls: view.controls }),
   };
-  const written = await run(bytes, bindInputs(header, contract, state));
+  const pictures = Object.entries(view.pictures ?? {}).map(([input, file]) => [input, planes(read(`${name}/${file}`))]);
+  const written = await run(bytes, { ...bindInputs(header, contract, state), ...Object.fromEntries(pictures) });
   const device = await nodeDevice();
   const layout = gaussianLayout(header, contract);
   assert.ok(layout, 'a model that writes Gaussians');
@@ -103,7 +108,18 @@ async function drawView(name: string, view: View): Promise<Float32Array> {
   return pixels;
 }
 
-async function run(model: Uint8Array, inputs: ReturnType<typeof bindInputs>): Promise<Float32Array<ArrayBuffer>> {
+/** A picture as a model takes it: red, green and blue one after the other. */
+function planes(file: Uint8Array): InputNumbers {
+  const { width, height, data } = PNG.sync.read(Buffer.from(file));
+  const size = width * height;
+  const numbers = Float32Array.from({ length: 3 * size }, (_, i) => data[4 * (i % size) + Math.floor(i / size)] / 255);
+  return { dtype: 'float32', dims: [1, 3, height, width], data: numbers };
+}
+
+async function run(
+  model: Uint8Array,
+  inputs: Readonly<Record<string, InputNumbers>>,
+): Promise<Float32Array<ArrayBuffer>> {
   ort.env.logLevel = 'error';
   ort.env.wasm.numThreads = 1;
   const session = await ort.InferenceSession.create(model, { executionProviders: ['wasm'], logSeverityLevel: 3 });

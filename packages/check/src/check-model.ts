@@ -1,4 +1,5 @@
 import {
+  carriesContract,
   checkContract,
   checkFile,
   ContractError,
@@ -70,7 +71,8 @@ async function contractOf(
   { contract }: CheckOptions,
 ): Promise<{ resolved?: ResolvedContract; faults: readonly ContractFault[] }> {
   const explicit = contract === undefined ? undefined : await readText(contract);
-  const sidecar = explicit === undefined ? await location.sidecar() : undefined;
+  const isAsked = explicit === undefined && !carriesContract(header);
+  const sidecar = isAsked ? await location.sidecar() : undefined;
   try {
     return { resolved: resolveContract({ header, explicit, sidecar }), faults: [] };
   } catch (error) {

@@ -6,7 +6,7 @@ const USAGE = `Usage: gaussian-check MODEL [--contract CONTRACT.json] [--run]
 
 Checks an ONNX file (a path or an address) against the Gaussian Generator contract.
 
-  --contract FILE   the contract; otherwise NAME.contract.json beside the model, the model's metadata, or its names
+  --contract FILE   the contract; otherwise the model's metadata, NAME.contract.json beside it, or its names
   --run             run the model on the CPU, too, and check its values
 
 Exit status: 0 if it keeps the contract, 1 if not, 2 if the command is wrong.`;

@@ -5,11 +5,11 @@ import {
   type Contract,
   type ContractFault,
   type OnnxHeader,
-  type OutputTensor,
 } from '@gaussian-splat/core';
 import type * as OnnxRuntime from 'onnxruntime-web';
 import type { InferenceSession, Tensor } from 'onnxruntime-web';
 import type { ModelLocation } from './model-location.js';
+import { compareTogether, runAlone, type Outputs, type SampleInputs } from './run-instances.js';
 import { sampleInputs, type Sample } from './sample-inputs.js';
 
 type Runtime = typeof OnnxRuntime;
@@ -30,7 +30,13 @@ export async function runModel(location: ModelLocation, header: OnnxHeader, cont
   try {
     const ort = await loadRuntime();
     session = await createSession(ort, location, header);
-    return await runSamples(ort, session, contract, samples);
+    const feed = (inputs: SampleInputs): Promise<Outputs> => run(ort, session!, inputs);
+    const { instances } = contract;
+    if (instances === undefined) return await runSamples(feed, contract, samples);
+    const alone = (inputs: SampleInputs): Promise<Outputs> => runAlone(feed, header, contract, inputs);
+    const report = await runSamples(alone, contract, samples);
+    const faults = await compareTogether(feed, header, contract, samples);
+    return { ...report, faults: [...report.faults, ...faults] };
   } catch (error) {
     return { faults: [runFault(session === undefined ? 'loading' : 'running', error)], rows: [] };
   } finally {
@@ -58,8 +64,7 @@ async function createSession(ort: Runtime, location: ModelLocation, header: Onnx
 }
 
 async function runSamples(
-  ort: Runtime,
-  session: InferenceSession,
+  feed: (inputs: SampleInputs) => Promise<Outputs>,
   contract: Contract,
   samples: readonly Sample[],
 ): Promise<RunReport> {
@@ -74,13 +79,13 @@ async function runSamples(
   const rows: string[][] = [];
   for (const [i, { label, isDefault, inputs }] of samples.entries()) {
     const start = performance.now();
-    const outputs = await run(ort, session, inputs);
+    const outputs = await feed(inputs);
     const milliseconds = performance.now() - start;
     const report = checkOutputs(contract, outputs);
     const { rows: count, live, bounds } = report;
     keep(label, report.faults);
     if (isDefault) keep(label, checkBounds(contract, report));
-    if (i === 0) keep(label, compareRuns(contract, outputs, await run(ort, session, inputs)));
+    if (i === 0) keep(label, compareRuns(contract, outputs, await feed(inputs)));
     if (contract.outputs.layout === 'image') {
       rows.push([
         label,
@@ -103,17 +108,13 @@ async function runSamples(
 
 const short = (value: number): string => String(Number(value.toPrecision(4)));
 
-async function run(
-  ort: Runtime,
-  session: InferenceSession,
-  inputs: Sample['inputs'],
-): Promise<Record<string, OutputTensor>> {
+async function run(ort: Runtime, session: InferenceSession, inputs: SampleInputs): Promise<Outputs> {
   const feeds: Record<string, Tensor> = {};
   for (const [name, { dtype, data, dims }] of Object.entries(inputs)) {
     feeds[name] = new ort.Tensor(dtype as 'float32', data as Float32Array, dims);
   }
   const results = await session.run(feeds);
-  const outputs: Record<string, OutputTensor> = {};
+  const outputs: Outputs = {};
   for (const [name, { type, dims, data }] of Object.entries(results)) {
     outputs[name] = { dtype: type, dims, data: data as Float32Array };
   }

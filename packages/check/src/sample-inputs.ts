@@ -1,6 +1,7 @@
 import {
   lookAt,
   numberToHalf,
+  oneInstance,
   type Camera,
   type Contract,
   type GaussiansInput,
@@ -29,9 +30,10 @@ export interface Sample {
 const SAMPLE_ROWS = 16;
 const SAMPLE_PIXELS = 64;
 
-/** Inputs for runs that reach the ends of what the contract declares: times and views at defaults, then controls. */
+/** Inputs, of one instance, for runs that reach the ends of what the contract declares: times and views at defaults, then controls. */
 export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
   const given = givenTensors(header, contract);
+  const one = oneInstance(header, contract);
   const end = contract.duration ?? 1;
   const states: [label: string, state: GeneratorState][] = [
     ['defaults', stateAt(contract, 0, 0)],
@@ -44,7 +46,7 @@ export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
   return states.map(([label, state]) => ({
     label,
     isDefault: state.controls === undefined,
-    inputs: { ...bindInputs(header, contract, state), ...given },
+    inputs: { ...bindInputs(one, contract, state), ...given },
   }));
 }
 

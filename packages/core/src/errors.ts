@@ -72,6 +72,8 @@ export type ContractErrorCode =
   | 'contract/rows'
   /** The degree of spherical harmonics that the shape tells is none, or not the one declared. */
   | 'contract/sh-degree'
+  /** A model of several instances whose axis is not where it must be, or whose instances come out differently in one run and in several. */
+  | 'contract/instances'
   /** Facts within one contract contradict each other. */
   | 'contract/conflict'
   /** The file asks for an IR version or an opset newer than the runtime knows. */

@@ -87,8 +87,8 @@ def feed_forward(views: int = 2) -> FeedForward:
         far=8.0,
         depths=7,
         encoder=[layer(rng, 3, 6), layer(rng, 6, 8), layer(rng, 8, 10), layer(rng, 10, 10)],
-        depth=[layer(rng, sweep, 9), layer(rng, 9, 7)],
-        head=[layer(rng, 10 + 6 + 3 + 1, 9), layer(rng, 9, 9), layer(rng, 9, 12)],
+        depth=[layer(rng, sweep, 9), layer(rng, 9, 9), layer(rng, 9, 7)],
+        head=[layer(rng, 10 + 6 + 3 + 1, 9, 1), layer(rng, 9, 9), layer(rng, 9, 12)],
     )
 
 
@@ -131,8 +131,8 @@ def reference(model: FeedForward, feeds: dict[str, AnyArray]) -> dict[str, Doubl
     encoded = []
     for picture in pictures:
         stages = [picture * 2 - 1]
-        for each, stride in zip(model.encoder, STRIDES, strict=True):
-            stages.append(relu(convolved(stages[-1], each, stride)))
+        for index, each in enumerate(model.encoder):
+            stages.append(relu(convolved(stages[-1], each, STRIDES[index] if index < 3 else 1)))
         encoded.append((stages[1], stages[-1]))
     there = feeds["relative_pose"].astype(np.float64) if model.views == 2 else np.eye(4)
     back: Doubles = np.linalg.inv(there).astype(np.float64)
@@ -140,9 +140,12 @@ def reference(model: FeedForward, feeds: dict[str, AnyArray]) -> dict[str, Doubl
     columns: dict[str, list[Doubles]] = {"positions": [], "covariances": [], "colour": [], "opacities": []}
     for view, picture in enumerate(pictures):
         fine, coarse = encoded[view]
-        cost = swept(model, coarse, encoded[1 - view][1], k, poses[view]) if model.views == 2 else None
+        even = [(each - each.mean(0)) / np.sqrt(each.var(0) + 1e-5) for _, each in encoded]
+        cost = swept(model, even[view], even[1 - view], k, poses[view]) if model.views == 2 else None
         x = coarse if cost is None else np.concatenate([cost, coarse])
-        logits = convolved(relu(convolved(x, model.depth[0])), model.depth[1]) + (0 if cost is None else cost)
+        for index, each in enumerate(model.depth):
+            x = convolved(relu(x) if index else x, each)
+        logits = x + (0 if cost is None else cost)
         weights = np.exp(logits - logits.max(0))
         candidates = np.linspace(1 / model.near, 1 / model.far, model.depths)
         guess = np.einsum("dhw,d->hw", weights / weights.sum(0), candidates)[None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -159,30 +160,53 @@ def test_the_real_body_is_read_and_exported(shared: Path, tmp_path: Path) -> Non
 def test_feed_forward(views: Path, tmp_path: Path, count: int) -> None:
     import common
     import feed_forward
-    import losses
+    import make_views
+    import shots
 
-    scene = common.load_views(views / "still.npz", "cpu")
+    scene = make_views.scene_of(views / "scene.ply", "cpu")
+    # Solid, and larger: pictures are few pixels wide.
+    scene = replace(scene, opacities=torch.full_like(scene.opacities, 0.95), covariances=scene.covariances * 6)
+    rng = np.random.default_rng(0)
+    learned, kept = (shots.draw_shots([scene], n, SIZE, count, 2, rng) for n in (12, 4))
     sizes = {"fine": 8, "coarse": 8, "depths": 8}
-    models = [feed_forward.train([scene], common.Pace(steps), count, 0, jitter=False, **sizes)[0] for steps in (1, 100)]
-
-    def loss(each: Any) -> float:
-        torch.manual_seed(0)
-        with torch.no_grad():
-            targets = range(0, 16, 4)
-            tried = [feed_forward.attempt(each, scene, feed_forward.neighbours(scene, i)[:count], [i]) for i in targets]
-            return sum(float(losses.loss_of(t.found[0], t.wanted[0])) for t in tried)
-
-    assert loss(models[1]) < 0.9 * loss(models[0])
+    models = [feed_forward.train(learned, common.Pace(n), 0, jitter=False, **sizes) for n in (1, 240)]
+    before, after = (feed_forward.measure(each, kept) for each in models)
+    assert after["psnr"] > before["psnr"] + 2 and after["depth_error"] < before["depth_error"], (before, after)
+    # Trainings that end in nothing to be seen begin by losing this, and never get it back.
+    assert after["opacity"] > 0.3, after
     model = models[1]
     model.save(tmp_path)
-    k = feed_forward.shares(scene.intrinsics[0], SIZE, SIZE)
-    pose = scene.views[1] @ torch.linalg.inv(scene.views[0])
-    images = [scene.pictures[i : i + 1, :3] for i in range(count)]
-    feeds = {"focal_length": k[:2].numpy(), "principal_point": k[2:].numpy(), "image": images[0].numpy()}
+    shot = kept[0].unpacked()
+    made = feed_forward.make(model, shot)
+    k = feed_forward.shares(shot.intrinsics, SIZE, SIZE)
+    images = shot.pictures[:count, :3].numpy()
+    feeds = {"focal_length": k[:2].numpy(), "principal_point": k[2:].numpy(), "image": images[:1]}
     if count == 2:
-        feeds |= {"image_2": images[1].numpy(), "relative_pose": pose.numpy()}
+        feeds |= {"image_2": images[1:], "relative_pose": shot.camera(1).view.numpy()}
     exported = export_feed_forward(read_feed_forward(tmp_path), FACTS)
-    assert_agrees(exported, feeds, model(images, k, pose if count == 2 else None))
+    assert_agrees(exported, feeds, made.splats)
+
+
+def test_a_shot_is_as_deep_as_its_scene() -> None:
+    import make_views
+    import rasterizer
+    import shots
+
+    # A solid sheet across the view, 2 world units away.
+    across = torch.linspace(-1, 1, 21)
+    places = torch.cartesian_prod(across, across, torch.tensor([0.0]))
+    flat = torch.diag(torch.tensor([0.1, 0.1, 1e-4])).square().expand(len(places), 3, 3)
+    sheet = rasterizer.Splats(places, flat, torch.full((len(places), 3), 0.5), torch.full((len(places),), 0.99))
+    view = torch.tensor(shots.looking(np.array([0, 0, -2.0]), np.zeros(3), 0)).float()
+    assert torch.allclose(view, torch.eye(4) + torch.tensor([[0.0] * 4, [0] * 4, [0, 0, 0, 2], [0] * 4]), atol=1e-6)
+    k = torch.tensor([[make_views.FOCAL * 16, 0, 8], [0, make_views.FOCAL * 16, 8], [0, 0, 1.0]])
+    drawn, depth = rasterizer.pictures_with_depth(sheet, [rasterizer.Camera(view, k, 16, 16)])
+    assert drawn[:, 3].min() > 0.98 and (depth - 2).abs().max() < 1e-4
+    # Two cameras at the ends, one between; the first is where the others are seen from.
+    shot = shots.draw_shot(sheet, 16, 2, 1, np.random.default_rng(1))
+    assert torch.allclose(shot.camera(0).view, torch.eye(4), atol=1e-5)
+    ends, middle = ([shot.camera(i).position for i in (0, 1)], shot.camera(2).position)
+    assert (middle - (ends[0] + ends[1]) / 2).norm() < 0.1 * (ends[1] - ends[0]).norm()
 
 
 @pytest.mark.parametrize("kind", ["oil", "denoise"])
@@ -219,6 +243,30 @@ def test_the_plain_rasterizer_draws_one_gaussian_as_its_formula_says() -> None:
     offset = np.array([8.5, 9.5]) - [11.5, 7.25]
     alpha = 0.8 * np.exp(-0.5 * offset @ np.linalg.inv(flat) @ offset)
     assert np.allclose(found[:, 9, 8].numpy(), alpha * np.array([0.9, 0.5, 0.1, 1]), rtol=1e-5)
+
+
+def test_the_plain_rasterizer_blends_from_near_to_far() -> None:
+    import rasterizer
+
+    rng = np.random.default_rng(0)
+    count, k = 30, torch.tensor([[20.0, 0, 6], [0, 20, 5], [0, 0, 1]])
+    places = torch.tensor(rng.normal(size=(count, 3)) * 0.3 + [0, 0, 2]).float()
+    sizes = torch.tensor(rng.uniform(0.02, 0.3, count)).float()
+    colors, opacities = (torch.tensor(rng.random(shape)).float() for shape in ((count, 3), (count,)))
+    round_ = sizes.square()[:, None, None] * torch.eye(3)
+    camera = rasterizer.Camera(torch.eye(4), k, 12, 10)
+    found = rasterizer.picture(rasterizer.Splats(places, round_, colors, opacities), camera).numpy()
+    for row, column in ((5, 6), (2, 3), (9, 11)):
+        left, wanted = 1.0, np.zeros(3)
+        for i in np.argsort(places[:, 2].numpy(), kind="stable"):
+            x, y, z = places[i].double().numpy()
+            jacobian = np.array([[20 / z, 0, -20 * x / z**2], [0, 20 / z, -20 * y / z**2]])
+            flat = jacobian @ round_[i].double().numpy() @ jacobian.T + 0.3 * np.eye(2)
+            offset = np.array([column + 0.5, row + 0.5]) - [20 * x / z + 6, 20 * y / z + 5]
+            alpha = min(float(opacities[i]) * np.exp(-0.5 * offset @ np.linalg.inv(flat) @ offset), 0.999)
+            if alpha >= 1 / 255:
+                wanted, left = wanted + left * alpha * colors[i].numpy(), left * (1 - alpha)
+        assert np.abs(found[:, row, column] - [*wanted, 1 - left]).max() < 1e-5
 
 
 def test_kuwahara_keeps_edges_and_evens_the_rest() -> None:

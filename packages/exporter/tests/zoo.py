@@ -14,6 +14,7 @@ from gaussian_exporter.families.feed_forward import export_feed_forward
 from gaussian_exporter.families.hexplane import export_hexplane
 from gaussian_exporter.families.image_filter import export_image_filter
 from gaussian_exporter.families.scaffold import export_scaffold
+from gaussian_exporter.outputs import Options
 
 from . import test_avatar, test_classic, test_hexplane, test_networks, test_scaffold
 from .running import FACTS
@@ -40,6 +41,16 @@ def every_family() -> dict[str, Case]:
         "hexplane": (export_hexplane(test_hexplane.small(), moving, FACTS), {"time": np.array([0.3], np.float32)}),
         "avatar": (export_avatar(test_avatar.avatar(degree=1), FACTS), body),
     }
+    for name, one, feeds in (
+        ("avatar", export_avatar(test_avatar.avatar(degree=1), FACTS, Options(instances=8)), body),
+        (
+            "hexplane",
+            export_hexplane(test_hexplane.small(), moving, FACTS, Options(instances=8)),
+            {"time": np.array([0.3])},
+        ),
+    ):
+        both = {key: np.stack([value, 0.8 * value]).astype(np.float32) for key, value in feeds.items()}
+        cases[f"{name}-instances"] = (one, both)
     picture = test_networks.given()["image"]
     for kind, norm in (("style", True), ("noise", False)):
         model = test_networks.image_filter("picture" if kind == "style" else "noise", norm)

@@ -1,8 +1,11 @@
-"""Makes the picture that a shipped example is held against: python example_view.py HELD_OUT.npz INDEX OUT [--size 256]
+"""Makes the picture that a shipped example is held against:
+
+    python example_view.py HELD_OUT.npz INDEX OUT [--size 256] [--given 2]
 
 HELD_OUT is what a trainer left beside its record. OUT/view.png has the picture, on black; its alpha is 255 where the
 picture counts (inside the outline, nothing in the way, no doubt) and 0 elsewhere. OUT/view.json has the camera, as `npm
-run render` takes it, and the time, pose or shape. Needs OpenCV.
+run render` takes it, and the time, pose or shape. `--given`: the pictures before INDEX are those that a feed-forward
+generator is given; they are written as OUT/image.png and OUT/image_2.png, its controls into view.json. Needs OpenCV.
 """
 
 from __future__ import annotations
@@ -35,6 +38,23 @@ def view_of(archive: dict[str, np.ndarray], index: int, size: int) -> tuple[np.n
     return np.dstack([small[..., ::-1], whole.astype(np.uint8) * 255]), facts
 
 
+def given_pictures(archive: dict[str, np.ndarray], index: int, count: int, out: Path) -> dict[str, object]:
+    """Writes the `count` pictures before one; returns what view.json holds of them. Cameras are seen from the first."""
+    names = ["image", "image_2"][:count]
+    rows = range(index - count, index)
+    for name, row in zip(names, rows, strict=True):
+        cv2.imwrite(str(out / f"{name}.png"), archive["pictures"][row][2::-1].transpose(1, 2, 0))
+    height, width = archive["pictures"].shape[2:]
+    k = archive["intrinsics"][index].astype(float)
+    controls = {
+        "focal_length": [k[0, 0] / width, k[1, 1] / height],
+        "principal_point": [k[0, 2] / width, k[1, 2] / height],
+    }
+    if count == 2:
+        controls["relative_pose"] = archive["views"][index - 1].astype(float).round(7).ravel().tolist()
+    return {"pictures": {name: f"{name}.png" for name in names}, "controls": controls}
+
+
 def main(argv: Sequence[str] | None = None) -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -42,10 +62,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("index", type=int)
     parser.add_argument("out", type=Path)
     parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--given", type=int, default=0, choices=(0, 1, 2), help="pictures before it that were given")
     given = parser.parse_args(argv)
-    with np.load(given.held_out) as archive:
-        picture, facts = view_of(dict(archive), given.index, given.size)
     given.out.mkdir(parents=True, exist_ok=True)
+    with np.load(given.held_out) as opened:
+        archive = dict(opened)
+    picture, facts = view_of(archive, given.index, given.size)
+    if given.given > 0:
+        facts |= given_pictures(archive, given.index, given.given, given.out)
     cv2.imwrite(str(given.out / "view.png"), picture)
     (given.out / "view.json").write_text(json.dumps(facts, indent=1) + "\n")
 

@@ -29,21 +29,15 @@ one classic classic.py "$data/skull.npz" "$data/skull.npy" "$out/classic" --step
   one wind-views make_views.py wind "$data/scenes/plant.ply" "$work/wind" --size 512 --count 400
   one hexplane hexplane.py "$work/wind.npz" "$work/wind.npy" "$out/hexplane" --steps 20000 --seconds $((seconds - 20))
 ) &
-(
-  for scene in skull plant playbot angel massa st-peter; do
-    one "orbit-$scene" make_views.py orbit "$data/scenes/$scene.ply" "$work/$scene" --size 256 --count 160 &
-  done
-  wait
-  one feed-forward feed_forward.py "$out/feed-forward" "$work"/{skull,plant,playbot,angel,massa}.npz \
-    --unseen "$work/st-peter.npz" --steps 30000 --seconds $((seconds - 30))
-) &
+one feed-forward feed_forward.py "$out/feed-forward" "$data"/scenes/{skull,plant,playbot,angel,massa}.ply \
+  --unseen "$data/scenes/st-peter.ply" --steps 40000 --seconds "$seconds" &
 (
   for scene in skull plant playbot; do
     one "large-$scene" make_views.py orbit "$data/scenes/$scene.ply" "$work/large-$scene" --size 512 --count 48
   done
-  for kind in oil denoise; do
-    one "$kind" style.py "$out/$kind" "$work"/large-{skull,plant,playbot}.npz --kind $kind --steps 8000 --seconds 120
-  done
+  one oil style.py "$out/oil" "$work"/large-{skull,plant,playbot}.npz --kind oil --steps 8000 --seconds 120
+  one denoise style.py "$out/denoise" "$work"/large-{skull,plant,playbot}.npz --kind denoise --halvings 0 --steps 8000 \
+    --seconds 120
 ) &
 wait
 echo "all done after $SECONDS s"

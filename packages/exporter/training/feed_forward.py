@@ -1,17 +1,18 @@
-"""Trains a feed-forward generator: python feed_forward.py OUT VIEWS [VIEWS ...] [--unseen VIEWS]
+"""Trains a feed-forward generator: python feed_forward.py OUT SCENE.ply [SCENE.ply ...] [--unseen SCENE.ply]
 
-Each VIEWS is one scene: pictures (.npz), all of one size (multiples of 4), or a .ply that is drawn from all round.
-`--count` is how many pictures go in: 1 or 2. A step takes neighbouring views, makes Gaussians of one (or two), and
-draws them for others. Every eighth view is never drawn while training; scenes given as `--unseen` are only measured.
-OUT is the folder that `gaussian-export feed-forward` reads.
+Scenes are drawn from all round (shots.py). `--count` is how many pictures go in: 1 or 2. A step takes some shots, makes
+Gaussians of the given pictures of each, and draws them for other cameras. It is measured on shots of their own, of the
+same scenes and of one that it never saw (`--unseen`). OUT is the folder that `gaussian-export feed-forward` reads.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +20,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-from common import HELD_OUT_EVERY, Pace, Record, Views, add_pace, decayed, device, load_views, seed, split
+from common import Pace, Record, Views, add_pace, device, seed
 from losses import loss_of, psnr
-from make_views import drawn, scene_of
-from rasterizer import Camera, Splats, covariances, pictures
+from make_views import scene_of
+from rasterizer import Splats, covariances, pictures
+from shots import FAR, NEAR, Shot, draw_shots
 from show import sheet
 
 REDUCTION = 4
@@ -30,17 +32,18 @@ HEAD = (1, 1, 3, 4, 3)
 REFINEMENT = 0.2
 SMALLEST, LARGEST = 0.2, 4.2
 NEAREST = 1e-3
-# Where opacity and size begin, before their sigmoids.
+EPSILON = 1e-5
+# Where opacity and size begin, before their sigmoids: nearly opaque, and a pixel wide.
 OPAQUE, SLIM = 1.0, -1.5
-# Share of the training during which rates rise.
-WARM_UP = 0.03
-# How much opacities count besides the pictures.
-COVERAGE_WEIGHT = 0.1
-NEIGHBOURS = 5
-# How many pictures are drawn from what one step made.
-TARGETS = 3
-# How a scene is looked at: from so many sides, in pictures of this size.
-ORBIT, ORBIT_SIZE = 96, 256
+RATE, LAST_RATE = 1e-3, 0.02
+# Shares of the training: rates rise; depths and opacities are learned before anything is drawn.
+WARM_UP, BEFORE_DRAWING = 0.02, 0.12
+# What depths and opacities count beside the pictures, at the beginning and at the end.
+DEPTH_WEIGHT, COVERAGE_WEIGHT = (2.0, 0.2), (0.5, 0.02)
+# A pixel has a depth where this much of it is covered.
+SOLID = 0.6
+# Pictures drawn of every shot besides the given ones; shots that are kept for measuring, of each scene.
+TARGETS, HELD_OUT = 3, 12
 
 
 @dataclass
@@ -55,6 +58,30 @@ class Shape:
     depths: int = 32
 
 
+@dataclass
+class Made:
+    """What the network makes of V pictures: Gaussians in the first camera's frame (V*H*W); opacities before the sigmoid
+    and inverse depths of the pixels (V,1,H,W); those before refinement (V,1,h,w)."""
+
+    splats: Splats
+    logits: Tensor
+    inverse: Tensor
+    coarse_inverse: Tensor
+
+
+def layers(*channels: int, kernels: Sequence[int] = ()) -> nn.ModuleList:
+    """Convolutions from each number of channels to the next, 3 by 3 unless `kernels` says otherwise, begun so that the
+    size of what goes through stays the same."""
+    stack = nn.ModuleList()
+    for index, (i, o) in enumerate(pairwise(channels)):
+        kernel = kernels[index] if index < len(kernels) else 3
+        layer = nn.Conv2d(i, o, kernel, 1, kernel // 2)
+        nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
+        nn.init.zeros_(layer.bias)
+        stack.append(layer)
+    return stack
+
+
 class Generator(nn.Module):
     """The network of gaussian_exporter.families.feed_forward, with the same names."""
 
@@ -63,21 +90,22 @@ class Generator(nn.Module):
         super().__init__()
         self.shape = shape
         sweep = coarse + (shape.depths if shape.views == 2 else 0)
-        sizes = [(3, fine), (fine, coarse), (coarse, coarse), (coarse, coarse)]
-        strides = (1, 2, 2, 1)
-        self.encoder = nn.ModuleList(nn.Conv2d(i, o, 3, s, 1) for (i, o), s in zip(sizes, strides, strict=True))
-        self.depth = nn.ModuleList([nn.Conv2d(sweep, coarse, 3, 1, 1), nn.Conv2d(coarse, shape.depths, 3, 1, 1)])
-        sizes = [(coarse + fine + 4, fine), (fine, fine), (fine, sum(HEAD))]
-        self.head = nn.ModuleList(nn.Conv2d(i, o, 3, 1, 1) for i, o in sizes)
-        # To begin with nearly opaque and a pixel wide: what starts out transparent learns to stay so.
+        self.encoder = layers(3, fine, coarse, coarse, coarse, coarse)
+        for layer in self.encoder[1:3]:
+            layer.stride = (2, 2)
+        self.depth = layers(sweep, coarse, coarse, coarse, coarse, shape.depths)
+        self.head = layers(coarse + fine + 4, fine, fine, sum(HEAD), kernels=(1,))
         with torch.no_grad():
+            # What a plane sweep says stands at first, and every Gaussian begins like every other.
+            self.depth[-1].weight.mul_(0.1)
+            self.head[-1].weight.mul_(0.1)
             self.head[-1].bias[1] = OPAQUE
             self.head[-1].bias[2:5] = SLIM
         self.register_buffer("candidates", torch.linspace(1 / shape.near, 1 / shape.far, shape.depths))
 
-    def encode(self, image: Tensor) -> tuple[Tensor, Tensor]:
-        """Fine and coarse features of a picture (1,3,H,W)."""
-        x, fine = image * 2 - 1, None
+    def encode(self, images: Tensor) -> tuple[Tensor, Tensor]:
+        """Fine and coarse features of pictures (V,3,H,W)."""
+        x, fine = images * 2 - 1, None
         for layer in self.encoder:
             x = F.relu(layer(x))
             fine = x if fine is None else fine
@@ -94,7 +122,7 @@ class Generator(nn.Module):
         return torch.stack([x, y, torch.ones_like(x)], 1)
 
     def sweep(self, own: Tensor, other: Tensor, k: Tensor, pose: Tensor) -> Tensor:
-        """(1,D,h,w): how alike features are at each candidate depth. pose (4,4): own camera to the other."""
+        """(1,D,h,w): how alike features (1,C,h,w) are at each candidate depth. pose (4,4): own camera to the other."""
         channels, height, width = own.shape[1:]
         points = (self.rays(k, width, height) @ pose[:3, :3].T)[None] / self.candidates[:, None, None] + pose[:3, 3]
         z = points[..., 2].clamp(min=NEAREST)
@@ -104,44 +132,39 @@ class Generator(nn.Module):
         alike = (seen.reshape(channels, len(self.candidates), -1) * own.reshape(channels, 1, -1)).sum(0)
         return (alike / channels**0.5).reshape(1, -1, height, width)
 
-    def place(self, image: Tensor, encoded: tuple[Tensor, Tensor], cost: Tensor | None, k: Tensor) -> Splats:
-        """One picture's Gaussians in its own camera's frame."""
-        fine, coarse = encoded
+    def costs(self, coarse: Tensor, k: Tensor, pose: Tensor) -> Tensor:
+        """(2,D,h,w): the sweep of each picture against the other."""
+        centred = coarse - coarse.mean(1, keepdim=True)
+        even = centred / (centred.square().mean(1, keepdim=True) + EPSILON).sqrt()
+        poses = (pose, torch.linalg.inv(pose))
+        return torch.cat([self.sweep(even[i : i + 1], even[1 - i :][:1], k, poses[i]) for i in range(2)])
+
+    def forward(self, images: Tensor, k: Tensor, pose: Tensor | None) -> Made:
+        """images (V,3,H,W); pose (4,4): first camera to the second, None with one picture."""
+        fine, coarse = self.encode(images)
+        cost = None if pose is None else self.costs(coarse, k, pose)
         x = coarse if cost is None else torch.cat([cost, coarse], 1)
-        logits = self.depth[1](F.relu(self.depth[0](x))) + (0 if cost is None else cost)
+        for index, layer in enumerate(self.depth):
+            x = layer(F.relu(x) if index else x)
+        logits = x if cost is None else x + cost
         guess = torch.einsum("bdhw,d->bhw", logits.softmax(1), self.candidates)[:, None]
-
-        def enlarged(values: Tensor) -> Tensor:
-            return F.interpolate(values, scale_factor=REDUCTION, mode="bilinear", align_corners=False)
-
-        guess = enlarged(guess)
-        x = torch.cat([enlarged(coarse), fine, image, guess], 1)
+        large, small = (F.interpolate(v, scale_factor=REDUCTION, mode="bilinear") for v in (guess, coarse))
+        x = torch.cat([small, fine, images, large], 1)
         for index, layer in enumerate(self.head):
             x = layer(F.relu(x) if index else x)
-        nearer, opacity, size, turn, tint = x[0].flatten(1).T.split(HEAD, 1)
-        inverse = guess.flatten()[:, None] * torch.exp(REFINEMENT * torch.tanh(nearer))
-        depth = 1 / inverse.clamp(1 / self.shape.far, 1 / self.shape.near)
+        inverse = (large * torch.exp(REFINEMENT * torch.tanh(x[:, :1]))).clamp(1 / self.shape.far, 1 / self.shape.near)
+        placed = [self.place(images[i], x[i], inverse[i], k) for i in range(len(images))]
+        return Made(placed[0] if pose is None else joined(*placed, pose), x[:, 1:2], inverse, guess)
+
+    def place(self, image: Tensor, x: Tensor, inverse: Tensor, k: Tensor) -> Splats:
+        """One picture's Gaussians in its own camera's frame."""
+        _, opacity, size, turn, tint = x.flatten(1).T.split(HEAD, 1)
+        depth = 1 / inverse.flatten()[:, None]
         scales = (torch.sigmoid(size) * (LARGEST - SMALLEST) + SMALLEST) * depth / (k[0] * self.shape.width)
         upright = turn + torch.tensor([1.0, 0, 0, 0], device=turn.device)
-        colors = (image[0].flatten(1).T + 0.5 * torch.tanh(tint)).clamp(0, 1)
+        colors = (image.flatten(1).T + 0.5 * torch.tanh(tint)).clamp(0, 1)
         positions = self.rays(k, self.shape.width, self.shape.height) * depth
         return Splats(positions, covariances(scales, upright), colors, torch.sigmoid(opacity[:, 0]))
-
-    def forward(self, images: list[Tensor], k: Tensor, pose: Tensor | None) -> Splats:
-        """Gaussians of all pictures in the first camera's frame; pose (4,4): first camera to the second."""
-        encoded = [self.encode(image) for image in images]
-        if len(images) == 1 or pose is None:
-            return self.place(images[0], encoded[0], None, k)
-        back = torch.linalg.inv(pose)
-        costs = [self.sweep(encoded[i][1], encoded[1 - i][1], k, p) for i, p in enumerate((pose, back))]
-        first, second = (self.place(images[i], encoded[i], costs[i], k) for i in range(2))
-        turn = back[:3, :3]
-        return Splats(
-            torch.cat([first.positions, second.positions @ turn.T + back[:3, 3]]),
-            torch.cat([first.covariances, turn @ second.covariances @ turn.T]),
-            torch.cat([first.colors, second.colors]),
-            torch.cat([first.opacities, second.opacities]),
-        )
 
     def save(self, folder: Path) -> None:
         """config.json and model.pth."""
@@ -151,11 +174,16 @@ class Generator(nn.Module):
         torch.save(state, folder / "model.pth")
 
 
-def load_scene(path: Path) -> Views:
-    """Pictures as they are, or of a scene's file."""
-    if path.suffix != ".ply":
-        return load_views(path, device())
-    return drawn(scene_of(path, device()), ORBIT, ORBIT_SIZE, "orbit")
+def joined(first: Splats, second: Splats, pose: Tensor) -> Splats:
+    """Both pictures' Gaussians in the first one's frame."""
+    back = torch.linalg.inv(pose)
+    turn = back[:3, :3]
+    return Splats(
+        torch.cat([first.positions, second.positions @ turn.T + back[:3, 3]]),
+        torch.cat([first.covariances, turn @ second.covariances @ turn.T]),
+        torch.cat([first.colors, second.colors]),
+        torch.cat([first.opacities, second.opacities]),
+    )
 
 
 def shares(intrinsics: Tensor, width: int, height: int) -> Tensor:
@@ -164,154 +192,152 @@ def shares(intrinsics: Tensor, width: int, height: int) -> Tensor:
     return torch.stack([k[0, 0] / width, k[1, 1] / height, k[0, 2] / width, k[1, 2] / height])
 
 
-@dataclass
-class Attempt:
-    """Targets (T,4,H,W) as drawn and as they are; opacities (N) and how covered the pixel of each Gaussian is (N)."""
-
-    found: Tensor
-    wanted: Tensor
-    opacities: Tensor
-    coverage: Tensor
-
-    def loss(self) -> Tensor:
-        """Of the pictures, and of opacities that are not what their own pixel is: a sigmoid that has come to its end
-        passes no other gradient on."""
-        drawn = torch.stack([loss_of(*both) for both in zip(self.found, self.wanted, strict=True)]).mean()
-        opacities = self.opacities.clamp(1e-6, 1 - 1e-6)
-        return drawn + COVERAGE_WEIGHT * F.binary_cross_entropy(opacities, self.coverage)
+def make(model: Generator, shot: Shot) -> Made:
+    """Gaussians of a shot's given pictures."""
+    height, width = shot.pictures.shape[2:]
+    count = model.shape.views
+    pose = shot.camera(1).view if count == 2 else None
+    return model(shot.pictures[:count, :3], shares(shot.intrinsics, width, height), pose)
 
 
-FIELDS = ("pictures", "views", "intrinsics")
-Recolour = Callable[[Tensor], Tensor]
+def known_loss(model: Generator, made: Made, shot: Shot) -> tuple[Tensor, Tensor]:
+    """How far depths are from the scene's, and opacities from the coverage of their own pixel. Logits, not opacities: a
+    sigmoid that has come to its end passes nothing on."""
+    coverage = shot.pictures[: model.shape.views, 3:]
+    solid = (coverage > SOLID).float()
+    wanted = solid / shot.depths.clamp(min=NEAR)
+    span = 1 / model.shape.near - 1 / model.shape.far
+
+    def far_off(found: Tensor, true: Tensor, there: Tensor) -> Tensor:
+        return ((found - true).abs() * there).sum() / there.sum().clamp(min=1) / span
+
+    small = F.avg_pool2d(solid, REDUCTION)
+    whole = (small > 0.99).float()
+    coarse = far_off(made.coarse_inverse, F.avg_pool2d(wanted, REDUCTION), whole)
+    depth = coarse + far_off(made.inverse, wanted, solid)
+    return depth, F.binary_cross_entropy_with_logits(made.logits, coverage)
 
 
-def untouched(pictures: Tensor) -> Tensor:
-    """Pictures as they are."""
-    return pictures
-
-
-def attempt(
-    model: Generator, views: Views, given: list[int], targets: list[int], recolour: Recolour = untouched
-) -> Attempt:
-    """The targets as drawn from the given views, and as they are; both recoloured."""
-    _, _, height, width = views.pictures.shape
-    images = [recolour(views.pictures[i : i + 1])[:, :3] for i in given]
-    world = torch.linalg.inv(views.views[given[0]])
-    pose = views.views[given[1]] @ world if len(given) == 2 else None
-    splats = model(images, shares(views.intrinsics[given[0]], width, height), pose)
-    cameras = [Camera(views.views[t] @ world, views.intrinsics[t], width, height) for t in targets]
-    coverage = views.pictures[given, 3].flatten()
-    return Attempt(pictures(splats, cameras), recolour(views.pictures[targets]), splats.opacities, coverage)
-
-
-def neighbours(views: Views, target: int) -> list[int]:
-    """The nearest other views by the cameras' places, nearest first."""
-    eyes = torch.stack([views.camera(i).position for i in range(len(views.pictures))])
-    order = torch.argsort((eyes - eyes[target]).norm(dim=1)).tolist()
-    return [i for i in order if i != target][:NEIGHBOURS]
-
-
-def pair_around(views: Views, target: int, count: int) -> list[int]:
-    """The views that a target is measured from: the nearest, and the near one most nearly on its other side."""
-    near = neighbours(views, target)
-    eyes = torch.stack([views.camera(i).position for i in [target, *near]])
-    away = torch.nn.functional.normalize(eyes[1:] - eyes[0], dim=1)
-    opposite = int((away[1:] @ away[0]).argmin()) + 1
-    return [near[0], near[opposite]][:count]
-
-
-def depth_range(scenes: list[Views]) -> tuple[float, float]:
-    """Near and far: cameras look at something around the origin."""
-    distances = torch.cat(
-        [torch.stack([s.camera(i).position for i in range(len(s.pictures))]).norm(dim=1) for s in scenes]
-    )
-    return float(distances.min()) * 0.62, float(distances.max()) * 1.5
+def loss_of_shot(model: Generator, shot: Shot, progress: float) -> Tensor:
+    """Pictures, and what is known of the scene, which counts less as time goes."""
+    made = make(model, shot)
+    depth, coverage = known_loss(model, made, shot)
+    late = min(max((progress - BEFORE_DRAWING) / (1 - BEFORE_DRAWING), 0), 1)
+    weights = [first * (last / first) ** late for first, last in (DEPTH_WEIGHT, COVERAGE_WEIGHT)]
+    loss = weights[0] * depth + weights[1] * coverage
+    if progress < BEFORE_DRAWING:
+        return loss
+    # A given picture is drawn, too: in it every Gaussian is where it belongs, whatever its depth.
+    drawn = [0, *range(model.shape.views, len(shot.pictures))]
+    found = pictures(made.splats, [shot.camera(i) for i in drawn])
+    return loss + torch.stack([loss_of(f, shot.pictures[i]) for f, i in zip(found, drawn, strict=True)]).mean()
 
 
 def train(
-    scenes: list[Views], pace: Pace, views: int, number: int, jitter: bool = True, **sizes: int
-) -> tuple[Generator, float]:
-    """The network, and its PSNR on targets it never drew. `jitter`: turn channels about and change brightness, so that
-    few scenes stand for more."""
+    shots: Sequence[Shot], pace: Pace, number: int, at_once: int = 1, jitter: bool = True, **sizes: int
+) -> Generator:
+    """The network. `at_once`: shots to a step. `jitter`: turn channels about and change brightness, so that few scenes
+    stand for more."""
     rng = seed(number)
-    height, width = scenes[0].pictures.shape[2:]
+    height, width = shots[0].pictures.shape[2:]
     depths = {"depths": sizes.pop("depths")} if "depths" in sizes else {}
-    model = Generator(Shape(width, height, views, *depth_range(scenes), **depths), **sizes)
-    model = model.to(scenes[0].pictures.device)
-    optimizer = torch.optim.Adam(model.parameters(), lr=6e-4)
-    near = [[neighbours(scene, i) for i in range(len(scene.pictures))] for scene in scenes]
+    model = Generator(Shape(width, height, len(shots[0].depths), NEAR, FAR, **depths), **sizes)
+    model = model.to(shots[0].pictures.device)
+    optimizer = torch.optim.Adam(model.parameters(), lr=RATE)
     for step, progress in enumerate(pace):
-        which = int(rng.integers(len(scenes)))
-        scene = scenes[which]
-        trained, held = split(len(scene.pictures))
-        target = int(rng.choice(trained))
-        given = rng.permutation(near[which][target])[:views].tolist()
-        # A given view among the targets: Gaussians of its own pixels are right there at any depth, so colours and
-        # opacities are learned at once, and depths from the others.
-        others = [given[0], *[i for i in near[which][target] if i not in given and i not in held]]
-        recolour = random_tint(rng) if jitter else untouched
-        loss = attempt(model, scene, given, [target, *others][:TARGETS], recolour).loss()
+        chosen = [shots[int(i)].unpacked() for i in rng.integers(len(shots), size=at_once)]
+        chosen = [tinted(shot, rng) for shot in chosen] if jitter else chosen
         optimizer.zero_grad(set_to_none=True)
-        decayed([optimizer], progress, 0.03)
-        optimizer.param_groups[0]["lr"] *= min(1.0, (progress + 1e-3) / WARM_UP)
-        loss.backward()
+        optimizer.param_groups[0]["lr"] = rate_at(progress)
+        total = 0.0
+        for shot in chosen:
+            loss = loss_of_shot(model, shot, progress) / at_once
+            loss.backward()
+            total += loss.detach()
         nn.utils.clip_grad_norm_(model.parameters(), 1.0)
         optimizer.step()
-        if step % 1000 == 0:
-            print(f"step {step}, {progress:.0%}: loss {loss.item():.4f}", flush=True)
-    return model, float(np.mean([held_out(model, scene) for scene in scenes]))
+        if step % 250 == 0:
+            print(f"step {step}, {progress:.0%}: loss {float(total):.4f}", flush=True)
+    return model
 
 
-def random_tint(rng: np.random.Generator) -> Recolour:
+def rate_at(progress: float) -> float:
+    """Adam's rate: up, and down along a cosine."""
+    wave = 0.5 + 0.5 * math.cos(math.pi * progress)
+    return RATE * min(1.0, (progress + 1e-3) / WARM_UP) * (LAST_RATE + (1 - LAST_RATE) * wave)
+
+
+def tinted(shot: Shot, rng: np.random.Generator) -> Shot:
     """Channels in another order, each a little brighter or darker."""
-    order, gain = [*rng.permutation(3).tolist(), 3], [*rng.uniform(0.7, 1.2, 3).tolist(), 1.0]
-
-    def recolour(pictures: Tensor) -> Tensor:
-        gains = torch.tensor(gain, device=pictures.device)
-        return (pictures[:, order] * gains[:, None, None]).clamp(max=1)
-
-    return recolour
+    order = [*rng.permutation(3).tolist(), 3]
+    gains = torch.tensor([*rng.uniform(0.7, 1.2, 3), 1.0], dtype=torch.float32, device=shot.pictures.device)
+    recoloured = (shot.pictures[:, order] * gains[:, None, None]).clamp(max=1)
+    return Shot(recoloured, shot.depths, shot.views, shot.intrinsics)
 
 
 @torch.no_grad()
-def held_out(model: Generator, scene: Views) -> float:
-    """Mean PSNR of held-out targets, on black."""
-    scores = []
-    for target in split(len(scene.pictures))[1]:
-        tried = attempt(model, scene, pair_around(scene, target, model.shape.views), [target])
-        scores.append(psnr(tried.found[0, :3], tried.wanted[0, :3]))
-    return float(np.mean(scores))
+def measure(model: Generator, shots: Sequence[Shot]) -> dict[str, float]:
+    """Means over the middle views of shots. PSNR on black: of what is drawn, inside the outline, and of the nearest
+    given picture as it is, which is what a page without a generator could show; depth: the mean relative error."""
+    rows = []
+    for each in shots:
+        shot, middle = each.unpacked(), model.shape.views
+        made = make(model, shot)
+        found, wanted = pictures(made.splats, [shot.camera(middle)])[0, :3], shot.pictures[middle, :3]
+        inside = shot.pictures[middle, 3] > SOLID
+        solid = shot.pictures[:middle, 3:] > SOLID
+        off = (1 / made.inverse - shot.depths).abs() / shot.depths.clamp(min=NEAR)
+        rows.append(
+            {
+                "psnr": psnr(found, wanted),
+                "outline_psnr": psnr(found[:, inside], wanted[:, inside]),
+                "given_picture_psnr": psnr(shot.pictures[0, :3], wanted),
+                "depth_error": float(off[solid].mean()),
+                "opacity": float(torch.sigmoid(made.logits)[solid].mean()),
+            }
+        )
+    return {key: round(float(np.mean([row[key] for row in rows])), 4) for key in rows[0]}
 
 
 @torch.no_grad()
-def show(path: Path, model: Generator, scenes: list[Views]) -> None:
-    """A held-out target of each scene, and, with its pictures and cameras, the two views that it was drawn from."""
-    target = HELD_OUT_EVERY // 2
-    tried = [attempt(model, s, pair_around(s, target, model.shape.views), [target]) for s in scenes]
-    sheet(path.with_suffix(".png"), [t.wanted[0] for t in tried], [t.found[0] for t in tried])
-    rows = [[*pair_around(s, target, model.shape.views), target] for s in scenes]
-    picked = [torch.cat([getattr(s, name)[r] for s, r in zip(scenes, rows, strict=True)]) for name in FIELDS]
-    Views(*picked, {}).save(path.with_suffix(".npz"))
+def show(path: Path, model: Generator, shots: Sequence[Shot]) -> None:
+    """Middle views as they are and as they are drawn; with cameras, given pictures first, for example_view.py."""
+    full = [shot.unpacked() for shot in shots]
+    middle = model.shape.views
+    drawn = [pictures(make(model, shot).splats, [shot.camera(middle)])[0] for shot in full]
+    sheet(path.with_suffix(".png"), [shot.pictures[middle] for shot in full], drawn)
+    rows = [(shot.pictures[i], shot.camera(i).view, shot.intrinsics) for shot in full for i in range(middle + 1)]
+    Views(*(torch.stack(column) for column in zip(*rows, strict=True)), {}).save(path.with_suffix(".npz"))
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
-    parser.add_argument("views", type=Path, nargs="+")
+    parser.add_argument("scenes", type=Path, nargs="+")
     parser.add_argument("--unseen", type=Path, help="a scene to measure on, and not to train on")
-    parser.add_argument("--count", type=int, default=2, choices=(1, 2))
+    parser.add_argument("--count", type=int, default=2, choices=(1, 2), help="pictures that go in")
+    parser.add_argument("--size", type=int, default=256, help="pixels of their sides, a multiple of 4")
+    parser.add_argument("--shots", type=int, default=3000, help="how many are drawn to learn from")
+    parser.add_argument("--at-once", type=int, default=4, help="shots to a step")
     add_pace(parser, 20_000)
     given = parser.parse_args(argv)
     record, pace = Record(given), Pace(given.steps, given.seconds)
-    scenes = [load_scene(path) for path in given.views]
-    print(f"{sum(len(scene.pictures) for scene in scenes)} pictures", flush=True)
-    model, score = train(scenes, pace, given.count, given.seed)
+    rng = np.random.default_rng(given.seed)
+
+    def drawn(paths: Sequence[Path], count: int, targets: int) -> list[Shot]:
+        scenes = [scene_of(path, device()) for path in paths]
+        return draw_shots(scenes, count, given.size, given.count, targets, rng)
+
+    held = drawn(given.scenes, HELD_OUT * len(given.scenes), 1)
+    unseen = drawn([given.unseen], HELD_OUT, 1) if given.unseen else []
+    shots = drawn(given.scenes, given.shots, TARGETS)
+    print(f"{len(shots)} shots of {len(shots[0].pictures)} pictures", flush=True)
+    model = train(shots, pace, given.seed, given.at_once)
     model.save(given.out)
-    unseen = [load_scene(given.unseen)] if given.unseen else []
-    unknown = [round(held_out(model, scene), 3) for scene in unseen]
-    record.write(held_out_psnr=score, unseen_scene_psnr=unknown, steps=pace.done, shape=vars(model.shape))
-    show(given.out / "held-out", model, [*scenes, *unseen])
+    known, unknown = measure(model, held), measure(model, unseen) if unseen else {}
+    record.write(held_out_psnr=known["psnr"], held_out=known, unseen=unknown, steps=pace.done, shape=vars(model.shape))
+    show(given.out / "held-out", model, [*held[: len(given.scenes)], *unseen[:3]])
 
 
 if __name__ == "__main__":

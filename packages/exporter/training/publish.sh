@@ -22,6 +22,11 @@ one walker avatar avatar "$out/avatar/avatar.npz" "$to/walker/model.onnx" --weig
   --metres-per-unit 1 --license CC0-1.0 --attribution 'Body and rig of MakeHuman, CC0'
 one oil oil image-filter "$out/oil" "$to/oil/model.onnx" --name 'Oil painting' \
   --license CC-BY-4.0 --attribution 'Trained on photographs by alansartlog, CC BY 4.0, and renders of a plant (MIT)'
+one statue feed-forward feed-forward "$out/feed-forward" "$to/statue/model.onnx" --weights compact --name 'Two pictures, feed-forward' \
+  --license CC-BY-4.0 --attribution 'Trained on views of scenes by alansartlog (CC BY 4.0), Stephane Agullo (CC BY 4.0), PlayCanvas (MIT) and schwa (MIT)'
+one denoise denoise image-filter "$out/denoise" "$to/denoise/model.onnx" --name 'Denoiser' \
+  --license CC-BY-4.0 --attribution 'Trained on views of scenes by alansartlog (CC BY 4.0), Stephane Agullo (CC BY 4.0) and schwa (MIT)'
+python3 "$here/example_view.py" "$out/feed-forward/held-out.npz" 17 "$to/statue" --given 2
 python3 "$here/example_view.py" "$out/scaffold/held-out.npz" 2 "$to/skull"
 python3 "$here/example_view.py" "$out/hexplane/held-out.npz" 1 "$to/plant"
 python3 "$here/example_view.py" "$out/avatar/held-out.npz" 3 "$to/walker"

@@ -1,4 +1,4 @@
-"""Pictures of Gaussians that can be differentiated: gsplat where there is a CUDA device, a plain sum elsewhere."""
+"""Pictures of Gaussians that can be differentiated: gsplat where there is a CUDA device, a list of pairs elsewhere."""
 
 from __future__ import annotations
 
@@ -62,12 +62,29 @@ def picture(splats: Splats, camera: Camera) -> Tensor:
 def pictures(splats: Splats, cameras: Sequence[Camera]) -> Tensor:
     """The same Gaussians for cameras of one size (C,4,H,W)."""
     if splats.positions.is_cuda:
-        return with_gsplat(splats, cameras)
-    return torch.stack([summed(splats, camera) for camera in cameras])
+        return with_gsplat(splats, cameras, "RGB")
+    return torch.stack([listed(splats, camera, splats.colors) for camera in cameras])
 
 
-def with_gsplat(splats: Splats, cameras: Sequence[Camera]) -> Tensor:
-    """By gsplat's CUDA rasterizer."""
+def pictures_with_depth(splats: Splats, cameras: Sequence[Camera]) -> tuple[Tensor, Tensor]:
+    """As `pictures`, and the depth of each pixel (C,1,H,W): the mean z in the camera's frame of what is seen there,
+    world units; 0 where nothing is."""
+    if splats.positions.is_cuda:
+        both = with_gsplat(splats, cameras, "RGB+D")
+    else:
+        both = torch.stack([listed(splats, camera, with_z(splats, camera)) for camera in cameras])
+    colour, depth, alpha = both.split((3, 1, 1), 1)
+    return torch.cat([colour, alpha], 1), depth / alpha.clamp(min=LEAST_ALPHA)
+
+
+def with_z(splats: Splats, camera: Camera) -> Tensor:
+    """Colours and the depth from a camera (N,4)."""
+    z = splats.positions @ camera.view[2, :3] + camera.view[2, 3]
+    return torch.cat([splats.colors, z[:, None]], 1)
+
+
+def with_gsplat(splats: Splats, cameras: Sequence[Camera], mode: str) -> Tensor:
+    """By gsplat's CUDA rasterizer; alpha is the last channel."""
     from gsplat import rasterization
 
     colour, alpha, _ = rasterization(
@@ -83,31 +100,78 @@ def with_gsplat(splats: Splats, cameras: Sequence[Camera]) -> Tensor:
         height=cameras[0].height,
         near_plane=NEAR,
         packed=False,
+        render_mode=mode,
     )
     return torch.cat([colour, alpha], -1).permute(0, 3, 1, 2)
 
 
-def summed(splats: Splats, camera: Camera) -> Tensor:
-    """Every Gaussian at every pixel: for a few hundred of them and pictures of a few thousand pixels."""
+@dataclass
+class Ellipses:
+    """Gaussians on the picture, near to far: centres (N,2) in pixels, covariances (N,3) xx, xy, yy, opacities (N), and
+    numbers of the Gaussians that they are of (N)."""
+
+    centres: Tensor
+    covariances: Tensor
+    opacities: Tensor
+    numbers: Tensor
+
+
+def projected(splats: Splats, camera: Camera) -> Ellipses:
+    """What is in front of the camera and not transparent."""
     turn, shift = camera.view[:3, :3], camera.view[:3, 3]
     at = splats.positions @ turn.T + shift
-    order = torch.argsort(at[:, 2].detach())
-    order = order[at[order, 2] > NEAR]
+    order = torch.argsort(at[:, 2].detach(), stable=True)
+    order = order[(at[order, 2] > NEAR) & (splats.opacities[order] > LEAST_ALPHA)]
     x, y, z = at[order].unbind(1)
     fx, fy = camera.intrinsics[0, 0], camera.intrinsics[1, 1]
     zero = torch.zeros_like(z)
     jacobian = torch.stack([fx / z, zero, -fx * x / z**2, zero, fy / z, -fy * y / z**2], 1).reshape(-1, 2, 3) @ turn
-    flat = jacobian @ splats.covariances[order] @ jacobian.transpose(1, 2) + DILATION * torch.eye(2)
-    inverse = torch.linalg.inv(flat)
-    centre = torch.stack([fx * x / z + camera.intrinsics[0, 2], fy * y / z + camera.intrinsics[1, 2]], 1)
-    rows, columns = torch.arange(camera.height) + 0.5, torch.arange(camera.width) + 0.5
-    pixels = torch.stack(torch.meshgrid(columns, rows, indexing="xy"), -1).reshape(-1, 2)
-    offset = pixels[None] - centre[:, None]
-    falloff = torch.exp(-0.5 * torch.einsum("npa,nab,npb->np", offset, inverse, offset))
-    alpha = (splats.opacities[order, None] * falloff).clamp(max=MOST_ALPHA)
-    alpha = torch.where(alpha < LEAST_ALPHA, torch.zeros_like(alpha), alpha)
-    through = torch.cumprod(torch.cat([torch.ones_like(alpha[:1]), 1 - alpha]), 0)
-    weights = alpha * through[:-1]
-    colour = weights.T @ splats.colors[order]
-    full = torch.cat([colour, 1 - through[-1:].T], 1)
-    return full.T.reshape(4, camera.height, camera.width)
+    flat = jacobian @ splats.covariances[order] @ jacobian.transpose(1, 2)
+    entries = torch.stack([flat[:, 0, 0] + DILATION, flat[:, 0, 1], flat[:, 1, 1] + DILATION], 1)
+    centres = torch.stack([fx * x / z + camera.intrinsics[0, 2], fy * y / z + camera.intrinsics[1, 2]], 1)
+    return Ellipses(centres, entries, splats.opacities[order], order)
+
+
+@torch.no_grad()
+def touched(ellipses: Ellipses, width: int, height: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Which ellipse may reach which pixel: numbers of ellipses, columns and rows of pixels, a pair to an entry."""
+    reach = (2 * torch.log(ellipses.opacities / LEAST_ALPHA)).sqrt()[:, None] * ellipses.covariances[:, ::2].sqrt()
+    most = torch.tensor([width, height])
+    low = (ellipses.centres - reach - 0.5).ceil().long().clamp(min=0)
+    size = ((ellipses.centres + reach - 0.5).floor().long() + 1).minimum(most).sub(low).clamp(min=0)
+    counts = size[:, 0] * size[:, 1]
+    which = torch.repeat_interleave(counts)
+    at = torch.arange(len(which)) - (counts.cumsum(0) - counts)[which]
+    wide = size[which, 0]
+    return which, low[which, 0] + at % wide, low[which, 1] + at // wide
+
+
+def listed(splats: Splats, camera: Camera, values: Tensor) -> Tensor:
+    """Values (N,K) of the Gaussians, blended, and alpha (K+1,H,W): all pairs of Gaussian and pixel in one list."""
+    ellipses = projected(splats, camera)
+    which, column, row = touched(ellipses, camera.width, camera.height)
+    dx, dy = (torch.stack([column, row], 1) + 0.5 - ellipses.centres[which]).unbind(1)
+    xx, xy, yy = ellipses.covariances[which].unbind(1)
+    falloff = torch.exp(-0.5 * (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
+    alpha = (ellipses.opacities[which] * falloff).clamp(max=MOST_ALPHA)
+    pixel = row * camera.width + column
+    kept = torch.nonzero(alpha.detach() >= LEAST_ALPHA)[:, 0]
+    # Stable, so that each pixel's entries stay in the order of depth.
+    kept = kept[torch.argsort(pixel[kept], stable=True)]
+    alpha, pixel = alpha[kept], pixel[kept]
+    weights = alpha * transmittance(alpha, pixel)
+    full = torch.cat([values[ellipses.numbers[which[kept]]], torch.ones_like(alpha[:, None])], 1)
+    count = camera.width * camera.height
+    blended = torch.zeros(count, full.shape[1]).index_add(0, pixel, weights[:, None] * full)
+    return blended.T.reshape(-1, camera.height, camera.width)
+
+
+def transmittance(alpha: Tensor, pixel: Tensor) -> Tensor:
+    """What is left of the light before each entry, of entries that lie pixel by pixel, near to far."""
+    # In double: one sum runs through all pixels.
+    logs = torch.log1p(-alpha.double())
+    before = logs.cumsum(0) - logs
+    first = torch.ones_like(pixel, dtype=torch.bool)
+    first[1:] = pixel[1:] != pixel[:-1]
+    start = before[first][first.cumsum(0) - 1]
+    return (before - start).exp().float()

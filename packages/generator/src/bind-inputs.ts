@@ -16,7 +16,7 @@ import type { GeneratorState } from './state.js';
  * The values of a generator's inputs, in the conventions that its contract declares. Inputs with the roles `gaussians` and
  * `image` are left out: their tensors come from another generator or from a picture.
  *
- * @param header of a file that keeps the contract (`checkContract` found nothing).
+ * @param header of a file that keeps the contract (`checkContract` found nothing); of a model of several instances that of one (`oneInstance`).
  * @throws GaussianSplatError `argument/value` if the state lacks a camera, or a value has the wrong length or is not finite.
  */
 export function bindInputs(

@@ -1,7 +1,9 @@
 import { ContractError, type GaussianLayout } from '@gaussian-splat/core';
+import { batchOf, type Seat } from './batch/batch.js';
 import { Chain } from './chain/chain.js';
 import { sameInputs, type Inputs } from './input-value.js';
 import { RunLoop } from './run-loop.js';
+import type { GeneratorSession } from './runtime/generator-session.js';
 import type { RunOutputs, SessionKind } from './runtime/live-session.js';
 import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
 import type { AcquireOptions } from './runtime/shared-sessions.js';
@@ -9,7 +11,12 @@ import type { GeneratorState } from './state.js';
 
 /** Takes what runs write: `DynamicGaussians` of the renderer is one. It must submit its work before it returns. */
 export interface GaussianSink {
-  ingest(tensors: RunOutputs['tensors'], rows: number): void;
+  /**
+   * @param rows of one instance.
+   * @param instance which instance of a run of several is this one's, 0 and up: its rows begin in each tensor at `instance * rows`, and its live
+   * count is element `instance` of that tensor.
+   */
+  ingest(tensors: RunOutputs['tensors'], rows: number, instance: number): void;
 }
 
 /** A run whose Gaussians have reached the sink. */
@@ -34,8 +41,15 @@ interface Wish {
   readonly inputs: readonly Inputs[];
 }
 
+/** The wish of an instance among others of its model. */
+interface InstanceWish {
+  readonly state: GeneratorState;
+  readonly inputs: Inputs;
+}
+
 /**
- * One instance of a generator: runs it for the latest state asked for, as fast as runs finish and never faster.
+ * One instance of a generator: runs it for the latest state asked for, as fast as runs finish and never faster. Instances of a model whose
+ * contract declares them run together.
  *
  * ```ts
  * const generator = await Generator.open({ url: 'walker.onnx' }, device, { onFrame: requestDraw });
@@ -48,19 +62,15 @@ export class Generator {
   sink: GaussianSink | undefined;
   readonly #chain: Chain;
   readonly #options: GeneratorOptions;
-  readonly #loop: RunLoop<Wish>;
+  readonly #runner: RunLoop<Wish> | Seat<InstanceWish>;
   #shown: Wish['inputs'] | undefined;
   #runs = 0;
 
   private constructor(chain: Chain, options: GeneratorOptions) {
     this.#chain = chain;
     this.#options = options;
-    this.#loop = new RunLoop({
-      queue: chain.device.queue,
-      isDue: ({ inputs }) => this.sink !== undefined && !this.#shows(inputs),
-      run: (wish) => this.#run(wish),
-      onError: (error) => this.#options.onError?.(error),
-    });
+    const { ofInstances } = chain;
+    this.#runner = ofInstances ? this.#seatOf(ofInstances) : this.#ownLoop();
   }
 
   /**
@@ -96,7 +106,7 @@ export class Generator {
 
   /** How it runs, by the slowest of its models; undefined before the first run. */
   get kind(): SessionKind | undefined {
-    return this.#chain.kind;
+    return this.#runner instanceof RunLoop ? this.#chain.kind : this.#runner.kind;
   }
 
   /** Runs that have reached the sink. */
@@ -106,7 +116,7 @@ export class Generator {
 
   /** Fulfils, and never rejects, when no run is on its way. */
   get idle(): Promise<void> {
-    return this.#loop.idle;
+    return this.#runner.idle;
   }
 
   /**
@@ -115,28 +125,56 @@ export class Generator {
    * @throws GaussianSplatError `argument/value` if the state does not fit the contract.
    */
   request(state: GeneratorState): void {
-    if (!this.#loop.isClosed) this.#loop.request({ state, inputs: this.#chain.bind(state) });
+    if (this.#runner.isClosed) return;
+    const inputs = this.#chain.bind(state);
+    if (this.#runner instanceof RunLoop) this.#runner.request({ state, inputs });
+    else this.#runner.request({ state, inputs: inputs[0] });
   }
 
   /** Ends it: a run on its way reaches nobody any more. */
   close(): void {
-    this.#loop.close();
-    this.#chain.release(this.#loop.idle);
+    this.#runner.close();
+    this.#chain.release(this.#runner.idle);
   }
 
-  #shows(inputs: Wish['inputs']): boolean {
-    return this.#shown?.every((shown, i) => sameInputs(shown, inputs[i])) ?? false;
+  #ownLoop(): RunLoop<Wish> {
+    return new RunLoop<Wish>({
+      queue: this.#chain.device.queue,
+      isDue: ({ inputs }) => this.#isDue(inputs),
+      run: (wish) => this.#run(wish),
+      onError: (error) => this.#options.onError?.(error),
+    });
+  }
+
+  #seatOf(session: GeneratorSession): Seat<InstanceWish> {
+    return batchOf(session).join<InstanceWish>({
+      isDue: ({ inputs }) => this.#isDue([inputs]),
+      take: ({ inputs }, outputs, instance) => this.#take([inputs], outputs, instance),
+      onTaken: ({ state }, start) => this.#announce(state, start),
+      onError: (error) => this.#options.onError?.(error),
+    });
+  }
+
+  #isDue(inputs: Wish['inputs']): boolean {
+    const isShown = this.#shown?.every((shown, i) => sameInputs(shown, inputs[i])) ?? false;
+    return this.sink !== undefined && !isShown;
+  }
+
+  #take(inputs: Wish['inputs'], { tensors, rows }: RunOutputs, instance: number): void {
+    if (this.#runner.isClosed) return;
+    this.sink?.ingest(tensors, rows, instance);
+    this.#shown = inputs;
+    this.#runs++;
   }
 
   async #run({ state, inputs }: Wish): Promise<void> {
     const start = performance.now();
-    await this.#chain.run(inputs, ({ tensors, rows }) => {
-      if (this.#loop.isClosed) return;
-      this.sink?.ingest(tensors, rows);
-      this.#shown = inputs;
-      this.#runs++;
-    });
-    if (!this.#loop.isClosed) this.#options.onFrame?.({ state, milliseconds: performance.now() - start });
+    await this.#chain.run(inputs, (outputs) => this.#take(inputs, outputs, 0));
+    this.#announce(state, start);
+  }
+
+  #announce(state: GeneratorState, start: number): void {
+    if (!this.#runner.isClosed) this.#options.onFrame?.({ state, milliseconds: performance.now() - start });
   }
 }
 

@@ -1,5 +1,6 @@
 export { bindInputs } from './bind-inputs.js';
 export { inOrder, projectionMatrix, viewMatrix, viewProjectionMatrix } from './camera-matrices.js';
+export { groupInstances, inputsOfInstances, stackInputs } from './batch/stack-inputs.js';
 export {
   Generator,
   type GaussianModelFile,

@@ -67,6 +67,8 @@ export class DynamicGaussians implements GaussianScene {
   readonly #bindings = new Map<string, readonly GPUBindGroup[]>();
   #version = 0;
   #rows = -1;
+  /** Rows of other scenes before this one's that the places in the uniforms stand for. */
+  #before = 0;
 
   private constructor(device: GPUDevice, layout: GaussianLayout, { antialiased = false }: DynamicGaussiansOptions) {
     this.#device = device;
@@ -121,19 +123,23 @@ export class DynamicGaussians implements GaussianScene {
    * @param tensors storage buffers by the names of the layout's tensors; that of the count needs COPY_SRC. Sizes of float16 tensors
    * are rounded up to 4 bytes.
    * @param rows number of rows that this run wrote, 0 to the layout's capacity. With 0 no tensor is needed.
+   * @param instance of a run that wrote several scenes of `rows` rows one after the other in each tensor, which is this one; default the first.
+   * A live count is then element `instance` of its tensor.
    * @throws GaussianSplatError `contract/rows` if there are more rows than capacity; `argument/value` for a tensor that is missing or
    * too small. What was shown before stays.
    */
-  ingest(tensors: Readonly<Record<string, GPUBuffer>>, rows: number): void {
+  ingest(tensors: Readonly<Record<string, GPUBuffer>>, rows: number, instance = 0): void {
     requireRows(rows, this.count);
     const counter = rows > 0 && this.layout.count !== undefined ? tensors[this.layout.count] : undefined;
-    this.#places.check(tensors, rows);
-    const bindings = this.#bindingsOf(rows > 0 ? tensors : {});
+    this.#places.check(tensors, rows, instance);
+    const before = instance * rows;
+    const bindings = this.#bindingsOf(rows > 0 ? tensors : {}, before);
     this.#writeRows(rows);
+    this.#writePlaces(before);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.ingest' });
     if (counter) {
       const { offset } = layouts.Ingest.fields.count;
-      for (const { uniform } of this.pages) encoder.copyBufferToBuffer(counter, 0, uniform, offset, 4);
+      for (const { uniform } of this.pages) encoder.copyBufferToBuffer(counter, 4 * instance, uniform, offset, 4);
     }
     const pass = encoder.beginComputePass({ label: 'gs.ingest' });
     this.pages.forEach(({ count }, page) => this.#stage.record(pass, bindings[page], count));
@@ -173,7 +179,7 @@ export class DynamicGaussians implements GaussianScene {
         uniform: this.#memory.buffer('gs.ingest.uniform', layouts.Ingest.size, uniform | copyDestination),
       };
       const bytes = new ArrayBuffer(layouts.Ingest.size);
-      writeStruct(layouts.Ingest, ingestValues(this.layout, first, count), bytes);
+      writeStruct(layouts.Ingest, ingestValues(this.layout, first, count, 0), bytes);
       this.#device.queue.writeBuffer(page.uniform, 0, bytes);
       pages.push(page);
     }
@@ -190,14 +196,26 @@ export class DynamicGaussians implements GaussianScene {
     for (const { uniform } of this.pages) this.#device.queue.writeBuffer(uniform, count.offset, words);
   }
 
-  #bindingsOf(tensors: Readonly<Record<string, GPUBuffer>>): readonly GPUBindGroup[] {
-    const key = this.#places.keyOf(tensors);
+  /** Bindings begin where the device lets them; the places in a uniform lead from there to the rows. */
+  #writePlaces(before: number): void {
+    if (before === this.#before) return;
+    this.#before = before;
+    const bytes = new ArrayBuffer(layouts.Ingest.size);
+    const { offset } = layouts.Ingest.fields.positions;
+    for (const { uniform, first, count } of this.pages) {
+      writeStruct(layouts.Ingest, ingestValues(this.layout, first, count, before), bytes);
+      this.#device.queue.writeBuffer(uniform, offset, bytes, offset);
+    }
+  }
+
+  #bindingsOf(tensors: Readonly<Record<string, GPUBuffer>>, before: number): readonly GPUBindGroup[] {
+    const key = `${before} ${this.#places.keyOf(tensors)}`;
     let bindings = this.#bindings.get(key);
     if (bindings === undefined) {
       if (this.#bindings.size >= MAX_BINDINGS) this.#bindings.clear();
       bindings = this.pages.map((page) =>
         this.#stage.bind({
-          ...this.#places.resources(tensors, page),
+          ...this.#places.resources(tensors, page, before),
           ingest: page.uniform,
           gaussians: page.geometry,
           sh: page.sh,

@@ -50,13 +50,15 @@ export class TensorPlaces {
   }
 
   /** @throws GaussianSplatError `argument/value` unless every tensor is there and large enough. */
-  check(tensors: Readonly<Record<string, GPUBuffer>>, rows: number): void {
+  check(tensors: Readonly<Record<string, GPUBuffer>>, rows: number, instance: number): void {
     if (rows === 0) return;
+    const all = (instance + 1) * rows;
     for (const { tensor, rowStride } of this.#layout.attributes) {
-      const least = Math.ceil((rows * rowStride * this.#elementBytes) / 4) * 4;
+      const least = Math.ceil((all * rowStride * this.#elementBytes) / 4) * 4;
       requireBytes(tensor, tensors[tensor], least);
     }
-    if (this.#layout.count !== undefined) requireBytes(this.#layout.count, tensors[this.#layout.count], 4);
+    if (this.#layout.count !== undefined)
+      requireBytes(this.#layout.count, tensors[this.#layout.count], 4 * (instance + 1));
   }
 
   /** The same text for the same buffers. */
@@ -70,18 +72,26 @@ export class TensorPlaces {
     return key;
   }
 
-  /** What the bindings of a page take. Where a run wrote fewer rows than come before the page there is nothing. */
-  resources(tensors: Readonly<Record<string, GPUBuffer>>, { first, count }: RowRange): Record<Binding, Resource> {
+  /**
+   * What the bindings of a page take. Where a run wrote fewer rows than come before the page there is nothing.
+   * @param before rows of other scenes in the same tensors, before the first of this one.
+   */
+  resources(
+    tensors: Readonly<Record<string, GPUBuffer>>,
+    { first, count }: RowRange,
+    before: number,
+  ): Record<Binding, Resource> {
     const resourceOf = (name: Binding): Resource => {
       const slice = this.#slices[name];
       const buffer = slice && tensors[slice.tensor];
       if (slice === undefined || buffer === undefined) return this.#nothing;
       const rowBytes = slice.rowStride * this.#elementBytes;
+      const { offset, skipped } = placeOf((before + first) * rowBytes);
       const size = Math.min(
-        Math.ceil((count * rowBytes) / 4) * 4,
-        Math.floor((buffer.size - first * rowBytes) / 4) * 4,
+        Math.ceil((skipped + count * rowBytes) / 4) * 4,
+        Math.floor((buffer.size - offset) / 4) * 4,
       );
-      return size <= 0 ? this.#nothing : { buffer, offset: first * rowBytes, size };
+      return size <= skipped ? this.#nothing : { buffer, offset, size };
     };
     return {
       positions: resourceOf('positions'),
@@ -99,14 +109,28 @@ export class TensorPlaces {
   }
 }
 
-/** `Ingest` of a page, before any run. */
+/** Bindings begin at multiples of this many bytes: the largest that a device may ask for. */
+const ALIGNMENT = 256;
+
+/** Where a binding begins so that a byte is in it, and how many bytes of it come before that one. */
+function placeOf(byte: number): { readonly offset: number; readonly skipped: number } {
+  const offset = Math.floor(byte / ALIGNMENT) * ALIGNMENT;
+  return { offset, skipped: byte - offset };
+}
+
+/** `Ingest` of a page, before any run. @param before rows of other scenes before the first of this one */
 export function ingestValues(
   layout: GaussianLayout,
   first: number,
   count: number,
+  before: number,
 ): StructValues<typeof layouts.Ingest> {
   const slices = slicesOf(layout);
-  const place = (name: Binding): number[] => [slices[name]?.offset ?? 0, slices[name]?.rowStride ?? 0];
+  const elementBytes = layout.dtype === 'float16' ? 2 : 4;
+  const place = (name: Binding): number[] => {
+    const { offset = 0, rowStride = 0 } = slices[name] ?? {};
+    return [placeOf((before + first) * rowStride * elementBytes).skipped / elementBytes + offset, rowStride];
+  };
   return {
     count: 0,
     rows: 0,

@@ -72,10 +72,10 @@ const REFUSED: Readonly<
   'external data that is missing': ['contract/external-data', { src: '/net/renamed/external.onnx' }],
   'a missing file': ['network/status', { src: '/net/status/404?x.onnx', contract: contract() }],
   'a missing contract': ['network/status', { src: BALL, contract: '/net/status/404' }],
-  'a contract beside the model that is no JSON': ['contract/json', { src: '/net/sidecar/json/packed.onnx' }],
+  'a contract beside the model that is no JSON': ['contract/json', { src: '/net/sidecar/json/canonical.onnx' }],
   'a contract beside the model that is another one': [
     'contract/unbound-input',
-    { src: '/net/sidecar/other/packed.onnx' },
+    { src: '/net/sidecar/other/canonical.onnx' },
   ],
   'a connection that breaks': ['network/interrupted', { src: '/net/cut-model/packed.onnx' }],
   'a length that is too long': ['network/interrupted', { src: '/net/too-long/packed.onnx' }],

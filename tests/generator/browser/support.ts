@@ -1,5 +1,12 @@
 /** What the tests of running generators share: a device, sinks that read back, the truth from the CPU, and counters. */
-import { bytesSource, halfToNumber, readOnnxHeader, resolveContract, type Camera } from '@gaussian-splat/core';
+import {
+  bytesSource,
+  carriesContract,
+  halfToNumber,
+  readOnnxHeader,
+  resolveContract,
+  type Camera,
+} from '@gaussian-splat/core';
 import { bindInputs, setRuntimeLocation, type GaussianSink, type GeneratorState } from '@gaussian-splat/generator';
 import type * as OnnxRuntime from 'onnxruntime-web/wasm';
 
@@ -88,8 +95,8 @@ export async function runOnCpu(
   const { InferenceSession, Tensor } = await cpuRuntime();
   const bytes = new Uint8Array(await (await fetch(url)).arrayBuffer());
   const header = await readOnnxHeader(bytesSource(bytes, url));
-  const beside = await fetch(url.replace(/\.onnx$/, '.contract.json'));
-  const { contract } = resolveContract({ header, sidecar: beside.ok ? await beside.text() : undefined });
+  const beside = carriesContract(header) ? undefined : await fetch(url.replace(/\.onnx$/, '.contract.json'));
+  const { contract } = resolveContract({ header, sidecar: beside?.ok ? await beside.text() : undefined });
   const externalData = await Promise.all(
     header.externalFiles.map(async ({ location: path }) => {
       const response = await fetch(new URL(path, new URL(url, location.href)));

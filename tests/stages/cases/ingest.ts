@@ -252,4 +252,45 @@ const paged: StageCase = {
   },
 };
 
-export const ingestCases: readonly StageCase[] = [...againstTwin, hostile, counted, paged];
+const ofInstances: StageCase = {
+  name: 'ingest: of several scenes in the same tensors each takes its own rows and its own count, wherever they begin',
+  async run(bench) {
+    const { cloud } = room();
+    // Odd, so that no slice begins where a binding may.
+    const rows = 1333;
+    for (const what of ['packed, covariances, colours', 'split, scales']) {
+      for (const dtype of ['float32', 'float16'] as const) {
+        const { layout, tensors } = writeTensors(cloud, { ...SPECS[what], dtype });
+        const whole = await ingestOnGpu(bench, { layout, tensors });
+        const buffers = Object.entries(tensors).map(([name, words]) => [name, bench.buffer(words)] as const);
+        const counts = bench.buffer(Uint32Array.of(7, rows, 1000, rows));
+        const gaussians = await DynamicGaussians.create(bench.device, { ...layout, capacity: rows, count: 'count' });
+        for (const [instance, living] of [
+          [3, rows],
+          [0, 7],
+          [2, 1000],
+        ]) {
+          gaussians.ingest({ ...Object.fromEntries(buffers), count: counts }, rows, instance);
+          const [page] = gaussians.pages;
+          const geometry = (await bench.read(page.geometry)).subarray(0, 8 * living);
+          const harmonics = whole.sh.length / cloud.count;
+          const sh = (await bench.read(page.sh)).subarray(0, harmonics * living);
+          const first = instance * rows;
+          const name = `${what}, ${dtype}, scene ${instance}`;
+          checkEqual(geometry, whole.geometry.subarray(8 * first, 8 * (first + living)), name);
+          checkEqual(sh, whole.sh.subarray(harmonics * first, harmonics * (first + living)), `${name}, harmonics`);
+        }
+        let refusal = '';
+        try {
+          gaussians.ingest({ ...Object.fromEntries(buffers), count: counts }, rows, 30);
+        } catch (error) {
+          refusal = (error as { code?: string }).code ?? '';
+        }
+        check(refusal === 'argument/value', `rows that are not there: ${refusal}`);
+        gaussians.destroy();
+      }
+    }
+  },
+};
+
+export const ingestCases: readonly StageCase[] = [...againstTwin, hostile, counted, paged, ofInstances];

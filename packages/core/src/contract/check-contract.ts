@@ -2,6 +2,7 @@ import { describeTensor, type OnnxDim, type OnnxHeader, type OnnxTensor } from '
 import type { ContractFault } from './contract-error.js';
 import type { Contract, ControlInput, InputBinding, OutputBinding } from './contract.js';
 import { checkFile, type CheckFileOptions } from './check-file.js';
+import { checkInstances, oneInstance } from './instances.js';
 import { tensorNames } from './parse-contract.js';
 import {
   describeShapes,
@@ -18,9 +19,11 @@ import {
  * Gaussians, opsets, operators, external files.
  * @returns every fault; none if the file keeps the contract.
  */
-export function checkContract(header: OnnxHeader, contract: Contract, options: CheckFileOptions = {}): ContractFault[] {
+export function checkContract(file: OnnxHeader, contract: Contract, options: CheckFileOptions = {}): ContractFault[] {
+  const header = oneInstance(file, contract);
   return [
-    ...checkFile(header, options),
+    ...checkFile(file, options),
+    ...checkInstances(file, contract),
     ...header.inputs.flatMap((input) => checkInput(input, contract)),
     ...missingInputs(header, contract),
     ...checkOutputTensors(header, contract.outputs),

@@ -17,6 +17,8 @@ export interface Contract {
   readonly outputs: OutputBinding;
   /** Most Gaussians that one run writes: needed where the file leaves their number N symbolic. */
   readonly nMax?: number;
+  /** Declared by a model that computes several instances of itself in one run. */
+  readonly instances?: Instances;
   /** Element type of the Gaussian outputs. The file says it too; declared here it is checked. */
   readonly dtype?: 'float32' | 'float16';
   /** Degree of the spherical harmonics. The shape says it too; declared here it is checked. */
@@ -34,6 +36,17 @@ export interface Contract {
   readonly license?: string;
   /** Who is to be named. */
   readonly attribution?: string;
+}
+
+/**
+ * A symbolic axis that stands first in every Gaussian output, in the count, and in those inputs that may differ from instance to instance.
+ * Behind it shapes are those of one instance, with N fixed. Inputs without it are the same for all instances of a run.
+ */
+export interface Instances {
+  /** Name of the symbolic dimension in the file. */
+  readonly axis: string;
+  /** Most instances that one run takes. */
+  readonly most: number;
 }
 
 /** The frame that Gaussians are written in. Default: y down, right-handed, the trainers' frame; units unknown. */

@@ -4,10 +4,12 @@ export { checkFile, RUNTIME_LIMITS, isInside, type CheckFileOptions } from './ch
 export { checkBounds, checkOutputs, compareRuns, type OutputReport, type OutputTensor } from './check-outputs.js';
 export { ContractError, describeFault, type ContractErrorData, type ContractFault } from './contract-error.js';
 export { halfToNumber, numberToHalf } from './half.js';
+export { hasInstances, ofInstances, oneInstance, outputsOfInstance } from './instances.js';
 export { gaussianLayout, type AttributeSlice, type GaussianLayout } from './layout.js';
 export { CONTRACT_VERSION, parseContract } from './parse-contract.js';
 export { contractReport, type ReportSection } from './report.js';
 export {
+  carriesContract,
   CONTRACT_METADATA_KEY,
   resolveContract,
   sidecarName,

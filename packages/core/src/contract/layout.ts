@@ -3,6 +3,7 @@ import type { OnnxHeader } from '../onnx/header.js';
 import { checkContract } from './check-contract.js';
 import { ContractError } from './contract-error.js';
 import type { Contract, GaussianAttribute, OutputBinding, QuaternionOrder, ShOrder } from './contract.js';
+import { oneInstance } from './instances.js';
 import { findTensor, shDegreeOf } from './tensor-rules.js';
 
 /**
@@ -29,7 +30,7 @@ export interface AttributeSlice {
 
 /** How a file writes Gaussians, with everything resolved. */
 export interface GaussianLayout {
-  /** Rows that a run writes at most: N, or `nMax` where N is symbolic. */
+  /** Rows that a run writes at most, of one instance: N, or `nMax` where N is symbolic. */
   readonly capacity: number;
   /** True if the number of rows may differ from run to run. */
   readonly isDynamic: boolean;
@@ -49,21 +50,22 @@ export interface GaussianLayout {
 export function gaussianLayout(header: OnnxHeader, contract: Contract): GaussianLayout | undefined {
   const faults = checkContract(header, contract);
   if (faults.length > 0) throw new ContractError(faults);
+  const { outputs: written } = oneInstance(header, contract);
   const { outputs, nMax } = contract;
   if (outputs.layout === 'image') return undefined;
   const columnsOf = (tensor: string): number => {
-    const dims = findTensor(header.outputs, tensor)!.dims!;
+    const dims = findTensor(written, tensor)!.dims!;
     return dims.slice(1).reduce<number>((product, dim) => product * Number(dim), 1);
   };
   const attributes = attributeSlices(outputs, columnsOf);
-  const tensors = [...new Set(attributes.map(({ tensor }) => tensor))].map((name) => findTensor(header.outputs, name)!);
+  const tensors = [...new Set(attributes.map(({ tensor }) => tensor))].map((name) => findTensor(written, name)!);
   const rows = tensors.map(({ dims }) => dims![0]).find((dim) => typeof dim === 'number');
   const sh = attributes.find(({ attribute }) => attribute === 'sh');
   return {
     capacity: typeof rows === 'number' ? rows : nMax!,
     isDynamic: typeof rows !== 'number',
     dtype: tensors[0].dtype as 'float32' | 'float16',
-    shDegree: sh && shDegreeOf(outputs, findTensor(header.outputs, sh.tensor)!.dims!),
+    shDegree: sh && shDegreeOf(outputs, findTensor(written, sh.tensor)!.dims!),
     attributes,
     count: outputs.count,
   };

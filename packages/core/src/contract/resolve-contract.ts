@@ -13,7 +13,7 @@ export interface ContractSources {
   readonly header: OnnxHeader;
   /** What the page or the caller gives: JSON text, or the object. */
   readonly explicit?: unknown;
-  /** Content of the file beside the model that {@link sidecarName} names: JSON text, or the object. */
+  /** Content of the file beside the model that {@link sidecarName} names: JSON text, or the object. Needed only where {@link carriesContract} is false. */
   readonly sidecar?: unknown;
 }
 
@@ -25,7 +25,7 @@ export interface ResolvedContract {
 }
 
 /**
- * The contract of a file: the explicit one, else its sidecar, else what its metadata holds, else inferred from canonical
+ * The contract of a file: the explicit one, else what its metadata holds, else its sidecar, else inferred from canonical
  * names. The first that is there counts, even if it is wrong: a broken contract is never passed over in silence.
  * @throws ContractError with every fault of that contract's JSON; `contract/inference` where names say too little.
  */
@@ -36,11 +36,14 @@ export function resolveContract({ header, explicit, sidecar }: ContractSources):
     notes: [],
   });
   if (explicit !== undefined && explicit !== null) return written('explicit', explicit, 'contract');
-  if (sidecar !== undefined && sidecar !== null) return written('sidecar', sidecar, sidecarName(header.name));
   const embedded = header.metadata.get(CONTRACT_METADATA_KEY);
   if (embedded !== undefined) return written('metadata', embedded, `metadata ${CONTRACT_METADATA_KEY}`);
+  if (sidecar !== undefined && sidecar !== null) return written('sidecar', sidecar, sidecarName(header.name));
   return { source: 'inferred', ...inferContract(header) };
 }
+
+/** True if the file says itself what it is: nobody need look for a contract beside it. */
+export const carriesContract = ({ metadata }: OnnxHeader): boolean => metadata.has(CONTRACT_METADATA_KEY);
 
 /** Name or address of a model's contract beside it: `NAME.contract.json` for `NAME.onnx`; a query stays where it is. */
 export function sidecarName(model: string): string {

@@ -246,6 +246,16 @@ export const CONTRACT_SCHEMA: Schema = {
     },
     outputs,
     nMax: { type: 'integer', minimum: 1, description: 'Most Gaussians that one run writes' },
+    instances: {
+      type: 'object',
+      properties: {
+        axis: text('Name of the symbolic dimension that stands first in outputs, and in inputs that may differ'),
+        most: { type: 'integer', minimum: 1, description: 'Most instances that one run takes' },
+      },
+      required: ['axis', 'most'],
+      additionalProperties: false,
+      description: 'Declared by a model that computes several instances of itself in one run',
+    },
     dtype: choice('Element type of the Gaussian outputs', 'float32', 'float16'),
     shDegree: { type: 'integer', minimum: 0, maximum: 3, description: 'Degree of the spherical harmonics' },
     bounds: {

@@ -7,7 +7,7 @@ import { valueOf, type Picture } from './values.js';
 export interface LivePicturesOptions {
   readonly credentials: RequestCredentials;
   readonly signal: AbortSignal;
-  /** A picture has arrived. */
+  /** All pictures that were named have arrived, or failed. */
   readonly onChange: () => void;
   readonly onError: (error: unknown) => void;
   /** Fulfils when no run reads a picture. */
@@ -50,6 +50,11 @@ export class LivePictures {
     return this.#tensors;
   }
 
+  /** True while a picture is on its way. What else the page has said since may belong to that one. */
+  get isLoading(): boolean {
+    return this.#loading.size > 0;
+  }
+
   /** Fulfils, and never rejects, once nothing is on its way. */
   async settled(): Promise<void> {
     while (this.#loading.size > 0) await Promise.all(this.#loading);
@@ -61,7 +66,10 @@ export class LivePictures {
       const source = valueOf(pictures, name);
       if (source === undefined || source === this.#sources.get(name)) continue;
       this.#sources.set(name, source);
-      const loading: Promise<void> = this.#load(name, source).finally(() => this.#loading.delete(loading));
+      const loading: Promise<void> = this.#load(name, source).finally(() => {
+        this.#loading.delete(loading);
+        if (!this.isLoading && !this.#isDestroyed) this.#options.onChange();
+      });
       this.#loading.add(loading);
     }
   }
@@ -78,7 +86,6 @@ export class LivePictures {
       if (this.#isDestroyed || this.#sources.get(name) !== source) return;
       this.#tensorFor(name, pixels).upload(pixels);
       if (pixels !== source && pixels instanceof ImageBitmap) pixels.close();
-      this.#options.onChange();
     } catch (error) {
       if (!this.#isDestroyed) this.#options.onError(error);
     }

@@ -73,7 +73,8 @@ function liveModel(
     duration: models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity,
     request: (state, camera) => {
       pictures.update(state.pictures);
-      generator.request(reader.read(state, camera, pictures.tensors, ownsControls()));
+      // Two pictures and the pose of their cameras are one thing: no run may mix old and new. The last one to arrive asks again.
+      if (!pictures.isLoading) generator.request(reader.read(state, camera, pictures.tensors, ownsControls()));
     },
     close: () => {
       generator.close();

@@ -26,7 +26,7 @@ from .families.hexplane import export_hexplane
 from .families.image_filter import export_image_filter
 from .families.scaffold import export_scaffold
 from .graph import Weights
-from .outputs import Options, save
+from .outputs import Options, refuse_instances, save
 from .placement import gpu_findings
 
 Command = argparse.ArgumentParser
@@ -74,6 +74,9 @@ def add_common(family: Command) -> None:
     written = family.add_argument_group("output")
     written.add_argument("--layout", choices=get_args(Layout), help="default: packed, or split with float16")
     written.add_argument("--weights", choices=get_args(Weights), default="float32", help="compact: in 16 bits")
+    written.add_argument(
+        "--instances", type=positive, help="most instances in one run: gives the file an axis for them"
+    )
     written.add_argument("--dtype", choices=get_args(DType), default="float32", help="float16 needs shader-f16")
 
 
@@ -95,9 +98,11 @@ def facts_of(given: argparse.Namespace) -> Facts:
 def export(given: argparse.Namespace) -> None:
     """Reads the checkpoint, writes the file, and reports on it."""
     _, _, build = FAMILIES[given.family]
-    model = build(given, facts_of(given), Options(given.layout, given.dtype, given.weights))
+    model = build(given, facts_of(given), Options(given.layout, given.dtype, given.weights, given.instances))
     size = save(model, str(given.out))
-    shapes = ", ".join(f"{o.name} {[d.dim_value for d in o.type.tensor_type.shape.dim]}" for o in model.graph.output)
+    shapes = ", ".join(
+        f"{o.name} {[d.dim_param or d.dim_value for d in o.type.tensor_type.shape.dim]}" for o in model.graph.output
+    )
     print(f"{given.out}: {size:,} bytes, {len(model.graph.node)} nodes, writes {shapes}")
     report_findings(model)
 
@@ -160,6 +165,13 @@ def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> 
     return export_feed_forward(read_feed_forward(given.checkpoint), facts, options)
 
 
+def positive(text: str) -> int:
+    """A whole number, 1 or more."""
+    if (value := int(text)) < 1:
+        raise ValueError(text)
+    return value
+
+
 def _image_filter_options(family: Command) -> None:
     family.add_argument("--size", type=size, help="WIDTHxHEIGHT in pixels; default: as in config.json")
 
@@ -171,6 +183,7 @@ def size(text: str) -> tuple[int, int]:
 
 
 def _image_filter(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    refuse_instances(options, "image_filter")
     model, config = read_image_filter(given.checkpoint)
     width, height = given.size or (int(config["width"]), int(config["height"]))
     return export_image_filter(model, width, height, facts)

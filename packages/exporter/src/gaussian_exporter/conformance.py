@@ -18,7 +18,8 @@ _NEGATIVE = {"float32": 1e-5, "float16": 5e-3}
 
 
 def default_feeds(model: onnx.ModelProto, contract: Json) -> dict[str, AnyArray]:
-    """Something for every input: declared defaults, zeros, and a camera five units in front of the bounds' centre."""
+    """Something for every input: declared defaults, zeros, and a camera five units in front of the bounds' centre; of a
+    file of several instances for one."""
     bindings = cast(dict[str, Json], contract["inputs"])
     return {value.name: _default(value, bindings.get(value.name), contract) for value in model.graph.input}
 
@@ -33,7 +34,7 @@ def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -
         box = cast(dict[str, list[float]], contract.get("bounds", {"min": [0.0] * 3, "max": [0.0] * 3}))
         low, high = np.array(box["min"]), np.array(box["max"])
         eye: AnyArray = (low + high) / 2 - [0, 0, np.linalg.norm(high - low) + 5]
-        return eye.astype(dtype)
+        return eye.astype(dtype).reshape(shape)
     if binding["role"] in ("view", "projection", "view_projection"):
         return np.eye(4).astype(dtype)
     if binding["role"] == "image":
@@ -66,7 +67,7 @@ def check_outputs(model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = No
             raise _violation(name, "the same result twice", "a difference", "declare a seed")
     ends = [dict(zip(names, session.run(None, given | end), strict=True)) for end in _ends_of_controls(contract, given)]
     for results in (first, *ends):
-        _check_values(cast(dict[str, Any], contract["outputs"]), results)
+        _check_values(cast(dict[str, Any], contract["outputs"]), results, "instances" in contract)
     return first
 
 
@@ -78,19 +79,22 @@ def _ends_of_controls(contract: Json, given: dict[str, AnyArray]) -> Iterator[di
         yield {name: np.full_like(given[name], limits[end]) for name, limits in ranges.items()}
 
 
-def _check_values(outputs: dict[str, Any], results: dict[str, AnyArray]) -> None:
+def _check_values(outputs: dict[str, Any], results: dict[str, AnyArray], instances: bool) -> None:
     for name, values in results.items():
         if not np.isfinite(values).all():
             wrong = int((~np.isfinite(values)).sum())
             raise _violation(name, "finite numbers", f"{wrong} of {values.size} that are not", "train longer or prune")
-    for check in _checks(outputs, results):
+    for check in _checks(outputs, results, instances):
         check()
 
 
-def _checks(outputs: dict[str, Any], values: dict[str, AnyArray]) -> Iterator[Callable[[], None]]:
+def _checks(outputs: dict[str, Any], values: dict[str, AnyArray], instances: bool) -> Iterator[Callable[[], None]]:
     if outputs["layout"] == "image":
         return
     covariances: AnyArray | None
+    # Rows of all instances, one after the other.
+    flat = {name: array.reshape(-1, *array.shape[2:]) if instances else array for name, array in values.items()}
+    values = flat
     if outputs["layout"] == "packed":
         rows = values[outputs["gaussians"]]
         covariances, opacities = rows[:, 3:9], rows[:, -1]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from .errors import ExportError
+from .graph import INSTANCES_AXIS
 
 METADATA_KEY = "gaussian_contract"
 VERSION = 1
@@ -103,6 +104,8 @@ class GaussianOutputs:
     dtype: DType
     sh_degree: int | None
     bounds: tuple[Sequence[float], Sequence[float]]
+    # Most instances that one run computes; None without an axis for them.
+    instances: int | None = None
 
     def json(self) -> Json:
         """The contract's `outputs`."""
@@ -128,6 +131,8 @@ def gaussian_contract(facts: Facts, inputs: Sequence[Input], outputs: GaussianOu
         )
     low, high = outputs.bounds
     written: Json = {"nMax": outputs.n_max, "dtype": outputs.dtype}
+    if outputs.instances is not None:
+        written["instances"] = {"axis": INSTANCES_AXIS, "most": outputs.instances}
     if outputs.sh_degree is not None:
         written["shDegree"] = outputs.sh_degree
     playing = {key: value for key, value in (("duration", facts.duration), ("fps", facts.fps)) if value is not None}

@@ -29,6 +29,9 @@ MOST_CONCAT_INPUTS = 7
 LEAST_COMPACT = 4096
 
 Shape = tuple[int, ...]
+# The size that stands for the axis of instances while a graph is built: a prime that no other size is a multiple of, so
+# that it is known again in products. In the file the axis is symbolic, under this name.
+INSTANCES, INSTANCES_AXIS = 2**31 - 1, "B"
 # How large tables lie in a file: as float32, or in 16 bits.
 Weights = Literal["float32", "compact"]
 Errors = Literal["relative", "even", "none"]
@@ -80,6 +83,7 @@ class Tensor:
 
     def sum(self, axis: int, keep: bool = False) -> Tensor:
         """Sum along one axis."""
+        axis %= len(self.shape)
         axes = self.graph.integers([axis])
         return self.graph.node("ReduceSum", [self, axes], reduced(self.shape, [axis], keep), keepdims=int(keep))
 
@@ -93,7 +97,11 @@ class Tensor:
         """The same numbers in another shape; no axis may be -1."""
         if prod(shape) != prod(self.shape):
             raise wrong_shape("Reshape", f"{prod(self.shape)} elements", str(shape))
-        return self if shape == self.shape else self.graph.node("Reshape", [self, self.graph.integers(shape)], shape)
+        if shape == self.shape:
+            return self
+        # At most one size depends on the instances: the one that ONNX finds by itself.
+        written = [-1 if size % INSTANCES == 0 else size for size in shape]
+        return self.graph.node("Reshape", [self, self.graph.integers(written)], shape)
 
     def transpose(self, *axes: int) -> Tensor:
         """Axes in another order."""
@@ -115,11 +123,25 @@ class Tensor:
         shape = replaced(self.shape, axis, len(indices))
         return self.graph.node("Gather", [self, self.graph.integers(indices)], shape, axis=axis)
 
+    def alongside(self, other: Tensor) -> Tensor:
+        """The same numbers, once for each instance if `other` has instances."""
+        if other.shape[0] != INSTANCES or self.shape[0] == INSTANCES:
+            return self
+        first = other
+        for axis in range(1, len(other.shape)):
+            first = first.part(0, 1, axis)
+        return first.reshape(INSTANCES, *[1] * len(self.shape)) * 0.0 + self
+
     def expand(self, *shape: int) -> Tensor:
         """Repeated along axes of length 1."""
         if np.broadcast_shapes(self.shape, shape) != shape:
             raise wrong_shape("Expand", f"a shape that {self.shape} broadcasts to", str(shape))
         return self.graph.node("Expand", [self, self.graph.integers(shape)], shape)
+
+
+def declared(shape: Shape) -> list[int | str]:
+    """A shape as the file says it."""
+    return [INSTANCES_AXIS if size == INSTANCES else size for size in shape]
 
 
 def replaced(shape: Shape, axis: int, size: int) -> Shape:
@@ -147,9 +169,11 @@ def wrong_shape(operator: str, expected: str, found: str) -> ExportError:
 class Graph:
     """One ONNX graph being built. Inputs first, then operators on tensors, then outputs, then `model`."""
 
-    def __init__(self, name: str, weights: Weights = "float32"):
-        """`name` is the graph's name inside the file; `weights`: how large tables of numbers lie in it."""
+    def __init__(self, name: str, weights: Weights = "float32", instances: bool = False):
+        """`name` is the graph's name inside the file; `weights`: how large tables of numbers lie in it; `instances`:
+        whether what differs from instance to instance has an axis for them, before all others."""
         self.name = name
+        self.lead: Shape = (INSTANCES,) if instances else ()
         self._weights = weights
         self._nodes: list[onnx.NodeProto] = []
         self._inputs: list[onnx.ValueInfoProto] = []
@@ -158,8 +182,8 @@ class Graph:
         self._by_value: dict[tuple[str, Shape, bytes], Tensor] = {}
 
     def input(self, name: str, *shape: int) -> Tensor:
-        """A float32 input of fixed shape."""
-        self._inputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, shape))
+        """A float32 input of fixed shape; one that differs from instance to instance begins with `lead`."""
+        self._inputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, declared(shape)))
         return Tensor(self, name, shape)
 
     def constant(
@@ -262,7 +286,7 @@ class Graph:
         else:
             self._nodes.append(helper.make_node("Identity", [tensor.name], [name], name=name))
         kind = TensorProto.FLOAT16 if half else TensorProto.FLOAT
-        self._outputs.append(helper.make_tensor_value_info(name, kind, tensor.shape))
+        self._outputs.append(helper.make_tensor_value_info(name, kind, declared(tensor.shape)))
 
     def model(self, metadata: dict[str, str]) -> onnx.ModelProto:
         """The finished file. ONNX's own checker and shape inference must agree with every shape that was declared."""

@@ -16,6 +16,7 @@ from typing import Literal
 import onnx
 from onnx import TensorProto, helper
 
+from .graph import INSTANCES_AXIS
 from .pieces.convolution import is_wrong_on_webgpu
 
 # Operators of ai.onnx with a float32 kernel. Control flow (If) has one too, but ends capture.
@@ -71,6 +72,13 @@ class Finding:
         return f"{self.kind}: {self.operator} '{self.node}': {self.reason}; {self.remedy}"
 
 
+def _size(dim: onnx.TensorShapeProto.Dimension) -> int | None:
+    """A size, or None where the file leaves it open. The axis of instances is a number in every session."""
+    if dim.dim_param == INSTANCES_AXIS:
+        return 1
+    return dim.dim_value if dim.HasField("dim_value") else None
+
+
 class _Values:
     """What shape inference knows of every value."""
 
@@ -88,7 +96,7 @@ class _Values:
         for value in [*graph.input, *graph.value_info, *graph.output]:
             tensor = value.type.tensor_type
             self.types[value.name] = tensor.elem_type
-            self.dims[value.name] = [d.dim_value if d.HasField("dim_value") else None for d in tensor.shape.dim]
+            self.dims[value.name] = [_size(d) for d in tensor.shape.dim]
 
 
 def gpu_findings(model: onnx.ModelProto) -> list[Finding]:

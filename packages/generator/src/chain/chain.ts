@@ -21,6 +21,7 @@ export class Chain {
     this.#leases = leases;
     const models = leases.map(({ session }) => session.model);
     requireNoneBefore(models[0]);
+    if (models.length > 1) requireNoInstances(models);
     this.#handOvers = models.slice(1).map((after, i) => new HandOver(device, models[i], connect(models[i], after)));
   }
 
@@ -42,6 +43,12 @@ export class Chain {
       for (const lease of opening) lease.then(({ release }) => release(), ignore);
       throw error;
     }
+  }
+
+  /** The session of a single model that computes several instances in one run; undefined for all others. */
+  get ofInstances(): GeneratorSession | undefined {
+    const [{ session }] = this.#leases;
+    return session.model.contract.instances && session;
   }
 
   /** In the order in which they run. */
@@ -118,6 +125,22 @@ function requireNoneBefore({ header, contract }: GeneratorModel): void {
         expected: 'a model before this one, whose Gaussians the input takes',
         found: 'none',
         remedy: 'open both as a chain, the one that makes Gaussians first',
+      };
+    });
+  if (faults.length > 0) throw new ContractError(faults);
+}
+
+/** What one model hands to the next is one instance's. */
+function requireNoInstances(models: readonly GeneratorModel[]): void {
+  const faults = models
+    .filter(({ contract }) => contract.instances !== undefined)
+    .map(({ header }): ContractFault => {
+      return {
+        code: 'contract/chain',
+        where: header.name,
+        expected: 'models of one instance, in a chain of several',
+        found: 'a model that declares instances',
+        remedy: 'export it without that axis for the chain',
       };
     });
   if (faults.length > 0) throw new ContractError(faults);

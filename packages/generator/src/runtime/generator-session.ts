@@ -1,4 +1,4 @@
-import { ContractError, GaussianSplatError } from '@gaussian-splat/core';
+import { ContractError, GaussianSplatError, ofInstances, oneInstance, type OnnxHeader } from '@gaussian-splat/core';
 import { bindInputs } from '../bind-inputs.js';
 import { bindPictures } from '../bind-pictures.js';
 import type { Inputs } from '../input-value.js';
@@ -19,6 +19,7 @@ export class GeneratorSession {
   readonly model: GeneratorModel;
   readonly device: GPUDevice;
   readonly #onFallback: (reason: string) => void;
+  readonly #oneInstance: OnnxHeader;
   #live: Promise<LiveSession> | undefined;
   #kind: SessionKind | undefined;
   #failures = 0;
@@ -33,6 +34,7 @@ export class GeneratorSession {
     this.model = model;
     this.device = device;
     this.#onFallback = onFallback;
+    this.#oneInstance = oneInstance(model.header, model.contract);
     requireRoom(model, device);
     void device.lost.then(() => (this.#isLost = true));
   }
@@ -43,13 +45,30 @@ export class GeneratorSession {
   }
 
   /**
-   * Values of the inputs for a state of the page.
+   * Values of the inputs for a state of the page, of one instance.
    * @param given inputs that another model writes; they are left out.
    * @throws GaussianSplatError `argument/value`
    */
   bind(state: GeneratorState, given: ReadonlySet<string> = new Set()): Inputs {
-    const { header, contract } = this.model;
+    const { contract } = this.model;
+    const header = this.#oneInstance;
     return { ...bindInputs(header, contract, state), ...bindPictures(header, contract, state, given) };
+  }
+
+  /**
+   * Another session of the same model, for runs of exactly so many instances.
+   * @throws GaussianSplatError `out-of-memory/buffer-limit`, as the constructor.
+   */
+  forInstances(count: number): GeneratorSession {
+    const { header, contract, outputs, ...rest } = this.model;
+    const model: GeneratorModel = {
+      ...rest,
+      contract,
+      header: ofInstances(header, contract, count),
+      outputs: outputs.map((output) => ({ ...output, most: output.most && output.most * count })),
+      instances: count,
+    };
+    return new GeneratorSession(model, this.device, this.#onFallback);
   }
 
   /**

@@ -23,7 +23,7 @@ export interface RunOutputs {
   readonly tensors: Readonly<Record<string, GPUBuffer>>;
   /** Shapes of this run, by the same names. */
   readonly dims: Readonly<Record<string, readonly number[]>>;
-  /** Rows of Gaussians that this run wrote; 1 for a picture. */
+  /** Rows of Gaussians that this run wrote, of one instance; 1 for a picture. */
   readonly rows: number;
 }
 
@@ -37,6 +37,8 @@ export class LiveSession {
   readonly #session: InferenceSession;
   readonly #device: GPUDevice;
   readonly #outputs: readonly ModelOutput[];
+  /** Which dimension of an output counts rows. */
+  readonly #rowAxis: 0 | 1;
   readonly #names: readonly string[];
   readonly #buffers: SessionBuffers;
   readonly #feeds: Record<string, Tensor> = {};
@@ -47,13 +49,14 @@ export class LiveSession {
     runtime: Runtime,
     session: InferenceSession,
     device: GPUDevice,
-    { outputs }: GeneratorModel,
+    { outputs, instances }: GeneratorModel,
   ) {
     this.kind = kind;
     this.#runtime = runtime;
     this.#session = session;
     this.#device = device;
     this.#outputs = outputs;
+    this.#rowAxis = instances === undefined ? 0 : 1;
     this.#names = outputs.map(({ name }) => name);
     this.#buffers = new SessionBuffers(device);
   }
@@ -67,6 +70,7 @@ export class LiveSession {
   ): Promise<LiveSession> {
     const options: InferenceSession.SessionOptions = {
       ...QUIET,
+      freeDimensionOverrides: fixedDimensions(model),
       externalData: model.externalData.map(({ path, data }) => ({ path, data })),
     };
     const onGpu: InferenceSession.SessionOptions = {
@@ -112,7 +116,7 @@ export class LiveSession {
     const results = await this.#infer(inputs);
     try {
       const dims = Object.fromEntries(this.#names.map((name) => [name, results[name].dims]));
-      use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(results, this.#outputs) });
+      use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(results, this.#outputs, this.#rowAxis) });
     } finally {
       // Recycled for what is submitted later; a captured session writes the same buffers for ever.
       if (this.kind === 'webgpu') for (const name of this.#names) disposeGpu(results[name]);
@@ -182,6 +186,11 @@ export class LiveSession {
   }
 }
 
+/** A run of several instances has a size that the file leaves open, and recorded commands need fixed ones. */
+function fixedDimensions({ contract, instances }: GeneratorModel): Record<string, number> | undefined {
+  return instances === undefined ? undefined : { [contract.instances!.axis]: instances };
+}
+
 const wholeWords = (bytes: number): number => Math.ceil(bytes / 4) * 4;
 const bytesOf = ({ dtype, dims }: GpuTensor | InputNumbers): number => elementsOf(dims) * (dtype === 'float16' ? 2 : 4);
 
@@ -190,19 +199,19 @@ function disposeGpu(tensor: Tensor): void {
 }
 
 /** Rows of all tensors of Gaussians, which must agree. */
-function rowsOf(results: Readonly<Record<string, Tensor>>, outputs: readonly ModelOutput[]): number {
+function rowsOf(results: Readonly<Record<string, Tensor>>, outputs: readonly ModelOutput[], axis: 0 | 1): number {
   const [first, ...others] = outputs.filter(({ kind }) => kind === 'gaussians').map(({ name }) => name);
   if (first === undefined) return 1;
-  const rows = results[first].dims[0];
+  const rows = results[first].dims[axis];
   for (const tensor of others) {
-    if (results[tensor].dims[0] === rows) continue;
+    if (results[tensor].dims[axis] === rows) continue;
     throw new ContractError([
       {
         code: 'contract/rows',
         tensor,
         where: `output ${tensor}`,
         expected: `${rows} rows, as ${first} has`,
-        found: `${results[tensor].dims[0]} rows`,
+        found: `${results[tensor].dims[axis]} rows`,
         remedy: 'write as many rows of every attribute',
       },
     ]);

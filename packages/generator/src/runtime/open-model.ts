@@ -1,5 +1,6 @@
 import {
   bytesSource,
+  carriesContract,
   checkContract,
   ContractError,
   gaussianLayout,
@@ -22,7 +23,7 @@ import { modelOutputs, type ModelOutput } from './model-outputs.js';
 export interface ModelSource {
   /** Address of the ONNX file, absolute or relative to the page. */
   readonly url: string;
-  /** The contract, as JSON text or as the object; default: a file beside the model, then what the model itself carries. */
+  /** The contract, as JSON text or as the object; default: what the model itself carries, else a file beside it. */
   readonly contract?: unknown;
   readonly credentials?: 'omit' | 'same-origin' | 'include';
 }
@@ -36,6 +37,8 @@ export interface GeneratorModel {
   readonly layout: GaussianLayout | undefined;
   /** All outputs that the contract names, each once. */
   readonly outputs: readonly ModelOutput[];
+  /** How many instances a run computes; undefined where the model has no axis for them, or it is still a symbol. */
+  readonly instances?: number;
   /** What was inferred for want of a contract, for a warning; sentences without a full stop. */
   readonly notes: readonly string[];
   readonly bytes: Uint8Array;
@@ -79,6 +82,7 @@ export async function openModel(
 async function contractOf(source: ModelSource, header: OnnxHeader, request: FetchOptions): Promise<ResolvedContract> {
   const explicit = source.contract;
   if (explicit !== undefined && explicit !== null) return resolveContract({ header, explicit });
+  if (carriesContract(header)) return resolveContract({ header });
   if (/^(data|blob):/.test(source.url)) return resolveContract({ header });
   const bytes = await fetchBytes(sidecarName(source.url), { ...request, mayBeMissing: true });
   const text = bytes && new TextDecoder().decode(bytes);

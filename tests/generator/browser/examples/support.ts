@@ -23,11 +23,18 @@ export interface OpenExample {
   readonly fallbacks: readonly string[];
 }
 
-/** Opens the page, brings an example into sight, and waits until it is on show. */
-export async function open(name: string): Promise<OpenExample> {
+/** Opens the page, and waits until an example says what it costs. */
+export async function openCard(name: string): Promise<Omit<OpenExample, 'fallbacks'>> {
   const page = await openPage();
   const card = page.querySelector<HTMLElement>(`[data-example="${name}"]`)!;
   const element = card.querySelector<GaussianSplatElement>('gaussian-splat')!;
+  await until(() => card.querySelector('.cost')!.childElementCount > 0, `${name}: its cost`);
+  return { page, card, element };
+}
+
+/** Opens the page, brings an example into sight, and waits until it is on show. */
+export async function open(name: string): Promise<OpenExample> {
+  const { page, card, element } = await openCard(name);
   const fallbacks: string[] = [];
   element.addEventListener('generator-fallback', (event) =>
     fallbacks.push(String((event as CustomEvent).detail.reason)),
@@ -35,7 +42,6 @@ export async function open(name: string): Promise<OpenExample> {
   element.scrollIntoView({ block: 'center' });
   await until(() => element.loaded || element.error !== null, `${name} on show`, PATIENCE_MS);
   assertEqual(element.error?.message, undefined, name);
-  await until(() => card.querySelector('.cost')!.childElementCount > 0, `${name}: its cost`);
   return { page, card, element, fallbacks };
 }
 

@@ -16,11 +16,12 @@ from .torch_file import Weights, read_weights
 
 
 def read_feed_forward(folder: Path) -> FeedForward:
-    """config.json: width, height, views, near, far, depths; layers encoder.0-3, depth.0-1, head.0-2."""
+    """config.json: width, height, views, near, far, depths; layers encoder.i, depth.i and head.i."""
     config, weights = read_network(folder, "feed-forward", ("width", "height", "views", "near", "far", "depths"))
 
-    def stack(name: str, count: int) -> list[Convolution]:
-        return [convolution(weights.under(f"{name}.{index}")) for index in range(count)]
+    def stack(name: str) -> list[Convolution]:
+        # Without any, the first is asked for: its absence is the error.
+        return [convolution(weights.under(f"{name}.{index}")) for index in numbers(weights, name) or [0]]
 
     return FeedForward(
         width=int(config["width"]),
@@ -29,9 +30,9 @@ def read_feed_forward(folder: Path) -> FeedForward:
         near=float(config["near"]),
         far=float(config["far"]),
         depths=int(config["depths"]),
-        encoder=stack("encoder", 4),
-        depth=stack("depth", 2),
-        head=stack("head", 3),
+        encoder=stack("encoder"),
+        depth=stack("depth"),
+        head=stack("head"),
     )
 
 
@@ -39,20 +40,22 @@ def read_image_filter(folder: Path) -> tuple[ImageFilter, dict[str, Any]]:
     """config.json: output, width, height; layers stem, down.i, blocks.i.0-1, up.i, out. Returns the config, too."""
     config, weights = read_network(folder, "image filter", ("output", "width", "height"))
 
-    def numbers(name: str) -> list[int]:
-        return sorted({int(key.split(".")[1]) for key in weights.tensors if key.startswith(f"{name}.")})
-
     return ImageFilter(
         stem=convolution(weights.under("stem")),
-        down=[convolution(weights.under(f"down.{i}")) for i in numbers("down")],
+        down=[convolution(weights.under(f"down.{i}")) for i in numbers(weights, "down")],
         blocks=[
             (convolution(weights.under(f"blocks.{i}.0")), convolution(weights.under(f"blocks.{i}.1")))
-            for i in numbers("blocks")
+            for i in numbers(weights, "blocks")
         ],
-        up=[convolution(weights.under(f"up.{i}")) for i in numbers("up")],
+        up=[convolution(weights.under(f"up.{i}")) for i in numbers(weights, "up")],
         out=convolution(weights.under("out")),
         output=cast(Output, config["output"]),
     ), config
+
+
+def numbers(weights: Weights, name: str) -> list[int]:
+    """The numbers of the layers NAME.0, NAME.1, ... that are there."""
+    return sorted({int(key.split(".")[1]) for key in weights.tensors if key.startswith(f"{name}.")})
 
 
 def convolution(weights: Weights) -> Convolution:

@@ -61,15 +61,15 @@ def export_avatar(
     """
     check(avatar)
     options = options or Options()
-    graph = Graph("avatar", options.weights)
+    graph = Graph("avatar", options.weights, options.instances is not None)
     quaternions = pose_format == "quaternion"
-    given = graph.input("pose", len(avatar.parents), 4 if quaternions else 3)
+    given = graph.input("pose", *graph.lead, len(avatar.parents), 4 if quaternions else 3)
     rotations = rotation_matrix(given) if quaternions else rotation_of_axis_angle(given)
     inputs = [pose("pose", avatar.joint_names, avatar.parents, quaternions)]
     positions, joints = blended(avatar, graph, rotations, inputs)
     frames = posed_joints(rotations, relative_to_parent(joints, avatar.parents), avatar.parents)
     carried = graph.constant(avatar.weights, "weights", errors="even") @ skinning_matrices(frames, joints)
-    translation = graph.input("translation", 3)
+    translation = row_of(graph, "translation", 3)
     inputs.append(control("translation", 0.0, -10.0, 10.0))
     gaussians = skinned(avatar, graph, positions, carried, translation, inputs)
     bounds = avatar.positions.min(0), avatar.positions.max(0)
@@ -117,47 +117,54 @@ def blended(avatar: Avatar, graph: Graph, rotations: Tensor, inputs: list[Input]
     if avatar.shape_directions is not None and avatar.joint_directions is not None:
         count = avatar.shape_directions.shape[2]
         inputs.append(shape("shape", count))
-        body = graph.input("shape", count).reshape(1, count)
+        body = row_of(graph, "shape", count)
         positions = positions + along(body, avatar.shape_directions, "shape_directions")
         joints = joints + along(body, avatar.joint_directions, "joint_directions")
     if avatar.expression_directions is not None:
         count = avatar.expression_directions.shape[2]
         # The role `shape` is there once only, so that a page knows which coefficients are the body's.
         inputs.append(control("expression", 0.0, -3.0, 3.0))
-        expression = graph.input("expression", count).reshape(1, count)
+        expression = row_of(graph, "expression", count)
         positions = positions + along(expression, avatar.expression_directions, "expression_directions")
     if avatar.pose_directions is not None:
-        bends = rotations.part(1, rotations.shape[0], 0) - graph.constant(np.eye(3)[None], "identity")
-        bends = bends.reshape(1, 9 * (rotations.shape[0] - 1))
+        count = len(avatar.parents)
+        bends = rotations.part(1, count, -3) - graph.constant(np.eye(3)[None], "identity")
+        bends = bends.reshape(*graph.lead, 1, 9 * (count - 1))
         positions = positions + along(bends, avatar.pose_directions, "pose_directions")
     return positions, joints
 
 
+def row_of(graph: Graph, name: str, count: int) -> Tensor:
+    """An input of `count` numbers, of each instance if there are such, as one row (...,1,count)."""
+    return graph.input(name, *graph.lead, count).reshape(*graph.lead, 1, count)
+
+
 def along(row: Tensor, directions: Floats, name: str) -> Tensor:
-    """Offsets (N,3): directions (N,3,B) times coefficients (1,B)."""
+    """Offsets (...,N,3): directions (N,3,B) times coefficients (...,1,B)."""
     count = directions.shape[0]
     table = directions.transpose(2, 0, 1).reshape(directions.shape[2], count * 3)
-    return (row @ row.graph.constant(table, name)).reshape(count, 3)
+    return (row @ row.graph.constant(table, name)).reshape(*row.shape[:-2], count, 3)
 
 
 def skinned(
     avatar: Avatar, graph: Graph, positions: Tensor, carried: Tensor, translation: Tensor, inputs: list[Input]
 ) -> Gaussians:
-    """Gaussians in the world; carried (N,12) is each one's blend of its joints' matrices."""
+    """Gaussians in the world; carried (...,N,12) is each one's blend of its joints' matrices."""
     count = len(avatar.positions)
-    turn = carried.part(0, 9).reshape(count, 3, 3)
-    placed = (turn * positions.reshape(count, 1, 3)).sum(2) + carried.part(9, 12) + translation
+    each = (*graph.lead, count)
+    turn = carried.part(0, 9).reshape(*each, 3, 3)
+    placed = (turn * positions.reshape(*positions.shape[:-1], 1, 3)).sum(-1) + carried.part(9, 12) + translation
     half = graph.constant(rotation_matrices(avatar.rotations) * avatar.scales[:, None, :], "halves")
     # The blend's own matrix also stretches where joints disagree; covariances follow it exactly.
-    stretched = (turn.reshape(count, 3, 3, 1) * half.reshape(count, 1, 3, 3)).sum(2)
+    stretched = (turn.reshape(*each, 3, 3, 1) * half.reshape(count, 1, 3, 3)).sum(-2)
     sh = graph.constant(avatar.sh, "sh")
     if avatar.sh.shape[1] > 1:
-        camera = graph.input("camera_position", 3)
+        camera = row_of(graph, "camera_position", 3)
         inputs.append(camera_position())
         direction, _ = direction_and_distance(placed, camera)
         # Transposed, the blend turns the direction back into the frame that the harmonics were trained in.
-        own = (turn * direction.reshape(count, 3, 1)).sum(1)
-        length = ((own * own).sum(1, keep=True) + 1e-20).unary("Sqrt")
+        own = (turn * direction.reshape(*each, 3, 1)).sum(-2)
+        length = ((own * own).sum(-1, keep=True) + 1e-20).unary("Sqrt")
         colours = harmonics.colour(own / length, sh)
     else:
         colours = graph.constant(np.maximum(avatar.sh[:, 0] * np.float64(0.28209479177387814) + 0.5, 0), "colors")

@@ -23,23 +23,25 @@ from ..outputs import Gaussians, Options, finish
 from ..pieces.convolution import Convolution, convolve, enlarge, rows_of
 from ..pieces.covariance import covariance_of_half, rotation_matrix
 
-# The encoder's strides; features are a quarter of the picture's size.
-STRIDES = (1, 2, 2, 1)
+# The encoder's first strides, all others are 1; features are a quarter of the picture's size.
+STRIDES = (1, 2, 2)
 REDUCTION = 4
 # The head's channels: inverse depth, opacity, scales, quaternion, colour.
 HEAD = (1, 1, 3, 4, 3)
 # How far the head may move an inverse depth (as a power of e), and the range of a Gaussian's size in pixels.
 REFINEMENT = 0.2
 SMALLEST, LARGEST = 0.2, 4.2
+# Added to the variance of a pixel's features before it is divided out.
+EPSILON = 1e-5
 # A second camera this near to a point, in world units, does not see it.
 NEAREST = 1e-3
 
 
 @dataclass(frozen=True)
 class FeedForward:
-    """A trained network for `views` (1 or 2) pictures of one size, multiples of 4. encoder: four layers; depth: two,
-    the last with a channel for each of `depths` candidates, spaced evenly in inverse depth from near to far (world
-    units); head: three, ending in 12 channels."""
+    """A trained network for `views` (1 or 2) pictures of one size, multiples of 4. encoder: three layers or more;
+    depth: the last with a channel for each of `depths` candidates, spaced evenly in inverse depth from near to far
+    (world units); head: ending in 12 channels."""
 
     width: int
     height: int
@@ -108,7 +110,7 @@ def check(model: FeedForward) -> None:
         "views": (model.views in (1, 2), "1 or 2", str(model.views)),
         "size": (not model.width % REDUCTION and not model.height % REDUCTION, f"multiples of {REDUCTION}", ""),
         "near and far": (0 < model.near < model.far, "0 < near < far", f"{model.near}, {model.far}"),
-        "encoder": (len(model.encoder) == len(STRIDES), f"{len(STRIDES)} layers", str(len(model.encoder))),
+        "encoder": (len(model.encoder) >= len(STRIDES), f"{len(STRIDES)} layers or more", str(len(model.encoder))),
         "depth": (model.depth[0].weight.shape[1] == sweep, f"{sweep} channels in", str(model.depth[0].weight.shape)),
         "depth's end": (len(model.depth[-1].bias) == model.depths, str(model.depths), str(len(model.depth[-1].bias))),
         "head": (model.head[0].weight.shape[1] == head, f"{head} channels in", str(model.head[0].weight.shape)),
@@ -138,11 +140,10 @@ def gaussians(
     inputs.append(control("relative_pose", [float(x) for x in rest.ravel()], -100.0, 100.0))
     upper = matrix.part(0, 3, 0)
     pose = Pose(upper.part(0, 3, 1), upper.part(3, 4, 1).reshape(1, 3))
-    first = placed(
-        model, pictures[0], encoded[0], sweep(model, encoded[0][1], encoded[1][1], camera, pose), camera, None
-    )
+    features = [evened(coarse) for _, coarse in encoded]
+    first = placed(model, pictures[0], encoded[0], sweep(model, features[0], features[1], camera, pose), camera, None)
     back = pose.inverse()
-    cost = sweep(model, encoded[1][1], encoded[0][1], camera, back)
+    cost = sweep(model, features[1], features[0], camera, back)
     return joined(graph, first, placed(model, pictures[1], encoded[1], cost, camera, back))
 
 
@@ -162,7 +163,8 @@ def encode(model: FeedForward, picture: Tensor) -> tuple[Tensor, Tensor]:
     """Fine features (1,C,H,W) and coarse ones (1,F,H/4,W/4)."""
     x = picture * 2.0 - 1.0
     fine = None
-    for index, (layer, stride) in enumerate(zip(model.encoder, STRIDES, strict=True)):
+    for index, layer in enumerate(model.encoder):
+        stride = STRIDES[index] if index < len(STRIDES) else 1
         x = convolve(x, layer, f"encoder_{index}", stride).unary("Relu")
         fine = x if fine is None else fine
     return (x if fine is None else fine), x
@@ -174,6 +176,12 @@ def rays(graph: Graph, width: int, height: int, camera: Camera) -> Tensor:
     x = (graph.constant(u.reshape(-1, 1), "u") - camera.cx) / camera.fx
     y = (graph.constant(v.reshape(-1, 1), "v") - camera.cy) / camera.fy
     return graph.concat([x, y, graph.constant(np.ones((width * height, 1)), "ones")], 1)
+
+
+def evened(features: Tensor) -> Tensor:
+    """Features of every pixel with mean 0 and variance 1: what a sweep then finds is how far they go together."""
+    centred = features - features.mean([1], keep=True)
+    return centred / ((centred * centred).mean([1], keep=True) + EPSILON).unary("Sqrt")
 
 
 def sweep(model: FeedForward, own: Tensor, other: Tensor, camera: Camera, pose: Pose) -> Tensor:
@@ -197,9 +205,10 @@ def sweep(model: FeedForward, own: Tensor, other: Tensor, camera: Camera, pose: 
 def inverse_depth(model: FeedForward, features: Tensor, cost: Tensor | None) -> Tensor:
     """(1,1,h,w), from coarse features and the plane sweep, if there was one."""
     graph = features.graph
-    given = features if cost is None else graph.concat([cost, features], 1)
-    logits = convolve(convolve(given, model.depth[0], "depth_0").unary("Relu"), model.depth[1], "depth_1")
-    logits = logits if cost is None else logits + cost
+    x = features if cost is None else graph.concat([cost, features], 1)
+    for index, layer in enumerate(model.depth):
+        x = convolve(x if index == 0 else x.unary("Relu"), layer, f"depth_{index}")
+    logits = x if cost is None else x + cost
     rows = rows_of(logits)
     weights = graph.node("Softmax", [rows], rows.shape, axis=1)
     candidates = graph.constant(model.inverse_depths().reshape(-1, 1), "inverse_depths")

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import prod
 
 import numpy as np
 import onnx
@@ -53,8 +54,8 @@ def export_hexplane(
     cloud = usable(cloud)
     check(cloud, deformation)
     options = options or Options()
-    graph = Graph("hexplane", options.weights)
-    time = graph.input("time", 1)
+    graph = Graph("hexplane", options.weights, options.instances is not None)
+    time = graph.input("time", *graph.lead, 1)
     hidden = mlp(features(cloud, deformation, graph, time), deformation.trunk, "trunk").unary("Relu")
     return finish(
         graph, move(cloud, deformation, hidden), [normalized_time()], reach(cloud, deformation), facts, options
@@ -124,16 +125,19 @@ def applied(layers: Sequence[Linear], x: Doubles) -> Doubles:
 
 
 def features(cloud: Cloud, deformation: Deformation, graph: Graph, time: Tensor) -> Tensor:
-    """The planes' features (N, sum of C)."""
+    """The planes' features (..., N, sum of C)."""
     at = plane_coordinates(cloud, deformation)
     count = len(at)
-    column = time.reshape(1, 1).expand(count, 1)
-    grids = [
-        graph.concat([graph.constant(at[:, [axis]], f"coordinate_{'xyz'[axis]}", errors="even"), column], 1).reshape(
-            1, count, 1, 2
-        )
-        for axis in range(TIME)
-    ]
+    each = (*graph.lead, count)
+    if graph.lead:
+        column = time.reshape(*graph.lead, 1, 1) + graph.constant(np.zeros((count, 1)), "rows")
+    else:
+        column = time.reshape(1, 1).expand(count, 1)
+    grids = []
+    for axis in range(TIME):
+        coordinate = graph.constant(at[:, [axis]], f"coordinate_{'xyz'[axis]}", errors="even").alongside(time)
+        # All instances are rows of one long picture.
+        grids.append(graph.concat([coordinate, column], -1).reshape(1, prod(each), 1, 2))
     columns = []
     for level, planes in enumerate(deformation.resolutions):
         channels = planes[0].shape[0]
@@ -145,9 +149,9 @@ def features(cloud: Cloud, deformation: Deformation, graph: Graph, time: Tensor)
             for i, (a, b) in enumerate(PLANES)
             if b == TIME
         ]
-        product = (moving[0] * moving[1] * moving[2]).reshape(channels, count).transpose(1, 0)
-        columns.append(product * graph.constant(still, f"still_{level}"))
-    return graph.concat(columns, 1)
+        product = (moving[0] * moving[1] * moving[2]).reshape(channels, prod(each)).transpose(1, 0)
+        columns.append(product.reshape(*each, channels) * graph.constant(still, f"still_{level}"))
+    return graph.concat(columns, -1)
 
 
 def sample_in_time(plane: Tensor, grid: Tensor, channels: int) -> Tensor:
@@ -157,7 +161,7 @@ def sample_in_time(plane: Tensor, grid: Tensor, channels: int) -> Tensor:
 
 
 def move(cloud: Cloud, deformation: Deformation, hidden: Tensor) -> Gaussians:
-    """The Gaussians where the heads put them. hidden (N,W), after its ReLU."""
+    """The Gaussians where the heads put them. hidden (...,N,W), after its ReLU."""
     graph = hidden.graph
     mask = mlp(hidden, deformation.mask, "mask") if deformation.mask else None
 
@@ -177,7 +181,8 @@ def move(cloud: Cloud, deformation: Deformation, hidden: Tensor) -> Gaussians:
     else:
         logits = np.clip(cloud.opacity_logits, -88, 88)
         opacities = moved(logits, deformation.opacity, "opacity_logits").unary("Sigmoid")
-    sh = moved(cloud.sh.reshape(len(cloud.sh), -1), deformation.sh, "sh").reshape(*cloud.sh.shape)
+    sh = moved(cloud.sh.reshape(len(cloud.sh), -1), deformation.sh, "sh")
+    sh = sh.reshape(*sh.shape[:-1], *cloud.sh.shape[1:])
     return Gaussians(
         positions=moved(cloud.positions, deformation.position, "positions"),
         scales=scales,

@@ -24,24 +24,24 @@ _TINY = 1e-30
 
 
 def rotation_matrix(quaternions: Tensor) -> Tensor:
-    """(N,3,3) of quaternions w x y z (N,4) of any length."""
-    count = quaternions.shape[0]
+    """(...,3,3) of quaternions w x y z (...,4) of any length."""
+    each = quaternions.shape[:-1]
     table = np.zeros((16, 9), np.float32)
     for entry, terms in _PRODUCTS.items():
         for i, j, factor in terms:
             table[4 * i + j, entry] = factor
-    products = quaternions.reshape(count, 4, 1) * quaternions.reshape(count, 1, 4)
-    squared = (quaternions * quaternions).sum(1, keep=True) + _TINY
+    products = quaternions.reshape(*each, 4, 1) * quaternions.reshape(*each, 1, 4)
+    squared = (quaternions * quaternions).sum(-1, keep=True) + _TINY
     graph = quaternions.graph
-    return (products.reshape(count, 16) @ graph.constant(table, "quaternion_products") / squared).reshape(count, 3, 3)
+    return (products.reshape(*each, 16) @ graph.constant(table, "quaternion_products") / squared).reshape(*each, 3, 3)
 
 
 def covariance_of_half(half: Tensor) -> Tensor:
-    """Upper triangles xx xy xz yy yz zz (N,6) of H H^T, for halves H (N,3,3)."""
+    """Upper triangles xx xy xz yy yz zz (...,6) of H H^T, for halves H (...,3,3)."""
     # Two gathers and a sum beat a batched product of 3x3 matrices, which WebGPU runs one small workgroup at a time.
-    return (half.take(ROWS, 1) * half.take(COLUMNS, 1)).sum(2)
+    return (half.take(ROWS, -2) * half.take(COLUMNS, -2)).sum(-1)
 
 
 def covariance_of_scale_and_rotation(scales: Tensor, quaternions: Tensor) -> Tensor:
-    """(N,6) of standard deviations (N,3) and quaternions w x y z (N,4) of any length."""
-    return covariance_of_half(rotation_matrix(quaternions) * scales.reshape(scales.shape[0], 1, 3))
+    """(...,6) of standard deviations (...,3) and quaternions w x y z (...,4) of any length."""
+    return covariance_of_half(rotation_matrix(quaternions) * scales.reshape(*scales.shape[:-1], 1, 3))

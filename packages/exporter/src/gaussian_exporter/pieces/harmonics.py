@@ -11,7 +11,7 @@ _C3 = [0.25 * sqrt(35 / (2 * pi)), 0.5 * sqrt(105 / pi), 0.25 * sqrt(21 / (2 * p
 
 
 def basis(directions: Tensor, degree: int) -> Tensor:
-    """Values (N,(degree+1)^2) of the harmonics in unit directions (N,3), with 3DGS's signs."""
+    """Values (...,(degree+1)^2) of the harmonics in unit directions (...,3), with 3DGS's signs."""
     graph = directions.graph
     x, y, z = (directions.part(i, i + 1) for i in range(3))
     columns = [x * 0.0 + _C0]
@@ -25,12 +25,12 @@ def basis(directions: Tensor, degree: int) -> Tensor:
         columns += [y * (xx * 3.0 - yy) * -_C3[0], x * y * z * _C3[1], y * five * -_C3[2]]
         columns += [z * (zz * 5.0 - 3.0) * _C3[3], x * five * -_C3[2]]
         columns += [z * (xx - yy) * (_C3[1] / 2), x * (xx - yy * 3.0) * -_C3[0]]
-    return graph.concat(columns, 1)
+    return graph.concat(columns, -1)
 
 
 def colour(directions: Tensor, sh: Tensor) -> Tensor:
-    """Colours (N,3), not negative, of harmonics (N,(d+1)^2,3) seen along unit directions (N,3)."""
-    count, terms = sh.shape[:2]
+    """Colours (...,N,3), not negative, of harmonics (N,(d+1)^2,3) seen along unit directions (...,N,3)."""
+    terms = sh.shape[1]
     degree = {1: 0, 4: 1, 9: 2, 16: 3}[terms]
-    values = basis(directions, degree).reshape(count, terms, 1) * sh
-    return (values.sum(1) + 0.5).unary("Relu")
+    values = basis(directions, degree).reshape(*directions.shape[:-1], terms, 1) * sh
+    return (values.sum(-2) + 0.5).unary("Relu")

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import prod
 
 from ..arrays import Floats
 from ..graph import Tensor
@@ -26,14 +27,16 @@ class Linear:
 
 
 def linear(x: Tensor, layer: Linear, name: str) -> Tensor:
-    """One layer on rows (N, in)."""
+    """One layer on rows (..., in)."""
     graph = x.graph
     weight = graph.constant(layer.weight.T, f"{name}_weight")
     bias = graph.constant(layer.bias, f"{name}_bias")
-    if x.shape[1] != layer.inputs:
+    if x.shape[-1] != layer.inputs:
         # The product raises the error that says so.
         return x @ weight
-    return graph.node("Gemm", [x, weight, bias], (x.shape[0], layer.outputs))
+    rows = x.reshape(prod(x.shape[:-1]), layer.inputs)
+    result = graph.node("Gemm", [rows, weight, bias], (rows.shape[0], layer.outputs))
+    return result.reshape(*x.shape[:-1], layer.outputs)
 
 
 def mlp(x: Tensor, layers: Sequence[Linear], name: str, last: str | None = None) -> Tensor:

@@ -1,0 +1,111 @@
+import type { OnnxDim, OnnxHeader, OnnxTensor } from '../onnx/header.js';
+import type { ContractFault } from './contract-error.js';
+import type { Contract } from './contract.js';
+import { tensorNames } from './parse-contract.js';
+import type { OutputTensor } from './check-outputs.js';
+
+/** Inputs that come from another model or are a picture: all instances of a run share them. */
+const SHARED_ROLES: readonly string[] = ['gaussians', 'image'];
+
+/** True if a tensor has a row for each instance: its first dimension is the axis that the contract names. */
+export function hasInstances({ dims }: Pick<OnnxTensor, 'dims'>, { instances }: Contract): boolean {
+  return instances !== undefined && dims?.[0] === instances.axis;
+}
+
+/**
+ * The header of one instance: the same without the instances' axis. What roles and layouts ask of shapes, they ask of this one.
+ * @returns the header itself where the contract declares no instances.
+ */
+export function oneInstance(header: OnnxHeader, contract: Contract): OnnxHeader {
+  if (contract.instances === undefined) return header;
+  return withAxis(header, contract, (rest) => rest);
+}
+
+/** The header of a run of `count` instances: the axis is that number. */
+export function ofInstances(header: OnnxHeader, contract: Contract, count: number): OnnxHeader {
+  return withAxis(header, contract, (rest) => [count, ...rest]);
+}
+
+function withAxis(header: OnnxHeader, contract: Contract, change: (rest: OnnxDim[]) => OnnxDim[]): OnnxHeader {
+  const changed = (tensor: OnnxTensor): OnnxTensor =>
+    hasInstances(tensor, contract) ? { ...tensor, dims: change(tensor.dims!.slice(1)) } : tensor;
+  return { ...header, inputs: header.inputs.map(changed), outputs: header.outputs.map(changed) };
+}
+
+/** What one of the instances of a run wrote, as a run without that axis would have written it. */
+export function outputsOfInstance(
+  outputs: Readonly<Record<string, OutputTensor>>,
+  instance: number,
+): Record<string, OutputTensor> {
+  const parts = Object.entries(outputs).map(([name, { dtype, dims, data }]) => {
+    const size = dims.slice(1).reduce((product, dim) => product * dim, 1);
+    const part = partOf(data, instance * size, (instance + 1) * size);
+    return [name, { dtype, dims: dims.slice(1), data: part }] as const;
+  });
+  return Object.fromEntries(parts);
+}
+
+/** A view, where the numbers are in a typed array. */
+function partOf(data: ArrayLike<number>, start: number, end: number): ArrayLike<number> {
+  return ArrayBuffer.isView(data) ? (data as Float32Array).subarray(start, end) : Array.from(data).slice(start, end);
+}
+
+/** Whether the axis stands where it must: first in every output that the contract names and in at least one input, and nowhere else. */
+export function checkInstances(header: OnnxHeader, contract: Contract): ContractFault[] {
+  const { instances, outputs, inputs } = contract;
+  if (instances === undefined) return [];
+  const { axis } = instances;
+  const fault = (where: string, expected: string, found: string, remedy: string, tensor?: string): ContractFault => ({
+    code: 'contract/instances',
+    tensor,
+    where,
+    expected,
+    found,
+    remedy,
+  });
+  if (outputs.layout === 'image') {
+    return [fault('instances', 'a model that writes Gaussians', 'a post-processor', 'leave out instances')];
+  }
+  const names = new Set(tensorNames(outputs).map(([, name]) => name));
+  const written = header.outputs.filter(({ name, dims }) => names.has(name) && dims !== undefined);
+  const roleOf = ({ name }: OnnxTensor): string => (Object.hasOwn(inputs, name) ? inputs[name].role : '');
+  return [
+    ...written
+      .filter((output) => !hasInstances(output, contract))
+      .map(({ name, dims }) => {
+        const remedy = `export it with the symbolic axis ${axis} before all others`;
+        return fault(`output ${name}`, `${axis} as its first dimension`, `[${dims!.join(', ')}]`, remedy, name);
+      }),
+    // Slices of one instance begin at the same place in every run.
+    ...written
+      .filter(
+        (output) => hasInstances(output, contract) && output.dims!.slice(1).some((dim) => typeof dim !== 'number'),
+      )
+      .map(({ name, dims }) => {
+        const remedy = 'fix N; rows that do not live may lie behind a count, or have the opacity 0';
+        return fault(`output ${name}`, `numbers behind ${axis}`, `[${dims!.join(', ')}]`, remedy, name);
+      }),
+    ...[...header.inputs, ...written]
+      .filter(({ dims }) => dims?.slice(1).includes(axis))
+      .map(({ name, dims }) => {
+        const remedy = "name the instances' axis as no other axis is named, and put it first";
+        return fault(`tensor ${name}`, `${axis} as the first dimension only`, `[${dims!.join(', ')}]`, remedy, name);
+      }),
+    ...header.inputs
+      .filter((input) => hasInstances(input, contract) && SHARED_ROLES.includes(roleOf(input)))
+      .map(({ name, dims }) => {
+        const remedy = 'export it without the axis';
+        return fault(`input ${name}`, 'a tensor that all instances share', `[${dims!.join(', ')}]`, remedy, name);
+      }),
+    ...(header.inputs.some((input) => hasInstances(input, contract))
+      ? []
+      : [
+          fault(
+            'instances',
+            `an input whose first dimension is ${axis}`,
+            'none',
+            'leave out instances: all would be alike',
+          ),
+        ]),
+  ];
+}

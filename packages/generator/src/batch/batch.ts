@@ -1,0 +1,186 @@
+import type { Inputs } from '../input-value.js';
+import { RunLoop } from '../run-loop.js';
+import type { GeneratorSession } from '../runtime/generator-session.js';
+import type { RunOutputs, SessionKind } from '../runtime/live-session.js';
+import { groupInstances, inputsOfInstances, stackInputs } from './stack-inputs.js';
+import { StepSessions } from './step-sessions.js';
+import { endOfTask } from './end-of-task.js';
+
+/** What an instance asks for. */
+interface Wish {
+  readonly inputs: Inputs;
+}
+
+/** One instance, as a batch sees it. */
+export interface BatchMember<W extends Wish> {
+  /** Whether there is anything to do for a wish. */
+  readonly isDue: (wish: W) => boolean;
+  /** Takes what a run wrote; `instance` says which of its instances is this one. It must submit its work before it returns. */
+  readonly take: (wish: W, outputs: RunOutputs, instance: number) => void;
+  /** The run is submitted; it started at `start`, as `performance.now()` has it. */
+  readonly onTaken: (wish: W, start: number) => void;
+  readonly onError: (error: unknown) => void;
+}
+
+const batches = new WeakMap<GeneratorSession, Batch>();
+
+/** The batch of all instances of a session. @param session of a model that declares instances */
+export function batchOf(session: GeneratorSession): Batch {
+  let batch = batches.get(session);
+  if (batch === undefined) batches.set(session, (batch = new Batch(session)));
+  return batch;
+}
+
+/**
+ * All instances of one generator on one device: those that ask within a task run together, each with its own inputs, and each gets its slice
+ * of what the run writes. The latest wish of each wins, and there is one loop for all, so that they stay together.
+ */
+export class Batch {
+  readonly #session: GeneratorSession;
+  readonly #varying: ReadonlySet<string>;
+  readonly #steps: StepSessions;
+  readonly #seats = new Set<Seat<Wish>>();
+  readonly #loop: RunLoop<true>;
+
+  constructor(session: GeneratorSession) {
+    this.#session = session;
+    const { header, contract } = session.model;
+    this.#varying = inputsOfInstances(header, contract);
+    this.#steps = new StepSessions(session);
+    this.#loop = new RunLoop({
+      queue: session.device.queue,
+      isDue: () => this.#due().length > 0,
+      run: () => this.#run(),
+      onError: (error) => this.#seats.forEach((seat) => seat.member.onError(error)),
+    });
+  }
+
+  /** How it runs; undefined before the first run. */
+  get kind(): SessionKind | undefined {
+    return this.#steps.kind;
+  }
+
+  /** Fulfils, and never rejects, when no run is on its way. */
+  get idle(): Promise<void> {
+    return this.#loop.idle;
+  }
+
+  /** Adds an instance. */
+  join<W extends Wish>(member: BatchMember<W>): Seat<W> {
+    const seat = new Seat(this, member, {
+      ask: () => this.#loop.request(true),
+      leave: () => this.#leave(seat as unknown as Seat<Wish>),
+    });
+    this.#seats.add(seat as unknown as Seat<Wish>);
+    return seat;
+  }
+
+  #leave(seat: Seat<Wish>): void {
+    this.#seats.delete(seat);
+    if (this.#seats.size > 0) return;
+    this.#loop.close();
+    // Whoever comes next begins anew.
+    if (batches.get(this.#session) === this) batches.delete(this.#session);
+    void this.#loop.idle.then(() => this.#steps.release());
+  }
+
+  #due(): Seat<Wish>[] {
+    return [...this.#seats].filter((seat) => seat.isDue);
+  }
+
+  async #run(): Promise<void> {
+    await endOfTask();
+    const asked = this.#due().map((seat) => ({ seat, wish: seat.takeWish()!, inputs: seat.inputs }));
+    for (const group of groupInstances(asked, this.#varying, this.#steps.most)) await this.#runGroup(group);
+  }
+
+  async #runGroup(group: readonly { seat: Seat<Wish>; wish: Wish; inputs: Inputs }[]): Promise<void> {
+    const start = performance.now();
+    const failed = new Set<Seat<Wish>>();
+    const fail = (seat: Seat<Wish>, error: unknown): void => {
+      failed.add(seat);
+      if (!seat.isClosed) seat.member.onError(error);
+    };
+    try {
+      const { session, count } = this.#steps.sessionFor(group.length);
+      const inputs = stackInputs(
+        group.map((each) => each.inputs),
+        this.#varying,
+        count,
+      );
+      await session.run(inputs, (outputs) => {
+        group.forEach(({ seat, wish }, instance) => {
+          if (seat.isClosed) return;
+          try {
+            seat.member.take(wish, outputs, instance);
+          } catch (error) {
+            // What one cannot take is nothing to the others.
+            fail(seat, error);
+          }
+        });
+      });
+    } catch (error) {
+      for (const { seat } of group) fail(seat, error);
+    }
+    for (const { seat, wish } of group) if (!seat.isClosed && !failed.has(seat)) seat.member.onTaken(wish, start);
+  }
+}
+
+/** The place of one instance in a batch; asked like a {@link RunLoop} of its own. */
+export class Seat<W extends Wish> {
+  readonly member: BatchMember<W>;
+  readonly #batch: Batch;
+  readonly #calls: { readonly ask: () => void; readonly leave: () => void };
+  #wish: W | undefined;
+  #taken: W | undefined;
+  #isClosed = false;
+
+  constructor(batch: Batch, member: BatchMember<W>, calls: { readonly ask: () => void; readonly leave: () => void }) {
+    this.#batch = batch;
+    this.member = member;
+    this.#calls = calls;
+  }
+
+  get isClosed(): boolean {
+    return this.#isClosed;
+  }
+
+  /** How the batch runs; undefined before its first run. */
+  get kind(): SessionKind | undefined {
+    return this.#batch.kind;
+  }
+
+  get idle(): Promise<void> {
+    return this.#batch.idle;
+  }
+
+  /** True if there is a wish, and anything to do for it. */
+  get isDue(): boolean {
+    return this.#wish !== undefined && this.member.isDue(this.#wish);
+  }
+
+  /** Inputs of the wish that was taken last. */
+  get inputs(): Inputs {
+    return this.#taken?.inputs ?? {};
+  }
+
+  /** Returns at once; a wish that has not started yet is replaced. */
+  request(wish: W): void {
+    if (this.#isClosed) return;
+    this.#wish = wish;
+    this.#calls.ask();
+  }
+
+  takeWish(): W | undefined {
+    this.#taken = this.#wish;
+    this.#wish = undefined;
+    return this.#taken;
+  }
+
+  close(): void {
+    if (this.#isClosed) return;
+    this.#isClosed = true;
+    this.#wish = undefined;
+    this.#calls.leave();
+  }
+}
