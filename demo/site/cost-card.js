@@ -41,7 +41,6 @@ export function fillCostCard(list, facts, element) {
 async function measureInto(place, button, element) {
   button.disabled = true;
   button.textContent = 'Measuring…';
-  element.scrollIntoView({ block: 'nearest' });
   try {
     const { median, frames, width, height } = await measureFrames(element);
     const adapter = await adapterName();

@@ -53,7 +53,9 @@ function markdownIn(folder) {
 function describe(source, section) {
   const text = readFileSync(posix.join(root, source), 'utf8');
   const [, heading] = /^# (.+)$/m.exec(text) ?? [];
-  return { source, section, title: TITLES[source] ?? plain(heading ?? source), url: urlOf(source), text };
+  const title = TITLES[source] ?? plain(heading ?? source);
+  // A licence has no heading; a page needs one.
+  return { source, section, title, url: urlOf(source), text: heading ? text : `# ${title}\n\n${text}` };
 }
 
 /** A heading without its marks. */

@@ -24,6 +24,7 @@ const urlOfSource = new Map(documents.map(({ source, url }) => [source, url]));
 export function improveMarkdown(markdown) {
   markdown.core.ruler.push('documents', ({ tokens, env }) => {
     nameHeadings(tokens);
+    emptyHeads(tokens);
     for (const token of tokens) if (token.type === 'inline') rewriteInline(token.children, env);
   });
   const { rules } = markdown.renderer;
@@ -53,6 +54,15 @@ function nameHeadings(tokens) {
     const times = taken.get(slug) ?? 0;
     taken.set(slug, times + 1);
     token.attrSet('id', times === 0 ? slug : `${slug}-${times}`);
+  });
+}
+
+/** A head cell without words is no heading for anybody who hears the table. */
+function emptyHeads(tokens) {
+  tokens.forEach((token, i) => {
+    if (token.type !== 'th_open' || tokens[i + 1].content !== '') return;
+    token.tag = 'td';
+    tokens[i + 2].tag = 'td';
   });
 }
 
