@@ -5,6 +5,9 @@ import { differenceOf } from './difference.js';
 import { keepInStep } from './in-step.js';
 
 const byId = (id) => document.getElementById(id);
+const query = new URLSearchParams(location.search);
+/** Most frames that are measured of each side. */
+const FRAMES = Number(query.get('frames') ?? 20);
 const [left, right] = ['left', 'right'].map(byId);
 const sides = [left, right];
 
@@ -33,7 +36,7 @@ async function measure() {
   byId('measure').disabled = true;
   try {
     const times = [];
-    for (const element of sides) times.push(await measureFrames(element, { frames: 20 }));
+    for (const element of sides) times.push(await measureFrames(element, { frames: FRAMES }));
     const { decibels, worst } = await differenceOf(left, right);
     const rows = sides.map((element, i) => [
       byId(`${element.id}-name`).textContent,
@@ -56,7 +59,6 @@ function rowOf(texts) {
   return row;
 }
 
-const query = new URLSearchParams(location.search);
 choose(left, query.get('left') ?? 'default,3');
 choose(right, query.get('right') ?? 'fast,3');
 for (const element of sides) {

@@ -61,7 +61,10 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
   });
 
   it('measures both, and how far harmonics of degree 0 are from those of degree 2', { timeout: 200_000 }, async () => {
-    const { tab, faults } = await open.visit('/compare/?left=default,3&right=default,0', { width: 240, height: 400 });
+    const { tab, faults } = await open.visit('/compare/?left=default,3&right=default,0&frames=3', {
+      width: 240,
+      height: 400,
+    });
     await bothLoaded(tab);
     await tab.click('#measure');
     await tab.waitForFunction(

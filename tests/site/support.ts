@@ -23,9 +23,17 @@ export interface Visit {
   readonly faults: string[];
 }
 
+export interface VisitOptions {
+  /** Of the window, in CSS pixels. */
+  readonly width?: number;
+  readonly height?: number;
+  /** What is to be done before the page is asked for. */
+  readonly prepare?: (tab: Page) => Promise<unknown>;
+}
+
 export interface OpenSite {
-  /** Opens a page; `size` is that of the window in CSS pixels. */
-  visit(path: string, size?: { width: number; height: number }): Promise<Visit>;
+  /** Opens a page. */
+  visit(path: string, options?: VisitOptions): Promise<Visit>;
   close(): Promise<void>;
 }
 
@@ -46,8 +54,8 @@ export async function openSite(): Promise<OpenSite> {
     args: SWIFTSHADER_FLAGS,
   });
   return {
-    async visit(path, size = { width: 390, height: 800 }) {
-      const tab = await browser.newPage({ viewport: size });
+    async visit(path, { width = 390, height = 800, prepare } = {}) {
+      const tab = await browser.newPage({ viewport: { width, height } });
       const faults: string[] = [];
       tab.on('pageerror', (error) => faults.push(`uncaught: ${error.message}`));
       tab.on('console', (message) => {
@@ -59,6 +67,7 @@ export async function openSite(): Promise<OpenSite> {
         if (response.status() >= 400 && !MAY_BE_MISSING.test(pathname))
           faults.push(`${response.status()}: ${pathname}`);
       });
+      await prepare?.(tab);
       await tab.goto(`http://localhost:${port}${path}`);
       return { tab, faults };
     },
