@@ -1,8 +1,18 @@
 /** `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, what editors know of the element, and the demo as a static site. */
-import { cpSync, existsSync, mkdirSync, readdirSync, rmSync } from 'node:fs';
+import { rmSync } from 'node:fs';
 import { join } from 'node:path';
 import { ensureDependencies } from './lib/prepare.mjs';
 import { must, root } from './lib/run.mjs';
+
+/** Scripts of pages, each beside its page. */
+const SCRIPTS = [
+  'home.js',
+  'check/check.js',
+  'compare/compare.js',
+  'examples/examples.js',
+  'playground/playground.js',
+  'stability/stability.js',
+];
 
 ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
@@ -15,11 +25,6 @@ must(process.execPath, [
 ]);
 describeElement();
 await buildDemo();
-
-/** Folders of the demo that frameworks build with their own tools. */
-function apps() {
-  return ['react', 'vue'];
-}
 
 function projects() {
   return ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react'].map(
@@ -34,35 +39,27 @@ function describeElement() {
   must(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], { cwd: join(root, 'packages/element') });
 }
 
-/** demo/dist is the whole site: any static host can serve it. */
+/** demo/dist is the whole site: any static host can serve it. Pages by Eleventy, their scripts by esbuild, the apps by Vite. */
 async function buildDemo() {
   const from = join(root, 'demo');
   const to = join(root, 'demo/dist');
   rmSync(to, { recursive: true, force: true });
-  mkdirSync(to, { recursive: true });
-  for (const name of readdirSync(from)) {
-    if (!['dist', 'bench', ...apps()].includes(name)) cpSync(join(from, name), join(to, name), { recursive: true });
-  }
-  cpSync(join(root, 'packages/element/cdn'), join(to, 'cdn'), { recursive: true });
-  cpSync(join(root, 'docs/stability'), join(to, 'stability/data'), { recursive: true });
+  must(process.execPath, ['node_modules/@11ty/eleventy/cmd.cjs', '--quiet', '--config=demo/site/eleventy.config.mjs']);
   // Its packages were not there when this script started on a fresh clone.
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));
   const { build } = await import('esbuild');
-  for (const script of ['check/check.js', 'examples/examples.js']) {
-    await build({
-      entryPoints: [join(from, script)],
-      outfile: join(to, script),
-      allowOverwrite: true,
-      bundle: true,
-      format: 'esm',
-      minify: true,
-      logLevel: 'warning',
-    });
-  }
-  for (const app of apps()) {
+  await build({
+    entryPoints: SCRIPTS.map((name) => join(from, name)),
+    outdir: to,
+    outbase: from,
+    bundle: true,
+    format: 'esm',
+    minify: true,
+    logLevel: 'warning',
+  });
+  for (const app of ['react', 'vue']) {
     const config = join(from, app, 'vite.config.mjs');
     must(process.execPath, ['node_modules/vite/bin/vite.js', 'build', '--config', config, '--logLevel', 'warn']);
   }
-  if (!existsSync(join(to, 'index.html'))) throw new Error('demo/index.html is missing');
 }

@@ -1,5 +1,6 @@
 /** The page of trained examples: what each costs, read from its own files, and handles for time, pose and shape. */
 import { openUrl, readOnnxHeader, resolveContract } from '@gaussian-splat/core';
+import { fillCostCard } from '../site/cost-card.js';
 import { poseOf, walkingPose } from './poses.js';
 
 const PACES_PER_SECOND = 0.9;
@@ -14,21 +15,17 @@ async function readFacts(name) {
   return { bytes: source.size, contract: resolveContract({ header }).contract, record: await response.json() };
 }
 
-/** Fills the card: bytes, Gaussians, accuracy, training, licence. */
-function showCost(list, { bytes, contract, record }) {
+/** What is known without running it: bytes, Gaussians, accuracy, training, licence. */
+function factsOf({ bytes, contract, record }) {
   const unseen = record.unseen ? `; ${record.unseen.psnr.toFixed(1)} dB on a scene that it never saw` : '';
   const inside = record.outline_psnr ? `; ${record.outline_psnr.toFixed(1)} dB inside the outline` : '';
-  const rows = [
+  return [
     ['File', `${(bytes / 1e6).toFixed(2)} MB`],
     ...(contract.nMax ? [['Gaussians', contract.nMax.toLocaleString('en')]] : []),
     ['Held-out PSNR', `${record.held_out_psnr.toFixed(1)} dB${inside}${unseen}`],
     ['Trained', `${Math.round(record.seconds)} s on one ${record.device}, ${record.steps.toLocaleString('en')} steps`],
     ['Licence', `${contract.license}. ${contract.attribution}`],
   ];
-  const cells = rows.flatMap((row) =>
-    row.map((text, column) => Object.assign(document.createElement(column === 0 ? 'dt' : 'dd'), { textContent: text })),
-  );
-  list.replaceChildren(...cells);
 }
 
 /** Play, pause and a slider that follows. */
@@ -104,15 +101,42 @@ function conductWalker(card, joints) {
   pose();
 }
 
-conductPlant(exampleOf('plant'));
-conductPictures(exampleOf('statue')).catch((error) => console.error(error));
-for (const card of document.querySelectorAll('[data-example]')) {
+/** The painter runs where somebody asks for it: it is the one example that a slow GPU has no patience for. */
+function conductPainter(card, facts) {
+  card.querySelector('[data-paint]').addEventListener('click', ({ target }) => {
+    target.remove();
+    const scene = card.querySelector('template').content.cloneNode(true).firstElementChild;
+    card.querySelector('.words').before(scene);
+    card.querySelector('img').remove();
+    const status = card.querySelector('[role=status]');
+    scene.addEventListener('generator-error', ({ detail }) => (status.textContent = detail.message));
+    scene.addEventListener('generator-fallback', ({ detail }) => (status.textContent = `On the CPU: ${detail.reason}`));
+    fillCostCard(card.querySelector('.cost'), facts, scene);
+  });
+}
+
+/** A file's card needs no ONNX header: what is known of it stands in the page. */
+function showFile(card) {
+  const facts = Object.entries(JSON.parse(card.dataset.facts));
+  fillCostCard(card.querySelector('.cost'), facts, card.querySelector('gaussian-splat'));
+}
+
+function showModel(card) {
   const name = card.dataset.example;
   readFacts(name).then(
-    (facts) => {
-      showCost(card.querySelector('.cost'), facts);
-      if (name === 'walker') conductWalker(card, facts.contract.inputs.pose.joints);
+    (read) => {
+      const facts = factsOf(read);
+      fillCostCard(card.querySelector('.cost'), facts, card.querySelector('gaussian-splat'));
+      if (name === 'walker') conductWalker(card, read.contract.inputs.pose.joints);
+      if (name === 'oil') conductPainter(card, facts);
     },
     (error) => (card.querySelector('.cost').textContent = error.message),
   );
+}
+
+conductPlant(exampleOf('plant'));
+conductPictures(exampleOf('statue')).catch((error) => console.error(error));
+for (const card of document.querySelectorAll('[data-example]')) {
+  if (card.dataset.facts) showFile(card);
+  else showModel(card);
 }

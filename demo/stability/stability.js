@@ -19,6 +19,9 @@ function table(head, rows) {
     );
   return make('div', make('table', [line('th', head), ...rows.map((cells) => line('td', cells))]), {
     className: 'scroll',
+    tabIndex: 0,
+    role: 'group',
+    ariaLabel: 'Figures',
   });
 }
 

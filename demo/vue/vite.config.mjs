@@ -7,5 +7,12 @@ export default defineConfig({
   plugins: [vue({ template: { compilerOptions: { isCustomElement: (tag) => tag === 'gaussian-splat' } } })],
   // The element's worker loads its readers on demand, and only ES modules can.
   worker: { format: 'es' },
-  build: { outDir: '../dist/vue', emptyOutDir: true, target: 'es2022', chunkSizeWarningLimit: 2000 },
+  // Eleventy writes the page (index.njk); here its script is made, with a name that the page can know.
+  build: {
+    outDir: '../dist/vue',
+    emptyOutDir: false,
+    target: 'es2022',
+    chunkSizeWarningLimit: 2000,
+    rollupOptions: { input: 'main.ts', output: { entryFileNames: 'assets/app.js' } },
+  },
 });

@@ -1,6 +1,6 @@
-/** Bundles the benchmark pages, with the peers they measure, into a folder that any static host can serve. */
+/** Bundles the scripts of the benchmark pages, with the peers they measure. The pages themselves are the site's. */
 import { execFileSync } from 'node:child_process';
-import { cpSync, readdirSync, readFileSync } from 'node:fs';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { build } from 'esbuild';
 import { root } from './run.mjs';
@@ -15,12 +15,9 @@ const ENTRIES = [
   'peers/spark',
 ];
 
-/** @param folder where the pages go, for example demo/dist/bench. */
+/** @param folder where the pages are, for example demo/dist/bench. */
 export async function bundleBench(folder) {
   const from = join(root, 'demo/bench');
-  for (const name of readdirSync(from, { recursive: true })) {
-    if (/\.(html|css)$/.test(name)) cpSync(join(from, name), join(folder, name));
-  }
   await build({
     entryPoints: ENTRIES.map((name) => join(from, `${name}.js`)),
     outdir: folder,

@@ -19,7 +19,9 @@ export function ensureDependencies() {
 /** Builds everything unless nothing changed since the last build. */
 export function ensureBuilt() {
   const stamp = join(root, '.cache/built');
-  const newest = Math.max(...['shaders', 'packages', 'demo', 'scripts', 'package.json'].map(newestChange));
+  const newest = Math.max(
+    ...['shaders', 'packages', 'demo', 'docs', 'scripts', 'package.json', ...AT_ROOT].map(newestChange),
+  );
   if (existsSync(stamp) && statSync(stamp).mtimeMs >= newest && existsSync(join(root, 'packages/element/dist'))) return;
   build();
   mkdirSync(join(root, '.cache'), { recursive: true });
@@ -31,6 +33,8 @@ export function build() {
   must(process.execPath, ['scripts/build.mjs']);
 }
 
+/** Documents that the site shows. */
+const AT_ROOT = ['README.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'SECURITY.md', 'LICENSE'];
 const IGNORED = new Set(['node_modules', 'dist', 'cdn', 'generated']);
 
 /** Latest modification time under a path, in milliseconds. */

@@ -29,6 +29,7 @@ const ABSENT: RawAttributes = {
   up: null,
   maxPixelRatio: null,
   quality: null,
+  maxShDegree: null,
   reveal: null,
   navigation: null,
   autoRotateDelay: null,
@@ -130,6 +131,7 @@ test('an absent attribute takes its default in silence', () => {
   assert.equal(read.interpolationDecay, 50);
   assert.equal(read.maxPixelRatio, Infinity);
   assert.equal(read.quality, 'default');
+  assert.equal(read.maxShDegree, 3);
   assert.equal(read.camera.up, '-y');
   assert.deepEqual(read.camera.orbit, { theta: 0, phi: 75 * DEGREE, radius: 'auto' });
 });
@@ -145,6 +147,7 @@ test('a malformed attribute takes its default with one warning that says what wa
     'interpolation-decay': 'interpolationDecay',
     'max-pixel-ratio': 'maxPixelRatio',
     quality: 'quality',
+    'max-sh-degree': 'maxShDegree',
   })) {
     const warnings: string[] = [];
     const read = readAttributes({ ...ABSENT, [key]: 'nonsense' }, (sentence) => warnings.push(sentence));
@@ -158,9 +161,10 @@ test('a malformed attribute takes its default with one warning that says what wa
 });
 
 test('properties may hold numbers where attributes hold text', () => {
-  const read = readAttributes({ ...ABSENT, interpolationDecay: 120, maxPixelRatio: 1.5 }, assert.fail);
+  const read = readAttributes({ ...ABSENT, interpolationDecay: 120, maxPixelRatio: 1.5, maxShDegree: 1 }, assert.fail);
   assert.equal(read.interpolationDecay, 120);
   assert.equal(read.maxPixelRatio, 1.5);
+  assert.equal(read.maxShDegree, 1);
 });
 
 test('crossorigin as of <img>', () => {

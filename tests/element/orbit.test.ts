@@ -63,6 +63,7 @@ const settings = (changes: Record<string, string> = {}): CameraSettings =>
       up: null,
       maxPixelRatio: null,
       quality: null,
+      maxShDegree: null,
       reveal: null,
       navigation: null,
       autoRotateDelay: null,

@@ -11,6 +11,7 @@ import {
   type AttributeGrammar,
 } from './camera/grammar.js';
 import { QUALITIES, type Quality } from '@gaussian-splat/renderer';
+import type { ShDegree } from '@gaussian-splat/core';
 import type { CameraSettings } from './camera/settings.js';
 
 /** When loading starts: once the element is in sight, or as soon as it is in the page. */
@@ -50,6 +51,7 @@ export interface RawAttributes {
   readonly up: Raw;
   readonly maxPixelRatio: Raw;
   readonly quality: Raw;
+  readonly maxShDegree: Raw;
   readonly reveal: Raw;
   readonly navigation: Raw;
   readonly autoRotateDelay: Raw;
@@ -71,6 +73,8 @@ export interface Attributes {
   readonly maxPixelRatio: number;
   /** The renderer's mix of accuracy and speed. */
   readonly quality: Quality;
+  /** Spherical harmonics above this degree are not evaluated. */
+  readonly maxShDegree: ShDegree;
   readonly reveal: Reveal;
   readonly navigation: Navigation;
   /** Rest before the camera turns by itself, ms. */
@@ -89,6 +93,7 @@ const crossorigin = keywordGrammar(['anonymous', 'use-credentials']);
 const loading = keywordGrammar<Loading>(['lazy', 'eager']);
 const touchAction = keywordGrammar<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']);
 const quality = keywordGrammar<Quality>(['default', ...(Object.keys(QUALITIES) as Quality[])]);
+const maxShDegree = keywordGrammar(['3', '2', '1', '0']);
 const reveal = keywordGrammar<Reveal>(['auto', 'manual']);
 const navigation = keywordGrammar<Navigation>(['orbit', 'fly']);
 const interactionPrompt = keywordGrammar<InteractionPrompt>(['auto', 'none']);
@@ -112,6 +117,7 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
     touchAction: read('touch-action', raw.touchAction, touchAction),
     maxPixelRatio: read('max-pixel-ratio', raw.maxPixelRatio, maxPixelRatio),
     quality: read('quality', raw.quality, quality),
+    maxShDegree: Number(read('max-sh-degree', raw.maxShDegree, maxShDegree)) as ShDegree,
     reveal: read('reveal', raw.reveal, reveal),
     navigation: read('navigation', raw.navigation, navigation),
     autoRotateDelay: read('auto-rotate-delay', raw.autoRotateDelay, threeSeconds),

@@ -28,6 +28,7 @@ export class SplatProperties extends LitElement {
     up: {},
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
     quality: {},
+    maxShDegree: { attribute: 'max-sh-degree' },
     contract: {},
     chain: {},
     postprocess: {},
@@ -88,6 +89,8 @@ export class SplatProperties extends LitElement {
   declare maxPixelRatio: number | string | null;
   /** Accuracy against speed: `reference`, `default`, `balanced` or `fast`. */
   declare quality: 'default' | 'reference' | 'balanced' | 'fast' | null;
+  /** Highest degree of spherical harmonics that colours are made of, 0 to 3; default 3. The file's own are kept. */
+  declare maxShDegree: number | string | null;
   /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
   declare contract: string | object | null;
   /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */

@@ -171,7 +171,7 @@ export class Stage {
       canvasOf: canvas,
       isVisible: () => this.#visibility.isVisible,
       maxPixelRatio: () => attributes().maxPixelRatio,
-      quality: () => attributes().quality,
+      rendering: () => ({ quality: attributes().quality, shDegree: attributes().maxShDegree }),
       decayMs: () => (prefersReducedMotion() ? 0 : attributes().interpolationDecay),
       beforeFrame: (now) => this.behaviours.advance(now),
       afterFrame: (camera) => {

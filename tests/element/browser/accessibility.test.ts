@@ -1,6 +1,6 @@
-/** axe-core on the element in all its states, and on every page of the demo as it is built. */
+/** axe-core on the element in all its states. The pages of the site: tests/site. */
 import '@gaussian-splat/element';
-import { assert, assertEqual, COMPASS, delay, nextEvent, show, showLoaded, until } from './support/harness.js';
+import { assert, assertEqual, COMPASS, nextEvent, show, showLoaded, until } from './support/harness.js';
 
 interface AxeResults {
   readonly violations: readonly {
@@ -84,40 +84,4 @@ describe('axe finds nothing in the element', () => {
       'an input without a label',
     );
   });
-});
-
-const PAGES = [
-  'index.html',
-  'check/index.html',
-  'bench/index.html',
-  'bench/frontier.html',
-  'react/index.html',
-  'vue/index.html',
-];
-
-describe('axe finds nothing on the demo', () => {
-  it('knows all of its pages', async () => {
-    // The pages that the benchmark frames have no content of their own.
-    const found: string[] = [];
-    for (const name of PAGES) if ((await fetch(`/demo/dist/${name}`)).ok) found.push(name);
-    assertEqual(found, PAGES);
-  });
-
-  for (const name of PAGES) {
-    for (const width of [390, 1280]) {
-      it(`${name} at ${width} pixels`, async () => {
-        const frame = document.createElement('iframe');
-        frame.style.cssText = `width: ${width}px; height: 800px; border: 0`;
-        // Benchmarks wait to be started.
-        frame.src = `/demo/dist/${name}`;
-        const loaded = nextEvent(frame, 'load');
-        document.body.append(frame);
-        await loaded;
-        await delay(600);
-        const page = frame.contentDocument;
-        assert(page, 'a page');
-        assertEqual(await violations(page), []);
-      });
-    }
-  }
 });

@@ -1,8 +1,7 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import type { Quality } from '@gaussian-splat/renderer';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { GpuScene, Rendering } from '../gpu/gpu-scene.js';
 import type { Frame } from '../live/frame-filter.js';
 import type { CameraController } from './camera-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
@@ -16,7 +15,7 @@ export interface ViewOptions {
   /** False where nobody would see a frame. */
   readonly isVisible: () => boolean;
   readonly maxPixelRatio: () => number;
-  readonly quality: () => Quality;
+  readonly rendering: () => Rendering;
   /** Time constant of the camera's motion, ms. */
   readonly decayMs: () => number;
   /** Called once a frame before the camera steps: what moves it by itself does so now. */
@@ -123,7 +122,7 @@ export class ViewController implements FrameClient {
   #render(scene: GpuScene, request: Frame): void {
     const first = this.#first;
     this.#first = undefined;
-    scene.setQuality(this.#options.quality());
+    scene.setRendering(this.#options.rendering());
     if (first === undefined) scene.render(request);
     else scene.renderFirst(request).then(first.resolve, first.reject);
   }

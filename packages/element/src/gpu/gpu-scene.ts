@@ -1,4 +1,4 @@
-import { GaussianSplatError, type Bounds } from '@gaussian-splat/core';
+import { GaussianSplatError, type Bounds, type ShDegree } from '@gaussian-splat/core';
 import {
   chooseVariants,
   GaussianBuffers,
@@ -23,6 +23,13 @@ export interface OwnedGaussians extends GaussianScene {
   destroy(): void;
 }
 
+/** How frames are drawn. */
+export interface Rendering {
+  readonly quality: Quality;
+  /** Spherical harmonics above this degree are not evaluated. */
+  readonly shDegree: ShDegree;
+}
+
 /**
  * A scene on the GPU: its splats, the renderer that draws them (whose buffers fit this scene and this picture size,
  * and so cannot be shared), and the lease that keeps the device.
@@ -35,7 +42,7 @@ export class GpuScene {
   /** Called when the frame just drawn lacked something that the next one will have. */
   onIncomplete: () => void = () => undefined;
   #renderer: Renderer;
-  #quality: Quality = 'default';
+  #rendering: Rendering = { quality: 'default', shDegree: 3 };
   #filter: FrameFilter | undefined;
   readonly #submissions: number;
   readonly #lease: DeviceLease;
@@ -67,10 +74,11 @@ export class GpuScene {
     return this.#destroyed;
   }
 
-  /** Draws the frames to come at this quality. */
-  setQuality(quality: Quality): void {
-    if (quality === this.#quality) return;
-    this.#quality = quality;
+  /** Draws the frames to come like this. */
+  setRendering(rendering: Rendering): void {
+    const { quality, shDegree } = this.#rendering;
+    if (rendering.quality === quality && rendering.shDegree === shDegree) return;
+    this.#rendering = rendering;
     this.#renderer.destroy();
     this.#renderer = this.#makeRenderer();
   }
@@ -91,13 +99,14 @@ export class GpuScene {
       this.#filter?.invalidate();
       this.onIncomplete();
     };
-    return new Renderer(this.device, { quality: this.#quality, submissions: this.#submissions, onIncomplete });
+    return new Renderer(this.device, { ...this.#rendering, submissions: this.#submissions, onIncomplete });
   }
 
   /** Encodes and submits one frame. */
   render(frame: Frame): void {
     const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, gaussians: this.gaussians });
-    if (this.#filter) this.#filter.render(frame, `${this.gaussians.version} ${this.#quality}`, draw);
+    const { quality, shDegree } = this.#rendering;
+    if (this.#filter) this.#filter.render(frame, `${this.gaussians.version} ${quality} ${shDegree}`, draw);
     else draw(frame);
   }
 

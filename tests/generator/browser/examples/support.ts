@@ -42,6 +42,9 @@ export async function open(name: string): Promise<OpenExample> {
   element.scrollIntoView({ block: 'center' });
   await until(() => element.loaded || element.error !== null, `${name} on show`, PATIENCE_MS);
   assertEqual(element.error?.message, undefined, name);
+  await until(() => card.querySelector('.cost')!.childElementCount > 0, `${name}: its cost`);
+  // Cards above may have grown meanwhile.
+  element.scrollIntoView({ block: 'center' });
   return { page, card, element, fallbacks };
 }
 

@@ -1,6 +1,11 @@
-/** What the demo page adds to the element: copying a view, opening a file, and showing an error. */
+/** What the first page adds to the element: tabs, copying a view, opening a file, and showing an error. */
+import { copy } from './site/copy.js';
+import { addressOf, takeFiles } from './site/local-file.js';
+import { bringTabsToLife } from './site/tabs.js';
 
 const byId = (id) => document.getElementById(id);
+
+bringTabsToLife(document.querySelector('.tabs'));
 
 byId('copy-view').addEventListener('click', async () => {
   const hero = byId('hero');
@@ -8,43 +13,15 @@ byId('copy-view').addEventListener('click', async () => {
     `<gaussian-splat src="skull.spz" alt="A skull" camera-controls\n` +
     `  camera-orbit="${hero.getCameraOrbit()}" camera-target="${hero.getCameraTarget()}"\n` +
     `  field-of-view="${hero.getFieldOfView()}"></gaussian-splat>`;
-  byId('snippet').textContent = `<script type="module" src="gaussian-splat.min.js"></script>\n${html}`;
-  try {
-    await navigator.clipboard.writeText(html);
-    byId('copied').textContent = 'Copied.';
-  } catch {
-    byId('copied').textContent = 'Shown above: the browser did not allow copying.';
-  }
+  byId('snippet').textContent = `<script type="module" src="cdn/gaussian-splat.min.js"></script>\n${html}`;
+  byId('copied').textContent = await copy(html);
 });
 
-let objectUrl;
-
-/** Shows a local file. The name goes into the fragment, so that the element can tell formats without a signature apart. */
-function open(file) {
+takeFiles(byId('drop'), (file) => {
   const element = byId('own-scene');
-  if (objectUrl) URL.revokeObjectURL(objectUrl);
-  objectUrl = URL.createObjectURL(file);
   element.hidden = false;
-  element.src = `${objectUrl}#${encodeURIComponent(file.name)}`;
+  element.src = addressOf(file);
   byId('own-status').textContent = `Loading ${file.name}`;
-}
-
-byId('file').addEventListener('change', ({ target }) => {
-  if (target.files.length > 0) open(target.files[0]);
-});
-
-const drop = byId('drop');
-for (const type of ['dragenter', 'dragover']) {
-  drop.addEventListener(type, (event) => {
-    event.preventDefault();
-    drop.classList.add('over');
-  });
-}
-for (const type of ['dragleave', 'drop']) drop.addEventListener(type, () => drop.classList.remove('over'));
-drop.addEventListener('drop', (event) => {
-  event.preventDefault();
-  const [file] = event.dataTransfer.files;
-  if (file) open(file);
 });
 
 /** Tells below an element what became of its source. */

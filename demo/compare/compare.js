@@ -1,0 +1,84 @@
+/** Two elements, one camera, one line between their pictures. */
+import { addressOf, takeFiles } from '../site/local-file.js';
+import { measureFrames } from '../site/measure.js';
+import { differenceOf } from './difference.js';
+import { keepInStep } from './in-step.js';
+
+const byId = (id) => document.getElementById(id);
+const query = new URLSearchParams(location.search);
+/** Most frames that are measured of each side. */
+const FRAMES = Number(query.get('frames') ?? 20);
+const [left, right] = ['left', 'right'].map(byId);
+const sides = [left, right];
+
+/** What one side's selects say, on its element and in the words over its picture. */
+function apply(element) {
+  const quality = byId(`${element.id}-quality`).value;
+  const degree = byId(`${element.id}-degree`).value;
+  element.setAttribute('quality', quality);
+  element.setAttribute('max-sh-degree', degree);
+  byId(`${element.id}-name`).textContent = `${quality}, degree ${degree}`;
+}
+
+function choose(element, words) {
+  const [quality, degree] = words.split(',');
+  byId(`${element.id}-quality`).value = quality;
+  byId(`${element.id}-degree`).value = degree ?? '3';
+  apply(element);
+}
+
+function moveLine() {
+  byId('pair').style.setProperty('--split', `${byId('split').value}%`);
+}
+
+async function measure() {
+  byId('status').textContent = 'Measuring…';
+  byId('measure').disabled = true;
+  try {
+    const times = [];
+    for (const element of sides) times.push(await measureFrames(element, { frames: FRAMES }));
+    const { decibels, worst } = await differenceOf(left, right);
+    const rows = sides.map((element, i) => [
+      byId(`${element.id}-name`).textContent,
+      times[i].median.toFixed(2),
+      decibels === Infinity ? 'the same' : decibels.toFixed(1),
+      String(worst),
+    ]);
+    byId('figures').tBodies[0].replaceChildren(...rows.map(rowOf));
+    byId('figures').hidden = false;
+    byId('status').textContent = `${times[0].width} × ${times[0].height} pixels.`;
+  } catch (error) {
+    byId('status').textContent = error.message;
+  }
+  byId('measure').disabled = false;
+}
+
+function rowOf(texts) {
+  const row = document.createElement('tr');
+  row.append(...texts.map((text) => Object.assign(document.createElement('td'), { textContent: text })));
+  return row;
+}
+
+choose(left, query.get('left') ?? 'default,3');
+choose(right, query.get('right') ?? 'fast,3');
+for (const element of sides) {
+  if (query.has('src')) element.src = query.get('src');
+  element.addEventListener('load', () => (byId('measure').disabled = !sides.every(({ loaded }) => loaded)));
+  element.addEventListener('error', () => (byId('status').textContent = element.error.message));
+  for (const name of ['quality', 'degree'])
+    byId(`${element.id}-${name}`).addEventListener('change', () => apply(element));
+}
+keepInStep(left, right);
+byId('split').addEventListener('input', moveLine);
+byId('measure').addEventListener('click', measure);
+for (const button of document.querySelectorAll('[data-left]')) {
+  button.addEventListener('click', () => {
+    choose(left, button.dataset.left);
+    choose(right, button.dataset.right);
+  });
+}
+takeFiles(byId('drop'), (file) => {
+  const address = addressOf(file);
+  for (const element of sides) Object.assign(element, { src: address, cameraOrbit: null, cameraTarget: null });
+});
+moveLine();

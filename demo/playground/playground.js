@@ -1,0 +1,109 @@
+/** Fields to attributes, attributes to HTML. The fields are made from the element's manifest when the site is built. */
+import { copy } from '../site/copy.js';
+import { addressOf, takeFiles } from '../site/local-file.js';
+import { SCRIPT, tagOf } from './html.js';
+
+const byId = (id) => document.getElementById(id);
+const scene = byId('scene');
+const form = byId('attributes');
+/** Attributes that are addresses: pasted elsewhere, they must still lead here. */
+const ADDRESSES = ['src', 'poster', 'contract', 'postprocess'];
+const VIEW = {
+  'camera-orbit': 'getCameraOrbit',
+  'camera-target': 'getCameraTarget',
+  'field-of-view': 'getFieldOfView',
+};
+
+/** The file that was dropped, while its name stands in the field of the source. */
+let local = { name: '', address: '' };
+
+/** What the fields say: `[name, value]`, true for a bare attribute. Empty fields set nothing; `alt` and `src` come first. */
+function chosen() {
+  return [...form.elements]
+    .filter(({ name }) => name)
+    .map(({ name, type, checked, value }) => [name, type === 'checkbox' ? checked : value.trim()])
+    .filter(([, value]) => value !== '' && value !== false)
+    .sort(([a], [b]) => rankOf(a) - rankOf(b));
+}
+
+const FIRST = ['src', 'alt', 'poster'];
+const rankOf = (name) => (FIRST.includes(name) ? FIRST.indexOf(name) : FIRST.length);
+
+function show() {
+  const attributes = chosen();
+  for (const { name } of form.elements) {
+    if (!name) continue;
+    const [, value] = attributes.find(([each]) => each === name) ?? [];
+    setAttribute(name, name === 'src' && value === local.name ? local.address : value);
+  }
+  byId('html').textContent = `${SCRIPT}\n${tagOf(attributes.map(([name, value]) => [name, pasteable(name, value)]))}`;
+  byId('copied').textContent = '';
+  remember(attributes);
+}
+
+function setAttribute(name, value) {
+  const wanted = value === true ? '' : (value ?? null);
+  if (wanted === scene.getAttribute(name)) return;
+  if (wanted === null) scene.removeAttribute(name);
+  else scene.setAttribute(name, wanted);
+}
+
+function pasteable(name, value) {
+  if (!ADDRESSES.includes(name) || value === local.name || value.startsWith('{')) return value;
+  return URL.canParse(value, document.baseURI) ? new URL(value, document.baseURI).href : value;
+}
+
+/** The page's address says what the fields say, so that it can be sent to somebody. A file stays where it is. */
+function remember(attributes) {
+  const query = new URLSearchParams();
+  for (const [name, value] of attributes) if (value !== local.name) query.set(name, value === true ? '' : value);
+  history.replaceState(null, '', `?${query}`);
+}
+
+/** Fields from the page's address; without one they are as the page has them. */
+function recall() {
+  const query = new URLSearchParams(location.search);
+  if (query.size === 0) return;
+  for (const field of form.elements) {
+    if (!field.name) continue;
+    if (field.type === 'checkbox') field.checked = query.has(field.name);
+    else field.value = query.get(field.name) ?? '';
+  }
+}
+
+/** Where the camera is, as attributes: into the fields, the HTML and the clipboard. */
+async function copyView() {
+  for (const [name, method] of Object.entries(VIEW)) form.elements[name].value = String(scene[method]());
+  show();
+  byId('copied').textContent = await copy(byId('html').textContent);
+}
+
+scene.addEventListener('load', () => {
+  const { splats, bytes } = scene.statistics;
+  byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
+  byId('copy-view').disabled = false;
+});
+scene.addEventListener('loadstart', () => (byId('status').textContent = 'Loading'));
+for (const type of ['error', 'generator-error']) {
+  scene.addEventListener(type, ({ detail }) => (byId('status').textContent = detail.message));
+}
+form.addEventListener('change', show);
+form.addEventListener('submit', (event) => event.preventDefault());
+byId('copy-view').addEventListener('click', copyView);
+byId('copy').addEventListener('click', async () => {
+  byId('copied').textContent = await copy(byId('html').textContent);
+});
+byId('reset').addEventListener('click', () => {
+  form.reset();
+  show();
+  scene.resetCamera();
+});
+takeFiles(byId('drop'), (file) => {
+  local = { name: file.name, address: addressOf(file) };
+  form.elements.src.value = file.name;
+  form.elements.alt.value = '';
+  for (const name of Object.keys(VIEW)) form.elements[name].value = '';
+  show();
+});
+recall();
+show();

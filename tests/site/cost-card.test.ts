@@ -1,0 +1,61 @@
+/** A cost card tells what this machine says; the page without WebGPU tells what there is to tell. */
+import assert from 'node:assert/strict';
+import { after, before, describe, it } from 'node:test';
+import { statSync } from 'node:fs';
+import { isBuilt, openSite, root, type OpenSite } from './support.js';
+
+interface Splat extends HTMLElement {
+  readonly loaded: boolean;
+  readonly error: { readonly reason: string } | null;
+}
+const PATIENCE = { timeout: 100_000, polling: 100 };
+
+describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
+  let open: OpenSite;
+  before(async () => (open = await openSite()));
+  after(() => open.close());
+
+  it('bytes of the file, the first picture, memory and milliseconds', { timeout: 200_000 }, async () => {
+    const { tab, faults } = await open.visit('/examples/', { width: 240, height: 300 });
+    const card = tab.locator('[data-example=file]');
+    await card.locator('gaussian-splat').scrollIntoViewIfNeeded();
+    await tab.waitForFunction(
+      () => document.querySelector<Splat>('[data-example=file] gaussian-splat')!.loaded,
+      undefined,
+      PATIENCE,
+    );
+    const megabytes = (statSync(`${root}demo/scenes/skull.spz`).size / 1e6).toFixed(2);
+    const before = (await card.locator('.cost').textContent())!;
+    assert.ok(before.includes(`${megabytes} MB, SPZ`), before);
+    assert.match(before, /First pictureafter [\d.]+ m?s, hereGPU memory5\.6 MB/);
+    await card.getByRole('button', { name: 'Measure here' }).click();
+    await card.getByRole('button', { name: 'Again' }).waitFor({ timeout: 100_000 });
+    assert.match((await card.locator('.cost').textContent())!, /[\d.]+ ms at \d+ × \d+, median of \d+, on \w+/);
+    assert.deepEqual(faults, []);
+    await tab.close();
+  });
+
+  it('without WebGPU: a sentence, or the fallback of the page, and not a byte of the scene', async () => {
+    const requests: string[] = [];
+    const { tab, faults } = await open.visit('/without-webgpu/', {
+      prepare: async (page) => page.on('request', (request) => requests.push(request.url())),
+    });
+    await tab.waitForFunction(() =>
+      [...document.querySelectorAll<Splat>('gaussian-splat')].every(
+        ({ error }) => error !== null && error !== undefined,
+      ),
+    );
+    const reasons = await tab.evaluate(() =>
+      [...document.querySelectorAll<Splat>('gaussian-splat')].map(({ error }) => error!.reason),
+    );
+    assert.deepEqual(reasons, ['unsupported/no-webgpu', 'unsupported/no-webgpu']);
+    assert.ok(await tab.locator('#plain').getByText('This 3D scene needs WebGPU').isVisible());
+    assert.ok(await tab.getByText('A picture of the scene').isVisible());
+    assert.deepEqual(
+      requests.filter((url) => url.endsWith('.spz')),
+      [],
+    );
+    assert.deepEqual(faults, []);
+    await tab.close();
+  });
+});

@@ -1,0 +1,93 @@
+/** The playground as a person uses it: its fields become attributes, and its HTML, pasted into another page, does the same there. */
+import assert from 'node:assert/strict';
+import { after, before, describe, it } from 'node:test';
+import { readFileSync } from 'node:fs';
+import type { Page } from 'playwright-core';
+import { isBuilt, openSite, root, type OpenSite } from './support.js';
+
+interface Splat extends Element {
+  readonly loaded: boolean;
+  readonly error: { readonly message: string } | null;
+  readonly statistics: { readonly splats: number };
+  getCameraOrbit(): object;
+  getFieldOfView(): object;
+  jumpCameraToGoal(): void;
+}
+const PATIENCE = { timeout: 100_000, polling: 100 };
+const COMPASS = '/fixtures/compass.splat';
+
+const loaded = (tab: Page): Promise<unknown> =>
+  tab.waitForFunction(() => document.querySelector<Splat>('gaussian-splat')?.loaded, undefined, PATIENCE);
+
+/** Attributes of a page's scene, and where its camera is. */
+const stateOf = (tab: Page): Promise<{ attributes: Record<string, string>; view: string[] }> =>
+  tab.evaluate(() => {
+    const scene = document.querySelector<Splat>('gaussian-splat')!;
+    scene.jumpCameraToGoal();
+    const attributes = [...scene.attributes].filter(({ name }) => name !== 'id' && name !== 'src');
+    return {
+      attributes: Object.fromEntries(attributes.map(({ name, value }) => [name, value])),
+      view: [String(scene.getCameraOrbit()), String(scene.getFieldOfView())],
+    };
+  });
+
+describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
+  let open: OpenSite;
+  before(async () => (open = await openSite()));
+  after(() => open.close());
+
+  it('writes HTML that does elsewhere what it does here', { timeout: 120_000 }, async () => {
+    const { tab, faults } = await open.visit(`/playground/?src=${COMPASS}&camera-controls=`);
+    await loaded(tab);
+    for (const group of ['Scene and page', 'Motion']) await tab.getByText(group, { exact: true }).click();
+    await tab.fill('#attribute-alt', 'A compass, "painted" <by> me & you');
+    await tab.selectOption('#attribute-quality', 'fast');
+    await tab.fill('#attribute-max-sh-degree', '1');
+    await tab.fill('#attribute-camera-orbit', '40deg 60deg 120%');
+    await tab.fill('#attribute-field-of-view', '33deg');
+    await tab.fill('#attribute-interpolation-decay', '0');
+    await tab.locator('#attribute-interpolation-decay').blur();
+    const here = await stateOf(tab);
+    assert.equal(here.attributes.quality, 'fast');
+    const html = (await tab.locator('#html').textContent())!;
+    assert.match(html, /^<script type="module" src="cdn\/gaussian-splat\.min\.js"><\/script>\n<gaussian-splat/);
+
+    const { tab: page, faults: others } = await open.visit('/docs/');
+    const address = new URL('/pasted.html', page.url()).href;
+    const body = `<!doctype html><title>Pasted</title><link rel="icon" href="data:,"><style>gaussian-splat { width: 358px; height: 268px }</style>${html}`;
+    await page.route(address, (route) => route.fulfill({ contentType: 'text/html', body }));
+    await page.goto(address);
+    await loaded(page);
+    assert.deepEqual(await stateOf(page), here);
+    assert.deepEqual([faults, others], [[], []]);
+    await Promise.all([tab.close(), page.close()]);
+  });
+
+  it('copies the view, opens a file of the visitor, and starts over', { timeout: 120_000 }, async () => {
+    const { tab, faults } = await open.visit(`/playground/?src=${COMPASS}&alt=A+compass&camera-controls=`);
+    await loaded(tab);
+    await tab.evaluate(() => document.querySelector<HTMLElement>('gaussian-splat')!.focus());
+    await tab.keyboard.press('ArrowRight');
+    await tab.waitForTimeout(500);
+    await tab.click('#copy-view');
+    const { view } = await stateOf(tab);
+    assert.ok((await tab.locator('#html').textContent())!.includes(`camera-orbit="${view[0]}"`));
+
+    const buffer = readFileSync(`${root}tests/element/browser/fixtures/compass.ply`);
+    const file = { name: 'mine & yours.ply', mimeType: '', buffer };
+    await tab.setInputFiles('#drop input', file);
+    await tab.waitForFunction(() => /^Loading|splats/.test(document.getElementById('status')!.textContent!));
+    await loaded(tab);
+    const html = await tab.locator('#html').textContent();
+    assert.match(html!, /<gaussian-splat src="mine &amp; yours\.ply" camera-controls><\/gaussian-splat>/);
+    assert.match(await tab.evaluate(() => document.querySelector('gaussian-splat')!.getAttribute('src')!), /^blob:/);
+
+    await tab.click('#reset');
+    assert.match(
+      (await tab.locator('#html').textContent())!,
+      /scenes\/skull\.spz"\s+alt="A skull"\s+camera-controls\s*>/,
+    );
+    assert.deepEqual(faults, []);
+    await tab.close();
+  });
+});
