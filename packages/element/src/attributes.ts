@@ -19,6 +19,9 @@ export type Loading = 'lazy' | 'eager';
 /** One-finger moves that stay the page's. */
 export type TouchAction = 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation';
 
+/** What pictures are drawn with: `auto` is the true image at rest and, in motion, as much of it as there is time for. */
+export type QualityChoice = 'auto' | Quality;
+
 /** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
 export type Reveal = 'auto' | 'manual';
 
@@ -69,8 +72,7 @@ export interface Attributes {
   readonly touchAction: TouchAction;
   /** Most drawn pixels for one CSS pixel. */
   readonly maxPixelRatio: number;
-  /** The renderer's mix of accuracy and speed. */
-  readonly quality: Quality;
+  readonly quality: QualityChoice;
   readonly reveal: Reveal;
   readonly navigation: Navigation;
   /** Rest before the camera turns by itself, ms. */
@@ -88,7 +90,7 @@ const orbitLimit = orbitGrammar('auto');
 const crossorigin = keywordGrammar(['anonymous', 'use-credentials']);
 const loading = keywordGrammar<Loading>(['lazy', 'eager']);
 const touchAction = keywordGrammar<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']);
-const quality = keywordGrammar<Quality>(['default', ...(Object.keys(QUALITIES) as Quality[])]);
+const quality = keywordGrammar<QualityChoice>(['auto', ...(Object.keys(QUALITIES) as Quality[])]);
 const reveal = keywordGrammar<Reveal>(['auto', 'manual']);
 const navigation = keywordGrammar<Navigation>(['orbit', 'fly']);
 const interactionPrompt = keywordGrammar<InteractionPrompt>(['auto', 'none']);

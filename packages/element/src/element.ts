@@ -8,6 +8,7 @@ import { SceneLoader } from './loading/scene-loader.js';
 import type { LiveState } from './live/live-model.js';
 import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
 import { Stage } from './stage.js';
+import type { SceneStats } from './stats.js';
 import { styles } from './styles.js';
 import { DEFAULT_LABEL, template } from './template.js';
 import { ViewingMethods } from './viewing.js';
@@ -155,6 +156,19 @@ export class GaussianSplatElement extends ViewingMethods {
     const gaussians = this.stage.scene.scene?.gaussians;
     if (!gaussians) return null;
     return { splats: gaussians.count, dropped: gaussians.droppedCount ?? 0, bytes: gaussians.byteLength };
+  }
+
+  /**
+   * What is modelled, drawn, seen and in memory, what pictures are drawn with, and why; null where no scene is on show. Counts of the picture are those of
+   * the last {@link updateStats}.
+   */
+  get stats(): SceneStats | null {
+    return this.stage.stats;
+  }
+
+  /** Counts what the picture on show draws and what of it can be seen. Asks the GPU and draws the view once more: for panels, not for every frame. */
+  updateStats(): Promise<SceneStats | null> {
+    return this.stage.updateStats();
   }
 
   override focus(options?: FocusOptions): void {

@@ -86,8 +86,11 @@ export class SplatProperties extends LitElement {
   declare up: 'x' | '-x' | 'y' | '-y' | 'z' | '-z' | null;
   /** Most drawn pixels for one CSS pixel; default no limit. */
   declare maxPixelRatio: number | string | null;
-  /** Accuracy against speed: `reference`, `default`, `balanced` or `fast`. */
-  declare quality: 'default' | 'reference' | 'balanced' | 'fast' | null;
+  /**
+   * Accuracy against speed. `auto`, the default: `default` at rest and, in motion, as much of it as the display leaves time for. `reference`, `default`,
+   * `balanced`, `fast`: always that.
+   */
+  declare quality: 'auto' | 'default' | 'reference' | 'balanced' | 'fast' | null;
   /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
   declare contract: string | object | null;
   /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */

@@ -1,9 +1,10 @@
-import { GaussianSplatError, type Bounds } from '@gaussian-splat/core';
+import { GaussianSplatError, type Bounds, type Camera } from '@gaussian-splat/core';
 import {
   chooseVariants,
   GaussianBuffers,
   Renderer,
   type GaussianScene,
+  type FrameLevers,
   type ProbeAnswer,
   type ProbePoint,
   type Quality,
@@ -12,6 +13,8 @@ import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { LiveModel, LiveRequest } from '../live/live-model.js';
 import type { LoadedScene, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
+import type { ReadCounts } from '../stats.js';
+import { FrameMeter } from './frame-meter.js';
 import { assertWebGpu } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 
@@ -39,6 +42,7 @@ export class GpuScene {
   #filter: FrameFilter | undefined;
   readonly #submissions: number;
   readonly #lease: DeviceLease;
+  readonly #meter: FrameMeter;
   #destroyed = false;
 
   constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, submissions: number, live?: LiveModel) {
@@ -48,6 +52,17 @@ export class GpuScene {
     this.bounds = bounds;
     this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
+    this.#meter = new FrameMeter(lease.device, live === undefined);
+  }
+
+  /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
+  get frameBytes(): number {
+    return this.#renderer.byteLength;
+  }
+
+  /** True if it can be told how long frames take. */
+  get isMeasurable(): boolean {
+    return this.#meter.isAble;
   }
 
   get device(): GPUDevice {
@@ -94,10 +109,24 @@ export class GpuScene {
     return new Renderer(this.device, { quality: this.#quality, submissions: this.#submissions, onIncomplete });
   }
 
-  /** Encodes and submits one frame. */
-  render(frame: Frame): void {
+  /** Makes what frames with other levers need, so that none of them has to. */
+  prepare(levers: readonly Partial<FrameLevers>[], format: GPUTextureFormat): void {
+    if (!this.isLost && !this.#destroyed) this.#renderer.prepare(levers, format);
+  }
+
+  /**
+   * Encodes and submits one frame.
+   * @param onTime gets milliseconds that the frame kept the GPU, some frames later; not every frame is timed
+   */
+  render(frame: Frame, onTime?: (milliseconds: number) => void): void {
+    if (onTime) this.#meter.measure((timer) => this.#draw({ ...frame, timer }), onTime);
+    else this.#draw(frame);
+  }
+
+  #draw(frame: Frame): void {
     const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, gaussians: this.gaussians });
-    if (this.#filter) this.#filter.render(frame, `${this.gaussians.version} ${this.#quality}`, draw);
+    const content = `${this.gaussians.version} ${this.#quality} ${JSON.stringify(frame.levers ?? null)}`;
+    if (this.#filter) this.#filter.render(frame, content, draw);
     else draw(frame);
   }
 
@@ -125,12 +154,20 @@ export class GpuScene {
     return this.#renderer.probeDepth(points);
   }
 
+  /** Counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
+  async readCounts(camera: Camera): Promise<ReadCounts> {
+    const { visible } = await this.#renderer.readStatistics();
+    const { countContributing } = await import('./contributions.js');
+    return { drawn: visible, contributed: await countContributing(this.device, this.gaussians, camera) };
+  }
+
   /** Frees the GPU memory and lets go of the device. */
   destroy(): void {
     if (this.#destroyed) return;
     this.#destroyed = true;
     this.setFilter(undefined);
     this.live?.close();
+    this.#meter.destroy();
     this.#renderer.destroy();
     this.gaussians.destroy();
     this.#lease.release();
