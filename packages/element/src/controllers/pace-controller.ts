@@ -42,6 +42,8 @@ export interface PaceReport {
   readonly reason: PaceReason;
   /** Median of the last frames on that rung, ms on the GPU; null while there are none. */
   readonly frameMs: number | null;
+  /** The last frame that was timed, at rest or in motion, ms on the GPU; null while there is none. */
+  readonly lastMs: number | null;
   /** What a frame may take, ms. */
   readonly targetMs: number;
 }
@@ -80,7 +82,7 @@ export class PaceController {
     const { level, reason, recent } = this.#pace;
     const frameMs = recent.length > 0 ? quantile(recent, 0.5) : null;
     const [drawn, moving] = [LADDER[this.#drawn].name, LADDER[level].name];
-    return { drawn, moving, reason, frameMs, targetMs: this.targetMs };
+    return { drawn, moving, reason, frameMs, lastMs: this.#lastMs || null, targetMs: this.targetMs };
   }
 
   /**
