@@ -24,7 +24,7 @@ export interface SceneStatistics {
 }
 
 /** Names of the custom states, for `gaussian-splat:state(ready)` in CSS. */
-const STATES = ['loading', 'ready', 'playing', 'error', 'unsupported'] as const;
+const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'] as const;
 
 /**
  * Shows a Gaussian splat scene.
@@ -62,12 +62,14 @@ const STATES = ['loading', 'ready', 'playing', 'error', 'unsupported'] as const;
  * @cssproperty --message-color - Their colour.
  * @cssproperty --message-font - Their font.
  * @cssstate loading - Bytes are on their way.
+ * @cssstate preview - A part of the scene is on show while the rest loads.
  * @cssstate ready - The scene is on show.
  * @cssstate playing - Its time runs.
  * @cssstate error - It cannot be shown.
  * @cssstate unsupported - It cannot be shown because there is no WebGPU.
  * @fires {CustomEvent<LoadDetail>} load - The first frame is drawn.
  * @fires {ProgressEvent} progress - Bytes have arrived.
+ * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is on show while the rest loads.
  * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
  * @fires {Event} poster-dismissed - The poster has given way to the scene.
@@ -247,6 +249,7 @@ export class GaussianSplatElement extends ViewingMethods {
         touchAction: this.#attributes.touchAction,
       }),
       services: () => this.constructor as typeof GaussianSplatElement,
+      economy: () => this.economy ?? null,
       loops: () => this.loop,
       autoplays: () => this.autoplay,
       autoRotates: () => this.autoRotate,
@@ -307,6 +310,7 @@ export class GaussianSplatElement extends ViewingMethods {
     const { state, error } = this.stage.scene;
     const active: Record<(typeof STATES)[number], boolean> = {
       loading: state === 'loading',
+      preview: this.stage.scene.isPreview,
       ready: state === 'ready',
       playing: !this.paused,
       error: error !== null,

@@ -8,6 +8,7 @@ export type {
   FallbackDetail,
   GaussianSplatEventMap,
   LoadDetail,
+  PreviewDetail,
   VisibilityDetail,
 } from './events.js';
 export { GaussianSplatElement, type SceneStatistics } from './element.js';

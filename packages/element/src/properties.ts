@@ -28,6 +28,7 @@ export class SplatProperties extends LitElement {
     up: {},
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
     quality: {},
+    economy: {},
     contract: {},
     chain: {},
     postprocess: {},
@@ -91,6 +92,11 @@ export class SplatProperties extends LitElement {
    * `balanced`, `fast`: always that.
    */
   declare quality: 'auto' | 'default' | 'reference' | 'balanced' | 'fast' | null;
+  /**
+   * Leaves out what views around the scene need least: a share of the splats to keep such as `60%`, or a figure such as `57db` that the picture keeps to.
+   * Without it all splats are there.
+   */
+  declare economy: string | null;
   /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
   declare contract: string | object | null;
   /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */

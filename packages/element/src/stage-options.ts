@@ -35,6 +35,8 @@ export interface StageOptions {
   readonly attributes: () => Attributes;
   readonly input: () => InputOptions;
   readonly services: () => Services;
+  /** The attribute `economy`. */
+  readonly economy: () => string | null;
   readonly loops: () => boolean;
   readonly autoplays: () => boolean;
   readonly autoRotates: () => boolean;

@@ -2,6 +2,7 @@ import type { Camera } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import { Behaviours } from './behaviours.js';
 import { CameraController } from './controllers/camera-controller.js';
+import { EconomyController } from './controllers/economy-controller.js';
 import { HotspotController } from './controllers/hotspot-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController } from './controllers/playback-controller.js';
@@ -25,6 +26,7 @@ import type { Source, StageOptions } from './stage-options.js';
 export class Stage {
   readonly camera: CameraController;
   readonly scene: SceneController;
+  readonly economy: EconomyController;
   readonly playback: PlaybackController;
   readonly reveal: RevealController;
   readonly behaviours: Behaviours;
@@ -41,6 +43,8 @@ export class Stage {
   #source: Source = { src: null, contract: null, chain: null, postprocess: null };
   #drawnFrom: Camera | undefined;
   #counts: ReadCounts | undefined;
+  /** Bytes that have arrived, and how many there are. */
+  #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
   constructor(host: ReactiveControllerHost & HTMLElement, options: StageOptions) {
     this.#host = host;
@@ -65,9 +69,15 @@ export class Stage {
       dispatch: (event) => this.#dispatch(event),
     });
     this.scene = this.#createScene();
+    this.economy = new EconomyController({
+      economy: options.economy,
+      memoryBudget: () => options.services().memoryBudget ?? defaultMemoryBudget(),
+      onChange: () => this.#onEconomy(),
+      warn: options.warn,
+    });
     this.reveal = new RevealController(host, {
       mode: () => options.attributes().reveal,
-      isReady: () => this.scene.state === 'ready',
+      isReady: () => this.scene.state === 'ready' || this.scene.isPreview,
       onDismissed: () => this.#onRevealed(),
     });
     this.behaviours = this.#createBehaviours();
@@ -90,12 +100,12 @@ export class Stage {
       togglePlayback: () => this.#togglePlayback(),
     });
     // Put back after a while, an eager element loads again though nothing has come into sight.
-    host.addController({ hostConnected: () => this.#requestScene(), hostUpdated: () => this.reveal.settle() });
+    host.addController({ hostConnected: () => this.#requestScene(), hostUpdated: () => this.#onUpdate() });
   }
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
   drawNow(): HTMLCanvasElement | null {
-    return this.#view.drawNow();
+    return this.scene.isPreview ? null : this.#view.drawNow();
   }
 
   /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */
@@ -109,7 +119,15 @@ export class Stage {
   /** What is known of the scene on show; null where there is none. */
   get stats(): SceneStats | null {
     const { scene } = this.scene;
-    return scene && statsOf(scene, this.#options.attributes().quality, this.#view.pace.report, this.#counts);
+    if (scene === null) return null;
+    const { quality } = this.#options.attributes();
+    return statsOf(scene, {
+      quality,
+      pace: this.#view.pace.report,
+      counts: this.#counts,
+      economy: this.economy.report,
+      isPreview: this.scene.isPreview,
+    });
   }
 
   /** Asks the GPU for the counts of the picture on show. */
@@ -165,9 +183,10 @@ export class Stage {
       device: () => services().sharedDevice,
       loader: () => services().sceneLoader,
       releaseDelayMs: () => services().releaseDelay,
-      show: (scene, isNew) => {
+      show: (scene, entrance) => {
         this.#counts = undefined;
-        if (isNew) this.camera.frame(scene.bounds);
+        if (entrance === 'new') this.camera.frame(scene.bounds);
+        if (entrance === 'whole') this.camera.refine(scene.bounds);
         this.playback.setDuration(scene.live?.duration ?? NaN);
         this.#live.post.attach(scene);
         return this.#view.show(scene);
@@ -179,6 +198,8 @@ export class Stage {
         if (clear) this.#view.clear();
         else this.#view.pause();
       },
+      wantsPreviews: () => this.#visibility.isVisible,
+      onPreview: ({ gaussians }) => this.#onPreview(gaussians.count),
       memoryBudget: () => services().memoryBudget ?? defaultMemoryBudget(),
       live: () => ({
         runtimeLocation: services().runtimeLocation,
@@ -240,6 +261,23 @@ export class Stage {
     this.#dispatch(new CustomEvent('load', { detail: { url } }));
   }
 
+  #onUpdate(): void {
+    this.reveal.settle();
+    this.economy.update(this.scene.state === 'ready' ? this.scene.scene : null);
+  }
+
+  #onEconomy(): void {
+    this.#counts = undefined;
+    this.#view.requestFrame();
+    this.#host.requestUpdate();
+  }
+
+  #onPreview(splats: number): void {
+    this.#host.requestUpdate();
+    this.#dispatch(new CustomEvent('preview', { detail: { splats } }));
+    this.#onProgress(...this.#bytes);
+  }
+
   #onRevealed(): void {
     this.#dispatch(new Event('poster-dismissed'));
     const mayPlay = this.playback.canPlay && this.playback.paused && !prefersReducedMotion();
@@ -273,6 +311,7 @@ export class Stage {
   }
 
   #onProgress(loaded: number, total: number | undefined): void {
+    this.#bytes = [loaded, total];
     this.progress = total ? Math.min(1, loaded / total) : null;
     this.#host.requestUpdate();
     const lengthComputable = total !== undefined;

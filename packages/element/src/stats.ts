@@ -1,4 +1,5 @@
 import type { QualityChoice } from './attributes.js';
+import type { EconomyReport } from './controllers/economy-controller.js';
 import type { PaceReport } from './controllers/pace-controller.js';
 import type { GpuScene } from './gpu/gpu-scene.js';
 
@@ -6,8 +7,14 @@ import type { GpuScene } from './gpu/gpu-scene.js';
 export interface SceneStats {
   /** Splats that the file has, or a generator writes at most. */
   readonly modelled: number;
+  /** What is on show is a part of a scene that is still loading; all counts are those of the part. */
+  readonly isPreview: boolean;
   /** Of these, left out because a value was not usable. */
   readonly dropped: number;
+  /** Of these, left out because the attribute `economy` asks for it. */
+  readonly spared: number;
+  /** dB to the whole scene in views around it that had no say; null unless `economy` asks for a figure. */
+  readonly decibels: number | null;
   /** Splats on the GPU. */
   readonly inMemory: number;
   /** Splats that were drawn, as of the last `updateStats()`: in front of the camera, opaque enough, and over a pixel. null before. */
@@ -30,17 +37,24 @@ export interface ReadCounts {
   readonly contributed: number;
 }
 
+/** What is known besides the scene. */
+export interface StatsContext {
+  readonly quality: QualityChoice;
+  readonly pace: PaceReport;
+  readonly counts: ReadCounts | undefined;
+  readonly economy: EconomyReport;
+  readonly isPreview: boolean;
+}
+
 /** Puts together what is known without asking the GPU. */
-export function statsOf(
-  scene: GpuScene,
-  quality: QualityChoice,
-  pace: PaceReport,
-  counts: ReadCounts | undefined,
-): SceneStats {
+export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPreview }: StatsContext): SceneStats {
   const { gaussians } = scene;
   const dropped = gaussians.droppedCount ?? 0;
   return {
-    modelled: gaussians.count + dropped,
+    isPreview,
+    modelled: gaussians.count + dropped + economy.spared,
+    spared: economy.spared,
+    decibels: economy.decibels,
     dropped,
     inMemory: gaussians.count,
     drawn: counts?.drawn ?? null,
@@ -48,12 +62,22 @@ export function statsOf(
     bytes: { scene: gaussians.byteLength, frames: scene.frameBytes },
     quality,
     pace,
-    why: [...whyDropped(dropped), ...whyPace(quality, pace)],
+    why: [...whyPreview(isPreview), ...whyDropped(dropped), ...whySpared(economy), ...whyPace(quality, pace)],
   };
+}
+
+function whyPreview(isPreview: boolean): string[] {
+  return isPreview ? ['The scene is still loading; this is a part of it.'] : [];
 }
 
 function whyDropped(dropped: number): string[] {
   return dropped > 0 ? [`${dropped} splats of the file have values that cannot be drawn.`] : [];
+}
+
+function whySpared({ spared, decibels }: EconomyReport): string[] {
+  if (spared === 0) return [];
+  const figure = decibels === null ? '' : `: ${decibels.toFixed(1)} dB to the whole scene`;
+  return [`${spared} splats that contribute least to views around the scene are left out${figure}.`];
 }
 
 function whyPace(quality: QualityChoice, { moving, frameMs, targetMs }: PaceReport): string[] {

@@ -9,6 +9,7 @@ export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
+export { readPacked, selectPacked } from './pack/packed-scene.js';
 export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, RasterizerName } from './rasterizers/rasterizer.js';
 export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';

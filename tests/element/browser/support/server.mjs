@@ -49,6 +49,22 @@ const ANSWERS = {
     );
   },
 
+  /** A red ball of `n` splats, 4,000 unless said, in twelve pieces over `ms` milliseconds. */
+  ball(context) {
+    const bytes = redBall(Number(context.query.n ?? 4_000));
+    const pause = Number(context.query.ms ?? 0) / 12;
+    context.set('Content-Length', String(bytes.length));
+    context.body = Readable.from(
+      (async function* pieces() {
+        const size = 32 * Math.ceil(bytes.length / 32 / 12);
+        for (let at = 0; at < bytes.length; at += size) {
+          await delay(pause);
+          yield bytes.subarray(at, at + size);
+        }
+      })(),
+    );
+  },
+
   /** Half of the file, then the connection breaks. */
   cut(context, name) {
     const bytes = readFileSync(join(fixtures, name));
@@ -224,4 +240,21 @@ export async function startOtherOrigin() {
   // The test runner ends when its own work is done; this server must not keep it.
   server.unref();
   return `http://127.0.0.1:${server.address().port}`;
+}
+
+/** A .splat file: splats in no order on a ball of radius 1. */
+function redBall(count) {
+  const bytes = Buffer.alloc(32 * count);
+  for (let i = 0; i < count; i++) {
+    const height = 1 - (2 * (i + 0.5)) / count;
+    const angle = 2.399963 * i;
+    const ring = Math.sqrt(1 - height * height);
+    // Steps of a number without common factor: any part of the file is spread over the ball.
+    const at = 32 * ((i * 1_301) % count);
+    [ring * Math.cos(angle), height, ring * Math.sin(angle), 0.05, 0.05, 0.05].forEach((value, k) =>
+      bytes.writeFloatLE(value, at + 4 * k),
+    );
+    bytes.set([230, 30, 30, 220, 255, 128, 128, 128], at + 24);
+  }
+  return bytes;
 }
