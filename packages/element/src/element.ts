@@ -157,7 +157,11 @@ export class GaussianSplatElement extends ViewingMethods {
   get statistics(): SceneStatistics | null {
     const gaussians = this.stage.scene.scene?.gaussians;
     if (!gaussians) return null;
-    return { splats: gaussians.count, dropped: gaussians.droppedCount ?? 0, bytes: gaussians.byteLength };
+    return {
+      splats: gaussians.frameCount ?? gaussians.count,
+      dropped: gaussians.droppedCount ?? 0,
+      bytes: gaussians.byteLength,
+    };
   }
 
   /**

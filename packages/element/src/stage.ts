@@ -112,7 +112,7 @@ export class Stage {
   async updateFraming(): Promise<void> {
     const { scene } = this.scene;
     if (scene === null) return;
-    const bounds = (await scene.live?.gaussians.readBounds()) ?? scene.bounds;
+    const bounds = (await scene.live?.readBounds?.()) ?? scene.bounds;
     if (this.scene.scene === scene) this.camera.frame(bounds);
   }
 
@@ -198,6 +198,8 @@ export class Stage {
         if (clear) this.#view.clear();
         else this.#view.pause();
       },
+      frameUrl: (url) => this.#options.services().urlModifier?.(url) ?? url,
+      loops: this.#options.loops,
       wantsPreviews: () => this.#visibility.isVisible,
       onPreview: ({ gaussians }) => this.#onPreview(gaussians.count),
       memoryBudget: () => services().memoryBudget ?? defaultMemoryBudget(),

@@ -52,7 +52,7 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPre
   const dropped = gaussians.droppedCount ?? 0;
   return {
     isPreview,
-    modelled: gaussians.count + dropped + economy.spared,
+    modelled: (gaussians.frameCount ?? gaussians.count) + dropped + economy.spared,
     spared: economy.spared,
     decibels: economy.decibels,
     dropped,

@@ -23,6 +23,9 @@ export interface SceneOptions {
   readonly show: (scene: GpuScene, entrance: Entrance) => Promise<void>;
   /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
   readonly hide: (clear: boolean) => void;
+  /** Address of a frame of a sequence as it is fetched. */
+  readonly frameUrl: (url: string) => string;
+  readonly loops: () => boolean;
   /** Whether anybody would see what there is of a scene while it loads. */
   readonly wantsPreviews: () => boolean;
   /** A preview of the scene is on show. */
@@ -191,7 +194,7 @@ export class SceneController implements ReactiveController {
     isNew: boolean,
     onProgress: (loaded: number, total: number | undefined) => void,
   ): Promise<void> {
-    const { device, loader, show, live, memoryBudget, wantsPreviews } = this.#options;
+    const { device, loader, show, live, memoryBudget, wantsPreviews, frameUrl, loops } = this.#options;
     const onPreview = isNew && wantsPreviews() ? (preview: GpuScene) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
@@ -199,7 +202,7 @@ export class SceneController implements ReactiveController {
       if (!isSmall) this.#drop(false);
     };
     const scene = await openGpuScene(request, {
-      ...{ device: device(), loader: loader() },
+      ...{ device: device(), loader: loader(), frameUrl, loops },
       ...{
         signal,
         onProgress,

@@ -8,13 +8,15 @@ import {
   type Quality,
 } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
-import type { LiveModel } from '../live/live-model.js';
+import type { Timeline } from '../live/live-model.js';
 import type { ReadCounts } from '../stats.js';
 import { FrameMeter } from './frame-meter.js';
 import type { DeviceLease } from './shared-device.js';
 
 /** Gaussians with one owner. */
 export interface OwnedGaussians extends GaussianScene {
+  /** Splats of the frame on show, where there is room for more. */
+  readonly frameCount?: number;
   /** Splats of the file that were left out; a generator's are counted by nobody. */
   readonly droppedCount?: number;
   readonly byteLength: number;
@@ -28,8 +30,8 @@ export interface OwnedGaussians extends GaussianScene {
 export class GpuScene {
   readonly bounds: Bounds;
   #gaussians: OwnedGaussians;
-  /** The generator that writes the Gaussians; undefined for those of a file. */
-  readonly live: LiveModel | undefined;
+  /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
+  readonly live: Timeline | undefined;
   /** Called when the scene is destroyed. */
   onDestroy: () => void = () => undefined;
   /** Called when the frame just drawn lacked something that the next one will have. */
@@ -42,7 +44,7 @@ export class GpuScene {
   readonly #meter: FrameMeter;
   #destroyed = false;
 
-  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, submissions: number, live?: LiveModel) {
+  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, submissions: number, live?: Timeline) {
     this.#lease = lease;
     this.live = live;
     this.#gaussians = gaussians;

@@ -1,18 +1,22 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { chooseVariants } from '@gaussian-splat/renderer';
 import type { LiveRequest } from '../live/live-model.js';
-import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { GpuScene } from './gpu-scene.js';
 import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu } from './request-device.js';
-import type { SharedDevice } from './shared-device.js';
+import type { DeviceLease, SharedDevice } from './shared-device.js';
 import { byteLengthOf, upload } from './upload.js';
 
 export interface OpenOptions {
   readonly device: SharedDevice;
   readonly loader: SceneLoader;
   readonly signal: AbortSignal;
+  /** Address of a frame of a sequence as it is fetched. */
+  readonly frameUrl: (url: string) => string;
+  /** Whether a sequence begins again at its end. */
+  readonly loops: () => boolean;
   readonly onProgress: ProgressListener;
   /** Called with what can be shown of a scene that is still loading; the scene is the callee's. Absent: previews are not wanted. */
   readonly onPreview?: (preview: GpuScene) => void;
@@ -40,10 +44,11 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
   const choosing = acquiring.then(({ device }) => chooseVariants(device));
   const previews =
     options.onPreview && new PreviewUploads({ ...options, onPreview: options.onPreview, ready: choosing });
-  const loading = options.loader.load(request, abort.signal, options.onProgress, previews?.show);
+  const loading = options.loader.open(request, abort.signal, options.onProgress, previews?.show);
   try {
     const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(unlessWrong)]);
     options.signal.throwIfAborted();
+    if ('frames' in scene) return await openSequence(request, lease, scene, options);
     previews?.end();
     options.beforeUpload(byteLengthOf(scene));
     return await upload(lease, scene, options);
@@ -63,6 +68,21 @@ function isGenerator({ url, contract }: SceneRequest): boolean {
   if (contract !== undefined && contract !== null && contract !== '') return true;
   const { pathname, protocol, hash } = URL.canParse(url) ? new URL(url) : { pathname: url, protocol: '', hash: '' };
   return /\.onnx$/i.test(protocol === 'blob:' ? hash : pathname);
+}
+
+async function openSequence(
+  request: SceneRequest,
+  lease: DeviceLease,
+  sequence: LoadedSequence,
+  options: OpenOptions,
+): Promise<GpuScene> {
+  const { SequencePlayer } = await import('../live/sequence-player.js');
+  const { listeners } = options.live();
+  const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners });
+  const { gaussians, bounds } = player;
+  const scene = new GpuScene(lease, gaussians, bounds, options.submissions, player);
+  player.scene = scene;
+  return scene;
 }
 
 async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {

@@ -48,6 +48,7 @@ export class LiveWiring {
         requestFrame();
         playback.frameShown(timeSeconds);
       },
+      onShown: (timeSeconds) => playback.frameShown(timeSeconds),
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
       onInput: requestFrame,
