@@ -9,6 +9,8 @@ struct Compose {
   background: vec4f,
   // Pixels of the accumulation for each pixel of the target, across and down; 1 where they are the same size.
   scale: vec2f,
+  // Pixels of the accumulation that are in use, from its first on.
+  used: vec2f,
 }
 
 @vertex
@@ -18,7 +20,7 @@ fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
 }
 
 fn interpolated(position: vec2f) -> vec4f {
-  let last = vec2i(textureDimensions(accumulated)) - 1;
+  let last = vec2i(compose.used) - 1;
   let at = position * compose.scale - 0.5;
   let share = fract(at);
   let low = vec2i(floor(at));

@@ -16,6 +16,17 @@ export function parseEconomy(text: string | null): EconomyShare {
   return share > 0 && share < 1 ? share : null;
 }
 
+/** What the attribute `economy` may ask for: a share of the splats, or a figure that the picture keeps to. */
+export type EconomyGoal = { readonly share: number } | { readonly decibels: number };
+
+/** Reads the `economy` attribute: a share as {@link parseEconomy} has it, or dB such as `57db`; null for anything else, which is all. */
+export function parseEconomyGoal(text: string | null): EconomyGoal | null {
+  const figure = /^\s*(\d*\.?\d+)\s*db\s*$/i.exec(text ?? '');
+  if (figure) return Number(figure[1]) > 0 ? { decibels: Number(figure[1]) } : null;
+  const share = parseEconomy(text);
+  return share === null ? null : { share };
+}
+
 /** The contribution that a splat needs to be among the given share of those that paint anything at all. */
 export function contributionOfShare({ contribution }: Pick<Scores, 'contribution'>, share: EconomyShare): number {
   if (share === null) return 0;

@@ -20,6 +20,9 @@ export type Loading = 'lazy' | 'eager';
 /** One-finger moves that stay the page's. */
 export type TouchAction = 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation';
 
+/** What pictures are drawn with: `auto` is the true image at rest and, in motion, as much of it as there is time for. */
+export type QualityChoice = 'auto' | Quality;
+
 /** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
 export type Reveal = 'auto' | 'manual';
 
@@ -72,7 +75,7 @@ export interface Attributes {
   /** Most drawn pixels for one CSS pixel. */
   readonly maxPixelRatio: number;
   /** The renderer's mix of accuracy and speed. */
-  readonly quality: Quality;
+  readonly quality: QualityChoice;
   /** Spherical harmonics above this degree are not evaluated. */
   readonly maxShDegree: ShDegree;
   readonly reveal: Reveal;
@@ -92,7 +95,7 @@ const orbitLimit = orbitGrammar('auto');
 const crossorigin = keywordGrammar(['anonymous', 'use-credentials']);
 const loading = keywordGrammar<Loading>(['lazy', 'eager']);
 const touchAction = keywordGrammar<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']);
-const quality = keywordGrammar<Quality>(['default', ...(Object.keys(QUALITIES) as Quality[])]);
+const quality = keywordGrammar<QualityChoice>(['auto', ...(Object.keys(QUALITIES) as Quality[])]);
 const maxShDegree = keywordGrammar(['3', '2', '1', '0']);
 const reveal = keywordGrammar<Reveal>(['auto', 'manual']);
 const navigation = keywordGrammar<Navigation>(['orbit', 'fly']);

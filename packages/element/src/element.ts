@@ -8,6 +8,7 @@ import { SceneLoader } from './loading/scene-loader.js';
 import type { LiveState } from './live/live-model.js';
 import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
 import { Stage } from './stage.js';
+import type { SceneStats } from './stats.js';
 import { styles } from './styles.js';
 import { DEFAULT_LABEL, template } from './template.js';
 import { ViewingMethods } from './viewing.js';
@@ -23,7 +24,7 @@ export interface SceneStatistics {
 }
 
 /** Names of the custom states, for `gaussian-splat:state(ready)` in CSS. */
-const STATES = ['loading', 'ready', 'playing', 'error', 'unsupported'] as const;
+const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'] as const;
 
 /**
  * Shows a Gaussian splat scene.
@@ -61,12 +62,14 @@ const STATES = ['loading', 'ready', 'playing', 'error', 'unsupported'] as const;
  * @cssproperty --message-color - Their colour.
  * @cssproperty --message-font - Their font.
  * @cssstate loading - Bytes are on their way.
+ * @cssstate preview - A part of the scene is on show while the rest loads.
  * @cssstate ready - The scene is on show.
  * @cssstate playing - Its time runs.
  * @cssstate error - It cannot be shown.
  * @cssstate unsupported - It cannot be shown because there is no WebGPU.
  * @fires {CustomEvent<LoadDetail>} load - The first frame is drawn.
  * @fires {ProgressEvent} progress - Bytes have arrived.
+ * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is on show while the rest loads.
  * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
  * @fires {Event} poster-dismissed - The poster has given way to the scene.
@@ -154,7 +157,24 @@ export class GaussianSplatElement extends ViewingMethods {
   get statistics(): SceneStatistics | null {
     const gaussians = this.stage.scene.scene?.gaussians;
     if (!gaussians) return null;
-    return { splats: gaussians.count, dropped: gaussians.droppedCount ?? 0, bytes: gaussians.byteLength };
+    return {
+      splats: gaussians.frameCount ?? gaussians.count,
+      dropped: gaussians.droppedCount ?? 0,
+      bytes: gaussians.byteLength,
+    };
+  }
+
+  /**
+   * What is modelled, drawn, seen and in memory, what pictures are drawn with, and why; null where no scene is on show. Counts of the picture are those of
+   * the last {@link updateStats}.
+   */
+  get stats(): SceneStats | null {
+    return this.stage.stats;
+  }
+
+  /** Counts what the picture on show draws and what of it can be seen. Asks the GPU and draws the view once more: for panels, not for every frame. */
+  updateStats(): Promise<SceneStats | null> {
+    return this.stage.updateStats();
   }
 
   override focus(options?: FocusOptions): void {
@@ -233,6 +253,7 @@ export class GaussianSplatElement extends ViewingMethods {
         touchAction: this.#attributes.touchAction,
       }),
       services: () => this.constructor as typeof GaussianSplatElement,
+      economy: () => this.economy ?? null,
       loops: () => this.loop,
       autoplays: () => this.autoplay,
       autoRotates: () => this.autoRotate,
@@ -293,6 +314,7 @@ export class GaussianSplatElement extends ViewingMethods {
     const { state, error } = this.stage.scene;
     const active: Record<(typeof STATES)[number], boolean> = {
       loading: state === 'loading',
+      preview: this.stage.scene.isPreview,
       ready: state === 'ready',
       playing: !this.paused,
       error: error !== null,

@@ -25,12 +25,19 @@ export interface FallbackDetail {
   readonly reason: string;
 }
 
+export interface PreviewDetail {
+  /** Splats on show. */
+  readonly splats: number;
+}
+
 /** Events of `<gaussian-splat>`. None of them bubbles. */
 export interface GaussianSplatEventMap {
   /** The scene's first frame is on the screen. */
   load: CustomEvent<LoadDetail>;
   /** Bytes have arrived. The first and the last event of a load always fire. */
   progress: ProgressEvent;
+  /** A part of the scene is on show while the rest of it loads: fewer splats, or splats without their view-dependent colours. */
+  preview: CustomEvent<PreviewDetail>;
   /** The scene cannot be shown; the same object as `element.error`. */
   error: CustomEvent<ElementError>;
   /** The camera has moved; at most once a frame. */

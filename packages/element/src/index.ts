@@ -8,9 +8,12 @@ export type {
   FallbackDetail,
   GaussianSplatEventMap,
   LoadDetail,
+  PreviewDetail,
   VisibilityDetail,
 } from './events.js';
 export { GaussianSplatElement, type SceneStatistics } from './element.js';
+export type { SceneStats } from './stats.js';
+export type { PaceReport } from './controllers/pace-controller.js';
 export type { PictureOptions } from './viewing.js';
 export type {
   InteractionPrompt,

@@ -29,6 +29,7 @@ export class SplatProperties extends LitElement {
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
     quality: {},
     maxShDegree: { attribute: 'max-sh-degree' },
+    economy: {},
     contract: {},
     chain: {},
     postprocess: {},
@@ -87,10 +88,18 @@ export class SplatProperties extends LitElement {
   declare up: 'x' | '-x' | 'y' | '-y' | 'z' | '-z' | null;
   /** Most drawn pixels for one CSS pixel; default no limit. */
   declare maxPixelRatio: number | string | null;
-  /** Accuracy against speed: `reference`, `default`, `balanced` or `fast`. */
-  declare quality: 'default' | 'reference' | 'balanced' | 'fast' | null;
+  /**
+   * Accuracy against speed. `auto`, the default: `default` at rest and, in motion, as much of it as the display leaves time for. `reference`, `default`,
+   * `balanced`, `fast`: always that.
+   */
+  declare quality: 'auto' | 'default' | 'reference' | 'balanced' | 'fast' | null;
   /** Highest degree of spherical harmonics that colours are made of, 0 to 3; default 3. The file's own are kept. */
   declare maxShDegree: number | string | null;
+  /**
+   * Leaves out what views around the scene need least: a share of the splats to keep such as `60%`, or a figure such as `57db` that the picture keeps to.
+   * Without it all splats are there.
+   */
+  declare economy: string | null;
   /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
   declare contract: string | object | null;
   /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */

@@ -1,71 +1,23 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
-import type { Attributes } from './attributes.js';
 import { Behaviours } from './behaviours.js';
-import type { SpokenStrings } from './camera/spoken.js';
 import { CameraController } from './controllers/camera-controller.js';
+import { EconomyController } from './controllers/economy-controller.js';
 import { HotspotController } from './controllers/hotspot-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController } from './controllers/playback-controller.js';
-import { InputController, type InputOptions } from './controllers/input-controller.js';
+import { InputController } from './controllers/input-controller.js';
 import { RevealController } from './controllers/reveal-controller.js';
 import { SceneController } from './controllers/scene-controller.js';
 import { SizeController } from './controllers/size-controller.js';
 import { ViewController } from './controllers/view-controller.js';
 import { VisibilityController } from './controllers/visibility-controller.js';
 import type { GaussianSplatEventMap } from './events.js';
-import type { FrameScheduler } from './gpu/frame-scheduler.js';
-import type { SharedDevice } from './gpu/shared-device.js';
-import { toElementError } from './errors.js';
-import type { GpuScene } from './gpu/gpu-scene.js';
-import type { LiveListeners, LiveState } from './live/live-model.js';
-import { PostController } from './live/post-controller.js';
+import { LiveWiring } from './live/live-wiring.js';
 import type { SceneRequest } from './loading/protocol.js';
-import type { SceneLoader } from './loading/scene-loader.js';
 import { SceneQueries } from './scene-queries.js';
-
-/** What elements share. */
-export interface Services {
-  readonly sharedDevice: SharedDevice;
-  readonly sceneLoader: SceneLoader;
-  readonly frameScheduler: FrameScheduler;
-  /** How long a removed element keeps its scene, ms. */
-  readonly releaseDelay: number;
-  /** Bytes of GPU memory that one scene may take; null for what suits the device. */
-  readonly memoryBudget: number | null;
-  /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
-  readonly runtimeLocation: string | null;
-  /** Rewrites the addresses of scenes before they are fetched. */
-  readonly urlModifier: ((url: string) => string) | null;
-}
-
-/** What is to be shown, as the element's attributes have it. */
-export interface Source {
-  readonly src: string | null;
-  readonly contract: unknown;
-  /** URLs with spaces between them. */
-  readonly chain: string | null;
-  readonly postprocess: string | null;
-}
-
-/** What the stage asks its element for. */
-export interface StageOptions {
-  readonly attributes: () => Attributes;
-  readonly input: () => InputOptions;
-  readonly services: () => Services;
-  readonly loops: () => boolean;
-  readonly autoplays: () => boolean;
-  readonly autoRotates: () => boolean;
-  /** A double click picks the point to turn around. */
-  readonly retargets: () => boolean;
-  readonly strings: () => SpokenStrings;
-  readonly liveValues: () => Omit<LiveState, 'timeSeconds'>;
-  /** Parts of the shadow tree, once they are rendered. */
-  readonly canvas: () => HTMLCanvasElement | null;
-  readonly surface: () => HTMLElement | null;
-  readonly hotspotLayer: () => HTMLElement | null;
-  readonly warn: (sentence: string) => void;
-}
+import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
+import type { Source, StageOptions } from './stage-options.js';
 
 /**
  * All that goes on behind the element's attributes and markup: scene, camera, size, sight and input, and who of them
@@ -74,6 +26,7 @@ export interface StageOptions {
 export class Stage {
   readonly camera: CameraController;
   readonly scene: SceneController;
+  readonly economy: EconomyController;
   readonly playback: PlaybackController;
   readonly reveal: RevealController;
   readonly behaviours: Behaviours;
@@ -86,10 +39,12 @@ export class Stage {
   readonly #visibility: VisibilityController;
   readonly #size: SizeController;
   readonly #view: ViewController;
-  readonly #post: PostController;
+  readonly #live: LiveWiring;
   #source: Source = { src: null, contract: null, chain: null, postprocess: null };
-  #lastFault = '';
   #drawnFrom: Camera | undefined;
+  #counts: ReadCounts | undefined;
+  /** Bytes that have arrived, and how many there are. */
+  #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
   constructor(host: ReactiveControllerHost & HTMLElement, options: StageOptions) {
     this.#host = host;
@@ -107,11 +62,22 @@ export class Stage {
       },
     });
     this.#view = this.#createView();
-    this.#post = this.#createPost();
+    this.#live = new LiveWiring({
+      ...options,
+      playback: this.playback,
+      requestFrame: () => this.#view.requestFrame(),
+      dispatch: (event) => this.#dispatch(event),
+    });
     this.scene = this.#createScene();
+    this.economy = new EconomyController({
+      economy: options.economy,
+      memoryBudget: () => options.services().memoryBudget ?? defaultMemoryBudget(),
+      onChange: () => this.#onEconomy(),
+      warn: options.warn,
+    });
     this.reveal = new RevealController(host, {
       mode: () => options.attributes().reveal,
-      isReady: () => this.scene.state === 'ready',
+      isReady: () => this.scene.state === 'ready' || this.scene.isPreview,
       onDismissed: () => this.#onRevealed(),
     });
     this.behaviours = this.#createBehaviours();
@@ -134,26 +100,50 @@ export class Stage {
       togglePlayback: () => this.#togglePlayback(),
     });
     // Put back after a while, an eager element loads again though nothing has come into sight.
-    host.addController({ hostConnected: () => this.#requestScene(), hostUpdated: () => this.reveal.settle() });
+    host.addController({ hostConnected: () => this.#requestScene(), hostUpdated: () => this.#onUpdate() });
   }
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
   drawNow(): HTMLCanvasElement | null {
-    return this.#view.drawNow();
+    return this.scene.isPreview ? null : this.#view.drawNow();
   }
 
   /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */
   async updateFraming(): Promise<void> {
     const { scene } = this.scene;
     if (scene === null) return;
-    const bounds = (await scene.live?.gaussians.readBounds()) ?? scene.bounds;
+    const bounds = (await scene.live?.readBounds?.()) ?? scene.bounds;
     if (this.scene.scene === scene) this.camera.frame(bounds);
+  }
+
+  /** What is known of the scene on show; null where there is none. */
+  get stats(): SceneStats | null {
+    const { scene } = this.scene;
+    if (scene === null) return null;
+    const { quality } = this.#options.attributes();
+    return statsOf(scene, {
+      quality,
+      pace: this.#view.pace.report,
+      counts: this.#counts,
+      economy: this.economy.report,
+      isPreview: this.scene.isPreview,
+    });
+  }
+
+  /** Asks the GPU for the counts of the picture on show. */
+  async updateStats(): Promise<SceneStats | null> {
+    const { scene } = this.scene;
+    const camera = this.#drawnFrom;
+    if (scene === null || camera === undefined) return this.stats;
+    const counts = await scene.readCounts(camera);
+    if (this.scene.scene === scene) this.#counts = counts;
+    return this.stats;
   }
 
   /** The scene to show. Called after every update; only changes act. */
   setSource(source: Source): void {
     this.#source = source;
-    this.#post.want(this.#urlsOf(source.postprocess));
+    this.#live.post.want(this.#urlsOf(source.postprocess));
     this.#requestScene();
   }
 
@@ -178,7 +168,7 @@ export class Stage {
         this.#drawnFrom = camera;
         this.hotspots.frameDrawn(camera);
       },
-      onFrame: (scene, camera, now) => this.#advance(scene, camera, now),
+      onFrame: (scene, camera, now) => this.#live.advance(scene, camera, now),
       onCameraChange: (source) => {
         this.behaviours.announcer.cameraMoved();
         this.#dispatch(new CustomEvent('camera-change', { detail: { source } }));
@@ -193,29 +183,35 @@ export class Stage {
       device: () => services().sharedDevice,
       loader: () => services().sceneLoader,
       releaseDelayMs: () => services().releaseDelay,
-      show: (scene, isNew) => {
-        if (isNew) this.camera.frame(scene.bounds);
+      show: (scene, entrance) => {
+        this.#counts = undefined;
+        if (entrance === 'new') this.camera.frame(scene.bounds);
+        if (entrance === 'whole') this.camera.refine(scene.bounds);
         this.playback.setDuration(scene.live?.duration ?? NaN);
-        this.#post.attach(scene);
+        this.#live.post.attach(scene);
         return this.#view.show(scene);
       },
       hide: (clear) => {
-        this.#post.attach(null);
+        this.#live.post.attach(null);
         if (clear) this.playback.setDuration(NaN);
         if (clear) this.#drawnFrom = undefined;
         if (clear) this.#view.clear();
         else this.#view.pause();
       },
+      frameUrl: (url) => this.#options.services().urlModifier?.(url) ?? url,
+      loops: this.#options.loops,
+      wantsPreviews: () => this.#visibility.isVisible,
+      onPreview: ({ gaussians }) => this.#onPreview(gaussians.count),
       memoryBudget: () => services().memoryBudget ?? defaultMemoryBudget(),
       live: () => ({
         runtimeLocation: services().runtimeLocation,
-        state: () => this.#liveState(),
-        ownsControls: () => !this.#post.isWanted,
+        state: () => this.#live.state,
+        ownsControls: () => !this.#live.post.isWanted,
         camera: (bounds) => {
           if (bounds) this.camera.frame(bounds);
           return this.camera.view(...FIRST_SIZE);
         },
-        listeners: this.#liveListeners(),
+        listeners: this.#live.listeners,
       }),
       onProgress: (loaded, total) => this.#onProgress(loaded, total),
       onStart: () => this.#dispatch(new Event('loadstart')),
@@ -223,19 +219,6 @@ export class Stage {
       onEmptied: () => this.#dispatch(new Event('emptied')),
       onError: (error) => this.#dispatch(new CustomEvent('error', { detail: error })),
       onContext: (type) => this.#dispatch(new Event(type)),
-    });
-  }
-
-  #createPost(): PostController {
-    return new PostController({
-      requestFrame: () => this.#view.requestFrame(),
-      request: () => ({
-        credentials: this.#options.attributes().credentials,
-        runtimeLocation: this.#options.services().runtimeLocation,
-        state: () => this.#liveState(),
-        onError: (error) => this.#onLiveError(error),
-        onFallback: (reason) => this.#dispatch(new CustomEvent('generator-fallback', { detail: { reason } })),
-      }),
     });
   }
 
@@ -280,6 +263,23 @@ export class Stage {
     this.#dispatch(new CustomEvent('load', { detail: { url } }));
   }
 
+  #onUpdate(): void {
+    this.reveal.settle();
+    this.economy.update(this.scene.state === 'ready' ? this.scene.scene : null);
+  }
+
+  #onEconomy(): void {
+    this.#counts = undefined;
+    this.#view.requestFrame();
+    this.#host.requestUpdate();
+  }
+
+  #onPreview(splats: number): void {
+    this.#host.requestUpdate();
+    this.#dispatch(new CustomEvent('preview', { detail: { splats } }));
+    this.#onProgress(...this.#bytes);
+  }
+
   #onRevealed(): void {
     this.#dispatch(new Event('poster-dismissed'));
     const mayPlay = this.playback.canPlay && this.playback.paused && !prefersReducedMotion();
@@ -313,47 +313,11 @@ export class Stage {
   }
 
   #onProgress(loaded: number, total: number | undefined): void {
+    this.#bytes = [loaded, total];
     this.progress = total ? Math.min(1, loaded / total) : null;
     this.#host.requestUpdate();
     const lengthComputable = total !== undefined;
     this.#dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));
-  }
-
-  #liveState(): LiveState {
-    return { ...this.#options.liveValues(), timeSeconds: this.playback.currentTime };
-  }
-
-  /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
-  #advance({ live }: GpuScene, camera: Camera, now: number): void {
-    if (live === undefined) return;
-    this.playback.tick(now);
-    try {
-      live.request(this.#liveState(), camera);
-    } catch (error) {
-      // Values of the page that do not fit the model: told once, not once a frame.
-      this.#onLiveError(error);
-    }
-  }
-
-  #liveListeners(): LiveListeners {
-    return {
-      onFrame: (timeSeconds) => {
-        this.#lastFault = '';
-        this.#view.requestFrame();
-        this.playback.frameShown(timeSeconds);
-      },
-      onError: (error) => this.#onLiveError(error),
-      onFallback: (reason) => this.#dispatch(new CustomEvent('generator-fallback', { detail: { reason } })),
-      onInput: () => this.#view.requestFrame(),
-    };
-  }
-
-  #onLiveError(cause: unknown): void {
-    const error = toElementError(cause);
-    // The loss of the device has events of its own.
-    if (error.code === 'device-lost' || error.message === this.#lastFault) return;
-    this.#lastFault = error.message;
-    this.#dispatch(new CustomEvent('generator-error', { detail: error }));
   }
 
   #dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void {

@@ -23,6 +23,7 @@ const event = <Type extends string & keyof GaussianSplatEventMap>(type: Type): E
 export const HANDLERS: Handlers = {
   onLoad: event('load'),
   onProgress: event('progress'),
+  onPreview: event('preview'),
   onError: event('error'),
   onCameraChange: event('camera-change'),
   onPosterDismissed: event('poster-dismissed'),

@@ -57,7 +57,6 @@ export interface FrameBuffers {
   readonly scratch: Scratch;
   /** How far one sees: see {@link Occlusion}. */
   readonly occlusion: GPUBuffer;
-  readonly keyBits: number;
 }
 
 /** Everything that the stages before the rasterizer are bound to, for one page table and one capacity. */
@@ -66,7 +65,7 @@ export class FrameBindings {
   /** Of the survivors in the file's order. */
   readonly scan: GPUBindGroup;
   readonly plan: GPUBindGroup;
-  readonly sort: ReturnType<SortStage['bind']>;
+  readonly #sorts = new Map<number, ReturnType<SortStage['bind']>>();
   readonly #device: GPUDevice;
   readonly #stages: Stages;
   readonly #table: PageTable;
@@ -81,14 +80,14 @@ export class FrameBindings {
   };
   #thinned: { order: GPUBuffer; thin: ReturnType<ThinStage['bind']>; plan: GPUBindGroup } | undefined;
 
-  constructor(device: GPUDevice, stages: Stages, { table, scratch, occlusion, keyBits }: FrameBuffers) {
+  constructor(device: GPUDevice, stages: Stages, { table, scratch, occlusion }: FrameBuffers) {
     this.#device = device;
     this.#stages = stages;
     this.#table = table;
     this.#scratch = scratch;
     const memory = (this.#memory = new GpuMemory(device));
     this.pages = bindPages(stages, table, scratch, occlusion);
-    const { groupOffsets, plan, keys, order, digitCounts, digitTotals } = scratch;
+    const { groupOffsets, plan } = scratch;
     const count = table.pages.length;
     const { storage, uniform } = BUFFER_USAGE;
     const constant = (name: string, ...words: number[]): GPUBuffer =>
@@ -106,7 +105,6 @@ export class FrameBindings {
       ),
       plan,
     });
-    this.sort = stages.sort.bind({ plan, keys, values: order, digitCounts, digitTotals }, keyBits);
     const length = constants.CULL_GROUP * table.groups;
     const blocks = thinBlocks(length);
     this.#ordered = {
@@ -123,6 +121,16 @@ export class FrameBindings {
 
   get byteLength(): number {
     return this.#memory.byteLength;
+  }
+
+  /** What sorting by keys of so many bits needs. */
+  sort(keyBits: number): ReturnType<SortStage['bind']> {
+    const known = this.#sorts.get(keyBits);
+    if (known) return known;
+    const { plan, keys, order, digitCounts, digitTotals } = this.#scratch;
+    const made = this.#stages.sort.bind({ plan, keys, values: order, digitCounts, digitTotals }, keyBits);
+    this.#sorts.set(keyBits, made);
+    return made;
   }
 
   /** What thinning an order needs. */

@@ -2,7 +2,7 @@ import { dot, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, dispatchGrid } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
-import type { PassTimer } from './gpu/pass-timer.js';
+import type { FrameTimer } from './gpu/pass-timer.js';
 import type { PageTable } from './page-table.js';
 import { OrderKeysStage } from './stages/order-keys.js';
 import { SortStage, type SortName } from './stages/sort.js';
@@ -62,7 +62,7 @@ export class DepthOrder {
   }
 
   /** Records the sorting of all splats for the camera that the table looks through. Call {@link settle} after submitting. */
-  record(encoder: GPUCommandEncoder, camera: Camera, timer?: PassTimer): void {
+  record(encoder: GPUCommandEncoder, camera: Camera, timer?: FrameTimer): void {
     const { storage, copyDestination, indirect } = BUFFER_USAGE;
     const memory = (this.#working ??= new GpuMemory(this.#device));
     const buffer = (name: string, bytes: number): GPUBuffer =>

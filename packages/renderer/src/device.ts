@@ -1,5 +1,10 @@
 /** Optional features that the renderer uses where they exist; it works without any. */
-const USEFUL_FEATURES: readonly GPUFeatureName[] = ['float32-blendable', 'bgra8unorm-storage', 'subgroups'];
+const USEFUL_FEATURES: readonly GPUFeatureName[] = [
+  'float32-blendable',
+  'bgra8unorm-storage',
+  'subgroups',
+  'timestamp-query',
+];
 
 /** Limits that decide how large a scene may be. */
 const SIZE_LIMITS = ['maxBufferSize', 'maxStorageBufferBindingSize'] as const;

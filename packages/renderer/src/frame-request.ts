@@ -1,7 +1,7 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { GaussianScene } from './gaussian-scene.js';
-import type { PassTimer } from './gpu/pass-timer.js';
-import type { Levers, Quality } from './levers.js';
+import type { FrameTimer } from './gpu/pass-timer.js';
+import type { FrameLevers, Levers, Quality } from './levers.js';
 import type { FrameNotes } from './rasterizers/rasterizer.js';
 
 /** A quality, and single levers that differ from it. */
@@ -30,6 +30,11 @@ export interface FrameRequest {
    * What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it.
    */
   readonly notes?: FrameNotes;
+  /**
+   * Levers of this frame alone, for pictures in motion. Give the same object for the same levers, and {@link Renderer.prepare} it: what it
+   * takes is remembered by the object.
+   */
+  readonly levers?: Partial<FrameLevers>;
   /** Notes when each pass ran. */
-  readonly timer?: PassTimer;
+  readonly timer?: FrameTimer;
 }

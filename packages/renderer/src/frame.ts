@@ -1,6 +1,6 @@
 import type { FrameBindings, Stages } from './bindings.js';
 import type { DepthOrder } from './depth-order.js';
-import type { PassTimer } from './gpu/pass-timer.js';
+import type { FrameTimer } from './gpu/pass-timer.js';
 import type { Occlusion } from './occlusion.js';
 import type { Scratch } from './scratch.js';
 
@@ -9,10 +9,12 @@ export interface Frame {
   readonly stages: Stages;
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
+  /** Bits of the keys. */
+  readonly keyBits: number;
   readonly occlusion: Occlusion;
   /** An order of all splats that serves the camera; without it the visible splats are sorted. */
   readonly depthOrder?: DepthOrder;
-  readonly timer?: PassTimer;
+  readonly timer?: FrameTimer;
 }
 
 /**
@@ -53,8 +55,8 @@ function listInDepthOrder(pass: GPUComputePassEncoder, { stages, bindings }: Fra
 }
 
 /** Orders the projected splats from near to far, equal depths in the file's order. */
-function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, timer }: Frame): void {
+function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, keyBits, timer }: Frame): void {
   const pass = encoder.beginComputePass({ label: 'gs.sort', timestampWrites: timer?.timestampWrites('sort') });
-  stages.sort.record(pass, bindings.sort, scratch.plan);
+  stages.sort.record(pass, bindings.sort(keyBits), scratch.plan);
   pass.end();
 }

@@ -81,7 +81,7 @@ function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemo
   const shStride = shWords(packed.shDegree, packed.shPrecision);
   const chunks = new Uint32Array(packed.chunks.buffer, packed.chunks.byteOffset, packed.chunks.length);
   const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
-  const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination;
+  const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
   const pages: GaussianPage[] = [];
   for (let first = 0; first < packed.count; first += capacity) {
     const end = Math.min(first + capacity, packed.count);

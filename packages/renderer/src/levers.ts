@@ -88,6 +88,21 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
   fast: { ...EXACT, occludedBelow: 0.1, transmittanceMin: 1 / 100, alphaMin: 1.25 / 255, depthKeyBits: 16 },
 };
 
+/**
+ * The levers that single frames may set otherwise than their renderer: see {@link FrameRequest.levers}. The others decide what a renderer
+ * allocates.
+ */
+export type FrameLevers = Pick<
+  Levers,
+  | 'depthKeyBits'
+  | 'occludedBelow'
+  | 'transmittanceMin'
+  | 'alphaMin'
+  | 'minContribution'
+  | 'shDegree'
+  | 'resolutionScale'
+>;
+
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
   submissions: [1, 256],
   sortAngle: [0, Math.PI],
@@ -109,11 +124,29 @@ export function leversOf(options: Partial<Levers> & { readonly quality?: Quality
   const base = QUALITIES[quality];
   const names = Object.keys(base) as (keyof Levers)[];
   const levers = Object.fromEntries(names.map((name) => [name, options[name] ?? base[name]])) as unknown as Levers;
+  checkRanges(levers);
+  return levers;
+}
+
+/**
+ * A renderer's levers with those that a frame sets otherwise.
+ * @throws GaussianSplatError `argument/value` for a number out of range.
+ */
+export function leversOfFrame<L extends Levers>(levers: L, changes: Partial<FrameLevers>): L {
+  const { depthKeyBits, occludedBelow, transmittanceMin, alphaMin, minContribution, shDegree, resolutionScale } =
+    changes;
+  const named = { depthKeyBits, occludedBelow, transmittanceMin, alphaMin, minContribution, shDegree, resolutionScale };
+  const set = Object.fromEntries(Object.entries(named).filter(([, value]) => value !== undefined));
+  const changed = { ...levers, ...set };
+  checkRanges(changed);
+  return changed;
+}
+
+function checkRanges(levers: Levers): void {
   for (const [name, [least, most]] of Object.entries(RANGES) as [keyof Levers, [number, number]][]) {
     const value = Number(levers[name]);
     if (!(value >= least && value <= most)) throw invalid(name, `a number from ${least} to ${most}`, levers[name]);
   }
-  return levers;
 }
 
 function invalid(name: string, expected: string, found: unknown): GaussianSplatError {

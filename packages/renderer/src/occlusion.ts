@@ -24,7 +24,7 @@ type Tiles = readonly [columns: number, rows: number];
  */
 export class Occlusion {
   readonly #device: GPUDevice;
-  readonly #isUsed: boolean;
+  #isUsed: boolean;
   readonly #memory: GpuMemory;
   readonly #stage: OcclusionDepthsStage;
   readonly #view: GPUBuffer;
@@ -36,8 +36,10 @@ export class Occlusion {
   #tiles: Tiles = NONE;
   #last: { readonly camera: Camera; readonly version: number } | undefined;
   #mayLack = false;
+  /** Whether the frame at hand leaves anything out. */
+  #isOn = false;
 
-  /** @param isUsed false where nothing tells how far one sees; then all is as if every tile were open */
+  /** @param isUsed false where nothing tells how far one sees; then all is as if every tile were open. See {@link use} */
   constructor(device: GPUDevice, isUsed: boolean) {
     this.#device = device;
     this.#isUsed = isUsed;
@@ -73,11 +75,16 @@ export class Occlusion {
     return this.#memory.byteLength;
   }
 
+  /** Frames to come may leave out what is hidden. */
+  use(): void {
+    this.#isUsed = true;
+  }
+
   /** Sees to room for an image. @returns true if the buffers are other ones now */
   fit({ width, height }: Camera): boolean {
     const words = wordsOf(tilesOf(width, height));
     if (!this.#isUsed || words <= this.#words) return false;
-    this.#words = words;
+    this.#words = Math.max(words, wordsOf(tilesOf(...USUAL)));
     this.#memory.free(this.#depths);
     this.#memory.free(this.#lastDepths);
     [this.#depths, this.#lastDepths, this.#bindings] = this.#allocate();
@@ -90,9 +97,14 @@ export class Occlusion {
     this.#last = undefined;
   }
 
-  /** Prepares a frame; {@link record} must follow. @param version of the content */
-  prepare(encoder: GPUCommandEncoder, camera: Camera, version: number): void {
-    if (!this.#isUsed) return;
+  /**
+   * Prepares a frame; {@link record} must follow.
+   * @param version of the content
+   * @param isOn false for a frame that leaves nothing out
+   */
+  prepare(encoder: GPUCommandEncoder, camera: Camera, version: number, isOn: boolean): void {
+    this.#isOn = this.#isUsed && isOn;
+    if (!this.#isOn) return this.#pass();
     const last = this.#last;
     const isKnown = last !== undefined && last.version === version && isNear(last.camera, camera);
     this.#tiles = tilesOf(camera.width, camera.height);
@@ -108,11 +120,18 @@ export class Occlusion {
   }
 
   record(pass: GPUComputePassEncoder): void {
-    if (this.#isUsed) this.#stage.record(pass, this.#bindings, this.#tiles);
+    if (this.#isOn) this.#stage.record(pass, this.#bindings, this.#tiles);
   }
 
   destroy(): void {
     this.#memory.destroy();
+  }
+
+  /** What such a frame sees is not noted. */
+  #pass(): void {
+    this.#tiles = NONE;
+    this.#mayLack = false;
+    this.#last = undefined;
   }
 
   #allocate(): [depths: GPUBuffer, lastDepths: GPUBuffer, bindings: GPUBindGroup] {

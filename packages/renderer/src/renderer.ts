@@ -1,6 +1,6 @@
 import { validateCamera, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { AccumulationTexture } from './accumulation.js';
-import { FrameBindings, makeStages, type Stages } from './bindings.js';
+import { FrameBindings } from './bindings.js';
 import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
 import { ContentWatch } from './content-watch.js';
 import { angleBetween, axisOf, DepthOrder } from './depth-order.js';
@@ -11,18 +11,18 @@ import type { GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
-import type { PassTimer } from './gpu/pass-timer.js';
+import type { FrameTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
-import { leversOf, overridesOf, type Levers } from './levers.js';
+import { mixOf, sortedOrder, type FrameMix } from './frame-mix.js';
+import { leversOf, leversOfFrame, type FrameLevers, type Levers } from './levers.js';
 import { Occlusion } from './occlusion.js';
 import { PageTable } from './page-table.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
-import type { Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import type { OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/tiles.js';
 import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
 import { maxVisible, Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
-import { sortedIn } from './stages/sort.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
@@ -70,7 +70,9 @@ export class Renderer {
   /** The levers in force; nothing is left `auto`. */
   readonly levers: Levers & Variants;
   readonly #device: GPUDevice;
-  readonly #stages: Stages;
+  /** How frames are drawn that ask for nothing else, and how those are that do. */
+  readonly #mix: FrameMix;
+  readonly #mixes = new WeakMap<Partial<FrameLevers>, FrameMix>();
   readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
   readonly #occlusion: Occlusion;
@@ -85,18 +87,17 @@ export class Renderer {
   #lastAxis: Vector3 | undefined;
   #turningFrames = 0;
   readonly #content = new ContentWatch();
-  /** Whether the slots of the last frame are in depth order themselves; undefined before there is one. */
-  #lastIsOrdered: boolean | undefined;
+  /** Where the slots of the last frame are listed, and its pixels for each of the target; undefined before there is one. */
+  #last: { readonly order: OrderKind; readonly scale: number } | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
     this.#device = device;
     this.levers = settle(device, leversOf(options));
     this.#onIncomplete = options.onIncomplete ?? (() => undefined);
-    const overrides = overridesOf(this.levers);
-    this.#stages = makeStages(device, overrides, this.levers);
+    this.#mix = mixOf(device, this.levers);
     this.#compose = new ComposeStage(device);
-    this.#rasterizer = makeRasterizer(device, this.levers, overrides);
+    this.#rasterizer = makeRasterizer(device, this.levers, this.#mix.overrides);
     this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
@@ -127,6 +128,15 @@ export class Renderer {
   }
 
   /**
+   * Makes what frames with other levers need, so that none of them has to. Their memory, next to nothing, comes with the next frame.
+   * @param targetFormat format of the targets
+   * @throws GaussianSplatError `argument/value` for a lever out of range.
+   */
+  prepare(levers: readonly Partial<FrameLevers>[], targetFormat: GPUTextureFormat): void {
+    for (const changes of levers) this.#rasterizer.prepare(this.#mixOf(changes).overrides, targetFormat);
+  }
+
+  /**
    * Encodes and submits one frame.
    * @throws GaussianSplatError `argument/camera` for a camera out of range; `out-of-memory/buffer-limit` if the scenes
    * need a larger buffer than the device allows.
@@ -138,18 +148,21 @@ export class Renderer {
     if (notes) requireNotes(this.#rasterizer);
     const target = this.#targetOf(request);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
-    const drawn = scaled(camera, this.levers.resolutionScale);
+    const mix = this.#mixOf(request.levers);
+    const { levers } = mix;
+    const drawn = scaled(camera, levers.resolutionScale);
     const resources = this.#resourcesFor(scenes, this.#occlusion.fit(drawn));
     const { table, scratch, bindings, depthOrder, monitor } = resources;
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer, notes !== undefined);
-    this.#occlusion.prepare(encoder, drawn, table.version);
-    table.look(drawn, this.levers, isOrdered, this.#occlusion.tiles);
+    this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
+    table.look(drawn, levers, isOrdered, this.#occlusion.tiles);
     recordProjection(encoder, {
-      stages: this.#stages,
+      stages: mix.stages,
       bindings,
       scratch,
+      keyBits: levers.depthKeyBits,
       occlusion: this.#occlusion,
       depthOrder: isOrdered ? depthOrder : undefined,
       timer,
@@ -158,12 +171,14 @@ export class Renderer {
       encoder,
       target,
       drawn,
-      { order: isOrdered ? 'identity' : 'sorted', notes, timer },
+      { order: isOrdered ? 'identity' : sortedOrder(levers), overrides: mix.overrides, notes, timer },
       background,
     );
+    timer?.endFrame?.(last);
     const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
     this.#device.queue.submit([last.finish()]);
-    this.#lastIsOrdered = isOrdered;
+    timer?.submitted?.();
+    this.#last = { order: isOrdered ? 'identity' : sortedOrder(levers), scale: drawn.width / camera.width };
     if (isWatched) monitor.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
@@ -196,12 +211,12 @@ export class Renderer {
    * @returns an answer for each point; none before the first frame.
    */
   async probeDepth(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
-    if (this.#resources === undefined || this.#lastIsOrdered === undefined) return [];
+    if (this.#resources === undefined || this.#last === undefined) return [];
     const { plan, splats, order, keys } = this.#resources.scratch;
-    const { depthKeyBits, resolutionScale, sort } = this.levers;
-    const nearToFar = this.#lastIsOrdered ? keys[0] : order[sortedIn(sort, depthKeyBits)];
-    const drawn = points.map(({ x, y, depth }) => ({ x: x * resolutionScale, y: y * resolutionScale, depth }));
-    return probe(this.#device, { plan, splats, order: nearToFar }, drawn, overridesOf(this.levers));
+    const { scale } = this.#last;
+    const nearToFar = { first: order[0], second: order[1], identity: keys[0] }[this.#last.order];
+    const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
+    return probe(this.#device, { plan, splats, order: nearToFar }, drawn, this.#mix.overrides);
   }
 
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
@@ -223,7 +238,7 @@ export class Renderer {
     encoder: GPUCommandEncoder,
     { depthOrder, table }: Resources,
     camera: Camera,
-    timer: PassTimer | undefined,
+    timer: FrameTimer | undefined,
     isAskedFor: boolean,
   ): boolean {
     const { sortAngle } = this.levers;
@@ -248,7 +263,7 @@ export class Renderer {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'order' | 'notes' | 'timer'>,
+    how: Pick<Painting, 'order' | 'overrides' | 'notes' | 'timer'>,
     background: readonly [number, number, number, number],
   ): GPUCommandEncoder {
     const isFullSize = camera.width === target.width && camera.height === target.height;
@@ -256,11 +271,14 @@ export class Renderer {
       this.#rasterizer.record(encoder, { ...how, surface: target, background });
       return encoder;
     }
-    const { texture, compose } = this.#accumulationOf(camera.width, camera.height);
+    const { texture, compose } = this.#accumulationOf(camera, target);
     const scale = [camera.width / target.width, camera.height / target.height];
-    writeStruct(layouts.Compose, { background, scale }, this.#composeBytes);
+    const used = [camera.width, camera.height];
+    writeStruct(layouts.Compose, { background, scale, used }, this.#composeBytes);
     this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
-    const last = this.#recordSlices(encoder, { ...how, surface: texture });
+    const { view, format } = texture;
+    const surface = { view, format, width: camera.width, height: camera.height };
+    const last = this.#recordSlices(encoder, { ...how, surface });
     this.#compose.record(last, compose, target.view, target.format, how.timer);
     return last;
   }
@@ -278,6 +296,16 @@ export class Renderer {
       this.#rasterizer.record(current, { ...painting, slice: { index, count } });
     }
     return current;
+  }
+
+  #mixOf(changes: Partial<FrameLevers> | undefined): FrameMix {
+    if (changes === undefined) return this.#mix;
+    const known = this.#mixes.get(changes);
+    if (known) return known;
+    const made = mixOf(this.#device, leversOfFrame(this.levers, changes));
+    if (made.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles') this.#occlusion.use();
+    this.#mixes.set(changes, made);
+    return made;
   }
 
   #targetOf({ target, targetFormat, camera }: FrameRequest): Target {
@@ -322,19 +350,18 @@ export class Renderer {
     this.#resources?.monitor.destroy();
     const pages = table.pages.length;
     const scratch = new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
-    const { depthKeyBits, sort } = this.levers;
     const { plan, splats, order, keys } = scratch;
     this.#rasterizer.bind({
       plan,
       splats,
       occlusion: this.#occlusion,
       survivors: order[0],
-      orders: { sorted: order[sortedIn(sort, depthKeyBits)], identity: keys[0] },
+      orders: { first: order[0], second: order[1], identity: keys[0] },
       capacity: capacity.visible,
       pairCapacity: capacity.pairs,
     });
     this.#hasOtherPairs = false;
-    this.#lastIsOrdered = undefined;
+    this.#last = undefined;
     const monitor = new CapacityMonitor(this.#device, capacity, this.#mostFor(table), (wished, overflowed) => {
       this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
       this.#capacity = wished;
@@ -343,11 +370,10 @@ export class Renderer {
     this.#resources = {
       table,
       scratch,
-      bindings: new FrameBindings(this.#device, this.#stages, {
+      bindings: new FrameBindings(this.#device, this.#mix.stages, {
         table,
         scratch,
         occlusion: this.#occlusion.depths,
-        keyBits: depthKeyBits,
       }),
       depthOrder,
       monitor,
@@ -363,11 +389,15 @@ export class Renderer {
     monitor?.destroy();
     this.#occlusion.forget();
     this.#resources = undefined;
-    this.#lastIsOrdered = undefined;
+    this.#last = undefined;
     this.#lastAxis = undefined;
   }
 
-  #accumulationOf(width: number, height: number): Accumulation {
+  /** As large as frames of this target are without levers of their own: one with fewer pixels paints a part of it. */
+  #accumulationOf(drawn: Camera, target: Target): Accumulation {
+    const share = this.levers.resolutionScale;
+    const width = Math.max(drawn.width, Math.round(target.width * share));
+    const height = Math.max(drawn.height, Math.round(target.height * share));
     const current = this.#accumulation;
     if (current?.texture.width === width && current.texture.height === height) return current;
     current?.texture.destroy();

@@ -25,6 +25,8 @@ export class CameraController {
   #source: CameraChangeSource = 'none';
   /** A person has zoomed since the attributes last set the distance; then a new aspect leaves it alone. */
   #userDistance = false;
+  /** A person has moved the camera since a scene was framed. */
+  #isTouched = false;
   #jumped = false;
   #lastStep: number | undefined;
 
@@ -98,7 +100,19 @@ export class CameraController {
   /** A new scene: the camera stands where the attributes ask, at once. */
   frame(bounds: Bounds): void {
     this.#bounds = bounds;
+    this.#isTouched = false;
     this.#reframe('automatic');
+  }
+
+  /** More of the scene is known: the camera goes where it would have stood, unless a person has moved it. */
+  refine(bounds: Bounds): void {
+    this.#bounds = bounds;
+    this.#camera.limits = limitsOf(this.#settings, bounds, this.#aspect);
+    if (!this.#isTouched) {
+      this.#source = 'automatic';
+      this.#camera.setGoal(poseOf(this.#settings, bounds, this.#aspect));
+    }
+    this.#onChange();
   }
 
   /** A new shape of the picture: an automatic distance follows, at once. */
@@ -189,6 +203,7 @@ export class CameraController {
   }
 
   #moveByUser(): void {
+    this.#isTouched = true;
     this.#source = 'user-interaction';
     this.#onChange();
   }

@@ -1,7 +1,8 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
-import { openGpuScene, type GpuScene, type OpenOptions } from '../gpu/gpu-scene.js';
+import type { GpuScene } from '../gpu/gpu-scene.js';
+import { openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { SharedDevice } from '../gpu/shared-device.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
@@ -9,16 +10,26 @@ import type { SceneLoader } from '../loading/scene-loader.js';
 /** `waiting`: there is a scene to load, but the element is not in sight yet. */
 export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';
 
+/** How a scene comes on show: as a `new` one, in place of a preview of it (`whole`), or `again` after a lost device. */
+export type Entrance = 'new' | 'whole' | 'again';
+
 /** What the controller needs of its element, and what it tells it. */
 export interface SceneOptions {
   readonly device: () => SharedDevice;
   readonly loader: () => SceneLoader;
   /** How long a removed element keeps its scene, ms: moving it within the page costs nothing. */
   readonly releaseDelayMs: () => number;
-  /** Shows a scene; fulfils once its first frame is drawn. `isNew` is false when a lost one comes back. */
-  readonly show: (scene: GpuScene, isNew: boolean) => Promise<void>;
+  /** Shows a scene; fulfils once its first frame is drawn. */
+  readonly show: (scene: GpuScene, entrance: Entrance) => Promise<void>;
   /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
   readonly hide: (clear: boolean) => void;
+  /** Address of a frame of a sequence as it is fetched. */
+  readonly frameUrl: (url: string) => string;
+  readonly loops: () => boolean;
+  /** Whether anybody would see what there is of a scene while it loads. */
+  readonly wantsPreviews: () => boolean;
+  /** A preview of the scene is on show. */
+  readonly onPreview: (preview: GpuScene) => void;
   /** Bytes of GPU memory that the scene may take. */
   readonly memoryBudget: () => number | undefined;
   /** What a generator needs to know beyond the request. */
@@ -37,6 +48,9 @@ const MAX_FAILURES = 2;
 /** Pause before the second try, ms: a GPU process that has just crashed needs a moment. */
 const RETRY_DELAY_MS = 1_000;
 
+/** A preview is kept while the whole scene is uploaded if that is so many times as large: both take memory then. */
+const MIN_GROWTH = 4;
+
 /** How many more submissions a frame is divided into after each loss, and where that ends: the picture is the same. */
 const SUBMISSIONS_GROWTH = 4;
 const MOST_SUBMISSIONS = 64;
@@ -51,6 +65,7 @@ export class SceneController implements ReactiveController {
   #state: SceneState = 'empty';
   #error: ElementError | null = null;
   #scene: GpuScene | null = null;
+  #isPreview = false;
   #request: SceneRequest | null = null;
   #running = new AbortController();
   #releaseTimer: ReturnType<typeof setTimeout> | undefined;
@@ -75,6 +90,11 @@ export class SceneController implements ReactiveController {
   /** The scene on show. */
   get scene(): GpuScene | null {
     return this.#scene;
+  }
+
+  /** The scene on show is a preview of the one that is being loaded. */
+  get isPreview(): boolean {
+    return this.#isPreview && this.#scene !== null;
   }
 
   /** Fulfils, and never rejects, once nothing is left to wait for: shown, failed or given up. */
@@ -174,20 +194,52 @@ export class SceneController implements ReactiveController {
     isNew: boolean,
     onProgress: (loaded: number, total: number | undefined) => void,
   ): Promise<void> {
-    const { device, loader, show, live, memoryBudget } = this.#options;
-    const beforeUpload = (): void => this.#drop(false);
+    const { device, loader, show, live, memoryBudget, wantsPreviews, frameUrl, loops } = this.#options;
+    const onPreview = isNew && wantsPreviews() ? (preview: GpuScene) => this.#showPreview(preview) : undefined;
+    const beforeUpload = (byteLength: number): void => {
+      const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
+      // A small preview stays on show meanwhile.
+      if (!isSmall) this.#drop(false);
+    };
     const scene = await openGpuScene(request, {
-      ...{ device: device(), loader: loader() },
-      ...{ signal, onProgress, beforeUpload, live, memoryBudget: memoryBudget(), submissions: this.#submissions },
+      ...{ device: device(), loader: loader(), frameUrl, loops },
+      ...{
+        signal,
+        onProgress,
+        onPreview,
+        beforeUpload,
+        live,
+        memoryBudget: memoryBudget(),
+        submissions: this.#submissions,
+      },
     });
     if (signal.aborted) return scene.destroy();
-    this.#scene = scene;
-    await Promise.race([show(scene, isNew), scene.lost]);
+    const entrance = !isNew ? 'again' : this.#isPreview ? 'whole' : 'new';
+    this.#replace(scene, false);
+    await Promise.race([show(scene, entrance), scene.lost]);
     if (signal.aborted) return;
     if (scene.isLost) throw new DeviceLostError((await scene.lost).message);
     void scene.lost.then(() => {
       if (this.#scene === scene) void this.#restore(request);
     });
+  }
+
+  #showPreview(preview: GpuScene): void {
+    const entrance = this.#isPreview ? 'whole' : 'new';
+    this.#replace(preview, true);
+    void this.#options.show(preview, entrance).then(
+      () => this.#scene === preview && this.#options.onPreview(preview),
+      // The whole scene will say what is wrong.
+      () => undefined,
+    );
+    this.#host.requestUpdate();
+  }
+
+  /** Another scene in place of the one on show, whose picture stays until the first of the new one. */
+  #replace(scene: GpuScene, isPreview: boolean): void {
+    this.#drop(false);
+    this.#scene = scene;
+    this.#isPreview = isPreview;
   }
 
   /** Ends what runs, and leaves the picture alone. */
@@ -213,6 +265,7 @@ export class SceneController implements ReactiveController {
 
   #setState(state: SceneState): void {
     this.#state = state;
+    if (state !== 'loading') this.#isPreview = false;
     this.#host.requestUpdate();
     if (state === 'waiting' || state === 'loading') return;
     const waiters = this.#waiters;

@@ -1,9 +1,13 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
+import type { FrameLevers } from '@gaussian-splat/renderer';
+import type { QualityChoice } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
 import type { GpuScene, Rendering } from '../gpu/gpu-scene.js';
 import type { Frame } from '../live/frame-filter.js';
+import { LADDER } from '../pace/ladder.js';
 import type { CameraController } from './camera-controller.js';
+import { PaceController } from './pace-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
@@ -15,7 +19,8 @@ export interface ViewOptions {
   /** False where nobody would see a frame. */
   readonly isVisible: () => boolean;
   readonly maxPixelRatio: () => number;
-  readonly rendering: () => Rendering;
+  /** How its frames are drawn. */
+  readonly rendering: () => Omit<Rendering, 'quality'> & { readonly quality: QualityChoice };
   /** Time constant of the camera's motion, ms. */
   readonly decayMs: () => number;
   /** Called once a frame before the camera steps: what moves it by itself does so now. */
@@ -34,17 +39,28 @@ interface Settle {
   readonly reject: (reason: unknown) => void;
 }
 
+/** All that pictures in motion may be drawn with. */
+const MOVING_LEVERS: readonly Partial<FrameLevers>[] = LADDER.flatMap(({ levers }) => levers ?? []);
+
 /** Draws the scene into the element's canvas, a frame at a time and only when asked. */
 export class ViewController implements FrameClient {
+  /** What frames in motion are drawn with. */
+  readonly pace: PaceController;
   readonly #options: ViewOptions;
   #scene: GpuScene | null = null;
   #context: GPUCanvasContext | null = null;
   #configured: GPUDevice | null = null;
   /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
   #first: Settle | undefined;
+  #drawnVersion = 0;
 
   constructor(options: ViewOptions) {
     this.#options = options;
+    this.pace = new PaceController({
+      isOn: () => options.rendering().quality === 'auto' && (this.#scene?.isMeasurable ?? false),
+      scheduler: options.scheduler,
+      requestFrame: () => this.requestFrame(),
+    });
   }
 
   /** Asks for a frame, if one would be seen. Free to call often. */
@@ -61,6 +77,7 @@ export class ViewController implements FrameClient {
   show(scene: GpuScene): Promise<void> {
     this.#scene = scene;
     scene.onIncomplete = () => this.requestFrame();
+    this.pace.reset();
     return new Promise((resolve, reject) => {
       this.#first = { resolve, reject };
       this.requestFrame();
@@ -71,6 +88,7 @@ export class ViewController implements FrameClient {
   pause(): void {
     this.#scene = null;
     this.#first = undefined;
+    this.pace.stop();
     this.#options.scheduler().cancel(this);
   }
 
@@ -93,7 +111,7 @@ export class ViewController implements FrameClient {
     try {
       const request = this.#frameRequest(scene, pixels);
       this.#options.onFrame(scene, request.camera, now);
-      this.#render(scene, request);
+      this.#render(scene, request, now, source !== null);
       this.#options.afterFrame(request.camera);
     } catch (error) {
       return onError(error);
@@ -115,16 +133,33 @@ export class ViewController implements FrameClient {
       scene.device.limits.maxTextureDimension2D,
     );
     if (pixels === null) return null;
-    this.#render(scene, this.#frameRequest(scene, pixels));
+    this.#applyRendering(scene);
+    scene.render(this.#frameRequest(scene, pixels));
     return canvas;
   }
 
-  #render(scene: GpuScene, request: Frame): void {
+  #render(scene: GpuScene, request: Frame, now: number, cameraMoved: boolean): void {
     const first = this.#first;
     this.#first = undefined;
-    scene.setRendering(this.#options.rendering());
-    if (first === undefined) scene.render(request);
-    else scene.renderFirst(request).then(first.resolve, first.reject);
+    this.#applyRendering(scene);
+    const { version } = scene.gaussians;
+    const hasChanged = first === undefined && (cameraMoved || version !== this.#drawnVersion);
+    this.#drawnVersion = version;
+    const { level, levers } = this.pace.plan({ now, hasChanged, goesOn: this.#options.camera.isMoving });
+    if (first === undefined) scene.render({ ...request, levers }, (spent) => this.pace.sample(level, spent));
+    else scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
+  }
+
+  /** Pictures in motion must not wait for pipelines: those that they may need are made now. */
+  #afterFirst(scene: GpuScene, { target }: Frame, { resolve }: Settle): void {
+    resolve();
+    const isPaced = this.#options.rendering().quality === 'auto';
+    if (isPaced && scene.isMeasurable) scene.prepare(MOVING_LEVERS, target.format);
+  }
+
+  #applyRendering(scene: GpuScene): void {
+    const { quality, shDegree } = this.#options.rendering();
+    scene.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree });
   }
 
   #finishUnseen(): void {

@@ -1,3 +1,5 @@
+import { DisplayInterval } from '../pace/display-interval.js';
+
 /** Something that draws. */
 export interface FrameClient {
   /** Draws one frame. Asks the scheduler again if there is to be another. `now` is requestAnimationFrame's clock, ms. */
@@ -10,6 +12,18 @@ export class FrameScheduler {
   #drawing = new Set<FrameClient>();
   #handle = 0;
   #waitsForPage = false;
+  readonly #interval = new DisplayInterval();
+  #clients = 0;
+
+  /** Milliseconds between two pictures of the display. */
+  get displayInterval(): number {
+    return this.#interval.milliseconds;
+  }
+
+  /** Clients that draw at the same time: those of the last frame. */
+  get clients(): number {
+    return this.#clients;
+  }
 
   /** Asks for one frame; asking twice is asking once. */
   request(client: FrameClient): void {
@@ -46,10 +60,13 @@ export class FrameScheduler {
     this.#handle = 0;
     if (document.visibilityState !== 'hidden') this.#drawAll(now);
     this.#schedule();
+    if (this.#handle === 0) this.#interval.pause();
   };
 
   #drawAll(now: number): void {
     [this.#due, this.#drawing] = [this.#drawing, this.#due];
+    this.#clients = this.#drawing.size;
+    this.#interval.tick(now);
     for (const client of this.#drawing) {
       try {
         client.drawFrame(now);

@@ -1,22 +1,22 @@
-import { GaussianSplatError, type Bounds, type ShDegree } from '@gaussian-splat/core';
+import { GaussianSplatError, type Bounds, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
-  chooseVariants,
-  GaussianBuffers,
   Renderer,
   type GaussianScene,
+  type FrameLevers,
   type ProbeAnswer,
   type ProbePoint,
   type Quality,
 } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
-import type { LiveModel, LiveRequest } from '../live/live-model.js';
-import type { LoadedScene, ProgressListener, SceneRequest } from '../loading/protocol.js';
-import type { SceneLoader } from '../loading/scene-loader.js';
-import { assertWebGpu } from './request-device.js';
-import type { DeviceLease, SharedDevice } from './shared-device.js';
+import type { Timeline } from '../live/live-model.js';
+import type { ReadCounts } from '../stats.js';
+import { FrameMeter } from './frame-meter.js';
+import type { DeviceLease } from './shared-device.js';
 
 /** Gaussians with one owner. */
 export interface OwnedGaussians extends GaussianScene {
+  /** Splats of the frame on show, where there is room for more. */
+  readonly frameCount?: number;
   /** Splats of the file that were left out; a generator's are counted by nobody. */
   readonly droppedCount?: number;
   readonly byteLength: number;
@@ -36,9 +36,11 @@ export interface Rendering {
  */
 export class GpuScene {
   readonly bounds: Bounds;
-  readonly gaussians: OwnedGaussians;
-  /** The generator that writes the Gaussians; undefined for those of a file. */
-  readonly live: LiveModel | undefined;
+  #gaussians: OwnedGaussians;
+  /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
+  readonly live: Timeline | undefined;
+  /** Called when the scene is destroyed. */
+  onDestroy: () => void = () => undefined;
   /** Called when the frame just drawn lacked something that the next one will have. */
   onIncomplete: () => void = () => undefined;
   #renderer: Renderer;
@@ -46,15 +48,39 @@ export class GpuScene {
   #filter: FrameFilter | undefined;
   readonly #submissions: number;
   readonly #lease: DeviceLease;
+  readonly #meter: FrameMeter;
   #destroyed = false;
 
-  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, submissions: number, live?: LiveModel) {
+  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, submissions: number, live?: Timeline) {
     this.#lease = lease;
     this.live = live;
-    this.gaussians = gaussians;
+    this.#gaussians = gaussians;
     this.bounds = bounds;
     this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
+    this.#meter = new FrameMeter(lease.device, live === undefined);
+  }
+
+  /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
+  get frameBytes(): number {
+    return this.#renderer.byteLength;
+  }
+
+  /** True if it can be told how long frames take. */
+  get isMeasurable(): boolean {
+    return this.#meter.isAble;
+  }
+
+  /** Its splats. */
+  get gaussians(): OwnedGaussians {
+    return this.#gaussians;
+  }
+
+  /** Draws other splats from now on; those before are freed. */
+  replaceGaussians(gaussians: OwnedGaussians): void {
+    this.#gaussians.destroy();
+    this.#gaussians = gaussians;
+    this.#filter?.invalidate();
   }
 
   get device(): GPUDevice {
@@ -102,11 +128,25 @@ export class GpuScene {
     return new Renderer(this.device, { ...this.#rendering, submissions: this.#submissions, onIncomplete });
   }
 
-  /** Encodes and submits one frame. */
-  render(frame: Frame): void {
+  /** Makes what frames with other levers need, so that none of them has to. */
+  prepare(levers: readonly Partial<FrameLevers>[], format: GPUTextureFormat): void {
+    if (!this.isLost && !this.#destroyed) this.#renderer.prepare(levers, format);
+  }
+
+  /**
+   * Encodes and submits one frame.
+   * @param onTime gets milliseconds that the frame kept the GPU, some frames later; not every frame is timed
+   */
+  render(frame: Frame, onTime?: (milliseconds: number) => void): void {
+    if (onTime) this.#meter.measure((timer) => this.#draw({ ...frame, timer }), onTime);
+    else this.#draw(frame);
+  }
+
+  #draw(frame: Frame): void {
     const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, gaussians: this.gaussians });
     const { quality, shDegree } = this.#rendering;
-    if (this.#filter) this.#filter.render(frame, `${this.gaussians.version} ${quality} ${shDegree}`, draw);
+    const content = `${this.gaussians.version} ${quality} ${shDegree} ${JSON.stringify(frame.levers ?? null)}`;
+    if (this.#filter) this.#filter.render(frame, content, draw);
     else draw(frame);
   }
 
@@ -134,101 +174,25 @@ export class GpuScene {
     return this.#renderer.probeDepth(points);
   }
 
+  /** Counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
+  async readCounts(camera: Camera): Promise<ReadCounts> {
+    const { visible } = await this.#renderer.readStatistics();
+    const { countContributing } = await import('./contributions.js');
+    return { drawn: visible, contributed: await countContributing(this.device, this.gaussians, camera) };
+  }
+
   /** Frees the GPU memory and lets go of the device. */
   destroy(): void {
     if (this.#destroyed) return;
     this.#destroyed = true;
+    this.onDestroy();
     this.setFilter(undefined);
     this.live?.close();
+    this.#meter.destroy();
     this.#renderer.destroy();
-    this.gaussians.destroy();
+    this.#gaussians.destroy();
     this.#lease.release();
   }
-}
-
-export interface OpenOptions {
-  readonly device: SharedDevice;
-  readonly loader: SceneLoader;
-  readonly signal: AbortSignal;
-  readonly onProgress: ProgressListener;
-  /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. */
-  readonly beforeUpload: () => void;
-  /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
-  readonly memoryBudget: number | undefined;
-  /** Submissions that the painting of a frame is divided into. */
-  readonly submissions: number;
-  /** What a generator needs to know beyond the request. */
-  readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
-}
-
-/** Device and file at the same time, then the upload. Rejects with GaussianSplatError or the signal's reason. */
-export async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
-  // Known at once, and then not a byte is fetched.
-  assertWebGpu();
-  if (isGenerator(request)) return openLiveScene(request, options);
-  // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
-  const abort = new AbortController();
-  const giveUp = (): void => abort.abort(options.signal.reason);
-  options.signal.addEventListener('abort', giveUp, { once: true });
-  const acquiring = options.device.acquire();
-  // While the bytes are on their way there is time to find out what suits the device.
-  const choosing = acquiring.then(({ device }) => chooseVariants(device));
-  const loading = options.loader.load(request, abort.signal, options.onProgress);
-  try {
-    const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(unlessWrong)]);
-    options.signal.throwIfAborted();
-    options.beforeUpload();
-    return await upload(lease, scene, options);
-  } catch (error) {
-    abort.abort(error);
-    acquiring.then((lease) => lease.release(), ignore);
-    loading.catch(ignore);
-    throw error;
-  } finally {
-    options.signal.removeEventListener('abort', giveUp);
-  }
-}
-
-/** Generators are known by the name of the file, or by the contract that the page gives along. */
-function isGenerator({ url, contract }: SceneRequest): boolean {
-  if (contract !== undefined && contract !== null && contract !== '') return true;
-  const { pathname, protocol, hash } = URL.canParse(url) ? new URL(url) : { pathname: url, protocol: '', hash: '' };
-  return /\.onnx$/i.test(protocol === 'blob:' ? hash : pathname);
-}
-
-async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
-  const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
-  const opening = import('../live/open-live-model.js');
-  const acquiring = options.device.acquire();
-  opening.catch(ignore);
-  const lease = await acquiring;
-  try {
-    signal.throwIfAborted();
-    const { openLiveModel } = await opening;
-    const { url, chain = [], contract, credentials } = request;
-    const live = await openLiveModel(
-      { ...options.live(), url, chain, contract, credentials, memoryBudget },
-      lease.device,
-      signal,
-      onProgress,
-    );
-    beforeUpload();
-    return new GpuScene(lease, live.gaussians, live.bounds, submissions, live);
-  } catch (error) {
-    lease.release();
-    throw error;
-  }
-}
-
-async function upload(
-  lease: DeviceLease,
-  { packed, bounds }: LoadedScene,
-  { signal, memoryBudget, submissions }: OpenOptions,
-): Promise<GpuScene> {
-  const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
-  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds, submissions);
-  gaussians.destroy();
-  throw signal.reason;
 }
 
 function outOfMemory(cause: GPUError): GaussianSplatError {
@@ -239,13 +203,4 @@ function outOfMemory(cause: GPUError): GaussianSplatError {
     remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
     cause,
   });
-}
-
-/** That no variant draws the right image ends the loading; that none could be timed does not. */
-function unlessWrong(error: unknown): void {
-  if (error instanceof GaussianSplatError && error.code === 'unsupported/wrong-image') throw error;
-}
-
-function ignore(): void {
-  // The failure that matters has been thrown already.
 }

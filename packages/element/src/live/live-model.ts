@@ -13,6 +13,8 @@ export interface LiveState extends ReadControls {
 export interface LiveListeners {
   /** A frame for a time is ready to be drawn. */
   readonly onFrame: (timeSeconds: number) => void;
+  /** The frame of a time is on show, as of the picture that is being drawn. */
+  readonly onShown: (timeSeconds: number) => void;
   /** A run failed; the last good frame stays. */
   readonly onError: (error: unknown) => void;
   /** The model runs on the CPU. */
@@ -21,15 +23,21 @@ export interface LiveListeners {
   readonly onInput: () => void;
 }
 
-/** A generator behind a scene, with the first frame in its Gaussians. */
-export interface LiveModel {
-  readonly gaussians: DynamicGaussians;
-  readonly bounds: Bounds;
+/** What changes the Gaussians of a scene as time goes on: a generator, or a sequence of files. */
+export interface Timeline {
+  /** Bounds of the Gaussians as they are now; absent where those of the first frame count. */
+  readBounds?(): Promise<Bounds>;
   /** Seconds; Infinity where the contract declares none. */
   readonly duration: number;
   /** Asks for the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
   request(state: LiveState, camera: Camera): void;
   close(): void;
+}
+
+/** A generator behind a scene, with the first frame in its Gaussians. */
+export interface LiveModel extends Timeline {
+  readonly gaussians: DynamicGaussians;
+  readonly bounds: Bounds;
 }
 
 /** Where the generator is, and what its first frame shows. */

@@ -70,6 +70,7 @@ function liveModel(
   const reader = new StateReader(models, listeners.onError);
   return {
     gaussians,
+    readBounds: () => gaussians.readBounds(),
     duration: models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity,
     request: (state, camera) => {
       pictures.update(state.pictures);

@@ -1,16 +1,23 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
 import { boundsOf, GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
-import { fetchScene, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
+import {
+  fetchScene,
+  isSequence,
+  openPartAt,
+  parseSequence,
+  readScene,
+  type FetchSceneOptions,
+} from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
 import { PreviewSchedule } from './preview-schedule.js';
 import { ProgressSum } from './progress-sum.js';
-import type { LoadedScene, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
+import type { LoadedScene, LoadedSequence, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
 
 /** Milliseconds between two progress reports: chunks may arrive by the thousand. */
 const PROGRESS_INTERVAL_MS = 50;
 
 /**
- * Loads one scene. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's
+ * Loads one scene, or the manifest of several. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's
  * reason once that is aborted.
  */
 export async function loadScene(
@@ -18,7 +25,7 @@ export async function loadScene(
   signal: AbortSignal,
   onProgress: ProgressListener,
   onPreview?: PreviewListener,
-): Promise<LoadedScene> {
+): Promise<LoadedScene | LoadedSequence> {
   try {
     const { url, credentials } = request;
     const name = fileName(url);
@@ -30,6 +37,7 @@ export async function loadScene(
     });
     const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
     const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
+    if (isSequence(bytes)) return sequenceOf(bytes, name, url);
     const openPart = openPartAt(url, options);
     const cloud = await readScene(bytes, { name, signal, openPart, onPreview: previews?.onPreview });
     signal.throwIfAborted();
@@ -38,6 +46,12 @@ export async function loadScene(
     signal.throwIfAborted();
     throw named(error, fileName(request.url));
   }
+}
+
+/** Frames are where the manifest says, seen from the manifest. */
+function sequenceOf(bytes: Uint8Array, name: string, url: string): LoadedSequence {
+  const { frames, framesPerSecond, durationSeconds } = parseSequence(bytes, name);
+  return { frames: frames.map((path) => new URL(path, url).href), framesPerSecond, durationSeconds };
 }
 
 /**

@@ -22,6 +22,14 @@ export interface LoadedScene {
   readonly bounds: Bounds;
 }
 
+/** The manifest of scenes that follow one another in time, in place of a scene. */
+export interface LoadedSequence {
+  /** Absolute URLs of the frames, in order. */
+  readonly frames: readonly string[];
+  readonly framesPerSecond: number;
+  readonly durationSeconds: number;
+}
+
 /**
  * Called with a part of a scene that is still loading, ready for upload: fewer splats, or splats without their view-dependent colours.
  * Each preview replaces the one before.
@@ -38,5 +46,6 @@ export type WorkerMessage =
   | { readonly type: 'ready' }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }
   | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
+  | { readonly type: 'sequence'; readonly id: number; readonly sequence: LoadedSequence }
   | { readonly type: 'scene'; readonly id: number; readonly scene: LoadedScene }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };

@@ -1,6 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type {
   LoadedScene,
+  LoadedSequence,
   PageMessage,
   PreviewListener,
   ProgressListener,
@@ -13,7 +14,7 @@ import { spawnSceneWorker } from './spawn-worker.js';
 const IDLE_MS = 5_000;
 
 interface Pending {
-  readonly resolve: (scene: LoadedScene) => void;
+  readonly resolve: (scene: LoadedScene | LoadedSequence) => void;
   readonly reject: (reason: unknown) => void;
   readonly onProgress: ProgressListener;
   readonly onPreview: PreviewListener | undefined;
@@ -47,6 +48,18 @@ export class SceneLoader {
     onProgress: ProgressListener,
     onPreview?: PreviewListener,
   ): Promise<LoadedScene> {
+    const loaded = await this.open(request, signal, onProgress, onPreview);
+    if ('frames' in loaded) throw sequenceWithin(request.url);
+    return loaded;
+  }
+
+  /** The same for an address that may name a sequence: then its manifest is what comes. */
+  async open(
+    request: SceneRequest,
+    signal: AbortSignal,
+    onProgress: ProgressListener,
+    onPreview?: PreviewListener,
+  ): Promise<LoadedScene | LoadedSequence> {
     signal.throwIfAborted();
     clearTimeout(this.#idleTimer);
     const worker = await (this.#worker ??= this.#start());
@@ -61,10 +74,10 @@ export class SceneLoader {
     signal: AbortSignal,
     onProgress: ProgressListener,
     onPreview: PreviewListener | undefined,
-  ): Promise<LoadedScene> {
+  ): Promise<LoadedScene | LoadedSequence> {
     const id = this.#nextId++;
     const post = (message: PageMessage): void => worker.postMessage(message);
-    const { promise, resolve, reject } = withResolvers<LoadedScene>();
+    const { promise, resolve, reject } = withResolvers<LoadedScene | LoadedSequence>();
     const cancel = (): void => {
       post({ type: 'cancel', id });
       reject(signal.reason);
@@ -88,7 +101,7 @@ export class SceneLoader {
     signal: AbortSignal,
     onProgress: ProgressListener,
     onPreview: PreviewListener | undefined,
-  ): Promise<LoadedScene> {
+  ): Promise<LoadedScene | LoadedSequence> {
     const { loadScene } = await import('./scene-worker.js');
     return loadScene(request, signal, onProgress, onPreview);
   }
@@ -120,6 +133,7 @@ export class SceneLoader {
     if (message.type === 'progress') pending?.onProgress(message.loaded, message.total);
     else if (message.type === 'preview') pending?.onPreview?.(message.scene);
     else if (message.type === 'scene') pending?.resolve(message.scene);
+    else if (message.type === 'sequence') pending?.resolve(message.sequence);
     else pending?.reject(GaussianSplatError.fromData(message.error));
   }
 
@@ -147,6 +161,15 @@ export class SceneLoader {
     this.#running = null;
     this.#worker = null;
   }
+}
+
+function sequenceWithin(url: string): GaussianSplatError {
+  return new GaussianSplatError('decode/unsupported', {
+    where: url,
+    expected: 'a scene file',
+    found: 'the manifest of a sequence',
+    remedy: 'name scene files as frames of a sequence, not other sequences',
+  });
 }
 
 /** Settles with the worker's first message: only then has its script been allowed, fetched and run. */

@@ -34,7 +34,9 @@ function serve(scope: WorkerScope): void {
       const onPreview: PreviewListener = (preview) =>
         scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview));
       const scene = await loadScene(request, abort.signal, onProgress, wantsPreviews ? onPreview : undefined);
-      if (!abort.signal.aborted) scope.postMessage({ type: 'scene', id, scene }, buffersOf(scene));
+      if (abort.signal.aborted) return;
+      if ('frames' in scene) scope.postMessage({ type: 'sequence', id, sequence: scene });
+      else scope.postMessage({ type: 'scene', id, scene }, buffersOf(scene));
     } catch (error) {
       // loadScene throws its own errors, or the reason of an abort, which nobody waits for.
       if (error instanceof GaussianSplatError) scope.postMessage({ type: 'error', id, error: error.toData() });

@@ -8,6 +8,18 @@ export interface PassTime {
   readonly end: number;
 }
 
+/** Something that notes on the GPU when the passes of frames ran. */
+export interface FrameTimer {
+  /** Starts the next frame. The renderer calls this. */
+  startFrame(): void;
+  /** What a pass descriptor needs to be timed; undefined for a pass that is not. */
+  timestampWrites(label: string): GPUComputePassTimestampWrites | undefined;
+  /** Ends the frame, with the last encoder of it. */
+  endFrame?(encoder: GPUCommandEncoder): void;
+  /** The frame has been submitted. */
+  submitted?(): void;
+}
+
 /** Timestamps that one query set holds: WebGPU's limit. */
 const MAX_QUERIES = 4096;
 const QUERY_RESOLVE = 0x200;
@@ -16,7 +28,7 @@ const QUERY_RESOLVE = 0x200;
  * Timestamps around the passes of many frames, read back together afterwards so that measuring never waits between
  * frames. Browsers round timestamps to 100 µs unless told otherwise.
  */
-export class PassTimer {
+export class PassTimer implements FrameTimer {
   readonly #device: GPUDevice;
   readonly #queries: GPUQuerySet;
   readonly #frames: string[][] = [];
@@ -28,12 +40,11 @@ export class PassTimer {
     this.#queries = device.createQuerySet({ label: 'gs.timer', type: 'timestamp', count: MAX_QUERIES });
   }
 
-  /** Starts the next frame. The renderer calls this. */
   startFrame(): void {
     this.#frames.push([]);
   }
 
-  /** What a pass descriptor needs to be timed; undefined once the room for timestamps is used up. */
+  /** Undefined once the room for timestamps is used up. */
   timestampWrites(label: string): GPUComputePassTimestampWrites | undefined {
     if (this.#used + 2 > MAX_QUERIES) return undefined;
     this.#frames.at(-1)?.push(label);

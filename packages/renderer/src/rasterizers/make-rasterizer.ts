@@ -11,7 +11,7 @@ export function makeRasterizer(
   { rasterizer, accumulation, sort }: Variants,
   overrides: Overrides,
 ): Rasterizer {
-  if (rasterizer === 'tiles') return new TilesRasterizer(device, overrides, sort);
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, accumulation, overrides, sort);
   requireBlendable(device, accumulation);
   return new QuadsRasterizer(device, accumulation, overrides);
 }

@@ -15,23 +15,22 @@ export class QuadsRasterizer implements Rasterizer {
   readonly takesNotes = false;
   readonly #device: GPUDevice;
   readonly #program: Program;
-  readonly #pipeline: GPURenderPipeline;
+  readonly #format: AccumulationFormat;
   readonly #indices: GPUBuffer;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.RasterView.size);
   #bindings: Readonly<Record<OrderKind, GPUBindGroup>> | undefined;
   #plan: GPUBuffer | undefined;
 
-  constructor(device: GPUDevice, format: AccumulationFormat, { alpha_min }: Overrides) {
+  constructor(device: GPUDevice, format: AccumulationFormat, overrides: Overrides) {
     this.#device = device;
+    this.#format = format;
     this.#program = perDevice(
       device,
       'quads',
       () => new ShaderProgram(device, rasterizeQuads, SHADER_STAGE.vertex | SHADER_STAGE.fragment),
     );
-    this.#pipeline = perDevice(device, `quads ${format} ${alpha_min}`, () =>
-      makePipeline(device, this.#program, format, { alpha_min }),
-    );
+    this.prepare(overrides);
     this.#indices = perDevice(device, 'quads indices', () => makeIndices(device));
     this.#uniform = device.createBuffer({
       label: 'gs.rasterize.view',
@@ -54,10 +53,18 @@ export class QuadsRasterizer implements Rasterizer {
     this.#plan = plan;
     const bindTo = (order: GPUBuffer): GPUBindGroup =>
       this.#program.bind({ raster: this.#uniform, plan, splats, order });
-    this.#bindings = { sorted: bindTo(orders.sorted), identity: bindTo(orders.identity) };
+    this.#bindings = {
+      first: bindTo(orders.first),
+      second: bindTo(orders.second),
+      identity: bindTo(orders.identity),
+    };
   }
 
-  record(encoder: GPUCommandEncoder, { surface, order, timer, slice = WHOLE }: Painting): void {
+  prepare(overrides: Overrides): void {
+    this.#pipeline(overrides);
+  }
+
+  record(encoder: GPUCommandEncoder, { surface, order, overrides, timer, slice = WHOLE }: Painting): void {
     const { view, width, height } = surface;
     writeStruct(
       layouts.RasterView,
@@ -79,7 +86,9 @@ export class QuadsRasterizer implements Rasterizer {
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
     if (this.#plan !== undefined && this.#bindings !== undefined) {
-      pass.setPipeline(this.#pipeline);
+      // The image may be a part of the texture.
+      pass.setViewport(0, 0, width, height, 0, 1);
+      pass.setPipeline(this.#pipeline(overrides));
       pass.setBindGroup(0, this.#bindings[order]);
       pass.setIndexBuffer(this.#indices, 'uint16');
       pass.drawIndexedIndirect(this.#plan, planOffsets.quads);
@@ -89,6 +98,12 @@ export class QuadsRasterizer implements Rasterizer {
 
   destroy(): void {
     this.#uniform.destroy();
+  }
+
+  #pipeline({ alpha_min }: Overrides): GPURenderPipeline {
+    return perDevice(this.#device, `quads ${this.#format} ${alpha_min}`, () =>
+      makePipeline(this.#device, this.#program, this.#format, { alpha_min }),
+    );
   }
 }
 

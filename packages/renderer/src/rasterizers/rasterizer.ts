@@ -1,4 +1,5 @@
-import type { PassTimer } from '../gpu/pass-timer.js';
+import type { Overrides } from '../gpu/kernel.js';
+import type { FrameTimer } from '../gpu/pass-timer.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
@@ -6,8 +7,11 @@ export type RasterizerName = 'quads' | 'tiles';
 /** Formats of the accumulation texture. Quads blend into `rgba32float` only with the feature `float32-blendable`. */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
 
-/** Buffers that list slots from near to far: after a sort, or when slots are in that order themselves. */
-export type OrderKind = 'sorted' | 'identity';
+/**
+ * Buffers that list slots from near to far: the two between which a sort goes back and forth (see `sortedIn`), and the one for slots that
+ * are in that order themselves.
+ */
+export type OrderKind = 'first' | 'second' | 'identity';
 
 /** What every rasterizer reads. */
 export interface RasterizerInputs {
@@ -56,12 +60,14 @@ export interface Painting {
   readonly notes?: FrameNotes;
   readonly surface: Surface;
   readonly order: OrderKind;
+  /** Levers that the shaders know. */
+  readonly overrides: Overrides;
   /**
    * Premultiplied colour to lay the splats over; the surface is then the final image. Without it the surface receives colour, and
    * transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
    */
   readonly background?: readonly [number, number, number, number];
-  readonly timer?: PassTimer;
+  readonly timer?: FrameTimer;
   /**
    * Paints one part of the splats only, the farthest first, over what the parts before have left in the surface. Only for rasterizers that can
    * slice their work.
@@ -87,6 +93,8 @@ export interface Rasterizer {
   finishes(format: GPUTextureFormat): boolean;
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
+  /** Makes the pipelines for other levers, so that no frame has to. @param format of the targets */
+  prepare(overrides: Overrides, format: GPUTextureFormat): void;
   /** Records the drawing of one frame. */
   record(encoder: GPUCommandEncoder, painting: Painting): void;
   destroy(): void;

@@ -23,7 +23,15 @@ import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import { sortedIn, SortStage, type SortBindings, type SortName } from '../stages/sort.js';
-import type { FrameNotes, OrderKind, Painting, Rasterizer, RasterizerInputs, Surface } from './rasterizer.js';
+import type {
+  AccumulationFormat,
+  FrameNotes,
+  OrderKind,
+  Painting,
+  Rasterizer,
+  RasterizerInputs,
+  Surface,
+} from './rasterizer.js';
 
 const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, PROJECT_GROUP, SORT_BLOCK, DIGITS } = constants;
 /** A slot, and a mask of tiles. */
@@ -64,6 +72,9 @@ interface GridBindings {
 const STORABLE: readonly GPUTextureFormat[] = ['rgba8unorm', 'rgba16float', 'rgba32float'];
 const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
 
+/** Numbers of bins that are kept bound. */
+const MAX_GRIDS = 12;
+
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
 /**
@@ -79,8 +90,9 @@ export class TilesRasterizer implements Rasterizer {
   readonly canSlice = false;
   readonly takesNotes = true;
   readonly #device: GPUDevice;
-  readonly #overrides: Overrides;
+  readonly #accumulation: AccumulationFormat;
   readonly #memory: GpuMemory;
+  /** Their bind groups fit those of other levers. */
   readonly #kernels: ReturnType<typeof makeKernels>;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
@@ -88,13 +100,14 @@ export class TilesRasterizer implements Rasterizer {
   readonly #scanLength: GPUBuffer;
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
-  #bound: GridBindings | undefined;
+  /** By the number of bins across and down: pictures in motion may have fewer pixels. */
+  readonly #bound = new Map<string, GridBindings>();
   /** Where notes go that nobody asked for. */
   #nowhere: Required<FrameNotes> | undefined;
 
-  constructor(device: GPUDevice, overrides: Overrides, sort: SortName) {
+  constructor(device: GPUDevice, accumulation: AccumulationFormat, overrides: Overrides, sort: SortName) {
     this.#device = device;
-    this.#overrides = overrides;
+    this.#accumulation = accumulation;
     this.#memory = new GpuMemory(device);
     this.#kernels = makeKernels(device, overrides);
     this.#sort = new SortStage(device, sort, 'pairs');
@@ -122,7 +135,15 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = this.#allocate(inputs);
   }
 
-  record(encoder: GPUCommandEncoder, { surface, order, background, notes, timer }: Painting): void {
+  prepare(overrides: Overrides, format: GPUTextureFormat): void {
+    makeKernels(this.#device, overrides);
+    const variant = { overrides, isNoting: false };
+    if (this.finishes(format)) rasterizeKernel(this.#device, { ...variant, format, isFinal: true });
+    rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false });
+  }
+
+  record(encoder: GPUCommandEncoder, painting: Painting): void {
+    const { surface, order, overrides, background, notes, timer } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const { plan } = this.#inputs;
     const buffers = this.#buffers;
@@ -131,7 +152,7 @@ export class TilesRasterizer implements Rasterizer {
     encoder.clearBuffer(buffers.groupPairs);
     encoder.clearBuffer(bound.ranges);
 
-    const { count, scan: scanKernel, plan: planKernel, emit, index } = this.#kernels;
+    const { count, scan: scanKernel, plan: planKernel, emit, index } = makeKernels(this.#device, overrides);
     const listing = bound.listing[order];
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
     count.dispatchIndirect(bin, listing.count, plan, planOffsets.visible);
@@ -150,7 +171,7 @@ export class TilesRasterizer implements Rasterizer {
       format,
       isFinal: background !== undefined,
       isNoting: notes !== undefined,
-      overrides: this.#overrides,
+      overrides,
     });
     const image = notes
       ? this.#bindNoting(kernel, bound, surface.view, notes)
@@ -166,9 +187,8 @@ export class TilesRasterizer implements Rasterizer {
 
   #release(): void {
     for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.#memory.free(buffer as GPUBuffer);
-    if (this.#bound) this.#memory.free(this.#bound.ranges);
+    this.#forgetGrids();
     this.#buffers = undefined;
-    this.#bound = undefined;
   }
 
   #allocate({ capacity, pairCapacity }: RasterizerInputs): PairBuffers {
@@ -198,14 +218,21 @@ export class TilesRasterizer implements Rasterizer {
   #gridFor({ width, height }: Surface, inputs: RasterizerInputs, buffers: PairBuffers): GridBindings {
     const columns = Math.ceil(width / BIN_WIDTH);
     const rows = Math.ceil(height / BIN_HEIGHT);
-    const current = this.#bound;
-    if (current?.grid.columns === columns && current.grid.rows === rows) return current;
-    if (current) this.#memory.free(current.ranges);
+    const key = `${columns} x ${rows}`;
+    const known = this.#bound.get(key);
+    if (known) return known;
+    if (this.#bound.size >= MAX_GRIDS) this.#forgetGrids();
     const bits = Math.ceil(Math.log2(columns * rows));
     const { storage, copyDestination } = BUFFER_USAGE;
     const ranges = this.#memory.buffer('gs.bin.ranges', 8 * columns * rows, storage | copyDestination);
-    this.#bound = { grid: { columns, rows, bits }, ranges, ...this.#bindings(inputs, buffers, bits, ranges) };
-    return this.#bound;
+    const bound = { grid: { columns, rows, bits }, ranges, ...this.#bindings(inputs, buffers, bits, ranges) };
+    this.#bound.set(key, bound);
+    return bound;
+  }
+
+  #forgetGrids(): void {
+    for (const { ranges } of this.#bound.values()) this.#memory.free(ranges);
+    this.#bound.clear();
   }
 
   #bindings(
@@ -222,7 +249,11 @@ export class TilesRasterizer implements Rasterizer {
       return { count: count.bind(shared), emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }) };
     };
     return {
-      listing: { sorted: listing(orders.sorted), identity: listing(orders.identity) },
+      listing: {
+        first: listing(orders.first),
+        second: listing(orders.second),
+        identity: listing(orders.identity),
+      },
       scan: scanKernel.bind({ values: groupPairs, scan: this.#scanLength }),
       plan: planKernel.bind({ view, group_pairs: groupPairs, pair_plan: pairPlan }),
       sort: this.#sort.bind({ plan: pairPlan, keys: bins, values: pairs, digitCounts, digitTotals }, bits),

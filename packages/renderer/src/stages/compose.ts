@@ -1,5 +1,5 @@
 import { compose } from '../generated/shaders.js';
-import type { PassTimer } from '../gpu/pass-timer.js';
+import type { FrameTimer } from '../gpu/pass-timer.js';
 import { perDevice, SHADER_STAGE, ShaderProgram, type Resources } from '../gpu/kernel.js';
 
 /** Lays the accumulated splats over the background, into a view of any renderable colour format. */
@@ -25,7 +25,7 @@ export class ComposeStage {
     bindings: GPUBindGroup,
     target: GPUTextureView,
     format: GPUTextureFormat,
-    timer?: PassTimer,
+    timer?: FrameTimer,
   ): void {
     const pass = encoder.beginRenderPass({
       label: 'gs.compose',

@@ -49,6 +49,36 @@ const ANSWERS = {
     );
   },
 
+  /** A red ball of `n` splats, 4,000 unless said, in twelve pieces over `ms` milliseconds. */
+  ball(context) {
+    const bytes = ball(Number(context.query.n ?? 4_000), COLOURS[0]);
+    const pause = Number(context.query.ms ?? 0) / 12;
+    context.set('Content-Length', String(bytes.length));
+    context.body = Readable.from(
+      (async function* pieces() {
+        const size = 32 * Math.ceil(bytes.length / 32 / 12);
+        for (let at = 0; at < bytes.length; at += size) {
+          await delay(pause);
+          yield bytes.subarray(at, at + size);
+        }
+      })(),
+    );
+  },
+
+  /** A sequence: its manifest, and frames that are balls of other colours, each larger than the one before. `ms` delays frames, `lost` is one that is not there. */
+  async sequence(context, name) {
+    const { count = '12', fps = '10', ms = '0', lost } = context.query;
+    if (name.endsWith('.json')) {
+      const frames = Array.from({ length: Number(count) }, (_, k) => `${k}.splat?ms=${ms}&lost=${lost}`);
+      context.body = JSON.stringify({ gaussianSplatSequence: 1, framesPerSecond: Number(fps), frames });
+      return;
+    }
+    const frame = Number.parseInt(name, 10);
+    if (frame > 0) await delay(Number(ms));
+    if (String(frame) === lost) return void (context.status = 404);
+    context.body = ball(200 + 20 * (frame % 12), COLOURS[frame % 3]);
+  },
+
   /** Half of the file, then the connection breaks. */
   cut(context, name) {
     const bytes = readFileSync(join(fixtures, name));
@@ -224,4 +254,29 @@ export async function startOtherOrigin() {
   // The test runner ends when its own work is done; this server must not keep it.
   server.unref();
   return `http://127.0.0.1:${server.address().port}`;
+}
+
+/** Red, green, blue. */
+const COLOURS = [
+  [230, 30, 30],
+  [30, 230, 30],
+  [30, 30, 230],
+];
+
+/** A .splat file: splats in no order on a ball of radius 1. */
+function ball(count, colour) {
+  const bytes = Buffer.alloc(32 * count);
+  for (let i = 0; i < count; i++) {
+    const height = 1 - (2 * (i + 0.5)) / count;
+    const angle = 2.399963 * i;
+    const ring = Math.sqrt(1 - height * height);
+    // Steps of a number without common factor: any part of the file is spread over the ball.
+    const at = 32 * ((i * 1_301) % count);
+    const size = Math.max(0.05, 2 / Math.sqrt(count));
+    [ring * Math.cos(angle), height, ring * Math.sin(angle), size, size, size].forEach((value, k) =>
+      bytes.writeFloatLE(value, at + 4 * k),
+    );
+    bytes.set([...colour, 220, 255, 128, 128, 128], at + 24);
+  }
+  return bytes;
 }

@@ -1,0 +1,124 @@
+import type { FrameLevers } from '@gaussian-splat/renderer';
+import type { FrameScheduler } from '../gpu/frame-scheduler.js';
+import { LADDER } from '../pace/ladder.js';
+import { INITIAL_PACE, keepPace, quantile, type Pace, type PaceReason } from '../pace/pace.js';
+
+/** Share of the display's interval that frames may take on the GPU: the page and its compositor need the rest. */
+const SHARE_OF_INTERVAL = 0.8;
+/** Without a change for so long, ms, the picture has come to rest. */
+const REST_MS = 150;
+/** Where frames take longer than that, a change within so many of them still belongs to the one before; at most ms. */
+const FRAMES_OF_MOTION = 2;
+const LONGEST_PAUSE_MS = 2_000;
+
+const COSTS = LADDER.map(({ cost }) => cost);
+
+/** How a frame is to be drawn. */
+export interface FramePlan {
+  /** Rung of the ladder; 0 is the true image. */
+  readonly level: number;
+  readonly levers: Partial<FrameLevers> | undefined;
+}
+
+const WHOLE: FramePlan = { level: 0, levers: undefined };
+
+/** What is known of a frame before it is drawn. */
+export interface FrameOccasion {
+  /** requestAnimationFrame's clock, ms. */
+  readonly now: number;
+  /** It shows something else than the frame before: the camera has moved, or the scene has. */
+  readonly hasChanged: boolean;
+  /** The camera will go on moving. */
+  readonly goesOn: boolean;
+}
+
+/** What the controller says about itself. */
+export interface PaceReport {
+  /** Name of the rung that the last frame was drawn on; `whole` is the true image. */
+  readonly drawn: string;
+  /** Name of the rung for pictures in motion. */
+  readonly moving: string;
+  /** Why: see {@link PaceReason}. */
+  readonly reason: PaceReason;
+  /** Median of the last frames on that rung, ms on the GPU; null while there are none. */
+  readonly frameMs: number | null;
+  /** The last frame that was timed, at rest or in motion, ms on the GPU; null while there is none. */
+  readonly lastMs: number | null;
+  /** What a frame may take, ms. */
+  readonly targetMs: number;
+}
+
+export interface PaceOptions {
+  /** False where the page has chosen a quality. */
+  readonly isOn: () => boolean;
+  readonly scheduler: () => FrameScheduler;
+  readonly requestFrame: () => void;
+}
+
+/**
+ * Keeps moving pictures in time with the display: measures what frames take, and draws those in motion with as much as there is time for. A picture at
+ * rest is the true image, at most 300 ms after the last motion.
+ */
+export class PaceController {
+  readonly #options: PaceOptions;
+  #pace: Pace = INITIAL_PACE;
+  #changedAt = -Infinity;
+  #drawn = 0;
+  /** What the last frame took, of those that are known. */
+  #lastMs = 0;
+  #restTimer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(options: PaceOptions) {
+    this.#options = options;
+  }
+
+  /** What a frame may take on the GPU, ms: elements that draw at the same time share it. */
+  get targetMs(): number {
+    const { displayInterval, clients } = this.#options.scheduler();
+    return (SHARE_OF_INTERVAL * displayInterval) / Math.max(1, clients);
+  }
+
+  get report(): PaceReport {
+    const { level, reason, recent } = this.#pace;
+    const frameMs = recent.length > 0 ? quantile(recent, 0.5) : null;
+    const [drawn, moving] = [LADDER[this.#drawn].name, LADDER[level].name];
+    return { drawn, moving, reason, frameMs, lastMs: this.#lastMs || null, targetMs: this.targetMs };
+  }
+
+  /**
+   * How to draw the next frame. A single change after a rest is drawn whole at once; what goes on to change is in motion.
+   */
+  plan({ now, hasChanged, goesOn }: FrameOccasion): FramePlan {
+    const pause = Math.max(REST_MS, Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * this.#lastMs));
+    const isMotion = hasChanged && (goesOn || now - this.#changedAt < pause);
+    if (hasChanged) this.#changedAt = now;
+    clearTimeout(this.#restTimer);
+    const { level } = this.#pace;
+    this.#drawn = isMotion && this.#options.isOn() ? level : 0;
+    if (this.#drawn === 0) return WHOLE;
+    this.#restTimer = setTimeout(this.#options.requestFrame, REST_MS);
+    return { level, levers: LADDER[level].levers };
+  }
+
+  /** What a frame took. */
+  sample(level: number, milliseconds: number): void {
+    this.#lastMs = milliseconds;
+    if (!this.#options.isOn()) return;
+    const sample = { now: performance.now(), level, milliseconds };
+    this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS });
+  }
+
+  /** Another scene: nothing is known. */
+  reset(): void {
+    this.stop();
+    this.#pace = INITIAL_PACE;
+    this.#changedAt = -Infinity;
+    this.#drawn = 0;
+    this.#lastMs = 0;
+  }
+
+  /** No frame follows. */
+  stop(): void {
+    clearTimeout(this.#restTimer);
+  }
+}

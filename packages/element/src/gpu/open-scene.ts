@@ -1,0 +1,119 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { chooseVariants } from '@gaussian-splat/renderer';
+import type { LiveRequest } from '../live/live-model.js';
+import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+import { GpuScene } from './gpu-scene.js';
+import { PreviewUploads } from './preview-uploads.js';
+import { assertWebGpu } from './request-device.js';
+import type { DeviceLease, SharedDevice } from './shared-device.js';
+import { byteLengthOf, upload } from './upload.js';
+
+export interface OpenOptions {
+  readonly device: SharedDevice;
+  readonly loader: SceneLoader;
+  readonly signal: AbortSignal;
+  /** Address of a frame of a sequence as it is fetched. */
+  readonly frameUrl: (url: string) => string;
+  /** Whether a sequence begins again at its end. */
+  readonly loops: () => boolean;
+  readonly onProgress: ProgressListener;
+  /** Called with what can be shown of a scene that is still loading; the scene is the callee's. Absent: previews are not wanted. */
+  readonly onPreview?: (preview: GpuScene) => void;
+  /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. Gets its bytes. */
+  readonly beforeUpload: (byteLength: number) => void;
+  /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
+  readonly memoryBudget: number | undefined;
+  /** Submissions that the painting of a frame is divided into. */
+  readonly submissions: number;
+  /** What a generator needs to know beyond the request. */
+  readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
+}
+
+/** Device and file at the same time, then the upload. Rejects with GaussianSplatError or the signal's reason. */
+export async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+  // Known at once, and then not a byte is fetched.
+  assertWebGpu();
+  if (isGenerator(request)) return openLiveScene(request, options);
+  // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
+  const abort = new AbortController();
+  const giveUp = (): void => abort.abort(options.signal.reason);
+  options.signal.addEventListener('abort', giveUp, { once: true });
+  const acquiring = options.device.acquire();
+  // While the bytes are on their way there is time to find out what suits the device.
+  const choosing = acquiring.then(({ device }) => chooseVariants(device));
+  const previews =
+    options.onPreview && new PreviewUploads({ ...options, onPreview: options.onPreview, ready: choosing });
+  const loading = options.loader.open(request, abort.signal, options.onProgress, previews?.show);
+  try {
+    const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(unlessWrong)]);
+    options.signal.throwIfAborted();
+    if ('frames' in scene) return await openSequence(request, lease, scene, options);
+    previews?.end();
+    options.beforeUpload(byteLengthOf(scene));
+    return await upload(lease, scene, options);
+  } catch (error) {
+    previews?.end();
+    abort.abort(error);
+    acquiring.then((lease) => lease.release(), ignore);
+    loading.catch(ignore);
+    throw error;
+  } finally {
+    options.signal.removeEventListener('abort', giveUp);
+  }
+}
+
+/** Generators are known by the name of the file, or by the contract that the page gives along. */
+function isGenerator({ url, contract }: SceneRequest): boolean {
+  if (contract !== undefined && contract !== null && contract !== '') return true;
+  const { pathname, protocol, hash } = URL.canParse(url) ? new URL(url) : { pathname: url, protocol: '', hash: '' };
+  return /\.onnx$/i.test(protocol === 'blob:' ? hash : pathname);
+}
+
+async function openSequence(
+  request: SceneRequest,
+  lease: DeviceLease,
+  sequence: LoadedSequence,
+  options: OpenOptions,
+): Promise<GpuScene> {
+  const { SequencePlayer } = await import('../live/sequence-player.js');
+  const { listeners } = options.live();
+  const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners });
+  const { gaussians, bounds } = player;
+  const scene = new GpuScene(lease, gaussians, bounds, options.submissions, player);
+  player.scene = scene;
+  return scene;
+}
+
+async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+  const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
+  const opening = import('../live/open-live-model.js');
+  const acquiring = options.device.acquire();
+  opening.catch(ignore);
+  const lease = await acquiring;
+  try {
+    signal.throwIfAborted();
+    const { openLiveModel } = await opening;
+    const { url, chain = [], contract, credentials } = request;
+    const live = await openLiveModel(
+      { ...options.live(), url, chain, contract, credentials, memoryBudget },
+      lease.device,
+      signal,
+      onProgress,
+    );
+    beforeUpload(live.gaussians.byteLength);
+    return new GpuScene(lease, live.gaussians, live.bounds, submissions, live);
+  } catch (error) {
+    lease.release();
+    throw error;
+  }
+}
+
+/** That no variant draws the right image ends the loading; that none could be timed does not. */
+function unlessWrong(error: unknown): void {
+  if (error instanceof GaussianSplatError && error.code === 'unsupported/wrong-image') throw error;
+}
+
+function ignore(): void {
+  // The failure that matters has been thrown already.
+}

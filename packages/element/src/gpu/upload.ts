@@ -1,0 +1,32 @@
+import { GaussianBuffers } from '@gaussian-splat/renderer';
+import type { LoadedScene } from '../loading/protocol.js';
+import { GpuScene } from './gpu-scene.js';
+import type { DeviceLease } from './shared-device.js';
+
+export interface SceneUploadOptions {
+  readonly signal: AbortSignal;
+  /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
+  readonly memoryBudget: number | undefined;
+  /** Submissions that the painting of a frame is divided into. */
+  readonly submissions: number;
+}
+
+/** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
+export async function upload(
+  lease: DeviceLease,
+  { packed, bounds }: LoadedScene,
+  { signal, memoryBudget, submissions }: SceneUploadOptions,
+): Promise<GpuScene> {
+  const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
+  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds, submissions);
+  gaussians.destroy();
+  throw signal.reason;
+}
+
+/** Bytes that a scene takes on the GPU, all but exactly. */
+export function byteLengthOf({ packed }: LoadedScene): number {
+  return Object.values(packed).reduce<number>(
+    (sum, value) => sum + (ArrayBuffer.isView(value) ? value.byteLength : 0),
+    0,
+  );
+}

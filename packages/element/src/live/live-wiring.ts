@@ -1,0 +1,81 @@
+import type { Camera } from '@gaussian-splat/core';
+import type { PlaybackController } from '../controllers/playback-controller.js';
+import { toElementError } from '../errors.js';
+import type { GaussianSplatEventMap } from '../events.js';
+import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { StageOptions } from '../stage-options.js';
+import type { LiveListeners, LiveState } from './live-model.js';
+import { PostController } from './post-controller.js';
+
+/** Whom the models of an element meet. */
+export interface LiveWiringOptions extends Pick<StageOptions, 'attributes' | 'services' | 'liveValues'> {
+  readonly playback: PlaybackController;
+  readonly requestFrame: () => void;
+  readonly dispatch: (event: GaussianSplatEventMap[keyof GaussianSplatEventMap]) => void;
+}
+
+/** What the models of an element, a generator and a post-processor, are told and whom they tell. */
+export class LiveWiring {
+  readonly post: PostController;
+  readonly #options: LiveWiringOptions;
+  #lastFault = '';
+
+  constructor(options: LiveWiringOptions) {
+    this.#options = options;
+    const { attributes, services, requestFrame } = options;
+    this.post = new PostController({
+      requestFrame,
+      request: () => ({
+        credentials: attributes().credentials,
+        runtimeLocation: services().runtimeLocation,
+        state: () => this.state,
+        onError: (error) => this.#fail(error),
+        onFallback: (reason) => this.#fallBack(reason),
+      }),
+    });
+  }
+
+  /** What the page says about the models at this time. */
+  get state(): LiveState {
+    return { ...this.#options.liveValues(), timeSeconds: this.#options.playback.currentTime };
+  }
+
+  get listeners(): LiveListeners {
+    const { requestFrame, playback } = this.#options;
+    return {
+      onFrame: (timeSeconds) => {
+        this.#lastFault = '';
+        requestFrame();
+        playback.frameShown(timeSeconds);
+      },
+      onShown: (timeSeconds) => playback.frameShown(timeSeconds),
+      onError: (error) => this.#fail(error),
+      onFallback: (reason) => this.#fallBack(reason),
+      onInput: requestFrame,
+    };
+  }
+
+  /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
+  advance({ live }: GpuScene, camera: Camera, now: number): void {
+    if (live === undefined) return;
+    this.#options.playback.tick(now);
+    try {
+      live.request(this.state, camera);
+    } catch (error) {
+      // Values of the page that do not fit the model: told once, not once a frame.
+      this.#fail(error);
+    }
+  }
+
+  #fail(cause: unknown): void {
+    const error = toElementError(cause);
+    // The loss of the device has events of its own.
+    if (error.code === 'device-lost' || error.message === this.#lastFault) return;
+    this.#lastFault = error.message;
+    this.#options.dispatch(new CustomEvent('generator-error', { detail: error }));
+  }
+
+  #fallBack(reason: string): void {
+    this.#options.dispatch(new CustomEvent('generator-fallback', { detail: { reason } }));
+  }
+}

@@ -1,0 +1,203 @@
+/** Loaded only when a sequence is shown. */
+import type { Bounds } from '@gaussian-splat/core';
+import { frameAt, type SceneSequence } from '@gaussian-splat/formats';
+import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
+import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+import type { LiveListeners, LiveState, Timeline } from './live-model.js';
+
+export interface SequenceOptions {
+  readonly request: SceneRequest;
+  readonly device: GPUDevice;
+  readonly loader: SceneLoader;
+  readonly signal: AbortSignal;
+  readonly onProgress: ProgressListener;
+  readonly listeners: LiveListeners;
+  readonly frameUrl: (url: string) => string;
+  readonly loops: () => boolean;
+  readonly memoryBudget: number | undefined;
+  /** The first frame is about to be uploaded: gets its bytes. */
+  readonly beforeUpload: (byteLength: number) => void;
+}
+
+/** Seconds that are fetched ahead, and bytes of all frames that are kept in the page's memory; two frames always are. */
+const AHEAD_SECONDS = 2;
+const MOST_BYTES = 256 << 20;
+const LEAST_FRAMES = 2;
+/** Frames that are fetched and unpacked at once. */
+const AT_ONCE = 3;
+
+/** A frame: on its way, there, or never to come. */
+interface Slot {
+  readonly abort: AbortController;
+  packed?: PackedGaussians;
+  isFailed?: boolean;
+}
+
+/**
+ * Shows scene files that follow one another in time. The frames ahead are fetched and unpacked in the worker, as many as the memory for them allows; one that is
+ * late leaves the last one on show.
+ */
+export class SequencePlayer implements Timeline {
+  readonly duration: number;
+  readonly bounds: Bounds;
+  /** Set once, by whoever makes the scene of it. */
+  scene: GpuScene | undefined;
+  readonly #sequence: SceneSequence;
+  readonly #options: SequenceOptions;
+  readonly #slots = new Map<number, Slot>();
+  readonly #room: number;
+  #gaussians: SequenceGaussians;
+  #shown = 0;
+  #isGrowing = false;
+  #isClosed = false;
+
+  private constructor(
+    options: SequenceOptions,
+    sequence: SceneSequence,
+    first: LoadedScene,
+    gaussians: SequenceGaussians,
+  ) {
+    this.#options = options;
+    this.#sequence = sequence;
+    this.#gaussians = gaussians;
+    this.duration = sequence.durationSeconds;
+    this.bounds = first.bounds;
+    const ahead = Math.ceil(AHEAD_SECONDS * sequence.framesPerSecond);
+    const inMemory = Math.floor(MOST_BYTES / bytesOf(first.packed));
+    this.#room = Math.max(LEAST_FRAMES, Math.min(sequence.frames.length, ahead, inMemory));
+    this.#slots.set(0, { abort: new AbortController(), packed: first.packed });
+  }
+
+  /** With its first frame on the GPU. Rejects with GaussianSplatError, or the signal's reason. */
+  static async open({ frames, ...times }: LoadedSequence, options: SequenceOptions): Promise<SequencePlayer> {
+    const { device, signal, onProgress, memoryBudget, beforeUpload } = options;
+    const sequence = { frames, ...times };
+    const first = await load(frames[0], options, 'auto', signal, onProgress);
+    signal.throwIfAborted();
+    beforeUpload(bytesOf(first.packed));
+    const gaussians = await SequenceGaussians.create(device, first.packed, { memoryBudget });
+    if (!signal.aborted) return new SequencePlayer(options, sequence, first, gaussians);
+    gaussians.destroy();
+    throw signal.reason;
+  }
+
+  get gaussians(): SequenceGaussians {
+    return this.#gaussians;
+  }
+
+  /** Frames that are in the page's memory or on their way: bounded, whatever the length of the sequence. */
+  get heldFrames(): number {
+    return this.#slots.size;
+  }
+
+  /** Shows the frame of a time, if it is there; sees to those that follow. */
+  request({ timeSeconds }: LiveState): void {
+    const frame = this.#frameAt(timeSeconds);
+    this.#prefetch(frame);
+    const slot = this.#slots.get(frame);
+    if (frame !== this.#shown && slot?.packed) this.#show(frame, slot.packed);
+    // A frame that cannot be had is passed over, so that a seek to it ends.
+    if (frame === this.#shown || slot?.isFailed) this.#tell(timeSeconds);
+  }
+
+  close(): void {
+    this.#isClosed = true;
+    for (const { abort } of this.#slots.values()) abort.abort();
+    this.#slots.clear();
+  }
+
+  #frameAt(timeSeconds: number): number {
+    return frameAt(this.#sequence, timeSeconds, false);
+  }
+
+  #show(frame: number, packed: PackedGaussians): void {
+    if (!this.#gaussians.fits(packed)) return void this.#grow(packed);
+    this.#gaussians.write(packed);
+    this.#shown = frame;
+  }
+
+  /** Once the picture of this moment has been submitted. */
+  #tell(timeSeconds: number): void {
+    queueMicrotask(() => this.#isClosed || this.#options.listeners.onShown(timeSeconds));
+  }
+
+  /** A frame with more splats than any before gets other buffers; the last one stays on show meanwhile. */
+  async #grow(packed: PackedGaussians): Promise<void> {
+    if (this.#isGrowing) return;
+    this.#isGrowing = true;
+    const { device, memoryBudget, listeners } = this.#options;
+    try {
+      const gaussians = await SequenceGaussians.create(device, packed, { memoryBudget });
+      if (this.#isClosed || this.scene === undefined) return gaussians.destroy();
+      this.scene.replaceGaussians(gaussians);
+      this.#gaussians = gaussians;
+      this.#shown = -1;
+      listeners.onInput();
+    } catch (error) {
+      if (!this.#isClosed) listeners.onError(error);
+    } finally {
+      this.#isGrowing = false;
+    }
+  }
+
+  /** Fetches what is ahead, the nearest first, and forgets what is not. */
+  #prefetch(frame: number): void {
+    const wanted = this.#wantedFrom(frame);
+    for (const [held, { abort }] of this.#slots) {
+      if (wanted.includes(held)) continue;
+      abort.abort();
+      this.#slots.delete(held);
+    }
+    let busy = 0;
+    for (const { packed, isFailed } of this.#slots.values()) if (!packed && !isFailed) busy++;
+    for (const next of wanted) {
+      if (busy >= AT_ONCE) return;
+      if (this.#slots.has(next)) continue;
+      busy++;
+      void this.#fetch(next);
+    }
+  }
+
+  #wantedFrom(frame: number): number[] {
+    const { length } = this.#sequence.frames;
+    const following = Array.from({ length: this.#room }, (_, k) => frame + k);
+    return this.#options.loops() ? following.map((each) => each % length) : following.filter((each) => each < length);
+  }
+
+  async #fetch(frame: number): Promise<void> {
+    const slot: Slot = { abort: new AbortController() };
+    this.#slots.set(frame, slot);
+    const { listeners } = this.#options;
+    const { shPrecision } = this.#gaussians;
+    try {
+      const url = this.#sequence.frames[frame];
+      slot.packed = (await load(url, this.#options, shPrecision, slot.abort.signal, () => undefined)).packed;
+    } catch (error) {
+      if (slot.abort.signal.aborted) return;
+      slot.isFailed = true;
+      listeners.onError(error);
+    }
+    // Whoever waits for it, and for those behind it, asks again.
+    if (!slot.abort.signal.aborted) listeners.onInput();
+  }
+}
+
+function load(
+  url: string,
+  { loader, request, frameUrl }: SequenceOptions,
+  sh: SceneRequest['sh'],
+  signal: AbortSignal,
+  onProgress: ProgressListener,
+): Promise<LoadedScene> {
+  const { credentials } = request;
+  return loader.load(
+    { url: frameUrl(url), credentials, sh: request.sh === 'auto' ? sh : request.sh },
+    signal,
+    onProgress,
+  );
+}
+
+const bytesOf = ({ geometry, sh, chunks }: PackedGaussians): number =>
+  geometry.byteLength + sh.byteLength + chunks.byteLength;

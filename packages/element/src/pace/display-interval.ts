@@ -1,0 +1,36 @@
+import { quantile } from './pace.js';
+
+/** What displays do that nothing is known of yet, and the slowest that is believed: frames that take too long look like a slow display. */
+const USUAL_MS = 1000 / 60;
+const LEAST_MS = 1000 / 360;
+const MEMORY = 32;
+const ENOUGH = 8;
+/** Small enough that a frame or two that were late do not matter, large enough for one that came early. */
+const SHARE = 0.2;
+
+/** The time between two pictures of the display, from requestAnimationFrame's clock. */
+export class DisplayInterval {
+  #steps: number[] = [];
+  #last: number | undefined;
+  #milliseconds = USUAL_MS;
+
+  /** Milliseconds; those of 60 Hz until enough frames were seen, and at most. */
+  get milliseconds(): number {
+    return this.#milliseconds;
+  }
+
+  /** A frame. @param now requestAnimationFrame's clock, ms */
+  tick(now: number): void {
+    const step = this.#last === undefined ? NaN : now - this.#last;
+    this.#last = now;
+    // Several elements draw at one moment.
+    if (!(step >= LEAST_MS)) return;
+    this.#steps = [...this.#steps, step].slice(-MEMORY);
+    if (this.#steps.length >= ENOUGH) this.#milliseconds = Math.min(USUAL_MS, quantile(this.#steps, SHARE));
+  }
+
+  /** No further frame follows the last one. */
+  pause(): void {
+    this.#last = undefined;
+  }
+}

@@ -1,0 +1,39 @@
+import { QUALITIES, type FrameLevers, type Levers } from '@gaussian-splat/renderer';
+
+/** One step down from the true image, for pictures in motion. */
+export interface Rung {
+  /** What frames are drawn with; undefined on the first rung, where nothing differs. */
+  readonly levers: Partial<FrameLevers> | undefined;
+  /** Most that a frame can cost, as a share of the first rung: what scales with pixels, all of it. */
+  readonly cost: number;
+  /** For people. */
+  readonly name: string;
+}
+
+/** Shares of the picture's width and height, each with about 0.7 of the pixels of the one before. */
+const SCALES = [0.84, 0.71, 0.59, 0.5, 0.42, 0.35, 0.25];
+/** Costs of the levers that leave the pixels alone; measured (docs/decisions/0014). */
+const BALANCED_COST = 0.87;
+const FAST_COST = 0.8;
+
+/** The levers of a quality that a frame can have without other memory. */
+function frameLeversOf({ depthKeyBits, occludedBelow, transmittanceMin, alphaMin }: Levers): Partial<FrameLevers> {
+  return { depthKeyBits, occludedBelow, transmittanceMin, alphaMin };
+}
+
+const fast = frameLeversOf(QUALITIES.fast);
+
+/**
+ * All steps, from the true image down: by what is lost, in dB, for each millisecond won. First the levers of the qualities `balanced` and `fast`, which
+ * cost least, then pixels. Single objects, since the renderer knows levers by them.
+ */
+export const LADDER: readonly Rung[] = [
+  { name: 'whole', levers: undefined, cost: 1 },
+  { name: 'balanced', levers: frameLeversOf(QUALITIES.balanced), cost: BALANCED_COST },
+  { name: 'fast', levers: fast, cost: FAST_COST },
+  ...SCALES.map((resolutionScale) => ({
+    name: `fast at ${resolutionScale}`,
+    levers: { ...fast, resolutionScale },
+    cost: FAST_COST * resolutionScale ** 2,
+  })),
+];

@@ -1,0 +1,117 @@
+/** How much of the true image a moving picture can afford: a pure function of what frames took. */
+
+/** What a frame took. */
+export interface FrameSample {
+  /** When that became known, ms on any clock that runs. */
+  readonly now: number;
+  /** Rung of the ladder that the frame was drawn on. */
+  readonly level: number;
+  /** How long it kept the GPU. */
+  readonly milliseconds: number;
+}
+
+/** What the pace is set by. */
+export interface PaceRules {
+  /** What a frame may take, ms. */
+  readonly targetMs: number;
+  /** For each rung, the first being the true image, the most that a frame on it can cost, as a share of the first. Falling. */
+  readonly costs: readonly number[];
+}
+
+/** Where the pace is, and what is remembered for the next step. */
+export interface Pace {
+  readonly level: number;
+  /** Why the level is what it is. */
+  readonly reason: PaceReason;
+  /** Times of the last frames on this level, oldest first. */
+  readonly recent: readonly number[];
+  /** When the level last changed. */
+  readonly changedAt: number;
+  /** The last change was towards the true image. */
+  readonly climbed: boolean;
+  /** No climb to a rung before this time, and how often one to it was in vain. */
+  readonly barred: Readonly<Record<number, { readonly until: number; readonly failures: number }>>;
+}
+
+/** `start`: nothing is known yet; `slow`: frames took too long; `spare`: there was time to spare. */
+export type PaceReason = 'start' | 'slow' | 'spare';
+
+/** Frames that are remembered, and the share of them that counts: a slow frame now and then is nobody's fault. */
+const MEMORY = 20;
+const COUNTED = 0.8;
+/** Frames are too slow from this share of the target on, and time to spare begins under the other: the dead band lies between. */
+const TOO_SLOW = 1.05;
+const TO_SPARE = 0.9;
+/** Two or three frames in a row suffice where all are as slow as this. */
+const TWO_FRAMES_SLOW = 4;
+const THREE_FRAMES_SLOW = 1.25;
+/** Frames that are looked at before a small excess counts, and before a climb. */
+const ENOUGH_FRAMES = 12;
+/** Between a change and a climb, ms. */
+const HOLD_MS = 500;
+/** A climb that ends sooner, ms, was in vain; the rung is then left alone for a while, each time for twice as long. */
+const IN_VAIN_MS = 2_000;
+const FIRST_BAR_MS = 5_000;
+const LONGEST_BAR_MS = 80_000;
+
+/** Before the first frame. */
+export const INITIAL_PACE: Pace = {
+  level: 0,
+  reason: 'start',
+  recent: [],
+  changedAt: -Infinity,
+  climbed: false,
+  barred: {},
+};
+
+/** The pace after a frame. Frames of another level than the current one are too late to say anything. */
+export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, rules: PaceRules): Pace {
+  if (level !== pace.level) return pace;
+  const known = { ...pace, recent: [...pace.recent, milliseconds].slice(-MEMORY) };
+  const excess = excessOf(known.recent, rules.targetMs);
+  if (excess !== null) return level + 1 < rules.costs.length ? fall(known, now, excess, rules) : known;
+  return mayClimb(known, now, rules) ? change(known, now, level - 1, 'spare') : known;
+}
+
+/** How long frames take where they take too long, as a share of the target; null where they do not. */
+function excessOf(recent: readonly number[], targetMs: number): number | null {
+  const [two, three] = [recent.slice(-2), recent.slice(-3)];
+  if (two.length === 2 && Math.min(...two) > TWO_FRAMES_SLOW * targetMs) return Math.min(...two) / targetMs;
+  if (three.length === 3 && Math.min(...three) > THREE_FRAMES_SLOW * targetMs) return quantile(three, 0.5) / targetMs;
+  const usual = recent.length >= ENOUGH_FRAMES ? quantile(recent, COUNTED) / targetMs : 0;
+  return usual > TOO_SLOW ? usual : null;
+}
+
+/** Multiplicative decrease: to the first rung whose cost would do, were all of the cost in what the rungs take away. */
+function fall(pace: Pace, now: number, excess: number, { costs }: PaceRules): Pace {
+  const { level, climbed, changedAt, barred } = pace;
+  const affordable = costs[level] / excess;
+  const lower = costs.findIndex((cost, rung) => rung > level && cost <= affordable);
+  const next = change(pace, now, lower === -1 ? costs.length - 1 : lower, 'slow');
+  if (!climbed || now - changedAt > IN_VAIN_MS) return next;
+  const failures = (barred[level]?.failures ?? 0) + 1;
+  const until = now + Math.min(LONGEST_BAR_MS, FIRST_BAR_MS * 2 ** (failures - 1));
+  return { ...next, barred: { ...barred, [level]: { until, failures } } };
+}
+
+/** Additive increase: one rung, after a hold, if its frames would be in time even at the most that it can cost. */
+function mayClimb({ level, recent, changedAt, barred }: Pace, now: number, { costs, targetMs }: PaceRules): boolean {
+  if (level === 0 || now - changedAt < HOLD_MS || recent.length < ENOUGH_FRAMES) return false;
+  if (now < (barred[level - 1]?.until ?? -Infinity)) return false;
+  return quantile(recent, COUNTED) * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs;
+}
+
+const change = (pace: Pace, now: number, level: number, reason: PaceReason): Pace => ({
+  ...pace,
+  level,
+  reason,
+  recent: [],
+  changedAt: now,
+  climbed: level < pace.level,
+});
+
+/** The smallest of the values that at least this share of them do not exceed. */
+export function quantile(values: readonly number[], share: number): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
+}

@@ -1,0 +1,123 @@
+/** Pictures in motion where every frame is too slow: less of them while they move, the true image when they rest. */
+import '@gaussian-splat/element';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { assert, assertEqual, delay, devices, frames, nextEvent, showLoaded, until } from './support/harness.js';
+import { screenOf } from './support/screen.js';
+
+const SCENE = { src: '/demo/scenes/skull.spz' };
+const SIZE = 'width: 300px; height: 200px';
+
+/** What was submitted is done. */
+const gpuIdle = (): Promise<undefined> => devices[devices.length - 1].queue.onSubmittedWorkDone();
+
+/** Turns the camera back and forth for a while. @returns what frames took meanwhile, ms on the GPU */
+async function turnFor(element: GaussianSplatElement, milliseconds: number): Promise<number[]> {
+  const times: number[] = [];
+  const end = performance.now() + milliseconds;
+  for (let degrees = 1; performance.now() < end; degrees++) {
+    element.cameraOrbit = `${degrees % 40}deg 75deg auto`;
+    await frames(1);
+    const { lastMs = null } = element.stats?.pace ?? {};
+    if (lastMs !== null && lastMs !== times[times.length - 1]) times.push(lastMs);
+  }
+  return times;
+}
+
+const median = (values: readonly number[]): number => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
+
+/** Turns the camera until the pace is known. */
+async function findPace(element: GaussianSplatElement): Promise<void> {
+  const isFound = (): boolean => element.stats?.pace.moving !== 'whole' && element.stats?.pace.frameMs !== null;
+  const end = performance.now() + 20_000;
+  while (!isFound() && performance.now() < end) await turnFor(element, 300);
+  assert(isFound(), `no pace but ${JSON.stringify(element.stats?.pace)}`);
+}
+
+/** Ends the camera's motion at a place. @returns when it was last drawn there */
+async function comeToRest(element: GaussianSplatElement): Promise<number> {
+  element.cameraOrbit = '20deg 70deg auto';
+  element.jumpCameraToGoal();
+  await nextEvent(element, 'camera-change');
+  return performance.now();
+}
+
+describe('the pace of pictures', () => {
+  it('moves faster than at full quality, comes to rest as the true image, byte for byte, and says what it does', async () => {
+    const auto = await showLoaded(SCENE, SIZE);
+    const fixed = await showLoaded({ ...SCENE, quality: 'default' }, SIZE);
+    await findPace(auto);
+    const [wholes, paceds]: number[][] = [[], []];
+    // In turns: other work on the machine comes and goes.
+    for (let round = 0; round < 2; round++) {
+      await gpuIdle();
+      wholes.push(...(await turnFor(fixed, 1_500)).slice(1));
+      await gpuIdle();
+      paceds.push(...(await turnFor(auto, 1_500)).slice(1));
+    }
+    const [whole, paced] = [median(wholes), median(paceds)];
+    const { pace, why } = auto.stats!;
+    console.log(`${whole.toFixed(0)} ms a frame at full quality, ${paced.toFixed(0)} with ${pace.moving}`);
+    await comeToRest(fixed);
+    assertEqual(fixed.stats?.pace.drawn, 'whole', 'a page that chose a quality gets it');
+    assertEqual(fixed.stats?.why, [], 'and nothing is done to it');
+    assert(pace.moving !== 'whole' && pace.drawn === pace.moving, `drawn with ${pace.drawn}`);
+    assertEqual(pace.reason, 'slow', 'the reason');
+    assert(why.length === 1 && why[0].includes(pace.moving), `says: ${why.join(' ')}`);
+    assert(paced < 0.8 * whole, `${paced} ms instead of ${whole}`);
+
+    const rested = await comeToRest(auto);
+    await until(() => auto.stats?.pace.drawn === 'whole', 'the true image');
+    const waited = performance.now() - rested;
+    console.log(`the true image ${waited.toFixed(0)} ms after rest`);
+    await frames(2);
+    const [shown, expected] = [await screenOf(auto), await screenOf(fixed)];
+    assertEqual(shown.differences(expected), 0, 'colour values that differ from the plain default picture');
+    // A frame that is on its way when the camera stops is waited for.
+    assert(waited <= 300 + 2 * whole, `${waited} ms after rest, a frame takes ${whole}`);
+  });
+
+  it('a picture that is asked for is whole, even in motion', async () => {
+    const element = await showLoaded({ ...SCENE, 'interpolation-decay': '0' }, SIZE);
+    await findPace(element);
+    await turnFor(element, 300);
+    assert(element.stats?.pace.drawn !== 'whole', 'in motion');
+    element.cameraOrbit = '20deg 70deg auto';
+    element.jumpCameraToGoal();
+    await frames(1);
+    const moving = await element.toBlob();
+    await delay(600);
+    assertEqual(element.stats?.pace.drawn, 'whole', 'at rest');
+    const resting = await element.toBlob();
+    assertEqual(moving.size, resting.size, 'bytes of the pictures');
+    const [a, b] = await Promise.all([moving, resting].map(async (blob) => new Uint8Array(await blob.arrayBuffer())));
+    assert(
+      a.every((value, i) => value === b[i]),
+      'the same bytes',
+    );
+  });
+
+  it('a single step after a rest is drawn whole at once', async () => {
+    const element = await showLoaded({ ...SCENE, 'interpolation-decay': '0' }, SIZE);
+    await findPace(element);
+    // Longer than two of the slow frames of this machine.
+    await delay(2_500);
+    element.cameraOrbit = '5deg 75deg auto';
+    await frames(3);
+    assertEqual(element.stats?.pace.drawn, 'whole', 'the step');
+  });
+
+  it('counts what is drawn and what of it is seen, when asked', async () => {
+    const element = await showLoaded({}, 'width: 60px; height: 50px');
+    assertEqual([element.stats?.drawn, element.stats?.contributed], [null, null], 'before');
+    const stats = await element.updateStats();
+    assert(stats, 'stats');
+    assertEqual(element.stats, stats, 'kept');
+    assertEqual(stats.modelled, element.statistics?.splats, 'modelled');
+    assert(stats.drawn !== null && stats.drawn > 0 && stats.drawn <= stats.inMemory, `${stats.drawn} drawn`);
+    assert(
+      stats.contributed !== null && stats.contributed > 0 && stats.contributed <= stats.drawn,
+      `${stats.contributed} seen`,
+    );
+    assert(stats.bytes.scene > 0 && stats.bytes.frames > 0, 'bytes');
+  });
+});

@@ -1,0 +1,197 @@
+/** The pace of moving pictures against simulated GPUs: fast, slow, noisy, with a load that steps, at several refresh rates. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import fc from 'fast-check';
+import { DisplayInterval } from '../../packages/element/src/pace/display-interval.js';
+import { LADDER } from '../../packages/element/src/pace/ladder.js';
+import { INITIAL_PACE, keepPace, quantile, type Pace } from '../../packages/element/src/pace/pace.js';
+import { randomSource } from '../support/gpu.js';
+
+const COSTS = LADDER.map(({ cost }) => cost);
+const LOWEST = COSTS.length - 1;
+/** Where the dead band ends, and the noise of what is in it. */
+const TOLERANCE = 1.1;
+
+interface Gpu {
+  /** Pictures a second of the display. */
+  readonly hertz: number;
+  /** What the true image takes at a time in ms, as a multiple of the target. */
+  readonly load: (now: number) => number;
+  /** Share of a frame that no rung makes cheaper. */
+  readonly fixed: number;
+  /** Relative spread of times; and how many frames in a hundred take three times as long. */
+  readonly noise: number;
+  readonly spikes: number;
+  /** Frames until a time is known. */
+  readonly latency: number;
+  readonly seed: number;
+}
+
+interface Frame {
+  readonly at: number;
+  readonly level: number;
+  /** As a share of the target. */
+  readonly share: number;
+}
+
+/** Draws a moving picture for so long: a frame begins with a picture of the display, once the GPU has at most one frame to do. */
+function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Pace; targetMs: number } {
+  const interval = 1000 / gpu.hertz;
+  const targetMs = 0.8 * interval;
+  const random = randomSource(gpu.seed);
+  const frames: Frame[] = [];
+  const waiting: { due: number; at: number; level: number; spent: number }[] = [];
+  let pace = INITIAL_PACE;
+  let free = 0;
+  for (let at = 0; at < milliseconds; at += interval) {
+    while (waiting.length > 0 && waiting[0].due <= at) {
+      const { due, level, spent } = waiting.shift()!;
+      pace = keepPace(pace, { now: due, level, milliseconds: spent }, { targetMs, costs: COSTS });
+    }
+    if (free > at + interval) continue;
+    const { level } = pace;
+    const whole = gpu.load(at) * (gpu.fixed + (1 - gpu.fixed) * COSTS[level]);
+    const spread = 1 + gpu.noise * (random() + random() + random() - 1.5);
+    const share = whole * spread * (random() < gpu.spikes / 100 ? 3 : 1);
+    const spent = share * targetMs;
+    free = Math.max(at, free) + spent;
+    frames.push({ at, level, share });
+    waiting.push({ due: free + gpu.latency * interval, at, level, spent });
+  }
+  return { frames, pace, targetMs };
+}
+
+/** Changes of direction of the level between two times. */
+function reversals(frames: readonly Frame[], from: number, to: number): number {
+  const levels = frames.filter(({ at }) => at >= from && at < to).map(({ level }) => level);
+  const steps = levels
+    .slice(1)
+    .map((level, i) => Math.sign(level - levels[i]))
+    .filter((step) => step !== 0);
+  return steps.slice(1).filter((step, i) => step !== steps[i]).length;
+}
+
+const p95 = (frames: readonly Frame[], from: number, to: number): number =>
+  quantile(
+    frames.filter(({ at }) => at >= from && at < to).map(({ share }) => share),
+    0.95,
+  );
+
+const STEP_MS = 6_000;
+const anyGpu = {
+  hertz: fc.constantFrom(60, 90, 120, 144),
+  fixed: fc.double({ min: 0, max: 0.25, noNaN: true }),
+  latency: fc.integer({ min: 0, max: 3 }),
+  seed: fc.integer({ min: 1, max: 1e6 }),
+};
+
+test('load steps: in time within a second, turning at most once in five', () => {
+  const loads = fc.record({
+    ...anyGpu,
+    before: fc.double({ min: 0.1, max: 2.5, noNaN: true }),
+    after: fc.double({ min: 0.1, max: 3, noNaN: true }),
+  });
+  fc.assert(
+    fc.property(loads, ({ before, after, ...gpu }) => {
+      const load = (now: number): number => (now < STEP_MS ? before : after);
+      const { frames } = run({ ...gpu, load, noise: 0.06, spikes: 0 }, 2 * STEP_MS);
+      for (const start of [0, STEP_MS]) {
+        const found = p95(frames, start + 1_000, start + STEP_MS);
+        assert.ok(found <= TOLERANCE, `p95 is ${found} of the target`);
+        // The step itself may turn the level, and that is the one.
+        assert.ok(reversals(frames, start, start + 5_000) <= 1, `${reversals(frames, start, start + 5_000)} reversals`);
+      }
+    }),
+    { numRuns: 120, seed: 5 },
+  );
+});
+
+test('noise and spikes: no picture of the display is missed in the usual frame, and the level stays quiet', () => {
+  fc.assert(
+    fc.property(fc.record({ ...anyGpu, load: fc.double({ min: 0.2, max: 3, noNaN: true }) }), ({ load, ...gpu }) => {
+      const { frames } = run({ ...gpu, load: () => load, noise: 0.2, spikes: 1.5 }, 20_000);
+      const found = p95(frames, 1_000, 20_000);
+      // The target leaves a quarter of itself to the display's interval.
+      assert.ok(found <= 1.25, `p95 is ${found} of the target`);
+      for (let start = 0; start < 15_000; start += 1_000) {
+        assert.ok(reversals(frames, start, start + 5_000) <= 1, `${reversals(frames, start, start + 5_000)} reversals`);
+      }
+    }),
+    { numRuns: 60, seed: 6 },
+  );
+});
+
+test('a fast GPU draws the true image, whatever the display, single slow frames or not', () => {
+  for (const hertz of [60, 120, 144]) {
+    const { frames } = run({ hertz, load: () => 0.3, fixed: 0.2, noise: 0.2, spikes: 3, latency: 2, seed: 9 }, 30_000);
+    assert.ok(frames.every(({ level }) => level === 0));
+  }
+});
+
+test('a GPU that is too slow for all comes to the lowest rung within few frames and stays', () => {
+  const { frames } = run({ hertz: 60, load: () => 60, fixed: 0.5, noise: 0.1, spikes: 0, latency: 2, seed: 3 }, 60_000);
+  assert.ok(
+    frames.slice(6).every(({ level }) => level === LOWEST),
+    frames.map(({ level }) => level).join(' '),
+  );
+});
+
+test('when the load is gone the true image comes back, one rung after the other', () => {
+  const load = (now: number): number => (now < 5_000 ? 4 : 0.2);
+  const { frames } = run({ hertz: 60, load, fixed: 0.2, noise: 0.1, spikes: 0, latency: 2, seed: 4 }, 15_000);
+  const after = frames.filter(({ at }) => at > 5_000);
+  for (let k = 1; k < after.length; k++) {
+    assert.ok([0, 1].includes(after[k - 1].level - after[k].level), 'one rung at a time');
+  }
+  assert.ok(after.filter(({ at }) => at > 12_000).every(({ level }) => level === 0));
+});
+
+test('a rung that costs more than the ladder says is tried ever more seldom', () => {
+  // The first rung down makes the frame more than twice as fast, though the ladder promises less.
+  const targetMs = 13.3;
+  let pace = INITIAL_PACE;
+  const changes: number[] = [];
+  for (let now = 0; now < 120_000; now += 16.7) {
+    const { level } = pace;
+    const milliseconds = targetMs * (level === 0 ? 1.3 : 0.5);
+    pace = keepPace(pace, { now, level, milliseconds }, { targetMs, costs: COSTS });
+    if (pace.level === 0 && level > 0) changes.push(now);
+  }
+  // After 5, 10, 20, 40 and then every 80 seconds.
+  assert.ok(changes.length >= 3 && changes.length <= 6, changes.join(' '));
+  const gaps = changes.slice(1).map((at, i) => at - changes[i]);
+  assert.ok(
+    gaps.every((gap, i) => i === 0 || gap > 1.5 * gaps[i - 1]),
+    gaps.join(' '),
+  );
+});
+
+test('frames of another level say nothing', () => {
+  const pace = { ...INITIAL_PACE, level: 3 };
+  assert.equal(keepPace(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, costs: COSTS }), pace);
+});
+
+test('every rung costs less than the one above, and the last is the smallest picture', () => {
+  assert.equal(LADDER[0].levers, undefined);
+  COSTS.slice(1).forEach((cost, i) => assert.ok(cost < COSTS[i]));
+  assert.equal(new Set(LADDER.map(({ name }) => name)).size, LADDER.length);
+});
+
+test('the display: refresh rates are found among late frames, and slow frames are not taken for a slow display', () => {
+  const seen = (steps: readonly number[]): number => {
+    const display = new DisplayInterval();
+    let now = 1000;
+    display.tick(now);
+    for (const step of steps) display.tick((now += step));
+    return display.milliseconds;
+  };
+  const late = (ms: number, k: number): number => (k % 3 === 0 ? 2 * ms : ms);
+  for (const hertz of [60, 75, 120, 144, 240]) {
+    const ms = 1000 / hertz;
+    assert.ok(Math.abs(seen(Array.from({ length: 40 }, (_, k) => late(ms, k))) - ms) < 0.01, `${hertz} Hz`);
+  }
+  assert.equal(seen(Array(40).fill(50)), 1000 / 60);
+  assert.equal(seen([]), 1000 / 60);
+  // Several elements draw at one moment.
+  assert.equal(seen(Array.from({ length: 40 }, (_, k) => (k % 2 === 0 ? 0 : 8))), 8);
+});

@@ -1,0 +1,135 @@
+/** Levers of single frames: the same picture as of a renderer that has them for good, and nothing made on the way. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import {
+  GaussianBuffers,
+  packGaussians,
+  Renderer,
+  SpanTimer,
+  type FrameLevers,
+  type RasterizerName,
+} from '@gaussian-splat/renderer';
+import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { cloudOf, repeat } from '../support/clouds.js';
+import { randomSource } from '../support/gpu.js';
+import { psnr } from '../support/metrics.js';
+import { nodeDevice } from '../support/node-device.js';
+import { readFrame } from '../support/read-frame.js';
+import { cameraAt } from '../support/scenes.js';
+import { countWork } from '../support/work-counters.js';
+
+const MIXES: readonly Partial<FrameLevers>[] = [
+  { depthKeyBits: 16, resolutionScale: 0.6, shDegree: 0 },
+  { resolutionScale: 0.35, depthKeyBits: 16, alphaMin: 4 / 255, transmittanceMin: 0.05, occludedBelow: 0.1 },
+];
+
+const size = { width: 144, height: 70 };
+const random = randomSource(7);
+const cloud = cloudOf(
+  repeat(1500, () => ({
+    position: [random() - 0.5, random() - 0.5, random() - 0.5],
+    scale: 0.01 + 0.04 * random(),
+    opacity: 0.1 + 0.85 * random(),
+    color: [random(), random(), random()],
+    sh: Array.from({ length: 9 }, () => 0.4 * (random() - 0.5)),
+  })),
+  1,
+);
+/** Turned frame by frame, so that the visible splats are sorted. */
+const views = Array.from({ length: 3 }, (_, k) => cameraAt([0.6 + 0.2 * k, -0.5, -1.6], [0, 0, 0], size));
+
+const isSame = (a: Float32Array, b: Float32Array): boolean => a.length === b.length && a.every((v, i) => v === b[i]);
+
+for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
+  test(`${rasterizer}: a frame's levers draw what a renderer of those levers draws, and the next frame without is whole`, async () => {
+    const device = await nodeDevice();
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+    const own = new Renderer(device, { rasterizer });
+    const plain = new Renderer(device, { rasterizer });
+    for (const levers of MIXES) {
+      const fixed = new Renderer(device, { rasterizer, ...levers });
+      for (const camera of views) {
+        const mixed = await readFrame(device, own, { gaussians, camera, levers });
+        const expected = await readFrame(device, fixed, { gaussians, camera });
+        assert.ok(
+          mixed.some((value) => value > 0.1),
+          'something is in view',
+        );
+        assert.ok(isSame(mixed, expected), `${JSON.stringify(levers)}: ${psnr(mixed, expected, { channels: 4 })} dB`);
+      }
+      const whole = await readFrame(device, own, { gaussians, camera: views[0] });
+      assert.ok(isSame(whole, await readFrame(device, plain, { gaussians, camera: views[0] })), 'the next frame');
+      fixed.destroy();
+    }
+    for (const renderer of [own, plain]) renderer.destroy();
+    gaussians.destroy();
+  });
+
+  test(`${rasterizer}: once prepared and seen, steps allocate and compile nothing`, async () => {
+    // Tiles take seconds to compile here: those of the test before are good enough for them.
+    const isFresh = rasterizer === 'quads';
+    const device = isFresh ? await (await requestNodeAdapter()).requestDevice() : await nodeDevice();
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+    const renderer = new Renderer(device, { rasterizer });
+    const format = 'rgba8unorm';
+    const target = device.createTexture({ size: [size.width, size.height], format, usage: 0x10 });
+    const made: string[] = [];
+    renderer.prepare(MIXES, format);
+    for (const name of ['createComputePipeline', 'createRenderPipeline', 'createShaderModule'] as const) {
+      const original = device[name].bind(device) as (descriptor: never) => never;
+      Object.assign(device, { [name]: (descriptor: never) => (made.push(name), original(descriptor)) });
+    }
+    const draw = (levers?: Partial<FrameLevers>): void => {
+      for (const camera of views) renderer.render({ gaussians, camera, target, levers });
+    };
+    draw();
+    made.length = 0;
+    for (const levers of MIXES) draw(levers);
+    assert.deepEqual(made, [], 'pipelines of prepared levers');
+    const counter = countWork(device);
+    counter.take();
+    const before = renderer.byteLength;
+    for (const levers of [...MIXES, undefined, ...MIXES]) draw(levers);
+    assert.equal(counter.take().bytesAllocated, 0);
+    assert.equal(renderer.byteLength, before);
+    renderer.destroy();
+    gaussians.destroy();
+    if (isFresh) device.destroy();
+  });
+}
+
+test('a lever out of range is refused', async () => {
+  const renderer = new Renderer(await nodeDevice());
+  assert.throws(() => renderer.prepare([{ resolutionScale: 0 }], 'rgba8unorm'), { code: 'argument/value' });
+  renderer.destroy();
+});
+
+test('the span of every frame comes back, beside the frames', async (t) => {
+  const adapter = await requestNodeAdapter();
+  if (!adapter.features.has('timestamp-query')) return t.skip('no timestamps here');
+  const device = await adapter.requestDevice({ requiredFeatures: ['timestamp-query'] });
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device);
+  const target = device.createTexture({ size: [size.width, size.height], format: 'rgba8unorm', usage: 0x10 });
+  const timer = new SpanTimer(device);
+  const spans: (number | null)[] = [];
+  for (let k = 0; k < 12; k++) {
+    const began = performance.now();
+    const span = await new Promise<number | null>((resolve) => {
+      assert.ok(timer.expect(resolve));
+      renderer.render({ gaussians, camera: views[k % views.length], target, timer });
+    });
+    assert.ok(span === null || (span > 0 && span <= performance.now() - began + 1), `${span} ms`);
+    spans.push(span);
+  }
+  assert.ok(spans.filter((span) => span !== null).length >= 10, String(spans));
+  timer.destroy();
+  renderer.destroy();
+  gaussians.destroy();
+  device.destroy();
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
