@@ -12,6 +12,8 @@ export interface Frame {
   readonly occlusion: Occlusion;
   /** An order of all splats that serves the camera; without it the visible splats are sorted. */
   readonly depthOrder?: DepthOrder;
+  /** Whether to keep the splats that are looked at within `Levers.splatBudget`. */
+  readonly isBudgeted: boolean;
   readonly timer?: PassTimer;
 }
 
@@ -23,14 +25,26 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): void
   const { scratch, bindings, timer } = frame;
   bindings.reset();
   encoder.clearBuffer(scratch.gathered);
+  encoder.clearBuffer(scratch.detailCounts);
+  // What the last budget allowed.
+  encoder.clearBuffer(scratch.chunkShares, scratch.chunkShares.size - 4);
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
   frame.occlusion.record(pass);
+  if (frame.isBudgeted) keepWithinBudget(pass, frame);
   cull(pass, frame);
   if (frame.depthOrder) listInDepthOrder(pass, frame, frame.depthOrder);
   else listInFileOrder(pass, frame);
   bindings.pages.forEach(({ project }, page) => frame.stages.project.record(pass, project, scratch.plan, page));
   pass.end();
   if (!frame.depthOrder) sort(encoder, frame);
+}
+
+/** Finds the error on screen that leaves as many splats as the frame may look at. */
+function keepWithinBudget(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
+  for (const { detailCount, splatCount } of bindings.pages) {
+    stages.detailBudget.recordCount(pass, detailCount, splatCount);
+  }
+  stages.detailBudget.recordAllow(pass, bindings.detailAllow);
 }
 
 /** Finds the visible splats: whole chunks first, then one by one. */

@@ -10,6 +10,8 @@ export interface GaussianPage {
   readonly sh: GPUBuffer;
   /** array<Chunk>: bounds of each 256 splats */
   readonly chunks: GPUBuffer;
+  /** array<ChunkDetail>, if there are levels of detail. */
+  readonly details?: GPUBuffer;
 }
 
 /**

@@ -7,6 +7,7 @@ export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 export type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 export { PassTimer, type PassTime } from './gpu/pass-timer.js';
 export { QUALITIES, type Levers, type Quality } from './levers.js';
+export { packWithDetail } from './detail/pack-with-detail.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, RasterizerName } from './rasterizers/rasterizer.js';

@@ -13,7 +13,7 @@ import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import type { PassTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
-import { leversOf, overridesOf, type Levers } from './levers.js';
+import { leversOf, overridesOf, requireInRange, type Levers } from './levers.js';
 import { Occlusion } from './occlusion.js';
 import { PageTable } from './page-table.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
@@ -138,6 +138,7 @@ export class Renderer {
     if (notes) requireNotes(this.#rasterizer);
     const target = this.#targetOf(request);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
+    const detail = detailOf(request, this.levers);
     const drawn = scaled(camera, this.levers.resolutionScale);
     const resources = this.#resourcesFor(scenes, this.#occlusion.fit(drawn));
     const { table, scratch, bindings, depthOrder, monitor } = resources;
@@ -145,13 +146,14 @@ export class Renderer {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer, notes !== undefined);
     this.#occlusion.prepare(encoder, drawn, table.version);
-    table.look(drawn, this.levers, isOrdered, this.#occlusion.tiles);
+    table.look(drawn, { ...this.levers, ...detail }, isOrdered, this.#occlusion.tiles);
     recordProjection(encoder, {
       stages: this.#stages,
       bindings,
       scratch,
       occlusion: this.#occlusion,
       depthOrder: isOrdered ? depthOrder : undefined,
+      isBudgeted: detail.splatBudget > 0 && table.hasDetail,
       timer,
     });
     const last = this.#paint(
@@ -376,6 +378,14 @@ export class Renderer {
     this.#accumulation = { texture, compose };
     return this.#accumulation;
   }
+}
+
+/** The levers of detail of a frame. */
+function detailOf(request: FrameRequest, levers: Levers): Pick<Levers, 'detail' | 'splatBudget'> {
+  const { detail = levers.detail, splatBudget = levers.splatBudget } = request;
+  requireInRange('detail', detail, 'FrameRequest');
+  requireInRange('splatBudget', splatBudget, 'FrameRequest');
+  return { detail, splatBudget };
 }
 
 const isTexture = (target: GPUTexture | GPUTextureView): target is GPUTexture => 'createView' in target;
