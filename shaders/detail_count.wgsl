@@ -33,7 +33,8 @@ fn count_chunk(chunk: u32) {
     own = screen_error(view, d.sphere, d.error);
     above = screen_error(view, d.parent_sphere, d.parent_error) * exp2(view.detail_fade);
   }
-  if (own > above || !may_be_visible(view, chunks[chunk])) { return; }
+  // Places of a streamed scene that hold nothing have nothing above them.
+  if (own > above || above <= 0.0 || !may_be_visible(view, chunks[chunk])) { return; }
   let splats = min(CULL_GROUP, view.splat_count - chunk * CULL_GROUP);
   atomicAdd(&own_counts[bucket_of(own)], splats);
   atomicAdd(&own_counts[DETAIL_BUCKETS + bucket_of(above)], splats);

@@ -1,11 +1,13 @@
 import type { DepthOrder } from './depth-order.js';
 import { BUFFER_USAGE, type Overrides } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import type { Wishes } from './gaussian-scene.js';
 import type { PageTable } from './page-table.js';
 import type { Scratch } from './scratch.js';
 import { CompactStage } from './stages/compact.js';
 import { CullChunksStage, CullStage } from './stages/cull.js';
 import { DetailBudgetStage } from './stages/detail-budget.js';
+import { NoteWishesStage } from './stages/note-wishes.js';
 import { PlanStage } from './stages/plan.js';
 import { ProjectStage } from './stages/project.js';
 import { ScanStage } from './stages/scan.js';
@@ -17,6 +19,7 @@ import { constants } from './generated/shaders.js';
 /** The stages before the rasterizer; each is a shader of the same name. */
 export interface Stages {
   readonly detailBudget: DetailBudgetStage;
+  readonly noteWishes: NoteWishesStage;
   readonly cullChunks: CullChunksStage;
   readonly cull: CullStage;
   readonly scan: ScanStage;
@@ -34,6 +37,7 @@ export function makeStages(
 ): Stages {
   return {
     detailBudget: new DetailBudgetStage(device),
+    noteWishes: new NoteWishesStage(device),
     cullChunks: new CullChunksStage(device),
     cull: new CullStage(device, { alpha_min, min_contribution }, threads),
     scan: new ScanStage(device),
@@ -49,6 +53,8 @@ export function makeStages(
 interface PageBindings {
   readonly splatCount: number;
   readonly detailCount: GPUBindGroup;
+  /** Of a page of a streamed scene. */
+  readonly wishes?: { readonly of: Wishes; readonly note: GPUBindGroup };
   readonly cullChunks: GPUBindGroup;
   readonly cull: GPUBindGroup;
   readonly compact: GPUBindGroup;
@@ -180,12 +186,20 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
   return table.pages.map((page, i) => {
     const view = table.view(i);
     const gaussians = page.geometry;
+    const wishes = table.wishesOf(i);
     // Something must be bound where there are no levels of detail; it is not looked at.
     const details = page.details ?? page.chunks;
     const chunk = { view, chunk_list: chunkList, visible_bits: visibleBits };
     return {
       splatCount: page.count,
       detailCount: stages.detailBudget.bindCount({ view, chunks: page.chunks, details, detail_counts: detailCounts }),
+      wishes: wishes && {
+        of: wishes,
+        note: stages.noteWishes.bind({
+          ...{ view, chunks: page.chunks, details },
+          ...{ chunk_shares: chunkShares, wishes: wishes.buffer },
+        }),
+      },
       cullChunks: stages.cullChunks.bind({
         ...chunk,
         chunks: page.chunks,

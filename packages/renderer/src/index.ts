@@ -4,10 +4,21 @@ export type { ProbeAnswer, ProbePoint } from './depth-probe.js';
 export { deviceDescriptor } from './device.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
-export type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+export type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 export { PassTimer, type PassTime } from './gpu/pass-timer.js';
 export { QUALITIES, type Levers, type Quality } from './levers.js';
 export { packWithDetail } from './detail/pack-with-detail.js';
+export {
+  buildDetailTree,
+  cutPages,
+  manifestOf,
+  packPage,
+  type BuiltPage,
+  type DetailTree,
+} from './detail/build-pages.js';
+export { treeOfCopies } from './detail/tile-tree.js';
+export { StreamedGaussians, type StreamOptions } from './detail/streamed-gaussians.js';
+export { checkManifest, type DetailManifest } from './detail/manifest.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, RasterizerName } from './rasterizers/rasterizer.js';

@@ -1,5 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
@@ -37,6 +37,16 @@ export class PageTable {
   /** Groups of all pages. */
   get groups(): number {
     return this.firstGroups[this.pages.length];
+  }
+
+  /** Where views of the scene that a page is part of say what they wish for, if it is streamed. */
+  wishesOf(page: number): Wishes | undefined {
+    return this.#scenes.find(({ pages }) => pages.includes(this.pages[page]))?.wishes;
+  }
+
+  /** Lets streamed scenes take in what has come. */
+  update(): void {
+    for (const scene of this.#scenes) scene.update?.();
   }
 
   /** True if a page has levels of detail. */

@@ -84,6 +84,8 @@ export class Renderer {
   #accumulation: Accumulation | undefined;
   #lastAxis: Vector3 | undefined;
   #turningFrames = 0;
+  /** The largest budget of splats that a frame has been given. */
+  #mostSplats: number | undefined;
   readonly #content = new ContentWatch();
   /** Whether the slots of the last frame are in depth order themselves; undefined before there is one. */
   #lastIsOrdered: boolean | undefined;
@@ -140,14 +142,16 @@ export class Renderer {
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
     const detail = detailOf(request, this.levers);
     const drawn = scaled(camera, this.levers.resolutionScale);
+    this.#roomFor(detail.splatBudget);
     const resources = this.#resourcesFor(scenes, this.#occlusion.fit(drawn));
     const { table, scratch, bindings, depthOrder, monitor } = resources;
+    table.update();
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer, notes !== undefined);
     this.#occlusion.prepare(encoder, drawn, table.version);
     table.look(drawn, { ...this.levers, ...detail }, isOrdered, this.#occlusion.tiles);
-    recordProjection(encoder, {
+    const wishes = recordProjection(encoder, {
       stages: this.#stages,
       bindings,
       scratch,
@@ -167,6 +171,7 @@ export class Renderer {
     this.#device.queue.submit([last.finish()]);
     this.#lastIsOrdered = isOrdered;
     if (isWatched) monitor.read();
+    for (const wish of wishes) wish.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
     if (this.levers.sortAngle <= STILL) depthOrder.settle();
@@ -309,10 +314,18 @@ export class Renderer {
     return this.#resources!;
   }
 
+  /** A larger budget of splats than before makes other room. */
+  #roomFor(splatBudget: number): void {
+    const most = splatBudget > 0 ? splatBudget : Infinity;
+    if (this.#mostSplats !== undefined && most > this.#mostSplats) this.#releaseResources();
+    this.#mostSplats = Math.max(this.#mostSplats ?? 0, most);
+  }
+
   #hasOtherPairs = false;
 
   #mostFor(table: PageTable): Capacity {
-    return { visible: Math.min(table.splats, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
+    const budget = table.hasDetail ? (this.#mostSplats ?? Infinity) : Infinity;
+    return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
   }
 
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
