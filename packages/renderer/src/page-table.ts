@@ -44,6 +44,11 @@ export class PageTable {
     return this.#scenes.find(({ pages }) => pages.includes(this.pages[page]))?.wishes;
   }
 
+  /** True if a scene is streamed. */
+  get isStreamed(): boolean {
+    return this.#scenes.some(({ wishes }) => wishes !== undefined);
+  }
+
   /** Lets streamed scenes take in what has come. */
   update(): void {
     for (const scene of this.#scenes) scene.update?.();

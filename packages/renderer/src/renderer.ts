@@ -179,9 +179,10 @@ export class Renderer {
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
   async readStatistics(): Promise<FrameStatistics> {
-    if (this.#resources === undefined) return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0 };
-    const { plan, gathered } = this.#resources.scratch;
-    return readStatistics(this.#device, { plan, gathered, pairPlan: this.#rasterizer.pairPlan });
+    if (this.#resources === undefined)
+      return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0 };
+    const { plan, gathered, chunkShares } = this.#resources.scratch;
+    return readStatistics(this.#device, { plan, gathered, chunkShares, pairPlan: this.#rasterizer.pairPlan });
   }
 
   /**
@@ -237,7 +238,8 @@ export class Renderer {
     const axis = axisOf(camera);
     const turned = this.#lastAxis === undefined ? 0 : angleBetween(this.#lastAxis, axis);
     this.#lastAxis = axis;
-    const isStill = this.#content.isStill(table.version);
+    // Of a streamed scene most splats are not in view, and others come and go: sorting all of them never pays.
+    const isStill = this.#content.isStill(table.version) && !table.isStreamed;
     if (depthOrder.serves(camera, sortAngle)) {
       this.#turningFrames = 0;
       return true;

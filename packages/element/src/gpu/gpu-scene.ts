@@ -3,6 +3,7 @@ import {
   chooseVariants,
   GaussianBuffers,
   Renderer,
+  type FrameRequest,
   type GaussianScene,
   type ProbeAnswer,
   type ProbePoint,
@@ -14,6 +15,9 @@ import type { LoadedScene, ProgressListener, SceneRequest } from '../loading/pro
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { assertWebGpu } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
+
+/** How much detail of a streamed scene is drawn. */
+export type DetailLevers = Pick<FrameRequest, 'detail' | 'splatBudget'>;
 
 /** Gaussians with one owner. */
 export interface OwnedGaussians extends GaussianScene {
@@ -39,10 +43,18 @@ export class GpuScene {
   #filter: FrameFilter | undefined;
   readonly #submissions: number;
   readonly #lease: DeviceLease;
+  readonly #detail: DetailLevers;
   #destroyed = false;
 
-  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, submissions: number, live?: LiveModel) {
+  constructor(
+    lease: DeviceLease,
+    gaussians: OwnedGaussians,
+    bounds: Bounds,
+    submissions: number,
+    { live, detail = {} }: { live?: LiveModel; detail?: DetailLevers } = {},
+  ) {
     this.#lease = lease;
+    this.#detail = detail;
     this.live = live;
     this.gaussians = gaussians;
     this.bounds = bounds;
@@ -96,7 +108,8 @@ export class GpuScene {
 
   /** Encodes and submits one frame. */
   render(frame: Frame): void {
-    const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, gaussians: this.gaussians });
+    const draw = (drawn: Frame): void =>
+      this.#renderer.render({ ...drawn, ...this.#detail, gaussians: this.gaussians });
     if (this.#filter) this.#filter.render(frame, `${this.gaussians.version} ${this.#quality}`, draw);
     else draw(frame);
   }
@@ -157,6 +170,7 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
   // Known at once, and then not a byte is fetched.
   assertWebGpu();
   if (isGenerator(request)) return openLiveScene(request, options);
+  if (isStreamed(request)) return openStreamedScene(request, options);
   // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
@@ -204,7 +218,35 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
       onProgress,
     );
     beforeUpload();
-    return new GpuScene(lease, live.gaussians, live.bounds, submissions, live);
+    return new GpuScene(lease, live.gaussians, live.bounds, submissions, { live });
+  } catch (error) {
+    lease.release();
+    throw error;
+  }
+}
+
+/** A folder that `npm run detail` wrote is known by the name of its manifest. */
+function isStreamed({ url }: SceneRequest): boolean {
+  return URL.canParse(url) && /(^|\/)detail\.json$/.test(new URL(url).pathname);
+}
+
+async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+  const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
+  const opening = import('./open-streamed.js');
+  const acquiring = options.device.acquire();
+  opening.catch(ignore);
+  const lease = await acquiring;
+  let scene: GpuScene | undefined;
+  try {
+    await chooseVariants(lease.device).catch(unlessWrong);
+    const { openStreamed } = await opening;
+    const onChange = (): void => scene?.onIncomplete();
+    beforeUpload();
+    const { gaussians, detail } = await openStreamed(request, lease.device, {
+      ...{ signal, onProgress, memoryBudget, onChange },
+    });
+    scene = new GpuScene(lease, gaussians, gaussians.bounds, submissions, { detail });
+    return scene;
   } catch (error) {
     lease.release();
     throw error;

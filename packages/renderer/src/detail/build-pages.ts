@@ -70,18 +70,26 @@ export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true)
     level < 0
       ? []
       : chunks.flatMap((c) => [0, 1, 2, 3].map((k) => 4 * c + k)).filter((c) => c < chunksOf(levels[level].count));
-  const add = (upper: number, upperChunks: readonly number[], parent: readonly [number, number] | undefined): void => {
-    const lowerChunks = below(upper - 1, upperChunks);
+  const add = (
+    upper: number,
+    upperChunks: readonly number[],
+    parent: readonly [number, number] | undefined,
+    isSingle = false,
+  ): void => {
+    const lowerChunks = isSingle ? [] : below(upper - 1, upperChunks);
     const holds = [...upperChunks.map((c) => [upper, c] as const), ...lowerChunks.map((c) => [upper - 1, c] as const)];
     const page = pages.push({ chunks: holds.length, upper: upperChunks.length, parent, holds }) - 1;
-    lowerChunks.forEach((c, k) => {
-      const next = below(upper - 2, [c]);
-      if (next.length > 0) add(upper - 2, next, [page, upperChunks.length + k]);
+    const [finest, firstFinest] = isSingle ? [upperChunks, 0] : [lowerChunks, upperChunks.length];
+    const level = isSingle ? upper - 1 : upper - 2;
+    finest.forEach((c, k) => {
+      const next = below(level, [c]);
+      if (next.length > 0) add(level, next, [page, firstFinest + k]);
     });
   };
   const top = levels.length - 1;
-  if (withTop) add(top, [0], undefined);
-  else if (top > 0) add(top - 1, below(top - 1, [0]), undefined);
+  // Where the levels are odd in number the first page has one alone: pages of the finest, of which there are most, are full.
+  if (withTop) add(top, [0], undefined, top % 2 === 0);
+  else if (top > 0) add(top - 1, below(top - 1, [0]), undefined, top % 2 === 1);
   return pages;
 }
 

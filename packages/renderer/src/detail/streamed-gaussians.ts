@@ -16,7 +16,7 @@ export interface StreamOptions {
   readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>;
   /** Bytes of GPU memory that resident splats may take, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */
   readonly memoryBudget?: number;
-  /** Called when a page has come and another frame would be better than the last. */
+  /** Called when another frame is asked for: a page has come, or what the last view lacks is not known yet. */
   readonly onChange?: () => void;
   /** Called when a page does not come; what is above it stays on show, and it is asked for again after a while. */
   readonly onError?: (error: unknown) => void;
@@ -80,7 +80,12 @@ export class StreamedGaussians implements GaussianScene {
     this.#memory = new GpuMemory(device);
     try {
       this.#pool = new PagePool(device, this.#memory, manifest, slots);
-      this.wishes = new WishReader(this.#memory, this.#list.count, (wishes) => this.#take(wishes));
+      this.wishes = new WishReader(
+        this.#memory,
+        this.#list.count,
+        (wishes) => this.#take(wishes),
+        () => this.#options.onChange?.(),
+      );
     } catch (error) {
       this.destroy();
       throw error;
@@ -142,6 +147,7 @@ export class StreamedGaussians implements GaussianScene {
 
   destroy(): void {
     this.#abort.abort();
+    this.wishes?.destroy();
     this.#arrivals = [];
     this.#reservation.release();
     this.#memory.destroy();

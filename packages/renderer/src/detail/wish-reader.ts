@@ -3,6 +3,8 @@ import type { GpuMemory } from '../gpu/memory.js';
 
 /** Frames between two looks at what is wished for. */
 const INTERVAL = 6;
+/** Milliseconds after which a view that nobody has looked at is drawn once more, to look. */
+const STALE_MS = 120;
 
 /** Brings what views wish for back from the GPU, now and then, with nobody waiting for it. */
 export class WishReader {
@@ -10,19 +12,39 @@ export class WishReader {
   readonly buffer: GPUBuffer;
   readonly #staging: GPUBuffer;
   readonly #onWishes: (wishes: Float32Array) => void;
-  #frame = 0;
+  readonly #onStale: () => void;
+  #frames = INTERVAL;
+  #timer: ReturnType<typeof setTimeout> | undefined;
   #isReading = false;
 
-  constructor(memory: GpuMemory, pages: number, onWishes: (wishes: Float32Array) => void) {
+  /**
+   * @param onWishes called with the pixels that doing without each page costs
+   * @param onStale called when the last view has not been looked at for want of another frame
+   */
+  constructor(memory: GpuMemory, pages: number, onWishes: (wishes: Float32Array) => void, onStale: () => void) {
     const { storage, copySource, copyDestination, mapRead } = BUFFER_USAGE;
     this.buffer = memory.buffer('gs.wishes', 4 * pages, storage | copySource | copyDestination);
     this.#staging = memory.buffer('gs.wishes.staging', 4 * pages, mapRead | copyDestination);
     this.#onWishes = onWishes;
+    this.#onStale = onStale;
   }
 
   /** True for a frame that must note wishes; then {@link begin}, {@link copy} and, after the submit, {@link read} follow. */
   isDue(): boolean {
-    return this.#frame++ % INTERVAL === 0 && !this.#isReading;
+    clearTimeout(this.#timer);
+    const isDue = this.#frames >= INTERVAL && !this.#isReading;
+    this.#frames = isDue ? 1 : this.#frames + 1;
+    if (!isDue) this.#timer = setTimeout(() => this.#look(), STALE_MS);
+    return isDue;
+  }
+
+  destroy(): void {
+    clearTimeout(this.#timer);
+  }
+
+  #look(): void {
+    this.#frames = INTERVAL;
+    this.#onStale();
   }
 
   begin(encoder: GPUCommandEncoder): void {
