@@ -1,44 +1,72 @@
-import type { Block } from './block.js';
+import { BLOCK, type Block } from './block.js';
 import { coverOfOpacity, opacityOfCover } from './cover.js';
 
 /** How much more it counts to displace a splat whose colour differs by 1 in a channel. */
 const COLOR_WEIGHT = 2;
 
-/** Square of how far merging two splats displaces them, in world units²: apart, in shape, and more if their colours differ. */
-export function displacement(b: Block, i: number, j: number): number {
-  const dx = b.x[i] - b.x[j];
-  const dy = b.y[i] - b.y[j];
-  const dz = b.z[i] - b.z[j];
-  const xx = b.xx[i] - b.xx[j];
-  const yy = b.yy[i] - b.yy[j];
-  const zz = b.zz[i] - b.zz[j];
-  const xy = b.xy[i] - b.xy[j];
-  const xz = b.xz[i] - b.xz[j];
-  const yz = b.yz[i] - b.yz[j];
-  const size = b.xx[i] + b.yy[i] + b.zz[i] + b.xx[j] + b.yy[j] + b.zz[j];
+/** Numbers of one splat in {@link traitsOf}, of which the last is spare. */
+const TRAITS = 16;
+const traits = new Float64Array(TRAITS * BLOCK);
+
+/** What {@link displacement} looks at, splat by splat in one piece: it is asked for millions of pairs. Valid until the next call. */
+export function traitsOf(b: Block): Float64Array {
+  for (let k = 0, at = 0; k < b.count; k++, at += TRAITS) {
+    traits[at] = b.x[k];
+    traits[at + 1] = b.y[k];
+    traits[at + 2] = b.z[k];
+    traits[at + 3] = b.xx[k];
+    traits[at + 4] = b.yy[k];
+    traits[at + 5] = b.zz[k];
+    traits[at + 6] = b.xy[k];
+    traits[at + 7] = b.xz[k];
+    traits[at + 8] = b.yz[k];
+    traits[at + 9] = b.xx[k] + b.yy[k] + b.zz[k];
+    traits[at + 10] = b.red[k];
+    traits[at + 11] = b.green[k];
+    traits[at + 12] = b.blue[k];
+    traits[at + 13] = b.mass[k];
+  }
+  return traits;
+}
+
+/** Square of how far merging splats i and j displaces them, in world units²: apart, in shape, and more if their colours differ. */
+function displacement(t: Float64Array, i: number, j: number): number {
+  const [p, q] = [TRAITS * i, TRAITS * j];
+  const dx = t[p] - t[q];
+  const dy = t[p + 1] - t[q + 1];
+  const dz = t[p + 2] - t[q + 2];
+  const xx = t[p + 3] - t[q + 3];
+  const yy = t[p + 4] - t[q + 4];
+  const zz = t[p + 5] - t[q + 5];
+  const xy = t[p + 6] - t[q + 6];
+  const xz = t[p + 7] - t[q + 7];
+  const yz = t[p + 8] - t[q + 8];
+  const size = t[p + 9] + t[q + 9];
   // Σ1 − Σ2 over the size of both has the unit of an area again: 0 for equal shapes.
   const shape = size > 0 ? (xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz)) / size : 0;
-  const red = b.red[i] - b.red[j];
-  const green = b.green[i] - b.green[j];
-  const blue = b.blue[i] - b.blue[j];
+  const red = t[p + 10] - t[q + 10];
+  const green = t[p + 11] - t[q + 11];
+  const blue = t[p + 12] - t[q + 12];
   const color = 1 + COLOR_WEIGHT * (red * red + green * green + blue * blue);
   return (dx * dx + dy * dy + dz * dz) * color + shape;
 }
 
-/** Ward's criterion (1963): what a merge adds to the squared displacement of all that is covered. */
-export function mergeCost(b: Block, i: number, j: number): number {
-  return ((b.mass[i] * b.mass[j]) / (b.mass[i] + b.mass[j])) * displacement(b, i, j);
+/** Ward's criterion (1963): what a merge of splats i and j adds to the squared displacement of all that is covered. */
+export function mergeCost(t: Float64Array, i: number, j: number): number {
+  const first = t[TRAITS * i + 13];
+  const second = t[TRAITS * j + 13];
+  return ((first * second) / (first + second)) * displacement(t, i, j);
 }
 
 /**
  * Makes splat i stand for both: the first two moments of the two, and their cover as the three axes see it. Seen from so far away that
  * their displacement is a pixel, which is where they are first drawn as one: small splats are wider there, by the dilation.
  */
-export function mergePair(b: Block, i: number, j: number): void {
+export function mergePair(b: Block, t: Float64Array, i: number, j: number): void {
   const mass = b.mass[i] + b.mass[j];
   const p = b.mass[i] / mass;
   const q = b.mass[j] / mass;
-  const spread = p * b.spread[i] + q * b.spread[j] + p * q * displacement(b, i, j);
+  const spread = p * b.spread[i] + q * b.spread[j] + p * q * displacement(t, i, j);
   const low = b.dilation * spread;
   const cover = jointCover(b, i, j, low);
   b.spread[i] = spread;

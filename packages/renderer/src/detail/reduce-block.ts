@@ -1,5 +1,5 @@
 import { BLOCK, type Block } from './block.js';
-import { mergeCost, mergePair } from './merge-pair.js';
+import { mergeCost, mergePair, traitsOf } from './merge-pair.js';
 
 /** How many of the splats that follow in the order may become a splat's partner. */
 const WINDOW = 6;
@@ -17,21 +17,21 @@ export class BlockReducer {
   /** In each round those pairs are merged that are each other's best partner, the cheapest first. */
   reduce(block: Block, target: number): void {
     while (block.count > target) {
-      this.#findPartners(block);
-      this.#mergePairs(block, block.count - target);
+      const traits = traitsOf(block);
+      this.#findPartners(traits, block.count);
+      this.#mergePairs(block, traits, block.count - target);
       block.closeRanks(this.#partOf);
     }
   }
 
-  #findPartners(block: Block): void {
+  #findPartners(traits: Float64Array, count: number): void {
     const best = this.#best;
     const bestCost = this.#bestCost;
-    const { count } = block;
     bestCost.fill(Infinity, 0, count);
     for (let i = 0; i < count; i++) {
       const end = Math.min(count, i + WINDOW + 1);
       for (let j = i + 1; j < end; j++) {
-        const cost = mergeCost(block, i, j);
+        const cost = mergeCost(traits, i, j);
         if (cost < bestCost[i]) {
           bestCost[i] = cost;
           best[i] = j;
@@ -45,14 +45,14 @@ export class BlockReducer {
   }
 
   /** Merges at most so many pairs; always at least one, for the cheapest pair of all wants each other. */
-  #mergePairs(block: Block, most: number): void {
+  #mergePairs(block: Block, traits: Float64Array, most: number): void {
     this.#partOf.fill(-1, 0, block.count);
     const limit = this.#dearest(block.count, most);
     let merged = 0;
     for (let i = 0; i < block.count && merged < most; i++) {
       const j = this.#best[i];
       if (j <= i || this.#best[j] !== i || this.#bestCost[i] > limit) continue;
-      mergePair(block, i, j);
+      mergePair(block, traits, i, j);
       this.#partOf[j] = i;
       merged++;
     }
