@@ -11,6 +11,7 @@
 @group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
 @group(0) @binding(4) var<storage, read_write> group_counts: array<u32>;
 @group(0) @binding(5) var<storage, read_write> gathered: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read> chunk_shares: array<f32>;
 
 var<workgroup> bits: array<atomic<u32>, WORDS_PER_GROUP>;
 var<workgroup> nearest_inverted: atomic<u32>;
@@ -20,12 +21,13 @@ var<workgroup> farthest: atomic<u32>;
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let chunk = chunk_list[view.first_group + workgroup_id.x];
   let i = chunk * CULL_GROUP + lane;
+  let share = chunk_shares[view.first_group + chunk];
   if (i < view.splat_count) {
     let packed = gaussians[i];
     if (!is_usable(packed)) {
       atomicAdd(&gathered[UNUSABLE], 1u);
     } else {
-      let depth = visible_depth(packed);
+      let depth = visible_depth(packed, share);
       if (depth > 0.0) {
         atomicOr(&bits[lane / 32u], 1u << (lane % 32u));
         atomicMax(&nearest_inverted, ~bitcast<u32>(depth));

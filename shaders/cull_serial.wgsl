@@ -10,12 +10,14 @@
 // Nothing at first.
 @group(0) @binding(4) var<storage, read_write> group_counts: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> gathered: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read> chunk_shares: array<f32>;
 
 @compute @workgroup_size(WORDS_PER_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let chunk = chunk_list[view.first_group + workgroup_id.x];
   let group = view.first_group + chunk;
   let first = chunk * CULL_GROUP + lane * 32u;
+  let share = chunk_shares[group];
   var bits = 0u;
   var nearest = 0xffffffffu;
   var farthest = 0u;
@@ -25,7 +27,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
       atomicAdd(&gathered[UNUSABLE], 1u);
       continue;
     }
-    let depth = visible_depth(packed);
+    let depth = visible_depth(packed, share);
     if (depth > 0.0) {
       bits |= 1u << k;
       nearest = min(nearest, bitcast<u32>(depth));

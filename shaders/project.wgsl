@@ -5,6 +5,7 @@
 #import shared/gathered
 #import shared/plan
 #import shared/group
+#import shared/detail
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
@@ -16,6 +17,7 @@
 @group(0) @binding(6) var<storage, read_write> splats: array<ProjectedSplat>;
 // Depth keys; or, where the survivors are in depth order already, the slots themselves.
 @group(0) @binding(7) var<storage, read_write> keys: array<u32>;
+@group(0) @binding(8) var<storage, read> chunk_shares: array<f32>;
 
 // Colour that four coefficients in three words add, or one coefficient in the last word of degrees 0 and 2.
 fn quartet_color(first_word: u32, basis: vec4f) -> vec3f {
@@ -121,7 +123,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   // In depth order the survivors of all pages are mixed: those of others wrap around to huge numbers.
   let i = survivors[slot] - view.first_group * CULL_GROUP;
   if (i >= view.splat_count) { return; }
-  let g = unpack_gaussian(gaussians[i]);
+  var g = unpack_gaussian(gaussians[i]);
+  g.opacity = shared_opacity(g.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
   let e = project_ellipse(view, g);
   let color = splat_sh_color(i, normalize(g.position - view.eye));
   splats[slot] = pack_splat(e, color);

@@ -7,6 +7,7 @@ import { root } from './run.mjs';
 
 const ENTRIES = [
   'bench',
+  'detail',
   'frontier',
   'generators',
   'stability',

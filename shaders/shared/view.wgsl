@@ -30,4 +30,12 @@ struct View {
   occlusion_tiles: vec2u,
   // Most that the camera's matrix stretches a vector: 1 unless it is more than a rotation and a translation.
   stretch: f32,
+  // 1 if the page has levels of detail.
+  has_detail: u32,
+  // Pixels that a chunk may be off on screen before the finer ones that it stands for take its place, and over how many octaves
+  // below that they do (shared/detail).
+  detail: f32,
+  detail_fade: f32,
+  // Splats that the frame may look at.
+  splat_budget: u32,
 }

@@ -1,6 +1,7 @@
 // Whether a splat paints anything.
 #import shared/projection
 #import shared/occlusion
+#import shared/detail
 
 // Depths beyond which nothing shows, of tiles and then of blocks of tiles: see shared/occlusion.
 @group(0) @binding(6) var<storage, read> occlusion: array<u32>;
@@ -39,9 +40,10 @@ fn is_occluded(view: View, e: Ellipse) -> bool {
   return true;
 }
 
-// Camera depth of a splat that paints something, 0 of any other.
-fn visible_depth(packed: PackedGaussian) -> f32 {
-  let g = unpack_gaussian(packed);
+// Camera depth of a splat that paints something when it is drawn to a share, 0 of any other.
+fn visible_depth(packed: PackedGaussian, share: f32) -> f32 {
+  var g = unpack_gaussian(packed);
+  g.opacity = shared_opacity(g.opacity, share);
   // The cheap tests first: most splats of a scene fail one of them.
   let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
   if (g.opacity < alpha_min || !is_in_depth_range(view, depth)) { return 0.0; }

@@ -1,5 +1,5 @@
 /** Copies of a scene, as one cloud or straight to the GPU. */
-import { GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, packWithDetail } from '@gaussian-splat/renderer';
 
 /** Splats in one upload: their harmonics stay well under the largest array that browsers allocate. */
 const UPLOAD = 6_500_000;
@@ -42,7 +42,9 @@ export function tileCloud(cloud, copies) {
  * Uploads the copies, a few million splats at a time, without ever holding them all in memory.
  * @returns {Promise<GaussianBuffers[]>} to be drawn together.
  */
-export async function uploadTiled(device, cloud, copies, packOptions) {
+export async function uploadTiled(device, cloud, copies, { detail = false, ...packOptions } = {}) {
+  // Levels of detail are built over all copies together.
+  if (detail) return [await GaussianBuffers.upload(device, packWithDetail(tileCloud(cloud, copies), packOptions))];
   const packed = packGaussians(cloud, packOptions);
   if (copies.length === 1) return [await GaussianBuffers.upload(device, shifted(packed, copies[0].offset))];
   const uploads = [];

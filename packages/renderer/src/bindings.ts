@@ -1,10 +1,13 @@
 import type { DepthOrder } from './depth-order.js';
 import { BUFFER_USAGE, type Overrides } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import type { Wishes } from './gaussian-scene.js';
 import type { PageTable } from './page-table.js';
 import type { Scratch } from './scratch.js';
 import { CompactStage } from './stages/compact.js';
 import { CullChunksStage, CullStage } from './stages/cull.js';
+import { DetailBudgetStage } from './stages/detail-budget.js';
+import { NoteWishesStage } from './stages/note-wishes.js';
 import { PlanStage } from './stages/plan.js';
 import { ProjectStage } from './stages/project.js';
 import { ScanStage } from './stages/scan.js';
@@ -15,6 +18,8 @@ import { constants } from './generated/shaders.js';
 
 /** The stages before the rasterizer; each is a shader of the same name. */
 export interface Stages {
+  readonly detailBudget: DetailBudgetStage;
+  readonly noteWishes: NoteWishesStage;
   readonly cullChunks: CullChunksStage;
   readonly cull: CullStage;
   readonly scan: ScanStage;
@@ -31,6 +36,8 @@ export function makeStages(
   { threads, sort }: Pick<Variants, 'threads' | 'sort'>,
 ): Stages {
   return {
+    detailBudget: new DetailBudgetStage(device),
+    noteWishes: new NoteWishesStage(device),
     cullChunks: new CullChunksStage(device),
     cull: new CullStage(device, { alpha_min, min_contribution }, threads),
     scan: new ScanStage(device),
@@ -45,6 +52,9 @@ export function makeStages(
 /** Bind groups of one page. */
 interface PageBindings {
   readonly splatCount: number;
+  readonly detailCount: GPUBindGroup;
+  /** Of a page of a streamed scene. */
+  readonly wishes?: { readonly of: Wishes; readonly note: GPUBindGroup };
   readonly cullChunks: GPUBindGroup;
   readonly cull: GPUBindGroup;
   readonly compact: GPUBindGroup;
@@ -62,6 +72,7 @@ export interface FrameBuffers {
 /** Everything that the stages before the rasterizer are bound to, for one page table and one capacity. */
 export class FrameBindings {
   readonly pages: readonly PageBindings[];
+  readonly detailAllow: GPUBindGroup;
   /** Of the survivors in the file's order. */
   readonly scan: GPUBindGroup;
   readonly plan: GPUBindGroup;
@@ -95,6 +106,11 @@ export class FrameBindings {
     const ranges = (name: string, words: number[]): GPUBuffer =>
       memory.buffer(`gs.${name}`, 8 * Math.max(1, count), storage, Uint32Array.from(words));
     const { firstGroups, groups } = table;
+    this.detailAllow = stages.detailBudget.bindAllow({
+      view: table.view(0),
+      detail_counts: scratch.detailCounts,
+      chunk_shares: scratch.chunkShares,
+    });
     this.scan = stages.scan.bind({ values: groupOffsets, scan: constant('scan.length', groups) });
     this.plan = stages.plan.bind({
       limits: constant('plan.limits', count, scratch.capacity, groups),
@@ -160,24 +176,60 @@ export class FrameBindings {
 }
 
 function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion: GPUBuffer): PageBindings[] {
-  const { chunkList, chunkArgs, visibleBits, groupOffsets, gathered, plan, splats, keys, order } = scratch;
+  const {
+    chunkList,
+    chunkArgs,
+    chunkShares,
+    detailCounts,
+    visibleBits,
+    groupOffsets,
+    gathered,
+    plan,
+    splats,
+    keys,
+    order,
+  } = scratch;
   // The sort needs its first order buffer only after `project` has read the survivors from it.
   const survivors = order[0];
   return table.pages.map((page, i) => {
     const view = table.view(i);
     const gaussians = page.geometry;
+    const wishes = table.wishesOf(i);
+    // Something must be bound where there are no levels of detail; it is not looked at.
+    const details = page.details ?? page.chunks;
     const chunk = { view, chunk_list: chunkList, visible_bits: visibleBits };
     return {
       splatCount: page.count,
+      detailCount: stages.detailBudget.bindCount({ view, chunks: page.chunks, details, detail_counts: detailCounts }),
+      wishes: wishes && {
+        of: wishes,
+        note: stages.noteWishes.bind({
+          ...{ view, chunks: page.chunks, details },
+          ...{ chunk_shares: chunkShares, wishes: wishes.buffer },
+        }),
+      },
       cullChunks: stages.cullChunks.bind({
         ...chunk,
         chunks: page.chunks,
         chunk_args: chunkArgs,
         group_counts: groupOffsets,
+        chunk_shares: chunkShares,
+        details,
       }),
-      cull: stages.cull.bind({ ...chunk, gaussians, group_counts: groupOffsets, gathered, occlusion }),
+      cull: stages.cull.bind({
+        ...chunk,
+        gaussians,
+        group_counts: groupOffsets,
+        gathered,
+        occlusion,
+        chunk_shares: chunkShares,
+      }),
       compact: stages.compact.bind({ ...chunk, group_offsets: groupOffsets, survivors }),
-      project: stages.project.bind({ view, gaussians, sh: page.sh, survivors, plan, gathered, splats, keys: keys[0] }),
+      project: stages.project.bind({
+        ...{ view, gaussians, sh: page.sh, survivors, plan, gathered, splats },
+        keys: keys[0],
+        chunk_shares: chunkShares,
+      }),
     };
   });
 }

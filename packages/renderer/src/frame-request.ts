@@ -26,6 +26,9 @@ export interface FrameRequest {
   readonly targetFormat?: GPUTextureFormat;
   /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
   readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
+  /** The levers of these names, for this frame alone. */
+  readonly detail?: number;
+  readonly splatBudget?: number;
   /**
    * What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it.
    */

@@ -1,5 +1,6 @@
 import type { FrameBindings, Stages } from './bindings.js';
 import type { DepthOrder } from './depth-order.js';
+import type { Wishes } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { Occlusion } from './occlusion.js';
 import type { Scratch } from './scratch.js';
@@ -14,25 +15,57 @@ export interface Frame {
   readonly occlusion: Occlusion;
   /** An order of all splats that serves the camera; without it the visible splats are sorted. */
   readonly depthOrder?: DepthOrder;
+  /** Whether to keep the splats that are looked at within `Levers.splatBudget`. */
+  readonly isBudgeted: boolean;
   readonly timer?: FrameTimer;
 }
 
 /**
  * Records what turns Gaussians into projected splats from near to far: cull and project, then sort; or, with an order that
  * serves, thin that order and project. Counts travel in `plan`; nothing comes back to the CPU.
+ * @returns what must be read after the submit: pages that streamed scenes lack
  */
-export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): void {
+export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wishes[] {
   const { scratch, bindings, timer } = frame;
   bindings.reset();
+  const wishes = wishesDue(frame);
+  for (const wish of wishes) wish.begin(encoder);
   encoder.clearBuffer(scratch.gathered);
+  encoder.clearBuffer(scratch.detailCounts);
+  // What the last budget allowed.
+  encoder.clearBuffer(scratch.chunkShares, scratch.chunkShares.size - 4);
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
   frame.occlusion.record(pass);
+  if (frame.isBudgeted) keepWithinBudget(pass, frame);
   cull(pass, frame);
   if (frame.depthOrder) listInDepthOrder(pass, frame, frame.depthOrder);
   else listInFileOrder(pass, frame);
   bindings.pages.forEach(({ project }, page) => frame.stages.project.record(pass, project, scratch.plan, page));
+  noteWishes(pass, frame, wishes);
   pass.end();
+  for (const wish of wishes) wish.copy(encoder);
   if (!frame.depthOrder) sort(encoder, frame);
+  return wishes;
+}
+
+/** Finds the error on screen that leaves as many splats as the frame may look at. */
+function keepWithinBudget(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
+  for (const { detailCount, splatCount } of bindings.pages) {
+    stages.detailBudget.recordCount(pass, detailCount, splatCount);
+  }
+  stages.detailBudget.recordAllow(pass, bindings.detailAllow);
+}
+
+/** Streamed scenes that want to know now which pages the view asks for. */
+function wishesDue({ bindings }: Frame): Wishes[] {
+  const all = new Set(bindings.pages.flatMap(({ wishes }) => (wishes ? [wishes.of] : [])));
+  return [...all].filter((wishes) => wishes.isDue());
+}
+
+function noteWishes(pass: GPUComputePassEncoder, { stages, bindings }: Frame, due: readonly Wishes[]): void {
+  for (const { wishes, splatCount } of bindings.pages) {
+    if (wishes && due.includes(wishes.of)) stages.noteWishes.record(pass, wishes.note, splatCount);
+  }
 }
 
 /** Finds the visible splats: whole chunks first, then one by one. */

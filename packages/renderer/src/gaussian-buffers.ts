@@ -4,6 +4,7 @@ import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, requireBudget, withMemoryCheck } from './gpu/memory.js';
 import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
+import { DETAIL_NUMBERS } from './detail/chunk-detail.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
 import { shWords, type ShPrecision } from './pack/sh.js';
@@ -15,6 +16,7 @@ export interface UploadOptions {
 
 /** Gaussians on the GPU, ready for any {@link Renderer} of the same device. */
 export class GaussianBuffers implements GaussianScene {
+  /** Splats of all levels of detail together. */
   readonly count: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
@@ -82,6 +84,8 @@ function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemo
   const chunks = new Uint32Array(packed.chunks.buffer, packed.chunks.byteOffset, packed.chunks.length);
   const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
+  const details =
+    packed.details && new Uint32Array(packed.details.buffer, packed.details.byteOffset, packed.details.length);
   const pages: GaussianPage[] = [];
   for (let first = 0; first < packed.count; first += capacity) {
     const end = Math.min(first + capacity, packed.count);
@@ -93,6 +97,7 @@ function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemo
       geometry: part('gs.gaussians.geometry', packed.geometry, GEOMETRY_WORDS),
       sh: part('gs.gaussians.sh', packed.sh, shStride),
       chunks: part('gs.gaussians.chunks', chunks, CHUNK_NUMBERS, firstChunk, endChunk),
+      details: details && part('gs.gaussians.details', details, DETAIL_NUMBERS, firstChunk, endChunk),
     });
   }
   return pages;

@@ -10,6 +10,19 @@ export interface GaussianPage {
   readonly sh: GPUBuffer;
   /** array<Chunk>: bounds of each 256 splats */
   readonly chunks: GPUBuffer;
+  /** array<ChunkDetail>, if there are levels of detail. */
+  readonly details?: GPUBuffer;
+}
+
+/** Carries the pages that a view asks for from a frame to whoever fetches them. */
+export interface Wishes {
+  /** For each page the bits of the pixels that doing without it costs. */
+  readonly buffer: GPUBuffer;
+  /** True for a frame in which to note them; then the other three are called in turn, the last after the submit. */
+  isDue(): boolean;
+  begin(encoder: GPUCommandEncoder): void;
+  copy(encoder: GPUCommandEncoder): void;
+  read(): void;
 }
 
 /**
@@ -26,6 +39,10 @@ export interface GaussianScene {
   /** World position, in float64, that the positions on the GPU are relative to. */
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
+  /** Of a scene that is streamed: where views say which pages they wish for. */
+  readonly wishes?: Wishes;
+  /** Called before each frame: a streamed scene uploads what has come. */
+  update?(): void;
   /** Grows whenever the content of the buffers changes; 0 for a scene that never does. */
   readonly version: number;
 }

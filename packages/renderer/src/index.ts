@@ -4,10 +4,22 @@ export type { ProbeAnswer, ProbePoint } from './depth-probe.js';
 export { deviceDescriptor } from './device.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
-export type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+export type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
+export { packWithDetail } from './detail/pack-with-detail.js';
+export {
+  buildDetailTree,
+  cutPages,
+  manifestOf,
+  packPage,
+  type BuiltPage,
+  type DetailTree,
+} from './detail/build-pages.js';
+export { treeOfCopies } from './detail/tile-tree.js';
+export { StreamedGaussians, type StreamOptions } from './detail/streamed-gaussians.js';
+export { checkManifest, type DetailManifest } from './detail/manifest.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export { readPacked, selectPacked } from './pack/packed-scene.js';
 export type { ShPrecision } from './pack/sh.js';

@@ -47,6 +47,17 @@ export interface Levers {
   readonly minContribution: number;
   /** Spherical harmonics above this degree are ignored. */
   readonly shDegree: 0 | 1 | 2 | 3;
+  /**
+   * Scenes with levels of detail (`packWithDetail`, streamed scenes): pixels by which nearly all that is drawn (two standard deviations) may be displaced for
+   * having been merged, before finer splats are drawn instead. 0, the default, draws the finest there are. 0 to 64.
+   */
+  readonly detail: number;
+  /** Octaves of distance over which one level of detail fades into the next; with 0 they pop. 0 to 2. */
+  readonly detailFade: number;
+  /**
+   * Scenes with levels of detail: most splats that a frame looks at; `detail` grows as far as that takes. 0 for no limit.
+   */
+  readonly splatBudget: number;
   /** Share of the target's width and height that is really drawn; the rest is interpolated. Above 0, at most 1. */
   readonly resolutionScale: number;
 }
@@ -65,6 +76,9 @@ const EXACT: Levers = {
   alphaMin: 1 / 255,
   minContribution: 0,
   shDegree: 3,
+  detail: 0,
+  detailFade: 0.5,
+  splatBudget: 0,
   resolutionScale: 1,
 };
 
@@ -111,6 +125,9 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
   alphaMin: [1 / 255, 1],
   minContribution: [0, Infinity],
   shDegree: [0, 3],
+  detail: [0, 64],
+  detailFade: [0, 2],
+  splatBudget: [0, 2 ** 31],
   resolutionScale: [1 / 64, 1],
 };
 
@@ -124,7 +141,7 @@ export function leversOf(options: Partial<Levers> & { readonly quality?: Quality
   const base = QUALITIES[quality];
   const names = Object.keys(base) as (keyof Levers)[];
   const levers = Object.fromEntries(names.map((name) => [name, options[name] ?? base[name]])) as unknown as Levers;
-  checkRanges(levers);
+  for (const name of Object.keys(RANGES) as (keyof Levers)[]) requireInRange(name, levers[name]);
   return levers;
 }
 
@@ -137,21 +154,20 @@ export function leversOfFrame<L extends Levers>(levers: L, changes: Partial<Fram
     changes;
   const named = { depthKeyBits, occludedBelow, transmittanceMin, alphaMin, minContribution, shDegree, resolutionScale };
   const set = Object.fromEntries(Object.entries(named).filter(([, value]) => value !== undefined));
-  const changed = { ...levers, ...set };
-  checkRanges(changed);
-  return changed;
+  for (const [name, value] of Object.entries(set)) requireInRange(name as keyof Levers, value, 'FrameRequest.levers');
+  return { ...levers, ...set };
 }
 
-function checkRanges(levers: Levers): void {
-  for (const [name, [least, most]] of Object.entries(RANGES) as [keyof Levers, [number, number]][]) {
-    const value = Number(levers[name]);
-    if (!(value >= least && value <= most)) throw invalid(name, `a number from ${least} to ${most}`, levers[name]);
-  }
+/** @throws GaussianSplatError `argument/value` for a number out of its lever's range. */
+export function requireInRange(name: keyof Levers, found: unknown, where = 'RendererOptions'): void {
+  const [least, most] = RANGES[name] ?? [-Infinity, Infinity];
+  const value = Number(found);
+  if (!(value >= least && value <= most)) throw invalid(name, `a number from ${least} to ${most}`, found, where);
 }
 
-function invalid(name: string, expected: string, found: unknown): GaussianSplatError {
+function invalid(name: string, expected: string, found: unknown, where = 'RendererOptions'): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
-    where: `RendererOptions.${name}`,
+    where: `${where}.${name}`,
     expected,
     found: String(found),
     remedy: 'leave the option out for the default, or choose a value in the range',

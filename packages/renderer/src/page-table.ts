@@ -1,5 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
+import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
@@ -39,6 +39,26 @@ export class PageTable {
     return this.firstGroups[this.pages.length];
   }
 
+  /** Where views of the scene that a page is part of say what they wish for, if it is streamed. */
+  wishesOf(page: number): Wishes | undefined {
+    return this.#scenes.find(({ pages }) => pages.includes(this.pages[page]))?.wishes;
+  }
+
+  /** True if a scene is streamed. */
+  get isStreamed(): boolean {
+    return this.#scenes.some(({ wishes }) => wishes !== undefined);
+  }
+
+  /** Lets streamed scenes take in what has come. */
+  update(): void {
+    for (const scene of this.#scenes) scene.update?.();
+  }
+
+  /** True if a page has levels of detail. */
+  get hasDetail(): boolean {
+    return this.pages.some(({ details }) => details !== undefined);
+  }
+
   /** Splats of all pages. */
   get splats(): number {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
@@ -66,7 +86,7 @@ export class PageTable {
   /** Points every page at a camera, for the commands that are submitted next. */
   look(
     camera: Camera,
-    { shDegree, depthKeyBits }: Levers,
+    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
     isOrdered: boolean,
     occlusionTiles: readonly [number, number],
   ): void {
@@ -75,6 +95,9 @@ export class PageTable {
       key_bits: depthKeyBits,
       is_ordered: isOrdered ? 1 : 0,
       occlusion_tiles: occlusionTiles,
+      detail,
+      detail_fade: detailFade,
+      splat_budget: splatBudget,
     };
     let page = 0;
     for (const scene of this.#scenes) {
@@ -84,8 +107,8 @@ export class PageTable {
         sh_encoding: SH_PRECISION[scene.shPrecision],
         antialiased: scene.antialiased ? 1 : 0,
       };
-      for (const { count } of scene.pages) {
-        const place = { splat_count: count, page, first_group: this.firstGroups[page] };
+      for (const { count, details } of scene.pages) {
+        const place = { has_detail: details ? 1 : 0, splat_count: count, page, first_group: this.firstGroups[page] };
         writeStruct(layouts.View, { ...values, ...shared, ...own, ...place }, this.#uniformBytes, VIEW_STRIDE * page);
         page++;
       }

@@ -14,7 +14,7 @@ import { GpuMemory } from './gpu/memory.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
 import { mixOf, sortedOrder, type FrameMix } from './frame-mix.js';
-import { leversOf, leversOfFrame, type FrameLevers, type Levers } from './levers.js';
+import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
 import { Occlusion } from './occlusion.js';
 import { PageTable } from './page-table.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
@@ -86,6 +86,8 @@ export class Renderer {
   #accumulation: Accumulation | undefined;
   #lastAxis: Vector3 | undefined;
   #turningFrames = 0;
+  /** The largest budget of splats that a frame has been given. */
+  #mostSplats: number | undefined;
   readonly #content = new ContentWatch();
   /** Where the slots of the last frame are listed, and its pixels for each of the target; undefined before there is one. */
   #last: { readonly order: OrderKind; readonly scale: number } | undefined;
@@ -150,21 +152,25 @@ export class Renderer {
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
     const mix = this.#mixOf(request.levers);
     const { levers } = mix;
+    const detail = detailOf(request, levers);
     const drawn = scaled(camera, levers.resolutionScale);
+    this.#roomFor(detail.splatBudget);
     const resources = this.#resourcesFor(scenes, this.#occlusion.fit(drawn));
     const { table, scratch, bindings, depthOrder, monitor } = resources;
+    table.update();
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer, notes !== undefined);
     this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
-    table.look(drawn, levers, isOrdered, this.#occlusion.tiles);
-    recordProjection(encoder, {
+    table.look(drawn, { ...levers, ...detail }, isOrdered, this.#occlusion.tiles);
+    const wishes = recordProjection(encoder, {
       stages: mix.stages,
       bindings,
       scratch,
       keyBits: levers.depthKeyBits,
       occlusion: this.#occlusion,
       depthOrder: isOrdered ? depthOrder : undefined,
+      isBudgeted: detail.splatBudget > 0 && table.hasDetail,
       timer,
     });
     const last = this.#paint(
@@ -180,6 +186,7 @@ export class Renderer {
     timer?.submitted?.();
     this.#last = { order: isOrdered ? 'identity' : sortedOrder(levers), scale: drawn.width / camera.width };
     if (isWatched) monitor.read();
+    for (const wish of wishes) wish.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
     if (this.levers.sortAngle <= STILL) depthOrder.settle();
@@ -187,9 +194,10 @@ export class Renderer {
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
   async readStatistics(): Promise<FrameStatistics> {
-    if (this.#resources === undefined) return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0 };
-    const { plan, gathered } = this.#resources.scratch;
-    return readStatistics(this.#device, { plan, gathered, pairPlan: this.#rasterizer.pairPlan });
+    if (this.#resources === undefined)
+      return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0 };
+    const { plan, gathered, chunkShares } = this.#resources.scratch;
+    return readStatistics(this.#device, { plan, gathered, chunkShares, pairPlan: this.#rasterizer.pairPlan });
   }
 
   /**
@@ -245,7 +253,8 @@ export class Renderer {
     const axis = axisOf(camera);
     const turned = this.#lastAxis === undefined ? 0 : angleBetween(this.#lastAxis, axis);
     this.#lastAxis = axis;
-    const isStill = this.#content.isStill(table.version);
+    // Of a streamed scene most splats are not in view, and others come and go: sorting all of them never pays.
+    const isStill = this.#content.isStill(table.version) && !table.isStreamed;
     if (depthOrder.serves(camera, sortAngle)) {
       this.#turningFrames = 0;
       return true;
@@ -335,10 +344,18 @@ export class Renderer {
     return this.#resources!;
   }
 
+  /** A larger budget of splats than before makes other room. */
+  #roomFor(splatBudget: number): void {
+    const most = splatBudget > 0 ? splatBudget : Infinity;
+    if (this.#mostSplats !== undefined && most > this.#mostSplats) this.#releaseResources();
+    this.#mostSplats = Math.max(this.#mostSplats ?? 0, most);
+  }
+
   #hasOtherPairs = false;
 
   #mostFor(table: PageTable): Capacity {
-    return { visible: Math.min(table.splats, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
+    const budget = table.hasDetail ? (this.#mostSplats ?? Infinity) : Infinity;
+    return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
   }
 
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
@@ -406,6 +423,14 @@ export class Renderer {
     this.#accumulation = { texture, compose };
     return this.#accumulation;
   }
+}
+
+/** The levers of detail of a frame. */
+function detailOf(request: FrameRequest, levers: Levers): Pick<Levers, 'detail' | 'splatBudget'> {
+  const { detail = levers.detail, splatBudget = levers.splatBudget } = request;
+  requireInRange('detail', detail, 'FrameRequest');
+  requireInRange('splatBudget', splatBudget, 'FrameRequest');
+  return { detail, splatBudget };
 }
 
 const isTexture = (target: GPUTexture | GPUTextureView): target is GPUTexture => 'createView' in target;

@@ -31,6 +31,10 @@ export class Scratch {
   readonly chunkList: GPUBuffer;
   /** Indirect arguments of `cull` and `compact`, three words a page. */
   readonly chunkArgs: GPUBuffer;
+  /** Share in which each chunk is drawn, and behind them, in the last word, the pixels of error that a budget asks for. */
+  readonly chunkShares: GPUBuffer;
+  /** See shaders/shared/detail_counts.wgsl. */
+  readonly detailCounts: GPUBuffer;
   /** One bit for each splat. */
   readonly visibleBits: GPUBuffer;
   /** Survivors of each cull group, then their exclusive prefix sums and the total. */
@@ -61,6 +65,8 @@ export class Scratch {
     try {
       this.chunkList = buffer('cull_chunks.chunk_list', 4 * groups);
       this.chunkArgs = buffer('cull_chunks.args', 12 * pages, planUsage);
+      this.chunkShares = buffer('cull_chunks.shares', 4 * (groups + 1));
+      this.detailCounts = buffer('detail.counts', 4 * constants.DETAIL_COUNTS);
       this.visibleBits = buffer('cull.visible_bits', 4 * constants.WORDS_PER_GROUP * groups);
       this.groupOffsets = buffer('scan.group_offsets', 4 * (groups + 1));
       this.gathered = buffer('cull.gathered', 4 * constants.GATHERED_WORDS);

@@ -13,6 +13,8 @@ export interface FrameStatistics {
   readonly pairOverflow: number;
   /** Splats on the GPU that were refused because a value was not usable, in the chunks that may be visible. */
   readonly unusable: number;
+  /** Pixels by which what is drawn may be displaced so that the frame keeps its `splatBudget`; 0 without one, or with room for all. */
+  readonly budgetError: number;
 }
 
 /** The buffers that hold the counts. */
@@ -22,6 +24,8 @@ export interface Counters {
   readonly pairPlan?: GPUBuffer;
   /** See shaders/shared/gathered.wgsl. */
   readonly gathered: GPUBuffer;
+  /** Its last word is what a budget asks for: see `Scratch.chunkShares`. */
+  readonly chunkShares: GPUBuffer;
 }
 
 /** Reads the counts back. */
@@ -33,6 +37,7 @@ export async function readStatistics(device: GPUDevice, counters: Counters): Pro
     [counters.pairPlan, visible.offset],
     [counters.pairPlan, overflow.offset],
     [counters.gathered, 4 * constants.UNUSABLE],
+    [counters.chunkShares, counters.chunkShares.size - 4],
   ];
   const staging = device.createBuffer({
     label: 'gs.statistics',
@@ -45,5 +50,13 @@ export async function readStatistics(device: GPUDevice, counters: Counters): Pro
   await staging.mapAsync(0x1);
   const words = new Uint32Array(staging.getMappedRange().slice(0));
   staging.destroy();
-  return { visible: words[0], overflow: words[1], pairs: words[2], pairOverflow: words[3], unusable: words[4] };
+  const [budgetError] = new Float32Array(words.buffer, 4 * 5, 1);
+  return {
+    visible: words[0],
+    overflow: words[1],
+    pairs: words[2],
+    pairOverflow: words[3],
+    unusable: words[4],
+    budgetError,
+  };
 }

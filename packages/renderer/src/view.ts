@@ -23,6 +23,10 @@ export type CameraValues = Omit<
   | 'key_bits'
   | 'is_ordered'
   | 'occlusion_tiles'
+  | 'has_detail'
+  | 'detail'
+  | 'detail_fade'
+  | 'splat_budget'
 >;
 
 /**

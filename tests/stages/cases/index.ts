@@ -1,5 +1,6 @@
 import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
+import { detailCases } from './detail.js';
 import { ingestCases } from './ingest.js';
 import { occlusionCases } from './occlusion.js';
 import { orderCases } from './order.js';
@@ -12,6 +13,7 @@ export const stageCases: readonly StageCase[] = [
   ...scanCases,
   ...projectionCases,
   ...compactCases,
+  ...detailCases,
   ...orderCases,
   ...occlusionCases,
   ...probeCases,

@@ -93,7 +93,8 @@ export const orderCases: readonly StageCase[] = [
       };
       const firstGroup = 2;
       const page = { splat_count: packed.count, page: 0, first_group: firstGroup };
-      writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...flags, ...page }, bytes);
+      const detail = { has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 };
+      writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...flags, ...page, ...detail }, bytes);
       const length = constants.CULL_GROUP * (firstGroup + cullGroups(packed.count));
       const keys = bench.buffer(4 * length);
       const stage = new OrderKeysStage(bench.device);

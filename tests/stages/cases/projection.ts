@@ -34,6 +34,7 @@ function uploadScene(
     key_bits: 32,
     is_ordered: 0,
     occlusion_tiles: occlusionTiles,
+    ...{ has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },
   };
   const sh = { sh_degree: packed.shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[packed.shPrecision] };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...sh, ...flags }, bytes);
@@ -62,9 +63,19 @@ export async function cullOnGpu(
   const chunkArgs = bench.buffer(Uint32Array.of(0, 1, 1));
   const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
   const shared = { view, chunk_list: bench.buffer(4 * groups), visible_bits: bits, group_counts: counts };
+  const shares = bench.buffer(4 * (groups + 1));
   const [chunkStage, stage] = [new CullChunksStage(bench.device), new CullStage(bench.device)];
-  const chunkBindings = chunkStage.bind({ ...shared, chunks, chunk_args: chunkArgs });
-  const bindings = stage.bind({ ...shared, gaussians, gathered, occlusion: bench.buffer(occlusion.depths) });
+  const chunkBindings = chunkStage.bind({
+    ...shared,
+    chunks,
+    details: chunks,
+    chunk_shares: shares,
+    chunk_args: chunkArgs,
+  });
+  const bindings = stage.bind({
+    ...{ ...shared, gaussians, gathered, occlusion: bench.buffer(occlusion.depths) },
+    chunk_shares: shares,
+  });
   bench.compute((pass) => {
     chunkStage.record(pass, chunkBindings, packed.count);
     stage.record(pass, bindings, chunkArgs, 0);
@@ -141,7 +152,18 @@ async function projectOnGpu(
   const survivors = bench.buffer(Uint32Array.from({ length: count }, (_, i) => i));
   const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
   const stage = new ProjectStage(bench.device);
-  const bindings = stage.bind({ view, gaussians, sh, survivors, plan: planBuffer, gathered, splats, keys });
+  const chunk_shares = bench.buffer(new Uint32Array(new Float32Array(cullGroups(count) + 1).fill(1).buffer));
+  const bindings = stage.bind({
+    view,
+    gaussians,
+    sh,
+    survivors,
+    plan: planBuffer,
+    gathered,
+    splats,
+    keys,
+    chunk_shares,
+  });
   bench.compute((pass) => stage.record(pass, bindings, planBuffer, 0));
   return { splats: await bench.read(splats), keys: await bench.read(keys) };
 }

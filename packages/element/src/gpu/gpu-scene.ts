@@ -1,6 +1,7 @@
 import { GaussianSplatError, type Bounds, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
   Renderer,
+  type FrameRequest,
   type GaussianScene,
   type FrameLevers,
   type ProbeAnswer,
@@ -12,6 +13,9 @@ import type { Timeline } from '../live/live-model.js';
 import type { ReadCounts } from '../stats.js';
 import { FrameMeter } from './frame-meter.js';
 import type { DeviceLease } from './shared-device.js';
+
+/** How much detail of a streamed scene is drawn. */
+export type DetailLevers = Pick<FrameRequest, 'detail' | 'splatBudget'>;
 
 /** Gaussians with one owner. */
 export interface OwnedGaussians extends GaussianScene {
@@ -49,10 +53,18 @@ export class GpuScene {
   readonly #submissions: number;
   readonly #lease: DeviceLease;
   readonly #meter: FrameMeter;
+  readonly #detail: DetailLevers;
   #destroyed = false;
 
-  constructor(lease: DeviceLease, gaussians: OwnedGaussians, bounds: Bounds, submissions: number, live?: Timeline) {
+  constructor(
+    lease: DeviceLease,
+    gaussians: OwnedGaussians,
+    bounds: Bounds,
+    submissions: number,
+    { live, detail = {} }: { live?: Timeline; detail?: DetailLevers } = {},
+  ) {
     this.#lease = lease;
+    this.#detail = detail;
     this.live = live;
     this.#gaussians = gaussians;
     this.bounds = bounds;
@@ -143,7 +155,8 @@ export class GpuScene {
   }
 
   #draw(frame: Frame): void {
-    const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, gaussians: this.gaussians });
+    const draw = (drawn: Frame): void =>
+      this.#renderer.render({ ...drawn, ...this.#detail, gaussians: this.gaussians });
     const { quality, shDegree } = this.#rendering;
     const content = `${this.gaussians.version} ${quality} ${shDegree} ${JSON.stringify(frame.levers ?? null)}`;
     if (this.#filter) this.#filter.render(frame, content, draw);

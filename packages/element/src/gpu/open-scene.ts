@@ -35,6 +35,7 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
   // Known at once, and then not a byte is fetched.
   assertWebGpu();
   if (isGenerator(request)) return openLiveScene(request, options);
+  if (isStreamed(request)) return openStreamedScene(request, options);
   // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
@@ -80,7 +81,7 @@ async function openSequence(
   const { listeners } = options.live();
   const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners });
   const { gaussians, bounds } = player;
-  const scene = new GpuScene(lease, gaussians, bounds, options.submissions, player);
+  const scene = new GpuScene(lease, gaussians, bounds, options.submissions, { live: player });
   player.scene = scene;
   return scene;
 }
@@ -102,7 +103,36 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
       onProgress,
     );
     beforeUpload(live.gaussians.byteLength);
-    return new GpuScene(lease, live.gaussians, live.bounds, submissions, live);
+    return new GpuScene(lease, live.gaussians, live.bounds, submissions, { live });
+  } catch (error) {
+    lease.release();
+    throw error;
+  }
+}
+
+/** A folder that `npm run detail` wrote is known by the name of its manifest. */
+function isStreamed({ url }: SceneRequest): boolean {
+  return URL.canParse(url) && /(^|\/)detail\.json$/.test(new URL(url).pathname);
+}
+
+async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+  const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
+  const opening = import('./open-streamed.js');
+  const acquiring = options.device.acquire();
+  opening.catch(ignore);
+  const lease = await acquiring;
+  let scene: GpuScene | undefined;
+  try {
+    await chooseVariants(lease.device).catch(unlessWrong);
+    const { openStreamed } = await opening;
+    const onChange = (): void => scene?.onIncomplete();
+    // How much of it fits is decided when its manifest is there.
+    beforeUpload(memoryBudget ?? 0);
+    const { gaussians, detail } = await openStreamed(request, lease.device, {
+      ...{ signal, onProgress, memoryBudget, onChange },
+    });
+    scene = new GpuScene(lease, gaussians, gaussians.bounds, submissions, { detail });
+    return scene;
   } catch (error) {
     lease.release();
     throw error;

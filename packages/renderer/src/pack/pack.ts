@@ -32,6 +32,10 @@ export interface PackedGaussians {
   readonly sh: Uint32Array;
   /** [ceil(N / 256), 8] numbers: `Chunk` of shaders/cull_chunks.wgsl. */
   readonly chunks: Float32Array;
+  /** [ceil(N / 256), 12] numbers, if there are levels of detail: `ChunkDetail` of shaders/shared/detail.wgsl. */
+  readonly details?: Float32Array;
+  /** Splats of the finest level, which come first, if there are levels of detail. */
+  readonly leafCount?: number;
 }
 
 /** 32-bit words of one splat's geometry. */
@@ -52,6 +56,14 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
+  return packUsable(given, options).packed;
+}
+
+/** {@link packGaussians}, with the cloud that was packed and the index in it of each packed splat. */
+export function packUsable(
+  given: GaussianCloud,
+  options: PackOptions,
+): { packed: PackedGaussians; cloud: GaussianCloud; kept: Uint32Array } {
   validateCloud(given);
   const cloud = recentred(given);
   const { shDegree, antialiased, origin } = cloud;
@@ -59,12 +71,13 @@ export function packGaussians(given: GaussianCloud, options: PackOptions = {}): 
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
-  return {
+  const packed = {
     ...{ count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount },
     geometry: packGeometry(cloud, kept),
     sh: packSh(cloud, kept, shPrecision),
     chunks: boundChunks(cloud, kept),
   };
+  return { packed, cloud, kept };
 }
 
 /** Index in the cloud of each packed splat. */
@@ -89,7 +102,7 @@ function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Array {
     floats[at + 1] = cloud.positions[3 * i + 1];
     floats[at + 2] = cloud.positions[3 * i + 2];
     scaleRotationFactor(cloud, i, factor);
-    packShape(words, at + 3, factor, cloud.opacities[i]);
+    packShape(words, at + 3, factor, Math.min(1, cloud.opacities[i]));
     at += GEOMETRY_WORDS;
   }
   return words;
@@ -103,12 +116,12 @@ function highBits(value: number, count: number): number {
 
 /** The 28 highest bits of an opacity, on the same side of 1/255 as the opacity: splats below it are not drawn. */
 function opacityBits(opacity: number): number {
-  const nearest = highBits(Math.min(1, Math.max(0, opacity)), 28);
+  const nearest = highBits(Math.max(0, opacity), 28);
   return opacity >= ALPHA_MIN ? Math.max(nearest, FIRST_VISIBLE) : Math.min(nearest, FIRST_VISIBLE - 1);
 }
 
-/** Five words: in the upper 22 bits of each a number of the factor, in the lower 10 a part of the sixth and of the opacity. */
-function packShape(words: Uint32Array, at: number, factor: Float64Array, opacity: number): void {
+/** Five words, of a factor and an opacity (above 1 only of merged splats): in the upper 22 bits of each a number of the factor, in the lower 10 a part of the sixth and of the opacity. */
+export function packShape(words: Uint32Array, at: number, factor: Float64Array, opacity: number): void {
   const last = highBits(factor[5], 22);
   const visible = opacityBits(opacity);
   words[at] = (highBits(factor[0], 22) << 10) | (last >>> 12);

@@ -1,0 +1,151 @@
+import { boundsOf, validateCloud, type Bounds, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { constants } from '../generated/shaders.js';
+import { packedOrder } from '../pack/pack.js';
+import { recentred } from '../pack/recentre.js';
+import { CHUNK_NUMBERS } from '../pack/chunks.js';
+import { choosePrecision, type ShPrecision } from '../pack/sh.js';
+import { buildLevels } from './build-levels.js';
+import { boundLevel, detailRows, leafErrors, parentErrors, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
+import { pageLayout, type DetailManifest } from './manifest.js';
+import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
+import { chunksOf, type SplatLevel } from './splat-level.js';
+
+const { CULL_GROUP } = constants;
+
+/** A page before it has a name. */
+export interface BuiltPage {
+  readonly chunks: number;
+  /** How many of them, the first, have their parent in another page or none. */
+  readonly upper: number;
+  /** Page of the tree that holds the chunk above, and the number of that chunk in it. */
+  readonly parent?: readonly [page: number, chunk: number];
+  /** Level and number of each chunk. */
+  readonly holds: readonly (readonly [level: number, chunk: number])[];
+}
+
+/** Levels of a scene or of a part of it, ready to be cut into pages. */
+export interface DetailTree {
+  readonly levels: readonly SplatLevel[];
+  /** `Chunk` rows of each level. */
+  readonly chunks: readonly Float32Array[];
+  readonly errors: readonly ChunkErrors[];
+  readonly shPrecision: ShPrecision;
+  readonly antialiased: boolean;
+  readonly origin: Vector3;
+  readonly bounds: Bounds;
+}
+
+/**
+ * The levels of detail of a cloud.
+ * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
+ */
+export function buildDetailTree(given: GaussianCloud): DetailTree {
+  validateCloud(given);
+  const cloud = recentred(given);
+  const kept = packedOrder(cloud);
+  const { antialiased, origin } = cloud;
+  const shPrecision = choosePrecision(cloud, kept);
+  return { ...treeOf(buildLevels(cloud, kept)), shPrecision, antialiased, origin, bounds: boundsOf(given) };
+}
+
+/** Bounds and errors of levels whose finest may itself stand for something, to `leaves`' errors. */
+export function treeOf(
+  levels: readonly SplatLevel[],
+  leaves?: ChunkErrors,
+): Pick<DetailTree, 'levels' | 'chunks' | 'errors'> {
+  const chunks = levels.map(boundLevel);
+  const errors = [leaves ?? leafErrors(chunks[0])];
+  for (let k = 1; k < levels.length; k++) errors.push(parentErrors(levels[k], chunks[k], errors[k - 1]));
+  return { levels, chunks, errors };
+}
+
+/**
+ * How a tree is cut into pages, parents before children: the first holds the coarsest chunk and those it stands for, each other the chunks
+ * below one chunk, and those below these.
+ * @param withTop false to leave the coarsest chunk to another tree: then the first page holds what is below it
+ */
+export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true): BuiltPage[] {
+  const pages: BuiltPage[] = [];
+  const below = (level: number, chunks: readonly number[]): number[] =>
+    level < 0
+      ? []
+      : chunks.flatMap((c) => [0, 1, 2, 3].map((k) => 4 * c + k)).filter((c) => c < chunksOf(levels[level].count));
+  const add = (
+    upper: number,
+    upperChunks: readonly number[],
+    parent: readonly [number, number] | undefined,
+    isSingle = false,
+  ): void => {
+    const lowerChunks = isSingle ? [] : below(upper - 1, upperChunks);
+    const holds = [...upperChunks.map((c) => [upper, c] as const), ...lowerChunks.map((c) => [upper - 1, c] as const)];
+    const page = pages.push({ chunks: holds.length, upper: upperChunks.length, parent, holds }) - 1;
+    const [finest, firstFinest] = isSingle ? [upperChunks, 0] : [lowerChunks, upperChunks.length];
+    const level = isSingle ? upper - 1 : upper - 2;
+    finest.forEach((c, k) => {
+      const next = below(level, [c]);
+      if (next.length > 0) add(level, next, [page, firstFinest + k]);
+    });
+  };
+  const top = levels.length - 1;
+  // Where the levels are odd in number the first page has one alone: pages of the finest, of which there are most, are full.
+  if (withTop) add(top, [0], undefined, top % 2 === 0);
+  else if (top > 0) add(top - 1, below(top - 1, [0]), undefined, top % 2 === 1);
+  return pages;
+}
+
+/** The words of a page's file: see docs/detail-pages.md. */
+export function packPage(tree: DetailTree, { holds, chunks }: BuiltPage): Uint32Array<ArrayBuffer> {
+  const { levels, shPrecision } = tree;
+  const layout = pageLayout({ shDegree: levels[0].shDegree, shPrecision }, chunks);
+  const words = new Uint32Array(layout.total);
+  const floats = new Float32Array(words.buffer);
+  const geometryAt = layout.chunks + layout.details;
+  const geometry = words.subarray(geometryAt, geometryAt + layout.geometry);
+  const stride = layout.sh / (CULL_GROUP * chunks);
+  holds.forEach(([level, chunk], k) => {
+    const [from, end] = [CULL_GROUP * chunk, Math.min(levels[level].count, CULL_GROUP * (chunk + 1))];
+    floats.set(tree.chunks[level].subarray(CHUNK_NUMBERS * chunk, CHUNK_NUMBERS * (chunk + 1)), CHUNK_NUMBERS * k);
+    floats.set(rowOf(tree, level, chunk), layout.chunks + DETAIL_NUMBERS * k);
+    packLevelGeometry(levels[level], geometry, CULL_GROUP * k, from, end);
+    packFiller(geometry, CULL_GROUP * k + end - from, CULL_GROUP * (k + 1));
+    words.set(
+      packLevelSh(levels[level], shPrecision, from, end),
+      geometryAt + layout.geometry + stride * CULL_GROUP * k,
+    );
+  });
+  return words;
+}
+
+function rowOf({ errors }: DetailTree, level: number, chunk: number): Float32Array {
+  const one = (all: ChunkErrors, c: number): ChunkErrors => ({
+    count: 1,
+    spheres: all.spheres.subarray(4 * c, 4 * c + 4),
+    errors: all.errors.subarray(c, c + 1),
+  });
+  const above = errors[level + 1];
+  return detailRows(one(errors[level], chunk), above && one(above, chunk >> 2));
+}
+
+/** What `detail.json` says of a scene of one tree. */
+export function manifestOf(
+  tree: DetailTree,
+  pages: readonly BuiltPage[],
+  fileOf: (page: number) => string,
+): DetailManifest {
+  const { shPrecision, antialiased, origin, bounds, levels } = tree;
+  return {
+    ...{ format: 'gaussian-splat-detail', version: 1, splats: levels[0].count, shDegree: levels[0].shDegree },
+    ...{ shPrecision, antialiased, origin, bounds },
+    trees: [
+      {
+        pages: pages.map(({ chunks, upper, parent }, p) => ({
+          file: fileOf(p),
+          chunks,
+          upper,
+          ...(parent && { parent }),
+        })),
+      },
+    ],
+    instances: [{ tree: 0, translate: [0, 0, 0] }],
+  };
+}

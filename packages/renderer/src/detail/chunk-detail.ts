@@ -1,0 +1,128 @@
+import { constants, layouts } from '../generated/shaders.js';
+import { CHUNK_NUMBERS } from '../pack/chunks.js';
+import { chunksOf, FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
+
+/** Numbers of one `ChunkDetail` of shaders/shared/detail.wgsl. */
+export const DETAIL_NUMBERS = layouts.ChunkDetail.size / 4;
+
+const { CULL_GROUP, ALPHA_MIN, NO_CHILDREN } = constants;
+const fields = layouts.ChunkDetail.fields;
+const place = (name: keyof typeof fields): number => fields[name].offset / 4;
+
+/** Where the numbers of a row lie. */
+export const DETAIL_PLACES = {
+  sphere: place('sphere'),
+  parentSphere: place('parent_sphere'),
+  error: place('error'),
+  parentError: place('parent_error'),
+  fullError: place('full_error'),
+  children: place('children'),
+} as const;
+
+/** The parent's error of a chunk without parent: never small enough. */
+export const ENDLESS = 1e25;
+
+/** Factor by which a parent's error and sphere exceed those of its children: more than float32 rounds. */
+const STRICTLY = 1.00001;
+
+/** Sphere and error of each chunk of a level. */
+export interface ChunkErrors {
+  readonly count: number;
+  /** [C, 4] centre and radius: holds the centres of the splats and the spheres of the chunks that it stands for. */
+  readonly spheres: Float32Array;
+  /** [C] world units: 0 for the finest level, larger than those of the chunks that it stands for. */
+  readonly errors: Float32Array;
+}
+
+/** `Chunk` rows of merged splats: boxes of their centres, and how far they reach. */
+export function boundLevel({ count, positions, factors, opacities }: SplatLevel): Float32Array {
+  const chunks = new Float32Array(CHUNK_NUMBERS * chunksOf(count));
+  for (let first = 0, at = 0; first < count; first += CULL_GROUP, at += CHUNK_NUMBERS) {
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    let reach = 0;
+    for (let i = first; i < Math.min(count, first + CULL_GROUP); i++) {
+      for (let axis = 0; axis < 3; axis++) {
+        const x = positions[3 * i + axis];
+        if (x < low[axis]) low[axis] = x;
+        if (x > high[axis]) high[axis] = x;
+      }
+      reach = Math.max(reach, Math.sqrt(traceOf(factors, i) * 2 * Math.log(Math.max(1, opacities[i] / ALPHA_MIN))));
+    }
+    chunks.set([...low, reach, ...high, 0], at);
+  }
+  return chunks;
+}
+
+/** Sum of a splat's variances along three axes: at least that along the longest. */
+function traceOf(factors: Float32Array, i: number): number {
+  let sum = 0;
+  for (let k = 0; k < FACTOR_NUMBERS; k++) sum += factors[FACTOR_NUMBERS * i + k] ** 2;
+  return sum;
+}
+
+/** Errors of the finest level: none. Its spheres hold the boxes. */
+export function leafErrors(chunks: Float32Array): ChunkErrors {
+  const count = chunks.length / CHUNK_NUMBERS;
+  const spheres = new Float32Array(4 * count);
+  for (let c = 0; c < count; c++) spheres.set(sphereOfBox(chunks, c), 4 * c);
+  return { count, spheres, errors: new Float32Array(count) };
+}
+
+/** Errors of a coarser level, of which chunk c stands for chunks 4 c to 4 c + 3 of `finer`. */
+export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: ChunkErrors): ChunkErrors {
+  const count = chunks.length / CHUNK_NUMBERS;
+  const spheres = new Float32Array(4 * count);
+  const errors = new Float32Array(count);
+  for (let c = 0; c < count; c++) {
+    const [x, y, z, own] = sphereOfBox(chunks, c);
+    let [radius, error] = [own, ownError(level, c)];
+    for (let child = 4 * c; child < Math.min(4 * c + 4, finer.count); child++) {
+      const [cx, cy, cz, r] = finer.spheres.subarray(4 * child, 4 * child + 4);
+      radius = Math.max(radius, Math.hypot(x - cx, y - cy, z - cz) + r);
+      error = Math.max(error, finer.errors[child]);
+    }
+    // Centres far from the origin are rounded themselves.
+    const rounding = 1e-6 * Math.hypot(x, y, z);
+    spheres.set([x, y, z, radius * STRICTLY + rounding], 4 * c);
+    errors[c] = Math.max(error * STRICTLY, LEAST_ERROR);
+  }
+  return { count, spheres, errors };
+}
+
+/** A merge that displaces nothing is an error all the same: with no error at all allowed, leaves are drawn. */
+const LEAST_ERROR = 1e-20;
+
+/** Twice the root mean square of how far the splats of a chunk are displaced, those alone that stand for several: nearly all are off by less. */
+function ownError({ count, spreads }: SplatLevel, chunk: number): number {
+  const [first, end] = [CULL_GROUP * chunk, Math.min(count, CULL_GROUP * (chunk + 1))];
+  let [sum, merged] = [0, 0];
+  for (let i = first; i < end; i++) {
+    sum += spreads[i];
+    if (spreads[i] > 0) merged++;
+  }
+  return 2 * Math.sqrt(sum / Math.max(1, merged));
+}
+
+function sphereOfBox(chunks: Float32Array, c: number): [number, number, number, number] {
+  const at = CHUNK_NUMBERS * c;
+  const [x, y, z] = [0, 1, 2].map((axis) => Math.fround((chunks[at + axis] + chunks[at + 4 + axis]) / 2));
+  const radius = Math.hypot(...[0, 1, 2].map((axis) => (chunks[at + 4 + axis] - chunks[at + axis]) / 2));
+  return [x, y, z, radius * STRICTLY];
+}
+
+/** The rows of one level; `parents` are those of the next coarser, none for the coarsest. */
+export function detailRows(own: ChunkErrors, parents: ChunkErrors | undefined): Float32Array {
+  const rows = new Float32Array(DETAIL_NUMBERS * own.count);
+  const words = new Uint32Array(rows.buffer);
+  for (let c = 0; c < own.count; c++) {
+    const at = DETAIL_NUMBERS * c;
+    rows.set(own.spheres.subarray(4 * c, 4 * c + 4), at + DETAIL_PLACES.sphere);
+    rows[at + DETAIL_PLACES.error] = own.errors[c];
+    rows[at + DETAIL_PLACES.fullError] = own.errors[c];
+    rows[at + DETAIL_PLACES.parentError] = parents?.errors[c >> 2] ?? ENDLESS;
+    if (parents) rows.set(parents.spheres.subarray(4 * (c >> 2), 4 * (c >> 2) + 4), at + DETAIL_PLACES.parentSphere);
+    words[at + DETAIL_PLACES.children] = NO_CHILDREN;
+  }
+  return rows;
+}

@@ -1,0 +1,136 @@
+import { GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { constants } from '../generated/shaders.js';
+import { CHUNK_NUMBERS } from '../pack/chunks.js';
+import { GEOMETRY_WORDS } from '../pack/pack.js';
+import { shWords, type ShPrecision } from '../pack/sh.js';
+import { DETAIL_NUMBERS } from './chunk-detail.js';
+
+/** Chunks of a page at most: four that have one parent, and what those four stand for. */
+export const PAGE_CHUNKS = 20;
+
+/** One page of a tree: a file of its own. */
+export interface TreePage {
+  /** Address, relative to the manifest. */
+  readonly file: string;
+  readonly chunks: number;
+  /** How many of them, the first, have their parent in another page or none. */
+  readonly upper: number;
+  /** Page of the tree that holds the chunk above, and the number of that chunk in it. None for the first page of a tree. */
+  readonly parent?: readonly [page: number, chunk: number];
+}
+
+/** Pages that hang together, parents before children. */
+export interface Tree {
+  readonly pages: readonly TreePage[];
+}
+
+/** A tree at its place in the scene, below a chunk of the first one. */
+export interface TreeInstance {
+  readonly tree: number;
+  /** World units, added to every position of the tree. */
+  readonly translate: Vector3;
+  /** Page of the first instance, and chunk in it, that the tree is the detail of. None for the first instance. */
+  readonly parent?: readonly [page: number, chunk: number];
+}
+
+/**
+ * What `detail.json` says of a streamed scene. Pages are numbered through all instances, the first instance first.
+ * docs/detail-pages.md describes the files.
+ */
+export interface DetailManifest {
+  readonly format: 'gaussian-splat-detail';
+  readonly version: 1;
+  /** Splats of the finest level. */
+  readonly splats: number;
+  readonly shDegree: ShDegree;
+  readonly shPrecision: ShPrecision;
+  readonly antialiased: boolean;
+  readonly origin: Vector3;
+  readonly bounds: Bounds;
+  readonly trees: readonly Tree[];
+  readonly instances: readonly TreeInstance[];
+}
+
+/** Words of each part of a page's file, one after the other. */
+export function pageLayout(
+  { shDegree, shPrecision }: Pick<DetailManifest, 'shDegree' | 'shPrecision'>,
+  chunks: number,
+): { chunks: number; details: number; geometry: number; sh: number; total: number } {
+  const splats = constants.CULL_GROUP * chunks;
+  const parts = {
+    chunks: CHUNK_NUMBERS * chunks,
+    details: DETAIL_NUMBERS * chunks,
+    geometry: GEOMETRY_WORDS * splats,
+    sh: shWords(shDegree, shPrecision) * splats,
+  };
+  return { ...parts, total: parts.chunks + parts.details + parts.geometry + parts.sh };
+}
+
+/**
+ * Checks what was read from a `detail.json`.
+ * @throws GaussianSplatError `decode/unsupported` for another format or version, `decode/header` for anything else that is wrong.
+ */
+export function checkManifest(value: unknown, where: string): DetailManifest {
+  const manifest = (typeof value === 'object' && value !== null ? value : {}) as Partial<DetailManifest>;
+  const fail = (path: string, expected: string, found: unknown, code = 'decode/header'): never => {
+    throw new GaussianSplatError(code as 'decode/header', {
+      where: `${where}, ${path}`,
+      expected,
+      found: String(JSON.stringify(found)).slice(0, 80),
+      remedy: 'write the folder again with npm run detail',
+    });
+  };
+  const { format, version, splats, shDegree, shPrecision, antialiased, origin, bounds, trees, instances } = manifest;
+  if (format !== 'gaussian-splat-detail') fail('format', 'gaussian-splat-detail', format, 'decode/unsupported');
+  if (version !== 1) fail('version', '1', version, 'decode/unsupported');
+  if (!isCount(splats)) fail('splats', 'a number of splats', splats);
+  if (![0, 1, 2, 3].includes(shDegree as number)) fail('shDegree', '0, 1, 2 or 3', shDegree);
+  if (shPrecision !== 'int8' && shPrecision !== 'float16') fail('shPrecision', 'int8 or float16', shPrecision);
+  if (typeof antialiased !== 'boolean') fail('antialiased', 'true or false', antialiased);
+  if (!isVector(origin)) fail('origin', '3 numbers', origin);
+  const hasBounds = isVector(bounds?.min) && isVector(bounds.max) && isVector(bounds.center);
+  if (!hasBounds || !Number.isFinite(bounds?.radius)) fail('bounds', 'min, max, center and radius', bounds);
+  if (!Array.isArray(trees) || trees.length === 0) fail('trees', 'one tree or more', trees);
+  trees!.forEach((tree, t) => checkTree(tree, (path, ...rest) => fail(`trees[${t}].${path}`, ...rest)));
+  if (!Array.isArray(instances) || instances.length === 0) fail('instances', 'one instance or more', instances);
+  instances!.forEach((instance, i) => {
+    const isFine =
+      isCount(instance?.tree) &&
+      instance.tree < trees!.length &&
+      isVector(instance.translate) &&
+      (i === 0) === (instance.parent === undefined) &&
+      (i === 0 || isPlace(instance.parent, trees![instances![0].tree].pages));
+    if (!isFine) fail(`instances[${i}]`, 'a tree, where it stands, and the chunk above it', instance);
+  });
+  return manifest as DetailManifest;
+}
+
+type Fail = (path: string, expected: string, found: unknown) => never;
+
+function checkTree(tree: Tree, fail: Fail): void {
+  if (!Array.isArray(tree?.pages) || tree.pages.length === 0) fail('pages', 'one page or more', tree);
+  tree.pages.forEach((page, p) => {
+    const isFine =
+      typeof page?.file === 'string' &&
+      isCount(page.chunks) &&
+      page.chunks >= 1 &&
+      page.chunks <= PAGE_CHUNKS &&
+      isCount(page.upper) &&
+      page.upper >= 1 &&
+      page.upper <= Math.min(4, page.chunks) &&
+      (p === 0) === (page.parent === undefined) &&
+      (p === 0 || isPlace(page.parent, tree.pages.slice(0, p)));
+    if (!isFine) fail(`pages[${p}]`, `a file of 1 to ${PAGE_CHUNKS} chunks below an earlier page`, page);
+  });
+}
+
+const isCount = (value: unknown): value is number => Number.isSafeInteger(value) && (value as number) >= 0;
+
+const isVector = (value: unknown): value is Vector3 =>
+  Array.isArray(value) && value.length === 3 && value.every((number) => Number.isFinite(number));
+
+function isPlace(value: unknown, pages: readonly TreePage[]): boolean {
+  if (!Array.isArray(value) || value.length !== 2) return false;
+  const [page, chunk] = value as [unknown, unknown];
+  return isCount(page) && page < pages.length && isCount(chunk) && chunk < pages[page].chunks;
+}

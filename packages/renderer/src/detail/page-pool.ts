@@ -1,0 +1,99 @@
+import type { Vector3 } from '@gaussian-splat/core';
+import type { GaussianPage } from '../gaussian-scene.js';
+import { pageCapacity } from '../gaussian-buffers.js';
+import { constants } from '../generated/shaders.js';
+import { BUFFER_USAGE } from '../gpu/kernel.js';
+import type { GpuMemory } from '../gpu/memory.js';
+import { CHUNK_NUMBERS } from '../pack/chunks.js';
+import { GEOMETRY_WORDS } from '../pack/pack.js';
+import { shWords } from '../pack/sh.js';
+import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
+import { PAGE_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
+
+const SLOT_SPLATS = PAGE_CHUNKS * constants.CULL_GROUP;
+/** Largest buffer of a pool, in bytes: several of this size are found where one large one is not (iOS). */
+const LARGEST_BUFFER = 1 << 27;
+
+/** Bytes of GPU memory that one slot takes. */
+export function slotBytes({ shDegree, shPrecision }: Pick<DetailManifest, 'shDegree' | 'shPrecision'>): number {
+  return 4 * pageLayout({ shDegree, shPrecision }, PAGE_CHUNKS).total;
+}
+
+/** Slots on the GPU, allocated once, each with room for one page of a streamed scene. What is in a slot without page is never drawn. */
+export class PagePool {
+  readonly pages: readonly GaussianPage[];
+  readonly #device: GPUDevice;
+  readonly #manifest: DetailManifest;
+  readonly #slotsPerPage: number;
+
+  constructor(device: GPUDevice, memory: GpuMemory, manifest: DetailManifest, slots: number) {
+    this.#device = device;
+    this.#manifest = manifest;
+    const stride = shWords(manifest.shDegree, manifest.shPrecision);
+    const bytes = 4 * Math.max(GEOMETRY_WORDS, stride);
+    const capacity = Math.min(pageCapacity(device, bytes), Math.floor(LARGEST_BUFFER / bytes));
+    this.#slotsPerPage = Math.max(1, Math.floor(capacity / SLOT_SPLATS));
+    const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
+    const buffer = (name: string, words: number): GPUBuffer => memory.buffer(`gs.pool.${name}`, 4 * words, usage);
+    this.pages = Array.from({ length: Math.ceil(slots / this.#slotsPerPage) }, (_, p) => {
+      const own = Math.min(this.#slotsPerPage, slots - p * this.#slotsPerPage);
+      return {
+        count: SLOT_SPLATS * own,
+        geometry: buffer('geometry', GEOMETRY_WORDS * SLOT_SPLATS * own),
+        sh: buffer('sh', stride * SLOT_SPLATS * own),
+        chunks: buffer('chunks', CHUNK_NUMBERS * PAGE_CHUNKS * own),
+        details: buffer('details', DETAIL_NUMBERS * PAGE_CHUNKS * own),
+      };
+    });
+  }
+
+  /** Puts the content of a page's file into a slot; its details are written by {@link writeDetails}. */
+  write(slot: number, words: Uint32Array<ArrayBuffer>, chunks: number): void {
+    const { page, place } = this.#find(slot);
+    const { queue } = this.#device;
+    const layout = pageLayout(this.#manifest, chunks);
+    const stride = shWords(this.#manifest.shDegree, this.#manifest.shPrecision);
+    const geometryAt = layout.chunks + layout.details;
+    queue.writeBuffer(page.chunks, 4 * CHUNK_NUMBERS * PAGE_CHUNKS * place, words, 0, layout.chunks);
+    queue.writeBuffer(page.geometry, 4 * GEOMETRY_WORDS * SLOT_SPLATS * place, words, geometryAt, layout.geometry);
+    queue.writeBuffer(page.sh, 4 * stride * SLOT_SPLATS * place, words, geometryAt + layout.geometry, layout.sh);
+  }
+
+  /** Writes the detail rows of a slot: all {@link PAGE_CHUNKS} of them. */
+  writeDetails(slot: number, rows: Float32Array<ArrayBuffer>): void {
+    const { page, place } = this.#find(slot);
+    this.#device.queue.writeBuffer(page.details!, 4 * DETAIL_NUMBERS * PAGE_CHUNKS * place, rows);
+  }
+
+  #find(slot: number): { page: GaussianPage; place: number } {
+    return { page: this.pages[Math.floor(slot / this.#slotsPerPage)], place: slot % this.#slotsPerPage };
+  }
+}
+
+/** Moves everything in a page's file that is a position. */
+export function movePage(
+  words: Uint32Array<ArrayBuffer>,
+  [x, y, z]: Vector3,
+  manifest: DetailManifest,
+  chunks: number,
+): void {
+  if (x === 0 && y === 0 && z === 0) return;
+  const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
+  const layout = pageLayout(manifest, chunks);
+  const move = (at: number): void => {
+    floats[at] += x;
+    floats[at + 1] += y;
+    floats[at + 2] += z;
+  };
+  for (let at = 0; at < layout.chunks; at += CHUNK_NUMBERS) {
+    move(at);
+    move(at + 4);
+  }
+  const details = layout.chunks;
+  for (let at = details; at < details + layout.details; at += DETAIL_NUMBERS) {
+    move(at + DETAIL_PLACES.sphere);
+    move(at + DETAIL_PLACES.parentSphere);
+  }
+  const geometry = details + layout.details;
+  for (let at = geometry; at < geometry + layout.geometry; at += GEOMETRY_WORDS) move(at);
+}

@@ -1,0 +1,58 @@
+import { constants } from '../generated/shaders.js';
+import type { Bounds, Vector3 } from '@gaussian-splat/core';
+import { levelsAbove } from './build-levels.js';
+import { treeOf, type DetailTree } from './build-pages.js';
+import type { ChunkErrors } from './chunk-detail.js';
+import { emptyLevel, FACTOR_NUMBERS, shNumbers, type SplatLevel } from './splat-level.js';
+
+const { CULL_GROUP } = constants;
+
+/** The tree above copies of another: its finest level has the coarsest chunk of each copy, in the order of `places`. */
+export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): DetailTree {
+  const top = tree.levels.length - 1;
+  const finest = copiesOf(tree.levels[top], places);
+  const levels = [...levelsAbove(finest)];
+  const { radius } = tree.bounds;
+  return {
+    ...treeOf(levels, errorsOfCopies(tree.errors[top], places)),
+    ...{ shPrecision: tree.shPrecision, antialiased: tree.antialiased, origin: tree.origin },
+    bounds: boundsAround(tree.bounds, places, radius),
+  };
+}
+
+/** Each copy fills a chunk; splats that make it full cover nothing. */
+function copiesOf(root: SplatLevel, places: readonly Vector3[]): SplatLevel {
+  const level = emptyLevel(CULL_GROUP * places.length, root);
+  const stride = shNumbers(root.shDegree);
+  places.forEach((place, copy) => {
+    for (let k = 0; k < CULL_GROUP; k++) {
+      const [i, to] = [Math.min(k, root.count - 1), CULL_GROUP * copy + k];
+      const from = root.shOrder === undefined ? i : root.shOrder[i];
+      for (let axis = 0; axis < 3; axis++) level.positions[3 * to + axis] = root.positions[3 * i + axis] + place[axis];
+      level.factors.set(root.factors.subarray(FACTOR_NUMBERS * i, FACTOR_NUMBERS * (i + 1)), FACTOR_NUMBERS * to);
+      level.sh.set(root.sh.subarray(stride * from, stride * (from + 1)), stride * to);
+      level.opacities[to] = k < root.count ? root.opacities[i] : 0;
+      level.spreads[to] = root.spreads[i];
+    }
+  });
+  return level;
+}
+
+function errorsOfCopies({ spheres, errors }: ChunkErrors, places: readonly Vector3[]): ChunkErrors {
+  const moved = places.flatMap(([x, y, z]) => [spheres[0] + x, spheres[1] + y, spheres[2] + z, spheres[3]]);
+  return {
+    count: places.length,
+    spheres: Float32Array.from(moved),
+    errors: Float32Array.from(places, () => errors[0]),
+  };
+}
+
+function boundsAround({ min, max }: Bounds, places: readonly Vector3[], own: number): Bounds {
+  const corner = (from: Vector3, pick: (...values: number[]) => number): Vector3 =>
+    [0, 1, 2].map((axis) =>
+      places.reduce((found, place) => pick(found, from[axis] + place[axis]), from[axis] + places[0][axis]),
+    ) as unknown as Vector3;
+  const [low, high] = [corner(min, Math.min), corner(max, Math.max)];
+  const center = [0, 1, 2].map((axis) => (low[axis] + high[axis]) / 2) as unknown as Vector3;
+  return { min: low, max: high, center, radius: Math.max(own, Math.hypot(...high.map((x, axis) => x - center[axis]))) };
+}

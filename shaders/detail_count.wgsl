@@ -1,0 +1,41 @@
+// For a budget: for which errors each chunk in view would be drawn. One thread for each chunk; sums of a workgroup go out together.
+#import shared/chunk_visibility
+#import shared/detail
+#import shared/detail_counts
+#import shared/group
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> chunks: array<Chunk>;
+@group(0) @binding(2) var<storage, read> details: array<ChunkDetail>;
+@group(0) @binding(3) var<storage, read_write> detail_counts: array<atomic<u32>>;
+
+const DETAIL_THREADS = 256u;
+
+var<workgroup> own_counts: array<atomic<u32>, DETAIL_COUNTS>;
+
+@compute @workgroup_size(DETAIL_THREADS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let chunk = group_index(workgroup_id) * DETAIL_THREADS + lane;
+  if (chunk * CULL_GROUP < view.splat_count) { count_chunk(chunk); }
+  workgroupBarrier();
+  for (var k = lane; k < DETAIL_COUNTS; k += DETAIL_THREADS) {
+    let count = atomicLoad(&own_counts[k]);
+    if (count > 0u) { atomicAdd(&detail_counts[k], count); }
+  }
+}
+
+fn count_chunk(chunk: u32) {
+  // Without levels a chunk is drawn whatever is allowed.
+  var own = 0.0;
+  var above = 1e30;
+  if (view.has_detail != 0u) {
+    let d = details[chunk];
+    own = screen_error(view, d.sphere, d.error);
+    above = screen_error(view, d.parent_sphere, d.parent_error) * exp2(view.detail_fade);
+  }
+  // Places of a streamed scene that hold nothing have nothing above them.
+  if (own > above || above <= 0.0 || !may_be_visible(view, chunks[chunk])) { return; }
+  let splats = min(CULL_GROUP, view.splat_count - chunk * CULL_GROUP);
+  atomicAdd(&own_counts[bucket_of(own)], splats);
+  atomicAdd(&own_counts[DETAIL_BUCKETS + bucket_of(above)], splats);
+}

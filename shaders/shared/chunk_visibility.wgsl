@@ -1,0 +1,33 @@
+// Whether a chunk may hold visible splats. The tests are linear in camera space, so that the corners of a box decide for all its
+// points, and err only towards keeping.
+#import shared/view
+#import shared/chunk
+
+// Pixels that dilation can add to a splat's half extent (sqrt(0.3 · 2 ln 255) = 1.83), and one for rounding.
+const MARGIN = 3.0;
+
+// Least value of normal · (camera-space point) over the box.
+fn least(view: View, center: vec3f, half_size: vec3f, normal: vec3f) -> f32 {
+  let local = vec3f(
+    dot(view.local_to_camera[0].xyz, normal), dot(view.local_to_camera[1].xyz, normal), dot(view.local_to_camera[2].xyz, normal),
+  );
+  let middle = dot(local, center) + dot(view.local_to_camera[3].xyz, normal);
+  let slack = 1e-5 * (dot(abs(local), abs(center)) + abs(dot(view.local_to_camera[3].xyz, normal)));
+  return middle - dot(abs(local), half_size) - slack;
+}
+
+fn may_be_visible(view: View, c: Chunk) -> bool {
+  let center = 0.5 * (c.low + c.high);
+  let half_size = 0.5 * (c.high - c.low);
+  if (least(view, center, half_size, vec3f(0.0, 0.0, -1.0)) > -view.near) { return false; }
+  if (least(view, center, half_size, vec3f(0.0, 0.0, 1.0)) > view.far) { return false; }
+  // The Jacobian stretches a splat by at most focal / z · sqrt(1 + t²): times z, that does not depend on the point.
+  let t = max(abs(view.jacobian_min), abs(view.jacobian_max));
+  let reach = 1.001 * c.reach * view.stretch * view.focal * sqrt(1.0 + t * t);
+  let right = view.principal.x - view.viewport.x - MARGIN;
+  let bottom = view.principal.y - view.viewport.y - MARGIN;
+  return least(view, center, half_size, vec3f(view.focal.x, 0.0, right)) <= reach.x
+    && least(view, center, half_size, vec3f(-view.focal.x, 0.0, -view.principal.x - MARGIN)) <= reach.x
+    && least(view, center, half_size, vec3f(0.0, view.focal.y, bottom)) <= reach.y
+    && least(view, center, half_size, vec3f(0.0, -view.focal.y, -view.principal.y - MARGIN)) <= reach.y;
+}

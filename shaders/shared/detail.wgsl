@@ -1,0 +1,52 @@
+// Levels of detail: a chunk stands for up to four finer ones, less truly by an error in world units. Of a chunk, the chunk that
+// stands for it, and so on, exactly one is drawn, or two that fade into one another: each can tell for itself from its own error on
+// screen and that of the chunk above, because both grow all the way up.
+#import shared/view
+#import shared/falloff
+
+struct ChunkDetail {
+  // Centre and radius: holds the spheres of all that the chunk stands for.
+  sphere: vec4f,
+  // That of the chunk above.
+  parent_sphere: vec4f,
+  // World units; 0 where nothing finer is there to be drawn.
+  error: f32,
+  parent_error: f32,
+  // The error, whether something finer is there or not.
+  full_error: f32,
+  // Number of the streamed page that holds what the chunk stands for.
+  children: u32,
+}
+
+const NO_CHILDREN = 4294967295u;
+// Pixels that count as none: the logarithm of less would leave float32.
+const SMALLEST_ERROR = 1e-30;
+
+// Pixels that an error takes on screen at most, in the middle of the image. Does not depend on where the camera looks, so that a turn
+// changes nothing.
+fn screen_error(view: View, sphere: vec4f, error: f32) -> f32 {
+  let distance = max(length(sphere.xyz - view.eye) - sphere.w, view.near / view.stretch);
+  return max(view.focal.x, view.focal.y) * error / distance;
+}
+
+// Share, 0 to 1, in which what is off by so many pixels has given way to what is finer.
+fn refined(pixels: f32, allowed: f32, fade: f32) -> f32 {
+  if (pixels > allowed) { return 1.0; }
+  if (fade <= 0.0 || pixels < SMALLEST_ERROR) { return 0.0; }
+  return clamp(1.0 + log2(pixels / allowed) / fade, 0.0, 1.0);
+}
+
+// Share, 0 to 1, in which a chunk is drawn. The shares of a chunk, the one above, and so on add up to 1.
+fn share_drawn(view: View, d: ChunkDetail, allowed: f32) -> f32 {
+  let own = refined(screen_error(view, d.sphere, d.error), allowed, view.detail_fade);
+  let above = refined(screen_error(view, d.parent_sphere, d.parent_error), allowed, view.detail_fade);
+  return max(0.0, above - own);
+}
+
+// Opacity of a splat that is drawn to a share: what all shares together let through is the (weighted geometric) mean of what each would.
+fn shared_opacity(opacity: f32, share: f32) -> f32 {
+  if (share >= 1.0) { return opacity; }
+  let capped = min(opacity, ALPHA_MAX);
+  let excess = opacity / max(capped, 1e-30);
+  return (1.0 - pow(1.0 - capped, share)) * pow(excess, share);
+}

@@ -1,0 +1,233 @@
+/** Scenes that are streamed: pages come and go, and whatever is there covers the scene. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { setTimeout as pause } from 'node:timers/promises';
+import type { Camera, Vector3 } from '@gaussian-splat/core';
+import { checkManifest, GaussianBuffers, packWithDetail, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { constants, DETAIL_NUMBERS, listPages, NONE, PAGE_CHUNKS, Residency } from '@gaussian-splat/renderer/stages';
+import { detailFolder, type DetailFolder } from '../support/detail-folder.js';
+import { shareDrawn, type DetailView } from '../support/detail-twin.js';
+import { randomSource } from '../support/gpu.js';
+import { psnr } from '../support/metrics.js';
+import { nodeDevice } from '../support/node-device.js';
+import { readFrame } from '../support/read-frame.js';
+import { cameraAt } from '../support/scenes.js';
+import { pebbles } from '../support/scenes/pebbles.js';
+
+const cloud = pebbles(20_000);
+const folder = detailFolder(cloud);
+const options = { threads: 'serial', sort: 'serial' } as const;
+const viewFrom = (distance: number, angle = 0.4, target: Vector3 = [0, 0, 0]): Camera =>
+  cameraAt([distance * Math.cos(angle), -0.5 * distance, distance * Math.sin(angle)], target, {
+    ...{ width: 96, height: 64, fovXDegrees: 60, near: 0.01 },
+  });
+
+/** Draws until nothing more comes. */
+async function drawUntilCalm(
+  scene: StreamedGaussians,
+  renderer: Renderer,
+  camera: Camera,
+  detail: number,
+): Promise<void> {
+  const device = await nodeDevice();
+  const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
+  for (let [calm, frames] = [0, 0]; calm < 8 && frames < 600; frames++) {
+    const { resident } = scene.progress;
+    renderer.render({ gaussians: scene, camera, target, detail });
+    await device.queue.onSubmittedWorkDone();
+    await pause(1);
+    calm = scene.progress.resident === resident && scene.progress.coming === 0 ? calm + 1 : 0;
+  }
+  target.destroy();
+}
+
+const openAll = async (source: DetailFolder, memoryBudget?: number): Promise<StreamedGaussians> =>
+  StreamedGaussians.open(await nodeDevice(), source.manifest, { fetchPage: source.fetchPage, memoryBudget });
+
+test('a scene that has room for all its pages becomes the picture of the scene that was loaded whole', async () => {
+  const device = await nodeDevice();
+  const whole = await GaussianBuffers.upload(device, packWithDetail(cloud));
+  const scene = await openAll(folder);
+  const [streaming, loaded] = [new Renderer(device, options), new Renderer(device, options)];
+  for (const [camera, detail] of [
+    [viewFrom(40), 1] as const,
+    [viewFrom(14, 1), 0.5] as const,
+    [viewFrom(8, 2), 0] as const,
+  ]) {
+    await drawUntilCalm(scene, streaming, camera, detail);
+    const expected = await readFrame(device, loaded, { gaussians: whole, camera, detail });
+    const found = await readFrame(device, streaming, { gaussians: scene, camera, detail });
+    const close = psnr(expected, found, { channels: 4 });
+    const { resident, total } = scene.progress;
+    console.log(`detail ${detail}: ${close.toFixed(1)} dB with ${resident} of ${total} pages`);
+    assert.ok(close > 65, `${close} dB`);
+  }
+  assert.ok(scene.progress.resident > 1);
+  [streaming, loaded, scene, whole].forEach((owner) => owner.destroy());
+});
+
+/** Detail rows by page, as they are on the GPU. */
+async function readRows(scene: StreamedGaussians): Promise<Map<number, Float32Array>> {
+  const device = await nodeDevice();
+  const rows: Float32Array[] = [];
+  for (const { details } of scene.pages) {
+    const staging = device.createBuffer({ size: details!.size, usage: 0x1 | 0x8 });
+    const encoder = device.createCommandEncoder();
+    encoder.copyBufferToBuffer(details!, 0, staging, 0, details!.size);
+    device.queue.submit([encoder.finish()]);
+    await staging.mapAsync(0x1);
+    const all = new Float32Array(staging.getMappedRange().slice(0));
+    staging.destroy();
+    const stride = DETAIL_NUMBERS * PAGE_CHUNKS;
+    for (let at = 0; at + stride <= all.length; at += stride) rows.push(all.subarray(at, at + stride));
+  }
+  return new Map(scene.pagesInSlots.flatMap((page, slot) => (page === undefined ? [] : [[page, rows[slot]] as const])));
+}
+
+/** Adds shares up along every path from the coarsest chunk down to the finest that is there: each must come to 1. */
+function checkCovered(source: DetailFolder, rows: ReadonlyMap<number, Float32Array>, view: DetailView): number {
+  const list = listPages(source.manifest);
+  let paths = 0;
+  const walk = (page: number, chunk: number, above: number): void => {
+    const sum = above + shareDrawn(rows.get(page)!, chunk, view);
+    const next = below(list, page, chunk, rows);
+    if (next.length === 0) {
+      paths++;
+      assert.ok(Math.abs(sum - 1) < 1e-4, `page ${page}, chunk ${chunk}: covered ${sum} times`);
+    }
+    for (const [p, c] of next) walk(p, c, sum);
+  };
+  walk(0, 0, 0);
+  return paths;
+}
+
+/** Chunks that one stands for, as far as they are there. */
+function below(
+  list: ReturnType<typeof listPages>,
+  page: number,
+  chunk: number,
+  rows: ReadonlyMap<number, Float32Array>,
+): [page: number, chunk: number][] {
+  const child = list.children[PAGE_CHUNKS * page + chunk];
+  if (child !== NONE) return rows.has(child) ? Array.from({ length: list.upper[child] }, (_, c) => [child, c]) : [];
+  const first = list.upper[page];
+  if (chunk >= first) return [];
+  const own = [0, 1, 2, 3].map((k) => first + 4 * chunk + k).filter((c) => c < list.chunks[page]);
+  return own.map((c) => [page, c]);
+}
+
+for (const [name, source] of [
+  ['one tree', folder] as const,
+  [
+    'copies of a tree',
+    detailFolder(
+      pebbles(4_000),
+      [0, 1, 2, 3, 4, 5, 6].map((k) => [14 * (k % 3), 0, 14 * (k >> 1)] as const),
+    ),
+  ] as const,
+]) {
+  test(`${name}: with room for a third of the pages, every place is covered exactly once wherever the camera goes`, async () => {
+    const list = listPages(source.manifest);
+    const slots = Math.ceil(list.count / 3);
+    const bytes = 4 * PAGE_CHUNKS * (8 + 12 + constants.CULL_GROUP * (8 + 4));
+    const scene = await openAll(source, slots * bytes);
+    assert.equal(scene.pagesInSlots.length, slots);
+    const renderer = new Renderer(await nodeDevice(), options);
+    const seen = new Set<number>();
+    for (const [k, distance] of [30, 3, 2, 60, 1.5, 2.5].entries()) {
+      const camera = viewFrom(distance, k, [2 * k - 5, 0, 3 - k]);
+      await drawUntilCalm(scene, renderer, camera, 0.2);
+      const rows = await readRows(scene);
+      for (const page of rows.keys()) seen.add(page);
+      for (const fade of [0, 0.5]) assert.ok(checkCovered(source, rows, { camera, allowed: 0.2, fade }) > 3);
+    }
+    assert.ok(seen.size > slots, `only ${seen.size} of ${list.count} pages were ever there: none left for another`);
+    renderer.destroy();
+    scene.destroy();
+  });
+}
+
+test('whatever is wished for, comes or fails, what is above a page is there, and no page twice', () => {
+  const random = randomSource(5);
+  const list = listPages(folder.manifest);
+  const residency = new Residency(list, 5);
+  residency.begin(0);
+  residency.settle(0);
+  const coming: number[] = [];
+  for (let step = 0; step < 3000; step++) {
+    residency.note(Float32Array.from({ length: list.count }, () => (random() < 0.5 ? 0 : 10 * random())));
+    for (const page of residency.missing) if (coming.length < 3 && residency.begin(page)) coming.push(page);
+    const [page] = coming.splice(Math.floor(random() * coming.length), 1);
+    if (page !== undefined && random() < 0.2) residency.giveUp(page);
+    else if (page !== undefined) residency.settle(page);
+    const residents = [...residency.pageIn].filter((resident) => resident !== NONE);
+    assert.equal(new Set(residents).size, residents.length);
+    assert.ok(residents.includes(0));
+    for (const resident of residents) {
+      assert.equal(residency.pageIn[residency.slotOf[resident]], resident);
+      if (resident !== 0) assert.ok(residency.isResident(list.parent[resident]), `page ${resident} hangs in the air`);
+    }
+  }
+});
+
+test('a page that does not come is told of, and what stands for it stays on show', async () => {
+  const errors: unknown[] = [];
+  const device = await nodeDevice();
+  const scene = await StreamedGaussians.open(device, folder.manifest, {
+    fetchPage: (file) => (file === 'part-0' ? folder.fetchPage(file) : Promise.reject(new Error(`${file}: 404`))),
+    onError: (error) => errors.push(error),
+  });
+  const renderer = new Renderer(device, options);
+  await drawUntilCalm(scene, renderer, viewFrom(14), 0.2);
+  const picture = await readFrame(device, renderer, { gaussians: scene, camera: viewFrom(14), detail: 0.2 });
+  assert.ok(errors.length > 0 && scene.progress.resident === 1);
+  assert.ok(picture.some((value) => value > 0.1));
+  renderer.destroy();
+  scene.destroy();
+});
+
+test('a page of the wrong length, and a manifest with anything wrong in it, are refused with a name', async () => {
+  const device = await nodeDevice();
+  const short = (): Promise<ArrayBuffer> => Promise.resolve(new ArrayBuffer(8));
+  await assert.rejects(StreamedGaussians.open(device, folder.manifest, { fetchPage: short }), {
+    code: 'decode/truncated',
+  });
+  const tiny = { fetchPage: folder.fetchPage, memoryBudget: 1000 };
+  await assert.rejects(StreamedGaussians.open(device, folder.manifest, tiny), { code: 'out-of-memory/budget' });
+  const text = JSON.stringify(folder.manifest);
+  assert.deepEqual(checkManifest(JSON.parse(text), 'detail.json'), JSON.parse(text));
+  const faults: Record<string, unknown>[] = [
+    ...[
+      { format: 'gltf' },
+      { version: 2 },
+      { shDegree: 4 },
+      { origin: [1, 2] },
+      { trees: [] },
+      { instances: [] },
+      { bounds: {} },
+    ],
+    { trees: [{ pages: [{ file: 'a', chunks: 21, upper: 4 }] }] },
+    { trees: [{ pages: [{ file: 'a', chunks: 1, upper: 1, parent: [0, 0] }] }] },
+    { trees: [{ pages: [{ file: 'a', chunks: 1, upper: 2 }] }] },
+    { instances: [{ tree: 1, translate: [0, 0, 0] }] },
+    {
+      instances: [
+        { tree: 0, translate: [0, 0, 0] },
+        { tree: 0, translate: [0, 0, 0], parent: [999, 0] },
+      ],
+    },
+  ];
+  for (const fault of faults) {
+    assert.throws(
+      () => checkManifest({ ...JSON.parse(text), ...fault }, 'detail.json'),
+      /detail\.json/,
+      JSON.stringify(fault),
+    );
+  }
+  assert.throws(() => checkManifest(null, 'detail.json'), { code: 'decode/unsupported' });
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});

@@ -1,0 +1,135 @@
+/** Levels of detail in pictures: none where none is asked for, how true they are, and how little they pop. */
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { after, test } from 'node:test';
+import { boundsOf, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
+import { GaussianBuffers, packGaussians, packWithDetail, Renderer } from '@gaussian-splat/renderer';
+import { psnr } from '../support/metrics.js';
+import { nodeDevice } from '../support/node-device.js';
+import { readFrame } from '../support/read-frame.js';
+import { cameraAt } from '../support/scenes.js';
+import { pebbles } from '../support/scenes/pebbles.js';
+
+const size = { width: 120, height: 80, fovXDegrees: 60 };
+const serial = { threads: 'serial', sort: 'serial' } as const;
+
+/** Looks at the middle of the scene from so far away. */
+const viewFrom = (distance: number, angle = 0.4): Camera =>
+  cameraAt([distance * Math.cos(angle), -0.5 * distance, distance * Math.sin(angle)], [0, 0, 0], size);
+
+async function uploaded(
+  cloud: GaussianCloud = pebbles(12_000),
+): Promise<{ device: GPUDevice; plain: GaussianBuffers; detailed: GaussianBuffers }> {
+  const device = await nodeDevice();
+  const [plain, detailed] = await Promise.all([
+    GaussianBuffers.upload(device, packGaussians(cloud)),
+    GaussianBuffers.upload(device, packWithDetail(cloud)),
+  ]);
+  return { device, plain, detailed };
+}
+
+for (const rasterizer of ['quads', 'tiles'] as const) {
+  test(`${rasterizer}: without a lever of detail the picture is the same, byte for byte, moving and turning`, async () => {
+    const { device, plain, detailed } = await uploaded();
+    const accumulation = rasterizer === 'tiles' ? 'rgba32float' : 'rgba16float';
+    const renderers = [0, 1].map(() => new Renderer(device, { ...serial, rasterizer, accumulation }));
+    for (const camera of [viewFrom(10), viewFrom(7), viewFrom(2, 0.5)]) {
+      const expected = await readFrame(device, renderers[0], { gaussians: plain, camera });
+      assert.deepEqual(await readFrame(device, renderers[1], { gaussians: detailed, camera }), expected);
+    }
+    renderers.forEach((renderer) => renderer.destroy());
+  });
+}
+
+/** The scene that ships, as it is and with levels of detail, and how far away its camera is. */
+async function skull(): Promise<{
+  device: GPUDevice;
+  plain: GaussianBuffers;
+  detailed: GaussianBuffers;
+  away: number;
+}> {
+  const bytes = new Uint8Array(readFileSync(new URL('../../demo/scenes/skull.spz', import.meta.url)));
+  const captured = await readScene(bytes, { name: 'skull.spz' });
+  const { radius } = boundsOf(captured);
+  return { ...(await uploaded(captured)), away: 2.5 * radius };
+}
+
+/** How much farther than where it fills the picture, least dB, and most splats drawn for one of the whole scene, that each lever is held to. */
+const HELD: readonly (readonly [farther: number, detail: number, decibels: number, share: number])[] = [
+  [1, 1, 45, 1.01],
+  [1, 2, 32, 0.7],
+  [2, 0.4, 45, 1.05],
+  [2, 2, 24, 0.25],
+];
+
+test('from afar fewer splats are drawn, and the picture stays', async () => {
+  const { device, plain, detailed, away } = await skull();
+  const renderer = new Renderer(device, serial);
+  for (const [farther, detail, decibels, share] of HELD) {
+    const camera = viewFrom(farther * away);
+    const truth = await readFrame(device, renderer, { gaussians: plain, camera });
+    const { visible: all } = await renderer.readStatistics();
+    const found = await readFrame(device, renderer, { gaussians: detailed, camera, detail });
+    const { visible } = await renderer.readStatistics();
+    const covered = truth.filter((_, i) => i % 4 === 3).map((alpha) => (alpha > 0 ? 1 : 0));
+    const close = psnr(truth, found, { channels: 4, mask: covered });
+    console.log(`${farther} times as far, detail ${detail}: ${close.toFixed(1)} dB with ${visible} of ${all} splats`);
+    assert.ok(close >= decibels, `${close} dB`);
+    assert.ok(visible <= share * all, `${visible} of ${all}`);
+  }
+  renderer.destroy();
+});
+
+test('a cut that changes while the camera moves without turning is drawn in the order at hand', async () => {
+  const { device, detailed } = await uploaded();
+  const [moving, fresh] = [new Renderer(device, serial), new Renderer(device, { ...serial, sortAngle: 0 })];
+  const along = (step: number): Camera => moved(viewFrom(30), [0, 0, 6 * step]);
+  for (let step = 0; step < 3; step++) {
+    const request = { gaussians: detailed, camera: along(step), detail: 1 };
+    const found = await readFrame(device, moving, request);
+    const expected = await readFrame(device, fresh, request);
+    assert.ok(psnr(expected, found, { channels: 4 }) > 80);
+  }
+  moving.destroy();
+  fresh.destroy();
+});
+
+/** The camera moved along its own axes. */
+function moved({ worldToCamera, ...camera }: Camera, [x, y, z]: Vector3): Camera {
+  const shifted = Array.from(worldToCamera);
+  [x, y, z].forEach((by, axis) => (shifted[4 * axis + 3] -= by));
+  return { ...camera, worldToCamera: shifted };
+}
+
+/**
+ * Largest change of the picture, in dB, while the camera stands still and the error allowed grows by one part in a hundred a frame: what a dolly of that speed
+ * changes because levels change, without what it changes anyway.
+ */
+async function largestPop(detailFade: number): Promise<number> {
+  const { device, detailed, away } = await skull();
+  const renderer = new Renderer(device, { ...serial, detailFade });
+  const camera = viewFrom(3 * away);
+  let [last, least]: [Float32Array | undefined, number] = [undefined, Infinity];
+  for (let step = 0; step < 8; step++) {
+    const picture = await readFrame(device, renderer, { gaussians: detailed, camera, detail: 1.6 * 1.01 ** step });
+    if (last) least = Math.min(least, psnr(last, picture, { channels: 4 }));
+    last = picture;
+  }
+  renderer.destroy();
+  return least;
+}
+
+test('levels fade: at 1 % nearer a frame no picture differs by 55 dB from the one before, and some do without the fade', async () => {
+  const [faded, popping] = [await largestPop(0.5), await largestPop(0)];
+  console.log(
+    `largest change by levels from frame to frame: ${faded.toFixed(1)} dB; without a fade ${popping.toFixed(1)} dB`,
+  );
+  assert.ok(faded >= 55, `${faded} dB`);
+  assert.ok(popping < faded - 3, `${popping} dB without a fade`);
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
