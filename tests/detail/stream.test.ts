@@ -117,7 +117,7 @@ function below(
 }
 
 for (const [name, source] of [
-  ['one tree', folder] as const,
+  ['one tree', detailFolder(pebbles(60_000))] as const,
   [
     'copies of a tree',
     detailFolder(
