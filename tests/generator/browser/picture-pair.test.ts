@@ -41,11 +41,17 @@ it('a pair of pictures and their pose are taken in one run, and a picture that f
   await frames(3);
   const before = runs.count;
   const third = await picture(180);
-  // One comes at once, the other has to be fetched.
+  // Decoded long after the pose is known.
+  const decode = createImageBitmap;
+  globalThis.createImageBitmap = (async (...given: Parameters<typeof decode>) => {
+    await delay(400);
+    return decode(...given);
+  }) as typeof decode;
   const fourth = URL.createObjectURL(await picture(270));
   element.controls = { image: third, image_2: fourth, relative_pose: poseAt(-0.3) };
   await until(() => runs.count > before, 'a run');
-  await delay(300);
+  globalThis.createImageBitmap = decode;
+  await delay(1000);
   assertEqual(runs.count - before, 1, 'runs for a pair and its pose');
   element.controls = { image: third, image_2: '/net/status/404', relative_pose: poseAt(-0.2) };
   await until(() => errors.length > 0, 'word of the picture that is missing');
