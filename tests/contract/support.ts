@@ -67,6 +67,8 @@ export function headerWith(
     functions: new Set(),
     externalFiles: [],
     convolutions: [],
+    casts: new Set(),
+    widestSplit: 0,
     initializerBytes: 0,
     ...rest,
   };

@@ -143,6 +143,27 @@ describe('instances of one generator', () => {
     renderer.destroy();
   });
 
+  it('cost less together', async () => {
+    const millisecondsOf = async (name: string): Promise<number> => {
+      const eight = await Promise.all(Array.from({ length: 8 }, () => open(name)));
+      for (const generator of eight) generator.sink = { ingest: () => undefined };
+      const times: number[] = [];
+      for (let frame = 0; frame < 6; frame++) {
+        const start = performance.now();
+        eight.forEach((generator, i) => generator.request(stateAt(8 * frame + i)));
+        await Promise.all(eight.map(({ idle }) => idle));
+        await device.queue.onSubmittedWorkDone();
+        // The first frames start sessions.
+        if (frame > 1) times.push(performance.now() - start);
+      }
+      eight.forEach((generator) => generator.close());
+      return Math.min(...times);
+    };
+    const [apart, together] = [await millisecondsOf('avatar'), await millisecondsOf('avatar-instances')];
+    console.log(`a frame of eight avatars: ${together.toFixed(1)} ms in one run, ${apart.toFixed(1)} ms in eight`);
+    assert(together < 0.7 * apart, `${together} ms in one run, ${apart} ms in eight`);
+  });
+
   it('come and go', async () => {
     const errors: unknown[] = [];
     const wanted = new Map<number, number[]>();

@@ -30,6 +30,20 @@ const stateAt = (step: number): GeneratorState => ({
   controls: { gain: 0.5 * step },
 });
 
+it('casts of 16-bit integers cannot even be loaded: what the check says of them is still true', async () => {
+  const url = `${FIXTURES}faulty-cast.onnx`;
+  const bytes = new Uint8Array(await (await fetch(url)).arrayBuffer());
+  const packed = await openModel({ url: `${FIXTURES}packed.onnx` });
+  const model = { ...packed, url, bytes };
+  for (const kind of ['webgpu', 'wasm'] as const) {
+    const failure = await LiveSession.create(kind, await loadRuntime(), model, device).then(
+      () => 'none',
+      (error: unknown) => String(error),
+    );
+    assert(/Cast/.test(failure), `${kind}: ${failure}`);
+  }
+});
+
 describe('recorded commands', () => {
   // The last writes five tensors, four of which never change.
   for (const path of [

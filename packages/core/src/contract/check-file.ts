@@ -1,4 +1,5 @@
-import type { ExternalFile, OnnxHeader } from '../onnx/header.js';
+import type { ExternalFile, OnnxDtype, OnnxHeader } from '../onnx/header.js';
+import { uncastableTypes } from '../onnx/webgpu-provider.js';
 import type { ContractFault } from './contract-error.js';
 
 /** What ONNX Runtime 1.30 reads. */
@@ -20,6 +21,7 @@ export function checkFile(header: OnnxHeader, { files }: CheckFileOptions): Cont
   return [
     ...checkVersions(header),
     ...checkOperators(header),
+    ...uncastableTypes(header).map(uncastable),
     ...header.externalFiles.flatMap((file) => checkExternalFile(file, files)),
   ];
 }
@@ -61,6 +63,14 @@ function checkOperators({ operators, functions }: OnnxHeader): ContractFault[] {
       remedy: 'export the model with standard operators',
     }));
 }
+
+const uncastable = (dtype: OnnxDtype): ContractFault => ({
+  code: 'contract/operator',
+  where: 'operator Cast',
+  expected: 'casts of types that ONNX Runtime in a page can cast',
+  found: `a cast from or to ${dtype}`,
+  remedy: 'store such numbers as uint8 (two of them for 16 bits), float16, int32 or float32',
+});
 
 function checkExternalFile({ location, byteLength }: ExternalFile, files: CheckFileOptions['files']): ContractFault[] {
   const fault = (expected: string, found: string, remedy: string): ContractFault[] => [

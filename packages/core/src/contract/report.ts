@@ -1,5 +1,5 @@
 import { describeTensor, type OnnxHeader } from '../onnx/header.js';
-import { miscomputedConvolutions } from '../onnx/webgpu-provider.js';
+import { gpuNotes } from '../onnx/webgpu-provider.js';
 import type { Contract, InputBinding } from './contract.js';
 import { tensorNames } from './parse-contract.js';
 import type { ResolvedContract } from './resolve-contract.js';
@@ -30,10 +30,7 @@ function fileRows(header: OnnxHeader): string[][] {
     ['versions', [`IR ${irVersion}`, ...[...opsets].map(([domain, version]) => `${domain} ${version}`)].join(', ')],
     ['operators', used.length > 40 ? `${used.slice(0, 40).join(', ')} and ${used.length - 40} more` : used.join(', ')],
   ];
-  for (const { inputs, outputs } of miscomputedConvolutions(header)) {
-    const remedy = 'pad the channels going in to a multiple of 4';
-    rows.push(['on the CPU', `WebGPU computes its convolution of ${inputs} channels to ${outputs} wrongly: ${remedy}`]);
-  }
+  for (const note of gpuNotes(header)) rows.push(['on the CPU', note]);
   for (const { location, byteLength: length } of externalFiles) {
     rows.push(['external data', `${location}${length > 0 ? `, at least ${grouped(length)} bytes` : ''}`]);
   }

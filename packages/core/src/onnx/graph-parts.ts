@@ -21,6 +21,13 @@ export interface Harvest {
   readonly convWeights: string[];
   /** Shapes of weights that might be those of a convolution over pictures, by name. */
   readonly kernels: Map<string, readonly number[]>;
+  /** Names of what casts read, and the element types that they write. */
+  readonly castInputs: string[];
+  readonly castTypes: OnnxDtype[];
+  /** Element types of initializers by name. */
+  readonly dtypes: Map<string, OnnxDtype>;
+  /** Most outputs of a `Split`. */
+  widestSplit: number;
   initializerBytes: number;
 }
 
@@ -30,6 +37,10 @@ export const emptyHarvest = (): Harvest => ({
   initializers: [],
   convWeights: [],
   kernels: new Map(),
+  castInputs: [],
+  castTypes: [],
+  dtypes: new Map(),
+  widestSplit: 0,
   initializerBytes: 0,
 });
 
@@ -106,15 +117,23 @@ export function readNode(bytes: LoadedBytes, span: Span, harvest: Harvest, depth
   let operator = '';
   let domain = '';
   const inputs: string[] = [];
+  let outputs = 0;
+  let castTo = 0;
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
     if (field.number === 1 && inputs.length < 2) inputs.push(field.text(NAME_LIMIT));
+    else if (field.number === 2) outputs++;
     else if (field.number === 4) operator = field.text(NAME_LIMIT);
     else if (field.number === 7) domain = field.text(NAME_LIMIT);
-    else if (field.number === 5 && field.isDelimited) readAttribute(bytes, field, harvest, depth);
+    else if (field.number === 5 && field.isDelimited) castTo = readAttribute(bytes, field, harvest, depth) ?? castTo;
   }
-  harvest.operators.push(operatorName(domain, operator));
-  if (operatorName(domain, operator) === 'Conv' && inputs.length > 1) harvest.convWeights.push(inputs[1]);
+  const full = operatorName(domain, operator);
+  harvest.operators.push(full);
+  if (full === 'Conv' && inputs.length > 1) harvest.convWeights.push(inputs[1]);
+  if (full === 'Split') harvest.widestSplit = Math.max(harvest.widestSplit, outputs);
+  if (full !== 'Cast') return;
+  harvest.castInputs.push(...inputs.slice(0, 1));
+  harvest.castTypes.push(ONNX_DTYPES[castTo] ?? 'unknown');
 }
 
 /** `MatMul` in ONNX's own domain, `com.example:Name` elsewhere. */
@@ -122,14 +141,20 @@ export function operatorName(domain: string, operator: string): string {
   return domain === '' || domain === 'ai.onnx' ? operator : `${domain}:${operator}`;
 }
 
-function readAttribute(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: number): void {
+/** `AttributeProto`. @returns the whole number of the attribute `to`, which casts have */
+function readAttribute(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: number): number | undefined {
+  let name = '';
+  let whole: number | undefined;
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
+    if (field.number === 3 && field.isVarint) whole = field.value;
     if (!field.isDelimited) continue;
-    if (field.number === 5 || field.number === 10) readTensor(bytes, field, harvest);
+    if (field.number === 1) name = field.text(NAME_LIMIT);
+    else if (field.number === 5 || field.number === 10) readTensor(bytes, field, harvest);
     else if (field.number === 22 || field.number === 23) readSparseTensor(bytes, field, harvest);
     else if (field.number === 6 || field.number === 11) readSubgraph(bytes, field, harvest, depth + 1);
   }
+  return name === 'to' ? whole : undefined;
 }
 
 function readSubgraph(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: number): void {
@@ -150,15 +175,18 @@ export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): st
   let name = '';
   const entries = new Map<string, string>();
   const dims: number[] = [];
+  let dtype: OnnxDtype = 'unknown';
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
     if (field.number === 1 && field.isVarint && dims.length <= CONV_RANK) dims.push(field.value);
+    else if (field.number === 2 && field.isVarint) dtype = ONNX_DTYPES[field.value] ?? 'unknown';
     else if (field.number === 8) name = field.text(NAME_LIMIT);
     else if (field.number === 13 && field.isDelimited) readEntry(bytes, field, entries, NAME_LIMIT);
   }
   harvest.initializerBytes += span.end - span.start;
   const location = entries.get('location');
   if (dims.length === CONV_RANK) harvest.kernels.set(name, dims);
+  harvest.dtypes.set(name, dtype);
   if (location !== undefined) harvest.externalFiles.push({ location, byteLength: externalEnd(entries) });
   return name;
 }

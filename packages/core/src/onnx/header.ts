@@ -79,6 +79,10 @@ export interface OnnxHeader {
   readonly operators: ReadonlyMap<string, number>;
   /** One for each set of weights. */
   readonly convolutions: readonly Convolution[];
+  /** Element types that casts turn into others, as far as they are known from initializers and inputs, or turn others into. */
+  readonly casts: ReadonlySet<OnnxDtype>;
+  /** Most outputs of one `Split`; 0 without any. */
+  readonly widestSplit: number;
   /** Operators that the file itself defines, named as in {@link operators}. */
   readonly functions: ReadonlySet<string>;
   readonly externalFiles: readonly ExternalFile[];

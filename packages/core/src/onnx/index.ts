@@ -8,6 +8,6 @@ export {
   type OnnxHeader,
   type OnnxTensor,
 } from './header.js';
-export { miscomputedConvolutions } from './webgpu-provider.js';
+export { gpuNotes, miscomputedConvolutions, uncastableTypes } from './webgpu-provider.js';
 export { readOnnxHeader } from './read-onnx-header.js';
 export { openUrl, type UrlSource, type UrlSourceOptions } from './url-source.js';

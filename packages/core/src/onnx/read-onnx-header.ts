@@ -13,7 +13,7 @@ import {
   readValueInfo,
   type Harvest,
 } from './graph-parts.js';
-import type { ExternalFile, Convolution, OnnxHeader, OnnxTensor } from './header.js';
+import type { ExternalFile, Convolution, OnnxDtype, OnnxHeader, OnnxTensor } from './header.js';
 import { LoadedBytes, NotLoaded } from './loaded-bytes.js';
 import { FieldCursor } from './protobuf.js';
 
@@ -39,6 +39,10 @@ interface Draft {
   readonly convWeights: Set<string>;
   readonly kernels: Map<string, readonly number[]>;
   readonly externalFiles: Map<string, ExternalFile>;
+  readonly castInputs: Set<string>;
+  readonly castTypes: Set<OnnxDtype>;
+  readonly dtypes: Map<string, OnnxDtype>;
+  widestSplit: number;
   initializerBytes: number;
 }
 
@@ -82,6 +86,10 @@ const emptyDraft = (): Draft => ({
   convWeights: new Set(),
   kernels: new Map(),
   externalFiles: new Map(),
+  castInputs: new Set(),
+  castTypes: new Set(),
+  dtypes: new Map(),
+  widestSplit: 0,
   initializerBytes: 0,
 });
 
@@ -187,6 +195,10 @@ function keep(draft: Draft, harvest: Harvest): void {
   const { operators, initializers, externalFiles, initializerBytes } = harvest;
   for (const name of harvest.convWeights) draft.convWeights.add(name);
   for (const [name, dims] of harvest.kernels) draft.kernels.set(name, dims);
+  for (const name of harvest.castInputs) draft.castInputs.add(name);
+  for (const dtype of harvest.castTypes) draft.castTypes.add(dtype);
+  for (const [name, dtype] of harvest.dtypes) draft.dtypes.set(name, dtype);
+  draft.widestSplit = Math.max(draft.widestSplit, harvest.widestSplit);
   for (const name of operators) draft.operators.set(name, (draft.operators.get(name) ?? 0) + 1);
   for (const name of initializers) draft.initializers.add(name);
   for (const { location, byteLength } of externalFiles) {
@@ -212,10 +224,18 @@ function headerOf(draft: Draft, { name, size }: ByteSource): OnnxHeader {
       const [outputs, inputs, ...kernel] = draft.kernels.get(weights) ?? [];
       return outputs === undefined ? [] : [{ inputs, outputs, kernel: kernel as [number, number] }];
     }),
+    casts: castsOf(draft),
+    widestSplit: draft.widestSplit,
     functions: draft.functions,
     externalFiles: [...draft.externalFiles.values()],
     initializerBytes: draft.initializerBytes,
   };
+}
+
+/** Types that casts write, and those of initializers and inputs that they read. */
+function castsOf({ castInputs, castTypes, dtypes, inputs }: Draft): Set<OnnxDtype> {
+  const read = [...castInputs].map((name) => dtypes.get(name) ?? inputs.find((input) => input.name === name)?.dtype);
+  return new Set([...castTypes, ...read.filter((dtype) => dtype !== undefined)]);
 }
 
 function notOnnx(source: ByteSource, head: Uint8Array, cause?: GaussianSplatError): GaussianSplatError {

@@ -131,7 +131,7 @@ def _of_file(model: onnx.ModelProto, opset: int, values: _Values) -> Iterator[Fi
 
 def _of_constants(node: onnx.NodeProto, values: _Values) -> Iterator[Finding]:
     kind = values.types.get(node.input[0])
-    if node.op_type == "Cast" and kind in (TensorProto.UINT16, TensorProto.INT16, TensorProto.UINT32):
+    if node.op_type == "Cast" and kind in (TensorProto.UINT16, TensorProto.INT16, TensorProto.DOUBLE):
         reason = f"{node.input[0]} is {helper.tensor_dtype_to_np_dtype(kind)}, which builds for the web cannot cast"
         yield Finding("failure", node.name, "Cast", reason, "store uint8 (two of them for 16 bits), float16 or int32")
 
