@@ -1,5 +1,5 @@
 /** `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, what editors know of the element, and the demo as a static site. */
-import { rmSync } from 'node:fs';
+import { readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { ensureDependencies } from './lib/prepare.mjs';
 import { must, root } from './lib/run.mjs';
@@ -23,6 +23,7 @@ must(process.execPath, [
   'packages/element/rollup.config.mjs',
   '--silent',
 ]);
+writeLicences();
 describeElement();
 await buildDemo();
 
@@ -30,6 +31,16 @@ function projects() {
   return ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react'].map(
     (name) => `packages/${name}`,
   );
+}
+
+/** The bundle is without comments, and the licences of what is in it ask for their text. */
+function writeLicences() {
+  const own = readFileSync(join(root, 'LICENSE'), 'utf8');
+  const lit = readFileSync(join(root, 'node_modules/lit/LICENSE'), 'utf8');
+  const text = `gaussian-splat\n\n${own}\n\nLit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js\n\n${lit}`;
+  const runtime =
+    'ONNX Runtime, in onnxruntime/: MIT, copyright Microsoft Corporation, https://github.com/microsoft/onnxruntime';
+  writeFileSync(join(root, 'packages/element/cdn/LICENSES.txt'), `${text}\n\n${runtime}\n`);
 }
 
 /** What editors and tools know of the element, from its sources. */

@@ -6,8 +6,6 @@ import { keepInStep } from './in-step.js';
 
 const byId = (id) => document.getElementById(id);
 const query = new URLSearchParams(location.search);
-/** Most frames that are measured of each side. */
-const FRAMES = Number(query.get('frames') ?? 20);
 const [left, right] = ['left', 'right'].map(byId);
 const sides = [left, right];
 
@@ -36,7 +34,7 @@ async function measure() {
   byId('measure').disabled = true;
   try {
     const times = [];
-    for (const element of sides) times.push(await measureFrames(element, { frames: FRAMES }));
+    for (const element of sides) times.push(await measureFrames(element));
     const { decibels, worst } = await differenceOf(left, right);
     const rows = sides.map((element, i) => [
       byId(`${element.id}-name`).textContent,

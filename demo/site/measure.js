@@ -1,6 +1,8 @@
 /** What a scene costs here: measured on the visitor's machine, in the page, while it is drawn. */
 
 const TURN_DEGREES = 6;
+/** Most frames that are measured; the page's address may say fewer. */
+const FRAMES = Number(new URLSearchParams(location.search).get('frames') ?? 30);
 
 /**
  * Milliseconds from the submission of a frame until the GPU has finished it: the camera is turned around the scene, frame by
@@ -9,7 +11,7 @@ const TURN_DEGREES = 6;
  * @param options.frames most frames. @param options.limitMs no further frame is begun after this time.
  * @returns {Promise<{ median: number, frames: number, width: number, height: number }>}
  */
-export async function measureFrames(element, { frames = 30, limitMs = 6000 } = {}) {
+export async function measureFrames(element, { frames = FRAMES, limitMs = 6000 } = {}) {
   element.scrollIntoView({ block: 'nearest' });
   const lease = await element.constructor.sharedDevice.acquire();
   const { queue } = lease.device;

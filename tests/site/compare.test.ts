@@ -21,18 +21,36 @@ const orbits = (tab: Page): Promise<string[]> =>
     [...document.querySelectorAll<Splat>('gaussian-splat')].map((each) => String(each.getCameraOrbit())),
   );
 
+/** A ball of splats whose colours change with the direction: harmonics of degree 2, in the layout of INRIA's trainer. */
+function glossy(): string {
+  const numbered = (name: string, count: number): string[] => Array.from({ length: count }, (_, i) => `${name}_${i}`);
+  const colors = [...numbered('f_dc', 3), ...numbered('f_rest', 24)];
+  const names = ['x', 'y', 'z', ...colors, 'opacity', ...numbered('scale', 3), ...numbered('rot', 4)];
+  const rows = Array.from({ length: 200 }, (_, i) => {
+    const place = [Math.sin(7 * i), Math.sin(11 * i), Math.sin(13 * i)];
+    return [...place, ...colors.map((_, k) => 0.6 * Math.sin(i + 3 * k)), 2, -1.5, -1.5, -1.5, 1, 0, 0, 0].join(' ');
+  });
+  const header = [
+    'ply',
+    'format ascii 1.0',
+    `element vertex ${rows.length}`,
+    ...names.map((name) => `property float ${name}`),
+  ];
+  return [...header, 'end_header', ...rows, ''].join('\n');
+}
+
 describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
   before(async () => (open = await openSite()));
   after(() => open.close());
 
-  for (const [leader, key] of [
-    ['left', 'ArrowRight'],
-    ['right', 'ArrowUp'],
-  ]) {
-    it(`whoever turns the ${leader} picture turns both`, { timeout: 120_000 }, async () => {
-      const { tab, faults } = await open.visit('/compare/?src=/fixtures/compass.splat', { width: 320, height: 500 });
-      await bothLoaded(tab);
+  it('whoever turns one picture turns both, and the keyboard moves the line', { timeout: 120_000 }, async () => {
+    const { tab, faults } = await open.visit('/compare/?src=/fixtures/compass.splat', { width: 240, height: 400 });
+    await bothLoaded(tab);
+    for (const [leader, key] of [
+      ['left', 'ArrowRight'],
+      ['right', 'ArrowUp'],
+    ]) {
       const [before] = await orbits(tab);
       await tab.evaluate((id) => document.getElementById(id)!.focus(), leader);
       await tab.keyboard.press(key);
@@ -44,26 +62,22 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
         before,
         PATIENCE,
       );
-      assert.deepEqual(faults, []);
-      await tab.close();
-    });
-  }
-
-  it('the keyboard moves the line, and each picture ends there', { timeout: 60_000 }, async () => {
-    const { tab } = await open.visit('/compare/?src=/fixtures/compass.splat');
+    }
     await tab.focus('#split');
     for (let i = 0; i < 20; i++) await tab.keyboard.press('ArrowLeft');
     const clips = await tab.evaluate(() =>
       [...document.querySelectorAll('gaussian-splat')].map((each) => getComputedStyle(each).clipPath),
     );
     assert.deepEqual(clips, ['inset(0px 60% 0px 0px)', 'inset(0px 0px 0px 40%)']);
+    assert.deepEqual(faults, []);
     await tab.close();
   });
 
   it('measures both, and how far harmonics of degree 0 are from those of degree 2', { timeout: 200_000 }, async () => {
-    const { tab, faults } = await open.visit('/compare/?left=default,3&right=default,0&frames=3', {
+    const { tab, faults } = await open.visit('/compare/?src=/glossy.ply&left=default,3&right=default,0&frames=3', {
       width: 240,
       height: 400,
+      prepare: (page) => page.route('**/glossy.ply', (route) => route.fulfill({ body: glossy() })),
     });
     await bothLoaded(tab);
     await tab.click('#measure');
@@ -78,7 +92,7 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
     const [decibels, worst] = [Number(cells[2]), Number(cells[3])];
     assert.equal(rows.length, 2);
     assert.ok(Number(cells[1]) > 0, 'it took time');
-    assert.ok(decibels > 20 && decibels < 45, `${decibels} dB`);
+    assert.ok(decibels > 5 && decibels < 40, `${decibels} dB`);
     assert.ok(worst > 5, `${worst} of 255`);
     assert.deepEqual(faults, []);
     // The same on both sides is the same picture.

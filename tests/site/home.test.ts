@@ -1,38 +1,25 @@
 /** The first page: tabs, the copied view, errors for people. Its scene is a small one here; pages.test.ts waits for the real one. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
-import { readFileSync } from 'node:fs';
-import type { Page } from 'playwright-core';
-import { isBuilt, openSite, root, type OpenSite } from './support.js';
+import { isBuilt, openSite, withCompass, type OpenSite, type Visit } from './support.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
   getCameraOrbit(): object;
 }
 const PATIENCE = { timeout: 100_000, polling: 100 };
-const compass = readFileSync(`${root}tests/element/browser/fixtures/compass.ply`);
-const withCompass = (tab: Page): Promise<unknown> =>
-  tab.route('**/skull.spz', (route) => route.fulfill({ body: compass, contentType: 'application/octet-stream' }));
 
 describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
-  before(async () => (open = await openSite()));
+  let only: Visit;
+  before(async () => {
+    open = await openSite();
+    only = await open.visit('/', { prepare: withCompass });
+  });
   after(() => open.close());
 
-  it('has tabs that the arrows lead through', async () => {
-    const { tab, faults } = await open.visit('/', { prepare: withCompass });
-    await tab.focus('#tab-html');
-    await tab.keyboard.press('ArrowLeft');
-    const shown = await tab.locator('[role=tabpanel]:visible').evaluateAll((all) => all.map(({ id }) => id));
-    assert.deepEqual(shown, ['panel-vue']);
-    assert.equal(await tab.evaluate(() => document.activeElement!.id), 'tab-vue');
-    assert.equal(await tab.getAttribute('#tab-vue', 'aria-selected'), 'true');
-    assert.deepEqual(faults, []);
-    await tab.close();
-  });
-
   it('copies the view that somebody has turned to', async () => {
-    const { tab, faults } = await open.visit('/', { prepare: withCompass });
+    const { tab, faults } = only;
     await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, PATIENCE);
     await tab.evaluate(() => document.querySelector<Splat>('#hero')!.focus());
     await tab.keyboard.press('ArrowRight');
@@ -42,11 +29,21 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.ok((await tab.locator('#snippet').textContent())!.includes(`camera-orbit="${orbit}"`));
     assert.notEqual(await tab.locator('#copied').textContent(), '');
     assert.deepEqual(faults, []);
-    await tab.close();
+  });
+
+  it('has tabs that the arrows lead through', async () => {
+    const { tab, faults } = only;
+    await tab.focus('#tab-html');
+    await tab.keyboard.press('ArrowLeft');
+    const shown = await tab.locator('[role=tabpanel]:visible').evaluateAll((all) => all.map(({ id }) => id));
+    assert.deepEqual(shown, ['panel-vue']);
+    assert.equal(await tab.evaluate(() => document.activeElement!.id), 'tab-vue');
+    assert.equal(await tab.getAttribute('#tab-vue', 'aria-selected'), 'true');
+    assert.deepEqual(faults, []);
   });
 
   it('says what is wrong with a scene, and shows the next one', async () => {
-    const { tab } = await open.visit('/', { prepare: withCompass });
+    const { tab } = only;
     const status = (pattern: RegExp): Promise<unknown> =>
       tab.waitForFunction(
         (source) => new RegExp(source).test(document.querySelector('#faulty-status')!.textContent!),
@@ -59,6 +56,5 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     await status(/web page|HTML/);
     await tab.click('[data-source="scenes/skull.spz"]');
     await status(/^\d+ splats/);
-    await tab.close();
   });
 });

@@ -1,8 +1,8 @@
-/** Every page of the built site in Chromium: nothing fails, nothing is missing, nothing is wider than a phone, axe finds nothing. */
+/** Every page of the built site (of the documents one, unless SITE=full) in Chromium: nothing fails, nothing is missing, nothing is wider than a phone, axe finds nothing. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
 import type { Page } from 'playwright-core';
-import { isBuilt, openSite, pagesOf, root, type OpenSite } from './support.js';
+import { isBuilt, openSite, pagesOf, root, withCompass, type OpenSite, type Visit } from './support.js';
 
 const AXE = `${root}node_modules/axe-core/axe.min.js`;
 /** Pages that measure as soon as they are open are given next to nothing to measure. */
@@ -11,9 +11,6 @@ const QUERIES: Readonly<Record<string, string>> = {
   '/bench/stability.html': '?only=S7&peers=0',
   '/bench/generators.html': '?models=/fixtures/compass.ply',
 };
-/** Scenes that are waited for; the others are shown by tests of their own. */
-const WAITED_FOR: Readonly<Record<string, string>> = { '/': '#hero' };
-
 interface AxeResults {
   readonly violations: readonly { id: string; help: string; nodes: readonly { html: string }[] }[];
   readonly passes: readonly unknown[];
@@ -29,6 +26,8 @@ async function violations(tab: Page, colors = true): Promise<string[]> {
 
 /** The document whose colours stand for those of all. */
 const LONGEST = '/docs/packages/element/';
+/** Documents have no scripts and one layout: `npm run test:site` opens all of them, `npm test` one that has everything. */
+const isVisited = (url: string): boolean => process.env.SITE === 'full' || !isDocument(url) || url === LONGEST;
 const isDocument = (url: string): boolean => /^\/docs\/./.test(url);
 
 const widerThanItsWindow = (tab: Page): Promise<number> =>
@@ -36,14 +35,19 @@ const widerThanItsWindow = (tab: Page): Promise<number> =>
 
 describe('every page of the site', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
-  before(async () => (open = await openSite()));
+  let only: Visit;
+  before(async () => {
+    open = await openSite();
+    only = await open.visit('/', { prepare: withCompass });
+  });
   after(() => open.close());
 
-  for (const url of isBuilt ? pagesOf() : []) {
+  for (const url of isBuilt ? pagesOf().filter(isVisited) : []) {
     it(url, { timeout: 120_000 }, async () => {
-      const { tab, faults } = await open.visit(url + (QUERIES[url] ?? ''));
-      const scene = WAITED_FOR[url];
-      if (scene) await tab.waitForFunction((id) => document.querySelector<Scene>(id)?.loaded, scene, PATIENCE);
+      const { tab, faults } = only;
+      await tab.setViewportSize({ width: 390, height: 400 });
+      await tab.emulateMedia({ colorScheme: 'light' });
+      await open.go(only, url + (QUERIES[url] ?? ''));
       assert.equal(await tab.locator('h1').count(), 1, 'one heading of the first rank');
       assert.notEqual(await tab.title(), '');
       await tab.addScriptTag({ path: AXE });
@@ -51,29 +55,23 @@ describe('every page of the site', { skip: isBuilt ? false : 'no site: npm run b
         [390, 'light'],
         [1280, 'dark'],
       ] as const) {
-        await tab.setViewportSize({ width, height: 800 });
-        await tab.emulateMedia({ colorScheme });
-        assert.ok((await widerThanItsWindow(tab)) <= 0, `wider than ${width} pixels`);
         // Documents share layout, markup and colours: once over each is enough, and a third of the time.
         if (width === 1280 && isDocument(url)) continue;
+        await tab.setViewportSize({ width, height: 400 });
+        await tab.emulateMedia({ colorScheme });
+        assert.ok((await widerThanItsWindow(tab)) <= 0, `wider than ${width} pixels`);
         const colors = !isDocument(url) || url === LONGEST;
         assert.deepEqual(await violations(tab, colors), [], `${width} pixels, ${colorScheme}`);
       }
       assert.deepEqual(faults, []);
-      await tab.close();
     });
   }
 
   it('and axe would find something', async () => {
-    const { tab } = await open.visit('/docs/');
+    const { tab } = only;
+    await open.go(only, '/docs/');
     await tab.addScriptTag({ path: AXE });
     await tab.evaluate(() => document.querySelector('main')!.append(document.createElement('input')));
     assert.ok((await violations(tab)).some((text) => text.startsWith('label')));
-    await tab.close();
   });
 });
-
-interface Scene extends Element {
-  readonly loaded: boolean;
-}
-const PATIENCE = { timeout: 100_000, polling: 200 };

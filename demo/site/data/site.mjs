@@ -22,6 +22,7 @@ export default {
     { title: 'Architecture', url: '/docs/architecture/' },
     { title: 'Changelog', url: '/docs/changelog/' },
     { title: 'Licence', url: '/docs/license/' },
+    { title: 'Third parties', url: '/docs/third-party/' },
     { title: 'Attribution: scenes', url: '/docs/demo/scenes/attribution/' },
     { title: 'Attribution: generators', url: '/docs/demo/generators/attribution/' },
   ],
