@@ -41,6 +41,9 @@ interface Settle {
 /** All that pictures in motion may be drawn with. */
 const MOVING_LEVERS: readonly Partial<FrameLevers>[] = LADDER.flatMap(({ levers }) => levers ?? []);
 
+/** A scene that is replaced sooner, as a preview may be, needs nothing made for it, ms. */
+const PREPARE_AFTER_MS = 300;
+
 /** Draws the scene into the element's canvas, a frame at a time and only when asked. */
 export class ViewController implements FrameClient {
   /** What frames in motion are drawn with. */
@@ -149,10 +152,11 @@ export class ViewController implements FrameClient {
     else scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
   }
 
-  /** Pictures in motion must not wait for pipelines: those that they may need are made now. */
-  #afterFirst(scene: GpuScene, { target }: Frame, { resolve }: Settle): void {
+  /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture. */
+  #afterFirst(scene: GpuScene, { target: { format } }: Frame, { resolve }: Settle): void {
     resolve();
-    if (this.#options.quality() === 'auto' && scene.isMeasurable) scene.prepare(MOVING_LEVERS, target.format);
+    if (this.#options.quality() !== 'auto' || !scene.isMeasurable) return;
+    setTimeout(() => this.#scene === scene && scene.prepare(MOVING_LEVERS, format), PREPARE_AFTER_MS);
   }
 
   #applyQuality(scene: GpuScene): void {
