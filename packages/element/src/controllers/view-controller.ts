@@ -148,7 +148,9 @@ export class ViewController implements FrameClient {
     const hasChanged = first === undefined && (cameraMoved || version !== this.#drawnVersion);
     this.#drawnVersion = version;
     const { level, levers } = this.pace.plan({ now, hasChanged, goesOn: this.#options.camera.isMoving });
-    if (first === undefined) scene.render({ ...request, levers }, (spent) => this.pace.sample(level, spent));
+    // Who has chosen a quality pays for no clock.
+    const onTime = this.#options.quality() === 'auto' ? (spent: number) => this.pace.sample(level, spent) : undefined;
+    if (first === undefined) scene.render({ ...request, levers }, onTime);
     else scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
   }
 
