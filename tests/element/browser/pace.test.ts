@@ -62,6 +62,7 @@ describe('the pace of pictures', () => {
       wholes.push(await nextTime(auto));
     }
     const [whole, paced] = [median(wholes), median(paceds)];
+    await turnFor(auto, 500);
     const { pace, why } = auto.stats!;
     console.log(`${whole.toFixed(0)} ms a frame at full quality, ${paced.toFixed(0)} with ${pace.moving}`);
     await turnFor(fixed, 1_000);
