@@ -41,12 +41,14 @@ const views = Array.from({ length: 3 }, (_, k) => cameraAt([0.6 + 0.2 * k, -0.5,
 const isSame = (a: Float32Array, b: Float32Array): boolean => a.length === b.length && a.every((v, i) => v === b[i]);
 
 for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
+  // Every mix of shader levers is seconds of compiling for tiles here.
+  const mixes = rasterizer === 'quads' ? MIXES : MIXES.slice(1);
   test(`${rasterizer}: a frame's levers draw what a renderer of those levers draws, and the next frame without is whole`, async () => {
     const device = await nodeDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const own = new Renderer(device, { rasterizer });
     const plain = new Renderer(device, { rasterizer });
-    for (const levers of MIXES) {
+    for (const levers of mixes) {
       const fixed = new Renderer(device, { rasterizer, ...levers });
       for (const camera of views) {
         const mixed = await readFrame(device, own, { gaussians, camera, levers });
@@ -74,7 +76,7 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
     const format = 'rgba8unorm';
     const target = device.createTexture({ size: [size.width, size.height], format, usage: 0x10 });
     const made: string[] = [];
-    renderer.prepare(MIXES, format);
+    renderer.prepare(mixes, format);
     for (const name of ['createComputePipeline', 'createRenderPipeline', 'createShaderModule'] as const) {
       const original = device[name].bind(device) as (descriptor: never) => never;
       Object.assign(device, { [name]: (descriptor: never) => (made.push(name), original(descriptor)) });
@@ -84,12 +86,12 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
     };
     draw();
     made.length = 0;
-    for (const levers of MIXES) draw(levers);
+    for (const levers of mixes) draw(levers);
     assert.deepEqual(made, [], 'pipelines of prepared levers');
     const counter = countWork(device);
     counter.take();
     const before = renderer.byteLength;
-    for (const levers of [...MIXES, undefined, ...MIXES]) draw(levers);
+    for (const levers of [...mixes, undefined, ...mixes]) draw(levers);
     assert.equal(counter.take().bytesAllocated, 0);
     assert.equal(renderer.byteLength, before);
     renderer.destroy();

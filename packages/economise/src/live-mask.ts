@@ -45,6 +45,8 @@ export interface LiveMaskOptions {
   readonly signal?: AbortSignal;
   /** Pixels of the views; default 480 x 270. */
   readonly viewSize?: ViewSize;
+  /** Once looking has taken so long, ms, 12 of the 32 views must do; default 8 s. The mask then depends on how fast the GPU is. */
+  readonly patienceMs?: number;
 }
 
 /** What is shown of a scene. */
@@ -87,10 +89,10 @@ export class LiveMask {
     device: GPUDevice,
     scene: GaussianScene,
     bounds: Bounds,
-    { signal, viewSize = VIEW_SIZE }: LiveMaskOptions = {},
+    { signal, viewSize = VIEW_SIZE, patienceMs = LONG_MS }: LiveMaskOptions = {},
   ): Promise<LiveMask> {
     const views = viewsAround(bounds, SCORED, viewSize);
-    const { weights, seen } = await contributionsIn(device, scene, views, signal);
+    const { weights, seen } = await contributionsIn(device, scene, views, patienceMs, signal);
     const whole = await readPacked(device, scene);
     signal?.throwIfAborted();
     await keepUnseen(weights, whole, views.slice(0, seen));
@@ -182,6 +184,7 @@ async function contributionsIn(
   device: GPUDevice,
   scene: GaussianScene,
   views: readonly Camera[],
+  patienceMs: number,
   signal: AbortSignal | undefined,
 ): Promise<{ weights: Float32Array; seen: number }> {
   const size = 4 * CHUNK * Math.max(1, Math.ceil(scene.count / CHUNK));
@@ -194,7 +197,7 @@ async function contributionsIn(
     const began = performance.now();
     let seen = 0;
     for (const camera of views) {
-      if (seen >= LEAST_VIEWS && performance.now() - began > LONG_MS) break;
+      if (seen >= LEAST_VIEWS && performance.now() - began > patienceMs) break;
       for (let tries = 0; tries < MOST_TRIES; tries++) {
         renderer.render({ gaussians: scene, camera, target, notes: { contributions: noted } });
         // The page's own frames come between.

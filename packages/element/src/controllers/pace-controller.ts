@@ -42,7 +42,7 @@ export interface PaceReport {
   readonly reason: PaceReason;
   /** Median of the last frames on that rung, ms on the GPU; null while there are none. */
   readonly frameMs: number | null;
-  /** The last frame that was timed, at rest or in motion, ms on the GPU; null while there is none. */
+  /** The last frame that was timed, at rest or in motion, ms on the GPU; null while there is none, and with a chosen quality. */
   readonly lastMs: number | null;
   /** What a frame may take, ms. */
   readonly targetMs: number;

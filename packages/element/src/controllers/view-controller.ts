@@ -42,6 +42,9 @@ interface Settle {
 /** All that pictures in motion may be drawn with. */
 const MOVING_LEVERS: readonly Partial<FrameLevers>[] = LADDER.flatMap(({ levers }) => levers ?? []);
 
+/** A scene that is replaced sooner, as a preview may be, needs nothing made for it, ms. */
+const PREPARE_AFTER_MS = 300;
+
 /** Draws the scene into the element's canvas, a frame at a time and only when asked. */
 export class ViewController implements FrameClient {
   /** What frames in motion are drawn with. */
@@ -146,15 +149,17 @@ export class ViewController implements FrameClient {
     const hasChanged = first === undefined && (cameraMoved || version !== this.#drawnVersion);
     this.#drawnVersion = version;
     const { level, levers } = this.pace.plan({ now, hasChanged, goesOn: this.#options.camera.isMoving });
-    if (first === undefined) scene.render({ ...request, levers }, (spent) => this.pace.sample(level, spent));
+    // Who has chosen a quality pays for no clock.
+    const onTime = this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(level, spent) : undefined;
+    if (first === undefined) scene.render({ ...request, levers }, onTime);
     else scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
   }
 
-  /** Pictures in motion must not wait for pipelines: those that they may need are made now. */
-  #afterFirst(scene: GpuScene, { target }: Frame, { resolve }: Settle): void {
+  /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture. */
+  #afterFirst(scene: GpuScene, { target: { format } }: Frame, { resolve }: Settle): void {
     resolve();
-    const isPaced = this.#options.rendering().quality === 'auto';
-    if (isPaced && scene.isMeasurable) scene.prepare(MOVING_LEVERS, target.format);
+    if (this.#options.rendering().quality !== 'auto' || !scene.isMeasurable) return;
+    setTimeout(() => this.#scene === scene && scene.prepare(MOVING_LEVERS, format), PREPARE_AFTER_MS);
   }
 
   #applyRendering(scene: GpuScene): void {
