@@ -16,7 +16,7 @@ const say = (text) => {
 };
 
 async function open(device) {
-  const url = new URL(query.get('scene') ?? 'scene/detail.json', location.href);
+  const url = new URL(query.get('scene'), location.href);
   const manifest = checkManifest(await (await fetch(url)).json(), url.href);
   const traffic = { requests: 0, bytes: 0, errors: [] };
   const fetchPage = async (file, signal) => {
@@ -167,7 +167,11 @@ async function main() {
   };
 }
 
-const report = await main().catch((error) => ({ error: `${error}\n${error.stack}` }));
-document.getElementById('json').textContent = JSON.stringify(report, null, 1);
-globalThis.report = report;
-if (query.has('report')) await fetch(query.get('report'), { method: 'POST', body: JSON.stringify(report, null, 1) });
+if (query.has('scene')) {
+  const report = await main().catch((error) => ({ error: `${error}\n${error.stack}` }));
+  document.getElementById('json').textContent = JSON.stringify(report, null, 1);
+  globalThis.report = report;
+  if (query.has('report')) {
+    await fetch(query.get('report'), { method: 'POST', body: JSON.stringify(report, null, 1) });
+  }
+}

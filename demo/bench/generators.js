@@ -1,5 +1,5 @@
 /** The page that times generators alone: sessions of ONNX Runtime on one device, runs back to back, nothing drawn. */
-import { GeneratorSession, openModel, setRuntimeLocation } from '@gaussian-splat/generator';
+import { GeneratorSession, inputsOfInstances, openModel, setRuntimeLocation, stackInputs } from '@gaussian-splat/generator';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { sendReport } from './run/report.js';
 
@@ -26,16 +26,25 @@ function stateAt(run, model) {
   };
 }
 
-/** Milliseconds for one run of every instance, first after the other, on a queue that is never waited for between. */
+/** One session for each instance, which run one after the other; or a single one where the model takes all of them in one run. */
+function sessionsFor(model, device, instances, onFallback) {
+  const make = () => new GeneratorSession(model, device, onFallback);
+  if (!model.contract.instances) return Array.from({ length: instances }, make);
+  return [make().forInstances(instances)];
+}
+
+/** Milliseconds for one run of every instance, on a queue that is never waited for between. */
 async function measure(device, url, instances) {
   const model = await openModel({ url: new URL(url, document.baseURI).href });
   const fallbacks = [];
-  const sessions = Array.from(
-    { length: instances },
-    () => new GeneratorSession(model, device, (r) => fallbacks.push(r)),
-  );
+  const sessions = sessionsFor(model, device, instances, (reason) => fallbacks.push(reason));
+  const varying = inputsOfInstances(model.header, model.contract);
   const runAll = async (run) => {
-    for (const session of sessions) await session.run(session.bind(stateAt(run, model)), () => undefined);
+    for (const session of sessions) {
+      const states = Array.from({ length: instances / sessions.length }, (_, i) => stateAt(run + 7 * i, model));
+      const inputs = states.map((state) => session.bind(state));
+      await session.run(model.contract.instances ? stackInputs(inputs, varying) : inputs[0], () => undefined);
+    }
   };
   for (let run = 0; run < WARM_UP; run++) await runAll(run + 0.5);
   await device.queue.onSubmittedWorkDone();
@@ -47,7 +56,7 @@ async function measure(device, url, instances) {
   const kind = sessions[0].kind;
   await Promise.all(sessions.map((session) => session.release()));
   return {
-    ...{ url, instances, rows: model.contract.nMax, kind, fallbacks },
+    ...{ url, instances, runs: sessions.length, rows: model.contract.nMax, kind, fallbacks },
     millisecondsPerRun: (ended - started) / RUNS,
     ofWhichSubmitting: (submitted - started) / RUNS,
   };
