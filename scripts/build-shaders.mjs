@@ -10,17 +10,22 @@ import { ResourceType, WgslReflect } from 'wgsl_reflect/wgsl_reflect.module.js';
 const shaderFolder = fileURLToPath(new URL('../shaders/', import.meta.url));
 const outputFolder = fileURLToPath(new URL('../packages/renderer/src/generated/', import.meta.url));
 
-/** The text of a shader with each `#import PATH` replaced, once, by the file it names. */
-function resolveImports(path, seen = new Set()) {
+const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
+const IMPORT = /^#import (\S+)$/gm;
+
+/** A shader and all files that it imports, each once, before whoever asks for it. */
+function partsOf(path, seen = new Set()) {
+  if (seen.has(path)) return [];
   seen.add(path);
-  return readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8')
-    .split('\n')
-    .map((line) => {
-      const imported = /^#import (\S+)$/.exec(line)?.[1];
-      if (imported === undefined) return line;
-      return seen.has(imported) ? '' : resolveImports(imported, seen);
-    })
-    .join('\n');
+  const imported = [...textOf(path).matchAll(IMPORT)].flatMap(([, name]) => partsOf(name, seen));
+  return [...imported, path];
+}
+
+/** A file's own lines. Its imports come first, as they would in any language. */
+function ownCode(path) {
+  const code = strip(textOf(path));
+  if (/\n(?!#import)[^\n]*\n#import/.test(`\n${code}`)) throw new Error(`shaders/${path}.wgsl: #import behind code`);
+  return code.replace(IMPORT, '').trim();
 }
 
 /** Comments and indentation are for readers of shaders/, not for the bytes that a page loads. */
@@ -90,16 +95,22 @@ const stages = readdirSync(shaderFolder)
   .sort();
 const structs = new Map();
 const constants = {};
+/** Each file once, however many stages import it: a page loads them all. */
+const parts = new Map();
+const partName = (path) => `${camelCase(path.replace('/', '_'))}Part`;
 const sections = stages.map((stage) => {
-  const code = strip(resolveImports(stage));
+  const paths = partsOf(stage);
+  for (const path of paths) parts.set(path, ownCode(path));
+  const code = paths.map((path) => parts.get(path)).join('\n');
   const reflection = reflect(stage, code);
   for (const struct of reflection.structs) structs.set(struct.name, reflectStruct(struct));
   for (const [name, value] of Object.entries(reflectConstants(code))) {
     if (constants[name] !== undefined && constants[name] !== value) throw new Error(`${stage}: ${name} has two values`);
     constants[name] = value;
   }
-  const description = { name: stage, bindings: reflectBindings(reflection), code };
-  return `export const ${camelCase(stage)} = ${literal(description)} as const;\n`;
+  const joined = paths.map(partName).join(" + '\\n' + ");
+  const bindings = literal(reflectBindings(reflection));
+  return `export const ${camelCase(stage)} = {\n  name: '${stage}',\n  bindings: ${bindings},\n  code: ${joined},\n} as const;\n`;
 });
 
 const header = '/** Written by scripts/build-shaders.mjs from shaders/. Do not edit. */\n/* eslint-disable */\n';
@@ -109,6 +120,8 @@ writeFileSync(
   `${outputFolder}shaders.ts`,
   [
     header,
+    ...[...parts].map(([path, code]) => `const ${partName(path)} = ${JSON.stringify(code)};`),
+    '',
     ...sections,
     '/** Byte sizes and offsets of the WGSL structs. */',
     `export const layouts = ${literal(layouts)} as const;\n`,

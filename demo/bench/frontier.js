@@ -75,6 +75,15 @@ async function collect(run) {
   const cameras = along(run.frames);
   const views = spread(along(PATH_FRAMES), Number(query.get('views') ?? 4));
   const kind = query.get('reference') ?? 'auto';
+  // Times first: reading pictures back lets a GPU fall asleep.
+  const measured = await visitInTurns(
+    entries.map((entry) => ({ ...entry, cameras })),
+    {
+      ...run,
+      open: (entry) => subjects.open(entry),
+      onVisit: ({ name }, round) => showProgress(`round ${round + 1} of ${run.rounds}: ${name}`),
+    },
+  );
   const references = await makeReferences({
     device: gpu.device,
     scene,
@@ -82,23 +91,17 @@ async function collect(run) {
     kind,
     onProgress: showProgress,
   });
-
-  const judged = [];
-  for (const entry of entries) {
-    showProgress(`comparing ${entry.name}`);
-    judged.push(await judge(subjects, entry, views, references));
+  const results = [];
+  for (const [i, configuration] of entries.entries()) {
+    const { visits, facts, error } = measured[i];
+    if (error) {
+      results.push({ configuration, error });
+      continue;
+    }
+    showProgress(`comparing ${configuration.name}`);
+    const judged = await judge(subjects, configuration, views, references);
+    results.push({ configuration, ...judged, ...(judged.error ? {} : { ...summarizeVisits(visits), ...facts }) });
   }
-  const measurable = entries.filter((_, i) => !judged[i].error).map((entry) => ({ ...entry, cameras }));
-  const measured = await visitInTurns(measurable, {
-    ...run,
-    open: (entry) => subjects.open(entry),
-    onVisit: ({ name }, round) => showProgress(`round ${round + 1} of ${run.rounds}: ${name}`),
-  });
-  const results = entries.map((configuration, i) => {
-    if (judged[i].error) return { configuration, ...judged[i] };
-    const { visits, facts, error } = measured.shift();
-    return { configuration, ...judged[i], ...(error ? { error } : { ...summarizeVisits(visits), ...facts }) };
-  });
   subjects.dispose();
   await scene.destroy();
   const { images, ...reference } = references;

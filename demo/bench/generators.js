@@ -1,5 +1,11 @@
 /** The page that times generators alone: sessions of ONNX Runtime on one device, runs back to back, nothing drawn. */
-import { GeneratorSession, inputsOfInstances, openModel, setRuntimeLocation, stackInputs } from '@gaussian-splat/generator';
+import {
+  GeneratorSession,
+  inputsOfInstances,
+  openModel,
+  setRuntimeLocation,
+  stackInputs,
+} from '@gaussian-splat/generator';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { sendReport } from './run/report.js';
 
@@ -26,24 +32,22 @@ function stateAt(run, model) {
   };
 }
 
-/** One session for each instance, which run one after the other; or a single one where the model takes all of them in one run. */
-function sessionsFor(model, device, instances, onFallback) {
-  const make = () => new GeneratorSession(model, device, onFallback);
-  if (!model.contract.instances) return Array.from({ length: instances }, make);
-  return [make().forInstances(instances)];
-}
-
 /** Milliseconds for one run of every instance, on a queue that is never waited for between. */
 async function measure(device, url, instances) {
   const model = await openModel({ url: new URL(url, document.baseURI).href });
   const fallbacks = [];
-  const sessions = sessionsFor(model, device, instances, (reason) => fallbacks.push(reason));
+  const makeSession = () => new GeneratorSession(model, device, (reason) => fallbacks.push(reason));
+  // The one that binds the inputs of each instance; all of them run together where the model takes instances, else one after the other.
+  const single = makeSession();
+  const isOneRun = model.contract.instances !== undefined;
+  const sessions = isOneRun ? [single.forInstances(instances)] : [single];
+  while (!isOneRun && sessions.length < instances) sessions.push(makeSession());
   const varying = inputsOfInstances(model.header, model.contract);
   const runAll = async (run) => {
     for (const session of sessions) {
       const states = Array.from({ length: instances / sessions.length }, (_, i) => stateAt(run + 7 * i, model));
-      const inputs = states.map((state) => session.bind(state));
-      await session.run(model.contract.instances ? stackInputs(inputs, varying) : inputs[0], () => undefined);
+      const inputs = states.map((state) => single.bind(state));
+      await session.run(isOneRun ? stackInputs(inputs, varying) : inputs[0], () => undefined);
     }
   };
   for (let run = 0; run < WARM_UP; run++) await runAll(run + 0.5);

@@ -225,7 +225,7 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(num_workgroups) tiles: vec3
       if (pixel.finished) { break; }
       // Of these 32 splats those that touch the block, two at once: the second is read while the first is blended.
       var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
-      while (ahead != 0u) {
+      while (ahead > 0u) {
         let k = word * 32u + countTrailingZeros(ahead);
         ahead &= ahead - 1u;
         let is_pair = ahead != 0u;

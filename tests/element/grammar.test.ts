@@ -130,7 +130,7 @@ test('an absent attribute takes its default in silence', () => {
   assert.equal(read.touchAction, 'pan-y');
   assert.equal(read.interpolationDecay, 50);
   assert.equal(read.maxPixelRatio, Infinity);
-  assert.equal(read.quality, 'default');
+  assert.equal(read.quality, 'auto');
   assert.equal(read.maxShDegree, 3);
   assert.equal(read.camera.up, '-y');
   assert.deepEqual(read.camera.orbit, { theta: 0, phi: 75 * DEGREE, radius: 'auto' });

@@ -27,7 +27,7 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.click('#copy-view');
     const orbit = await tab.evaluate(() => String(document.querySelector<Splat>('#hero')!.getCameraOrbit()));
     assert.ok((await tab.locator('#snippet').textContent())!.includes(`camera-orbit="${orbit}"`));
-    assert.notEqual(await tab.locator('#copied').textContent(), '');
+    await tab.waitForFunction(() => document.querySelector('#copied')!.textContent !== '', undefined, PATIENCE);
     assert.deepEqual(faults, []);
   });
 

@@ -10,15 +10,19 @@
 
 export const PHASES = ['gpu', 'wall', 'throughput'];
 
-/** Timed frames between two readings of timestamps. */
+/** Timed frames between two readings of timestamps, submitted without waiting for one another. */
 const READ_EVERY = 50;
-/** Frames that may be in flight when throughput is measured. */
+/** Frames that may be in flight when throughput is measured, and when a GPU is made to work. */
 const IN_FLIGHT = 2;
+const BUSY_IN_FLIGHT = 16;
+/** Milliseconds of work before a visit measures: GPUs that were idle run at a fraction of their clock. */
+const BUSY_MS = 400;
 
 /** One visit to a subject: warm-up, then each phase over all cameras. Times in milliseconds. */
 export async function visit(subject, cameras, { warmUp, phases = PHASES }) {
   const samples = { passes: [], wall: [], sortedWall: [], cpu: [], throughput: [] };
   for (let i = 0; i < warmUp; i++) await drawAndWait(subject, cameras[i % cameras.length]);
+  await keepBusy(subject, cameras);
   if (subject.settle) await subject.settle(cameras[0]);
   if (phases.includes('gpu') && subject.readTimes) samples.passes = await timePasses(subject, cameras);
   if (phases.includes('wall')) {
@@ -29,16 +33,29 @@ export async function visit(subject, cameras, { warmUp, phases = PHASES }) {
   return samples;
 }
 
-async function drawAndWait(subject, camera, timed = false) {
-  subject.draw(camera, timed);
+async function drawAndWait(subject, camera) {
+  subject.draw(camera, false);
   await subject.finish();
   await nextTask();
 }
 
+/** Draws without a pause until the GPU has worked for a while. */
+async function keepBusy(subject, cameras) {
+  const until = performance.now() + BUSY_MS;
+  for (let i = 0; performance.now() < until; i++) {
+    subject.draw(cameras[i % cameras.length], false);
+    if (i % BUSY_IN_FLIGHT === BUSY_IN_FLIGHT - 1) await subject.finish();
+    await nextTask();
+  }
+  await subject.finish();
+}
+
+/** Frames one right after the other: waited for one by one, a GPU that they do not fill lowers its clock. */
 async function timePasses(subject, cameras) {
   const frames = [];
   for (const [i, camera] of cameras.entries()) {
-    await drawAndWait(subject, camera, true);
+    subject.draw(camera, true);
+    await nextTask();
     if ((i + 1) % READ_EVERY === 0) frames.push(...(await subject.readTimes()));
   }
   frames.push(...(await subject.readTimes()));
