@@ -18,9 +18,9 @@ const skull = await readScene(readFileSync(new URL('../../demo/scenes/skull.spz'
 });
 
 const views: { name: string; cloud: GaussianCloud; camera: Camera }[] = [
-  { name: 'skull', cloud: skull, camera: cameraAt([0.6, -0.5, -1.2], [0, 0, 0], { width: 240, height: 160 }) },
+  { name: 'skull', cloud: skull, camera: cameraAt([0.6, -0.5, -1.2], [0, 0, 0], { width: 168, height: 112 }) },
   // Splats of less than a pixel: levers that go by area fail here.
-  { name: 'skull from afar', cloud: skull, camera: cameraAt([2, -1.5, -5], [0, 0, 0], { width: 240, height: 160 }) },
+  { name: 'skull from afar', cloud: skull, camera: cameraAt([2, -1.5, -5], [0, 0, 0], { width: 168, height: 112 }) },
   { name: 'room', cloud: room().cloud, camera: { ...room().cameras[0] } },
 ];
 

@@ -1,3 +1,4 @@
+import type { GaussianSplatElement } from '@gaussian-splat/element';
 import '@gaussian-splat/element';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
@@ -21,6 +22,13 @@ function serve(address: string, lost: RegExp = /$^/): { requests: string[]; stop
   return { requests, stop: () => (window.fetch = original) };
 }
 
+/** An element that is removed keeps its scene for a moment, in case it is put elsewhere; one without a source lets go of it, and of its fetches. */
+async function close(element: GaussianSplatElement): Promise<void> {
+  element.removeAttribute('src');
+  await until(() => !element.loaded, 'the scene is let go');
+  element.remove();
+}
+
 describe('a streamed scene', () => {
   it('loads its coarsest page, shows it, and then fetches what the camera asks for, once each', async () => {
     const { requests, stop } = serve('/streamed/');
@@ -32,7 +40,7 @@ describe('a streamed scene', () => {
     element.setAttribute('camera-orbit', '200deg 80deg 1m');
     await until(() => requests.length > few + 3, 'pages for another view');
     assertEqual(new Set(requests).size, requests.length, 'no page twice');
-    element.remove();
+    await close(element);
     stop();
   });
 
@@ -45,7 +53,7 @@ describe('a streamed scene', () => {
     await element.ready;
     await until(() => warned.some((message) => message.includes('404')), 'a word on the missing page');
     assert(element.loaded && element.error === null, 'still on show');
-    element.remove();
+    await close(element);
     some.stop();
     console.warn = original;
     const none = serve('/none/', /part-0/);
