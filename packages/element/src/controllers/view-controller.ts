@@ -150,7 +150,8 @@ export class ViewController implements FrameClient {
     this.#drawnVersion = version;
     const { level, levers } = this.pace.plan({ now, hasChanged, goesOn: this.#options.camera.isMoving });
     // Who has chosen a quality pays for no clock.
-    const onTime = this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(level, spent) : undefined;
+    const onTime =
+      this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(level, spent) : undefined;
     if (first === undefined) scene.render({ ...request, levers }, onTime);
     else scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
   }
