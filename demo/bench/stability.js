@@ -35,7 +35,7 @@ async function run() {
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   await chooseVariants(device);
   const subjects = query.get('peers') === '0' ? SUBJECTS.slice(0, 1) : SUBJECTS;
-  addRow('th', ['', 'reference', ...subjects.map(({ name }) => name)]);
+  addRow('th', ['row', 'reference', ...subjects.map(({ name }) => name)]);
   const rows = [];
   for (const make of CASES) {
     const one = make();

@@ -83,7 +83,7 @@ test('subjects are visited forwards, then backwards; one that fails does not sto
     if (name === 'b') throw new Error('no b');
     return { draw: () => {}, finish: async () => {}, facts: async () => ({}), close: () => {} };
   };
-  const results = await visitInTurns(entries, { rounds: 2, open, warmUp: 1 });
+  const results = await visitInTurns(entries, { rounds: 2, open, warmUp: 1, busyMs: 0 });
   assert.deepEqual(order, ['a', 'b', 'c', 'c', 'a']);
   assert.match(results[1].error, /no b/);
   assert.equal(results[0].visits.length, 2);

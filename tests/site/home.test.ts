@@ -9,6 +9,17 @@ interface Splat extends HTMLElement {
 }
 const PATIENCE = { timeout: 100_000, polling: 100 };
 
+/** Where the camera is, once it has stood still for a while. */
+async function orbitAtRest({ tab }: Visit): Promise<string> {
+  let last = '';
+  for (;;) {
+    const orbit = await tab.evaluate(() => String(document.querySelector<Splat>('#hero')!.getCameraOrbit()));
+    if (orbit === last) return orbit;
+    last = orbit;
+    await tab.waitForTimeout(1000);
+  }
+}
+
 describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
   let only: Visit;
@@ -23,9 +34,8 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, PATIENCE);
     await tab.evaluate(() => document.querySelector<Splat>('#hero')!.focus());
     await tab.keyboard.press('ArrowRight');
-    await tab.waitForTimeout(600);
+    const orbit = await orbitAtRest(only);
     await tab.click('#copy-view');
-    const orbit = await tab.evaluate(() => String(document.querySelector<Splat>('#hero')!.getCameraOrbit()));
     assert.ok((await tab.locator('#snippet').textContent())!.includes(`camera-orbit="${orbit}"`));
     await tab.waitForFunction(() => document.querySelector('#copied')!.textContent !== '', undefined, PATIENCE);
     assert.deepEqual(faults, []);

@@ -19,10 +19,10 @@ const BUSY_IN_FLIGHT = 16;
 const BUSY_MS = 400;
 
 /** One visit to a subject: warm-up, then each phase over all cameras. Times in milliseconds. */
-export async function visit(subject, cameras, { warmUp, phases = PHASES }) {
+export async function visit(subject, cameras, { warmUp, phases = PHASES, busyMs = BUSY_MS }) {
   const samples = { passes: [], wall: [], sortedWall: [], cpu: [], throughput: [] };
   for (let i = 0; i < warmUp; i++) await drawAndWait(subject, cameras[i % cameras.length]);
-  await keepBusy(subject, cameras);
+  await keepBusy(subject, cameras, busyMs);
   if (subject.settle) await subject.settle(cameras[0]);
   if (phases.includes('gpu') && subject.readTimes) samples.passes = await timePasses(subject, cameras);
   if (phases.includes('wall')) {
@@ -40,8 +40,8 @@ async function drawAndWait(subject, camera) {
 }
 
 /** Draws without a pause until the GPU has worked for a while. */
-async function keepBusy(subject, cameras) {
-  const until = performance.now() + BUSY_MS;
+async function keepBusy(subject, cameras, milliseconds) {
+  const until = performance.now() + milliseconds;
   for (let i = 0; performance.now() < until; i++) {
     subject.draw(cameras[i % cameras.length], false);
     if (i % BUSY_IN_FLIGHT === BUSY_IN_FLIGHT - 1) await subject.finish();
