@@ -1,6 +1,6 @@
 /**
  * Tests in real Chromium with WebGPU, on SwiftShader where there is no GPU: `npm test`, or after `npm run build`
- * `npx web-test-runner [--files tests/element/browser/idle.test.ts]`. The environment variable CHROMIUM names the browser.
+ * `npx web-test-runner [--files tests/element/browser/lifecycle.test.ts]`. The environment variable CHROMIUM names the browser.
  */
 import { defaultReporter } from '@web/test-runner';
 import { playwrightLauncher } from '@web/test-runner-playwright';
@@ -17,7 +17,11 @@ const isFull = process.env.STABILITY === 'full';
 const HIGH_DENSITY = 'tests/element/browser/high-density.test.ts';
 
 export default {
-  reporters: [defaultReporter({ reportTestResults: true, reportTestProgress: process.stdout.isTTY }), countReporter()],
+  reporters: [
+    defaultReporter({ reportTestResults: true, reportTestProgress: process.stdout.isTTY }),
+    slowestReporter(),
+    countReporter(),
+  ],
   files: ['tests/**/browser/**/*.test.ts', `!${HIGH_DENSITY}`],
   groups: [{ name: 'high-density', files: HIGH_DENSITY, browsers: [chromium(2)] }],
   rootDir: '.',
@@ -35,6 +39,22 @@ export default {
   middleware: [hostileServer(otherOrigin)],
   plugins: [typescript(), pageCommands()],
 };
+
+/** The files that took longest, in whole seconds: where to look when the tests have become slow. */
+function slowestReporter(count = 12) {
+  const secondsOf = (suite) =>
+    [
+      ...(suite?.tests ?? []).map(({ duration = 0 }) => duration / 1000),
+      ...(suite?.suites ?? []).map(secondsOf),
+    ].reduce((sum, seconds) => sum + seconds, 0);
+  return {
+    onTestRunFinished({ sessions }) {
+      const files = sessions.map(({ testFile, testResults }) => ({ testFile, seconds: secondsOf(testResults) }));
+      const slowest = files.sort((a, b) => b.seconds - a.seconds).slice(0, count);
+      for (const { testFile, seconds } of slowest) console.log(`${seconds.toFixed(0).padStart(4)} s ${testFile}`);
+    },
+  };
+}
 
 /** One closing line that counts every test of every group, in the words that `npm test` reads. */
 function countReporter() {

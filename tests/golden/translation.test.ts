@@ -7,7 +7,7 @@ import { renderOracle } from '../oracle/oracle.js';
 import { closeness, describeCloseness } from '../support/compare.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { notePasses } from '../support/passes.js';
-import { offCentre, room } from '../support/scenes.js';
+import { offCentre, resized, room } from '../support/scenes.js';
 
 /** The camera moved along its own axes (right, down, forward) and then turned to the right by an angle in radians. */
 function moved({ worldToCamera: m, ...camera }: Camera, [x, y, z]: readonly number[], angle = 0): Camera {
@@ -32,13 +32,11 @@ for (const make of [room, offCentre]) {
     test(`${make.name}, ${rasterizer}: no sort while the camera only moves, and the image is that of the oracle`, async () => {
       const device = await nodeDevice();
       const { cloud, cameras } = make();
+      const start = resized(cameras[0], 240);
       const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
       const renderer = new Renderer(device, { rasterizer });
       for (const [i, step] of steps.entries()) {
-        const camera = moved(
-          { ...cameras[0], fx: cameras[0].fx * (1 + 0.1 * i), fy: cameras[0].fy * (1 + 0.1 * i) },
-          step,
-        );
+        const camera = moved({ ...start, fx: start.fx * (1 + 0.1 * i), fy: start.fy * (1 + 0.1 * i) }, step);
         const passes = notePasses(device);
         const pixels = await capture(device, renderer, { gaussians, camera });
         passes.stop();
@@ -85,13 +83,14 @@ test('sortAngle lets a camera turn that far before it sorts again', async () => 
 test('several scenes keep their common order while the camera moves', async () => {
   const device = await nodeDevice();
   const { cloud, cameras } = room();
+  const start = resized(cameras[0], 240);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const other = offCentre();
   const second = await GaussianBuffers.upload(device, packGaussians(other.cloud));
   const [moving, fresh] = [new Renderer(device), new Renderer(device)];
   const scenes = [gaussians, second];
-  await capture(device, moving, { gaussians: scenes, camera: cameras[0] });
-  const camera = moved(cameras[0], [0.3, -0.2, 0.6]);
+  await capture(device, moving, { gaussians: scenes, camera: start });
+  const camera = moved(start, [0.3, -0.2, 0.6]);
   const expected = await capture(device, fresh, { gaussians: scenes, camera });
   const found = await capture(device, moving, { gaussians: scenes, camera });
   let worst = 0;

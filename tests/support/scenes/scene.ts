@@ -11,6 +11,13 @@ export interface Scene {
 /** Up in the picture: y points down in the frame of clouds. */
 export const UP: Vector3 = [0, -1, 0];
 
+/** The same view at another width, in pixels: a fraction of the work where a test is not about pixels. */
+export function resized(camera: Camera, width: number): Camera {
+  const s = width / camera.width;
+  const height = Math.round(camera.height * s);
+  return { ...camera, width, height, fx: camera.fx * s, fy: camera.fy * s, cx: camera.cx * s, cy: camera.cy * s };
+}
+
 /** A camera of the given size and horizontal field of view that looks from one point to another. */
 export function cameraAt(
   eye: Vector3,
