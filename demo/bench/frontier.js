@@ -7,11 +7,11 @@ import { camerasAlong } from './scene/paths.js';
 import { showError, showProgress, showResults } from './page/show.js';
 import { DEFAULTS, readConfigurations, readRun } from './run/configuration.js';
 import { describeEnvironment, openDevice } from './run/environment.js';
-import { visitInTurns } from './run/measure.js';
+import { visit, visitInTurns } from './run/measure.js';
 import { sendReport } from './run/report.js';
 import { BenchScene } from './run/scenes.js';
 import { Subjects } from './run/subjects.js';
-import { summarizeVisits } from './run/summary.js';
+import { summarizeStandard, summarizeVisits } from './run/summary.js';
 import { compareImages, worstOf } from './quality/metrics.js';
 import { makeReferences } from './quality/reference.js';
 
@@ -75,15 +75,19 @@ async function collect(run) {
   const cameras = along(run.frames);
   const views = spread(along(PATH_FRAMES), Number(query.get('views') ?? 4));
   const kind = query.get('reference') ?? 'auto';
-  // Times first: reading pictures back lets a GPU fall asleep.
+  // Times first: reading pictures back lets a GPU fall asleep. Each beside the default, in turns: a GPU's clock changes within a run.
+  const standard = await subjects.open({ ...DEFAULTS, ...common });
+  await visit(standard, cameras, { ...run, phases: [] });
   const measured = await visitInTurns(
     entries.map((entry) => ({ ...entry, cameras })),
     {
       ...run,
+      standard,
       open: (entry) => subjects.open(entry),
       onVisit: ({ name }, round) => showProgress(`round ${round + 1} of ${run.rounds}: ${name}`),
     },
   );
+  standard.close();
   const references = await makeReferences({
     device: gpu.device,
     scene,
@@ -111,6 +115,7 @@ async function collect(run) {
     run,
     scene: { ...common, splats: scene.count, antialiased: scene.antialiased, views: images.length },
     reference,
+    standard: summarizeStandard(measured),
     results: results.map((result) => ({ ...result, configuration: { ...result.configuration, splats: scene.count } })),
     errors: gpu.errors,
   };

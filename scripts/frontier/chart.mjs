@@ -146,14 +146,14 @@ function drawPoints(points, front, { x, y }) {
   return [...marks, ...labels].join('\n');
 }
 
-function drawCaption({ environment, scene, reference, run }) {
+function drawCaption({ environment, scene, reference, run, standard }) {
   const { versions, date, userAgent } = environment;
   const browser = /(?:Headless)?(?:Chrome|Firefox|Version)\/[\d.]+/.exec(userAgent)?.[0] ?? userAgent;
   const against = reference.kind === 'oracle' ? 'the float64 oracle' : 'our compute rasterizer in float32';
   const lines = [
     `Orange: ours (${versions.commit}); blue: PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}. Filled: GPU time, first pass to last; hollow: wall time, queue drained.`,
     `Dashed, bold: nothing else is both faster and truer. ${scene.views} views of the path “${scene.path}”, covered pixels, against ${against}.`,
-    `Scene ${scene.scene.split('/').at(-1)}, ${scene.antialiased ? 'antialiased' : 'classic'}; ${run.rounds} × ${run.frames} frames; ${browser}; ${date.slice(0, 10)}.`,
+    `Scene ${scene.scene.split('/').at(-1)}, ${scene.antialiased ? 'antialiased' : 'classic'}; ${run.rounds} × ${run.frames} frames${standard ? ', each beside the default in turns' : ''}; ${browser}; ${date.slice(0, 10)}.`,
   ];
   return lines
     .map((line, i) => words(MARGIN.left - 40, HEIGHT - 40 + 15 * i, line, { class: 'quiet', 'font-size': 11 }))

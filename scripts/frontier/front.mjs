@@ -23,18 +23,28 @@ export function hypervolume(points, reference = { ms: 16.6, psnr: 36 }) {
 }
 
 /**
- * The points of a report. Time is the GPU's span where timestamps exist, else the wall time with the queue drained, for
- * renderers that sort on the side until the image has its own order.
+ * Milliseconds a frame. Time is the GPU's span where timestamps exist, else the wall time with the queue drained, for renderers that sort on
+ * the side until the image has its own order. Where a configuration was measured beside the default in turns, its time is the ratio of the two times
+ * what the default took over the whole run: the clock of a GPU that changes within a run then changes nothing.
  */
-export function pointsOf({ results }) {
+export function timeOf(result, standard) {
+  const kind = ['span', 'sortedWall', 'wall'].find((name) => result[name] !== undefined);
+  const common = standard?.[kind === 'span' ? 'span' : 'wall'];
+  const ratio = result.ratio?.[kind];
+  return { kind, ms: ratio && common ? ratio.p50 * common.p50 : result[kind].p50 };
+}
+
+/** The points of a report. */
+export function pointsOf({ results, standard }) {
   return results
     .filter((result) => !result.error)
-    .map(({ configuration, quality, span, wall, sortedWall }) => ({
+    .map((result) => ({ ...result, time: timeOf(result, standard) }))
+    .map(({ configuration, quality, time }) => ({
       name: configuration.name,
       tier: configuration.tier,
       peer: configuration.peer,
-      clock: span ? 'GPU' : 'wall',
-      ms: (span ?? sortedWall ?? wall).p50,
+      clock: time.kind === 'span' ? 'GPU' : 'wall',
+      ms: time.ms,
       // An image without any error at all has no finite PSNR; no chart needs more.
       psnr: Math.min(120, quality.psnr),
       worst: quality.worst,

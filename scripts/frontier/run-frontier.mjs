@@ -6,7 +6,7 @@ import { adapterName } from '../../demo/bench/run/environment.js';
 import { runPage } from '../lib/browser-page.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
-import { hypervolume, nonDominated, pointsOf } from './front.mjs';
+import { hypervolume, nonDominated, pointsOf, timeOf } from './front.mjs';
 
 const USAGE = `usage: npm run frontier -- [options]
 
@@ -87,9 +87,11 @@ function slugOf(adapter) {
 
 function describe(report) {
   const front = new Set(nonDominated(pointsOf(report)).map(({ name }) => name));
-  const lines = report.results.map(({ configuration: { name }, error, quality, span, wall, sortedWall }) => {
+  const lines = report.results.map((result) => {
+    const { configuration, error, quality } = result;
+    const { name } = configuration;
     if (error) return `  ${name.padEnd(28)} left out: ${error.split('\n')[0]}`;
-    const time = (span ?? sortedWall ?? wall).p50.toFixed(2);
+    const time = timeOf(result, report.standard).ms.toFixed(2);
     const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  SSIM ${quality.ssim.toFixed(4)}`;
     return `${front.has(name) ? '*' : ' '} ${name.padEnd(28)}${numbers}`;
   });

@@ -9,12 +9,12 @@ interface Point {
   readonly psnr: number;
 }
 
-const { quantile, spanOf, summarizeStages, summarizeVisits } = await benchModule('run/summary.js');
+const { quantile, spanOf, summarizeStages, summarizeStandard, summarizeVisits } = await benchModule('run/summary.js');
 const { parseObject, readConfigurations, readRun } = await benchModule('run/configuration.js');
 const { watchOptions } = await benchModule('run/levers.js');
-const { visitInTurns } = await benchModule('run/measure.js');
+const { visit, visitInTurns } = await benchModule('run/measure.js');
 const { compareImages } = await benchModule('quality/metrics.js');
-const { nonDominated, hypervolume } = await scriptModule('frontier/front.mjs');
+const { nonDominated, hypervolume, pointsOf } = await scriptModule('frontier/front.mjs');
 const { configurations } = await scriptModule('frontier/configurations.mjs');
 const { drawChart } = await scriptModule('frontier/chart.mjs');
 
@@ -88,6 +88,36 @@ test('subjects are visited forwards, then backwards; one that fails does not sto
   assert.match(results[1].error, /no b/);
   assert.equal(results[0].visits.length, 2);
   assert.equal(results[0].visits[0].wall.length, 2);
+});
+
+test('beside a standard a clock that changes within the run changes nothing', async () => {
+  // Ever slower: from a frame to the one a hundred frames later it takes twice the time.
+  let drawn = 0;
+  const subject = (milliseconds: number) => {
+    const frames: { label: string; begin: number; end: number }[][] = [];
+    return {
+      draw: (_: unknown, timed: boolean) => {
+        drawn++;
+        if (timed) frames.push([{ label: 'a', begin: 0, end: milliseconds * 2 ** (drawn / 100) }]);
+      },
+      finish: async () => {},
+      readTimes: async () => frames.splice(0),
+    };
+  };
+  const how = { warmUp: 0, busyMs: 0, phases: ['gpu'] };
+  const cameras = Array.from({ length: 100 }, (_, i) => i);
+  const standard = subject(2);
+  const visits = [];
+  for (const milliseconds of [2, 3]) visits.push(await visit(subject(milliseconds), cameras, { ...how, standard }));
+  const [same, slower] = visits.map((one) => summarizeVisits([one]));
+  assert.ok(slower.span.p50 > 2 * same.span.p50, 'what the times alone say');
+  assert.ok(Math.abs(same.ratio.span.p50 - 1) < 0.01 && Math.abs(slower.ratio.span.p50 - 1.5) < 0.01);
+  const quality = { psnr: 60, worst: 1, ssim: 0.99 };
+  const results = [same, slower].map((one, i) => ({ ...one, quality, configuration: { name: `${i}` } }));
+  const common = summarizeStandard(visits.map((one) => ({ visits: [one] })));
+  const [a, b] = pointsOf({ results, standard: common });
+  assert.ok(Math.abs(b.ms / a.ms - 1.5) < 0.02, `${a.ms} and ${b.ms} ms`);
+  assert.equal((await visit(subject(2), cameras, how)).ratios, undefined);
 });
 
 test('images are compared as a display shows them, where anything is seen', () => {

@@ -8,6 +8,8 @@
  *   settle?(camera)       promise: an asynchronous depth order has caught up with this camera
  */
 
+import { quantile, spanOf } from './summary.js';
+
 export const PHASES = ['gpu', 'wall', 'throughput'];
 
 /** Timed frames between two readings of timestamps, submitted without waiting for one another. */
@@ -18,19 +20,78 @@ const BUSY_IN_FLIGHT = 16;
 /** Milliseconds of work before a visit measures: GPUs that were idle run at a fraction of their clock. */
 const BUSY_MS = 400;
 
-/** One visit to a subject: warm-up, then each phase over all cameras. Times in milliseconds. */
-export async function visit(subject, cameras, { warmUp, phases = PHASES, busyMs = BUSY_MS }) {
-  const samples = { passes: [], wall: [], sortedWall: [], cpu: [], throughput: [] };
+/** Frames of a subject between two turns of the standard: long enough for a median, short against changes of a GPU's clock. */
+const BURST = 10;
+
+/**
+ * One visit to a subject: warm-up, then each phase over all cameras. Times in milliseconds.
+ * @param how.standard another subject, warm already, that draws the same in turns: `ratios` then holds the subject's times as shares of the
+ * standard's, a number for each burst, and `standard` what the standard took.
+ */
+export async function visit(subject, cameras, { warmUp, phases = PHASES, busyMs = BUSY_MS, standard }) {
   for (let i = 0; i < warmUp; i++) await drawAndWait(subject, cameras[i % cameras.length]);
   await keepBusy(subject, cameras, busyMs);
   if (subject.settle) await subject.settle(cameras[0]);
-  if (phases.includes('gpu') && subject.readTimes) samples.passes = await timePasses(subject, cameras);
-  if (phases.includes('wall')) {
-    await timeFrames(subject, cameras, samples);
-    if (subject.settle) samples.sortedWall = await timeSortedFrames(subject, cameras);
+  const none = { own: [], others: [], ratios: [] };
+  const time = (kind) => timeBeside(subject, standard, cameras, KINDS[kind]);
+  const passes = phases.includes('gpu') && subject.readTimes ? await time('span') : none;
+  const alone = phases.includes('wall') ? await time('wall') : none;
+  const sorted = phases.includes('wall') && subject.settle ? await time('sortedWall') : none;
+  const throughput = phases.includes('throughput') ? [await timeStream(subject, cameras)] : [];
+  const samples = {
+    passes: passes.own,
+    wall: wallsOf(alone.own),
+    sortedWall: wallsOf(sorted.own),
+    cpu: alone.own.map(({ cpu }) => cpu),
+    throughput,
+  };
+  if (!standard) return samples;
+  return {
+    ...samples,
+    ratios: { span: passes.ratios, wall: alone.ratios, sortedWall: sorted.ratios },
+    standard: { passes: passes.others, wall: wallsOf(alone.others) },
+  };
+}
+
+const wallsOf = (frames) => frames.map(({ wall }) => wall);
+const medianWall = (frames) => quantile(wallsOf(frames), 0.5);
+const medianSpan = (frames) =>
+  quantile(
+    frames.map(spanOf).filter((span) => span !== undefined),
+    0.5,
+  );
+
+/** How a burst of frames of a subject is timed, how one of the standard beside it, and what a burst took. */
+const KINDS = {
+  span: { ofSubject: timePasses, ofStandard: timePasses, median: medianSpan },
+  wall: { ofSubject: timeFrames, ofStandard: timeFrames, median: medianWall },
+  sortedWall: { ofSubject: timeSortedFrames, ofStandard: timeFrames, median: medianWall },
+};
+
+/**
+ * Bursts of a subject between bursts of a standard, if there is one, so that both see the same clock: a burst's ratio is that to the mean of the
+ * standard's bursts before and after it.
+ */
+async function timeBeside(subject, standard, cameras, { ofSubject, ofStandard, median }) {
+  const [own, others, ratios] = [[], [], []];
+  const turnOfStandard = async (some) => {
+    const frames = await ofStandard(standard, some);
+    others.push(...frames);
+    return median(frames);
+  };
+  if (!standard || (ofStandard === timePasses && !standard.readTimes))
+    return { own: await ofSubject(subject, cameras), others, ratios };
+  let before = await turnOfStandard(cameras.slice(0, BURST));
+  for (let first = 0; first < cameras.length; first += BURST) {
+    const some = cameras.slice(first, first + BURST);
+    const frames = await ofSubject(subject, some);
+    own.push(...frames);
+    const after = await turnOfStandard(some);
+    const ratio = median(frames) / ((before + after) / 2);
+    if (Number.isFinite(ratio)) ratios.push(ratio);
+    before = after;
   }
-  if (phases.includes('throughput')) samples.throughput = [await timeStream(subject, cameras)];
-  return samples;
+  return { own, others, ratios };
 }
 
 async function drawAndWait(subject, camera) {
@@ -63,30 +124,32 @@ async function timePasses(subject, cameras) {
 }
 
 /** Each frame alone: from the call that draws it until the GPU is done. */
-async function timeFrames(subject, cameras, { wall, cpu }) {
+async function timeFrames(subject, cameras) {
+  const frames = [];
   for (const camera of cameras) {
     const start = performance.now();
     subject.draw(camera, false);
-    cpu.push(performance.now() - start);
+    const cpu = performance.now() - start;
     await subject.finish();
-    wall.push(performance.now() - start);
+    frames.push({ cpu, wall: performance.now() - start });
     await nextTask();
   }
+  return frames;
 }
 
 /** Each frame until it is shown in the order that belongs to its camera: for renderers that sort on the side. */
 async function timeSortedFrames(subject, cameras) {
-  const times = [];
+  const frames = [];
   for (const camera of cameras) {
     const start = performance.now();
     subject.draw(camera, false);
     await subject.settle(camera);
     subject.draw(camera, false);
     await subject.finish();
-    times.push(performance.now() - start);
+    frames.push({ wall: performance.now() - start });
     await nextTask();
   }
-  return times;
+  return frames;
 }
 
 /** Milliseconds a frame with two frames in flight, until the queue is drained. */

@@ -30,6 +30,20 @@ export function summarizeStages(frames) {
   return Object.fromEntries(labels.map((label) => [label, summarize(frames.map((passes) => total(passes, label)))]));
 }
 
+/** Times as shares of the standard's (see `visit`), medians over all bursts; undefined where nothing was measured beside one. */
+function summarizeRatios(visits) {
+  if (visits.every(({ ratios }) => ratios === undefined)) return undefined;
+  const all = (name) => visits.flatMap(({ ratios }) => ratios?.[name] ?? []);
+  return { span: summarize(all('span')), wall: summarize(all('wall')), sortedWall: summarize(all('sortedWall')) };
+}
+
+/** What the standard took over all visits to all subjects, as a result of its own. */
+export function summarizeStandard(results) {
+  const all = (name) => results.flatMap(({ visits }) => visits.flatMap(({ standard }) => standard?.[name] ?? []));
+  const spans = all('passes').map(spanOf);
+  return { span: summarize(spans.filter((span) => span !== undefined)), wall: summarize(all('wall')) };
+}
+
 /** All samples of a configuration over all rounds; undefined where nothing was measured. */
 export function summarizeVisits(visits) {
   const all = (name) => visits.flatMap((visit) => visit[name]);
@@ -42,6 +56,7 @@ export function summarizeVisits(visits) {
     sortedWall: summarize(all('sortedWall')),
     throughput: summarize(all('throughput')),
     cpu: summarize(all('cpu')),
+    ratio: summarizeRatios(visits),
     /** Medians of each round: how repeatable the figures are. */
     rounds: {
       span: visits.map((visit) =>
