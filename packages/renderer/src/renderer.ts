@@ -1,41 +1,26 @@
-import { validateCamera, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { validateCamera, type Camera } from '@gaussian-splat/core';
 import { AccumulationTexture } from './accumulation.js';
-import { FrameBindings } from './bindings.js';
-import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
-import { ContentWatch } from './content-watch.js';
-import { angleBetween, axisOf, DepthOrder } from './depth-order.js';
 import { probe, type ProbeAnswer, type ProbePoint } from './depth-probe.js';
 import { recordProjection } from './frame.js';
 import type { FrameRequest, RendererOptions } from './frame-request.js';
+import { FrameResources } from './frame-resources.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
-import type { FrameTimer } from './gpu/pass-timer.js';
 import { writeStruct } from './gpu/struct.js';
 import { mixOf, sortedOrder, type FrameMix } from './frame-mix.js';
 import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
 import { Occlusion } from './occlusion.js';
-import { PageTable } from './page-table.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
-import { maxPairs } from './rasterizers/tiles.js';
 import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
-import { maxVisible, Scratch } from './scratch.js';
+import type { Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
 import { scaled } from './view.js';
-
-/** What a set of scenes needs on the GPU between the stages. */
-interface Resources {
-  readonly table: PageTable;
-  readonly scratch: Scratch;
-  readonly bindings: FrameBindings;
-  readonly depthOrder: DepthOrder;
-  readonly monitor: CapacityMonitor;
-}
 
 /** What an image size needs where the rasterizer cannot write the target. */
 interface Accumulation {
@@ -49,11 +34,6 @@ interface Target extends Surface {
 }
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
-/** Radians under which a camera counts as not having turned. */
-const STILL = 2e-5;
-/** Frames of a turning camera after which the order of all splats, useless meanwhile, is given up. */
-const TURNING_FRAMES = 64;
-
 /**
  * Draws Gaussians into a texture, on a device of yours.
  *
@@ -81,16 +61,10 @@ export class Renderer {
   readonly #composeUniform: GPUBuffer;
   readonly #composeBytes = new ArrayBuffer(layouts.Compose.size);
   readonly #views = new WeakMap<GPUTexture, GPUTextureView>();
-  #resources: Resources | undefined;
-  #capacity: Capacity | undefined;
+  readonly #resources: FrameResources;
   #accumulation: Accumulation | undefined;
-  #lastAxis: Vector3 | undefined;
-  #turningFrames = 0;
-  /** The largest budget of splats that a frame has been given. */
-  #mostSplats: number | undefined;
-  readonly #content = new ContentWatch();
-  /** Where the slots of the last frame are listed, and its pixels for each of the target; undefined before there is one. */
-  #last: { readonly order: OrderKind; readonly scale: number } | undefined;
+  /** Where the slots of the last frame are listed, in which buffers, and its pixels for each of the target; undefined before there is one. */
+  #last: { readonly order: OrderKind; readonly scratch: Scratch; readonly scale: number } | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
@@ -101,6 +75,13 @@ export class Renderer {
     this.#compose = new ComposeStage(device);
     this.#rasterizer = makeRasterizer(device, this.levers, this.#mix.overrides);
     this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
+    this.#resources = new FrameResources(device, {
+      stages: this.#mix.stages,
+      sort: this.levers.sort,
+      rasterizer: this.#rasterizer,
+      occlusion: this.#occlusion,
+      onIncomplete: this.#onIncomplete,
+    });
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
@@ -123,10 +104,8 @@ export class Renderer {
 
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
-    const { table, scratch, bindings, depthOrder } = this.#resources ?? {};
-    const parts = [this.#memory, table, scratch, bindings, depthOrder, this.#rasterizer, this.#occlusion];
-    const { texture } = this.#accumulation ?? {};
-    return [...parts, texture].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    const parts = [this.#memory, this.#resources, this.#rasterizer, this.#occlusion, this.#accumulation?.texture];
+    return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
   /**
@@ -154,13 +133,13 @@ export class Renderer {
     const { levers } = mix;
     const detail = detailOf(request, levers);
     const drawn = scaled(camera, levers.resolutionScale);
-    this.#roomFor(detail.splatBudget);
-    const resources = this.#resourcesFor(scenes, this.#occlusion.fit(drawn));
-    const { table, scratch, bindings, depthOrder, monitor } = resources;
+    const resources = this.#resources.fit(scenes, drawn, detail.splatBudget);
+    const { table, scratch, bindings, depthOrder, orderPolicy, monitor } = resources;
     table.update();
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const isOrdered = this.#prepareOrder(encoder, resources, drawn, timer, notes !== undefined);
+    const { sortAngle } = this.levers;
+    const isOrdered = orderPolicy.prepare(encoder, drawn, { sortAngle, timer, isAskedFor: notes !== undefined });
     this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
     table.look(drawn, { ...levers, ...detail }, isOrdered, this.#occlusion.tiles);
     const wishes = recordProjection(encoder, {
@@ -173,30 +152,25 @@ export class Renderer {
       isBudgeted: detail.splatBudget > 0 && table.hasDetail,
       timer,
     });
-    const last = this.#paint(
-      encoder,
-      target,
-      drawn,
-      { order: isOrdered ? 'identity' : sortedOrder(levers), overrides: mix.overrides, notes, timer },
-      background,
-    );
+    const order = isOrdered ? 'identity' : sortedOrder(levers);
+    const last = this.#paint(encoder, target, drawn, { order, overrides: mix.overrides, notes, timer }, background);
     timer?.endFrame?.(last);
     const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
     this.#device.queue.submit([last.finish()]);
     timer?.submitted?.();
-    this.#last = { order: isOrdered ? 'identity' : sortedOrder(levers), scale: drawn.width / camera.width };
+    this.#last = { order, scratch, scale: drawn.width / camera.width };
     if (isWatched) monitor.read();
     for (const wish of wishes) wish.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
-    // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
-    if (this.levers.sortAngle <= STILL) depthOrder.settle();
+    orderPolicy.settle(sortAngle);
   }
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
   async readStatistics(): Promise<FrameStatistics> {
-    if (this.#resources === undefined)
+    const resources = this.#resources.current;
+    if (resources === undefined)
       return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0 };
-    const { plan, gathered, chunkShares } = this.#resources.scratch;
+    const { plan, gathered, chunkShares } = resources.scratch;
     return readStatistics(this.#device, { plan, gathered, chunkShares, pairPlan: this.#rasterizer.pairPlan });
   }
 
@@ -205,11 +179,11 @@ export class Renderer {
    * images, not for every frame.
    */
   async isComplete(): Promise<boolean> {
-    if (this.#resources === undefined) return true;
+    if (this.#resources.current === undefined) return true;
     const mayLack = this.#occlusion.mayLack;
     const { visible, overflow, pairs, pairOverflow } = await this.readStatistics();
     if (overflow + pairOverflow === 0) return !mayLack;
-    this.#resources?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
+    this.#resources.current?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
     return false;
   }
 
@@ -219,9 +193,9 @@ export class Renderer {
    * @returns an answer for each point; none before the first frame.
    */
   async probeDepth(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
-    if (this.#resources === undefined || this.#last === undefined) return [];
-    const { plan, splats, order, keys } = this.#resources.scratch;
-    const { scale } = this.#last;
+    if (this.#last === undefined || this.#last.scratch !== this.#resources.current?.scratch) return [];
+    const { scale, scratch } = this.#last;
+    const { plan, splats, order, keys } = scratch;
     const nearToFar = { first: order[0], second: order[1], identity: keys[0] }[this.#last.order];
     const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
     return probe(this.#device, { plan, splats, order: nearToFar }, drawn, this.#mix.overrides);
@@ -229,43 +203,12 @@ export class Renderer {
 
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
   destroy(): void {
-    this.#releaseResources();
+    this.#resources.release();
     this.#accumulation?.texture.destroy();
     this.#accumulation = undefined;
     this.#rasterizer.destroy();
     this.#occlusion.destroy();
     this.#memory.destroy();
-  }
-
-  /**
-   * Sees to an order of all splats where one is of use: for the first frame, and for the first of those between which the camera
-   * does not turn. While it turns, or the content changes, only the visible splats are sorted.
-   * @returns whether the order serves this frame
-   */
-  #prepareOrder(
-    encoder: GPUCommandEncoder,
-    { depthOrder, table }: Resources,
-    camera: Camera,
-    timer: FrameTimer | undefined,
-    isAskedFor: boolean,
-  ): boolean {
-    const { sortAngle } = this.levers;
-    const axis = axisOf(camera);
-    const turned = this.#lastAxis === undefined ? 0 : angleBetween(this.#lastAxis, axis);
-    this.#lastAxis = axis;
-    // Of a streamed scene most splats are not in view, and others come and go: sorting all of them never pays.
-    const isStill = this.#content.isStill(table.version) && !table.isStreamed;
-    if (depthOrder.serves(camera, sortAngle)) {
-      this.#turningFrames = 0;
-      return true;
-    }
-    const isUseful = isAskedFor || (isStill && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL));
-    if (isUseful && depthOrder.isPossible) {
-      depthOrder.record(encoder, camera, timer);
-      return true;
-    }
-    if (++this.#turningFrames === TURNING_FRAMES) depthOrder.release();
-    return false;
   }
 
   #paint(
@@ -327,87 +270,6 @@ export class Renderer {
     if (view === undefined) this.#views.set(target, (view = target.createView()));
     const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;
     return { view, format: target.format, isStorable, width, height };
-  }
-
-  #resourcesFor(scenes: readonly GaussianScene[], mustRebind: boolean): Resources {
-    const current = this.#resources;
-    if (current?.table.holds(scenes)) {
-      // The monitor has asked for other room.
-      const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
-      if (mustRebind || hasOtherRoom) this.#rebind(current.table);
-      return this.#resources!;
-    }
-    this.#releaseResources();
-    const table = new PageTable(this.#device, [...scenes]);
-    this.#capacity = initialCapacity(table.splats, this.#mostFor(table));
-    this.#rebind(table);
-    return this.#resources!;
-  }
-
-  /** A larger budget of splats than before makes other room. */
-  #roomFor(splatBudget: number): void {
-    const most = splatBudget > 0 ? splatBudget : Infinity;
-    if (this.#mostSplats !== undefined && most > this.#mostSplats) this.#releaseResources();
-    this.#mostSplats = Math.max(this.#mostSplats ?? 0, most);
-  }
-
-  #hasOtherPairs = false;
-
-  #mostFor(table: PageTable): Capacity {
-    const budget = table.hasDetail ? (this.#mostSplats ?? Infinity) : Infinity;
-    return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
-  }
-
-  /** Allocates and binds what lies between the stages, for the capacity at hand. */
-  #rebind(table: PageTable): void {
-    const capacity = this.#capacity!;
-    const depthOrder = this.#resources?.depthOrder ?? new DepthOrder(this.#device, table, this.levers.sort);
-    this.#resources?.scratch.destroy();
-    this.#resources?.bindings.destroy();
-    this.#resources?.monitor.destroy();
-    const pages = table.pages.length;
-    const scratch = new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
-    const { plan, splats, order, keys } = scratch;
-    this.#rasterizer.bind({
-      plan,
-      splats,
-      occlusion: this.#occlusion,
-      survivors: order[0],
-      orders: { first: order[0], second: order[1], identity: keys[0] },
-      capacity: capacity.visible,
-      pairCapacity: capacity.pairs,
-    });
-    this.#hasOtherPairs = false;
-    this.#last = undefined;
-    const monitor = new CapacityMonitor(this.#device, capacity, this.#mostFor(table), (wished, overflowed) => {
-      this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
-      this.#capacity = wished;
-      if (overflowed) this.#onIncomplete();
-    });
-    this.#resources = {
-      table,
-      scratch,
-      bindings: new FrameBindings(this.#device, this.#mix.stages, {
-        table,
-        scratch,
-        occlusion: this.#occlusion.depths,
-      }),
-      depthOrder,
-      monitor,
-    };
-  }
-
-  #releaseResources(): void {
-    const { table, scratch, bindings, depthOrder, monitor } = this.#resources ?? {};
-    table?.destroy();
-    scratch?.destroy();
-    bindings?.destroy();
-    depthOrder?.release();
-    monitor?.destroy();
-    this.#occlusion.forget();
-    this.#resources = undefined;
-    this.#last = undefined;
-    this.#lastAxis = undefined;
   }
 
   /** As large as frames of this target are without levers of their own: one with fewer pixels paints a part of it. */

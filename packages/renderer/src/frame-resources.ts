@@ -1,0 +1,141 @@
+import type { Camera } from '@gaussian-splat/core';
+import { FrameBindings } from './bindings.js';
+import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
+import { DepthOrder } from './depth-order.js';
+import type { FrameMix } from './frame-mix.js';
+import type { GaussianScene } from './gaussian-scene.js';
+import type { Occlusion } from './occlusion.js';
+import { OrderPolicy } from './order-policy.js';
+import { PageTable } from './page-table.js';
+import type { Rasterizer } from './rasterizers/rasterizer.js';
+import { maxPairs } from './rasterizers/tiles.js';
+import { maxVisible, Scratch } from './scratch.js';
+import type { SortName } from './stages/sort.js';
+
+/** What a set of scenes needs on the GPU between the stages. */
+export interface Resources {
+  readonly table: PageTable;
+  readonly scratch: Scratch;
+  readonly bindings: FrameBindings;
+  readonly depthOrder: DepthOrder;
+  readonly orderPolicy: OrderPolicy;
+  readonly monitor: CapacityMonitor;
+}
+
+export interface ResourceOptions {
+  readonly stages: FrameMix['stages'];
+  readonly sort: SortName;
+  readonly rasterizer: Rasterizer;
+  readonly occlusion: Occlusion;
+  /** A frame lacked room, and the next one has it. */
+  readonly onIncomplete: () => void;
+}
+
+/** Sees to buffers between the stages for the scenes at hand, as large as what is visible of them needs. */
+export class FrameResources {
+  readonly #device: GPUDevice;
+  readonly #options: ResourceOptions;
+  #current: Resources | undefined;
+  #capacity: Capacity | undefined;
+  #hasOtherPairs = false;
+  /** The largest budget of splats that a frame has been given. */
+  #mostSplats: number | undefined;
+
+  constructor(device: GPUDevice, options: ResourceOptions) {
+    this.#device = device;
+    this.#options = options;
+  }
+
+  /** What the last frame was drawn with; undefined before the first. */
+  get current(): Resources | undefined {
+    return this.#current;
+  }
+
+  get byteLength(): number {
+    const { table, scratch, bindings, depthOrder } = this.#current ?? {};
+    return [table, scratch, bindings, depthOrder].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+  }
+
+  /**
+   * What a frame is drawn with: allocates where the scenes, the image's size or the wished room are other ones than before.
+   * @param splatBudget most splats that the frame draws; 0 for no limit
+   */
+  fit(scenes: readonly GaussianScene[], camera: Camera, splatBudget: number): Resources {
+    this.#roomFor(splatBudget);
+    const mustRebind = this.#options.occlusion.fit(camera);
+    const current = this.#current;
+    if (current?.table.holds(scenes)) {
+      // The monitor has asked for other room.
+      const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
+      return mustRebind || hasOtherRoom ? this.#rebind(current.table) : current;
+    }
+    this.release();
+    const table = new PageTable(this.#device, [...scenes]);
+    this.#capacity = initialCapacity(table.splats, this.#mostFor(table));
+    return this.#rebind(table);
+  }
+
+  /** Frees everything. */
+  release(): void {
+    const { table, scratch, bindings, depthOrder, monitor } = this.#current ?? {};
+    table?.destroy();
+    scratch?.destroy();
+    bindings?.destroy();
+    depthOrder?.release();
+    monitor?.destroy();
+    this.#options.occlusion.forget();
+    this.#current = undefined;
+  }
+
+  /** A larger budget of splats than before makes other room. */
+  #roomFor(splatBudget: number): void {
+    const most = splatBudget > 0 ? splatBudget : Infinity;
+    if (this.#mostSplats !== undefined && most > this.#mostSplats) this.release();
+    this.#mostSplats = Math.max(this.#mostSplats ?? 0, most);
+  }
+
+  #mostFor(table: PageTable): Capacity {
+    const budget = table.hasDetail ? (this.#mostSplats ?? Infinity) : Infinity;
+    return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
+  }
+
+  /** Allocates and binds what lies between the stages, for the capacity at hand. */
+  #rebind(table: PageTable): Resources {
+    const { stages, sort, occlusion } = this.#options;
+    const capacity = this.#capacity!;
+    const depthOrder = this.#current?.depthOrder ?? new DepthOrder(this.#device, table, sort);
+    const orderPolicy = this.#current?.orderPolicy ?? new OrderPolicy(table, depthOrder);
+    this.#current?.scratch.destroy();
+    this.#current?.bindings.destroy();
+    this.#current?.monitor.destroy();
+    const pages = table.pages.length;
+    const scratch = new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
+    this.#bindRasterizer(scratch, capacity);
+    this.#hasOtherPairs = false;
+    const bindings = new FrameBindings(this.#device, stages, { table, scratch, occlusion: occlusion.depths });
+    const monitor = this.#watch(table, capacity);
+    this.#current = { table, scratch, bindings, depthOrder, orderPolicy, monitor };
+    return this.#current;
+  }
+
+  #bindRasterizer({ plan, splats, order, keys }: Scratch, { visible, pairs }: Capacity): void {
+    const { rasterizer, occlusion } = this.#options;
+    rasterizer.bind({
+      plan,
+      splats,
+      occlusion,
+      survivors: order[0],
+      orders: { first: order[0], second: order[1], identity: keys[0] },
+      capacity: visible,
+      pairCapacity: pairs,
+    });
+  }
+
+  #watch(table: PageTable, capacity: Capacity): CapacityMonitor {
+    return new CapacityMonitor(this.#device, capacity, this.#mostFor(table), (wished, overflowed) => {
+      this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
+      this.#capacity = wished;
+      if (overflowed) this.#options.onIncomplete();
+    });
+  }
+}

@@ -1,0 +1,66 @@
+import type { Camera, Vector3 } from '@gaussian-splat/core';
+import { ContentWatch } from './content-watch.js';
+import { angleBetween, axisOf, type DepthOrder } from './depth-order.js';
+import type { FrameTimer } from './gpu/pass-timer.js';
+import type { PageTable } from './page-table.js';
+
+/** Radians under which a camera counts as not having turned. */
+const STILL = 2e-5;
+/** Frames of a turning camera after which the order of all splats, useless meanwhile, is given up. */
+const TURNING_FRAMES = 64;
+
+/** What decides besides the camera. */
+export interface OrderOccasion {
+  /** Radians that a camera may turn before its order is made anew. */
+  readonly sortAngle: number;
+  /** The frame can be drawn with an order of all splats only. */
+  readonly isAskedFor: boolean;
+  readonly timer: FrameTimer | undefined;
+}
+
+/**
+ * Whether all splats are put in order, which lasts while the camera does not turn, or only the visible ones are sorted, which is less work and lasts
+ * for one frame.
+ */
+export class OrderPolicy {
+  readonly #table: PageTable;
+  readonly #depthOrder: DepthOrder;
+  readonly #content = new ContentWatch();
+  #lastAxis: Vector3 | undefined;
+  #turningFrames = 0;
+
+  constructor(table: PageTable, depthOrder: DepthOrder) {
+    this.#table = table;
+    this.#depthOrder = depthOrder;
+  }
+
+  /**
+   * Sees to an order of all splats where one is of use: for the first frame, and for the first of those between which the camera
+   * does not turn. While it turns, or the content changes, only the visible splats are sorted. Call {@link settle} after submitting.
+   * @returns whether the order serves this frame
+   */
+  prepare(encoder: GPUCommandEncoder, camera: Camera, { sortAngle, isAskedFor, timer }: OrderOccasion): boolean {
+    const depthOrder = this.#depthOrder;
+    const axis = axisOf(camera);
+    const turned = this.#lastAxis === undefined ? 0 : angleBetween(this.#lastAxis, axis);
+    this.#lastAxis = axis;
+    // Of a streamed scene most splats are not in view, and others come and go: sorting all of them never pays.
+    const isStill = this.#content.isStill(this.#table.version) && !this.#table.isStreamed;
+    if (depthOrder.serves(camera, sortAngle)) {
+      this.#turningFrames = 0;
+      return true;
+    }
+    const isUseful = isAskedFor || (isStill && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL));
+    if (isUseful && depthOrder.isPossible) {
+      depthOrder.record(encoder, camera, timer);
+      return true;
+    }
+    if (++this.#turningFrames === TURNING_FRAMES) depthOrder.release();
+    return false;
+  }
+
+  /** Frees what only the sorting needed. A lever that reuses orders sorts all splats again and again: it keeps the buffers. */
+  settle(sortAngle: number): void {
+    if (sortAngle <= STILL) this.#depthOrder.settle();
+  }
+}
