@@ -2,9 +2,25 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { bytesPerSplat, GaussianBuffers, MemoryLedger, packGaussians } from '@gaussian-splat/renderer';
+import {
+  bytesPerSplat,
+  DynamicGaussians,
+  GaussianBuffers,
+  MemoryLedger,
+  packGaussians,
+} from '@gaussian-splat/renderer';
 import { smallCloud } from '../formats/support/small-cloud.js';
+import { writeTensors, type TensorSpec } from '../support/generator-tensors.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+
+const SPEC: TensorSpec = {
+  layout: 'split',
+  shape: 'log-scale',
+  color: 'channel-major',
+  opacity: 'logit',
+  quaternionOrder: 'xyzw',
+  dtype: 'float32',
+};
 
 test('what is declared is what the buffers take', async () => {
   const device = await nodeDevice();
@@ -19,6 +35,15 @@ test('what is declared is what the buffers take', async () => {
       assert.equal(ledger.bytes, 0);
     }
   }
+});
+
+test('room for what a generator writes is declared, and given back', async () => {
+  const device = await nodeDevice();
+  const ledger = MemoryLedger.of(device);
+  const gaussians = await DynamicGaussians.create(device, writeTensors(smallCloud(512, 1), SPEC).layout);
+  assert.equal(ledger.bytes, 512 * bytesPerSplat(1, 'float16'));
+  gaussians.destroy();
+  assert.equal(ledger.bytes, 0);
 });
 
 test('a scene beyond the budget is refused before the device hears of it', async () => {
@@ -38,6 +63,10 @@ test('a scene beyond the budget is refused before the device hears of it', async
   });
   assert.deepEqual(created, []);
   device.createBuffer = createBuffer;
+  await assert.rejects(
+    DynamicGaussians.create(device, writeTensors(smallCloud(512, 1), SPEC).layout),
+    /generated scene of up to 512 splats: expected at most 0\.0 MB, what is left/,
+  );
   first.destroy();
   (await GaussianBuffers.upload(device, packed)).destroy();
   ledger.budgetBytes = Infinity;

@@ -10,13 +10,14 @@ import { pageCapacity } from './gaussian-buffers.js';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory, requireBudget, withMemoryCheck } from './gpu/memory.js';
+import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS } from './pack/pack.js';
 import { shWords } from './pack/sh.js';
 import { readPlaces } from './read-places.js';
 import { IngestStage } from './stages/ingest.js';
+import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
 import { cullGroups } from './stages/cull.js';
 import { ingestValues, TensorPlaces } from './tensor-places.js';
 
@@ -63,6 +64,7 @@ export class DynamicGaussians implements GaussianScene {
   readonly #device: GPUDevice;
   readonly #stage: IngestStage;
   readonly #memory: GpuMemory;
+  readonly #reservation: Reservation;
   readonly #places: TensorPlaces;
   readonly #bindings = new Map<string, readonly GPUBindGroup[]>();
   #version = 0;
@@ -70,19 +72,21 @@ export class DynamicGaussians implements GaussianScene {
   /** Rows of other scenes before this one's that the places in the uniforms stand for. */
   #before = 0;
 
-  private constructor(device: GPUDevice, layout: GaussianLayout, { antialiased = false }: DynamicGaussiansOptions) {
+  private constructor(device: GPUDevice, layout: GaussianLayout, options: DynamicGaussiansOptions) {
     this.#device = device;
     this.layout = layout;
     this.count = layout.capacity;
     this.shDegree = layout.shDegree ?? 0;
-    this.antialiased = antialiased;
+    this.antialiased = options.antialiased ?? false;
+    const bytes = layout.capacity * bytesPerSplat(this.shDegree, this.shPrecision);
+    this.#reservation = MemoryLedger.of(device).reserve(whatOf(layout), bytes, options.memoryBudget);
     this.#stage = new IngestStage(device);
     this.#memory = new GpuMemory(device);
     try {
       this.#places = new TensorPlaces(layout, this.#memory);
       this.pages = this.#makePages();
     } catch (error) {
-      this.#memory.destroy();
+      this.destroy();
       throw error;
     }
     // Until the first run there is nothing to see.
@@ -99,10 +103,7 @@ export class DynamicGaussians implements GaussianScene {
     layout: GaussianLayout,
     options: DynamicGaussiansOptions = {},
   ): Promise<DynamicGaussians> {
-    const what = `generated scene of up to ${layout.capacity} splats`;
-    const bytesPerRow = 4 * (GEOMETRY_WORDS + shWords(layout.shDegree ?? 0, 'float16'));
-    requireBudget(what, bytesPerRow * layout.capacity, options.memoryBudget);
-    return withMemoryCheck(device, what, () => new DynamicGaussians(device, layout, options));
+    return withMemoryCheck(device, whatOf(layout), () => new DynamicGaussians(device, layout, options));
   }
 
   /** Number of runs taken in so far, and one. */
@@ -157,6 +158,7 @@ export class DynamicGaussians implements GaussianScene {
   }
 
   destroy(): void {
+    this.#reservation.release();
     this.#bindings.clear();
     this.#memory.destroy();
   }
@@ -227,6 +229,8 @@ export class DynamicGaussians implements GaussianScene {
     return bindings;
   }
 }
+
+const whatOf = ({ capacity }: GaussianLayout): string => `generated scene of up to ${capacity} splats`;
 
 function requireRows(rows: number, capacity: number): void {
   if (Number.isInteger(rows) && rows >= 0 && rows <= capacity) return;

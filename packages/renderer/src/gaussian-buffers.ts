@@ -2,8 +2,8 @@ import type { ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
-import { GpuMemory, requireBudget, withMemoryCheck } from './gpu/memory.js';
-import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
+import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { MemoryLedger, type Reservation } from './memory-ledger.js';
 import { DETAIL_NUMBERS } from './detail/chunk-detail.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
 import { GEOMETRY_WORDS, type PackedGaussians } from './pack/pack.js';
@@ -31,7 +31,7 @@ export class GaussianBuffers implements GaussianScene {
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
 
-  private constructor(device: GPUDevice, packed: PackedGaussians) {
+  private constructor(device: GPUDevice, packed: PackedGaussians, memoryBudget?: number) {
     ({
       count: this.count,
       shDegree: this.shDegree,
@@ -40,9 +40,9 @@ export class GaussianBuffers implements GaussianScene {
       origin: this.origin,
       droppedCount: this.droppedCount,
     } = packed);
-    const { count, shDegree, shPrecision } = packed;
-    const bytes = count * bytesPerSplat(shDegree, shPrecision);
-    this.#reservation = MemoryLedger.of(device).reserve(`scene of ${count} splats`, bytes);
+    const { geometry, sh, chunks, details } = packed;
+    const bytes = [geometry, sh, chunks, details].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), bytes, memoryBudget);
     this.#memory = new GpuMemory(device);
     try {
       this.pages = uploadPages(device, packed, this.#memory);
@@ -62,10 +62,7 @@ export class GaussianBuffers implements GaussianScene {
     packed: PackedGaussians,
     { memoryBudget }: UploadOptions = {},
   ): Promise<GaussianBuffers> {
-    const what = `scene of ${packed.count} splats`;
-    const { geometry, sh, chunks } = packed;
-    requireBudget(what, geometry.byteLength + sh.byteLength + chunks.byteLength, memoryBudget);
-    return withMemoryCheck(device, what, () => new GaussianBuffers(device, packed));
+    return withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, memoryBudget));
   }
 
   /** Bytes of GPU memory held. */
@@ -78,6 +75,8 @@ export class GaussianBuffers implements GaussianScene {
     this.#memory.destroy();
   }
 }
+
+const whatOf = ({ count }: PackedGaussians): string => `scene of ${count} splats`;
 
 function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemory): GaussianPage[] {
   const shStride = shWords(packed.shDegree, packed.shPrecision);

@@ -46,12 +46,19 @@ export class MemoryLedger {
   }
 
   /**
-   * Sets bytes aside before they are allocated.
-   * @throws GaussianSplatError `out-of-memory/budget` if that is more than the budget leaves.
+   * Sets bytes aside before they are allocated: a device that runs out of memory may be lost, and the page with it.
+   * @param most bytes that this reservation may take, whatever is left; default no limit
+   * @throws GaussianSplatError `out-of-memory/budget` if it is more than that, or more than the budget leaves.
    */
-  reserve(label: string, bytes: number): Reservation {
+  reserve(label: string, bytes: number, most = Infinity): Reservation {
+    if (bytes > most) throw overBudget(label, bytes, `${megabytes(most)}, the memoryBudget that was given`);
     const left = this.budgetBytes - this.bytes;
-    if (bytes > left) throw overBudget(label, bytes, left, this.budgetBytes);
+    if (bytes > left)
+      throw overBudget(
+        label,
+        bytes,
+        `${megabytes(Math.max(0, left))}, what is left of a budget of ${megabytes(this.budgetBytes)}`,
+      );
     const reservation: Reservation = { label, bytes, release: () => void this.#held.delete(reservation) };
     this.#held.add(reservation);
     return reservation;
@@ -60,13 +67,14 @@ export class MemoryLedger {
 
 const LEDGERS = new WeakMap<GPUDevice, MemoryLedger>();
 
-function overBudget(label: string, bytes: number, left: number, budget: number): GaussianSplatError {
-  const megabytes = (value: number): string => `${(value / 1e6).toFixed(1)} MB`;
+const megabytes = (value: number): string => `${(value / 1e6).toFixed(1)} MB`;
+
+function overBudget(label: string, bytes: number, most: string): GaussianSplatError {
   return new GaussianSplatError('out-of-memory/budget', {
     where: label,
-    expected: `at most ${megabytes(Math.max(0, left))}, what is left of a budget of ${megabytes(budget)}`,
+    expected: `at most ${most}`,
     found: megabytes(bytes),
     remedy:
-      'show a smaller scene (npm run economise makes one), remove other scenes, or raise MemoryLedger.budgetBytes',
+      'show a smaller scene (npm run economise makes one), remove other scenes, or raise the budget (memoryBudget, MemoryLedger.budgetBytes) if the device is known to have the memory',
   });
 }

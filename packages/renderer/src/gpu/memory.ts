@@ -58,22 +58,6 @@ function requireBufferSize(device: GPUDevice, label: string, size: number): void
 }
 
 /**
- * Refuses what would take more memory than there is meant to be, before a byte of it is allocated: a device that runs out of memory may be
- * lost, and the page with it.
- * @param budget bytes; undefined for no limit
- * @throws GaussianSplatError `out-of-memory/budget`
- */
-export function requireBudget(where: string, byteLength: number, budget: number | undefined): void {
-  if (budget === undefined || byteLength <= budget) return;
-  throw new GaussianSplatError('out-of-memory/budget', {
-    where,
-    expected: `at most ${Math.floor(budget)} bytes of GPU memory (memoryBudget)`,
-    found: `${byteLength} bytes`,
-    remedy: 'show a smaller scene, or raise the budget if the device is known to have the memory',
-  });
-}
-
-/**
  * Runs `allocate` and waits until the device has really found the memory.
  * @throws GaussianSplatError `out-of-memory/allocation`; what `allocate` threw, if it threw.
  */
