@@ -41,6 +41,15 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.deepEqual(faults, []);
   });
 
+  it('lets the wheel scroll the page, also over the scene', async () => {
+    const { tab } = only;
+    const { x, y, width, height } = (await tab.locator('#hero').boundingBox())!;
+    await tab.mouse.move(x + width / 2, y + height / 2);
+    await tab.mouse.wheel(0, 200);
+    await tab.waitForFunction(() => scrollY > 0, undefined, PATIENCE);
+    await tab.evaluate(() => scrollTo(0, 0));
+  });
+
   it('has tabs that the arrows lead through', async () => {
     const { tab, faults } = only;
     await tab.focus('#tab-html');

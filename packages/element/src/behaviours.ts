@@ -1,7 +1,8 @@
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { CameraAction } from './camera/gestures.js';
-import { viewName, type SpokenStrings } from './camera/spoken.js';
+import { viewName } from './camera/spoken.js';
+import type { SpokenStrings } from './words.js';
 import { AnnouncerController } from './controllers/announcer-controller.js';
 import { AutoRotateController } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
@@ -62,7 +63,8 @@ export class Behaviours {
     this.announcer = new AnnouncerController(host, {
       viewName: () => viewName(camera.orbit.theta, camera.orbit.phi),
       strings: options.strings,
-      isFocused: () => surface()?.matches(':focus') ?? false,
+      // In flight there is no side from which the scene is seen.
+      isFocused: () => !this.#flies && (surface()?.matches(':focus') ?? false),
     });
     this.#movers = [this.#autoRotate, this.prompt, fly];
     host.addController({

@@ -1,6 +1,5 @@
 import { isServer, type PropertyValues, type TemplateResult } from 'lit';
 import { readAttributes, type Attributes } from './attributes.js';
-import { readSpokenStrings, type SpokenStrings } from './camera/spoken.js';
 import type { ElementError } from './errors.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import { SharedDevice } from './gpu/shared-device.js';
@@ -10,8 +9,9 @@ import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
 import { Stage } from './stage.js';
 import type { SceneStats } from './stats.js';
 import { styles } from './styles.js';
-import { DEFAULT_LABEL, template } from './template.js';
+import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
+import { readSpokenStrings, type SpokenStrings } from './words.js';
 
 /** Size of the scene on show. */
 export interface SceneStatistics {
@@ -43,6 +43,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart canvas - The picture.
  * @csspart poster - The image of the `poster` attribute.
  * @csspart poster-button - The button around it with `reveal="manual"`.
+ * @csspart poster-cue - The sign in the middle of that button.
  * @csspart prompt - The default interaction prompt.
  * @csspart progress-track - The progress bar's ground.
  * @csspart progress-bar - The progress bar.
@@ -225,7 +226,7 @@ export class GaussianSplatElement extends ViewingMethods {
     const { scene, reveal, behaviours, hotspots, progress } = this.stage;
     const { prompt, promptWiggles, announcer } = behaviours;
     return template({
-      label: this.alt ?? this.getAttribute?.('aria-label') ?? DEFAULT_LABEL,
+      label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
       controls: this.cameraControls,
       navigation: this.#attributes.navigation,
       poster: this.poster,
@@ -236,7 +237,7 @@ export class GaussianSplatElement extends ViewingMethods {
       progress,
       error: scene.error,
       prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
-      promptText: this.#strings['interaction-prompt'],
+      strings: this.#strings,
       spoken: announcer.text,
       hotspots: hotspots.names,
     });

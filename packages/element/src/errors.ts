@@ -1,4 +1,5 @@
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
+import type { SpokenStrings } from './words.js';
 
 /** Families of failure, as `element.error.code` gives them. */
 export type ElementErrorCode = 'unsupported' | 'network' | 'decode' | 'contract' | 'device-lost' | 'out-of-memory';
@@ -34,8 +35,10 @@ export function toElementError(error: unknown): ElementError {
   return { code: 'decode', reason: 'decode/corrupt', message, cause: error };
 }
 
-/** One sentence for visitors of the page, who can mend little, by what went wrong. */
-export function visitorMessage({ code, reason }: ElementError): string {
+/** One sentence for visitors of the page, who can mend little: the page's own, or an English one by what went wrong. */
+export function visitorMessage({ code, reason }: ElementError, strings: SpokenStrings): string {
+  const own = strings[`error-${code}`];
+  if (own !== undefined) return own;
   switch (reason) {
     case 'unsupported/insecure-context':
       return 'This 3D scene needs WebGPU, which browsers offer only on secure pages: open this page over https.';

@@ -23,7 +23,8 @@ export type {
   Reveal,
   TouchAction,
 } from './attributes.js';
-export type { SpokenStrings, ViewName } from './camera/spoken.js';
+export type { ViewName } from './camera/spoken.js';
+export type { SpokenStrings } from './words.js';
 export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
 export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';

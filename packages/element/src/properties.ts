@@ -1,5 +1,5 @@
 import { LitElement, type PropertyDeclarations } from 'lit';
-import type { SpokenStrings } from './camera/spoken.js';
+import type { SpokenStrings } from './words.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { ControlValues, Numbers } from './live/values.js';
 
@@ -80,7 +80,7 @@ export class SplatProperties extends LitElement {
   declare interpolationDecay: number | string | null;
   /** One-finger moves that stay the page's; default `pan-y`, so that pages scroll. */
   declare touchAction: 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation' | null;
-  /** Leaves wheel and pinch to the page. */
+  /** Leaves the wheel and all that two fingers do to the page; keys do not zoom either. */
   declare disableZoom: boolean;
   /** Keeps the camera's target where it is. */
   declare disablePan: boolean;

@@ -1,5 +1,5 @@
 import type { Attributes } from './attributes.js';
-import type { SpokenStrings } from './camera/spoken.js';
+import type { SpokenStrings } from './words.js';
 import type { InputOptions } from './controllers/input-controller.js';
 import type { FrameScheduler } from './gpu/frame-scheduler.js';
 import type { SharedDevice } from './gpu/shared-device.js';

@@ -55,6 +55,7 @@ export const styles = css`
   }
   [part='poster-button'] {
     display: block;
+    position: relative;
     width: 100%;
     height: 100%;
     padding: 0;
@@ -93,12 +94,19 @@ export const styles = css`
     align-items: center;
     justify-content: center;
   }
-  [part='prompt'] {
+  [part='prompt'],
+  [part='poster-cue'] {
     padding: 10px;
     border-radius: 50%;
     line-height: 0;
     background: var(--interaction-prompt-background, rgb(0 0 0 / 0.45));
     color: var(--interaction-prompt-color, rgb(255 255 255));
+  }
+  [part='poster-cue'] {
+    position: absolute;
+    top: 50%;
+    left: 50%;
+    translate: -50% -50%;
   }
   [part='prompt'].wiggle {
     animation: wiggle 4.5s;

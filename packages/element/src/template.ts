@@ -1,10 +1,11 @@
 import { html, nothing, svg, type TemplateResult } from 'lit';
 import { visitorMessage, type ElementError } from './errors.js';
+import { languageOf, word, type SpokenStrings } from './words.js';
 
 /** Everything that the shadow tree shows. */
 export interface TemplateModel {
-  /** Text alternative; empty for a decorative scene. */
-  readonly label: string;
+  /** Text alternative; empty for a decorative scene, null where the page gives none. */
+  readonly label: string | null;
   readonly controls: boolean;
   readonly navigation: 'orbit' | 'fly';
   readonly poster: string | null;
@@ -18,37 +19,25 @@ export interface TemplateModel {
   readonly error: ElementError | null;
   /** How people learn that they can move the scene. */
   readonly prompt: 'none' | 'basic' | 'wiggle';
-  /** What screen readers are told of the prompt, where the page has its own words. */
-  readonly promptText: string | undefined;
+  /** Words of the page in place of the English ones. */
+  readonly strings: SpokenStrings;
   /** What screen readers are told of the camera. */
   readonly spoken: string;
   /** Slots of the hotspots. */
   readonly hotspots: readonly string[];
 }
 
-/** Used where a page gives no text alternative. */
-export const DEFAULT_LABEL = '3D scene';
-
-const KEYS_HELP = {
-  orbit:
-    'Arrow keys turn the view, Page Up and Page Down or plus and minus change the distance, ' +
-    'Shift with the arrow keys moves it sideways, Home brings it back.',
-  fly:
-    'Arrow keys look around, W and S fly forward and back, A and D to the sides, E and Q up and down, with Shift faster, ' +
-    'Home brings the view back.',
-};
-
 /** The element's shadow tree. */
 export function template(model: TemplateModel): TemplateResult {
   return html`
     ${view(model)} ${hotspots(model.hotspots)} ${prompt(model)} ${poster(model)}
-    ${model.isLoading ? progressBar(model.progress) : nothing} ${model.error ? message(model.error) : nothing}
-    <div class="for-screen-readers" role="status">${model.spoken}</div>
+    ${model.isLoading ? progressBar(model) : nothing} ${model.error ? message(model.error, model.strings) : nothing}
+    <div class="for-screen-readers" role="status" lang=${languageOf(model.strings) ?? nothing}>${model.spoken}</div>
   `;
 }
 
 /** The picture. One canvas for life, whatever the attributes: a context cannot move from one to another. */
-function view({ label, controls, navigation, onReveal }: TemplateModel): TemplateResult {
+function view({ label, controls, navigation, onReveal, strings }: TemplateModel): TemplateResult {
   const role = controls ? 'application' : label === '' ? 'presentation' : 'img';
   // Behind a poster that waits for a person there is nothing to see or to do yet.
   const isWaiting = onReveal !== null;
@@ -57,16 +46,20 @@ function view({ label, controls, navigation, onReveal }: TemplateModel): Templat
       id="view"
       class="view ${controls ? 'interactive' : ''} ${isWaiting ? 'covered' : ''}"
       role=${role}
-      aria-label=${role === 'presentation' ? nothing : label || DEFAULT_LABEL}
-      aria-roledescription=${controls ? '3D scene viewer' : nothing}
+      aria-label=${role === 'presentation' ? nothing : label || word(strings, 'scene')}
+      lang=${(label ? undefined : languageOf(strings)) ?? nothing}
+      aria-roledescription=${controls ? word(strings, 'role') : nothing}
       aria-describedby=${controls ? 'keys' : nothing}
       tabindex=${controls && !isWaiting ? '0' : nothing}
     >
       <canvas part="canvas"></canvas>
     </div>
-    ${controls ? html`<span id="keys" class="for-screen-readers" hidden>${KEYS_HELP[navigation]}</span>` : nothing}
+    ${controls ? help(word(strings, `keys-${navigation}`), strings) : nothing}
   `;
 }
+
+const help = (text: string, strings: SpokenStrings): TemplateResult =>
+  html`<span id="keys" class="for-screen-readers" hidden lang=${languageOf(strings) ?? nothing}>${text}</span>`;
 
 /** A box for each name, in their order; where it lies is up to the controller of the hotspots. */
 function hotspots(names: readonly string[]): TemplateResult {
@@ -76,45 +69,66 @@ function hotspots(names: readonly string[]): TemplateResult {
 }
 
 /** A hand that drags. Only a picture: those who do not see it are told the keys when the scene has the focus. */
-function prompt({ prompt, promptText }: TemplateModel): TemplateResult | typeof nothing {
+function prompt({ prompt, strings }: TemplateModel): TemplateResult | typeof nothing {
   if (prompt === 'none') return nothing;
   const hand = svg`<path d="M9 11.24V7.5a2.5 2.5 0 0 1 5 0v3.74a4.5 4.5 0 1 0-5 0zm9.84 4.63-4.54-2.26a1 1 0 0 0-.54-.11H13v-6a1.5
     1.5 0 0 0-3 0v10.74l-3.43-.72a1 1 0 0 0-1 .33l-.57.62 4.94 4.94a1.5 1.5 0 0 0 1.06.44h6.79a1.5 1.5 0 0 0 1.48-1.29l.75-5.27a1.5
     1.5 0 0 0-.18-1.42z" />`;
   return html`<div class="layer prompt">
     <slot name="interaction-prompt">
-      <div part="prompt" class=${prompt} role="img" aria-label=${promptText ?? 'Drag to look around'}>
+      <div
+        part="prompt"
+        class=${prompt}
+        role="img"
+        lang=${languageOf(strings) ?? nothing}
+        aria-label=${word(strings, 'interaction-prompt')}
+      >
         <svg viewBox="0 0 24 24" width="44" height="44" aria-hidden="true" fill="currentColor">${hand}</svg>
       </div>
     </slot>
   </div>`;
 }
 
-/** The poster is scenery of the same scene, so it needs no text of its own; one that waits for a person is a button. */
-function poster({ poster, posterLoading, showPoster, onReveal, label }: TemplateModel): TemplateResult {
+/**
+ * The poster is scenery of the same scene, so it needs no text of its own. One that waits for a person is a button around the image, the page's
+ * own included, with a sign that there is something to start.
+ */
+function poster(model: TemplateModel): TemplateResult {
+  const { poster, posterLoading, showPoster, onReveal } = model;
   const image = poster
     ? html`<img part="poster" alt="" loading=${posterLoading} decoding="async" src=${poster} />`
     : nothing;
-  const button = html`<button
-    type="button"
-    part="poster-button"
-    aria-label="Show ${label || DEFAULT_LABEL}"
-    @click=${onReveal}
-  >
-    ${image}
-  </button>`;
+  const content = html`<slot name="poster">${image}</slot>`;
   return html`<div class="layer poster ${showPoster ? '' : 'gone'}">
-    <slot name="poster">${onReveal ? button : image}</slot>
+    ${onReveal ? revealButton(model, onReveal, content) : content}
   </div>`;
 }
 
-function progressBar(progress: number | null): TemplateResult {
+function revealButton(
+  { label, strings }: TemplateModel,
+  onReveal: () => void,
+  content: TemplateResult,
+): TemplateResult {
+  const text = word(strings, 'show').replace('…', label || word(strings, 'scene'));
+  const lang = (label ? undefined : languageOf(strings)) ?? nothing;
+  return html`<button type="button" part="poster-button" aria-label=${text} lang=${lang} @click=${onReveal}>
+    ${content}
+    <span part="poster-cue">
+      <svg viewBox="0 0 24 24" width="44" height="44" aria-hidden="true" fill="currentColor">
+        <path d="M8 5v14l11-7z" />
+      </svg>
+    </span>
+  </button>`;
+}
+
+function progressBar({ progress, strings }: TemplateModel): TemplateResult {
   return html`<div class="layer progress">
     <slot name="progress-bar">
       <div
         part="progress-track"
         role="progressbar"
-        aria-label="Loading the 3D scene"
+        lang=${languageOf(strings) ?? nothing}
+        aria-label=${word(strings, 'loading')}
         aria-valuemin="0"
         aria-valuemax="100"
         aria-valuenow=${progress === null ? nothing : String(Math.round(100 * progress))}
@@ -126,11 +140,13 @@ function progressBar(progress: number | null): TemplateResult {
 }
 
 /** What went wrong: a sentence for visitors, and the details for those who made the page. */
-function message(error: ElementError): TemplateResult {
-  const text = html`<p>${visitorMessage(error)}</p>
+function message(error: ElementError, strings: SpokenStrings): TemplateResult {
+  const lang = languageOf(strings) ?? nothing;
+  // The details are for the person who made the page, and always English.
+  const text = html`<p lang=${lang}>${visitorMessage(error, strings)}</p>
     <details>
-      <summary>Details</summary>
-      ${error.message}
+      <summary lang=${lang}>${word(strings, 'details')}</summary>
+      <span lang="en">${error.message}</span>
     </details>`;
   return html`<div class="layer message" role="status">
     ${

@@ -56,6 +56,21 @@ describe('the poster', () => {
     assertEqual(element.shadowRoot?.activeElement?.id, 'view', 'the keyboard goes on in the scene');
   });
 
+  it('of the page itself is a button, too, with a sign that there is something to start', async () => {
+    const element = show({ src: COMPASS, reveal: 'manual', alt: 'Ein Kompass' });
+    const own = document.createElement('b');
+    Object.assign(own, { slot: 'poster', textContent: 'Unser Poster' });
+    element.append(own);
+    await element.updateComplete;
+    const cue = partOf(element, '[part=poster-cue]')?.getBoundingClientRect();
+    const box = element.getBoundingClientRect();
+    assert(cue && cue.width > 20, 'a sign');
+    assertEqual(Math.round(cue.x + cue.width / 2 - box.x), Math.round(box.width / 2), 'in the middle');
+    own.click();
+    await nextEvent(element, 'load');
+    assert(element.revealed, 'revealed');
+  });
+
   it('covers a scene that was loaded eagerly until dismissPoster(), and again after showPoster()', async () => {
     const element = await showLoaded({ reveal: 'manual', loading: 'eager' });
     assert(!element.revealed, 'covered');
@@ -252,6 +267,27 @@ describe('screen readers', () => {
     element.blur();
     (element.shadowRoot?.activeElement as HTMLElement | null)?.blur();
     await until(() => spoken(element) === '', 'silence');
+  });
+
+  it('are told that words are English, but for those of the page', async () => {
+    const languages = (element: Element): (string | null | undefined)[] =>
+      ['#view', '#keys', '[part=error] p', '[part=error] summary'].map((part) =>
+        element.shadowRoot?.querySelector(part)?.getAttribute('lang'),
+      );
+    const failed = async (attributes: Record<string, string>) => {
+      const element = show({ src: '/net/status/404', 'camera-controls': '', ...attributes });
+      await nextEvent(element, 'error');
+      await element.updateComplete;
+      return element;
+    };
+    assertEqual(languages(await failed({})), ['en', 'en', 'en', 'en']);
+    assertEqual(languages(await failed({ alt: 'Ein Kompass' })), [null, 'en', 'en', 'en']);
+    const words = { 'keys-orbit': 'Pfeiltasten drehen.', 'error-network': 'Nicht da.', details: 'Genaueres' };
+    const german = await failed({ alt: 'Ein Kompass', a11y: JSON.stringify(words) });
+    assertEqual(languages(german), [null, null, null, null]);
+    assertEqual(partOf(german, '#keys')?.textContent, words['keys-orbit']);
+    assertEqual(partOf(german, '[part=error] p')?.textContent, words['error-network']);
+    assertEqual(partOf(german, '[part=error] summary')?.textContent, words.details);
   });
 
   it('hear the words of the page', async () => {

@@ -209,6 +209,28 @@ describe('touch', () => {
     close(place.theta, 90, 'theta');
   });
 
+  it("with disable-zoom two fingers are the page's, which people zoom to read", async () => {
+    const surfaceOf = (element: Element) => element.shadowRoot?.querySelector<HTMLElement>('#view');
+    const element = await controlled({ 'disable-zoom': '' });
+    assertEqual(surfaceOf(element)?.style.touchAction, 'pan-y pinch-zoom');
+    const prevented: boolean[] = [];
+    addEventListener('touchmove', ({ defaultPrevented }) => prevented.push(defaultPrevented), { once: true });
+    await sendTouch('touchStart', [
+      { x: 50, y: 50, id: 1 },
+      { x: 70, y: 50, id: 2 },
+    ]);
+    await sendTouch('touchMove', [
+      { x: 50, y: 45, id: 1 },
+      { x: 70, y: 45, id: 2 },
+    ]);
+    await sendTouch('touchEnd', []);
+    assertEqual(prevented, [false]);
+    const place = await settled(element);
+    close(Math.hypot(...place.target), 0, 'target');
+    const free = await controlled({ 'disable-zoom': '', 'touch-action': 'none' });
+    assertEqual(surfaceOf(free)?.style.touchAction, 'pinch-zoom');
+  });
+
   it('by default a vertical move of one finger scrolls the page', async () => {
     const element = await controlled();
     document.body.style.height = '5000px';

@@ -30,29 +30,6 @@ export function viewName(theta: number, phi: number): ViewName {
   return phi > (2 * Math.PI) / 3 ? `lower-${side}` : side;
 }
 
-/** Strings of a page in place of the English ones. */
-export type SpokenStrings = Readonly<Partial<Record<ViewName | 'interaction-prompt', string>>>;
-
 /** What is said of a place. */
-export const viewSentence = (name: ViewName, strings: SpokenStrings): string =>
+export const viewSentence = (name: ViewName, strings: Readonly<Partial<Record<ViewName, string>>>): string =>
   strings[name] ?? `View from ${name.replace('-', ' ')}`;
-
-/**
- * The attribute `a11y`: an object, or its JSON.
- * @returns null where it is malformed.
- */
-export function readSpokenStrings(value: unknown): SpokenStrings | null {
-  if (value === null || value === undefined || value === '') return {};
-  let parsed: unknown = value;
-  if (typeof value === 'string') {
-    try {
-      parsed = JSON.parse(value);
-    } catch {
-      return null;
-    }
-  }
-  const isObject = typeof parsed === 'object' && parsed !== null && !Array.isArray(parsed);
-  if (!isObject) return null;
-  const strings = Object.entries(parsed as object).filter(([, text]) => typeof text === 'string');
-  return Object.fromEntries(strings) as SpokenStrings;
-}

@@ -1,5 +1,6 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import { viewSentence, type SpokenStrings, type ViewName } from '../camera/spoken.js';
+import { viewSentence, type ViewName } from '../camera/spoken.js';
+import type { SpokenStrings } from '../words.js';
 
 export interface AnnouncerOptions {
   readonly viewName: () => ViewName;

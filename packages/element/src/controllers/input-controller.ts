@@ -81,7 +81,7 @@ export class InputController implements ReactiveController {
     this.#surface = this.#surfaceOf();
     if (this.#surface === null) return;
     const { enabled, zoom, touchAction } = this.#options();
-    this.#surface.style.touchAction = enabled ? touchAction : '';
+    this.#surface.style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
     if (!enabled) return this.#stop();
     this.#listening ??= this.#listen(this.#surface);
     // A wheel listener that may prevent scrolling costs the page; it exists only where the wheel zooms.
@@ -147,7 +147,7 @@ export class InputController implements ReactiveController {
     const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
     if (!other && from.owner === 'undecided') return this.#decide(event.pointerId, from, to);
     this.#pointers.set(event.pointerId, { ...from, ...to });
-    if (other) this.#performAll(pinchOf([from, other], [to, other], height));
+    if (other) this.#movePair([from, other], [to, other], height);
     else if (from.owner === 'camera') this.#perform(from.pans ? panOf(from, to, height) : orbitOf(from, to, height));
   };
 
@@ -181,13 +181,14 @@ export class InputController implements ReactiveController {
     if (this.#options().pan) event.preventDefault();
   };
 
-  /** Two fingers move the camera, also where one finger scrolls the page. */
+  /** Two fingers move the camera, also where one finger scrolls the page; without zoom they are the page's, whose own zoom some people need. */
   readonly #onTouchMove = (event: TouchEvent): void => {
-    if (event.touches.length > 1 && event.cancelable) event.preventDefault();
+    if (event.touches.length > 1 && event.cancelable && this.#options().zoom) event.preventDefault();
   };
 
-  #performAll(actions: readonly CameraAction[]): void {
-    for (const action of actions) this.#perform(action);
+  #movePair(from: readonly [Point, Point], to: readonly [Point, Point], height: number): void {
+    if (!this.#options().zoom) return;
+    for (const action of pinchOf(from, to, height)) this.#perform(action);
   }
 
   /** Passes an action on; false if the page does not allow it. */
@@ -198,5 +199,11 @@ export class InputController implements ReactiveController {
     return true;
   }
 }
+
+/** A CSS touch-action that leaves pinches to the page, too. */
+const withPinch = (touchAction: string): string =>
+  ['auto', 'manipulation'].includes(touchAction)
+    ? touchAction
+    : `${touchAction === 'none' ? '' : touchAction} pinch-zoom`.trim();
 
 const positionOf = (event: PointerEvent): Point => ({ x: event.clientX, y: event.clientY });

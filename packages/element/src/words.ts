@@ -1,0 +1,51 @@
+/** The words that the element says to people, and those that a page may put in their place. */
+import type { ViewName } from './camera/spoken.js';
+import type { ElementErrorCode } from './errors.js';
+
+/** What the element says apart from the camera's places, in English; `…` stands for the scene's text alternative. The keys are those of `a11y`, too. */
+export const WORDS = {
+  scene: '3D scene',
+  role: '3D scene viewer',
+  'keys-orbit':
+    'Arrow keys turn the view, Page Up and Page Down or plus and minus change the distance, ' +
+    'Shift with the arrow keys moves it sideways, Home brings it back.',
+  'keys-fly':
+    'Arrow keys look around, W and S fly forward and back, A and D to the sides, E and Q up and down, with Shift faster, ' +
+    'Home brings the view back.',
+  'interaction-prompt': 'Drag to look around',
+  show: 'Show …',
+  loading: 'Loading the 3D scene',
+  details: 'Details',
+} as const;
+
+/** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
+export type SpokenStrings = Readonly<
+  Partial<Record<ViewName | keyof typeof WORDS | `error-${ElementErrorCode}`, string>>
+>;
+
+/** A word of the page, or the English one. */
+export const word = (strings: SpokenStrings, key: keyof typeof WORDS): string => strings[key] ?? WORDS[key];
+
+/** The language of the element's own words: a page that gives any gives them in its own language. */
+export const languageOf = (strings: SpokenStrings): 'en' | undefined =>
+  Object.keys(strings).length === 0 ? 'en' : undefined;
+
+/**
+ * The attribute `a11y`: an object, or its JSON.
+ * @returns null where it is malformed.
+ */
+export function readSpokenStrings(value: unknown): SpokenStrings | null {
+  if (value === null || value === undefined || value === '') return {};
+  let parsed: unknown = value;
+  if (typeof value === 'string') {
+    try {
+      parsed = JSON.parse(value);
+    } catch {
+      return null;
+    }
+  }
+  const isObject = typeof parsed === 'object' && parsed !== null && !Array.isArray(parsed);
+  if (!isObject) return null;
+  const strings = Object.entries(parsed as object).filter(([, text]) => typeof text === 'string');
+  return Object.fromEntries(strings) as SpokenStrings;
+}
