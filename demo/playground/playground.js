@@ -7,7 +7,9 @@ const byId = (id) => document.getElementById(id);
 const scene = byId('scene');
 const form = byId('attributes');
 /** Attributes that are addresses: pasted elsewhere, they must still lead here. */
-const ADDRESSES = ['src', 'poster', 'contract', 'postprocess'];
+const ADDRESSES = ['src', 'poster', 'contract'];
+/** And those that are several, with spaces between them. */
+const LISTS = ['chain', 'postprocess'];
 const VIEW = {
   'camera-orbit': 'getCameraOrbit',
   'camera-target': 'getCameraTarget',
@@ -49,9 +51,13 @@ function setAttribute(name, value) {
 }
 
 function pasteable(name, value) {
+  if (LISTS.includes(name)) return value.split(/\s+/).map(absolute).join(' ');
   if (!ADDRESSES.includes(name) || value === local.name || value.startsWith('{')) return value;
-  return URL.canParse(value, document.baseURI) ? new URL(value, document.baseURI).href : value;
+  return absolute(value);
 }
+
+const absolute = (address) =>
+  URL.canParse(address, document.baseURI) ? new URL(address, document.baseURI).href : address;
 
 /** The page's address says what the fields say, so that it can be sent to somebody. A file stays where it is. */
 function remember(attributes) {

@@ -50,6 +50,12 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     const here = await stateOf(tab);
     assert.equal(here.attributes.quality, 'fast');
     const html = (await tab.locator('#html').textContent())!;
+    await tab.getByText('Generators', { exact: true }).click();
+    await tab.fill('#attribute-chain', ' /a.onnx  b.onnx ');
+    await tab.locator('#attribute-chain').blur();
+    const { origin, href } = new URL(tab.url());
+    const addresses = `${origin}/a.onnx ${new URL('b.onnx', href).href}`;
+    assert.ok((await tab.locator('#html').textContent())!.includes(`chain="${addresses}"`), 'each address by itself');
     assert.match(html, /^<script type="module" src="cdn\/gaussian-splat\.min\.js"><\/script>\n<gaussian-splat/);
 
     const { tab: page, faults: others } = await open.visit('/docs/');
