@@ -16,7 +16,7 @@ import { differingBytes, RASTERIZERS, yawed, THREADS } from './support/pictures.
 import { holds, sized } from './support/row.js';
 
 const SPLATS = sized(20_000, 1_000_000);
-const FRAMES = { quads: sized(20, 200), tiles: sized(4, 40) };
+const FRAMES = { quads: sized(20, 200), tiles: sized(4, 200) };
 
 const random = seededRandom(42);
 const plane = cloudOf(

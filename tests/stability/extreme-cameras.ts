@@ -70,7 +70,7 @@ for (const rasterizer of RASTERIZERS) {
         worst = Math.min(worst, psnr);
         return psnr >= 59;
       }),
-      { numRuns: rasterizer === 'quads' ? sized(25, 500) : sized(6, 100), seed: 19 },
+      { numRuns: rasterizer === 'quads' ? sized(25, 500) : sized(6, 500), seed: 19 },
     );
     holds('S19', `cameras at random, ${rasterizer}, worst`, worst, { atLeast: 59, unit: 'dB' });
     holds('S19', 'distance of the eye that colours are seen from to the true one', offCentre, {

@@ -48,7 +48,7 @@ for (const rasterizer of RASTERIZERS) {
         differing += count;
         return count === 0;
       }),
-      { numRuns: rasterizer === 'quads' ? sized(25, 1000) : sized(8, 100), seed: 18 },
+      { numRuns: rasterizer === 'quads' ? sized(25, 1000) : sized(8, 1000), seed: 18 },
     );
     assert.equal(await device.popErrorScope(), null);
     holds('S18', `sizes at random, ${rasterizer}: bytes that differ from a fresh start`, differing, {

@@ -4,7 +4,8 @@
  * Who fails: splat-transform #22 and #293 (DXGI_ERROR_DEVICE_HUNG), PlayCanvas #9036 (hang), vello #548: one submission runs longer than the watchdog of
  * the driver allows, and the device is lost.
  *
- * Passes: no loss of the device; the picture is right; work is handed over in submissions of a bounded share (see docs/stability.md for the share).
+ * Passes: no loss of the device; the picture is right, and the same to the byte however it is divided into submissions; tiles are divided by themselves, the more the more
+ * pairs of splat and bin there may be, quads where the lever `submissions` asks for it.
  */
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
@@ -13,6 +14,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { nodeDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { cameraAt } from '../support/scenes.js';
+import { deviceWith } from './support/devices.js';
 import { compareImage, differingBytes, notFinite, RASTERIZERS, truth, THREADS } from './support/pictures.js';
 import { holds, note, sized } from './support/row.js';
 
@@ -57,6 +59,17 @@ for (const rasterizer of RASTERIZERS) {
   });
 }
 
+/** Splats of about a pixel. */
+const specks = (count: number) =>
+  cloudOf(
+    repeat(count, () => ({
+      position: [random.uniform(-1, 1), random.uniform(-0.5, 0.5), random.uniform(0, 1)],
+      scale: 0.003,
+      opacity: 0.5,
+      color: [0.9, 0.5, 0.1],
+    })),
+  );
+
 /** Milliseconds of every submission of a device's queue, from when the one before it was done. */
 function timeSubmissions(device: GPUDevice): { readonly times: Promise<number>[]; stop(): void } {
   const { queue } = device;
@@ -75,10 +88,10 @@ function timeSubmissions(device: GPUDevice): { readonly times: Promise<number>[]
   return { times, stop: () => void Reflect.deleteProperty(queue, 'submit') };
 }
 
-test('the painting of a frame, divided into many submissions, is the same to the byte, and none is long', async () => {
+test('quads, divided into many submissions, are the same to the byte, and none is long', async () => {
   const device = await nodeDevice();
-  const width = sized(320, 1920);
-  const cloud = fullScreen(sized(600, 2_000));
+  const width = sized(240, 1920);
+  const cloud = fullScreen(sized(300, 2_000));
   const camera = cameraAt([0, 0, -1], [0, 0, 0], { width, height: Math.round((width * 9) / 16) });
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const images: Float32Array[] = [];
@@ -106,4 +119,62 @@ test('the painting of a frame, divided into many submissions, is the same to the
   });
   holds('S9', 'longest of 64 submissions over the one', longest[1] / longest[0], { atMost: 0.5, unit: 'times' });
   gaussians.destroy();
+});
+
+test('tiles, divided into any number of submissions, are the same to the byte', async () => {
+  const device = await nodeDevice();
+  const cloud = fullScreen(40);
+  // Neither whole tiles nor whole bins: 10 x 5 tiles, fewer than the most parts.
+  const camera = cameraAt([0, 0, -1], [0, 0, 0], { width: 150, height: 70 });
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  let whole: Float32Array | undefined;
+  let differing = 0;
+  const counts = sized([1, 3, 7, 256], [1, 2, 3, 4, 5, 6, 7, 11, 49, 50, 51, 64, 256]);
+  for (const submissions of counts) {
+    const renderer = new Renderer(device, { threads: THREADS, rasterizer: 'tiles', submissions });
+    await capture(device, renderer, { gaussians, camera });
+    const watch = timeSubmissions(device);
+    const pixels = await capture(device, renderer, { gaussians, camera });
+    watch.stop();
+    // The frame's own, the one before its painting, and two that read back.
+    assert.equal(watch.times.length, submissions + (submissions > 1 ? 3 : 2), `submissions of ${submissions}`);
+    await Promise.all(watch.times);
+    whole ??= pixels;
+    differing += differingBytes(whole, pixels);
+    renderer.destroy();
+  }
+  holds('S9', `tiles in ${counts.length} numbers of submissions: differing bytes`, differing, {
+    atMost: 0,
+    unit: 'bytes',
+  });
+  gaussians.destroy();
+});
+
+test('tiles are divided by themselves, the more the more there is to do', async () => {
+  // A device that knows nothing yet of what painting costs.
+  const device = await deviceWith([]);
+  const camera = cameraAt([0, 0, -1], [0, 0, 0], { width: 160, height: 96 });
+  const found: number[] = [];
+  for (const count of sized([1_000, 70_000], [10_000, 100_000, 300_000])) {
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(specks(count)));
+    const renderer = new Renderer(device, { threads: THREADS, rasterizer: 'tiles' });
+    const target = device.createTexture({ size: [160, 96], format: 'rgba8unorm', usage: 0x8 | 0x10 });
+    const watch = timeSubmissions(device);
+    renderer.render({ gaussians, camera, target });
+    watch.stop();
+    found.push(watch.times.length);
+    note('S9', `${count} small splats, tiles: submissions of the first frame`, watch.times.length, { unit: '' });
+    note('S9', `${count} small splats, tiles: longest submission`, Math.max(...(await Promise.all(watch.times))), {
+      unit: 'ms',
+    });
+    renderer.destroy();
+    gaussians.destroy();
+    target.destroy();
+  }
+  assert.equal(found[0], 1, 'little work is one submission');
+  assert.ok(
+    found.every((submissions, i) => i === 0 || submissions > found[i - 1]),
+    `${found.join(', ')} submissions`,
+  );
+  device.destroy();
 });

@@ -23,6 +23,7 @@ import { maxPairs } from './rasterizers/tiles.js';
 import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
 import { maxVisible, Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
+import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
@@ -41,6 +42,12 @@ interface Resources {
 interface Accumulation {
   readonly texture: AccumulationTexture;
   readonly compose: GPUBindGroup;
+}
+
+/** In how many parts the painting of a frame is handed over, and who times them. */
+interface Submissions {
+  readonly parts: number;
+  readonly watch?: SubmissionWatch;
 }
 
 /** A target, and whether a compute shader may write it. */
@@ -76,6 +83,7 @@ export class Renderer {
   readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
   readonly #occlusion: Occlusion;
+  readonly #pacer: SubmissionPacer;
   readonly #onIncomplete: () => void;
   readonly #memory: GpuMemory;
   readonly #composeUniform: GPUBuffer;
@@ -101,6 +109,7 @@ export class Renderer {
     this.#compose = new ComposeStage(device);
     this.#rasterizer = makeRasterizer(device, this.levers, this.#mix.overrides);
     this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
+    this.#pacer = new SubmissionPacer(device);
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
@@ -173,19 +182,29 @@ export class Renderer {
       isBudgeted: detail.splatBudget > 0 && table.hasDetail,
       timer,
     });
+    const { pairPlan } = this.#rasterizer;
+    const isWatched = monitor.isDue(pairPlan !== undefined);
+    const submissions = this.#submissionsFor(isWatched);
     const last = this.#paint(
       encoder,
       target,
       drawn,
       { order: isOrdered ? 'identity' : sortedOrder(levers), overrides: mix.overrides, notes, timer },
       background,
+      submissions,
     );
     timer?.endFrame?.(last);
-    const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
-    this.#device.queue.submit([last.finish()]);
+    if (isWatched) monitor.record(last, scratch.plan, pairPlan);
+    this.#submit(last, submissions);
     timer?.submitted?.();
     this.#last = { order: isOrdered ? 'identity' : sortedOrder(levers), scale: drawn.width / camera.width };
-    if (isWatched) monitor.read();
+    const counts = isWatched ? monitor.read() : undefined;
+    if (counts && submissions.watch) {
+      void this.#pacer.learn(
+        submissions.watch,
+        counts.then((painted) => painted?.pairs),
+      );
+    }
     for (const wish of wishes) wish.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     // A lever that reuses orders sorts all splats again and again: it keeps the buffers.
@@ -274,11 +293,11 @@ export class Renderer {
     camera: Camera,
     how: Pick<Painting, 'order' | 'overrides' | 'notes' | 'timer'>,
     background: readonly [number, number, number, number],
+    submissions: Submissions,
   ): GPUCommandEncoder {
     const isFullSize = camera.width === target.width && camera.height === target.height;
     if (isFullSize && target.isStorable && this.#rasterizer.finishes(target.format)) {
-      this.#rasterizer.record(encoder, { ...how, surface: target, background });
-      return encoder;
+      return this.#recordParts(encoder, { ...how, surface: target, background }, submissions);
     }
     const { texture, compose } = this.#accumulationOf(camera, target);
     const scale = [camera.width / target.width, camera.height / target.height];
@@ -287,22 +306,37 @@ export class Renderer {
     this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
     const { view, format } = texture;
     const surface = { view, format, width: camera.width, height: camera.height };
-    const last = this.#recordSlices(encoder, { ...how, surface });
+    const last = this.#recordParts(encoder, { ...how, surface }, submissions);
     this.#compose.record(last, compose, target.view, target.format, how.timer);
     return last;
   }
 
+  /** How this frame is handed over: in one submission, or in as many as keep each short. */
+  #submissionsFor(isWatched: boolean): Submissions {
+    const least = Math.ceil(this.levers.submissions);
+    if (this.#rasterizer.pairPlan === undefined) return { parts: least };
+    const { pairs } = this.#capacity!;
+    const watch = isWatched && this.#pacer.wantsToKnow(pairs) ? this.#pacer.watch() : undefined;
+    return { parts: Math.max(least, this.#pacer.partsFor(pairs)), watch };
+  }
+
+  #submit(encoder: GPUCommandEncoder, { watch }: Submissions): void {
+    this.#device.queue.submit([encoder.finish()]);
+    watch?.note();
+  }
+
   /** Records the painting, in several submissions where that is asked for. @returns the encoder to go on with */
-  #recordSlices(encoder: GPUCommandEncoder, painting: Painting): GPUCommandEncoder {
-    const count = this.#rasterizer.canSlice ? Math.ceil(this.levers.submissions) : 1;
+  #recordParts(encoder: GPUCommandEncoder, painting: Painting, submissions: Submissions): GPUCommandEncoder {
+    const { parts: count } = submissions;
+    this.#rasterizer.prepareFrame(encoder, painting);
     let current = encoder;
     for (let index = 0; index < count; index++) {
       // What comes before the painting is a submission of its own, too.
       if (count > 1) {
-        this.#device.queue.submit([current.finish()]);
+        this.#submit(current, submissions);
         current = this.#device.createCommandEncoder({ label: `gs.frame.${index}` });
       }
-      this.#rasterizer.record(current, { ...painting, slice: { index, count } });
+      this.#rasterizer.record(current, painting, { index, count });
     }
     return current;
   }
