@@ -7,11 +7,17 @@
  * Passes: sums stop at the largest number, whatever the counts: nothing is written where it does not belong, and the overflow is reported.
  */
 import { test } from 'node:test';
+import assert from 'node:assert/strict';
 import fc from 'fast-check';
+import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { ScanStage } from '@gaussian-splat/renderer/stages';
+import { cloudOf, repeat } from '../support/clouds.js';
 import { runCase } from '../support/gpu.js';
 import { nodeDevice } from '../support/node-device.js';
-import { holds, sized } from './support/row.js';
+import { cameraAt } from '../support/scenes.js';
+import { deviceWith } from './support/devices.js';
+import { THREADS } from './support/pictures.js';
+import { fullTest, holds, sized } from './support/row.js';
 
 const MOST = 0xffffffff;
 
@@ -49,4 +55,44 @@ test('prefix sums of any counts stop at the largest number', async () => {
     { numRuns: sized(60, 600), seed: 13 },
   );
   holds('S13', 'wrong prefix sums of counts beyond 32 bits', wrong, { atMost: 0, unit: 'sums' });
+});
+
+fullTest('five billion pairs of splat and bin in one frame', async () => {
+  const device = await deviceWith([]);
+  let isLost = false;
+  void device.lost.then(() => (isLost = true));
+  const [count, side] = [620_000, 8192];
+  // Each fills the image: 64 x 128 bins. The nearest hide the rest.
+  const cloud = cloudOf(
+    repeat(count, (i) => ({ position: [0, 0, 1e-6 * i], scale: 500, opacity: 0.9, color: [0.25, 0.5, 0.75] })),
+  );
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device, { threads: THREADS, rasterizer: 'tiles' });
+  const target = device.createTexture({ size: [side, side], format: 'rgba8unorm', usage: 0x8 | 0x10 | 0x1 });
+  const camera = cameraAt([0, 0, -1], [0, 0, 0], { width: side, height: side });
+  renderer.render({ gaussians, camera, target });
+  const { pairs, pairOverflow } = await renderer.readStatistics();
+  assert.ok(count * (side / 128) * (side / 64) > 5e9, 'five billion are demanded');
+  holds('S13', 'pairs that are counted of 5.08e9', pairs + pairOverflow, {
+    atLeast: MOST,
+    atMost: MOST,
+    unit: 'pairs',
+  });
+  const staging = device.createBuffer({ size: 4 * side, usage: 0x1 | 0x8 });
+  let wrong = 0;
+  for (const y of [0, side / 2, side - 1]) {
+    const encoder = device.createCommandEncoder();
+    encoder.copyTextureToBuffer({ texture: target, origin: [0, y] }, { buffer: staging, bytesPerRow: 4 * side }, [
+      side,
+      1,
+    ]);
+    device.queue.submit([encoder.finish()]);
+    await staging.mapAsync(0x1);
+    const row = new Uint8Array(staging.getMappedRange());
+    wrong += row.filter((value, i) => Math.abs(value - [64, 128, 191, 255][i % 4]) > 1).length;
+    staging.unmap();
+  }
+  holds('S13', 'wrong colour values in three rows of the picture', wrong, { atMost: 0, unit: 'values' });
+  assert.equal(isLost, false, 'the device is there');
+  device.destroy();
 });
