@@ -4,6 +4,9 @@
  * Who fails: a symmetric clamp of the Jacobian is wrong for an off-centre principal point (gsplat made its own asymmetric); PlayCanvas #8889 culled with one eye's frustum
  * in XR; the camera's centre taken from a transposed matrix is wrong when the view is sheared.
  *
+ * Recipe: asked for fields of view from 5 to 160 degrees, lens shifts, sheared and mirrored views, orthographic ones. Run with 500 random cameras for each
+ * rasterizer; there is no orthographic projection.
+ *
  * Passes: 59 dB or more for fields of view from 5 to 160 degrees, any lens shift, any invertible view. Orthographic cameras cannot be expressed.
  */
 import { test } from 'node:test';

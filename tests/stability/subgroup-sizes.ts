@@ -4,6 +4,9 @@
  * Who fails: sorts that count with ballots: b0nes164/GPUSorting #4 (wrong on Adreno), vulkan_radix_sort #7, VkRadixSort #7; PlayCanvas had a buffer too small for
  * subgroups of 16, and wrong bits of inactive lanes on Mali and IMG.
  *
+ * Recipe: asked for subgroups of 4, 8, 16, 32, 64 and 128 emulated in workgroup memory. Run so, with digits of 4 and 8 bits where they have room, and with
+ * sizes other than the announced least; `npm test` has 32.
+ *
  * Passes: nothing needs subgroups: the one shader that votes is a variant of the sort, which must first give a known answer on the device. Sorted permutations are those of a
  * stable sort on the CPU for any keys, with every variant that the device has, and with subgroups of 4 to 128 threads whose votes are counted in workgroup memory.
  */

@@ -14,7 +14,7 @@ const USAGE = `usage: npm run fuzz -- [options]
   --minutes M      stop after so many minutes (default 240)
   --seed S         default: the time; the report names it
   --rasterizer R   quads (default) or tiles
-  --below DB       shrink the first picture under so many dB, too, whatever its cause: the smallest case that shows it
+  --below DB       shrink the first picture, too, that is under so many dB where no rounding decides, whatever its cause
   --out FILE       where to write the report as JSON
 `;
 
@@ -80,7 +80,7 @@ const failing = await fc.check(
     if (performance.now() > end) return true;
     const verdict = await judge(recipe, subject);
     count(recipe, verdict);
-    return verdict.cause !== 'none' && verdict.decibels >= Number(values.below) && !isLost;
+    return verdict.cause !== 'none' && verdict.withoutThresholds >= Number(values.below) && !isLost;
   }),
   {
     numRuns: Number(values.cases),
