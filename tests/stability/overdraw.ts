@@ -94,7 +94,7 @@ function timeSubmissions(device: GPUDevice): { readonly times: Promise<number>[]
 test('quads, divided into many submissions, are the same to the byte, and none is long', async () => {
   const device = await nodeDevice();
   const width = sized(240, 1920);
-  const cloud = fullScreen(sized(300, 2_000));
+  const cloud = fullScreen(sized(600, 2_000));
   const camera = cameraAt([0, 0, -1], [0, 0, 0], { width, height: Math.round((width * 9) / 16) });
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const images: Float32Array[] = [];

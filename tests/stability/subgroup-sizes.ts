@@ -89,7 +89,7 @@ for (const variant of SORT_NAMES) {
   test(`any keys, ${variant}`, async (context) => {
     const device = await (variant.startsWith('subgroup') ? fullDevice() : nodeDevice());
     if (!canSort(device, variant)) return context.skip(`this device has no subgroups for ${variant}`);
-    const wrong = await misplaced(device, variant, sized(40, 400));
+    const wrong = await misplaced(device, variant, sized(25, 400));
     holds('S15', `misplaced keys, ${variant}`, wrong, { atMost: 0, unit: 'keys' });
   });
 }
@@ -117,7 +117,7 @@ for (const [size, least] of SIZES) {
     const variants = (['subgroup4', 'subgroup8'] as const).filter((variant) => canSort(device, variant));
     assert.equal(variants.includes('subgroup8'), least >= 32);
     for (const variant of sized(variants.slice(-1), variants)) {
-      const wrong = await misplaced(device, variant, sized(6, 100));
+      const wrong = await misplaced(device, variant, sized(4, 100));
       holds('S15', `misplaced keys, ${variant}, subgroups of ${size} of ${least} or more`, wrong, {
         atMost: 0,
         unit: 'keys',
