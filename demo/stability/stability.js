@@ -45,11 +45,17 @@ function showPeers({ rows, adapter }) {
   place('peers').append(table(['row', 'limit', ...names], lines));
 }
 
-function showRow({ id, title, fails, passes, figures }) {
-  place('rows').append(make('h2', `${id}. ${title}`), make('p', `Who fails: ${fails}`), make('p', `Passes: ${passes}`));
+function showRow({ id, title, fails, recipe, passes, figures }) {
+  const texts = [`Who fails: ${fails}`, `Recipe: ${recipe}`, `Passes: ${passes}`];
+  place('rows').append(make('h2', `${id}. ${title}`), ...texts.map((text) => make('p', text)));
   if (figures.length === 0) return;
-  const lines = figures.map((figure) => [figure.what, `${number(figure.value)} ${figure.unit}`, limitOf(figure)]);
-  place('rows').append(table(['what', 'measured', 'limit'], lines));
+  const lines = figures.map((figure) => [
+    figure.what,
+    `${number(figure.value)} ${figure.unit}`,
+    limitOf(figure),
+    figure.isFull ? 'whole' : 'a part',
+  ]);
+  place('rows').append(table(['what', 'measured', 'limit', 'recipe'], lines));
 }
 
 try {

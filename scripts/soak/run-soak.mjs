@@ -6,14 +6,21 @@ import { PNG } from 'pngjs';
 import { findChromium, SWIFTSHADER_FLAGS } from '../lib/chromium.mjs';
 import { root } from '../lib/run.mjs';
 import { serve } from '../lib/server.mjs';
+import { residentBytes } from './processes.mjs';
 import { heapSlope } from './slope.mjs';
+import { summaryLine } from './summary.mjs';
 
-const USAGE = `usage: npm run soak -- [--minutes N (default 120)] [--seed S] [--out FILE]`;
+const USAGE = `usage: npm run soak -- [--minutes N (default 120)] [--seed S] [--out FILE] [--max-mib N (default 6144)]
+
+Every five minutes a line that begins with "summary:" tells how far it has come, and FILE holds the report so far. Ends with an error once the
+browser's processes hold more memory than --max-mib together (on Linux, which tells).`;
 const ANCHOR = { x: 0, y: 0, width: 160, height: 120 };
 /** Actions between two looks at the books. */
 const EPOCH = 30;
 /** Looks at the books, two seconds apart, before a byte too many counts as lost. */
 const PATIENCE = 8;
+/** Minutes between two summaries. */
+const SUMMARY_EVERY = 5;
 /** What a page says of files that are damaged or missing on purpose. */
 const EXPECTED = [/truncated\.ply|none\.ply|faulty-run|faulty/i, /404/, /pose expects|camera-orbit/];
 
@@ -22,6 +29,7 @@ const { values } = parseArgs({
     minutes: { type: 'string', default: '120' },
     seed: { type: 'string', default: '1' },
     out: { type: 'string' },
+    'max-mib': { type: 'string', default: '6144' },
     help: { type: 'boolean' },
   },
 });
@@ -54,7 +62,7 @@ const faults = [];
 try {
   const report = await soak(await browser.newPage({ viewport: { width: 800, height: 600 } }));
   console.log(JSON.stringify(report, null, 2));
-  if (values.out) writeFileSync(values.out, `${JSON.stringify(report, null, 2)}\n`);
+  keep(report);
 } catch (error) {
   failures.push(String(error));
 } finally {
@@ -70,6 +78,7 @@ async function soak(page) {
   await page.goto(`http://localhost:${server.address().port}/soak/index.html`);
   await page.waitForFunction(() => window.soak !== undefined);
   const devtools = await page.context().newCDPSession(page);
+  const processes = await browser.newBrowserCDPSession();
   const actions = await page.evaluate(() => window.soak.actions);
   const random = randomSource(Number(values.seed));
   // The very first frames allocate what is kept for good: the baseline is what lives after one epoch of each action.
@@ -80,6 +89,7 @@ async function soak(page) {
   const end = started + 60_000 * Number(values.minutes);
   const epochs = [];
   let performed = EPOCH;
+  let summaries = 0;
   while (Date.now() < end && failures.length === 0) {
     await walk(page, actions, random);
     performed += EPOCH;
@@ -90,12 +100,16 @@ async function soak(page) {
       now = await look(page, devtools);
     }
     const differing = differences(base.picture, now.picture);
+    const resident = await residentBytes(processes);
     epochs.push({
       minutes: (Date.now() - started) / 60_000,
       heap: now.heap,
       own: now.state.ledger.own,
       others: now.state.ledger.others,
+      resident,
     });
+    const held = Object.values(resident ?? {}).reduce((sum, bytes) => sum + bytes, 0) / 2 ** 20;
+    if (held > Number(values['max-mib'])) failures.push(`the browser holds ${held.toFixed(0)} MiB`);
     if (!now.state.loaded) failures.push(`the anchor is not loaded: ${now.state.error}`);
     if (differing > 0) failures.push(`${differing} colour values of the anchor differ`);
     const grown = now.state.ledger.own - base.state.ledger.own;
@@ -107,20 +121,38 @@ async function soak(page) {
     console.error(
       `${epochs.at(-1).minutes.toFixed(1)} min, ${performed} actions, heap ${(now.heap / 2 ** 20).toFixed(2)} MiB, ours ${now.state.ledger.own} bytes, ${differing} differing`,
     );
+    if (epochs.at(-1).minutes >= SUMMARY_EVERY * (summaries + 1)) {
+      summaries = Math.floor(epochs.at(-1).minutes / SUMMARY_EVERY);
+      const events = await page.evaluate(() => window.soak.events());
+      const { heap, state } = base;
+      const start = { heap, own: state.ledger.own };
+      console.error(summaryLine({ epochs, actions: performed, base: start, events, failures }));
+      keep(reportOf(base, epochs, performed, events));
+    }
   }
   const slope = heapSlope(epochs);
   if (Number(values.minutes) >= 60 && slope > 1) failures.push(`the heap grows by ${slope.toFixed(2)} MiB an hour`);
+  return reportOf(base, epochs, performed, await page.evaluate(() => window.soak.events()));
+}
+
+function reportOf(base, epochs, actions, events) {
+  const last = epochs.at(-1);
   return {
     seed: Number(values.seed),
-    minutes: epochs.at(-1)?.minutes ?? 0,
-    actions: performed,
+    minutes: last?.minutes ?? 0,
+    actions,
     epochs: epochs.length,
-    events: await page.evaluate(() => window.soak.events()),
-    ownBytes: { first: base.state.ledger.own, last: epochs.at(-1)?.own },
-    otherBytes: { first: base.state.ledger.others, last: epochs.at(-1)?.others },
-    heapMiB: { first: base.heap / 2 ** 20, last: (epochs.at(-1)?.heap ?? 0) / 2 ** 20, slopePerHour: slope },
+    events,
+    ownBytes: { first: base.state.ledger.own, last: last?.own },
+    otherBytes: { first: base.state.ledger.others, last: last?.others },
+    heapMiB: { first: base.heap / 2 ** 20, last: (last?.heap ?? 0) / 2 ** 20, slopePerHour: heapSlope(epochs) },
+    residentBytes: { first: epochs[0]?.resident, last: last?.resident },
     failures,
   };
+}
+
+function keep(report) {
+  if (values.out) writeFileSync(values.out, `${JSON.stringify(report, null, 2)}\n`);
 }
 
 async function walk(page, actions, random) {

@@ -1,4 +1,4 @@
-/** What the files of the catalogue say about themselves: number, title, who fails and how that was seen, what passes. */
+/** What the files of the catalogue say about themselves: number, title, who fails and how that was seen, what was asked for and what is run, what passes. */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from '../lib/run.mjs';
@@ -23,9 +23,9 @@ function readHeader(file) {
   const [, id, title] = /^(S\d+b?)\. (.+?)\.?$/m.exec(text) ?? [];
   if (id === undefined) return undefined;
   const part = (name) => {
-    const [, found] = new RegExp(`^${name}: ([\\s\\S]*?)(?:\\n\\n|$)`, 'm').exec(text) ?? [];
+    const [, found] = new RegExp(`^${name}: ([\\s\\S]*?)(?:\\n\\n|$(?![\\s\\S]))`, 'm').exec(text) ?? [];
     if (found === undefined) throw new Error(`${file}: its header does not say "${name}:"`);
     return found.replace(/\s+/g, ' ');
   };
-  return { file, id, title, fails: part('Who fails'), passes: part('Passes') };
+  return { file, id, title, fails: part('Who fails'), recipe: part('Recipe'), passes: part('Passes') };
 }

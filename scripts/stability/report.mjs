@@ -76,6 +76,7 @@ function markdown({ rows, peers }, drawn) {
   for (const row of rows) {
     parts.push(`### ${row.id}. ${row.title}\n`);
     parts.push(`Who fails: ${row.fails}\n`);
+    parts.push(`Recipe: ${row.recipe}\n`);
     parts.push(`Passes: ${row.passes}\n`);
     if (row.figures.length > 0) parts.push(`${figuresTable(row.figures)}\n`);
     parts.push(`Test: [${row.file}](../${row.file})\n`);
@@ -89,7 +90,8 @@ function figuresTable(figures) {
       .filter(Boolean)
       .join(', ');
   const cells = figures.map(
-    (figure) => `| ${cell(figure.what)} | ${shown(figure.value)} ${figure.unit} | ${limit(figure)} |`,
+    (figure) =>
+      `| ${cell(figure.what)} | ${shown(figure.value)} ${figure.unit} | ${limit(figure)} | ${figure.isFull ? 'whole' : 'a part'} |`,
   );
   return ['| what | measured | limit | recipe |', '|---|---|---|---|', ...cells].join('\n');
 }

@@ -26,4 +26,6 @@ struct BinView {
   background: vec4f,
   // Pairs of splat and bin that the buffers have room for. Pairs beyond it, the farthest, are left out.
   pair_capacity: u32,
+  // First tile, across and down, of the part of the image that is painted: a frame with much to do is painted part by part.
+  first_tile: vec2u,
 }

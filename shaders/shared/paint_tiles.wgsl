@@ -177,14 +177,15 @@ fn note_depth(tile: u32, lane: u32, is_seen_through: bool, last_seen: u32) {
 }
 
 @compute @workgroup_size(TILE_THREADS)
-fn main(@builtin(workgroup_id) tile: vec3u, @builtin(num_workgroups) tiles: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let corner = tile.xy * TILE;
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let tile = view.first_tile + workgroup_id.xy;
+  let corner = tile * TILE;
   let position = corner + pixel_in_tile(lane);
   let center = vec2f(position) + 0.5;
   let is_outside = any(center > view.viewport);
   let own_block = lane / BLOCK_THREADS;
-  let bin = tile.xy / vec2u(BIN_COLUMNS, BIN_ROWS);
-  let in_bin = tile.xy % vec2u(BIN_COLUMNS, BIN_ROWS);
+  let bin = tile / vec2u(BIN_COLUMNS, BIN_ROWS);
+  let in_bin = tile % vec2u(BIN_COLUMNS, BIN_ROWS);
   let tile_in_bin = in_bin.y * BIN_COLUMNS + in_bin.x;
   let range = ranges[bin.y * view.bins.x + bin.x];
 
@@ -247,7 +248,8 @@ fn main(@builtin(workgroup_id) tile: vec3u, @builtin(num_workgroups) tiles: vec3
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
   }
   let is_seen_through = !pixel.finished && pixel.transmittance > occluded_below;
-  note_depth(tile.y * tiles.x + tile.x, lane, is_seen_through, pixel.last_seen);
+  let columns = (u32(view.viewport.x) + TILE - 1u) / TILE;
+  note_depth(tile.y * columns + tile.x, lane, is_seen_through, pixel.last_seen);
   if (is_outside) { return; }
   note_pixel(position);
   var result = vec4f(pixel.color, pixel.transmittance);

@@ -4,6 +4,9 @@
  * Who fails: Visionary's shader has the check of the row number commented out (read in preprocess.wgsl), so rows of an earlier run stay on show; ONNX Runtime #26367 tells of
  * float16 models that write NaN.
  *
+ * Recipe: asked for NaN, counts that change, 0 and too many rows, late, throwing, times out of range, another type. Run with 300 random sequences of runs;
+ * what needs a session is in tests/generator/browser.
+ *
  * Passes: whatever a run writes, and in whatever order runs come, the picture is that of the usable rows of the last accepted run; a refused run changes nothing and has a
  * code. Generators that are late, throw or lose their device are tried in the element: tests/generator/browser.
  */

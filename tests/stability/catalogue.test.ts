@@ -7,7 +7,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { scriptModule } from '../bench/load.js';
 
-test('27 rows, and each says who fails it and when it passes', async () => {
+test('27 rows, and each says who fails it, what is run, and when it passes', async () => {
   const { readHeaders } = await scriptModule('stability/headers.mjs');
   const ids = (readHeaders() as { id: string }[]).map(({ id }) => id);
   const numbers = Array.from({ length: 26 }, (_, i) => `S${i + 1}`);

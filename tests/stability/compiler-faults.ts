@@ -4,6 +4,9 @@
  * Who fails: whoever trusts them: Firefox on Direct3D 12 transposed matrices read through a pointer (PlayCanvas #9148), naga refused storage pointers (#8784,
  * #8450): a wrong picture, or none.
  *
+ * Recipe: asked for a known answer of 64 splats in less than 10 ms. Run with shaders broken on purpose; on a processor the answer takes longer, and the
+ * figure is noted.
+ *
  * Passes: shaders are broken on purpose, one after another: the variant concerned fails its known answer and the next takes over with the right picture; where
  * no variant is right, that is an error with a code instead of a wrong picture.
  */

@@ -4,14 +4,22 @@
  * Who fails: INRIA's rasterizer keeps the number of pairs in an int (read in its source); 525,000 splats over an image of 8192 x 8192 make more than 4.29 billion
  * pairs of splat and bin. A sum that wraps around looks like room for everything.
  *
+ * Recipe: asked for five billion pairs, synthetic. Run with 620,000 splats that each fill 8192 x 8192 pixels, and with 600 random lists of counts.
+ *
  * Passes: sums stop at the largest number, whatever the counts: nothing is written where it does not belong, and the overflow is reported.
  */
 import { test } from 'node:test';
+import assert from 'node:assert/strict';
 import fc from 'fast-check';
+import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { ScanStage } from '@gaussian-splat/renderer/stages';
+import { cloudOf, repeat } from '../support/clouds.js';
 import { runCase } from '../support/gpu.js';
 import { nodeDevice } from '../support/node-device.js';
-import { holds, sized } from './support/row.js';
+import { cameraAt } from '../support/scenes.js';
+import { deviceWith } from './support/devices.js';
+import { THREADS } from './support/pictures.js';
+import { fullTest, holds, sized } from './support/row.js';
 
 const MOST = 0xffffffff;
 
@@ -50,3 +58,47 @@ test('prefix sums of any counts stop at the largest number', async () => {
   );
   holds('S13', 'wrong prefix sums of counts beyond 32 bits', wrong, { atMost: 0, unit: 'sums' });
 });
+
+for (const side of [1024, 8192]) {
+  fullTest(`620,000 splats that each fill ${side} x ${side} pixels`, () => countPairs(620_000, side));
+}
+
+async function countPairs(count: number, side: number): Promise<void> {
+  const device = await deviceWith([]);
+  let isLost = false;
+  void device.lost.then(() => (isLost = true));
+  // Each fills all bins of the image, of 128 x 64 pixels. The nearest hide the rest.
+  const demanded = count * (side / 128) * (side / 64);
+  const cloud = cloudOf(
+    repeat(count, (i) => ({ position: [0, 0, 1e-6 * i], scale: 500, opacity: 0.9, color: [0.25, 0.5, 0.75] })),
+  );
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device, { threads: THREADS, rasterizer: 'tiles' });
+  const target = device.createTexture({ size: [side, side], format: 'rgba8unorm', usage: 0x8 | 0x10 | 0x1 });
+  const camera = cameraAt([0, 0, -1], [0, 0, 0], { width: side, height: side });
+  renderer.render({ gaussians, camera, target });
+  const { pairs, pairOverflow } = await renderer.readStatistics();
+  const counted = Math.min(MOST, demanded);
+  holds('S13', `pairs that are counted of ${demanded.toPrecision(3)}`, pairs + pairOverflow, {
+    atLeast: counted,
+    atMost: counted,
+    unit: 'pairs',
+  });
+  const staging = device.createBuffer({ size: 4 * side, usage: 0x1 | 0x8 });
+  let wrong = 0;
+  for (const y of [0, side / 2, side - 1]) {
+    const encoder = device.createCommandEncoder();
+    encoder.copyTextureToBuffer({ texture: target, origin: [0, y] }, { buffer: staging, bytesPerRow: 4 * side }, [
+      side,
+      1,
+    ]);
+    device.queue.submit([encoder.finish()]);
+    await staging.mapAsync(0x1);
+    const row = new Uint8Array(staging.getMappedRange());
+    wrong += row.filter((value, i) => Math.abs(value - [64, 128, 191, 255][i % 4]) > 1).length;
+    staging.unmap();
+  }
+  holds('S13', 'wrong colour values in three rows of the picture', wrong, { atMost: 0, unit: 'values' });
+  assert.equal(isLost, false, 'the device is there');
+  device.destroy();
+}

@@ -4,6 +4,9 @@
  * Who fails: readers and renderers that invert the covariance: splat-transform #287 (log scale of minus infinity) and #272 (endless loop),
  * aras-p/UnityGaussianSplatting #14 (a degenerate splat fills the screen).
  *
+ * Recipe: asked for scales of 0, 1e-30 and 1e-7 to 1e4, aspect ratios of 1e6, discs from their edge. Run so: 1,500 random scenes, and thousands of needles
+ * and discs with both rasterizers.
+ *
  * Passes: 59 dB or more for any three standard deviations out of 0, 1e-30, 1e-7 to 1e4, aspect ratios of 1e6 and discs seen exactly from
  * their edge. Splats without any extent are left out.
  */

@@ -3,6 +3,9 @@
  *
  * Who fails: nobody was named; float16 centres (web-splat, Visionary, WebSplatter) and atomically appended splats make pictures differ between devices and runs.
  *
+ * Recipe: asked for two adapters. Run with two devices of one, and against the picture of SwiftShader that is kept: with another adapter the same command
+ * compares the two.
+ *
  * Passes: two devices of one adapter agree to the byte; the picture of any adapter agrees with the one that SwiftShader has drawn, which is kept here, to 1/255 in 99.9 % of
  * all channels. With GAUSSIAN_SPLAT_GPU=system the row draws with the driver of the machine (llvmpipe, say).
  */

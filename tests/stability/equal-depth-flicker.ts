@@ -4,6 +4,9 @@
  * Who fails: PlayCanvas (#8570 describes visible flicker), web-splat, Visionary and WebSplatter take slots for visible splats from a global
  * atomicAdd (read in their sources): splats of equal depth then change places from frame to frame.
  *
+ * Recipe: asked for a million splats on one plane, 200 identical frames. Run so with both rasterizers, and with turns between; `npm test` has 20,000 splats
+ * and 20 frames.
+ *
  * Passes: 0 differing bytes in 200 frames of a plane of splats (a million in the full run), also with turns between them.
  */
 import { test } from 'node:test';
@@ -16,7 +19,7 @@ import { differingBytes, RASTERIZERS, yawed, THREADS } from './support/pictures.
 import { holds, sized } from './support/row.js';
 
 const SPLATS = sized(20_000, 1_000_000);
-const FRAMES = { quads: sized(20, 200), tiles: sized(4, 40) };
+const FRAMES = { quads: sized(20, 200), tiles: sized(4, 200) };
 
 const random = seededRandom(42);
 const plane = cloudOf(

@@ -4,6 +4,8 @@
  * Who fails: any shader that asks `x != x` or compares with an infinity: the specification lets compilers drop the question (WGSL, section on
  * floating point evaluation); subnormals may be flushed.
  *
+ * Recipe: asked for a check when shaders are compiled. Run on their text, and with packed splats of such bits besides.
+ *
  * Passes: no shader asks a float whether it is a number, bit patterns are asked instead; packed splats whose bits are those of NaN and infinities,
  * which no CPU has seen, are not drawn and are counted.
  */

@@ -4,6 +4,8 @@
  * Who fails: decoupled look-back spins until a neighbour has written; WebGPU promises no such progress. Visionary still does (`while true` in its source), web-splat
  * froze machines with M-series chips (MarcusAndreasSvensson/gaussian-splatting-webgpu #10), PlayCanvas found its one-sweep wrong on Mali, IMG and Adreno.
  *
+ * Recipe: asked for a check of the text, a software adapter, and one thread. Run so.
+ *
  * Passes: no loop of any shader reads what another workgroup may write at the same time; the sort ends and is right with barriers and, in the `serial` variant,
  * without.
  */

@@ -4,6 +4,9 @@
  * Who fails: web-splat, Visionary, PlayCanvas and Spark have no clamp of the Jacobian (read in their sources): 11 dB in a room, by a
  * float64 emulation of the rule; aras-p/UnityGaussianSplatting #14, #147 and #196, INRIA #963 and Resonite #4173 report screen-filling flashes.
  *
+ * Recipe: asked for a path through 500 large splats, depths about 0 and the near plane, up to 50 focal lengths aside. Run so: 25 steps with each rasterizer,
+ * 1,000 single splats, and times of 25 frames.
+ *
  * Passes: 50 dB or more along a path through 500 large splats, with centres beyond 50 focal lengths aside and a hair from the near plane; no NaN;
  * no frame takes more than 3 times the median.
  */
@@ -33,7 +36,7 @@ for (const rasterizer of RASTERIZERS) {
   test(`a path through 500 large splats, ${rasterizer}`, async () => {
     const device = await nodeDevice();
     let [worst, broken] = [Infinity, 0];
-    const steps = rasterizer === 'quads' ? sized(5, 25) : sized(2, 13);
+    const steps = rasterizer === 'quads' ? sized(5, 25) : sized(2, 25);
     for (let step = 0; step < steps; step++) {
       const t = (step / Math.max(1, steps - 1)) * 2 - 1;
       const camera = cameraAt([3 * t, 0.4 * t, 2.5 * t], [3 * t + 1, 0.2, 2.5 * t + 1], { ...SIZE, fovXDegrees: 90 });

@@ -4,6 +4,8 @@
  * Who fails: Visionary needs shader-f16, which Chrome on Linux with NVIDIA hides ("Ubuntu is not supported" in its README); sorts that need subgroups; targets that
  * need float32-blendable.
  *
+ * Recipe: asked for features taken away one by one. Run so, and all at once.
+ *
  * Passes: with every optional feature removed, one by one and all together, at default limits, the picture is the same; only the precision of blending may follow
  * float32-blendable.
  */

@@ -4,6 +4,8 @@
  * Who fails: GaussianSplats3D #402 and #375, INRIA #176, loaders.gl #4023, Cesium #12790 (harmonics that do not turn with the object); Visionary divides by a
  * squared scale, which is wrong for unequal ones (read in its source).
  *
+ * Recipe: asked for rotations of the object against those of the camera, and a scale of (1, 2, 3). Run so with eight rotations.
+ *
  * Passes: 75 dB or more between turning the object, harmonics included, and turning the camera; and between an object scaled by (1, 2, 3) through the camera's
  * matrix and the same splats transformed in float64. An object's matrix M is drawn by a camera with worldToCamera · M.
  */

@@ -4,6 +4,8 @@
  * Who fails: renderers that accumulate into unorm targets clamp colours above 1 (58.9 dB, worst pixel 54/255 by a float64 emulation); caps of
  * 1.0 (Spark) and 0.999 (brush) and floors of 0.5/255 (Spark) differ from the trainer's (76 dB, 52 dB, emulated likewise).
  *
+ * Recipe: asked for a ladder of opacities and colours beyond white, at 75 dB. Run so in the quality `reference`; the default has a limit of 59.
+ *
  * Passes: 75 dB or more in the `reference` quality, as far as a display shows it; 59 in the default. Colours up to 4 times white are kept
  * in float16, which is 73 dB of a peak of 1 before a display clamps them.
  */

@@ -4,6 +4,8 @@
  * Who fails: PlayCanvas' tile renderers #8574 (missing tiles after a jump) and #8586 (writes beyond the buffer end in tile 0), 16-bit tile numbers over
  * 5,000 pixels; brush needed a sentinel.
  *
+ * Recipe: asked for ten times the capacity at once. Run so. What is left out is the farthest of the whole image, not of each tile.
+ *
  * Passes: with ten times the room demanded, the frame has no corrupt pixel: it is that of the nearest splats that fit; what was left out is counted;
  * the next frame has room for all.
  */

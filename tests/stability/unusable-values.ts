@@ -3,6 +3,9 @@
  *
  * Who fails: PlayCanvas #7243 and #7592, splat-transform #288: one such number in a file and parts of the picture or all of it are gone.
  *
+ * Recipe: asked for each attribute with NaN, infinities, -0, denormals, the largest number and a zero quaternion, in files and in what generators write. Run
+ * so for files; for generators with NaN and infinities in every column of the rows.
+ *
  * Passes: with bad splats of every kind mixed in, from a file and from a generator's tensors, the picture is bit for bit that of the scene
  * without them, and they are counted.
  */

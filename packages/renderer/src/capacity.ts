@@ -64,31 +64,41 @@ export class CapacityMonitor {
     this.#staging = device.createBuffer({ label: 'gs.capacity', size: 16, usage: mapRead | copyDestination });
   }
 
-  /** Records the copy of the counts if this frame is one to look at; then {@link read} must follow the submit. */
-  record(encoder: GPUCommandEncoder, plan: GPUBuffer, pairPlan: GPUBuffer | undefined): boolean {
-    const hasRoom = this.#capacity.visible >= this.#most.visible && pairPlan === undefined;
+  /**
+   * Counts a frame.
+   * @param hasPairs whether its rasterizer makes pairs of splat and bin
+   * @returns whether this frame is one to look at; then {@link record} must be called before the submit and {@link read} after it
+   */
+  isDue(hasPairs: boolean): boolean {
+    const hasRoom = this.#capacity.visible >= this.#most.visible && !hasPairs;
     this.#frame++;
     const isDue = this.#frame % INTERVAL === 0 || (this.#frame < INTERVAL && Number.isInteger(Math.log2(this.#frame)));
-    if (hasRoom || !isDue || this.#isReading) return false;
+    return isDue && !hasRoom && !this.#isReading;
+  }
+
+  /** Records the copy of the counts. */
+  record(encoder: GPUCommandEncoder, plan: GPUBuffer, pairPlan: GPUBuffer | undefined): void {
     const { visible, overflow } = layouts.Plan.fields;
     if (overflow.offset !== visible.offset + 4) throw new Error('Plan: overflow must follow visible');
     encoder.copyBufferToBuffer(plan, visible.offset, this.#staging, 0, 8);
     if (pairPlan) encoder.copyBufferToBuffer(pairPlan, visible.offset, this.#staging, 8, 8);
     this.#isReading = true;
-    return true;
   }
 
-  /** Looks at the counts once they are there. */
-  read(): void {
-    void this.#staging.mapAsync(0x1).then(
+  /**
+   * Looks at the counts once they are there.
+   * @returns what the frame had: undefined where the device is lost, or this monitor was destroyed meanwhile
+   */
+  read(): Promise<Capacity | undefined> {
+    return this.#staging.mapAsync(0x1).then(
       () => {
-        if (this.#isDestroyed) return;
+        if (this.#isDestroyed) return undefined;
         const [visible, hidden, pairs, lostPairs] = new Uint32Array(this.#staging.getMappedRange().slice(0));
         this.#staging.unmap();
         this.#isReading = false;
         this.judge({ visible: visible + hidden, pairs: pairs + lostPairs }, hidden + lostPairs > 0);
+        return { visible, pairs };
       },
-      // The device is lost, or this monitor was destroyed meanwhile.
       () => undefined,
     );
   }

@@ -51,6 +51,11 @@ export class FrameResources {
     return this.#current;
   }
 
+  /** Pairs of splat and bin for which there is room; 0 before the first frame. */
+  get pairCapacity(): number {
+    return this.#capacity?.pairs ?? 0;
+  }
+
   get byteLength(): number {
     const { table, scratch, bindings, depthOrder } = this.#current ?? {};
     return [table, scratch, bindings, depthOrder].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);

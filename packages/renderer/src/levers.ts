@@ -28,8 +28,8 @@ export interface Levers {
    */
   readonly depthKeyBits: 16 | 24 | 32;
   /**
-   * Submissions that the painting of a frame is divided into, where the rasterizer can (quads): the picture is the same, but none runs as long, which matters
-   * where drivers stop what takes them too long. 1 to 256.
+   * Submissions that the painting of a frame is divided into, at least: the picture is the same, but none runs as long, which matters where drivers stop what takes
+   * them too long. Frames of tiles that may have much to do are divided further without being asked. 1 to 256.
    */
   readonly submissions: number;
   /** Radians that the camera may turn before an order of all splats is made anew. */

@@ -17,6 +17,7 @@ import type { OrderKind, Painting, Rasterizer, RasterizerName, Surface } from '.
 import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
+import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
@@ -26,6 +27,12 @@ import { scaled } from './view.js';
 interface Accumulation {
   readonly texture: AccumulationTexture;
   readonly compose: GPUBindGroup;
+}
+
+/** In how many parts the painting of a frame is handed over, and who times them. */
+interface Submissions {
+  readonly parts: number;
+  readonly watch?: SubmissionWatch;
 }
 
 /** A target, and whether a compute shader may write it. */
@@ -56,6 +63,7 @@ export class Renderer {
   readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
   readonly #occlusion: Occlusion;
+  readonly #pacer: SubmissionPacer;
   readonly #onIncomplete: () => void;
   readonly #memory: GpuMemory;
   readonly #composeUniform: GPUBuffer;
@@ -82,6 +90,7 @@ export class Renderer {
       occlusion: this.#occlusion,
       onIncomplete: this.#onIncomplete,
     });
+    this.#pacer = new SubmissionPacer(device);
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
@@ -152,14 +161,24 @@ export class Renderer {
       isBudgeted: detail.splatBudget > 0 && table.hasDetail,
       timer,
     });
+    const { pairPlan } = this.#rasterizer;
+    const isWatched = monitor.isDue(pairPlan !== undefined);
+    const submissions = this.#submissionsFor(isWatched);
     const order = isOrdered ? 'identity' : sortedOrder(levers);
-    const last = this.#paint(encoder, target, drawn, { order, overrides: mix.overrides, notes, timer }, background);
+    const how = { order, overrides: mix.overrides, notes, timer } as const;
+    const last = this.#paint(encoder, target, drawn, how, background, submissions);
     timer?.endFrame?.(last);
-    const isWatched = monitor.record(last, scratch.plan, this.#rasterizer.pairPlan);
-    this.#device.queue.submit([last.finish()]);
+    if (isWatched) monitor.record(last, scratch.plan, pairPlan);
+    this.#submit(last, submissions);
     timer?.submitted?.();
     this.#last = { order, scratch, scale: drawn.width / camera.width };
-    if (isWatched) monitor.read();
+    const counts = isWatched ? monitor.read() : undefined;
+    if (counts && submissions.watch) {
+      void this.#pacer.learn(
+        submissions.watch,
+        counts.then((painted) => painted?.pairs),
+      );
+    }
     for (const wish of wishes) wish.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     orderPolicy.settle(sortAngle);
@@ -217,11 +236,11 @@ export class Renderer {
     camera: Camera,
     how: Pick<Painting, 'order' | 'overrides' | 'notes' | 'timer'>,
     background: readonly [number, number, number, number],
+    submissions: Submissions,
   ): GPUCommandEncoder {
     const isFullSize = camera.width === target.width && camera.height === target.height;
     if (isFullSize && target.isStorable && this.#rasterizer.finishes(target.format)) {
-      this.#rasterizer.record(encoder, { ...how, surface: target, background });
-      return encoder;
+      return this.#recordParts(encoder, { ...how, surface: target, background }, submissions);
     }
     const { texture, compose } = this.#accumulationOf(camera, target);
     const scale = [camera.width / target.width, camera.height / target.height];
@@ -230,22 +249,37 @@ export class Renderer {
     this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
     const { view, format } = texture;
     const surface = { view, format, width: camera.width, height: camera.height };
-    const last = this.#recordSlices(encoder, { ...how, surface });
+    const last = this.#recordParts(encoder, { ...how, surface }, submissions);
     this.#compose.record(last, compose, target.view, target.format, how.timer);
     return last;
   }
 
+  /** How this frame is handed over: in one submission, or in as many as keep each short. */
+  #submissionsFor(isWatched: boolean): Submissions {
+    const least = Math.ceil(this.levers.submissions);
+    if (this.#rasterizer.pairPlan === undefined) return { parts: least };
+    const pairs = this.#resources.pairCapacity;
+    const watch = isWatched && this.#pacer.wantsToKnow(pairs) ? this.#pacer.watch() : undefined;
+    return { parts: Math.max(least, this.#pacer.partsFor(pairs)), watch };
+  }
+
+  #submit(encoder: GPUCommandEncoder, { watch }: Submissions): void {
+    this.#device.queue.submit([encoder.finish()]);
+    watch?.note();
+  }
+
   /** Records the painting, in several submissions where that is asked for. @returns the encoder to go on with */
-  #recordSlices(encoder: GPUCommandEncoder, painting: Painting): GPUCommandEncoder {
-    const count = this.#rasterizer.canSlice ? Math.ceil(this.levers.submissions) : 1;
+  #recordParts(encoder: GPUCommandEncoder, painting: Painting, submissions: Submissions): GPUCommandEncoder {
+    const { parts: count } = submissions;
+    this.#rasterizer.prepareFrame(encoder, painting);
     let current = encoder;
     for (let index = 0; index < count; index++) {
       // What comes before the painting is a submission of its own, too.
       if (count > 1) {
-        this.#device.queue.submit([current.finish()]);
+        this.#submit(current, submissions);
         current = this.#device.createCommandEncoder({ label: `gs.frame.${index}` });
       }
-      this.#rasterizer.record(current, { ...painting, slice: { index, count } });
+      this.#rasterizer.record(current, painting, { index, count });
     }
     return current;
   }

@@ -89,10 +89,13 @@ function* neighbours(cloud: GaussianCloud, camera: Camera, mode: Mode): Generato
     { minTransmittance: gsplat.minTransmittance * (1 + side * LIGHT_ROUNDING) },
   ]);
   for (const limit of limits) yield renderOracle(cloud, camera, { rules: { ...gsplat, ...limit }, mode });
+  const places = Array.from({ length: cloud.count }, (_, i) => toCamera(camera, worldPosition(cloud, i)));
+  // A depth near 0 is the difference of large products: what is far aside has the rounding of how far.
+  const reach = places.reduce((most, place) => Math.max(most, Math.hypot(...place)), near);
   for (const side of [-1, 1]) {
-    yield renderOracle(cloud, { ...camera, near: near * (1 + side * DEPTH_ROUNDING) }, { rules: 'gsplat', mode });
+    yield renderOracle(cloud, { ...camera, near: near + side * DEPTH_ROUNDING * reach }, { rules: 'gsplat', mode });
   }
-  const depths = Float64Array.from({ length: cloud.count }, (_, i) => toCamera(camera, worldPosition(cloud, i))[2]);
+  const depths = Float64Array.from(places, ([, , z]) => z);
   for (const spread of [1, -1]) {
     const depthKeys = depths.map((z, i) => z * (1 + ((i * 7919) % 13) * spread * (DEPTH_ROUNDING / 13)));
     yield renderOracle(cloud, camera, { rules: 'gsplat', mode, depthKeys });

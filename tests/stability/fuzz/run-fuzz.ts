@@ -14,6 +14,7 @@ const USAGE = `usage: npm run fuzz -- [options]
   --minutes M      stop after so many minutes (default 240)
   --seed S         default: the time; the report names it
   --rasterizer R   quads (default) or tiles
+  --below DB       shrink the first picture, too, that is under so many dB where no rounding decides, whatever its cause
   --out FILE       where to write the report as JSON
 `;
 
@@ -31,6 +32,7 @@ const { values } = parseArgs({
     minutes: { type: 'string', default: '240' },
     seed: { type: 'string' },
     rasterizer: { type: 'string', default: 'quads' },
+    below: { type: 'string', default: '0' },
     out: { type: 'string' },
     help: { type: 'boolean' },
   },
@@ -78,7 +80,7 @@ const failing = await fc.check(
     if (performance.now() > end) return true;
     const verdict = await judge(recipe, subject);
     count(recipe, verdict);
-    return verdict.cause !== 'none' && !isLost;
+    return verdict.cause !== 'none' && verdict.withoutThresholds >= Number(values.below) && !isLost;
   }),
   {
     numRuns: Number(values.cases),
@@ -96,6 +98,7 @@ if (failing.counterexample) {
   const verdict = await judge(recipe, subject);
   const file = new URL(`../corpus/${rasterizer}-${seed}.json`, import.meta.url);
   writeFileSync(file, `${JSON.stringify({ rasterizer, verdict, recipe })}\n`);
-  console.error(`A fault: ${JSON.stringify(verdict)}. Its smallest case is kept in ${file.pathname}`);
+  const what = verdict.cause === 'none' ? 'A fault' : `Under ${values.below} dB`;
+  console.error(`${what}: ${JSON.stringify(verdict)}. Its smallest case is kept in ${file.pathname}`);
 }
 process.exit(failing.counterexample || isLost ? 1 : 0);

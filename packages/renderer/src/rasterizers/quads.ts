@@ -2,16 +2,13 @@ import { constants as shaderConstants, layouts, rasterizeQuads } from '../genera
 import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram, type Overrides } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
-import type { AccumulationFormat, OrderKind, Painting, Rasterizer, RasterizerInputs } from './rasterizer.js';
+import type { AccumulationFormat, OrderKind, Painting, Rasterizer, RasterizerInputs, Slice } from './rasterizer.js';
 
 type Program = ShaderProgram<typeof rasterizeQuads>;
-
-const WHOLE = { index: 0, count: 1 } as const;
 
 /** Hardware quads, back to front, blended into a float texture. */
 export class QuadsRasterizer implements Rasterizer {
   readonly name = 'quads';
-  readonly canSlice = true;
   readonly takesNotes = false;
   readonly #device: GPUDevice;
   readonly #program: Program;
@@ -64,7 +61,10 @@ export class QuadsRasterizer implements Rasterizer {
     this.#pipeline(overrides);
   }
 
-  record(encoder: GPUCommandEncoder, { surface, order, overrides, timer, slice = WHOLE }: Painting): void {
+  /** Quads are drawn from what the stages before have left. */
+  prepareFrame(): void {}
+
+  record(encoder: GPUCommandEncoder, { surface, order, overrides, timer }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
     writeStruct(
       layouts.RasterView,

@@ -68,11 +68,12 @@ export interface Painting {
    */
   readonly background?: readonly [number, number, number, number];
   readonly timer?: FrameTimer;
-  /**
-   * Paints one part of the splats only, the farthest first, over what the parts before have left in the surface. Only for rasterizers that can
-   * slice their work.
-   */
-  readonly slice?: { readonly index: number; readonly count: number };
+}
+
+/** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */
+export interface Slice {
+  readonly index: number;
+  readonly count: number;
 }
 
 /**
@@ -81,8 +82,6 @@ export interface Painting {
  */
 export interface Rasterizer {
   readonly name: RasterizerName;
-  /** Whether the work of an image can be recorded in slices, for submissions that stay short. */
-  readonly canSlice: boolean;
   /** True if it can take {@link FrameNotes}. */
   readonly takesNotes: boolean;
   /** Bytes of GPU memory held. */
@@ -95,7 +94,9 @@ export interface Rasterizer {
   bind(inputs: RasterizerInputs): void;
   /** Makes the pipelines for other levers, so that no frame has to. @param format of the targets */
   prepare(overrides: Overrides, format: GPUTextureFormat): void;
-  /** Records the drawing of one frame. */
-  record(encoder: GPUCommandEncoder, painting: Painting): void;
+  /** Records what the parts of one frame have in common, before the first of them. */
+  prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;
+  /** Records the drawing of one part of one frame. Parts of a frame are submitted one by one. */
+  record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void;
   destroy(): void;
 }

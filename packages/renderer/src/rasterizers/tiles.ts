@@ -30,8 +30,10 @@ import type {
   Painting,
   Rasterizer,
   RasterizerInputs,
+  Slice,
   Surface,
 } from './rasterizer.js';
+import { sliceOfTiles } from './tile-slice.js';
 
 const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, PROJECT_GROUP, SORT_BLOCK, DIGITS } = constants;
 /** A slot, and a mask of tiles. */
@@ -86,8 +88,6 @@ const TRANSPARENT = [0, 0, 0, 0] as const;
  */
 export class TilesRasterizer implements Rasterizer {
   readonly name = 'tiles';
-  /** Tiles stop where nothing behind can be seen: their work is bounded by what is. */
-  readonly canSlice = false;
   readonly takesNotes = true;
   readonly #device: GPUDevice;
   readonly #accumulation: AccumulationFormat;
@@ -142,13 +142,13 @@ export class TilesRasterizer implements Rasterizer {
     rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false });
   }
 
-  record(encoder: GPUCommandEncoder, painting: Painting): void {
-    const { surface, order, overrides, background, notes, timer } = painting;
+  /** Lists the splats for the bins. */
+  prepareFrame(encoder: GPUCommandEncoder, { surface, order, overrides, background, timer }: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const { plan } = this.#inputs;
     const buffers = this.#buffers;
     const bound = this.#gridFor(surface, this.#inputs, buffers);
-    this.#writeView(surface, bound.grid, this.#inputs.pairCapacity, background ?? TRANSPARENT);
+    this.#writeView(surface, bound.grid, [0, 0], background);
     encoder.clearBuffer(buffers.groupPairs);
     encoder.clearBuffer(bound.ranges);
 
@@ -162,11 +162,21 @@ export class TilesRasterizer implements Rasterizer {
     this.#sort.record(bin, bound.sort, buffers.plan);
     index.dispatchIndirect(bin, bound.index, buffers.plan, planOffsets.visible);
     bin.end();
+  }
+
+  record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
+    const { surface, overrides, background, notes, timer } = painting;
+    if (this.#inputs === undefined || this.#buffers === undefined) return;
+    const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
+    const { format, width, height } = surface;
+    const { column, row, columns, rows } = sliceOfTiles(Math.ceil(width / TILE), Math.ceil(height / TILE), slice);
+    if (columns * rows === 0) return;
+    // A whole frame has the view that its splats were listed with.
+    if (slice.count > 1) this.#writeView(surface, bound.grid, [column, row], background);
     const paint = encoder.beginComputePass({
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    const { format, width, height } = surface;
     const kernel = rasterizeKernel(this.#device, {
       format,
       isFinal: background !== undefined,
@@ -176,7 +186,7 @@ export class TilesRasterizer implements Rasterizer {
     const image = notes
       ? this.#bindNoting(kernel, bound, surface.view, notes)
       : this.#imageBindings(kernel, bound, surface.view);
-    kernel.dispatchGrid(paint, image, Math.ceil(width / TILE), Math.ceil(height / TILE));
+    kernel.dispatchGrid(paint, image, columns, rows);
     paint.end();
   }
 
@@ -320,10 +330,11 @@ export class TilesRasterizer implements Rasterizer {
   #writeView(
     { width, height }: Surface,
     { columns, rows }: Grid,
-    pair_capacity: number,
-    background: readonly number[],
+    first_tile: readonly [number, number],
+    background: Painting['background'] = TRANSPARENT,
   ): void {
-    const values = { viewport: [width, height], bins: [columns, rows], pair_capacity, background };
+    const pair_capacity = this.#inputs!.pairCapacity;
+    const values = { viewport: [width, height], bins: [columns, rows], pair_capacity, background, first_tile };
     writeStruct(layouts.BinView, values, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
