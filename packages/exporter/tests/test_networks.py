@@ -19,7 +19,7 @@ from gaussian_exporter.graph import Graph
 from gaussian_exporter.pieces.convolution import Convolution
 
 from .picture_reference import convolved, doubled, looked_up, relu, sigmoid, smoothly_enlarged
-from .running import FACTS, covariance, error, parts, run
+from .running import FACTS, covariance, error, parts, rows, run
 
 WIDTH, HEIGHT = 16, 12
 
@@ -172,7 +172,7 @@ def reference(model: FeedForward, feeds: dict[str, AnyArray]) -> dict[str, Doubl
 @pytest.mark.parametrize("views", [1, 2])
 def test_pixel_aligned_gaussians(views: int) -> None:
     model, feeds = feed_forward(views), given(views)
-    found = parts(run(export_feed_forward(model, FACTS), feeds)["gaussians"])
+    found = parts(run(export_feed_forward(model, FACTS), feeds))
     assert len(found["positions"]) == views * WIDTH * HEIGHT
     for name, values in reference(model, feeds).items():
         assert error(found[name], values) < 1e-5, name
@@ -232,10 +232,8 @@ def test_folders_are_read_back(tmp_path: Path) -> None:
     }
     config = {name: getattr(model, name) for name in ("width", "height", "views", "near", "far", "depths")}
     write_network(tmp_path / "ff", config, tensors)
-    rows = [
-        run(export_feed_forward(m, FACTS), given())["gaussians"] for m in (model, read_feed_forward(tmp_path / "ff"))
-    ]
-    assert np.array_equal(rows[0], rows[1])
+    both = [rows(run(export_feed_forward(m, FACTS), given())) for m in (model, read_feed_forward(tmp_path / "ff"))]
+    assert np.array_equal(both[0], both[1])
 
     style = image_filter(norm=True)
     tensors = arrays("stem", style.stem) | arrays("out", style.out)

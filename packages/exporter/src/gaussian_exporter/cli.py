@@ -1,4 +1,4 @@
-"""The command `gaussian-export FAMILY CHECKPOINT OUT.onnx`, and `gaussian-export check FILE.onnx`."""
+"""The command `gaussian-export FAMILY CHECKPOINT OUT.onnx`; `gaussian-export check` and `cost` of a file."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from .checkpoints.networks import read_feed_forward, read_image_filter
 from .checkpoints.scaffold_folder import read_scaffold
 from .conformance import check_outputs
 from .contract import Coordinates, DType, Facts, Json, Layout, Up, of_metadata
+from .cost import cost_of, report
 from .errors import ExportError
 from .families.avatar import PoseFormat, export_avatar
 from .families.classic import Colours, export_classic, read_cloud
@@ -37,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; 0 if all went well, 1 with a message for people if not, 2 for wrong options."""
     given = parser().parse_args(arguments)
     try:
-        check(given.file) if given.family == "check" else export(given)
+        {"check": check, "cost": cost}.get(given.family, export)(given)
     except ExportError as error:
         print(f"gaussian-export: {error}", file=sys.stderr)
         return 1
@@ -56,6 +57,10 @@ def parser() -> Command:
         describe(family)
     checker = families.add_parser("check", help="run a file on the CPU, and say what would leave the GPU")
     checker.add_argument("file", type=Path)
+    counter = families.add_parser("cost", help="where a run's time goes: dispatches, bytes, an estimate, for any file")
+    counter.add_argument("file", type=Path)
+    counter.add_argument("--instances", type=positive, default=1, help="instances in one run, if the file has an axis")
+    counter.add_argument("--rows", type=positive, default=12, help="nodes to list, the dearest first; default 12")
     return root
 
 
@@ -107,8 +112,16 @@ def export(given: argparse.Namespace) -> None:
     report_findings(model)
 
 
-def check(path: Path) -> None:
+def cost(given: argparse.Namespace) -> None:
+    """Prints what a run of a file costs, without running it."""
+    model = onnx.load(existing(given.file, "an .onnx file"), load_external_data=False)
+    for line in report(cost_of(model, given.instances), given.rows):
+        print(line)
+
+
+def check(given: argparse.Namespace) -> None:
     """Holds a file against its contract, and reports what would leave the GPU."""
+    path = given.file
     model = onnx.load(existing(path, "an .onnx file"))
     contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
     print(f"{path}: contract version {contract['version']}, {contract.get('name', 'without a name')}")

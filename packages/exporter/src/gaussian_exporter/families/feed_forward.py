@@ -155,7 +155,7 @@ def joined(graph: Graph, first: Gaussians, second: Gaussians) -> Gaussians:
         positions=graph.concat([first.positions, second.positions], 0),
         covariances=graph.concat([first.covariance(), second.covariance()], 0),
         colors=graph.concat([first.colors, second.colors], 0),
-        opacities=graph.concat([first.opacities, second.opacities], 0),
+        opacities=graph.concat([first.opacity(), second.opacity()], 0),
     )
 
 
