@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import cast, get_args
@@ -175,7 +176,12 @@ def _avatar(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.M
 
 
 def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_feed_forward(read_feed_forward(given.checkpoint), facts, options)
+    return export_feed_forward(replace(read_feed_forward(given.checkpoint), widened=given.widen), facts, options)
+
+
+def _feed_forward_options(family: Command) -> None:
+    what = "squared pixels added to every Gaussian, against gaps where it is seen larger than its pictures; default 0"
+    family.add_argument("--widen", type=float, default=0.0, help=what)
 
 
 def positive(text: str) -> int:
@@ -207,6 +213,10 @@ FAMILIES: dict[str, tuple[Callable[[Command], None], str, Export]] = {
     "scaffold": (_scaffold_options, "Scaffold-GS or Octree-GS: the trainer's folder", _scaffold),
     "hexplane": (_no_options, "4DGS: the folder of 4DGaussians", _hexplane),
     "avatar": (_avatar_options, "a skinned avatar: one .npz file", _avatar),
-    "feed-forward": (_no_options, "pictures to Gaussians: a folder of config.json and model.pth", _feed_forward),
+    "feed-forward": (
+        _feed_forward_options,
+        "pictures to Gaussians: a folder of config.json and model.pth",
+        _feed_forward,
+    ),
     "image-filter": (_image_filter_options, "style or denoising: a folder of config.json and model.pth", _image_filter),
 }
