@@ -97,14 +97,17 @@ async function drawView(name: string, view: View): Promise<Float32Array> {
   const layout = gaussianLayout(header, contract);
   assert.ok(layout, 'a model that writes Gaussians');
   const gaussians = await DynamicGaussians.create(device, layout, { antialiased: contract.antialiased });
-  const buffer = device.createBuffer({ size: written.byteLength, usage: STORAGE_AND_COPY });
-  device.queue.writeBuffer(buffer, 0, written);
-  gaussians.ingest({ gaussians: buffer }, gaussians.count);
+  const buffers = Object.entries(written).map(([name, numbers]) => {
+    const buffer = device.createBuffer({ size: numbers.byteLength, usage: STORAGE_AND_COPY });
+    device.queue.writeBuffer(buffer, 0, numbers);
+    return [name, buffer] as const;
+  });
+  gaussians.ingest(Object.fromEntries(buffers), gaussians.count);
   const renderer = new Renderer(device);
   const pixels = await capture(device, renderer, { gaussians, camera });
   renderer.destroy();
   gaussians.destroy();
-  buffer.destroy();
+  for (const [, buffer] of buffers) buffer.destroy();
   return pixels;
 }
 
@@ -119,7 +122,7 @@ function planes(file: Uint8Array): InputNumbers {
 async function run(
   model: Uint8Array,
   inputs: Readonly<Record<string, InputNumbers>>,
-): Promise<Float32Array<ArrayBuffer>> {
+): Promise<Record<string, Float32Array<ArrayBuffer>>> {
   ort.env.logLevel = 'error';
   ort.env.wasm.numThreads = 1;
   const session = await ort.InferenceSession.create(model, { executionProviders: ['wasm'], logSeverityLevel: 3 });
@@ -127,10 +130,12 @@ async function run(
   for (const [name, { data, dims }] of Object.entries(inputs)) {
     feeds[name] = new ort.Tensor('float32', data as Float32Array, dims);
   }
-  const { gaussians } = await session.run(feeds);
-  const written = new Float32Array(gaussians.data as Float32Array);
+  const results = await session.run(feeds);
+  const written = Object.entries(results).map(
+    ([name, { data }]) => [name, new Float32Array(data as Float32Array)] as const,
+  );
   await session.release();
-  return written;
+  return Object.fromEntries(written);
 }
 
 /** Decibels over the pixels that count, on black; with `fitGain` after the best gain for each channel, as of photographs. */

@@ -2,31 +2,61 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
 import onnxruntime as ort
 
 from gaussian_exporter.arrays import AnyArray, Doubles
-from gaussian_exporter.contract import Coordinates, Facts
+from gaussian_exporter.contract import METADATA_KEY, Coordinates, Facts
 
 FACTS = Facts("test", "CC0-1.0", "nobody", coordinates=Coordinates("-y", "right", 1.0), duration=2.0)
 UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 
 
 def run(model: onnx.ModelProto, feeds: dict[str, AnyArray] | None = None) -> dict[str, AnyArray]:
-    """All outputs of a model on the CPU provider."""
+    """All outputs of a model on the CPU provider; scales and opacities after the activations that it declares."""
     session = ort.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
     given = {name: np.asarray(value, np.float32) for name, value in (feeds or {}).items()}
     names = [output.name for output in session.get_outputs()]
-    return dict(zip(names, session.run(None, given), strict=True))
+    written = dict(zip(names, session.run(None, given), strict=True))
+    contract: Any = json.loads({prop.key: prop.value for prop in model.metadata_props}.get(METADATA_KEY, "{}"))
+    outputs = contract.get("outputs", {})
+    if outputs.get("scaleActivation") == "log":
+        written["scales"] = np.exp(written["scales"])
+    if outputs.get("opacityActivation") == "logit":
+        written["opacities"] = 1 / (1 + np.exp(-written["opacities"]))
+    return written
 
 
-def parts(rows: AnyArray) -> dict[str, Doubles]:
-    """The columns of a packed tensor by what they hold."""
-    rows = np.asarray(rows, np.float64)
-    return {"positions": rows[:, :3], "covariances": rows[:, 3:9], "colour": rows[:, 9:-1], "opacities": rows[:, -1:]}
+def parts(written: dict[str, AnyArray] | AnyArray) -> dict[str, Doubles]:
+    """What a file wrote, packed (or the rows alone) or split, by what it holds; covariances also of scales and
+    rotations."""
+    if not isinstance(written, dict) or "gaussians" in written:
+        rows = np.asarray(written["gaussians"] if isinstance(written, dict) else written, np.float64)
+        return {
+            "positions": rows[:, :3],
+            "covariances": rows[:, 3:9],
+            "colour": rows[:, 9:-1],
+            "opacities": rows[:, -1:],
+        }
+    wide = {name: np.asarray(values, np.float64).reshape(len(values), -1) for name, values in written.items()}
+    covariances = wide["covariances"] if "covariances" in wide else covariance(wide["scales"], wide["rotations"])
+    colour = wide["sh"] if "sh" in wide else wide["colors"]
+    return {
+        "positions": wide["positions"],
+        "covariances": covariances,
+        "colour": colour,
+        "opacities": wide["opacities"],
+    }
+
+
+def rows(written: dict[str, AnyArray]) -> Doubles:
+    """All of it as rows: position, covariance, colour, opacity."""
+    return np.concatenate(list(parts(written).values()), 1)
 
 
 def error(found: AnyArray, expected: AnyArray) -> float:

@@ -14,7 +14,7 @@ from gaussian_exporter.checkpoints.avatar_file import read_avatar
 from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.avatar import Avatar, PoseFormat, export_avatar
 
-from .running import FACTS, UPPER, error, parts, run
+from .running import FACTS, UPPER, error, parts, rows, run
 from .sh_reference import basis
 
 PARENTS = [-1, 0, 0, 1, 3, 3, 2, 6]
@@ -96,7 +96,7 @@ def feeds(scale: float = 0.7, **more: AnyArray) -> dict[str, AnyArray]:
 
 
 def assert_matches(model: Avatar, given: dict[str, AnyArray]) -> None:
-    found = parts(run(export_avatar(model, FACTS), given)["gaussians"])
+    found = parts(run(export_avatar(model, FACTS), given))
     # The graph gets float32 numbers; so does the reference.
     rounded = {name: np.asarray(value, np.float32).astype(np.float64) for name, value in given.items()}
     for name, values in reference(model, rounded).items():
@@ -129,25 +129,42 @@ def test_quaternion_poses_agree_with_axis_angles() -> None:
     angle = np.linalg.norm(given["pose"], axis=1, keepdims=True)
     quaternions = np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * given["pose"] / angle], 1)
     formats: dict[PoseFormat, AnyArray] = {"axis-angle": given["pose"], "quaternion": quaternions * 1.7}
-    rows = [
-        run(export_avatar(model, FACTS, pose_format=kind), {**given, "pose": pose})["gaussians"]
+    both = [
+        rows(run(export_avatar(model, FACTS, pose_format=kind), {**given, "pose": pose}))
         for kind, pose in formats.items()
     ]
-    assert error(rows[1], rows[0]) < 1e-5
+    assert error(both[1], both[0]) < 1e-5
 
 
 def test_at_rest_nothing_moves() -> None:
     model = avatar()
     given = {"pose": np.zeros((8, 3)), "translation": np.zeros(3)}
-    found = parts(run(export_avatar(model, FACTS), given)["gaussians"])
+    found = parts(run(export_avatar(model, FACTS), given))
     assert error(found["positions"], model.positions) < 1e-6
 
 
-def test_one_product_for_each_level_of_the_tree() -> None:
-    model = export_avatar(avatar(), FACTS)
-    batched = [node for node in model.graph.node if node.op_type == "MatMul"]
-    assert len(batched) == 3 + 2 + 2  # levels below the root; axis to cross, its square; parents, weights
-    assert not {node.op_type for node in model.graph.node} & {"Split", "Loop", "Scan"}
+def chain(length: int) -> Avatar:
+    """A snake: every joint hangs on the one before it."""
+    rng = np.random.default_rng(2)
+    weights = rng.random((30, length)).astype(np.float32)
+    return replace(
+        avatar(30),
+        weights=weights / weights.sum(1, keepdims=True),
+        joints=rng.normal(size=(length, 3)).astype(np.float32),
+        parents=list(range(-1, length - 1)),
+        joint_names=[f"joint {i}" for i in range(length)],
+    )
+
+
+@pytest.mark.parametrize(("length", "products"), [(1, 1), (2, 1), (3, 2), (5, 3), (16, 4)])
+def test_products_of_joints_double_their_reach(length: int, products: int) -> None:
+    model = chain(length)
+    given = {"pose": np.random.default_rng(1).normal(size=(length, 3)), "translation": np.array([0.1, 0.2, -0.3])}
+    assert_matches(model, given)
+    operators = [node.op_type for node in export_avatar(model, FACTS).graph.node]
+    # Steps, and: turns around joints, weights, points, halves padded and carried, a zero.
+    assert operators.count("MatMul") == products + 6
+    assert not set(operators) & {"Split", "Loop", "Scan"}
 
 
 def test_faults_are_named() -> None:
@@ -163,8 +180,8 @@ def test_a_file_is_read_back(tmp_path: Path) -> None:
     np.savez(tmp_path / "avatar.npz", **arrays)
     again = read_avatar(tmp_path / "avatar.npz")
     given = feeds(camera_position=np.array([0.5, 1.0, -4.0]))
-    rows = [run(export_avatar(each, FACTS), given)["gaussians"] for each in (model, again)]
-    assert np.array_equal(rows[0], rows[1])
+    both = [rows(run(export_avatar(each, FACTS), given)) for each in (model, again)]
+    assert np.array_equal(both[0], both[1])
     arrays.pop("weights")
     np.savez(tmp_path / "avatar.npz", **arrays)
     with pytest.raises(ExportError, match=r"expected arrays weights.*\[checkpoint/incomplete\]"):

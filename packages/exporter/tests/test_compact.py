@@ -25,7 +25,7 @@ def test_tables_take_fewer_bytes_and_stay_float32_in_use() -> None:
     assert compact.ByteSize() < 0.7 * whole.ByteSize()
     assert gpu_findings(compact) == []
     check_outputs(compact)
-    wide, close = (parts(run(model, {})["gaussians"]) for model in (whole, compact))
+    wide, close = (parts(run(model, {})) for model in (whole, compact))
     reach = np.ptp(wide["positions"], axis=0).max()
     # Places are evenly spaced: half a step of 65,535 to the reach, and float32's own rounding.
     assert np.abs(wide["positions"] - close["positions"]).max() < reach / 65535

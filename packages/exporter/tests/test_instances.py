@@ -22,7 +22,7 @@ from gaussian_exporter.outputs import Options
 from gaussian_exporter.placement import gpu_findings
 
 from . import test_avatar, test_classic, test_hexplane
-from .running import FACTS, error, parts, run
+from .running import FACTS, error, parts, rows, run
 
 ONE, MANY = Options(), Options(instances=8)
 
@@ -82,15 +82,19 @@ def test_three_at_once_are_three_one_by_one(name: str) -> None:
     build, given = CASES[name]
     one, many = build(ONE), build(MANY)
     feeds = [given(seed) for seed in range(3)]
-    together = run(many, {key: np.stack([each[key] for each in feeds]) for key in feeds[0]})["gaussians"]
-    alone = [run(one, each)["gaussians"] for each in feeds]
-    assert together.shape == (3, *alone[0].shape)
-    for found, expected in zip(together, alone, strict=True):
+    together = run(many, {key: np.stack([each[key] for each in feeds]) for key in feeds[0]})
+    for index, given_alone in enumerate(feeds):
+        expected = run(one, given_alone)
         for part, values in parts(expected).items():
-            assert error(parts(found)[part], values) < 1e-6, part
-    assert np.abs(together[0] - together[2]).max() > 0.01
+            assert error(parts(of_instance(together, index))[part], values) < 1e-6, part
+    assert np.abs(together["positions"][0] - together["positions"][2]).max() > 0.01
     # Alone in a run of one, too.
-    assert error(run(many, {key: value[None] for key, value in feeds[1].items()})["gaussians"][0], alone[1]) < 1e-6
+    alone = run(many, {key: value[None] for key, value in feeds[1].items()})
+    assert error(rows(of_instance(alone, 0)), rows(run(one, feeds[1]))) < 1e-6
+
+
+def of_instance(written: dict[str, AnyArray], index: int) -> dict[str, AnyArray]:
+    return {name: values[index] for name, values in written.items()}
 
 
 @pytest.mark.parametrize("name", CASES)

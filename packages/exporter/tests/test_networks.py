@@ -13,13 +13,21 @@ import pytest
 from gaussian_exporter.arrays import AnyArray, Doubles
 from gaussian_exporter.checkpoints.networks import read_feed_forward, read_image_filter
 from gaussian_exporter.errors import ExportError
-from gaussian_exporter.families.feed_forward import STRIDES, Camera, FeedForward, Pose, export_feed_forward, sweep
+from gaussian_exporter.families.feed_forward import (
+    SHARPENING,
+    STRIDES,
+    Camera,
+    FeedForward,
+    Pose,
+    export_feed_forward,
+    sweep,
+)
 from gaussian_exporter.families.image_filter import ImageFilter, export_image_filter
 from gaussian_exporter.graph import Graph
 from gaussian_exporter.pieces.convolution import Convolution
 
 from .picture_reference import convolved, doubled, looked_up, relu, sigmoid, smoothly_enlarged
-from .running import FACTS, covariance, error, parts, run
+from .running import FACTS, covariance, error, parts, rows, run
 
 WIDTH, HEIGHT = 16, 12
 
@@ -154,25 +162,30 @@ def reference(model: FeedForward, feeds: dict[str, AnyArray]) -> dict[str, Doubl
         for index, each in enumerate(model.head):
             x = convolved(relu(x) if index else x, each)
         depth = 1 / np.clip(guess[0] * np.exp(0.2 * np.tanh(x[0])), 1 / model.far, 1 / model.near)
+        colours = np.clip(picture + 0.5 * np.tanh(x[9:]), 0, 1)
+        wide = np.pad(colours, ((0, 0), (1, 1), (1, 1)), "edge")
+        bend = wide[:, :-2, 1:-1] + wide[:, 2:, 1:-1] + wide[:, 1:-1, :-2] + wide[:, 1:-1, 2:] - 4 * colours
+        colours = np.clip(colours - SHARPENING * model.widened * bend, 0, 1)
         for row in range(HEIGHT):
             for column in range(WIDTH):
                 z, pixel = depth[row, column], x[:, row, column]
                 point = ray(column + 0.5, row + 0.5, WIDTH, HEIGHT, k) * z
-                scales = (0.2 + 4 * sigmoid(pixel[2:5])) * z / (k[0] * WIDTH)
+                scales = np.sqrt((0.2 + 4 * sigmoid(pixel[2:5])) ** 2 + model.widened) * z / (k[0] * WIDTH)
                 turn = np.eye(4) if view == 0 else np.linalg.inv(there)
                 upper = covariance(scales[None], (pixel[5:9] + np.eye(4)[0])[None])[0]
                 full = turn[:3, :3] @ upper[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3) @ turn[:3, :3].T
                 columns["positions"].append(turn[:3, :3] @ point + turn[:3, 3])
                 columns["covariances"].append(full[np.triu_indices(3)])
-                columns["colour"].append(np.clip(picture[:, row, column] + 0.5 * np.tanh(pixel[9:]), 0, 1))
-                columns["opacities"].append(sigmoid(pixel[1:2]))
+                columns["colour"].append(colours[:, row, column])
+                drawn = ((0.2 + 4 * sigmoid(pixel[2:5])) ** 2).mean() + 0.3
+                columns["opacities"].append(sigmoid(pixel[1:2]) * drawn / (drawn + model.widened))
     return {name: np.stack(values) for name, values in columns.items()}
 
 
-@pytest.mark.parametrize("views", [1, 2])
-def test_pixel_aligned_gaussians(views: int) -> None:
-    model, feeds = feed_forward(views), given(views)
-    found = parts(run(export_feed_forward(model, FACTS), feeds)["gaussians"])
+@pytest.mark.parametrize(("views", "widened"), [(1, 0.0), (2, 0.0), (1, 0.1)])
+def test_pixel_aligned_gaussians(views: int, widened: float) -> None:
+    model, feeds = replace(feed_forward(views), widened=widened), given(views)
+    found = parts(run(export_feed_forward(model, FACTS), feeds))
     assert len(found["positions"]) == views * WIDTH * HEIGHT
     for name, values in reference(model, feeds).items():
         assert error(found[name], values) < 1e-5, name
@@ -232,10 +245,8 @@ def test_folders_are_read_back(tmp_path: Path) -> None:
     }
     config = {name: getattr(model, name) for name in ("width", "height", "views", "near", "far", "depths")}
     write_network(tmp_path / "ff", config, tensors)
-    rows = [
-        run(export_feed_forward(m, FACTS), given())["gaussians"] for m in (model, read_feed_forward(tmp_path / "ff"))
-    ]
-    assert np.array_equal(rows[0], rows[1])
+    both = [rows(run(export_feed_forward(m, FACTS), given())) for m in (model, read_feed_forward(tmp_path / "ff"))]
+    assert np.array_equal(both[0], both[1])
 
     style = image_filter(norm=True)
     tensors = arrays("stem", style.stem) | arrays("out", style.out)

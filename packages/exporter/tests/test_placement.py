@@ -44,6 +44,16 @@ def test_every_family_stays_on_the_gpu(name: str) -> None:
     assert [str(finding) for finding in gpu_findings(model)] == []
 
 
+def test_outputs_that_a_recording_would_lose_are_named() -> None:
+    shape: dict[str, AnyArray] = {"shape": np.array([4, 8])}
+    last = helper.make_node("Reshape", ["x", "shape"], ["y"])
+    assert ("slow", "Reshape") in found(made([last], shape))
+    first = helper.make_node("Reshape", ["x", "shape"], ["z"])
+    assert ("slow", "Reshape") not in found(made([first, helper.make_node("Relu", ["z"], ["y"])], shape))
+    constant = made([helper.make_node("Relu", ["c"], ["y"])], {"c": np.ones((2, 2), np.float32)})
+    assert ("slow", "constant") in found(constant)
+
+
 @pytest.mark.parametrize("name", list(every_family()))
 def test_every_family_keeps_the_contract(name: str) -> None:
     model, _ = every_family()[name]

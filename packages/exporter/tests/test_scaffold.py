@@ -20,7 +20,7 @@ from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.scaffold import DistanceToLevel, Levels, Scaffold, export_scaffold
 from gaussian_exporter.pieces.mlp import Linear
 
-from .running import FACTS, covariance, error, parts, run, write_ply
+from .running import FACTS, covariance, error, parts, rows, run, write_ply
 
 CAMERA = np.array([0.4, -0.3, -3.0])
 
@@ -113,7 +113,7 @@ def assert_matches(model: Scaffold, camera: Doubles = CAMERA, resolution: float 
     feeds: dict[str, AnyArray] = {"camera_position": camera}
     if resolution is not None:
         feeds["resolution_scale"] = np.array([resolution])
-    found = parts(run(export_scaffold(model, FACTS), feeds)["gaussians"])
+    found = parts(run(export_scaffold(model, FACTS), feeds))
     expected = reference(model, camera.astype(np.float64), resolution or 1)
     for name, values in expected.items():
         assert error(found[name], values) < 1e-5, name
@@ -154,7 +154,7 @@ def levels(count: int, rule: DistanceToLevel, fed: bool = False, fork: float = 2
 def test_levels_of_detail(rule: DistanceToLevel, resolution: float) -> None:
     model = scaffold(levels=levels(60, rule))
     found = assert_matches(model, resolution=resolution)
-    without = parts(run(export_scaffold(replace(model, levels=None), FACTS), {"camera_position": CAMERA})["gaussians"])
+    without = parts(run(export_scaffold(replace(model, levels=None), FACTS), {"camera_position": CAMERA}))
     hidden = (found["opacities"] < without["opacities"]).mean()
     assert 0.02 < hidden < 0.6
 
@@ -166,8 +166,8 @@ def test_levels_fed_to_the_networks_and_other_forks() -> None:
 
 def test_a_camera_inside_an_anchor_gives_finite_numbers() -> None:
     model = scaffold(levels=levels(60, "progressive"))
-    rows = run(export_scaffold(model, FACTS), {"camera_position": model.anchors[0], "resolution_scale": np.ones(1)})
-    assert np.isfinite(rows["gaussians"]).all()
+    written = run(export_scaffold(model, FACTS), {"camera_position": model.anchors[0], "resolution_scale": np.ones(1)})
+    assert np.isfinite(rows(written)).all()
 
 
 def test_networks_that_do_not_fit_are_refused() -> None:
@@ -238,10 +238,10 @@ def test_the_published_octree_model_runs(shared: Path) -> None:
 
 def test_all_its_anchors_run(shared: Path) -> None:
     model = octree(shared, 265550)
-    rows = run(
+    written = run(
         export_scaffold(model, FACTS), {"camera_position": model.anchors.mean(0), "resolution_scale": np.ones(1)}
-    )["gaussians"]
-    assert rows.shape == (2655500, 13) and np.isfinite(rows).all()
+    )
+    assert written["rotations"].shape == (2655500, 4) and all(np.isfinite(each).all() for each in written.values())
 
 
 def test_a_checkpoint_folder_is_read_back(shared: Path, tmp_path: Path) -> None:
@@ -255,8 +255,8 @@ def test_a_checkpoint_folder_is_read_back(shared: Path, tmp_path: Path) -> None:
     assert np.array_equal(again.offsets, model.offsets) and np.array_equal(again.features, model.features)
     assert error(again.scales, model.scales) < 1e-6
     feeds = {"camera_position": model.anchors.mean(0), "resolution_scale": np.ones(1)}
-    rows = [run(export_scaffold(each, FACTS), feeds)["gaussians"] for each in (model, again)]
-    assert error(rows[1], rows[0]) < 1e-5
+    both = [rows(run(export_scaffold(each, FACTS), feeds)) for each in (model, again)]
+    assert error(both[1], both[0]) < 1e-5
 
 
 def test_broken_checkpoints_are_named(shared: Path, tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def assert_agrees(model: onnx.ModelProto, feeds: dict[str, AnyArray], splats: An
     """The exported file writes what PyTorch computes."""
     check_outputs(model)
     assert gpu_findings(model) == []
-    found = parts(run(model, feeds)["gaussians"])
+    found = parts(run(model, feeds))
     full = splats.covariances.detach().numpy()
     assert error(found["positions"], splats.positions.detach().numpy()) < 1e-4
     assert error(found["covariances"], full[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]) < 1e-3

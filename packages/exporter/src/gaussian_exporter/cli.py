@@ -1,10 +1,11 @@
-"""The command `gaussian-export FAMILY CHECKPOINT OUT.onnx`, and `gaussian-export check FILE.onnx`."""
+"""The command `gaussian-export FAMILY CHECKPOINT OUT.onnx`; `gaussian-export check` and `cost` of a file."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import cast, get_args
@@ -18,6 +19,7 @@ from .checkpoints.networks import read_feed_forward, read_image_filter
 from .checkpoints.scaffold_folder import read_scaffold
 from .conformance import check_outputs
 from .contract import Coordinates, DType, Facts, Json, Layout, Up, of_metadata
+from .cost import cost_of, report
 from .errors import ExportError
 from .families.avatar import PoseFormat, export_avatar
 from .families.classic import Colours, export_classic, read_cloud
@@ -37,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command; 0 if all went well, 1 with a message for people if not, 2 for wrong options."""
     given = parser().parse_args(arguments)
     try:
-        check(given.file) if given.family == "check" else export(given)
+        {"check": check, "cost": cost}.get(given.family, export)(given)
     except ExportError as error:
         print(f"gaussian-export: {error}", file=sys.stderr)
         return 1
@@ -56,6 +58,10 @@ def parser() -> Command:
         describe(family)
     checker = families.add_parser("check", help="run a file on the CPU, and say what would leave the GPU")
     checker.add_argument("file", type=Path)
+    counter = families.add_parser("cost", help="where a run's time goes: dispatches, bytes, an estimate, for any file")
+    counter.add_argument("file", type=Path)
+    counter.add_argument("--instances", type=positive, default=1, help="instances in one run, if the file has an axis")
+    counter.add_argument("--rows", type=positive, default=12, help="nodes to list, the dearest first; default 12")
     return root
 
 
@@ -107,8 +113,16 @@ def export(given: argparse.Namespace) -> None:
     report_findings(model)
 
 
-def check(path: Path) -> None:
+def cost(given: argparse.Namespace) -> None:
+    """Prints what a run of a file costs, without running it."""
+    model = onnx.load(existing(given.file, "an .onnx file"), load_external_data=False)
+    for line in report(cost_of(model, given.instances), given.rows):
+        print(line)
+
+
+def check(given: argparse.Namespace) -> None:
     """Holds a file against its contract, and reports what would leave the GPU."""
+    path = given.file
     model = onnx.load(existing(path, "an .onnx file"))
     contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
     print(f"{path}: contract version {contract['version']}, {contract.get('name', 'without a name')}")
@@ -162,7 +176,12 @@ def _avatar(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.M
 
 
 def _feed_forward(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_feed_forward(read_feed_forward(given.checkpoint), facts, options)
+    return export_feed_forward(replace(read_feed_forward(given.checkpoint), widened=given.widen), facts, options)
+
+
+def _feed_forward_options(family: Command) -> None:
+    what = "squared pixels added to every Gaussian, against gaps where it is seen larger than its pictures; default 0"
+    family.add_argument("--widen", type=float, default=0.0, help=what)
 
 
 def positive(text: str) -> int:
@@ -194,6 +213,10 @@ FAMILIES: dict[str, tuple[Callable[[Command], None], str, Export]] = {
     "scaffold": (_scaffold_options, "Scaffold-GS or Octree-GS: the trainer's folder", _scaffold),
     "hexplane": (_no_options, "4DGS: the folder of 4DGaussians", _hexplane),
     "avatar": (_avatar_options, "a skinned avatar: one .npz file", _avatar),
-    "feed-forward": (_no_options, "pictures to Gaussians: a folder of config.json and model.pth", _feed_forward),
+    "feed-forward": (
+        _feed_forward_options,
+        "pictures to Gaussians: a folder of config.json and model.pth",
+        _feed_forward,
+    ),
     "image-filter": (_image_filter_options, "style or denoising: a folder of config.json and model.pth", _image_filter),
 }

@@ -101,11 +101,13 @@ def _checks(outputs: dict[str, Any], values: dict[str, AnyArray], instances: boo
     else:
         opacities = values[outputs["opacities"]]
         covariances = values[outputs["covariances"]] if "covariances" in outputs else None
-    yield lambda: _check_opacities(opacities)
+    if outputs["opacityActivation"] == "linear":
+        yield lambda: _check_opacities(opacities)
     if covariances is not None:
         yield lambda: _check_covariances(covariances)
     if "scales" in outputs:
-        yield lambda: _check_axes(values[outputs["scales"]], values[outputs["rotations"]])
+        scales = values[outputs["scales"]] if outputs["scaleActivation"] == "linear" else np.zeros(1)
+        yield lambda: _check_axes(scales, values[outputs["rotations"]])
 
 
 def _check_opacities(opacities: AnyArray) -> None:

@@ -19,6 +19,8 @@ VERSION = 1
 Layout = Literal["packed", "split"]
 # What a split layout says of the shape: covariances, or scales and rotations.
 Shape = Literal["covariances", "axes"]
+ScaleActivation = Literal["linear", "log"]
+OpacityActivation = Literal["linear", "logit"]
 DType = Literal["float32", "float16"]
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Json = dict[str, object]
@@ -106,6 +108,8 @@ class GaussianOutputs:
     bounds: tuple[Sequence[float], Sequence[float]]
     # Most instances that one run computes; None without an axis for them.
     instances: int | None = None
+    scale_activation: ScaleActivation = "linear"
+    opacity_activation: OpacityActivation = "linear"
 
     def json(self) -> Json:
         """The contract's `outputs`."""
@@ -114,9 +118,15 @@ class GaussianOutputs:
             color = "rgb" if self.sh_degree is None else "sh"
             return {"layout": "packed", "gaussians": "gaussians", "color": color, "opacityActivation": "linear", **sh}
         shape = ["covariances"] if self.shape == "covariances" else ["scales", "rotations"]
-        axes = {"scaleActivation": "linear", "rotationOrder": "wxyz"} if self.shape == "axes" else {}
+        axes = {"scaleActivation": self.scale_activation, "rotationOrder": "wxyz"} if self.shape == "axes" else {}
         names = ["positions", *shape, "colors" if self.sh_degree is None else "sh", "opacities"]
-        return {"layout": "split", **{name: name for name in names}, **axes, "opacityActivation": "linear", **sh}
+        return {
+            "layout": "split",
+            **{name: name for name in names},
+            **axes,
+            "opacityActivation": self.opacity_activation,
+            **sh,
+        }
 
 
 def gaussian_contract(facts: Facts, inputs: Sequence[Input], outputs: GaussianOutputs) -> Json:

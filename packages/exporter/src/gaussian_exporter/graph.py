@@ -28,6 +28,9 @@ MOST_CONCAT_INPUTS = 7
 # Tables of fewer numbers stay float32 also in compact files: there is little to save.
 LEAST_COMPACT = 4096
 
+# These give their input another shape, or none: no kernel runs.
+ALIASES = frozenset({"Reshape", "Unsqueeze", "Squeeze", "Flatten", "Identity"})
+
 Shape = tuple[int, ...]
 # The size that stands for the axis of instances while a graph is built: a prime that no other size is a multiple of, so
 # that it is known again in products. In the file the axis is symbolic, under this name.
@@ -87,6 +90,15 @@ class Tensor:
         axes = self.graph.integers([axis])
         return self.graph.node("ReduceSum", [self, axes], reduced(self.shape, [axis], keep), keepdims=int(keep))
 
+    def length(self, axis: int, keep: bool = False) -> Tensor:
+        """Euclidean length along one axis."""
+        axis %= len(self.shape)
+        return self.graph.node("ReduceL2", [self], reduced(self.shape, [axis], keep), axes=[axis], keepdims=int(keep))
+
+    def product(self, axis: int) -> Tensor:
+        """Product along one axis, which is gone."""
+        return self.graph.node("ReduceProd", [self], reduced(self.shape, [axis], False), axes=[axis], keepdims=0)
+
     def mean(self, axes: Sequence[int], keep: bool = False) -> Tensor:
         """Mean along some axes."""
         return self.graph.node(
@@ -127,10 +139,7 @@ class Tensor:
         """The same numbers, once for each instance if `other` has instances."""
         if other.shape[0] != INSTANCES or self.shape[0] == INSTANCES:
             return self
-        first = other
-        for axis in range(1, len(other.shape)):
-            first = first.part(0, 1, axis)
-        return first.reshape(INSTANCES, *[1] * len(self.shape)) * 0.0 + self
+        return self.graph.zero().reshape(INSTANCES, *[1] * len(self.shape)) + self
 
     def expand(self, *shape: int) -> Tensor:
         """Repeated along axes of length 1."""
@@ -180,11 +189,41 @@ class Graph:
         self._outputs: list[onnx.ValueInfoProto] = []
         self._constants: dict[str, onnx.TensorProto] = {}
         self._by_value: dict[tuple[str, Shape, bytes], Tensor] = {}
+        self._by_node: dict[tuple[str, tuple[str, ...], str], Tensor] = {}
+        # Names of results that became outputs, by those that they had.
+        self._now: dict[str, str] = {}
+        # Results and inputs that may differ from run to run; the smallest input of each instance.
+        self._changing: set[str] = set()
+        self._least: Tensor | None = None
 
     def input(self, name: str, *shape: int) -> Tensor:
         """A float32 input of fixed shape; one that differs from instance to instance begins with `lead`."""
         self._inputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, declared(shape)))
-        return Tensor(self, name, shape)
+        self._changing.add(name)
+        tensor = Tensor(self, name, shape)
+        if shape[: len(self.lead)] == self.lead and (self._least is None or prod(shape) < prod(self._least.shape)):
+            self._least = tensor
+        return tensor
+
+    def zero(self) -> Tensor:
+        """A zero (1), or one for each instance (B), that the runtime cannot know to be constant: it comes from an
+        input. Adding it repeats what all instances share, and writes what never changes anew in every run."""
+        if self._least is None:
+            raise ValueError("there is no input to make a zero of")
+        each = prod(self.lead)
+        row = self._least.reshape(each, prod(self._least.shape) // each)
+        total = row @ self.constant(np.zeros((row.shape[1], 1)), "zeros")
+        return total.reshape(each)
+
+    def written_anew(self, tensor: Tensor) -> Tensor:
+        """The same numbers as the result of a kernel. ONNX Runtime copies constants and other shapes of a result into
+        outputs; where its commands are recorded (graph capture), a copy is made in the first run and never again."""
+        maker = next((node.op_type for node in self._nodes if tensor.name in node.output), None)
+        is_copied = tensor.name not in self._changing or maker in ALIASES
+        if not is_copied or self._least is None:
+            return tensor
+        zero = self.zero()
+        return tensor + (zero.reshape(*self.lead, *[1] * (len(tensor.shape) - 1)) if self.lead else zero)
 
     def constant(
         self, value: AnyArray | Sequence[Number], name: str = "constant", errors: Errors = "relative"
@@ -246,12 +285,18 @@ class Graph:
     def node(
         self, operator: str, inputs: Sequence[Tensor], shape: Shape, **attributes: int | float | str | Sequence[int]
     ) -> Tensor:
-        """Adds an operator of one result, whose shape the caller knows."""
+        """Adds an operator of one result, whose shape the caller knows. The same on the same inputs is there once."""
+        key = (operator, tuple(tensor.name for tensor in inputs), repr(sorted(attributes.items())))
+        if key in self._by_node:
+            return self._by_node[key]
         name = f"{operator.lower()}_{len(self._nodes)}"
         node = helper.make_node(operator, [tensor.name for tensor in inputs], [name], name=name)
         node.attribute.extend(helper.make_attribute(key, value) for key, value in attributes.items())
         self._nodes.append(node)
-        return Tensor(self, name, shape)
+        if any(tensor.name in self._changing for tensor in inputs):
+            self._changing.add(name)
+        self._by_node[key] = Tensor(self, name, shape)
+        return self._by_node[key]
 
     def binary(self, operator: str, left: Tensor, right: Tensor | Number) -> Tensor:
         """An operator of two arguments that broadcast."""
@@ -279,17 +324,31 @@ class Graph:
 
     def output(self, name: str, tensor: Tensor, half: bool = False) -> None:
         """Names a result, as float32 or, with `half`, cast to float16."""
+        source = self._now.get(tensor.name, tensor.name)
         if half:
-            self._nodes.append(helper.make_node("Cast", [tensor.name], [name], name=name, to=TensorProto.FLOAT16))
-        elif tensor.name == (self._nodes[-1].output[0] if self._nodes else ""):
-            self._nodes[-1].output[0] = name
-        else:
-            self._nodes.append(helper.make_node("Identity", [tensor.name], [name], name=name))
+            self._nodes.append(helper.make_node("Cast", [source], [name], name=name, to=TensorProto.FLOAT16))
+        elif not self._renamed(source, name):
+            self._nodes.append(helper.make_node("Identity", [source], [name], name=name))
         kind = TensorProto.FLOAT16 if half else TensorProto.FLOAT
         self._outputs.append(helper.make_tensor_value_info(name, kind, declared(tensor.shape)))
 
+    def _renamed(self, old: str, new: str) -> bool:
+        """Gives a node's result the name of an output, which saves a copy; not if it is one already, or no node's."""
+        taken = {output.name for output in self._outputs}
+        maker = next((node for node in self._nodes if old in node.output), None)
+        if maker is None or old in taken:
+            return False
+        maker.output[0] = self._now[old] = new
+        for node in self._nodes:
+            for index, name in enumerate(node.input):
+                if name == old:
+                    node.input[index] = new
+        return True
+
     def model(self, metadata: dict[str, str]) -> onnx.ModelProto:
-        """The finished file. ONNX's own checker and shape inference must agree with every shape that was declared."""
+        """The finished file, without what no output needs. ONNX's own checker and shape inference must agree with every
+        shape that was declared."""
+        self._nodes = self._needed_nodes()
         graph = helper.make_graph(
             self._nodes, self.name, self._inputs, self._outputs, list(self._used_constants().values())
         )
@@ -310,6 +369,14 @@ class Graph:
                 remedy="this is a fault of the exporter; please report it with the command that you ran",
             ) from error
         return model
+
+    def _needed_nodes(self) -> list[onnx.NodeProto]:
+        needed, found = {output.name for output in self._outputs}, []
+        for node in reversed(self._nodes):
+            if node.output[0] in needed:
+                needed.update(node.input)
+                found.append(node)
+        return found[::-1]
 
     def _used_constants(self) -> dict[str, onnx.TensorProto]:
         used = {name for node in self._nodes for name in node.input}

@@ -8,7 +8,18 @@ from dataclasses import dataclass, fields, replace
 import onnx
 
 from .arrays import AnyArray
-from .contract import DType, Facts, GaussianOutputs, Input, Layout, Shape, gaussian_contract, metadata
+from .contract import (
+    DType,
+    Facts,
+    GaussianOutputs,
+    Input,
+    Layout,
+    OpacityActivation,
+    ScaleActivation,
+    Shape,
+    gaussian_contract,
+    metadata,
+)
 from .errors import ExportError
 from .graph import INSTANCES, Graph, Tensor, Weights
 from .pieces.covariance import covariance_of_scale_and_rotation
@@ -16,11 +27,13 @@ from .pieces.covariance import covariance_of_scale_and_rotation
 
 @dataclass(frozen=True)
 class Options:
-    """How a generator is written. dtype float16 halves what it writes and needs the device feature shader-f16. The
-    default layout is packed in float32, and split in float16: there scales and rotations take the place of covariances,
-    since float16 makes those of needles and discs indefinite. Weights `compact` halve the file, and nothing else:
-    tables are float32 again when the session is made. `instances`: the most that one run may compute, of a file with
-    an axis for them; None for a file without. Families that have no such file refuse it."""
+    """How a generator is written. dtype float16 halves what it writes and needs the device feature shader-f16. Where a
+    family has scales and rotations the split layout writes them in place of covariances, which cost a graph more than
+    the rest of it and in float16 lose what makes needles thin. The default layout is split, where nothing is copied
+    together and what never changes is written once; packed for files without inputs, which run once. Weights `compact`
+    halve the file, and nothing else: tables are float32 again when the session is made. `instances`: the most that one
+    run may compute, of a file with an axis for them; None for a file without. Families that have no such file refuse
+    it."""
 
     layout: Layout | None = None
     dtype: DType = "float32"
@@ -28,21 +41,23 @@ class Options:
     instances: int | None = None
 
     @property
-    def writes_axes(self) -> bool:
-        """Whether scales and rotations are written, by families that have them."""
-        return self.dtype == "float16" and self.layout != "packed"
+    def wants_axes(self) -> bool:
+        """Whether scales and rotations are written by families that could as well bake covariances."""
+        return self.layout == "split" or (self.dtype == "float16" and self.layout is None)
 
 
 @dataclass(frozen=True)
 class Gaussians:
-    """What every family makes. positions (N,3) world units; covariances (N,6) or scales (N,3) standard deviations
-    with rotations (N,4) w x y z of any length; colors (N,3) 0..1 or sh (N,(d+1)^2,3); opacities (N,1) 0..1. Where a
-    graph has instances, any of them may have their axis before these."""
+    """What every family makes. positions (N,3) world units; covariances (N,6) or scales (N,3) standard deviations, or
+    their logarithms, with rotations (N,4) w x y z of any length; colors (N,3) 0..1 or sh (N,(d+1)^2,3); opacities (N,1)
+    0..1, or their logits. Where a graph has instances, any of them may have their axis before these."""
 
     positions: Tensor
-    opacities: Tensor
+    opacities: Tensor | None = None
+    opacity_logits: Tensor | None = None
     covariances: Tensor | None = None
     scales: Tensor | None = None
+    log_scales: Tensor | None = None
     rotations: Tensor | None = None
     colors: Tensor | None = None
     sh: Tensor | None = None
@@ -51,9 +66,25 @@ class Gaussians:
         """The covariances (N,6), made from scales and rotations if they were not given."""
         if self.covariances is not None:
             return self.covariances
-        if self.scales is None or self.rotations is None:
+        if self.rotations is None:
             raise ValueError("Gaussians need covariances, or scales and rotations")
-        return covariance_of_scale_and_rotation(self.scales, self.rotations)
+        return covariance_of_scale_and_rotation(self.scale(), self.rotations)
+
+    def scale(self) -> Tensor:
+        """Standard deviations (N,3), made from their logarithms if those were given."""
+        if self.scales is not None:
+            return self.scales
+        if self.log_scales is None:
+            raise ValueError("Gaussians need scales with their rotations")
+        return self.log_scales.unary("Exp")
+
+    def opacity(self) -> Tensor:
+        """Opacities (N,1), made from their logits if those were given."""
+        if self.opacities is not None:
+            return self.opacities
+        if self.opacity_logits is None:
+            raise ValueError("Gaussians need opacities")
+        return self.opacity_logits.unary("Sigmoid")
 
     def colour(self) -> Tensor:
         """Colours (N,3), or harmonics as rows of (d+1)^2 * 3, all channels of a coefficient together."""
@@ -65,7 +96,7 @@ class Gaussians:
 
     def has_axes(self) -> bool:
         """Whether there are scales and rotations, and not covariances alone."""
-        return self.scales is not None and self.rotations is not None
+        return self.rotations is not None
 
     def sh_degree(self) -> int:
         """Degree of the harmonics; 0 with plain colours."""
@@ -93,8 +124,12 @@ def finish(
     if not graph.lead:
         refuse_instances(options, graph.name)
     gaussians = gaussians.of_all_instances()
-    layout = options.layout or ("split" if options.writes_axes else "packed")
-    shape: Shape = "axes" if options.writes_axes and gaussians.has_axes() else "covariances"
+    layout = options.layout or ("split" if options.wants_axes or inputs else "packed")
+    shape: Shape = "axes" if layout == "split" and gaussians.has_axes() else "covariances"
+    # Float16 keeps the digits of a scale better than those of its logarithm.
+    raw = layout == "split" and options.dtype == "float32"
+    scale_activation: ScaleActivation = "log" if raw and gaussians.log_scales is not None else "linear"
+    opacity_activation: OpacityActivation = "logit" if raw and gaussians.opacity_logits is not None else "linear"
     if layout == "packed":
         write_packed(graph, gaussians, options)
     else:
@@ -107,6 +142,8 @@ def finish(
         sh_degree=None if gaussians.sh is None else gaussians.sh_degree(),
         bounds=([float(x) for x in bounds[0]], [float(x) for x in bounds[1]]),
         instances=options.instances,
+        scale_activation=scale_activation,
+        opacity_activation=opacity_activation,
     )
     return graph.model(metadata(gaussian_contract(facts, inputs, outputs)))
 
@@ -125,24 +162,29 @@ def refuse_instances(options: Options, family: str) -> None:
 
 def write_packed(graph: Graph, gaussians: Gaussians, options: Options) -> None:
     """One tensor: position 3, covariance 6, colour 3 or harmonics, opacity 1."""
-    columns = [gaussians.positions, gaussians.covariance(), gaussians.colour(), gaussians.opacities]
+    columns = [gaussians.positions, gaussians.covariance(), gaussians.colour(), gaussians.opacity()]
     graph.output("gaussians", graph.concat(columns, -1), options.dtype == "float16")
 
 
 def write_split(graph: Graph, gaussians: Gaussians, options: Options, shape: Shape) -> None:
-    """A tensor for each attribute. Scales are linear, rotations w x y z."""
-    colour = "colors" if gaussians.sh is None else "sh"
-    tensors = {
-        "positions": gaussians.positions,
-        "covariances": gaussians.covariance() if shape == "covariances" else None,
-        "scales": gaussians.scales if shape == "axes" else None,
-        "rotations": gaussians.rotations if shape == "axes" else None,
-        colour: gaussians.colors if gaussians.sh is None else gaussians.sh,
-        "opacities": gaussians.opacities,
-    }
+    """A tensor for each attribute. Float32 scales and opacities as they come, before their activation or after it;
+    rotations w x y z."""
+    raw = options.dtype == "float32"
+    tensors = {"positions": gaussians.positions}
+    if shape == "covariances":
+        tensors["covariances"] = gaussians.covariance()
+    elif gaussians.rotations is not None:
+        logarithms = gaussians.log_scales if raw else None
+        tensors["scales"] = logarithms if logarithms is not None else gaussians.scale()
+        tensors["rotations"] = gaussians.rotations
+    if gaussians.sh is not None:
+        tensors["sh"] = gaussians.sh
+    elif gaussians.colors is not None:
+        tensors["colors"] = gaussians.colors
+    logits = gaussians.opacity_logits if raw else None
+    tensors["opacities"] = logits if logits is not None else gaussians.opacity()
     for name, tensor in tensors.items():
-        if tensor is not None:
-            graph.output(name, tensor, options.dtype == "float16")
+        graph.output(name, graph.written_anew(tensor), not raw)
 
 
 def save(model: onnx.ModelProto, path: str) -> int:

@@ -16,7 +16,7 @@ from typing import Literal
 import onnx
 from onnx import TensorProto, helper
 
-from .graph import INSTANCES_AXIS
+from .graph import ALIASES, INSTANCES_AXIS
 from .pieces.convolution import is_wrong_on_webgpu
 
 # Operators of ai.onnx with a float32 kernel. Control flow (If) has one too, but ends capture.
@@ -111,7 +111,19 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
             found += _of_constants(node, values)
             continue
         found += [finding for rule in _RULES for finding in rule(node, opset, values)]
-    return found
+    return [*found, *_of_copies(model, values)]
+
+
+def _of_copies(model: onnx.ModelProto, values: _Values) -> Iterator[Finding]:
+    """Outputs that no kernel writes. A file without inputs runs once and is none the worse for it."""
+    makers = {name: node for node in model.graph.node for name in node.output}
+    for output in model.graph.output if model.graph.input else []:
+        maker = makers.get(output.name)
+        operator = "constant" if maker is None or output.name in values.constants else maker.op_type
+        if operator in ALIASES or operator == "constant":
+            reason = f"{output.name} is copied, which a recording of the commands does not repeat: it runs unrecorded"
+            remedy = "let a kernel write it: add a zero that comes from an input"
+            yield Finding("slow", maker.name if maker else output.name, operator, reason, remedy)
 
 
 def _of_file(model: onnx.ModelProto, opset: int, values: _Values) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import prod
 from typing import Literal
 
 import numpy as np
@@ -19,8 +20,14 @@ from ..errors import ExportError
 from ..graph import Graph, Tensor
 from ..outputs import Gaussians, Options, finish
 from ..pieces import harmonics
-from ..pieces.covariance import covariance_of_half, rotation_matrix
-from ..pieces.skeleton import posed_joints, relative_to_parent, rotation_of_axis_angle, skinning_matrices
+from ..pieces.covariance import covariance_of_half
+from ..pieces.skeleton import (
+    products_of_parts,
+    quaternions_of_axis_angle,
+    rotation_entries,
+    skinning_matrices,
+    unit_quaternions,
+)
 from ..pieces.view import direction_and_distance
 
 PoseFormat = Literal["axis-angle", "quaternion"]
@@ -64,14 +71,13 @@ def export_avatar(
     graph = Graph("avatar", options.weights, options.instances is not None)
     quaternions = pose_format == "quaternion"
     given = graph.input("pose", *graph.lead, len(avatar.parents), 4 if quaternions else 3)
-    rotations = rotation_matrix(given) if quaternions else rotation_of_axis_angle(given)
+    products = products_of_parts(unit_quaternions(given) if quaternions else quaternions_of_axis_angle(given))
     inputs = [pose("pose", avatar.joint_names, avatar.parents, quaternions)]
-    positions, joints = blended(avatar, graph, rotations, inputs)
-    frames = posed_joints(rotations, relative_to_parent(joints, avatar.parents), avatar.parents)
-    carried = graph.constant(avatar.weights, "weights", errors="even") @ skinning_matrices(frames, joints)
+    points, joints = blended(avatar, graph, products, inputs)
+    carried = blended_matrices(avatar, skinning_matrices(products, joints, avatar.parents))
     translation = row_of(graph, "translation", 3)
     inputs.append(control("translation", 0.0, -10.0, 10.0))
-    gaussians = skinned(avatar, graph, positions, carried, translation, inputs)
+    gaussians = skinned(avatar, graph, points, carried, translation, inputs)
     bounds = avatar.positions.min(0), avatar.positions.max(0)
     return finish(graph, gaussians, inputs, bounds, facts, options)
 
@@ -110,28 +116,31 @@ def _demand(holds: bool, where: str, expected: str, found: str) -> None:
         )
 
 
-def blended(avatar: Avatar, graph: Graph, rotations: Tensor, inputs: list[Input]) -> tuple[Tensor, Tensor]:
-    """Positions (N,3) and joints (J,3) at rest, of this shape, expression and pose. Adds the inputs it needs."""
+def blended(avatar: Avatar, graph: Graph, products: Tensor, inputs: list[Input]) -> tuple[Tensor, Tensor]:
+    """Points x y z 1 (...,N,4) and joints (...,J,3) at rest, of this shape, expression and pose. Adds the inputs it
+    needs."""
     positions = graph.constant(avatar.positions, "positions", errors="even")
+    ones = graph.constant(np.ones((1, 1)), "one").expand(len(avatar.positions), 1)
+    points = graph.concat([positions, ones], 1)
     joints = graph.constant(avatar.joints, "joints")
     if avatar.shape_directions is not None and avatar.joint_directions is not None:
         count = avatar.shape_directions.shape[2]
         inputs.append(shape("shape", count))
         body = row_of(graph, "shape", count)
-        positions = positions + along(body, avatar.shape_directions, "shape_directions")
-        joints = joints + along(body, avatar.joint_directions, "joint_directions")
+        points = along(body, avatar.shape_directions, points, "shape_directions")
+        joints = along(body, avatar.joint_directions, joints, "joint_directions")
     if avatar.expression_directions is not None:
         count = avatar.expression_directions.shape[2]
         # The role `shape` is there once only, so that a page knows which coefficients are the body's.
         inputs.append(control("expression", 0.0, -3.0, 3.0))
-        expression = row_of(graph, "expression", count)
-        positions = positions + along(expression, avatar.expression_directions, "expression_directions")
+        points = along(
+            row_of(graph, "expression", count), avatar.expression_directions, points, "expression_directions"
+        )
     if avatar.pose_directions is not None:
         count = len(avatar.parents)
-        bends = rotations.part(1, count, -3) - graph.constant(np.eye(3)[None], "identity")
-        bends = bends.reshape(*graph.lead, 1, 9 * (count - 1))
-        positions = positions + along(bends, avatar.pose_directions, "pose_directions")
-    return positions, joints
+        bends = rotation_entries(products.part(1, count, -2)).reshape(*graph.lead, 1, 9 * (count - 1))
+        points = along(bends, avatar.pose_directions, points, "pose_directions")
+    return points, joints
 
 
 def row_of(graph: Graph, name: str, count: int) -> Tensor:
@@ -139,33 +148,48 @@ def row_of(graph: Graph, name: str, count: int) -> Tensor:
     return graph.input(name, *graph.lead, count).reshape(*graph.lead, 1, count)
 
 
-def along(row: Tensor, directions: Floats, name: str) -> Tensor:
-    """Offsets (...,N,3): directions (N,3,B) times coefficients (...,1,B)."""
-    count = directions.shape[0]
-    table = directions.transpose(2, 0, 1).reshape(directions.shape[2], count * 3)
-    return (row @ row.graph.constant(table, name)).reshape(*row.shape[:-2], count, 3)
+def along(row: Tensor, directions: Floats, start: Tensor, name: str) -> Tensor:
+    """Points (...,N,C) from a start (N,C) or (...,N,C): directions (N,3,B) times coefficients (...,1,B) further. With
+    C = 4 the last column stays."""
+    graph, (count, columns) = row.graph, start.shape[-2:]
+    table = graph.constant(directions.transpose(2, 0, 1), name)
+    if columns > 3:
+        none = graph.constant(np.zeros((1, 1, 1)), "none").expand(*table.shape[:2], columns - 3)
+        table = graph.concat([table, none], 2)
+    number, size = row.shape[-1], count * columns
+    lead = row.shape[:-2]
+    rows = row.reshape(prod(lead), number)
+    begun = start.reshape(prod(start.shape[:-2]), size)
+    ended = graph.node("Gemm", [rows, table.reshape(number, size), begun], (rows.shape[0], size))
+    return ended.reshape(*lead, count, columns)
+
+
+def blended_matrices(avatar: Avatar, matrices: Tensor) -> Tensor:
+    """Each Gaussian's blend (...,N,3,4) of its joints' matrices (...,R,12), R joints or more."""
+    graph, (count, joints) = matrices.graph, avatar.weights.shape
+    weights = graph.constant(avatar.weights, "weights", errors="even")
+    none = graph.constant(np.zeros((1, 1)), "no_weight").expand(count, matrices.shape[-2] - joints)
+    blend = graph.concat([weights, none], 1) @ matrices
+    return blend.reshape(*graph.lead, count, 3, 4)
 
 
 def skinned(
-    avatar: Avatar, graph: Graph, positions: Tensor, carried: Tensor, translation: Tensor, inputs: list[Input]
+    avatar: Avatar, graph: Graph, points: Tensor, carried: Tensor, translation: Tensor, inputs: list[Input]
 ) -> Gaussians:
-    """Gaussians in the world; carried (...,N,12) is each one's blend of its joints' matrices."""
+    """Gaussians in the world; points (...,N,4) x y z 1 at rest, carried (...,N,3,4) each one's matrix."""
     count = len(avatar.positions)
-    each = (*graph.lead, count)
-    turn = carried.part(0, 9).reshape(*each, 3, 3)
-    placed = (turn * positions.reshape(*positions.shape[:-1], 1, 3)).sum(-1) + carried.part(9, 12) + translation
+    placed = (carried @ points.reshape(*points.shape, 1)).reshape(*graph.lead, count, 3) + translation
     half = graph.constant(rotation_matrices(avatar.rotations) * avatar.scales[:, None, :], "halves")
     # The blend's own matrix also stretches where joints disagree; covariances follow it exactly.
-    stretched = (turn.reshape(*each, 3, 3, 1) * half.reshape(count, 1, 3, 3)).sum(-2)
+    stretched = carried @ in_four_rows(half)
     sh = graph.constant(avatar.sh, "sh")
     if avatar.sh.shape[1] > 1:
         camera = row_of(graph, "camera_position", 3)
         inputs.append(camera_position())
         direction, _ = direction_and_distance(placed, camera)
         # Transposed, the blend turns the direction back into the frame that the harmonics were trained in.
-        own = (turn * direction.reshape(*each, 3, 1)).sum(-2)
-        length = ((own * own).sum(-1, keep=True) + 1e-20).unary("Sqrt")
-        colours = harmonics.colour(own / length, sh)
+        own = (carried * direction.reshape(*direction.shape, 1)).sum(-2).part(0, 3)
+        colours = harmonics.colour(own / (own.length(-1, keep=True) + 1e-10), sh)
     else:
         colours = graph.constant(np.maximum(avatar.sh[:, 0] * np.float64(0.28209479177387814) + 0.5, 0), "colors")
     return Gaussians(
@@ -174,3 +198,12 @@ def skinned(
         opacities=graph.constant(avatar.opacities, "opacities"),
         colors=colours,
     )
+
+
+def in_four_rows(half: Tensor) -> Tensor:
+    """Constant halves (N,3,3) as (N,4,4) with zeros around, for which there are faster kernels."""
+    count, table = half.shape[0], np.zeros((9, 16), np.float32)
+    for row in range(3):
+        for column in range(3):
+            table[3 * row + column, 4 * row + column] = 1
+    return (half.reshape(count, 9) @ half.graph.constant(table, "wider")).reshape(count, 4, 4)

@@ -4,7 +4,7 @@ Written with its harmonics the file is constant: a page runs it once. With `colo
 in the graph from the camera's position, which makes the output 13 numbers a Gaussian instead of up to 58.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -100,7 +100,7 @@ def export_classic(
         seen = harmonics.colour(direction_and_distance(positions, camera)[0], sh)
     scales = np.exp(np.float64(cloud.log_scales))
     turns = cloud.rotations / np.linalg.norm(cloud.rotations, axis=1, keepdims=True)
-    axes = options.writes_axes
+    axes = options.wants_axes
     gaussians = Gaussians(
         positions=positions,
         covariances=None if axes else graph.constant(covariances(scales, cloud.rotations), "covariances", "none"),
@@ -111,4 +111,7 @@ def export_classic(
         sh=sh if seen is None else None,
     )
     bounds = cloud.positions.min(0), cloud.positions.max(0)
+    if options.layout is None and not axes:
+        # Most columns never change: one operator copies them beside the colours.
+        options = replace(options, layout="packed")
     return finish(graph, gaussians, inputs, bounds, facts, options)

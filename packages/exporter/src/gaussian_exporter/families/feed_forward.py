@@ -31,6 +31,10 @@ HEAD = (1, 1, 3, 4, 3)
 # How far the head may move an inverse depth (as a power of e), and the range of a Gaussian's size in pixels.
 REFINEMENT = 0.2
 SMALLEST, LARGEST = 0.2, 4.2
+# The heat equation, backwards: half of the variance times the colours' second derivative.
+SHARPENING = 0.5
+# What renderers add to variances on the screen, in squared pixels.
+DILATION = 0.3
 # Added to the variance of a pixel's features before it is divided out.
 EPSILON = 1e-5
 # A second camera this near to a point, in world units, does not see it.
@@ -41,7 +45,12 @@ NEAREST = 1e-3
 class FeedForward:
     """A trained network for `views` (1 or 2) pictures of one size, multiples of 4. encoder: three layers or more;
     depth: the last with a channel for each of `depths` candidates, spaced evenly in inverse depth from near to far
-    (world units); head: ending in 12 channels."""
+    (world units); head: ending in 12 channels.
+
+    widened: squared pixels of the given pictures that every Gaussian's variance is raised by. A network learns what it
+    draws at the size of its pictures, where a renderer's own 0.3 closes the gaps between pixels; seen larger, gaps
+    show. Opacities go down by as much as areas grow, and colours are sharpened by as much as that blurs them.
+    """
 
     width: int
     height: int
@@ -52,6 +61,7 @@ class FeedForward:
     encoder: Sequence[Convolution]
     depth: Sequence[Convolution]
     head: Sequence[Convolution]
+    widened: float = 0.0
 
     def inverse_depths(self) -> Doubles:
         """The candidates (D), near first."""
@@ -155,7 +165,7 @@ def joined(graph: Graph, first: Gaussians, second: Gaussians) -> Gaussians:
         positions=graph.concat([first.positions, second.positions], 0),
         covariances=graph.concat([first.covariance(), second.covariance()], 0),
         colors=graph.concat([first.colors, second.colors], 0),
-        opacities=graph.concat([first.opacities, second.opacities], 0),
+        opacities=graph.concat([first.opacity(), second.opacity()], 0),
     )
 
 
@@ -230,11 +240,19 @@ def placed(
     for index, layer in enumerate(model.head):
         x = convolve(x if index == 0 else x.unary("Relu"), layer, f"head_{index}")
     ends = np.cumsum(HEAD)
-    rows = rows_of(x)
-    nearer, opacity, size, turn, tint = (rows.part(int(e - n), int(e)) for e, n in zip(ends, HEAD, strict=True))
+    rows, tint = rows_of(x), x.part(int(ends[-2]), int(ends[-1]), 1).unary("Tanh")
+    nearer, opacity, size, turn, _ = (rows.part(int(e - n), int(e)) for e, n in zip(ends, HEAD, strict=True))
     inverse = (rows_of(guess) * (nearer.unary("Tanh") * REFINEMENT).unary("Exp")).clip(1 / model.far, 1 / model.near)
     depth = inverse.unary("Reciprocal")
-    scales = (size.unary("Sigmoid") * (LARGEST - SMALLEST) + SMALLEST) * depth / (camera.fx * float(model.width))
+    pixels = size.unary("Sigmoid") * (LARGEST - SMALLEST) + SMALLEST
+    solid = opacity.unary("Sigmoid")
+    if model.widened > 0:
+        variances = pixels * pixels
+        # As much paint as before, on the larger area that it has at the pictures' own size.
+        drawn = variances.mean([1], keep=True) + DILATION
+        solid = solid * (drawn / (drawn + model.widened))
+        pixels = (variances + model.widened).unary("Sqrt")
+    scales = pixels * depth / (camera.fx * float(model.width))
     quaternions = turn + graph.constant(np.array([[1, 0, 0, 0]]), "upright")
     half = rotation_matrix(quaternions) * scales.reshape(scales.shape[0], 1, 3)
     positions = rays(graph, model.width, model.height, camera) * depth
@@ -244,9 +262,29 @@ def placed(
     return Gaussians(
         positions=positions,
         covariances=covariance_of_half(half),
-        opacities=opacity.unary("Sigmoid"),
-        colors=(rows_of(picture) + tint.unary("Tanh") * 0.5).clip(0, 1),
+        opacities=solid,
+        colors=rows_of(sharpened((picture + tint * 0.5).clip(0, 1), model.widened)),
     )
+
+
+def sharpened(colors: Tensor, widened: float) -> Tensor:
+    """Colours (1,3,H,W) that a blur of this variance, in squared pixels, turns into those given, nearly."""
+    if widened == 0:
+        return colors
+    graph, (_, channels, height, width) = colors.graph, colors.shape
+    around = np.array([[0, 1, 0], [1, -4, 1], [0, 1, 0]]) * SHARPENING * widened
+    kernel = np.zeros((channels, channels, 3, 3), np.float32)
+    for channel in range(channels):
+        kernel[channel, channel] = -around
+        kernel[channel, channel, 1, 1] += 1
+    # Beyond the border the picture goes on as it ends: what zeros there have added is taken back.
+    lines = []
+    for size, shape in ((height, (1, 1, height, 1)), (width, (1, 1, 1, width))):
+        line = np.zeros(size, np.float32)
+        line[[0, -1]] = -SHARPENING * widened
+        lines.append(graph.constant(line.reshape(shape), "border"))
+    plain = convolve(colors, Convolution(kernel, np.zeros(channels, np.float32)), "sharpen")
+    return (plain + colors * (lines[0] + lines[1])).clip(0, 1)
 
 
 def reach(model: FeedForward) -> tuple[Doubles, Doubles]:

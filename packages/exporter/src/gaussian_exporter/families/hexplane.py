@@ -20,7 +20,7 @@ from ..contract import Facts, normalized_time
 from ..errors import ExportError
 from ..graph import Graph, Tensor
 from ..outputs import Gaussians, Options, finish
-from ..pieces.mlp import Linear, mlp
+from ..pieces.mlp import Linear, beside, linear, mlp, stacked
 from ..planes import sample_plane
 from .classic import Cloud, usable
 
@@ -56,10 +56,12 @@ def export_hexplane(
     options = options or Options()
     graph = Graph("hexplane", options.weights, options.instances is not None)
     time = graph.input("time", *graph.lead, 1)
-    hidden = mlp(features(cloud, deformation, graph, time), deformation.trunk, "trunk").unary("Relu")
-    return finish(
-        graph, move(cloud, deformation, hidden), [normalized_time()], reach(cloud, deformation), facts, options
-    )
+    first, *rest = deformation.trunk
+    hidden = linear(features(cloud, deformation, graph, time), first, "trunk_0", are_columns=True).unary("Relu")
+    for index, layer in enumerate(rest):
+        hidden = linear(hidden, layer, f"trunk_{index + 1}").unary("Relu")
+    gaussians = move(cloud, deformation, hidden)
+    return finish(graph, gaussians, [normalized_time()], reach(cloud, deformation), facts, options)
 
 
 def check(cloud: Cloud, deformation: Deformation) -> None:
@@ -125,68 +127,114 @@ def applied(layers: Sequence[Linear], x: Doubles) -> Doubles:
 
 
 def features(cloud: Cloud, deformation: Deformation, graph: Graph, time: Tensor) -> Tensor:
-    """The planes' features (..., N, sum of C)."""
+    """The planes' features (sum of C, rows), a column for each Gaussian of each instance, as sampling leaves them."""
     at = plane_coordinates(cloud, deformation)
-    count = len(at)
-    each = (*graph.lead, count)
-    if graph.lead:
-        column = time.reshape(*graph.lead, 1, 1) + graph.constant(np.zeros((count, 1)), "rows")
-    else:
-        column = time.reshape(1, 1).expand(count, 1)
-    grids = []
-    for axis in range(TIME):
-        coordinate = graph.constant(at[:, [axis]], f"coordinate_{'xyz'[axis]}", errors="even").alongside(time)
-        # All instances are rows of one long picture.
-        grids.append(graph.concat([coordinate, column], -1).reshape(1, prod(each), 1, 2))
-    columns = []
+    products, still = [], []
     for level, planes in enumerate(deformation.resolutions):
-        channels = planes[0].shape[0]
-        still = np.prod(
-            [sample_plane(planes[i], at[:, a], at[:, b]) for i, (a, b) in enumerate(PLANES) if b != TIME], 0
-        )
-        moving = [
-            sample_in_time(graph.constant(planes[i][None], f"plane_{level}_{'xyz'[a]}t"), grids[a], channels)
-            for i, (a, b) in enumerate(PLANES)
-            if b == TIME
-        ]
-        product = (moving[0] * moving[1] * moving[2]).reshape(channels, prod(each)).transpose(1, 0)
-        columns.append(product.reshape(*each, channels) * graph.constant(still, f"still_{level}"))
-    return graph.concat(columns, -1)
+        of_level = dict(zip(PLANES, planes, strict=True))
+        moving = [of_level[axis, TIME] for axis in range(TIME)]
+        products.append(sampled_in_time(graph, moving, at, time, level))
+        at_rest = [sample_plane(plane, at[:, a], at[:, b]) for (a, b), plane in of_level.items() if b != TIME]
+        still.append(graph.constant(np.prod(at_rest, 0).T, f"still_{level}"))
+    product, rest = graph.concat(products, 0), graph.concat(still, 0)
+    channels, count = rest.shape
+    if graph.lead:
+        product, rest = product.reshape(channels, *graph.lead, count), rest.reshape(channels, 1, count)
+    return (product * rest).reshape(channels, prod(product.shape[1:]))
 
 
-def sample_in_time(plane: Tensor, grid: Tensor, channels: int) -> Tensor:
-    """Values (1,C,N,1) of one plane."""
-    shape = (1, channels, grid.shape[1], 1)
-    return plane.graph.node("GridSample", [plane, grid], shape, mode="bilinear", padding_mode="border", align_corners=1)
+def sampled_in_time(graph: Graph, planes: Sequence[Floats], at: Doubles, time: Tensor, level: int) -> Tensor:
+    """The product (C, rows) of the planes of x, y and z with time, in one sampling of all three."""
+    height, width = (max(plane.shape[axis] for plane in planes) for axis in (1, 2))
+    # Smaller planes go on with their border, which is what lies beyond them.
+    whole = [np.pad(p, ((0, 0), (0, height - p.shape[1]), (0, width - p.shape[2])), "edge") for p in planes]
+    across = [(np.clip(at[:, i], -1, 1) + 1) * share(p.shape[2], width) - 1 for i, p in enumerate(planes)]
+    down = [share(plane.shape[1], height) for plane in planes]
+    x = graph.constant(np.stack(across)[..., None], f"across_{level}", errors="even")
+    y = graph.constant(np.reshape(down, (3, 1, 1)) - 1, "down").expand(*x.shape)
+    rest = graph.concat([x, y], 2)
+    by_time = graph.constant(np.stack([np.zeros(3), down], 1), "by_time")
+    count, channels = len(at), planes[0].shape[0]
+    if graph.lead:
+        moved = time.reshape(1, *graph.lead, 1, 1) * by_time.reshape(3, 1, 1, 2)
+        grid = rest.reshape(3, 1, count, 2) + moved
+    else:
+        grid = rest + time * by_time.reshape(3, 1, 2)
+    rows = prod(grid.shape[1:-1])
+    values = graph.node(
+        "GridSample",
+        [graph.constant(np.stack(whole), f"planes_{level}"), grid.reshape(3, rows, 1, 2)],
+        (3, channels, rows, 1),
+        mode="bilinear",
+        padding_mode="border",
+        align_corners=1,
+    )
+    return values.product(0).reshape(channels, rows)
+
+
+def share(size: int, of: int) -> float:
+    """The part of a padded plane's length that a plane's own points take."""
+    return (size - 1) / (of - 1) if of > 1 else 0.0
 
 
 def move(cloud: Cloud, deformation: Deformation, hidden: Tensor) -> Gaussians:
-    """The Gaussians where the heads put them. hidden (...,N,W), after its ReLU."""
-    graph = hidden.graph
-    mask = mlp(hidden, deformation.mask, "mask") if deformation.mask else None
-
-    def moved(rest: Floats, head: Sequence[Linear] | None, name: str) -> Tensor:
-        still = graph.constant(rest, name, errors="even" if name == "positions" else "relative")
-        if head is None:
-            return still
-        return mlp(hidden, head, f"{name}_head") + (still if mask is None or name == "rotations" else still * mask)
-
-    scales: Tensor
-    if deformation.scale is None:
-        scales = graph.constant(np.exp(np.float64(cloud.log_scales)), "scales")
-    else:
-        scales = moved(cloud.log_scales, deformation.scale, "log_scales").unary("Exp")
-    if deformation.opacity is None:
-        opacities = graph.constant(sigmoid(cloud.opacity_logits), "opacities")
-    else:
-        logits = np.clip(cloud.opacity_logits, -88, 88)
-        opacities = moved(logits, deformation.opacity, "opacity_logits").unary("Sigmoid")
-    sh = moved(cloud.sh.reshape(len(cloud.sh), -1), deformation.sh, "sh")
-    sh = sh.reshape(*sh.shape[:-1], *cloud.sh.shape[1:])
+    """The Gaussians where the heads put them. hidden (rows, W), after its ReLU."""
+    graph, count = hidden.graph, len(cloud.positions)
+    at_rest = {
+        "position": graph.constant(cloud.positions, "positions", errors="even"),
+        "scale": graph.constant(cloud.log_scales, "log_scales"),
+        "rotation": graph.constant(cloud.rotations, "rotations"),
+        "opacity": graph.constant(np.clip(cloud.opacity_logits, -88, 88), "opacity_logits"),
+        "sh": graph.constant(cloud.sh.reshape(count, -1), "sh"),
+    }
+    heads = {name: layers for name in at_rest if (layers := getattr(deformation, name)) is not None}
+    now = at_rest | moved(deformation, graph, hidden, heads, at_rest)
+    sh = now["sh"]
     return Gaussians(
-        positions=moved(cloud.positions, deformation.position, "positions"),
-        scales=scales,
-        rotations=moved(cloud.rotations, deformation.rotation, "rotations"),
-        opacities=opacities,
-        sh=sh,
+        positions=now["position"],
+        scales=graph.constant(np.exp(np.float64(cloud.log_scales)), "scales") if "scale" not in heads else None,
+        log_scales=now["scale"] if "scale" in heads else None,
+        rotations=now["rotation"],
+        opacities=graph.constant(sigmoid(cloud.opacity_logits), "opacities") if "opacity" not in heads else None,
+        opacity_logits=now["opacity"] if "opacity" in heads else None,
+        sh=sh.reshape(*sh.shape[:-1], *cloud.sh.shape[1:]),
     )
+
+
+def moved(
+    deformation: Deformation,
+    graph: Graph,
+    hidden: Tensor,
+    heads: dict[str, Sequence[Linear]],
+    at_rest: dict[str, Tensor],
+) -> dict[str, Tensor]:
+    """What has a head, where it puts it. Heads run as one network of the same depth: few dispatches, whole tiles."""
+    if not heads:
+        return {}
+    sizes = {name: layers[-1].outputs for name, layers in heads.items()}
+    total, count = sum(sizes.values()), at_rest["position"].shape[0]
+    rest = graph.concat([at_rest[name] for name in heads], 1)
+    if graph.lead or deformation.mask is not None:
+        changes = together(hidden, list(heads.values())).reshape(*graph.lead, count, total)
+        if deformation.mask is not None:
+            mask = mlp(hidden, deformation.mask, "mask").reshape(*graph.lead, count, 1)
+            # What turns is never masked.
+            free = np.concatenate([np.full(size, name == "rotation", np.float32) for name, size in sizes.items()])
+            rest = rest * (mask * graph.constant(1 - free, "masked") + graph.constant(free, "free"))
+        changes = changes + rest
+    else:
+        changes = together(hidden, list(heads.values()), rest)
+    ends = np.cumsum(list(sizes.values()))
+    return {name: changes.part(int(end - sizes[name]), int(end)) for name, end in zip(sizes, ends, strict=True)}
+
+
+def together(hidden: Tensor, heads: Sequence[Sequence[Linear]], plus: Tensor | None = None) -> Tensor:
+    """Outputs (rows, sum of outputs) of several networks on the same rows, one after the other; `plus` is added."""
+    if len({len(layers) for layers in heads}) > 1:
+        apart = hidden.graph.concat([mlp(hidden, layers, "head") for layers in heads], 1)
+        return apart if plus is None else apart + plus
+    first, *rest = zip(*heads, strict=True)
+    one = [stacked(first), *(beside(layers) for layers in rest)]
+    bias = hidden.graph.constant(one[-1].bias, "heads_bias")
+    x = mlp(hidden, one[:-1], "heads").unary("Relu") if len(one) > 1 else hidden
+    return linear(x, one[-1], "heads_end", None if plus is None else plus + bias)

@@ -20,8 +20,8 @@ from ..contract import Facts, camera_position, control
 from ..errors import ExportError
 from ..graph import Graph, Tensor
 from ..outputs import Gaussians, Options, finish
-from ..pieces.mlp import Linear, mlp
-from ..pieces.view import direction_and_distance
+from ..pieces.mlp import Linear, linear, mlp
+from ..pieces.view import direction_and_distance, distance_to
 
 DistanceToLevel = Literal["floor", "round", "ceil", "progressive"]
 
@@ -72,8 +72,8 @@ def export_scaffold(model: Scaffold, facts: Facts, options: Options | None = Non
     camera = graph.input("camera_position", 3)
     inputs = [camera_position()]
     anchors = graph.constant(model.anchors, "anchors", errors="even")
-    seen = direction_and_distance(anchors, camera)
-    decoded = decode(model, graph, *seen)
+    seen = graph.concat(direction_and_distance(anchors, camera), 1)
+    decoded = decode(model, graph, seen)
     opacity = decoded["opacity"].unary("Tanh")
     if model.levels is not None:
         resolution = graph.input("resolution_scale", 1)
@@ -100,20 +100,76 @@ def check(model: Scaffold) -> None:
                 found=f"{layers[0].inputs} and {layers[-1].outputs}",
                 remedy="compare cfg_args (feat_dim, n_offsets, add_*_dist, appearance_dim, add_level) with the files",
             )
+        if len(layers) < 2:
+            raise ExportError(
+                "checkpoint/unsupported",
+                where=f"the {name} network",
+                expected="two layers or more",
+                found="one",
+                remedy="train with the networks of Scaffold-GS",
+            )
 
 
-def decode(model: Scaffold, graph: Graph, direction: Tensor, distance: Tensor) -> dict[str, Tensor]:
-    """The networks' outputs (M, ...), without their activations."""
-    features = graph.constant(model.features, "features")
+def decode(model: Scaffold, graph: Graph, seen: Tensor) -> dict[str, Tensor]:
+    """The networks' outputs (M, ...), without their activations: opacity, colour, and of the covariance its scales and
+    rotations apart. seen (M,4): direction and distance."""
+    known = [graph.constant(model.features, "features")]
     levels = model.levels
-    level = [graph.constant(levels.levels, "levels")] if levels is not None and levels.fed_to_networks else []
+    if levels is not None and levels.fed_to_networks:
+        known.append(graph.constant(levels.levels, "levels"))
     if model.feature_bank is not None:
-        weights = mlp(graph.concat([direction, *level], 1), model.feature_bank, "bank", "Softmax")
-        features = view_dependent(features, weights)
-    near = graph.concat([features, direction, *level], 1)
-    far = graph.concat([features, direction, distance, *level], 1) if model.uses_distance else near
+        first, *rest = model.feature_bank
+        bank = [Linear(in_order(first.weight, 0, False), first.bias), *rest]
+        weights = mlp(graph.concat([*known[1:], seen], 1), bank, "bank", "Softmax")
+        known = [view_dependent(known[0], weights), *known[1:]]
     networks = {"opacity": model.opacity, "colour": without_appearance(model), "covariance": model.covariance}
-    return {name: mlp(far if name in model.uses_distance else near, layers, name) for name, layers in networks.items()}
+    inner = {name: hidden(model, graph, known, seen, name, layers) for name, layers in networks.items()}
+    ends = {name: layers[-1] for name, layers in networks.items()}
+    scales, rotations = parts_of_covariance(ends.pop("covariance"))
+    return {
+        **{name: linear(inner[name], end, f"{name}_end") for name, end in ends.items()},
+        "scales": linear(inner["covariance"], scales, "scales_end"),
+        "rotations": linear(inner["covariance"], rotations, "rotations_end"),
+    }
+
+
+def hidden(
+    model: Scaffold, graph: Graph, known: Sequence[Tensor], seen: Tensor, name: str, layers: Sequence[Linear]
+) -> Tensor:
+    """What the last layer of a network is given (M,H).
+
+    Features that no view changes are multiplied once, when the session is made; a run multiplies direction and distance
+    alone, and adds.
+    """
+    first, *rest = layers[:-1]
+    weight = in_order(first.weight, model.features.shape[1], name in model.uses_distance)
+    if model.feature_bank is not None:
+        x = linear(graph.concat([*known, seen], 1), Linear(weight, first.bias), f"{name}_0")
+    else:
+        of_known = Linear(np.ascontiguousarray(weight[:, :-4]), first.bias)
+        baked = linear(graph.concat(known, 1), of_known, f"{name}_known")
+        x = linear(seen, Linear(np.ascontiguousarray(weight[:, -4:]), first.bias), f"{name}_seen", baked)
+    for index, layer in enumerate(rest):
+        x = linear(x.unary("Relu"), layer, f"{name}_{index + 1}")
+    return x.unary("Relu")
+
+
+def in_order(weight: Floats, features: int, uses_distance: bool) -> Floats:
+    """A first layer's columns (features, direction, perhaps distance, perhaps level) in the order of the graph:
+    features, perhaps level, direction, distance, the last zero where it is not used."""
+    direction = features + 3
+    distance = weight[:, direction : direction + 1] if uses_distance else np.zeros((len(weight), 1), np.float32)
+    level = weight[:, direction + uses_distance :]
+    return np.concatenate([weight[:, :features], level, weight[:, features:direction], distance], 1)
+
+
+def parts_of_covariance(end: Linear) -> tuple[Linear, Linear]:
+    """The covariance's last layer, 7 outputs for each Gaussian, as two: 3 for its scales, 4 for its rotation."""
+    weight, bias = end.weight.reshape(-1, 7, end.inputs), end.bias.reshape(-1, 7)
+    return (
+        Linear(weight[:, :3].reshape(-1, end.inputs), bias[:, :3].reshape(-1)),
+        Linear(weight[:, 3:].reshape(-1, end.inputs), bias[:, 3:].reshape(-1)),
+    )
 
 
 def without_appearance(model: Scaffold) -> Sequence[Linear]:
@@ -138,7 +194,7 @@ def presence(levels: Levels, anchors: Tensor, camera: Tensor, resolution: Tensor
     """How present each anchor is from here (M,1): 1, 0, or, with the rule `progressive`, between."""
     graph = anchors.graph
     centre = levels.voxel_size / 2 / np.float64(levels.fork) ** levels.levels
-    _, distance = direction_and_distance(anchors + graph.constant(centre, "half_voxels"), camera)
+    distance = distance_to(anchors + graph.constant(centre, "half_voxels"), camera)
     nearness = (distance * resolution).unary("Log") * (-1 / log(levels.fork))
     wanted = nearness + graph.constant(levels.extra_levels + log(levels.standard_distance, levels.fork), "extra_levels")
     own = graph.constant(levels.levels, "levels")
@@ -155,18 +211,18 @@ def presence(levels: Levels, anchors: Tensor, camera: Tensor, resolution: Tensor
 
 
 def place(model: Scaffold, graph: Graph, anchors: Tensor, opacity: Tensor, decoded: dict[str, Tensor]) -> Gaussians:
-    """Gaussians (M*k) from what the networks said."""
+    """Gaussians (M*k) from what the networks said. Each is in its final shape before the last operator: to change the
+    shape of what a file writes is a copy."""
     count, k = model.offsets.shape[:2]
     total = count * k
     reach = graph.constant(model.offsets * model.scales[:, None, :3], "offsets")
-    widest = graph.constant(model.scales[:, None, 3:], "widest")
-    shape = decoded["covariance"].reshape(count, k, 7)
+    widest = graph.constant(model.scales[:, None, 3:], "widest").expand(count, k, 3).reshape(total, 3)
     return Gaussians(
         positions=(reach + anchors.reshape(count, 1, 3)).reshape(total, 3),
-        scales=(shape.part(0, 3).unary("Sigmoid") * widest).reshape(total, 3),
-        rotations=shape.part(3, 7).reshape(total, 4),
-        opacities=opacity.unary("Relu").reshape(total, 1),
-        colors=decoded["colour"].unary("Sigmoid").reshape(total, 3),
+        scales=decoded["scales"].reshape(total, 3).unary("Sigmoid") * widest,
+        rotations=decoded["rotations"].reshape(total, 4),
+        opacities=opacity.reshape(total, 1).unary("Relu"),
+        colors=decoded["colour"].reshape(total, 3).unary("Sigmoid"),
     )
 
 

@@ -2,13 +2,15 @@
 
 import numpy as np
 
+from ..arrays import Floats
 from ..graph import Tensor
+from .mlp import Linear, linear
 
-ROWS = [0, 0, 0, 1, 1, 2]
-COLUMNS = [0, 1, 2, 1, 2, 2]
+# Entries of an upper triangle, row by row.
+UPPER = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
 # A rotation matrix is linear in the products of its quaternion's parts: entry (row by row) -> (i, j, factor) of parts
 # i and j of (w x y z). Divided by |q|^2 it holds for quaternions of any length.
-_PRODUCTS = {
+_TERMS = {
     0: [(0, 0, 1), (1, 1, 1), (2, 2, -1), (3, 3, -1)],
     1: [(1, 2, 2), (0, 3, -2)],
     2: [(1, 3, 2), (0, 2, 2)],
@@ -19,6 +21,11 @@ _PRODUCTS = {
     7: [(2, 3, 2), (0, 1, 2)],
     8: [(0, 0, 1), (1, 1, -1), (2, 2, -1), (3, 3, 1)],
 }
+# The same as a matrix (16,9): from all products of two parts to the entries.
+PRODUCTS: Floats = np.zeros((16, 9), np.float32)
+for _entry, _terms in _TERMS.items():
+    for _i, _j, _factor in _terms:
+        PRODUCTS[4 * _i + _j, _entry] = _factor
 # Keeps a zero quaternion from giving NaN: its Gaussian gets covariance 0, which a renderer refuses.
 _TINY = 1e-30
 
@@ -26,20 +33,26 @@ _TINY = 1e-30
 def rotation_matrix(quaternions: Tensor) -> Tensor:
     """(...,3,3) of quaternions w x y z (...,4) of any length."""
     each = quaternions.shape[:-1]
-    table = np.zeros((16, 9), np.float32)
-    for entry, terms in _PRODUCTS.items():
-        for i, j, factor in terms:
-            table[4 * i + j, entry] = factor
     products = quaternions.reshape(*each, 4, 1) * quaternions.reshape(*each, 1, 4)
     squared = (quaternions * quaternions).sum(-1, keep=True) + _TINY
     graph = quaternions.graph
-    return (products.reshape(*each, 16) @ graph.constant(table, "quaternion_products") / squared).reshape(*each, 3, 3)
+    table = graph.constant(PRODUCTS, "quaternion_products")
+    return (products.reshape(*each, 16) @ table / squared).reshape(*each, 3, 3)
 
 
 def covariance_of_half(half: Tensor) -> Tensor:
-    """Upper triangles xx xy xz yy yz zz (...,6) of H H^T, for halves H (...,3,3)."""
-    # Two gathers and a sum beat a batched product of 3x3 matrices, which WebGPU runs one small workgroup at a time.
-    return (half.take(ROWS, -2) * half.take(COLUMNS, -2)).sum(-1)
+    """Upper triangles xx xy xz yy yz zz (...,6) of H H^T, for halves H (...,3,C); columns of zeros do no harm."""
+    # All products of two rows, then one product with a table that adds up those of an entry: WebGPU runs a product of
+    # small matrices for each Gaussian slowly.
+    each, columns = half.shape[:-2], half.shape[-1]
+    products = half.reshape(*each, 3, 1, columns) * half.reshape(*each, 1, 3, columns)
+    table = np.zeros((6, 3, 3, columns), np.float32)
+    for entry, (row, column) in enumerate(UPPER):
+        table[entry, row, column] = 1
+    rows, sums = products.reshape(*each, 9 * columns), table.reshape(6, -1)
+    if len(each) > 1:
+        return rows @ half.graph.constant(sums.T, "covariance_sums")
+    return linear(rows, Linear(sums, np.zeros(6, np.float32)), "covariance_sums")
 
 
 def covariance_of_scale_and_rotation(scales: Tensor, quaternions: Tensor) -> Tensor:

@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
 
+import numpy as np
+
 from ..arrays import Floats
-from ..graph import Tensor
+from ..graph import Tensor, wrong_shape
 
 
 @dataclass(frozen=True)
@@ -26,16 +28,19 @@ class Linear:
         return int(self.weight.shape[0])
 
 
-def linear(x: Tensor, layer: Linear, name: str) -> Tensor:
-    """One layer on rows (..., in)."""
+def linear(x: Tensor, layer: Linear, name: str, plus: Tensor | None = None, are_columns: bool = False) -> Tensor:
+    """One layer on rows (..., in), or with `are_columns` on columns (in, rows), which saves turning them; gives rows.
+    `plus` (rows, out), constant or not, takes the place of the bias."""
     graph = x.graph
-    weight = graph.constant(layer.weight.T, f"{name}_weight")
-    bias = graph.constant(layer.bias, f"{name}_bias")
-    if x.shape[-1] != layer.inputs:
-        # The product raises the error that says so.
-        return x @ weight
+    if x.shape[0 if are_columns else -1] != layer.inputs:
+        raise wrong_shape("Gemm", f"{layer.inputs} columns", str(x.shape))
+    # As PyTorch stores it: the provider then reads four numbers at once whatever the number of outputs.
+    weight = graph.constant(layer.weight, f"{name}_weight")
+    added = graph.constant(layer.bias, f"{name}_bias") if plus is None else plus
+    if are_columns:
+        return graph.node("Gemm", [x, weight, added], (x.shape[1], layer.outputs), transA=1, transB=1)
     rows = x.reshape(prod(x.shape[:-1]), layer.inputs)
-    result = graph.node("Gemm", [rows, weight, bias], (rows.shape[0], layer.outputs))
+    result = graph.node("Gemm", [rows, weight, added], (rows.shape[0], layer.outputs), transB=1)
     return result.reshape(*x.shape[:-1], layer.outputs)
 
 
@@ -46,3 +51,18 @@ def mlp(x: Tensor, layers: Sequence[Linear], name: str, last: str | None = None)
             x = x.unary("Relu")
         x = linear(x, layer, f"{name}_{index}")
     return x.unary(last) if last else x
+
+
+def stacked(layers: Sequence[Linear]) -> Linear:
+    """Layers of the same input as one, outputs one after the other."""
+    return Linear(np.concatenate([layer.weight for layer in layers]), np.concatenate([layer.bias for layer in layers]))
+
+
+def beside(layers: Sequence[Linear]) -> Linear:
+    """Layers as one, each on a part of the input of its own: a matrix with blocks along its diagonal."""
+    weight = np.zeros((sum(layer.outputs for layer in layers), sum(layer.inputs for layer in layers)), np.float32)
+    row = column = 0
+    for layer in layers:
+        weight[row : row + layer.outputs, column : column + layer.inputs] = layer.weight
+        row, column = row + layer.outputs, column + layer.inputs
+    return Linear(weight, np.concatenate([layer.bias for layer in layers]))

@@ -1,73 +1,90 @@
-"""Poses of a skeleton: rotations of joints, and where they carry the bones."""
+"""Poses of a skeleton: rotations of joints, and what they do to points at rest."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
+from ..arrays import Floats
 from ..graph import Tensor
+from .covariance import PRODUCTS
+from .mlp import Linear, linear
 
-# Row i: the entries (row by row) of the matrix that is the cross product with axis i.
-_CROSS = np.zeros((3, 9), np.float32)
-_CROSS[0, 5], _CROSS[0, 7] = -1, 1
-_CROSS[1, 2], _CROSS[1, 6] = 1, -1
-_CROSS[2, 1], _CROSS[2, 3] = -1, 1
-
-
-def rotation_of_axis_angle(pose: Tensor) -> Tensor:
-    """Rotation matrices (...,J,3,3) of axes times angles in radians (...,J,3), Rodrigues' formula; smooth at 0."""
-    graph, joints = pose.graph, pose.shape[:-1]
-    angle = ((pose * pose).sum(-1, keep=True) + 1e-16).unary("Sqrt")
-    cross = (pose / angle @ graph.constant(_CROSS, "cross")).reshape(*joints, 3, 3)
-    turned = cross * angle.unary("Sin").reshape(*joints, 1, 1)
-    # 1 - cos(a) as 2 sin(a/2)^2, which keeps its digits at small angles.
-    half = (angle * 0.5).unary("Sin")
-    bent = cross @ cross * (half * half * 2.0).reshape(*joints, 1, 1)
-    return turned + bent + graph.constant(np.eye(3)[None], "identity")
+# Rows are filled up to a multiple of this, which the provider multiplies four at a time; one of those that are no
+# joint's is the parent of roots.
+_AT_ONCE = 4
+_TINY = 1e-10
 
 
-def relative_to_parent(joints: Tensor, parents: Sequence[int]) -> Tensor:
-    """Joint positions (...,J,3) as seen from the parent's; a root's as it is."""
-    difference = np.eye(len(parents), dtype=np.float32)
-    for joint, parent in enumerate(parents):
-        if parent >= 0:
-            difference[joint, parent] = -1
-    return joints.graph.constant(difference, "from_parent") @ joints
+def quaternions_of_axis_angle(pose: Tensor) -> Tensor:
+    """Unit quaternions w x y z (...,J,4) of axes times angles in radians (...,J,3); smooth at 0."""
+    angle = pose.length(-1, keep=True) + _TINY
+    half = angle * 0.5
+    # Made unit again: sines of some GPUs are good to 1e-4, and what is no rotation adds up along the way to the root.
+    return unit_quaternions(pose.graph.concat([half.unary("Cos"), pose * (half.unary("Sin") / angle)], -1))
 
 
-def levels_of(parents: Sequence[int]) -> list[list[int]]:
-    """Joints by their distance from the root. Parents must come before children."""
+def unit_quaternions(quaternions: Tensor) -> Tensor:
+    """Quaternions (...,J,4) of any length, made as long as 1."""
+    return quaternions / (quaternions.length(-1, keep=True) + _TINY)
+
+
+def products_of_parts(quaternions: Tensor) -> Tensor:
+    """All products of two parts (...,J,16): what every entry of a rotation matrix is a sum of."""
+    each = quaternions.shape[:-1]
+    return (quaternions.reshape(*each, 4, 1) * quaternions.reshape(*each, 1, 4)).reshape(*each, 16)
+
+
+def rotation_entries(products: Tensor) -> Tensor:
+    """Entries of rotation matrices less the identity's (...,J,9), row by row; products (...,J,16) as above."""
+    return linear(products, Linear(PRODUCTS.T, -np.eye(3, dtype=np.float32).ravel()), "bends")
+
+
+def skinning_matrices(products: Tensor, joints: Tensor, parents: Sequence[int]) -> Tensor:
+    """What each joint does to a point at rest (...,R,12): rows of a 3x4 matrix. R is the number of joints and as many
+    rows more as fill a multiple of 4, which say nothing. products (...,J,16) of unit quaternions relative to the
+    parent; joints (J,3) or (...,J,3) at rest.
+
+    A joint turns space around where it is at rest, then its parent turns all that around its own place, and so on: a
+    product of matrices along the way to the root. Each step doubles how far every joint has come, so that a tree of
+    depth 15 takes 4 products of all joints and not 15.
+    """
+    graph, count = products.graph, len(parents)
+    rows = -(-(count + 1) // _AT_ONCE) * _AT_ONCE
+    turned = linear(joints, _around_a_point(), "around").reshape(*joints.shape[:-1], 16, 16)
+    lead = products.shape[:-2]
+    local = (products.reshape(*lead, count, 1, 16) @ turned).reshape(*lead, count, 4, 4)
+    nothing = graph.constant(np.tile(np.eye(4), (rows - count, 1, 1)), "identity").alongside(products)
+    moved = graph.concat([local, nothing], -3)
+    above = [parent if parent >= 0 else count for parent in parents] + [count] * (rows - count)
+    for _ in range(_doublings(parents) - 1):
+        moved = moved.take(above, -3) @ moved
+        above = [above[joint] for joint in above]
+    # Of the last product the lowest row is known: 0 0 0 1.
+    upper = [4 * joint + row for joint in above for row in range(3)]
+    first = moved.reshape(*lead, rows * 4, 4).take(upper, -2).reshape(*lead, rows, 3, 4)
+    return (first @ moved).reshape(*lead, rows, 12)
+
+
+def _doublings(parents: Sequence[int]) -> int:
+    """Products until the deepest joint has come to the root, 1 or more. Parents must come before children."""
     depth: list[int] = []
     for parent in parents:
         depth.append(0 if parent < 0 else depth[parent] + 1)
-    return [[joint for joint, own in enumerate(depth) if own == level] for level in range(max(depth) + 1)]
+    return max(1, max(depth).bit_length())
 
 
-def posed_joints(rotations: Tensor, offsets: Tensor, parents: Sequence[int]) -> Tensor:
-    """Each joint's frame in the world (...,J,4,4). rotations (...,J,3,3) and offsets (J,3) or (...,J,3) are relative to
-    the parent.
-
-    One product for each level of the tree: a product for each joint would be as many dispatches as joints.
-    """
-    graph, count = rotations.graph, len(parents)
-    last_row = graph.constant(np.tile(np.array([[[0, 0, 0, 1]]]), (count, 1, 1)), "last_row").alongside(rotations)
-    offsets = offsets.alongside(rotations)
-    local = graph.concat([graph.concat([rotations, offsets.reshape(*offsets.shape, 1)], -1), last_row], -2)
-    levels = levels_of(parents)
-    frames = [local.take(levels[0], -3)]
-    for above, level in pairwise(levels):
-        carried = frames[-1].take([above.index(parents[joint]) for joint in level], -3)
-        frames.append(carried @ local.take(level, -3))
-    order = [joint for level in levels for joint in level]
-    return graph.concat(frames, -3).take([order.index(joint) for joint in range(count)], -3)
-
-
-def skinning_matrices(frames: Tensor, joints: Tensor) -> Tensor:
-    """What each joint does to a point at rest (...,J,12): nine numbers of a matrix, row by row, then a translation.
-    frames (...,J,4,4) from posed_joints, joints (J,3) or (...,J,3) at rest."""
-    each = frames.shape[:-2]
-    upper = frames.part(0, 3, -2)
-    turn = upper.part(0, 3, -1)
-    at_rest = joints.reshape(*joints.shape[:-1], 1, 3)
-    shift = upper.part(3, 4, -1).reshape(*each, 3) - (turn * at_rest).sum(-1)
-    return frames.graph.concat([turn.reshape(*each, 9), shift], -1)
+def _around_a_point() -> Linear:
+    """From a point (3) to the matrix (16x16, row by row) that leads from products of a quaternion's parts to the 4x4
+    matrix that turns space around that point."""
+    weight: Floats = np.zeros((3, 16, 16), np.float32)
+    bias: Floats = np.zeros((16, 16), np.float32)
+    squares = np.eye(4, dtype=np.float32).ravel()
+    turn = PRODUCTS.reshape(16, 3, 3)
+    for row in range(3):
+        for column in range(3):
+            bias[:, 4 * row + column] = turn[:, row, column]
+            # The point itself, less where it would be turned to.
+            weight[column, :, 4 * row + 3] -= turn[:, row, column]
+        weight[row, :, 4 * row + 3] += squares
+    bias[:, 15] = squares
+    return Linear(weight.reshape(3, 256).T, bias.ravel())
