@@ -53,6 +53,8 @@ export interface PaceOptions {
   readonly isOn: () => boolean;
   readonly scheduler: () => FrameScheduler;
   readonly requestFrame: () => void;
+  /** Pictures in motion are drawn whole from now on, or are not. */
+  readonly onWhole: (isWhole: boolean) => void;
 }
 
 /**
@@ -105,7 +107,9 @@ export class PaceController {
     this.#lastMs = milliseconds;
     if (!this.#options.isOn()) return;
     const sample = { now: performance.now(), level, milliseconds };
+    const before = this.#pace.level;
     this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS });
+    if ((before === 0) !== (this.#pace.level === 0)) this.#options.onWhole(this.#pace.level === 0);
   }
 
   /** Another scene: nothing is known. */

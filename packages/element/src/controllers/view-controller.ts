@@ -30,6 +30,8 @@ export interface ViewOptions {
   /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
   readonly onFrame: (scene: GpuScene, camera: Camera, now: number) => void;
   readonly onCameraChange: (source: CameraChangeSource) => void;
+  /** Pictures in motion are drawn whole from now on, or are not. */
+  readonly onWhole: (isWhole: boolean) => void;
   /** Drawing has failed for good. */
   readonly onError: (error: unknown) => void;
 }
@@ -63,6 +65,7 @@ export class ViewController implements FrameClient {
       isOn: () => options.rendering().quality === 'auto' && (this.#scene?.isMeasurable ?? false),
       scheduler: options.scheduler,
       requestFrame: () => this.requestFrame(),
+      onWhole: options.onWhole,
     });
   }
 

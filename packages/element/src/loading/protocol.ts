@@ -1,6 +1,6 @@
 /** What the page and the scene worker say to each other. */
 import type { Bounds, ErrorData } from '@gaussian-splat/core';
-import type { PackedGaussians, ShPrecision } from '@gaussian-splat/renderer';
+import type { PackedGaussians, PackedLevels, ShPrecision } from '@gaussian-splat/renderer';
 
 /** A scene to fetch. */
 export interface SceneRequest {
@@ -40,6 +40,7 @@ export type ProgressListener = (loaded: number, total: number | undefined) => vo
 
 export type PageMessage =
   | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest; readonly wantsPreviews: boolean }
+  | { readonly type: 'levels'; readonly id: number; readonly packed: PackedGaussians }
   | { readonly type: 'cancel'; readonly id: number };
 
 export type WorkerMessage =
@@ -48,4 +49,5 @@ export type WorkerMessage =
   | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
   | { readonly type: 'sequence'; readonly id: number; readonly sequence: LoadedSequence }
   | { readonly type: 'scene'; readonly id: number; readonly scene: LoadedScene }
+  | { readonly type: 'levels'; readonly id: number; readonly levels: PackedLevels | undefined }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };

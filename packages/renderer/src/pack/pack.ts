@@ -56,14 +56,6 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
-  return packUsable(given, options).packed;
-}
-
-/** {@link packGaussians}, with the cloud that was packed and the index in it of each packed splat. */
-export function packUsable(
-  given: GaussianCloud,
-  options: PackOptions,
-): { packed: PackedGaussians; cloud: GaussianCloud; kept: Uint32Array } {
   validateCloud(given);
   const cloud = recentred(given);
   const { shDegree, antialiased, origin } = cloud;
@@ -71,13 +63,12 @@ export function packUsable(
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
-  const packed = {
+  return {
     ...{ count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount },
     geometry: packGeometry(cloud, kept),
     sh: packSh(cloud, kept, shPrecision),
     chunks: boundChunks(cloud, kept),
   };
-  return { packed, cloud, kept };
 }
 
 /** Index in the cloud of each packed splat. */

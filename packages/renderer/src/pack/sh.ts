@@ -8,13 +8,13 @@ export type ShPrecision = 'int8' | 'float16';
 export const SH_PRECISION: Record<ShPrecision, number> = { int8: 0, float16: 1 };
 
 /** Coefficients, three channels each, of bands 1, 2 and 3. */
-const BAND_SIZES = [3, 5, 7] as const;
+export const BAND_SIZES = [3, 5, 7] as const;
 /** Where the scale of each band lies, in bytes from the start of a splat. */
-const SCALE_BYTES = [6, 7, 53] as const;
-const FIRST_CODE_BYTE = 8;
+export const SCALE_BYTES = [6, 7, 53] as const;
+export const FIRST_CODE_BYTE = 8;
 /** A scale of code k is 2^(k / 8 - 16). */
-const SCALE_STEPS = 8;
-const SCALE_BIAS = 16;
+export const SCALE_STEPS = 8;
+export const SCALE_BIAS = 16;
 const MAX_CODE = 255;
 
 /** PSNR of a single splat, rounded as `int8`, that {@link choosePrecision} asks for on average: images then lose no more than 75 dB of noise. */
