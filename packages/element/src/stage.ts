@@ -182,7 +182,7 @@ export class Stage {
         this.behaviours.announcer.cameraMoved();
         this.#dispatch(new CustomEvent('camera-change', { detail: { source } }));
       },
-      onWhole: (isWhole) => this.detail.notePace(isWhole),
+      onPace: (isWhole) => this.detail.notePace(isWhole),
       onError: (error) => this.scene.fail(error),
     });
   }

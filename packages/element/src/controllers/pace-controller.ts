@@ -53,8 +53,8 @@ export interface PaceOptions {
   readonly isOn: () => boolean;
   readonly scheduler: () => FrameScheduler;
   readonly requestFrame: () => void;
-  /** Pictures in motion are drawn whole from now on, or are not. */
-  readonly onWhole: (isWhole: boolean) => void;
+  /** Called for each frame that was timed: whether pictures in motion are drawn whole. */
+  readonly onPace: (isWhole: boolean) => void;
 }
 
 /**
@@ -107,9 +107,8 @@ export class PaceController {
     this.#lastMs = milliseconds;
     if (!this.#options.isOn()) return;
     const sample = { now: performance.now(), level, milliseconds };
-    const before = this.#pace.level;
     this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS });
-    if ((before === 0) !== (this.#pace.level === 0)) this.#options.onWhole(this.#pace.level === 0);
+    this.#options.onPace(this.#pace.level === 0);
   }
 
   /** Another scene: nothing is known. */
