@@ -233,11 +233,18 @@ export class Stage {
   }
 
   #requestScene(): void {
-    const { loading, credentials, quality } = this.#options.attributes();
+    const { loading, credentials, quality, detail } = this.#options.attributes();
     const sh = quality === 'reference' ? 'float16' : 'auto';
     const { src, contract, chain } = this.#source;
     const request: SceneRequest | null = src
-      ? { url: this.#urlOf(src), credentials, sh, contract, chain: this.#urlsOf(chain) }
+      ? {
+          url: this.#urlOf(src),
+          credentials,
+          sh,
+          levels: typeof detail === 'number' && detail > 0,
+          contract,
+          chain: this.#urlsOf(chain),
+        }
       : null;
     const mayStart = loading === 'eager' || (this.#visibility.isVisible && this.reveal.mayReveal);
     if (this.#host.isConnected) this.scene.want(request, mayStart);

@@ -59,7 +59,7 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPre
   const detail = { splats: merged, pixels: scene.detail.detail ?? 0 };
   return {
     isPreview,
-    modelled: (gaussians.frameCount ?? gaussians.count) + dropped + economy.spared,
+    modelled: (gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped + economy.spared,
     spared: economy.spared,
     decibels: economy.decibels,
     dropped,

@@ -41,7 +41,7 @@ export class DetailController {
     if (scene !== this.#scene) this.#begin(scene);
     if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
     this.#allow(scene, this.#options.detail());
-    if (scene.isStreamed) return;
+    if (scene.hasOwnLevels) return;
     if (this.#choice === 'off') return this.#dismiss(scene);
     if (this.#of === scene.gaussians || !this.#isWorthIt(scene)) return;
     void this.#build(scene);

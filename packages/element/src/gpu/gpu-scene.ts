@@ -28,6 +28,8 @@ export interface OwnedLevels extends GaussianScene {
 export interface OwnedGaussians extends GaussianScene {
   /** Splats of the frame on show, where there is room for more. */
   readonly frameCount?: number;
+  /** Splats of the finest level, where the file has levels of detail. */
+  readonly leafCount?: number;
   /** Splats of the file that were left out; a generator's are counted by nobody. */
   readonly droppedCount?: number;
   readonly byteLength: number;
@@ -118,9 +120,9 @@ export class GpuScene {
     this.#detail = detail;
   }
 
-  /** True for a scene that brings levels of its own: they come page by page. */
-  get isStreamed(): boolean {
-    return this.gaussians.wishes !== undefined;
+  /** True for a scene whose file brings levels of detail, all at once or page by page. */
+  get hasOwnLevels(): boolean {
+    return this.gaussians.pages.some(({ details }) => details !== undefined);
   }
 
   /** Draws other splats from now on; those before are freed, and levels that were built of them. */

@@ -39,7 +39,8 @@ export async function loadScene(
     const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
     if (isSequence(bytes)) return sequenceOf(bytes, name, url);
     const openPart = openPartAt(url, options);
-    const cloud = await readScene(bytes, { name, signal, openPart, onPreview: previews?.onPreview });
+    const level = request.levels ? 'all' : 0;
+    const cloud = await readScene(bytes, { name, signal, openPart, level, onPreview: previews?.onPreview });
     signal.throwIfAborted();
     return pack(cloud);
   } catch (error) {

@@ -10,6 +10,8 @@ export interface SceneRequest {
   readonly credentials: RequestCredentials;
   /** Precision of the spherical harmonics on the GPU. */
   readonly sh: ShPrecision | 'auto';
+  /** Whether levels of detail are wanted that the file has, besides the finest. */
+  readonly levels?: boolean;
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
   readonly contract?: unknown;
   /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */

@@ -1,5 +1,6 @@
 import { isUsable, validateCloud, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import { constants, layouts } from '../generated/shaders.js';
+import { packRuns } from '../detail/pack-runs.js';
 import { boundChunks } from './chunks.js';
 import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
@@ -52,19 +53,30 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
 /**
  * Packs a cloud for {@link GaussianBuffers.upload}: neighbours in space become neighbours in memory, 32 bytes of geometry a
  * splat (positions in float32, the covariance's root to 14 significant bits, opacities to 20) and its spherical
- * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`.
+ * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`. Of a cloud with `levelRuns` all levels are packed, with what it takes to
+ * choose among them.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
   validateCloud(given);
   const cloud = recentred(given);
   const { shDegree, antialiased, origin } = cloud;
-  const kept = packedOrder(cloud);
+  const kept = cloud.levelRuns ? usableIndices(cloud) : packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
+  if (cloud.levelRuns) return { ...packRuns(cloud, kept, shPrecision), droppedCount };
+  const facts = { count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount };
+  return { ...facts, ...packKept(cloud, kept, shPrecision) };
+}
+
+/** The bytes of some splats of a cloud, in that order. */
+export function packKept(
+  cloud: GaussianCloud,
+  kept: Uint32Array,
+  shPrecision: ShPrecision,
+): Pick<PackedGaussians, 'geometry' | 'sh' | 'chunks'> {
   return {
-    ...{ count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount },
     geometry: packGeometry(cloud, kept),
     sh: packSh(cloud, kept, shPrecision),
     chunks: boundChunks(cloud, kept),
