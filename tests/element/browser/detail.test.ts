@@ -12,6 +12,14 @@ const pictureOf = async (element: GaussianSplatElement): Promise<string> => {
   return bytes.join();
 };
 
+/** Colours of the picture as it is now. */
+async function pixelsOf(element: GaussianSplatElement): Promise<Uint8ClampedArray> {
+  const bitmap = await createImageBitmap(await element.toBlob());
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d')!;
+  context.drawImage(bitmap, 0, 0);
+  return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+}
+
 const hasLevels = (element: GaussianSplatElement): boolean => (element.stats?.detail.splats ?? 0) > 0;
 
 describe('levels of detail of a plain file', () => {
@@ -47,7 +55,7 @@ describe('levels of detail of a plain file', () => {
 
   it('are built unasked where a large scene moves too slowly, and rest pictures stay whole', async () => {
     const element = await showLoaded({ src: ball(50_000), 'camera-orbit': AT_REST }, 'width: 60px; height: 40px');
-    const whole = await pictureOf(element);
+    const whole = await pixelsOf(element);
     const start = performance.now();
     for (let degrees = 0; !hasLevels(element) && performance.now() < start + 80_000; degrees++) {
       element.cameraOrbit = `${degrees}deg 75deg auto`;
@@ -59,7 +67,12 @@ describe('levels of detail of a plain file', () => {
     element.cameraOrbit = AT_REST;
     element.jumpCameraToGoal();
     await frames(2);
-    assert((await pictureOf(element)) === whole, 'the picture at rest is the same');
+    // After a turn splats of nearly one depth may be in another order than before it, with levels or without.
+    const rested = await pixelsOf(element);
+    const error = rested.reduce((sum, value, i) => sum + (value - whole[i]) ** 2, 0) / rested.length;
+    const decibels = 10 * Math.log10(255 ** 2 / error);
+    console.log(`the picture at rest: ${decibels.toFixed(1)} dB to that before the turn`);
+    assert(decibels > 50, `${decibels} dB`);
   }).timeout(120_000);
 
   it('a word that is none is said, and means auto', async () => {

@@ -93,7 +93,7 @@ function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
       bytes[at + SCALE_BYTES[band]] = packBand(sh, first, size, codes);
       // Degree 1 has nine codes and room for eight: the last takes the place of the scale of band 2.
       const behind = Math.min(size, stride - (code - at));
-      bytes.set(codes.subarray(0, behind), code);
+      for (let k = 0; k < behind; k++) bytes[code + k] = codes[k];
       if (behind < size) bytes[at + SCALE_BYTES[1]] = codes[behind];
       first += size;
       code += size;
