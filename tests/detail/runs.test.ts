@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { keepUsable, type Camera, type GaussianCloud, type LevelRun } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { GaussianBuffers, packGaussians, packLevelRuns, Renderer } from '@gaussian-splat/renderer';
 import { constants, DETAIL_NUMBERS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { shareDrawn } from '../support/detail-twin.js';
@@ -47,7 +47,7 @@ test('dropping unusable splats leaves each run its own', () => {
 });
 
 test('of every node exactly one level is drawn, or two that fade; the finest where no error is allowed', () => {
-  const packed = packGaussians(nodes());
+  const packed = packLevelRuns(nodes());
   const chunksOf = (counts: readonly number[]): number[] => counts.map((count) => Math.ceil(count / CULL_GROUP));
   const runs = [chunksOf([697, 299, 60]), chunksOf([799, 90]), chunksOf([600, 400, 49])];
   assert.equal(packed.count, CULL_GROUP * runs.flat().reduce((a, b) => a + b));
@@ -92,7 +92,10 @@ test(
       readScene(bytes, { name: 'lod-meta.json', openPart, level });
     const device = await nodeDevice();
     const upload = async (level: number | 'all'): Promise<GaussianBuffers> =>
-      GaussianBuffers.upload(device, packGaussians(await read(level), { sh: 'float16' }));
+      GaussianBuffers.upload(
+        device,
+        (level === 'all' ? packLevelRuns : packGaussians)(await read(level), { sh: 'float16' }),
+      );
     const [levels, finest] = await Promise.all([upload('all'), upload(3)]);
     assert.equal(levels.leafCount, 31_000);
     const renderer = new Renderer(device, { threads: 'serial', sort: 'serial' });

@@ -1,9 +1,10 @@
-import type { GaussianCloud, LevelRun } from '@gaussian-splat/core';
+import { validateCloud, type GaussianCloud, type LevelRun } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { GEOMETRY_WORDS, packKept, type PackedGaussians } from '../pack/pack.js';
+import { GEOMETRY_WORDS, packKept, usableIndices, type PackedGaussians, type PackOptions } from '../pack/pack.js';
+import { recentred } from '../pack/recentre.js';
 import { mortonOrder } from '../pack/morton.js';
-import { shWords, type ShPrecision } from '../pack/sh.js';
+import { choosePrecision, shWords, type ShPrecision } from '../pack/sh.js';
 import { detailRows, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
 import { packFiller } from './pack-level.js';
 import { chunksOf } from './splat-level.js';
@@ -18,11 +19,20 @@ interface PackedRun extends LevelRun {
 }
 
 /**
- * Packs a cloud whose file has levels of detail of its own, each run from a chunk's start on: of every node the level is drawn whose error on screen is small enough,
- * by the rule of all levels of detail.
- * @param usable indices of the splats that can be drawn, ascending
+ * Packs a cloud whose file has levels of detail of its own (`levelRuns`), each run from a chunk's start on: of every node the level is drawn whose error on screen is small
+ * enough, by the rule of all levels of detail.
+ * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
-export function packRuns(
+export function packLevelRuns(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
+  validateCloud(given);
+  const cloud = recentred(given);
+  const usable = usableIndices(cloud);
+  const { sh = 'auto' } = options;
+  const droppedCount = cloud.droppedCount + cloud.count - usable.length;
+  return { ...packRuns(cloud, usable, sh === 'auto' ? choosePrecision(cloud, usable) : sh), droppedCount };
+}
+
+function packRuns(
   cloud: GaussianCloud,
   usable: Uint32Array,
   shPrecision: ShPrecision,

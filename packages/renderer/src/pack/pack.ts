@@ -1,6 +1,5 @@
 import { isUsable, validateCloud, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import { constants, layouts } from '../generated/shaders.js';
-import { packRuns } from '../detail/pack-runs.js';
 import { boundChunks } from './chunks.js';
 import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
@@ -53,19 +52,17 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
 /**
  * Packs a cloud for {@link GaussianBuffers.upload}: neighbours in space become neighbours in memory, 32 bytes of geometry a
  * splat (positions in float32, the covariance's root to 14 significant bits, opacities to 20) and its spherical
- * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`. Of a cloud with `levelRuns` all levels are packed, with what it takes to
- * choose among them.
+ * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`. Of a cloud with `levelRuns` all splats are drawn; `packLevelRuns` chooses.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
   validateCloud(given);
   const cloud = recentred(given);
   const { shDegree, antialiased, origin } = cloud;
-  const kept = cloud.levelRuns ? usableIndices(cloud) : packedOrder(cloud);
+  const kept = packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
-  if (cloud.levelRuns) return { ...packRuns(cloud, kept, shPrecision), droppedCount };
   const facts = { count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount };
   return { ...facts, ...packKept(cloud, kept, shPrecision) };
 }
@@ -88,7 +85,8 @@ export function packedOrder(cloud: GaussianCloud): Uint32Array {
   return mortonOrder(cloud.positions, usableIndices(cloud));
 }
 
-function usableIndices(cloud: GaussianCloud): Uint32Array {
+/** Indices of the splats that can be drawn, ascending. */
+export function usableIndices(cloud: GaussianCloud): Uint32Array {
   const indices = new Uint32Array(cloud.count);
   let kept = 0;
   for (let i = 0; i < cloud.count; i++) if (isUsable(cloud, i)) indices[kept++] = i;
