@@ -20,10 +20,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let chunk = group_index(workgroup_id) * WISH_THREADS + lane;
   if (chunk * CULL_GROUP >= view.splat_count) { return; }
   let d = details[chunk];
-  if (d.children >= arrayLength(&wishes)) { return; }
+  let page = d.children & CHILD_PAGE_MASK;
+  if (page >= arrayLength(&wishes)) { return; }
   let allowed = max(view.detail, chunk_shares[arrayLength(&chunk_shares) - 1u]);
   let pixels = screen_error(view, d.sphere, d.full_error);
   if (refined(pixels, allowed, view.detail_fade) <= 0.0) { return; }
   let wish = select(UNSEEN * pixels, pixels, may_be_visible(view, chunks[chunk]));
-  atomicMax(&wishes[d.children], bitcast<u32>(wish));
+  atomicMax(&wishes[page], bitcast<u32>(wish));
 }

@@ -1,6 +1,7 @@
 /** Measures a streamed scene: a flight over it, frame after frame, and how far its picture is from one with more splats. */
 import { lookAt } from '@gaussian-splat/core';
 import { checkManifest, MemoryLedger, PassTimer, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { Progress, within } from './run/bounded.js';
 import { describeEnvironment, openDevice } from './run/environment.js';
 import { readPixels } from './run/read-pixels.js';
 
@@ -11,22 +12,47 @@ const [splats, megabytes, seconds] = [number('splats', 1e6), number('megabytes',
 /** Pixels that what is drawn may be displaced, if the budget allows. */
 const detail = number('detail', 1);
 
+/** Seconds that a view may take to have all its pages, and after which everything is reported as far as it has come. */
+const [settleSeconds, limit] = [number('settle', 5), number('limit', seconds + 60)];
+/** Seconds that one file may take. */
+const FETCH_SECONDS = 20;
+
 const say = (text) => {
   document.getElementById('status').textContent = text;
 };
 
+const progress = new Progress(limit, say);
+/** Grows while there is something to measure; what stands in it is reported, whatever happens. */
+const report = { ...{ width, height, detail, splatBudget: splats, megabytes, seconds, limit }, flight: [], atRest: [] };
+
+/** A file, or an error that names it: one of the wrong kind, or one that does not come, must not be waited for forever. */
+async function get(url, signal) {
+  const response = await fetch(url, { signal: AbortSignal.any([signal, AbortSignal.timeout(1000 * FETCH_SECONDS)]) });
+  if (!response.ok) throw new Error(`${url}: HTTP ${response.status}`);
+  return response;
+}
+
 async function open(device) {
   const url = new URL(query.get('scene'), location.href);
-  const manifest = checkManifest(await (await fetch(url)).json(), url.href);
+  const fetched = get(url, new AbortController().signal).then((response) => response.json());
+  const manifest = checkManifest(await progress.wait('the manifest', fetched), url.href);
   const traffic = { requests: 0, bytes: 0, errors: [] };
+  report.fetched = traffic;
   const fetchPage = async (file, signal) => {
-    const bytes = await (await fetch(new URL(file, url), { signal })).arrayBuffer();
+    const bytes = await (await get(new URL(file, url), signal)).arrayBuffer();
     traffic.requests++;
     traffic.bytes += bytes.byteLength;
     return bytes;
   };
-  const onError = (error) => traffic.errors.push(String(error));
-  const scene = await StreamedGaussians.open(device, manifest, { fetchPage, memoryBudget: 1e6 * megabytes, onError });
+  const onError = (error) => {
+    traffic.errors.push(String(error));
+    traffic.errors.splice(5);
+  };
+  const options = { fetchPage, memoryBudget: 1e6 * megabytes, onError };
+  const scene = await progress.wait(
+    'the pool and the coarsest page',
+    StreamedGaussians.open(device, manifest, options),
+  );
   return { manifest, scene, traffic };
 }
 
@@ -56,19 +82,30 @@ const rounded = (value) => Math.round(1000 * value) / 1000;
 const spans = (frames) =>
   frames.filter((passes) => passes.length > 0).map((passes) => Math.max(...passes.map((p) => p.end)) - passes[0].begin);
 
-async function fly({ device, renderer, scene, manifest, traffic, target }) {
+/**
+ * Lets the page's other tasks have a turn, as they do between the frames of a display: a loop that only ever waits for the GPU was seen to bring in two pages in two
+ * seconds, with eight on their way all the time.
+ */
+const turn = () => new Promise((resolve) => setTimeout(resolve));
+
+/** Waits until the GPU has drawn what was submitted. */
+const drawn = (device) => within(FETCH_SECONDS, 'the GPU to draw a frame', device.queue.onSubmittedWorkDone());
+
+async function fly({ device, renderer, scene, manifest, traffic, target }, rows) {
   const timer = device.features.has('timestamp-query') ? new PassTimer(device) : undefined;
-  const rows = [];
   const start = performance.now();
   for (let second = 0; second < seconds; second++) {
     const [frames, gpu] = [[], []];
     const end = start + 1000 * (second + 1);
-    while (performance.now() < end) {
+    progress.begin(`second ${second} of the flight`);
+    // One frame at least, however slow.
+    while (performance.now() < end || frames.length === 0) {
       const before = performance.now();
       const camera = cameraAt((before - start) / 1000 / seconds, manifest.bounds);
       renderer.render({ gaussians: scene, camera, target, detail, splatBudget: splats, timer });
-      await device.queue.onSubmittedWorkDone();
+      await drawn(device);
       frames.push(performance.now() - before);
+      await turn();
       if (timer && frames.length % 8 === 0) gpu.push(...spans(await timer.read()));
     }
     const { visible, overflow, pairOverflow, budgetError } = await renderer.readStatistics();
@@ -92,20 +129,25 @@ async function fly({ device, renderer, scene, manifest, traffic, target }) {
       ...{ visible, overflow, pairOverflow, budgetError: rounded(budgetError), ...scene.progress },
       fetched: { ...traffic, errors: traffic.errors.length },
     });
-    say(`second ${second}: ${frames.length} frames, ${visible} splats, ${scene.progress.resident} pages`);
+    if (progress.left === 0) throw new Error('the time was up');
   }
-  return rows;
 }
 
-/** Draws one view until nothing more comes. */
+/**
+ * Draws one view until nothing more comes, or its time is up: a pool that is too small for a view goes on exchanging pages for a while.
+ * @returns seconds taken, and pages on their way at the end: 0 if the view has all that it gets
+ */
 async function settle({ device, renderer, scene, target }, request) {
-  for (let [calm, frames] = [0, 0]; calm < 20 && frames < 3000; frames++) {
+  const start = performance.now();
+  const took = () => (performance.now() - start) / 1000;
+  for (let [calm, frames] = [0, 0]; calm < 20 && took() < Math.min(settleSeconds, progress.left); frames++) {
     const { resident } = scene.progress;
     renderer.render({ ...request, gaussians: scene, target });
-    await device.queue.onSubmittedWorkDone();
-    if (frames % 8 === 0) await new Promise((resolve) => setTimeout(resolve));
+    await drawn(device);
+    await turn();
     calm = scene.progress.resident === resident && scene.progress.coming === 0 ? calm + 1 : 0;
   }
+  return { seconds: rounded(took()), coming: scene.progress.coming };
 }
 
 /** PSNR over the pixels that either picture covers. */
@@ -120,19 +162,22 @@ function psnr(a, b) {
 }
 
 /** Views at rest: the picture within the budget against one of a quarter of the error and no budget. */
-async function compare(all) {
-  const views = [];
+async function compare(all, views) {
   for (const share of [0.1, 0.3, 0.5]) {
+    if (progress.left === 0) throw new Error('the time was up');
     const camera = cameraAt(share, all.manifest.bounds);
-    await settle(all, { camera, detail, splatBudget: splats });
+    progress.begin(`the view at ${share} of the flight`);
+    const settled = await settle(all, { camera, detail, splatBudget: splats });
     const within = await readPixels(all.device, all.target);
     const { visible, budgetError } = await all.renderer.readStatistics();
-    await settle(all, { camera, detail: detail / 4, splatBudget: 4 * splats });
+    progress.begin(`the view at ${share} of the flight, four times finer`);
+    const finerSettled = await settle(all, { camera, detail: detail / 4, splatBudget: 4 * splats });
     const finer = await readPixels(all.device, all.target);
     const more = await all.renderer.readStatistics();
     views.push({
-      ...{ share, visible, budgetError: rounded(budgetError), resident: all.scene.progress.resident },
+      ...{ share, settled, visible, budgetError: rounded(budgetError), resident: all.scene.progress.resident },
       against: {
+        settled: finerSettled,
         visible: more.visible,
         budgetError: rounded(more.budgetError),
         overflow: more.overflow,
@@ -140,38 +185,39 @@ async function compare(all) {
       },
     });
   }
-  return views;
 }
 
-async function main() {
-  const environment = await openDevice();
+async function measure() {
+  const environment = await progress.wait('the GPU device', openDevice());
   const { device } = environment;
+  report.environment = describeEnvironment(environment);
+  report.gpuErrors = environment.errors;
   const { manifest, scene, traffic } = await open(device);
+  Object.assign(report, { splats: manifest.splats, pages: scene.progress.total });
   const renderer = new Renderer(device);
+  report.levers = renderer.levers;
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.STORAGE_BINDING;
   const target = device.createTexture({ size: [width, height], format: 'rgba8unorm', usage });
   const all = { device, renderer, scene, manifest, traffic, target };
-  const flight = await fly(all);
-  const bytes = { scene: scene.byteLength, renderer: renderer.byteLength, ledger: MemoryLedger.of(device).bytes };
-  const atRest = await compare(all);
-  return {
-    ...{ splats: manifest.splats, pages: scene.progress.total, width, height, detail, splatBudget: splats, megabytes },
-    ...{
-      levers: renderer.levers,
-      environment: describeEnvironment(environment),
-      bytes,
-      flight,
-      atRest,
-      errors: traffic.errors.slice(0, 5),
-    },
-  };
+  await fly(all, report.flight);
+  report.bytes = { scene: scene.byteLength, renderer: renderer.byteLength, ledger: MemoryLedger.of(device).bytes };
+  await compare(all, report.atRest);
+}
+
+/** The report in the page, for scripts, and to whoever has asked for it. */
+async function publish() {
+  const text = JSON.stringify(report, null, 1);
+  document.getElementById('json').textContent = text;
+  globalThis.report = report;
+  if (query.has('report')) await fetch(query.get('report'), { method: 'POST', body: text });
 }
 
 if (query.has('scene')) {
-  const report = await main().catch((error) => ({ error: `${error}\n${error.stack}` }));
-  document.getElementById('json').textContent = JSON.stringify(report, null, 1);
-  globalThis.report = report;
-  if (query.has('report')) {
-    await fetch(query.get('report'), { method: 'POST', body: JSON.stringify(report, null, 1) });
-  }
+  const watch = within(limit + 5, 'the page', measure());
+  await watch.catch((error) => {
+    report.unfinished = `${error.message}; at work on ${progress}`;
+    report.stack = error.stack;
+  });
+  say(report.unfinished ?? 'done');
+  await publish();
 }

@@ -9,16 +9,20 @@ struct ChunkDetail {
   sphere: vec4f,
   // That of the chunk above.
   parent_sphere: vec4f,
-  // World units; 0 where nothing finer is there to be drawn.
+  // World units: the full error times the share, 0 to 1, in which what is finer has arrived; 0 where nothing finer is there to be drawn.
   error: f32,
   parent_error: f32,
   // The error, whether something finer is there or not.
   full_error: f32,
-  // Number of the streamed page that holds what the chunk stands for.
+  // In the lower 24 bits the number of the streamed page that holds what the chunk stands for; in the upper 8 the share, in 255ths, in which
+  // the page that the chunk is part of has arrived.
   children: u32,
 }
 
+// No such page, and the chunk has arrived.
 const NO_CHILDREN = 4294967295u;
+const CHILD_PAGE_BITS = 24u;
+const CHILD_PAGE_MASK = 16777215u;
 // Pixels that count as none: the logarithm of less would leave float32.
 const SMALLEST_ERROR = 1e-30;
 
@@ -36,10 +40,20 @@ fn refined(pixels: f32, allowed: f32, fade: f32) -> f32 {
   return clamp(1.0 + log2(pixels / allowed) / fade, 0.0, 1.0);
 }
 
-// Share, 0 to 1, in which a chunk is drawn. The shares of a chunk, the one above, and so on add up to 1.
+// Share, 0 to 1, in which what a chunk stands for has arrived.
+fn arrived_below(d: ChunkDetail) -> f32 {
+  if (d.full_error <= 0.0) { return 0.0; }
+  return min(1.0, d.error / d.full_error);
+}
+
+// The same for the chunk itself.
+fn arrived(d: ChunkDetail) -> f32 { return f32(d.children >> CHILD_PAGE_BITS) / 255.0; }
+
+// Share, 0 to 1, in which a chunk is drawn. The shares of a chunk, the one above, and so on add up to 1, for what is below has never arrived further
+// than what is above.
 fn share_drawn(view: View, d: ChunkDetail, allowed: f32) -> f32 {
-  let own = refined(screen_error(view, d.sphere, d.error), allowed, view.detail_fade);
-  let above = refined(screen_error(view, d.parent_sphere, d.parent_error), allowed, view.detail_fade);
+  let own = arrived_below(d) * refined(screen_error(view, d.sphere, d.full_error), allowed, view.detail_fade);
+  let above = arrived(d) * refined(screen_error(view, d.parent_sphere, d.parent_error), allowed, view.detail_fade);
   return max(0.0, above - own);
 }
 

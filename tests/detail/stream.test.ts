@@ -227,6 +227,36 @@ test('a page of the wrong length, and a manifest with anything wrong in it, are 
   assert.throws(() => checkManifest(null, 'detail.json'), { code: 'decode/unsupported' });
 });
 
+/** Most that the picture of a camera at rest changes from one frame to the next, in dB, while pages come. */
+async function largestChange(arrivalMs: number): Promise<{ decibels: number; frames: number; pages: number }> {
+  const device = await nodeDevice();
+  const fetchPage = folder.fetchPage;
+  const scene = await StreamedGaussians.open(device, folder.manifest, { fetchPage, arrivalMs });
+  const renderer = new Renderer(device, options);
+  const request = { gaussians: scene, camera: viewFrom(9), detail: 0.5 };
+  let [least, frames, calm]: number[] = [Infinity, 1, 0];
+  let last = await readFrame(device, renderer, request);
+  for (; calm < 8 && frames < 400; frames++) {
+    await pause(1);
+    const { resident } = scene.progress;
+    const picture = await readFrame(device, renderer, request);
+    least = Math.min(least, psnr(last, picture, { channels: 4 }));
+    last = picture;
+    calm = scene.progress.resident === resident && scene.progress.coming === 0 ? calm + 1 : 0;
+  }
+  const pages = scene.progress.resident;
+  renderer.destroy();
+  scene.destroy();
+  return { decibels: least, frames, pages };
+}
+
+test('pages that come fade in: no picture differs by 40 dB from the one before; without the fade they pop', async () => {
+  const [faded, popping] = [await largestChange(1), await largestChange(0)];
+  console.log(`${faded.pages} pages, largest change: ${JSON.stringify(faded)}; at once ${JSON.stringify(popping)}`);
+  assert.ok(faded.pages > 3 && faded.pages === popping.pages);
+  assert.ok(faded.decibels >= 40 && popping.decibels < faded.decibels - 10);
+});
+
 // Dawn keeps Node alive.
 after(() => {
   setImmediate(() => process.exit());

@@ -30,6 +30,7 @@ const ABSENT: RawAttributes = {
   maxPixelRatio: null,
   quality: null,
   maxShDegree: null,
+  detail: null,
   reveal: null,
   navigation: null,
   autoRotateDelay: null,
@@ -38,6 +39,16 @@ const ABSENT: RawAttributes = {
   interactionPromptStyle: null,
   interactionPromptThreshold: null,
 };
+
+test('detail: a word, or pixels', () => {
+  const detailOf = (detail: string): unknown => readAttributes({ ...ABSENT, detail }, assert.fail).detail;
+  assert.deepEqual(['auto', ' OFF ', '1px', '.5PX', '0px', '64px'].map(detailOf), ['auto', 'off', 1, 0.5, 0, 64]);
+  for (const detail of ['1', '-1px', '65px', 'on', '1 px', 'NaNpx', '1e1px']) {
+    const said: string[] = [];
+    assert.equal(readAttributes({ ...ABSENT, detail }, (sentence) => said.push(sentence)).detail, 'auto', detail);
+    assert.equal(said.length, 1, detail);
+  }
+});
 
 test('orbits', () => {
   assert.deepEqual(orbit.parse('90deg 1rad 2m'), { theta: 90 * DEGREE, phi: 1, radius: { metres: 2 } });
@@ -132,6 +143,7 @@ test('an absent attribute takes its default in silence', () => {
   assert.equal(read.maxPixelRatio, Infinity);
   assert.equal(read.quality, 'auto');
   assert.equal(read.maxShDegree, 3);
+  assert.equal(read.detail, 'auto');
   assert.equal(read.camera.up, '-y');
   assert.deepEqual(read.camera.orbit, { theta: 0, phi: 75 * DEGREE, radius: 'auto' });
 });

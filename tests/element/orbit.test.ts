@@ -64,6 +64,7 @@ const settings = (changes: Record<string, string> = {}): CameraSettings =>
       maxPixelRatio: null,
       quality: null,
       maxShDegree: null,
+      detail: null,
       reveal: null,
       navigation: null,
       autoRotateDelay: null,

@@ -77,6 +77,19 @@ test('a streamed scene at each level, in both dialects', async () => {
   }
 });
 
+test('a streamed scene at all its levels tells which splats show what', async () => {
+  const all = { version: 1, lodLevels: 3, environment: 'env/meta.json', filenames, tree };
+  const { count, levelRuns } = await readScene(streamed(all), { name: 'a.zip', level: 'all' });
+  assert.equal(count, 43);
+  assert.deepEqual(levelRuns, [
+    { first: 0, count: 20, node: 0, level: 0 },
+    { first: 20, count: 10, node: 1, level: 0 },
+    { first: 30, count: 6, node: 0, level: 2 },
+    { first: 36, count: 4, node: 1, level: 2 },
+    { first: 40, count: 3, node: 2, level: 0 },
+  ]);
+});
+
 test('indices that contradict their files are refused by name', async () => {
   const lods = (run: object): object => ({ lodLevels: 1, filenames, tree: { bound, lods: { 0: run } } });
   const beyond = streamed(lods({ file: 0, offset: 25, count: 6 }));

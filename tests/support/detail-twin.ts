@@ -25,11 +25,11 @@ export function pathOf(starts: readonly number[], leaf: number): number[] {
   return Array.from({ length: starts.length - 1 }, (_, level) => starts[level] + Math.floor(leaf / 4 ** level));
 }
 
-/** Pixels that a chunk (`sphere`, `error`) or the one above it (`parentSphere`, `parentError`) is off. */
+/** Pixels that a chunk (`sphere`, `fullError`) or the one above it (`parentSphere`, `parentError`) is off. */
 export function screenError(rows: Float32Array, chunk: number, camera: Camera, isParent: boolean): number {
   const at = DETAIL_NUMBERS * chunk;
   const sphere = at + (isParent ? DETAIL_PLACES.parentSphere : DETAIL_PLACES.sphere);
-  const error = rows[at + (isParent ? DETAIL_PLACES.parentError : DETAIL_PLACES.error)];
+  const error = rows[at + (isParent ? DETAIL_PLACES.parentError : DETAIL_PLACES.fullError)];
   const eye = eyeOf(camera.worldToCamera);
   const distance = Math.hypot(rows[sphere] - eye[0], rows[sphere + 1] - eye[1], rows[sphere + 2] - eye[2]);
   return (Math.max(camera.fx, camera.fy) * error) / Math.max(distance - rows[sphere + 3], camera.near);
@@ -43,6 +43,11 @@ function refined(pixels: number, { allowed, fade }: DetailView): number {
 
 /** Share in which a chunk is drawn. */
 export function shareDrawn(rows: Float32Array, chunk: number, view: DetailView): number {
-  const own = refined(screenError(rows, chunk, view.camera, false), view);
-  return Math.max(0, refined(screenError(rows, chunk, view.camera, true), view) - own);
+  const at = DETAIL_NUMBERS * chunk;
+  const full = rows[at + DETAIL_PLACES.fullError];
+  const below = full > 0 ? Math.min(1, rows[at + DETAIL_PLACES.error] / full) : 0;
+  const bits = new Uint32Array(rows.buffer, rows.byteOffset + 4 * (at + DETAIL_PLACES.children), 1)[0];
+  const arrived = (bits >>> constants.CHILD_PAGE_BITS) / 255;
+  const own = below * refined(screenError(rows, chunk, view.camera, false), view);
+  return Math.max(0, arrived * refined(screenError(rows, chunk, view.camera, true), view) - own);
 }

@@ -2,7 +2,7 @@
 import manifest from './manifest.mjs';
 
 const GROUPS = {
-  Picture: ['quality', 'max-sh-degree', 'max-pixel-ratio', 'postprocess'],
+  Picture: ['quality', 'max-sh-degree', 'detail', 'max-pixel-ratio', 'postprocess'],
   Camera: ['camera-controls', 'camera-orbit', 'camera-target', 'field-of-view', 'navigation'],
   'Scene and page': ['alt', 'poster', 'loading', 'reveal', 'crossorigin', 'up'],
   Motion: ['auto-rotate', 'auto-rotate-delay', 'rotation-per-second', 'interpolation-decay'],
@@ -25,6 +25,7 @@ const EXAMPLES = {
   'camera-target': '0m 0m 0m',
   'field-of-view': '40deg',
   'max-sh-degree': '0 to 3',
+  detail: '1px',
   'rotation-per-second': '30deg',
   up: '-y',
 };

@@ -9,6 +9,14 @@ export function shCoefficientCount(degree: ShDegree): 1 | 4 | 9 | 16 {
   return ((degree + 1) * (degree + 1)) as 1 | 4 | 9 | 16;
 }
 
+/** Splats `first` to `first + count` of a cloud: what a place of the scene, a node, looks like at one level of detail, 0 being the finest. */
+export interface LevelRun {
+  readonly first: number;
+  readonly count: number;
+  readonly node: number;
+  readonly level: number;
+}
+
 /**
  * Gaussians on the CPU, activated and ready to draw; every format is read into this one shape.
  *
@@ -36,6 +44,8 @@ export interface GaussianCloud {
   readonly shDegree: ShDegree;
   /** True if the scene was trained with opacity compensation for the screen-space dilation (Mip-Splatting style). */
   readonly antialiased: boolean;
+  /** Where a file has levels of detail of its own: all splats in runs, of which one of each node is to be drawn. Undefined: all splats are. */
+  readonly levelRuns?: readonly LevelRun[];
   /** Number of splats of the source that were left out because a value was not usable; see {@link keepUsable}. */
   readonly droppedCount: number;
 }
@@ -105,8 +115,14 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   const { count, positions, scales, rotations, opacities, sh, shDegree } = cloud;
   const shLength = 3 * shCoefficientCount(shDegree);
   let kept = 0;
+  const runs = cloud.levelRuns?.map(({ node, level }) => ({ first: 0, count: 0, node, level }));
+  let run = 0;
   for (let i = 0; i < count; i++) {
     if (!isUsable(cloud, i)) continue;
+    if (runs) {
+      while (i >= cloud.levelRuns![run].first + cloud.levelRuns![run].count) runs[++run].first = kept;
+      runs[run].count++;
+    }
     if (kept !== i) {
       positions.copyWithin(3 * kept, 3 * i, 3 * i + 3);
       scales.copyWithin(3 * kept, 3 * i, 3 * i + 3);
@@ -126,6 +142,7 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
     rotations: rotations.subarray(0, 4 * kept),
     opacities: opacities.subarray(0, kept),
     sh: sh.subarray(0, shLength * kept),
+    ...(runs && { levelRuns: runs }),
     droppedCount: cloud.droppedCount + count - kept,
   };
 }

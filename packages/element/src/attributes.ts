@@ -20,6 +20,12 @@ export type Loading = 'lazy' | 'eager';
 /** One-finger moves that stay the page's. */
 export type TouchAction = 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation';
 
+/**
+ * How far pictures may be off for being drawn from levels of detail: `auto` at rest not at all, and in motion where the GPU is too slow; `off` never; or, at
+ * rest and in motion, as many pixels as the number says.
+ */
+export type DetailChoice = 'auto' | 'off' | number;
+
 /** What pictures are drawn with: `auto` is the true image at rest and, in motion, as much of it as there is time for. */
 export type QualityChoice = 'auto' | Quality;
 
@@ -55,6 +61,7 @@ export interface RawAttributes {
   readonly maxPixelRatio: Raw;
   readonly quality: Raw;
   readonly maxShDegree: Raw;
+  readonly detail: Raw;
   readonly reveal: Raw;
   readonly navigation: Raw;
   readonly autoRotateDelay: Raw;
@@ -78,6 +85,7 @@ export interface Attributes {
   readonly quality: QualityChoice;
   /** Spherical harmonics above this degree are not evaluated. */
   readonly maxShDegree: ShDegree;
+  readonly detail: DetailChoice;
   readonly reveal: Reveal;
   readonly navigation: Navigation;
   /** Rest before the camera turns by itself, ms. */
@@ -97,6 +105,18 @@ const loading = keywordGrammar<Loading>(['lazy', 'eager']);
 const touchAction = keywordGrammar<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']);
 const quality = keywordGrammar<QualityChoice>(['auto', ...(Object.keys(QUALITIES) as Quality[])]);
 const maxShDegree = keywordGrammar(['3', '2', '1', '0']);
+/** The renderer's own limit. */
+const MOST_DETAIL_PIXELS = 64;
+const detail: AttributeGrammar<DetailChoice> = {
+  expected: `auto, off, or at most ${MOST_DETAIL_PIXELS} pixels such as 1px`,
+  fallback: 'auto',
+  parse: (text) => {
+    const word = text.trim().toLowerCase();
+    if (word === 'auto' || word === 'off') return word;
+    const pixels = /^(\d+\.?\d*|\.\d+)px$/.test(word) ? parseFloat(word) : NaN;
+    return pixels <= MOST_DETAIL_PIXELS ? pixels : null;
+  },
+};
 const reveal = keywordGrammar<Reveal>(['auto', 'manual']);
 const navigation = keywordGrammar<Navigation>(['orbit', 'fly']);
 const interactionPrompt = keywordGrammar<InteractionPrompt>(['auto', 'none']);
@@ -121,6 +141,7 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
     maxPixelRatio: read('max-pixel-ratio', raw.maxPixelRatio, maxPixelRatio),
     quality: read('quality', raw.quality, quality),
     maxShDegree: Number(read('max-sh-degree', raw.maxShDegree, maxShDegree)) as ShDegree,
+    detail: read('detail', raw.detail, detail),
     reveal: read('reveal', raw.reveal, reveal),
     navigation: read('navigation', raw.navigation, navigation),
     autoRotateDelay: read('auto-rotate-delay', raw.autoRotateDelay, threeSeconds),

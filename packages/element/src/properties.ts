@@ -29,6 +29,7 @@ export class SplatProperties extends LitElement {
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
     quality: {},
     maxShDegree: { attribute: 'max-sh-degree' },
+    detail: {},
     economy: {},
     contract: {},
     chain: {},
@@ -95,6 +96,11 @@ export class SplatProperties extends LitElement {
   declare quality: 'auto' | 'default' | 'reference' | 'balanced' | 'fast' | null;
   /** Highest degree of spherical harmonics that colours are made of, 0 to 3; default 3. The file's own are kept. */
   declare maxShDegree: number | string | null;
+  /**
+   * Levels of detail. `auto`, the default: built from the scene where the GPU is too slow for it, and drawn in motion alone. `off`: never. Pixels such as `1px`: what
+   * is drawn, at rest too, may be displaced by so many for having been merged.
+   */
+  declare detail: string | null;
   /**
    * Leaves out what views around the scene need least: a share of the splats to keep such as `60%`, or a figure such as `57db` that the picture keeps to.
    * Without it all splats are there.

@@ -2,6 +2,7 @@ import type { Camera } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import { Behaviours } from './behaviours.js';
 import { CameraController } from './controllers/camera-controller.js';
+import { DetailController } from './controllers/detail-controller.js';
 import { EconomyController } from './controllers/economy-controller.js';
 import { HotspotController } from './controllers/hotspot-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
@@ -27,6 +28,7 @@ export class Stage {
   readonly camera: CameraController;
   readonly scene: SceneController;
   readonly economy: EconomyController;
+  readonly detail: DetailController;
   readonly playback: PlaybackController;
   readonly reveal: RevealController;
   readonly behaviours: Behaviours;
@@ -72,7 +74,14 @@ export class Stage {
     this.economy = new EconomyController({
       economy: options.economy,
       memoryBudget: () => options.services().memoryBudget ?? defaultMemoryBudget(),
-      onChange: () => this.#onEconomy(),
+      onChange: () => this.#onOtherSplats(),
+      warn: options.warn,
+    });
+    this.detail = new DetailController({
+      detail: () => options.attributes().detail,
+      loader: () => options.services().sceneLoader,
+      memoryBudget: () => options.services().memoryBudget ?? defaultMemoryBudget(),
+      onChange: () => this.#onOtherSplats(),
       warn: options.warn,
     });
     this.reveal = new RevealController(host, {
@@ -173,6 +182,7 @@ export class Stage {
         this.behaviours.announcer.cameraMoved();
         this.#dispatch(new CustomEvent('camera-change', { detail: { source } }));
       },
+      onPace: (isWhole) => this.detail.notePace(isWhole),
       onError: (error) => this.scene.fail(error),
     });
   }
@@ -223,11 +233,18 @@ export class Stage {
   }
 
   #requestScene(): void {
-    const { loading, credentials, quality } = this.#options.attributes();
+    const { loading, credentials, quality, detail } = this.#options.attributes();
     const sh = quality === 'reference' ? 'float16' : 'auto';
     const { src, contract, chain } = this.#source;
     const request: SceneRequest | null = src
-      ? { url: this.#urlOf(src), credentials, sh, contract, chain: this.#urlsOf(chain) }
+      ? {
+          url: this.#urlOf(src),
+          credentials,
+          sh,
+          levels: typeof detail === 'number' && detail > 0,
+          contract,
+          chain: this.#urlsOf(chain),
+        }
       : null;
     const mayStart = loading === 'eager' || (this.#visibility.isVisible && this.reveal.mayReveal);
     if (this.#host.isConnected) this.scene.want(request, mayStart);
@@ -265,10 +282,12 @@ export class Stage {
 
   #onUpdate(): void {
     this.reveal.settle();
-    this.economy.update(this.scene.state === 'ready' ? this.scene.scene : null);
+    const whole = this.scene.state === 'ready' ? this.scene.scene : null;
+    this.economy.update(whole);
+    this.detail.update(whole);
   }
 
-  #onEconomy(): void {
+  #onOtherSplats(): void {
     this.#counts = undefined;
     this.#view.requestFrame();
     this.#host.requestUpdate();

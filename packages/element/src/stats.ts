@@ -15,8 +15,13 @@ export interface SceneStats {
   readonly spared: number;
   /** dB to the whole scene in views around it that had no say; null unless `economy` asks for a figure. */
   readonly decibels: number | null;
-  /** Splats on the GPU. */
+  /** Splats on the GPU, those of levels of detail included. */
   readonly inMemory: number;
+  /**
+   * Levels of detail: splats that were merged for them and are on the GPU besides the scene's own, and pixels by which pictures at rest may be off. Of a streamed
+   * scene, whose levels are its own, 0 splats.
+   */
+  readonly detail: { readonly splats: number; readonly pixels: number };
   /** Splats that were drawn, as of the last `updateStats()`: in front of the camera, opaque enough, and over a pixel. null before. */
   readonly drawn: number | null;
   /** Splats that some pixel shows by half a step of 255 or more, likewise. */
@@ -50,19 +55,28 @@ export interface StatsContext {
 export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPreview }: StatsContext): SceneStats {
   const { gaussians } = scene;
   const dropped = gaussians.droppedCount ?? 0;
+  const merged = scene.levels === undefined ? 0 : scene.levels.count - gaussians.count;
+  const detail = { splats: merged, pixels: scene.detail.detail ?? 0 };
   return {
     isPreview,
-    modelled: (gaussians.frameCount ?? gaussians.count) + dropped + economy.spared,
+    modelled: (gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped + economy.spared,
     spared: economy.spared,
     decibels: economy.decibels,
     dropped,
-    inMemory: gaussians.count,
+    inMemory: gaussians.count + merged,
+    detail,
     drawn: counts?.drawn ?? null,
     contributed: counts?.contributed ?? null,
-    bytes: { scene: gaussians.byteLength, frames: scene.frameBytes },
+    bytes: { scene: gaussians.byteLength + (scene.levels?.byteLength ?? 0), frames: scene.frameBytes },
     quality,
     pace,
-    why: [...whyPreview(isPreview), ...whyDropped(dropped), ...whySpared(economy), ...whyPace(quality, pace)],
+    why: [
+      ...whyPreview(isPreview),
+      ...whyDropped(dropped),
+      ...whySpared(economy),
+      ...whyDetail(detail),
+      ...whyPace(quality, pace),
+    ],
   };
 }
 
@@ -78,6 +92,12 @@ function whySpared({ spared, decibels }: EconomyReport): string[] {
   if (spared === 0) return [];
   const figure = decibels === null ? '' : `: ${decibels.toFixed(1)} dB to the whole scene`;
   return [`${spared} splats that contribute least to views around the scene are left out${figure}.`];
+}
+
+function whyDetail({ splats, pixels }: SceneStats['detail']): string[] {
+  if (splats === 0) return [];
+  const rest = pixels > 0 ? `, by ${pixels} px at most` : ' while they move';
+  return [`${splats} merged splats stand for what is too small to see: pictures may be off for it${rest}.`];
 }
 
 function whyPace(quality: QualityChoice, { moving, frameMs, targetMs }: PaceReport): string[] {

@@ -17,8 +17,8 @@ export interface ReadSceneOptions {
    * for an address. Archives need none.
    */
   readonly openPart?: OpenPart;
-  /** Level of detail that is read of a streamed scene, 0 (default) the finest. */
-  readonly level?: number;
+  /** Level of detail that is read of a streamed scene, 0 (default) the finest; `all` reads all of them, for renderers that choose: see `GaussianCloud.levelRuns`. */
+  readonly level?: number | 'all';
   /**
    * Called, if the scene is large and its format allows, with some of its splats, spread over all of it and larger to stand
    * for the rest, before the whole is read. Reading goes on once the promise fulfils.

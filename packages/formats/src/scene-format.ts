@@ -12,8 +12,8 @@ export interface SceneSource {
   readonly isPrefix?: boolean;
   /** Opens the files that a scene of several files names; absent where there is only the one. */
   readonly openPart?: OpenPart;
-  /** Which level of a scene with levels of detail is read: 0 is the finest. */
-  readonly level?: number;
+  /** Which level of a scene with levels of detail is read: 0 is the finest. `all`: all of them, in the runs that `GaussianCloud.levelRuns` tells. */
+  readonly level?: number | 'all';
   /** Called with a part of the splats that stands for all, before the whole is read. See `ReadSceneOptions.onPreview`. */
   readonly onPreview?: (preview: GaussianCloud) => void | Promise<void>;
 }

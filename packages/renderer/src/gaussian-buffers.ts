@@ -24,6 +24,8 @@ export class GaussianBuffers implements GaussianScene {
   readonly antialiased: boolean;
   /** World position, in float64, that the positions on the GPU are relative to. */
   readonly origin: Vector3;
+  /** Splats of the finest level, if there are levels of detail. */
+  readonly leafCount: number | undefined;
   /** Splats of the source that were left out because a value was not usable. */
   readonly droppedCount: number;
   readonly pages: readonly GaussianPage[];
@@ -39,6 +41,7 @@ export class GaussianBuffers implements GaussianScene {
       antialiased: this.antialiased,
       origin: this.origin,
       droppedCount: this.droppedCount,
+      leafCount: this.leafCount,
     } = packed);
     const { geometry, sh, chunks, details } = packed;
     const bytes = [geometry, sh, chunks, details].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);

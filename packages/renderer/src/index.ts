@@ -9,6 +9,9 @@ export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
 export { packWithDetail } from './detail/pack-with-detail.js';
+export { buildPackedLevels, type PackedLevels } from './detail/packed-levels.js';
+export { packLevelRuns } from './detail/pack-runs.js';
+export { DetailedGaussians } from './detail/detailed-gaussians.js';
 export {
   buildDetailTree,
   cutPages,

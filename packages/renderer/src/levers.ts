@@ -106,16 +106,18 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
  * The levers that single frames may set otherwise than their renderer: see {@link FrameRequest.levers}. The others decide what a renderer
  * allocates.
  */
-export type FrameLevers = Pick<
-  Levers,
-  | 'depthKeyBits'
-  | 'occludedBelow'
-  | 'transmittanceMin'
-  | 'alphaMin'
-  | 'minContribution'
-  | 'shDegree'
-  | 'resolutionScale'
->;
+export type FrameLevers = Pick<Levers, (typeof FRAME_LEVERS)[number]>;
+
+const FRAME_LEVERS = [
+  'depthKeyBits',
+  'occludedBelow',
+  'transmittanceMin',
+  'alphaMin',
+  'minContribution',
+  'shDegree',
+  'detail',
+  'resolutionScale',
+] as const;
 
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
   submissions: [1, 256],
@@ -150,12 +152,9 @@ export function leversOf(options: Partial<Levers> & { readonly quality?: Quality
  * @throws GaussianSplatError `argument/value` for a number out of range.
  */
 export function leversOfFrame<L extends Levers>(levers: L, changes: Partial<FrameLevers>): L {
-  const { depthKeyBits, occludedBelow, transmittanceMin, alphaMin, minContribution, shDegree, resolutionScale } =
-    changes;
-  const named = { depthKeyBits, occludedBelow, transmittanceMin, alphaMin, minContribution, shDegree, resolutionScale };
-  const set = Object.fromEntries(Object.entries(named).filter(([, value]) => value !== undefined));
-  for (const [name, value] of Object.entries(set)) requireInRange(name as keyof Levers, value, 'FrameRequest.levers');
-  return { ...levers, ...set };
+  const set = FRAME_LEVERS.filter((name) => changes[name] !== undefined);
+  for (const name of set) requireInRange(name, changes[name], 'FrameRequest.levers');
+  return { ...levers, ...Object.fromEntries(set.map((name) => [name, changes[name]])) };
 }
 
 /** @throws GaussianSplatError `argument/value` for a number out of its lever's range. */

@@ -47,7 +47,8 @@ export class EconomyController {
     this.#wish = wish;
     this.#running.abort();
     this.#running = new AbortController();
-    if (scene === null || scene.live !== undefined) return;
+    // Nor of levels of detail that are the file's own, which stand for one another.
+    if (scene === null || scene.live !== undefined || scene.hasOwnLevels) return;
     // Whoever never asks for it never loads it.
     if (wish === null && this.#economy === undefined) return;
     void this.#apply(scene, wish, this.#running.signal);

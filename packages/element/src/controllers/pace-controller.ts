@@ -53,6 +53,8 @@ export interface PaceOptions {
   readonly isOn: () => boolean;
   readonly scheduler: () => FrameScheduler;
   readonly requestFrame: () => void;
+  /** Called for each frame that was timed: whether pictures in motion are drawn whole. */
+  readonly onPace: (isWhole: boolean) => void;
 }
 
 /**
@@ -106,6 +108,7 @@ export class PaceController {
     if (!this.#options.isOn()) return;
     const sample = { now: performance.now(), level, milliseconds };
     this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS });
+    this.#options.onPace(this.#pace.level === 0);
   }
 
   /** Another scene: nothing is known. */

@@ -30,6 +30,8 @@ export interface ViewOptions {
   /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
   readonly onFrame: (scene: GpuScene, camera: Camera, now: number) => void;
   readonly onCameraChange: (source: CameraChangeSource) => void;
+  /** Called for each frame that was timed: whether pictures in motion are drawn whole. */
+  readonly onPace: (isWhole: boolean) => void;
   /** Drawing has failed for good. */
   readonly onError: (error: unknown) => void;
 }
@@ -63,6 +65,7 @@ export class ViewController implements FrameClient {
       isOn: () => options.rendering().quality === 'auto' && (this.#scene?.isMeasurable ?? false),
       scheduler: options.scheduler,
       requestFrame: () => this.requestFrame(),
+      onPace: options.onPace,
     });
   }
 

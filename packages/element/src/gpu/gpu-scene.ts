@@ -14,13 +14,22 @@ import type { ReadCounts } from '../stats.js';
 import { FrameMeter } from './frame-meter.js';
 import type { DeviceLease } from './shared-device.js';
 
-/** How much detail of a streamed scene is drawn. */
+/** How much detail is drawn of a scene that has levels of it. */
 export type DetailLevers = Pick<FrameRequest, 'detail' | 'splatBudget'>;
+
+/** A scene's Gaussians with levels of detail besides; those alone are freed with it. */
+export interface OwnedLevels extends GaussianScene {
+  /** Bytes of GPU memory that the levels take. */
+  readonly byteLength: number;
+  destroy(): void;
+}
 
 /** Gaussians with one owner. */
 export interface OwnedGaussians extends GaussianScene {
   /** Splats of the frame on show, where there is room for more. */
   readonly frameCount?: number;
+  /** Splats of the finest level, where the file has levels of detail. */
+  readonly leafCount?: number;
   /** Splats of the file that were left out; a generator's are counted by nobody. */
   readonly droppedCount?: number;
   readonly byteLength: number;
@@ -53,7 +62,8 @@ export class GpuScene {
   readonly #submissions: number;
   readonly #lease: DeviceLease;
   readonly #meter: FrameMeter;
-  readonly #detail: DetailLevers;
+  #detail: DetailLevers;
+  #levels: OwnedLevels | undefined;
   #destroyed = false;
 
   constructor(
@@ -88,8 +98,36 @@ export class GpuScene {
     return this.#gaussians;
   }
 
-  /** Draws other splats from now on; those before are freed. */
+  /** Levels of detail that were built of its splats. */
+  get levels(): OwnedLevels | undefined {
+    return this.#levels;
+  }
+
+  /** Draws from these levels from now on, or from the splats alone; levels before are freed. */
+  setLevels(levels: OwnedLevels | undefined): void {
+    if (levels === this.#levels) return;
+    this.#levels?.destroy();
+    this.#levels = levels;
+    this.#filter?.invalidate();
+  }
+
+  /** How much detail is drawn, at rest too. */
+  get detail(): DetailLevers {
+    return this.#detail;
+  }
+
+  setDetail(detail: DetailLevers): void {
+    this.#detail = detail;
+  }
+
+  /** True for a scene whose file brings levels of detail, all at once or page by page. */
+  get hasOwnLevels(): boolean {
+    return this.gaussians.pages.some(({ details }) => details !== undefined);
+  }
+
+  /** Draws other splats from now on; those before are freed, and levels that were built of them. */
   replaceGaussians(gaussians: OwnedGaussians): void {
+    this.setLevels(undefined);
     this.#gaussians.destroy();
     this.#gaussians = gaussians;
     this.#filter?.invalidate();
@@ -155,10 +193,13 @@ export class GpuScene {
   }
 
   #draw(frame: Frame): void {
-    const draw = (drawn: Frame): void =>
-      this.#renderer.render({ ...drawn, ...this.#detail, gaussians: this.gaussians });
+    const { splatBudget } = this.#detail;
+    // Whichever leaves out more: what the page asks for, or the pace.
+    const detail = Math.max(this.#detail.detail ?? 0, frame.levers?.detail ?? 0);
+    const gaussians = this.#levels ?? this.gaussians;
+    const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, detail, splatBudget, gaussians });
     const { quality, shDegree } = this.#rendering;
-    const content = `${this.gaussians.version} ${quality} ${shDegree} ${JSON.stringify(frame.levers ?? null)}`;
+    const content = `${gaussians.version} ${quality} ${shDegree} ${detail} ${JSON.stringify(frame.levers ?? null)}`;
     if (this.#filter) this.#filter.render(frame, content, draw);
     else draw(frame);
   }
@@ -203,6 +244,7 @@ export class GpuScene {
     this.live?.close();
     this.#meter.destroy();
     this.#renderer.destroy();
+    this.#levels?.destroy();
     this.#gaussians.destroy();
     this.#lease.release();
   }

@@ -39,9 +39,12 @@ export async function loadScene(
     const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
     if (isSequence(bytes)) return sequenceOf(bytes, name, url);
     const openPart = openPartAt(url, options);
-    const cloud = await readScene(bytes, { name, signal, openPart, onPreview: previews?.onPreview });
+    const level = request.levels ? 'all' : 0;
+    const cloud = await readScene(bytes, { name, signal, openPart, level, onPreview: previews?.onPreview });
     signal.throwIfAborted();
-    return pack(cloud);
+    if (cloud.levelRuns === undefined) return pack(cloud);
+    const { packLevels } = await import('./pack-levels.js');
+    return packLevels(cloud, request.sh);
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(request.url));

@@ -1,6 +1,6 @@
 /** What the page and the scene worker say to each other. */
 import type { Bounds, ErrorData } from '@gaussian-splat/core';
-import type { PackedGaussians, ShPrecision } from '@gaussian-splat/renderer';
+import type { PackedGaussians, PackedLevels, ShPrecision } from '@gaussian-splat/renderer';
 
 /** A scene to fetch. */
 export interface SceneRequest {
@@ -10,6 +10,8 @@ export interface SceneRequest {
   readonly credentials: RequestCredentials;
   /** Precision of the spherical harmonics on the GPU. */
   readonly sh: ShPrecision | 'auto';
+  /** Whether levels of detail are wanted that the file has, besides the finest. */
+  readonly levels?: boolean;
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
   readonly contract?: unknown;
   /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */
@@ -40,6 +42,7 @@ export type ProgressListener = (loaded: number, total: number | undefined) => vo
 
 export type PageMessage =
   | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest; readonly wantsPreviews: boolean }
+  | { readonly type: 'levels'; readonly id: number; readonly packed: PackedGaussians }
   | { readonly type: 'cancel'; readonly id: number };
 
 export type WorkerMessage =
@@ -48,4 +51,5 @@ export type WorkerMessage =
   | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
   | { readonly type: 'sequence'; readonly id: number; readonly sequence: LoadedSequence }
   | { readonly type: 'scene'; readonly id: number; readonly scene: LoadedScene }
+  | { readonly type: 'levels'; readonly id: number; readonly levels: PackedLevels | undefined }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };

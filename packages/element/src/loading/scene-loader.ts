@@ -1,4 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import type { PackedGaussians, PackedLevels } from '@gaussian-splat/renderer';
+import { buffersOf } from './buffers-of.js';
 import type {
   LoadedScene,
   LoadedSequence,
@@ -13,11 +15,15 @@ import { spawnSceneWorker } from './spawn-worker.js';
 /** An unused worker is kept this long: pages with several elements load one scene after another. */
 const IDLE_MS = 5_000;
 
-interface Pending {
-  readonly resolve: (scene: LoadedScene | LoadedSequence) => void;
+interface Listeners {
+  readonly onProgress?: ProgressListener;
+  readonly onPreview?: PreviewListener | undefined;
+}
+
+interface Pending extends Listeners {
+  /** Gets what the worker answered: a scene, a sequence or levels, as was asked for. */
+  readonly resolve: (answer: never) => void;
   readonly reject: (reason: unknown) => void;
-  readonly onProgress: ProgressListener;
-  readonly onPreview: PreviewListener | undefined;
 }
 
 /** Loads scenes in one worker for the whole page, started on the first load and ended when idle. */
@@ -65,27 +71,42 @@ export class SceneLoader {
     const worker = await (this.#worker ??= this.#start());
     signal.throwIfAborted();
     if (worker === null) return this.#loadHere(request, signal, onProgress, onPreview);
-    return this.#loadThere(worker, request, signal, onProgress, onPreview);
+    const id = this.#nextId++;
+    const message: PageMessage = { type: 'load', id, request, wantsPreviews: onPreview !== undefined };
+    return this.#ask<LoadedScene | LoadedSequence>(worker, message, signal, { onProgress, onPreview });
   }
 
-  async #loadThere(
+  /**
+   * Builds the levels of detail of a packed scene, whose arrays are the worker's afterwards; undefined for one that is too small to have any, and where the page
+   * refuses workers: its own thread would stand still for seconds. Rejects with GaussianSplatError `out-of-memory/allocation` or the signal's reason.
+   */
+  async buildLevels(packed: PackedGaussians, signal: AbortSignal): Promise<PackedLevels | undefined> {
+    clearTimeout(this.#idleTimer);
+    const worker = await (this.#worker ??= this.#start());
+    signal.throwIfAborted();
+    if (worker === null) return undefined;
+    const message: PageMessage = { type: 'levels', id: this.#nextId++, packed };
+    return this.#ask<PackedLevels | undefined>(worker, message, signal, {}, buffersOf(packed));
+  }
+
+  /** Sends a request to the worker, and waits for its answer. */
+  async #ask<T>(
     worker: Worker,
-    request: SceneRequest,
+    message: PageMessage,
     signal: AbortSignal,
-    onProgress: ProgressListener,
-    onPreview: PreviewListener | undefined,
-  ): Promise<LoadedScene | LoadedSequence> {
-    const id = this.#nextId++;
-    const post = (message: PageMessage): void => worker.postMessage(message);
-    const { promise, resolve, reject } = withResolvers<LoadedScene | LoadedSequence>();
+    listeners: Listeners,
+    transfer: Transferable[] = [],
+  ): Promise<T> {
+    const { id } = message;
+    const { promise, resolve, reject } = withResolvers<T>();
     const cancel = (): void => {
-      post({ type: 'cancel', id });
+      worker.postMessage({ type: 'cancel', id } satisfies PageMessage);
       reject(signal.reason);
     };
     clearTimeout(this.#idleTimer);
-    this.#pending.set(id, { resolve, reject, onProgress, onPreview });
+    this.#pending.set(id, { resolve, reject, ...listeners });
     signal.addEventListener('abort', cancel, { once: true });
-    post({ type: 'load', id, request, wantsPreviews: onPreview !== undefined });
+    worker.postMessage(message, transfer);
     try {
       return await promise;
     } finally {
@@ -130,10 +151,11 @@ export class SceneLoader {
   #receive(message: WorkerMessage): void {
     if (message.type === 'ready') return;
     const pending = this.#pending.get(message.id);
-    if (message.type === 'progress') pending?.onProgress(message.loaded, message.total);
+    if (message.type === 'progress') pending?.onProgress?.(message.loaded, message.total);
     else if (message.type === 'preview') pending?.onPreview?.(message.scene);
-    else if (message.type === 'scene') pending?.resolve(message.scene);
-    else if (message.type === 'sequence') pending?.resolve(message.sequence);
+    else if (message.type === 'scene') pending?.resolve(message.scene as never);
+    else if (message.type === 'sequence') pending?.resolve(message.sequence as never);
+    else if (message.type === 'levels') pending?.resolve(message.levels as never);
     else pending?.reject(GaussianSplatError.fromData(message.error));
   }
 

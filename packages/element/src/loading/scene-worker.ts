@@ -3,8 +3,9 @@
  * {@link loadScene} itself; then nothing here listens.
  */
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { buffersOf } from './buffers-of.js';
 import { loadScene } from './load-scene.js';
-import type { LoadedScene, PageMessage, PreviewListener, ProgressListener, WorkerMessage } from './protocol.js';
+import type { PageMessage, PreviewListener, ProgressListener, WorkerMessage } from './protocol.js';
 
 export { loadScene };
 
@@ -12,14 +13,6 @@ export { loadScene };
 interface WorkerScope {
   postMessage(message: WorkerMessage, transfer?: Transferable[]): void;
   addEventListener(type: 'message', listener: (event: MessageEvent<PageMessage>) => void): void;
-}
-
-/** Every buffer of a packed scene once: transferred, a scene of any size changes threads at no cost. */
-function buffersOf(scene: LoadedScene): ArrayBuffer[] {
-  const buffers = Object.values(scene.packed)
-    .filter((value): value is ArrayBufferView<ArrayBuffer> => ArrayBuffer.isView(value))
-    .map((view) => view.buffer);
-  return [...new Set(buffers)];
 }
 
 function serve(scope: WorkerScope): void {
@@ -32,11 +25,11 @@ function serve(scope: WorkerScope): void {
       const onProgress: ProgressListener = (loaded, total) =>
         scope.postMessage({ type: 'progress', id, loaded, total });
       const onPreview: PreviewListener = (preview) =>
-        scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview));
+        scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview.packed));
       const scene = await loadScene(request, abort.signal, onProgress, wantsPreviews ? onPreview : undefined);
       if (abort.signal.aborted) return;
       if ('frames' in scene) scope.postMessage({ type: 'sequence', id, sequence: scene });
-      else scope.postMessage({ type: 'scene', id, scene }, buffersOf(scene));
+      else scope.postMessage({ type: 'scene', id, scene }, buffersOf(scene.packed));
     } catch (error) {
       // loadScene throws its own errors, or the reason of an abort, which nobody waits for.
       if (error instanceof GaussianSplatError) scope.postMessage({ type: 'error', id, error: error.toData() });
@@ -46,11 +39,37 @@ function serve(scope: WorkerScope): void {
     }
   }
 
+  async function buildLevels({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> {
+    const abort = new AbortController();
+    running.set(id, abort);
+    try {
+      const { levelsInTurns } = await import('./levels-in-turns.js');
+      const levels = await levelsInTurns(packed, abort.signal);
+      scope.postMessage({ type: 'levels', id, levels }, levels ? buffersOf(levels, levels.coarser) : []);
+    } catch (error) {
+      if (!abort.signal.aborted) scope.postMessage({ type: 'error', id, error: outOfMemory(error).toData() });
+    } finally {
+      running.delete(id);
+    }
+  }
+
   scope.addEventListener('message', ({ data }) => {
     if (data.type === 'load') void load(data);
+    else if (data.type === 'levels') void buildLevels(data);
     else running.get(data.id)?.abort();
   });
   scope.postMessage({ type: 'ready' });
+}
+
+/** Nothing but memory can be missing for levels of a scene that is on show. */
+function outOfMemory(cause: unknown): GaussianSplatError {
+  return new GaussianSplatError('out-of-memory/allocation', {
+    where: 'levels of detail',
+    expected: 'memory enough to build them',
+    found: cause instanceof Error ? cause.message : String(cause),
+    remedy: 'use a smaller scene, or write it with npm run detail',
+    cause,
+  });
 }
 
 const isWorker = typeof document === 'undefined' && 'WorkerGlobalScope' in globalThis;

@@ -24,7 +24,15 @@ function frameLeversOf({ depthKeyBits, occludedBelow, transmittanceMin, alphaMin
   return { depthKeyBits, occludedBelow, transmittanceMin, alphaMin };
 }
 
-const fast = frameLeversOf(QUALITIES.fast);
+/**
+ * Pixels, of those that are drawn, by which rungs may be off where there are levels of detail: next to nothing close up, and from afar less than fewer
+ * pixels would cost (docs/decisions/0014).
+ */
+const BALANCED_DETAIL = 0.5;
+const FAST_DETAIL = 1;
+
+const balanced = { ...frameLeversOf(QUALITIES.balanced), detail: BALANCED_DETAIL };
+const fast = { ...frameLeversOf(QUALITIES.fast), detail: FAST_DETAIL };
 
 /**
  * All steps, from the true image down: by what is lost, in dB, for each millisecond won. First the levers of the qualities `balanced` and `fast`, which
@@ -32,7 +40,7 @@ const fast = frameLeversOf(QUALITIES.fast);
  */
 export const LADDER: readonly Rung[] = [
   { name: 'whole', levers: undefined, cost: 1 },
-  { name: 'balanced', levers: frameLeversOf(QUALITIES.balanced), cost: BALANCED_COST },
+  { name: 'balanced', levers: balanced, cost: BALANCED_COST },
   { name: 'fast', levers: fast, cost: FAST_COST },
   ...SCALES.map((resolutionScale) => ({
     name: `fast at ${resolutionScale}`,

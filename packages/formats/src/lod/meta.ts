@@ -106,11 +106,24 @@ function parseRun(value: unknown, files: number, fail: Fail): LodRun {
   return { file: file as number, offset: offset as number, count: count as number };
 }
 
+/** A run, and what it shows: a node of the scene at a level. */
+export interface NodeRun extends LodRun {
+  readonly node: number;
+  readonly level: number;
+}
+
+/** The runs of all boxes at all levels that they have. */
+export function runsAtAllLevels({ leaves }: LodMeta): NodeRun[] {
+  return leaves.flatMap(({ levels }, node) =>
+    levels.flatMap((run, level) => (run === undefined || run.count === 0 ? [] : [{ ...run, node, level }])),
+  );
+}
+
 /** The runs that show the scene at a level: of each box that level, or the nearest it has, a finer one first. */
-export function runsAtLevel({ leaves }: LodMeta, level: number): LodRun[] {
-  return leaves.flatMap(({ levels }) => {
+export function runsAtLevel({ leaves }: LodMeta, level: number): NodeRun[] {
+  return leaves.flatMap(({ levels }, node) => {
     const finer = levels.slice(0, level + 1).findLast((run) => run !== undefined);
     const run = finer ?? levels.slice(level + 1).find((candidate) => candidate !== undefined);
-    return run === undefined || run.count === 0 ? [] : [run];
+    return run === undefined || run.count === 0 ? [] : [{ ...run, node, level: 0 }];
   });
 }

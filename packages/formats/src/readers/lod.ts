@@ -1,7 +1,7 @@
-import { type GaussianCloud } from '@gaussian-splat/core';
+import type { GaussianCloud, LevelRun } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { damaged } from '../damaged.js';
-import { parseLodMeta, runsAtLevel, type LodRun } from '../lod/meta.js';
+import { parseLodMeta, runsAtAllLevels, runsAtLevel, type NodeRun } from '../lod/meta.js';
 import { mergeClouds, type CloudPart } from '../merge-clouds.js';
 import type { OpenPart, SceneSource } from '../scene-format.js';
 import { parseSogMeta } from '../sog/meta.js';
@@ -10,15 +10,15 @@ import { noParts } from './sog.js';
 
 /**
  * Reads a streamed SOG scene from its `lod-meta.json` as a whole at one level of detail (`source.level`, 0 the finest; levels
- * beyond the last give the coarsest), with its environment.
+ * beyond the last give the coarsest) or at all of them (`all`), with its environment.
  */
 export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   const { name, level = 0 } = source;
   const meta = parseLodMeta(source.bytes, name);
   const open = source.openPart ?? noParts(name);
-  const runs = runsAtLevel(meta, Math.min(level, meta.levels - 1));
+  const runs = level === 'all' ? runsAtAllLevels(meta) : runsAtLevel(meta, Math.min(level, meta.levels - 1));
   const files = [...new Set(runs.map(({ file }) => file))];
-  const parts: CloudPart[] = [];
+  const parts: NodePart[] = [];
   for (const file of files) {
     source.signal?.throwIfAborted();
     const cloud = await readPart(meta.files[file], open, source);
@@ -33,9 +33,24 @@ export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   }
   if (meta.environment !== undefined) {
     const cloud = await readPart(meta.environment, open, source);
-    parts.push({ cloud, first: 0, count: cloud.count });
+    // Another node than all others, at a level of its own: it is always drawn.
+    parts.push({ cloud, first: 0, count: cloud.count, node: meta.leaves.length, level: 0 });
   }
-  return mergeClouds(parts, name);
+  const merged = mergeClouds(parts, name);
+  return level === 'all' ? { ...merged, levelRuns: levelRunsOf(parts) } : merged;
+}
+
+/** Part of a cloud, and what it shows. */
+type NodePart = CloudPart & Pick<NodeRun, 'node' | 'level'>;
+
+/** Where the parts lie once they are merged. */
+function levelRunsOf(parts: readonly NodePart[]): LevelRun[] {
+  let first = 0;
+  return parts.map(({ count, node, level }) => {
+    const run = { first, count, node, level };
+    first += count;
+    return run;
+  });
 }
 
 /** One SOG of the scene; the paths in its description are relative to it. */
@@ -48,16 +63,16 @@ async function readPart(path: string, open: OpenPart, { name, signal }: SceneSou
 }
 
 /** The runs must lie within the file and apart from one another: together they never hold more splats than the file. */
-function partsOf(cloud: GaussianCloud, runs: readonly LodRun[], path: string, name: string): CloudPart[] {
+function partsOf(cloud: GaussianCloud, runs: readonly NodeRun[], path: string, name: string): NodePart[] {
   let end = 0;
   return [...runs]
     .sort((a, b) => a.offset - b.offset)
-    .map(({ offset, count }) => {
+    .map(({ offset, count, node, level }) => {
       if (offset < end || offset + count > cloud.count) {
         const found = `splats ${grouped(offset)} to ${grouped(offset + count)}`;
         throw damaged(`${name}, tree, ${path}`, `runs apart within ${grouped(cloud.count)} splats`, found);
       }
       end = offset + count;
-      return { cloud, first: offset, count };
+      return { cloud, first: offset, count, node, level };
     });
 }

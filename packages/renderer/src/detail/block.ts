@@ -1,5 +1,6 @@
 import { constants } from '../generated/shaders.js';
-import { FACTOR_NUMBERS, shNumbers, type SplatLevel } from './splat-level.js';
+import { FACTOR_NUMBERS, shNumbers, type LevelSource, type SplatLevel } from './splat-level.js';
+import { areaOf, BLUE, covarianceOf, factorOf, GREEN, MASS, OPACITY, RED, ROW, SPREAD, X, Y, Z } from './splat-rows.js';
 
 /** Splats that are merged among one another: those of the chunks that get one parent. */
 export const BLOCK = 4 * constants.CULL_GROUP;
@@ -8,60 +9,41 @@ const SH_C0 = 0.28209479177387814;
 /** Keeps shares of splats that cover nothing finite. */
 const TINY = 1e-30;
 
-const column = (): Float64Array => new Float64Array(BLOCK);
-
-/** The splats of a block while they are merged, a column for each number. */
+/** The splats of a block while they are merged. */
 export class Block {
   count = 0;
-  /** See {@link SplatLevel.dilation}. */
+  /** See {@link LevelSource.dilation}. */
   dilation = 0;
-  readonly x = column();
-  readonly y = column();
-  readonly z = column();
-  /** Covariances. */
-  readonly xx = column();
-  readonly xy = column();
-  readonly xz = column();
-  readonly yy = column();
-  readonly yz = column();
-  readonly zz = column();
-  /** Mean colour, of degree 0 alone. */
-  readonly red = column();
-  readonly green = column();
-  readonly blue = column();
-  readonly opacity = column();
-  /** What a splat weighs in every mean: opacity times area of the splats that it stands for. */
-  readonly mass = column();
-  /** Mean square displacement so far. */
-  readonly spread = column();
-  readonly #columns = [
-    ...[this.x, this.y, this.z, this.xx, this.xy, this.xz, this.yy, this.yz, this.zz],
-    ...[this.red, this.green, this.blue, this.opacity, this.mass, this.spread],
-  ];
+  /** [count] see splat-rows.ts. */
+  readonly rows = new Float64Array(ROW * BLOCK);
+  /** Harmonics of the splats that were loaded. */
+  readonly #sh = new Float32Array(shNumbers(3) * BLOCK);
   /** Of each splat that was loaded: its mass, and the splat that it is now part of. */
-  readonly #loadedMass = column();
+  readonly #loadedMass = new Float64Array(BLOCK);
   readonly #cluster = new Int32Array(BLOCK);
   readonly #place = new Int32Array(BLOCK);
   #loaded = 0;
 
   /** Takes over `count` splats of a level from `first` on, at most {@link BLOCK}. */
-  load(level: SplatLevel, first: number, count: number): void {
-    const { positions, opacities, sh, shOrder, shDegree, spreads } = level;
+  load(level: LevelSource, first: number, count: number): void {
+    const { positions, factors, opacities, spreads, shDegree } = level;
+    const { rows } = this;
+    const sh = this.#sh;
+    level.readSh(first, count, sh);
     const stride = shNumbers(shDegree);
-    for (let k = 0; k < count; k++) {
+    for (let k = 0, p = 0; k < count; k++, p += ROW) {
       const i = first + k;
-      this.x[k] = positions[3 * i];
-      this.y[k] = positions[3 * i + 1];
-      this.z[k] = positions[3 * i + 2];
-      this.#loadCovariance(k, level.factors, FACTOR_NUMBERS * i);
-      const color = stride * (shOrder === undefined ? i : shOrder[i]);
-      this.red[k] = SH_C0 * sh[color];
-      this.green[k] = SH_C0 * sh[color + 1];
-      this.blue[k] = SH_C0 * sh[color + 2];
-      this.opacity[k] = opacities[i];
-      this.mass[k] = opacities[i] * this.area(k) + TINY;
-      this.#loadedMass[k] = this.mass[k];
-      this.spread[k] = spreads[i];
+      rows[p + X] = positions[3 * i];
+      rows[p + Y] = positions[3 * i + 1];
+      rows[p + Z] = positions[3 * i + 2];
+      covarianceOf(factors, FACTOR_NUMBERS * i, rows, p);
+      rows[p + RED] = SH_C0 * sh[stride * k];
+      rows[p + GREEN] = SH_C0 * sh[stride * k + 1];
+      rows[p + BLUE] = SH_C0 * sh[stride * k + 2];
+      rows[p + OPACITY] = opacities[i];
+      rows[p + SPREAD] = spreads[i];
+      rows[p + MASS] = opacities[i] * areaOf(rows, p) + TINY;
+      this.#loadedMass[k] = rows[p + MASS];
       this.#cluster[k] = k;
     }
     this.#loaded = count;
@@ -69,84 +51,47 @@ export class Block {
     this.count = count;
   }
 
-  /** Area of a splat, its variances larger by `low`, in units of 2π: the sum of what the three axes see. */
-  area(k: number, low = 0): number {
-    const { xx, xy, xz, yy, yz, zz } = this;
-    return (
-      Math.sqrt(Math.max(0, (xx[k] + low) * (yy[k] + low) - xy[k] * xy[k])) +
-      Math.sqrt(Math.max(0, (xx[k] + low) * (zz[k] + low) - xz[k] * xz[k])) +
-      Math.sqrt(Math.max(0, (yy[k] + low) * (zz[k] + low) - yz[k] * yz[k]))
-    );
-  }
-
   /** Drops the splats that have become part of another: `partOf[k]` is that other, or -1. The rest keep their order. */
   closeRanks(partOf: Int32Array): void {
+    const { rows } = this;
     let kept = 0;
     for (let k = 0; k < this.count; k++) {
       if (partOf[k] >= 0) continue;
       this.#place[k] = kept;
-      if (kept !== k) for (const values of this.#columns) values[kept] = values[k];
+      if (kept !== k) for (let n = 0; n < ROW; n++) rows[ROW * kept + n] = rows[ROW * k + n];
       kept++;
     }
+    const cluster = this.#cluster;
     for (let i = 0; i < this.#loaded; i++) {
-      const now = this.#cluster[i];
-      this.#cluster[i] = this.#place[partOf[now] >= 0 ? partOf[now] : now];
+      const now = cluster[i];
+      cluster[i] = this.#place[partOf[now] >= 0 ? partOf[now] : now];
     }
     this.count = kept;
   }
 
-  /** Writes the splats to a level from `at` on; `source` and `first` are what was loaded. */
-  store(level: SplatLevel, at: number, source: SplatLevel, first: number): void {
-    for (let k = 0; k < this.count; k++) {
-      level.positions[3 * (at + k)] = this.x[k];
-      level.positions[3 * (at + k) + 1] = this.y[k];
-      level.positions[3 * (at + k) + 2] = this.z[k];
-      this.#storeFactor(k, level.factors, FACTOR_NUMBERS * (at + k));
-      level.opacities[at + k] = this.opacity[k];
-      level.spreads[at + k] = this.spread[k];
+  /** Writes the splats to a level from `at` on. */
+  store(level: SplatLevel, at: number): void {
+    const { rows } = this;
+    for (let k = 0, p = 0; k < this.count; k++, p += ROW) {
+      const to = 3 * (at + k);
+      level.positions[to] = rows[p + X];
+      level.positions[to + 1] = rows[p + Y];
+      level.positions[to + 2] = rows[p + Z];
+      factorOf(rows, p, level.factors, FACTOR_NUMBERS * (at + k));
+      level.opacities[at + k] = rows[p + OPACITY];
+      level.spreads[at + k] = rows[p + SPREAD];
     }
-    this.#storeSh(level, at, source, first);
+    this.#storeSh(level.sh, shNumbers(level.shDegree), at);
   }
 
-  #storeSh({ sh, shDegree }: SplatLevel, at: number, source: SplatLevel, first: number): void {
-    const stride = shNumbers(shDegree);
+  #storeSh(out: Float32Array, stride: number, at: number): void {
+    const sh = this.#sh;
     for (let k = 0; k < this.#loaded; k++) {
       const cluster = this.#cluster[k];
-      const share = this.#loadedMass[k] / this.mass[cluster];
-      const from = stride * (source.shOrder === undefined ? first + k : source.shOrder[first + k]);
+      const share = this.#loadedMass[k] / this.rows[ROW * cluster + MASS];
+      const from = stride * k;
       const to = stride * (at + cluster);
-      for (let n = 0; n < stride; n++) sh[to + n] += share * source.sh[from + n];
+      for (let n = 0; n < stride; n++) out[to + n] += share * sh[from + n];
     }
-  }
-
-  #loadCovariance(k: number, factors: Float32Array, at: number): void {
-    const xx = factors[at];
-    const yx = factors[at + 1];
-    const yy = factors[at + 2];
-    const zx = factors[at + 3];
-    const zy = factors[at + 4];
-    const zz = factors[at + 5];
-    this.xx[k] = xx * xx;
-    this.xy[k] = xx * yx;
-    this.xz[k] = xx * zx;
-    this.yy[k] = yx * yx + yy * yy;
-    this.yz[k] = yx * zx + yy * zy;
-    this.zz[k] = zx * zx + zy * zy + zz * zz;
-  }
-
-  /** The Cholesky factor; of flat splats and needles with zeros where rounding has left less than nothing. */
-  #storeFactor(k: number, out: Float32Array, at: number): void {
-    const xx = Math.sqrt(Math.max(0, this.xx[k]));
-    const inverseX = xx > 0 ? 1 / xx : 0;
-    const yx = this.xy[k] * inverseX;
-    const zx = this.xz[k] * inverseX;
-    const yy = Math.sqrt(Math.max(0, this.yy[k] - yx * yx));
-    const zy = yy > 0 ? (this.yz[k] - yx * zx) / yy : 0;
-    out[at] = xx;
-    out[at + 1] = yx;
-    out[at + 2] = yy;
-    out[at + 3] = zx;
-    out[at + 4] = zy;
-    out[at + 5] = Math.sqrt(Math.max(0, this.zz[k] - zx * zx - zy * zy));
   }
 }

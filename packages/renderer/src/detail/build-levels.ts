@@ -1,36 +1,58 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { Block, BLOCK } from './block.js';
 import { BlockReducer } from './reduce-block.js';
-import { chunksOf, emptyLevel, leafLevel, type SplatLevel } from './splat-level.js';
+import { chunksOf, emptyLevel, leafLevel, type LevelSource, type SplatLevel } from './splat-level.js';
 
 /** Splats of the next level for one of this. */
 const KEPT = 1 / 4;
+/** Blocks between two steps: some ten milliseconds. */
+const BLOCKS_A_STEP = 8;
 
 /**
  * All levels of detail of the splats `kept` of a cloud, finest first: each merges the splats of four chunks of the one before to those of one,
  * until one chunk holds the scene. All levels together have 4/3 of the splats.
  */
 export function buildLevels(cloud: GaussianCloud, kept: Uint32Array): SplatLevel[] {
-  return [...levelsAbove(leafLevel(cloud, kept))];
+  const leaves = leafLevel(cloud, kept);
+  return [leaves, ...levelsAbove(leaves)];
 }
 
-/** A level and all coarser ones. */
-export function* levelsAbove(finest: SplatLevel): Generator<SplatLevel> {
+/** All levels coarser than one. */
+export function levelsAbove(finest: LevelSource): SplatLevel[] {
+  return finish(buildLevelsAbove(finest));
+}
+
+/** The same in steps of some ten milliseconds, for those who have something else to do meanwhile. */
+export function* buildLevelsAbove(finest: LevelSource): Generator<void, SplatLevel[]> {
+  const levels: SplatLevel[] = [];
   let level = finest;
-  yield level;
-  while (chunksOf(level.count) > 1) yield (level = nextLevel(level));
+  while (chunksOf(level.count) > 1) {
+    const next: SplatLevel = yield* buildNextLevel(level);
+    levels.push(next);
+    level = next;
+  }
+  return levels;
 }
 
 /** The next coarser level: chunk k of it stands for chunks 4 k to 4 k + 3. */
-export function nextLevel(level: SplatLevel): SplatLevel {
+function* buildNextLevel(level: LevelSource): Generator<void, SplatLevel> {
   const reducer = new BlockReducer();
   const block = new Block();
   const next = emptyLevel(Math.ceil(level.count * KEPT), level);
   for (let first = 0, at = 0; first < level.count; first += BLOCK) {
     block.load(level, first, Math.min(BLOCK, level.count - first));
     reducer.reduce(block, Math.ceil(block.count * KEPT));
-    block.store(next, at, level, first);
+    block.store(next, at);
     at += block.count;
+    if ((first / BLOCK) % BLOCKS_A_STEP === BLOCKS_A_STEP - 1) yield;
   }
   return next;
+}
+
+/** Takes all steps at once. */
+export function finish<T>(steps: Generator<void, T>): T {
+  for (;;) {
+    const { done, value } = steps.next();
+    if (done) return value;
+  }
 }

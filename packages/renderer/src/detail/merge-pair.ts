@@ -1,127 +1,129 @@
-import { BLOCK, type Block } from './block.js';
 import { coverOfOpacity, opacityOfCover } from './cover.js';
+import {
+  areaOf,
+  BLUE,
+  GREEN,
+  MASS,
+  OPACITY,
+  RED,
+  SPREAD,
+  TRACE,
+  X,
+  XX,
+  XY,
+  XZ,
+  Y,
+  YY,
+  YZ,
+  Z,
+  ZZ,
+} from './splat-rows.js';
 
 /** How much more it counts to displace a splat whose colour differs by 1 in a channel. */
 const COLOR_WEIGHT = 2;
 
-/** Numbers of one splat in {@link traitsOf}, of which the last is spare. */
-const TRAITS = 16;
-const traits = new Float64Array(TRAITS * BLOCK);
-
-/** What {@link displacement} looks at, splat by splat in one piece: it is asked for millions of pairs. Valid until the next call. */
-export function traitsOf(b: Block): Float64Array {
-  for (let k = 0, at = 0; k < b.count; k++, at += TRAITS) {
-    traits[at] = b.x[k];
-    traits[at + 1] = b.y[k];
-    traits[at + 2] = b.z[k];
-    traits[at + 3] = b.xx[k];
-    traits[at + 4] = b.yy[k];
-    traits[at + 5] = b.zz[k];
-    traits[at + 6] = b.xy[k];
-    traits[at + 7] = b.xz[k];
-    traits[at + 8] = b.yz[k];
-    traits[at + 9] = b.xx[k] + b.yy[k] + b.zz[k];
-    traits[at + 10] = b.red[k];
-    traits[at + 11] = b.green[k];
-    traits[at + 12] = b.blue[k];
-    traits[at + 13] = b.mass[k];
-  }
-  return traits;
-}
-
-/** Square of how far merging splats i and j displaces them, in world units²: apart, in shape, and more if their colours differ. */
-function displacement(t: Float64Array, i: number, j: number): number {
-  const [p, q] = [TRAITS * i, TRAITS * j];
-  const dx = t[p] - t[q];
-  const dy = t[p + 1] - t[q + 1];
-  const dz = t[p + 2] - t[q + 2];
-  const xx = t[p + 3] - t[q + 3];
-  const yy = t[p + 4] - t[q + 4];
-  const zz = t[p + 5] - t[q + 5];
-  const xy = t[p + 6] - t[q + 6];
-  const xz = t[p + 7] - t[q + 7];
-  const yz = t[p + 8] - t[q + 8];
-  const size = t[p + 9] + t[q + 9];
+/** Square of how far merging the splats at p and q displaces them, in world units²: apart, in shape, and more if their colours differ. */
+function displacement(rows: Float64Array, p: number, q: number): number {
+  const dx = rows[p + X] - rows[q + X];
+  const dy = rows[p + Y] - rows[q + Y];
+  const dz = rows[p + Z] - rows[q + Z];
+  const xx = rows[p + XX] - rows[q + XX];
+  const yy = rows[p + YY] - rows[q + YY];
+  const zz = rows[p + ZZ] - rows[q + ZZ];
+  const xy = rows[p + XY] - rows[q + XY];
+  const xz = rows[p + XZ] - rows[q + XZ];
+  const yz = rows[p + YZ] - rows[q + YZ];
+  const size = rows[p + TRACE] + rows[q + TRACE];
   // Σ1 − Σ2 over the size of both has the unit of an area again: 0 for equal shapes.
   const shape = size > 0 ? (xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz)) / size : 0;
-  const red = t[p + 10] - t[q + 10];
-  const green = t[p + 11] - t[q + 11];
-  const blue = t[p + 12] - t[q + 12];
+  const red = rows[p + RED] - rows[q + RED];
+  const green = rows[p + GREEN] - rows[q + GREEN];
+  const blue = rows[p + BLUE] - rows[q + BLUE];
   const color = 1 + COLOR_WEIGHT * (red * red + green * green + blue * blue);
   return (dx * dx + dy * dy + dz * dz) * color + shape;
 }
 
-/** Ward's criterion (1963): what a merge of splats i and j adds to the squared displacement of all that is covered. */
-export function mergeCost(t: Float64Array, i: number, j: number): number {
-  const first = t[TRAITS * i + 13];
-  const second = t[TRAITS * j + 13];
-  return ((first * second) / (first + second)) * displacement(t, i, j);
+/** Ward's criterion (1963): what a merge of the splats at p and q adds to the squared displacement of all that is covered. */
+export function mergeCost(rows: Float64Array, p: number, q: number): number {
+  const first = rows[p + MASS];
+  const second = rows[q + MASS];
+  return ((first * second) / (first + second)) * displacement(rows, p, q);
 }
 
 /**
- * Makes splat i stand for both: the first two moments of the two, and their cover as the three axes see it. Seen from so far away that
+ * Makes the splat at i stand for both: the first two moments of the two, and their cover as the three axes see it. Seen from so far away that
  * their displacement is a pixel, which is where they are first drawn as one: small splats are wider there, by the dilation.
  */
-export function mergePair(b: Block, t: Float64Array, i: number, j: number): void {
-  const mass = b.mass[i] + b.mass[j];
-  const p = b.mass[i] / mass;
-  const q = b.mass[j] / mass;
-  const spread = p * b.spread[i] + q * b.spread[j] + p * q * displacement(t, i, j);
-  const low = b.dilation * spread;
-  const cover = jointCover(b, i, j, low);
-  b.spread[i] = spread;
-  const dx = b.x[j] - b.x[i];
-  const dy = b.y[j] - b.y[i];
-  const dz = b.z[j] - b.z[i];
-  b.xx[i] = p * b.xx[i] + q * b.xx[j] + p * q * dx * dx;
-  b.xy[i] = p * b.xy[i] + q * b.xy[j] + p * q * dx * dy;
-  b.xz[i] = p * b.xz[i] + q * b.xz[j] + p * q * dx * dz;
-  b.yy[i] = p * b.yy[i] + q * b.yy[j] + p * q * dy * dy;
-  b.yz[i] = p * b.yz[i] + q * b.yz[j] + p * q * dy * dz;
-  b.zz[i] = p * b.zz[i] + q * b.zz[j] + p * q * dz * dz;
-  b.x[i] += q * dx;
-  b.y[i] += q * dy;
-  b.z[i] += q * dz;
-  b.red[i] = p * b.red[i] + q * b.red[j];
-  b.green[i] = p * b.green[i] + q * b.green[j];
-  b.blue[i] = p * b.blue[i] + q * b.blue[j];
-  const area = b.area(i, low);
-  b.opacity[i] = area > 0 ? opacityOfCover(cover / area) : Math.max(b.opacity[i], b.opacity[j]);
-  b.mass[i] = mass;
+export function mergePair(rows: Float64Array, i: number, j: number, dilation: number): void {
+  const mass = rows[i + MASS] + rows[j + MASS];
+  const p = rows[i + MASS] / mass;
+  const q = rows[j + MASS] / mass;
+  const dx = rows[j + X] - rows[i + X];
+  const dy = rows[j + Y] - rows[i + Y];
+  const dz = rows[j + Z] - rows[i + Z];
+  const moved = displacement(rows, i, j);
+  const spread = p * rows[i + SPREAD] + q * rows[j + SPREAD] + p * q * moved;
+  const low = dilation * spread;
+  const cover = jointCover(rows, i, j, low);
+  const largest = Math.max(rows[i + OPACITY], rows[j + OPACITY]);
+  rows[i + SPREAD] = spread;
+  rows[i + XX] = p * rows[i + XX] + q * rows[j + XX] + p * q * dx * dx;
+  rows[i + XY] = p * rows[i + XY] + q * rows[j + XY] + p * q * dx * dy;
+  rows[i + XZ] = p * rows[i + XZ] + q * rows[j + XZ] + p * q * dx * dz;
+  rows[i + YY] = p * rows[i + YY] + q * rows[j + YY] + p * q * dy * dy;
+  rows[i + YZ] = p * rows[i + YZ] + q * rows[j + YZ] + p * q * dy * dz;
+  rows[i + ZZ] = p * rows[i + ZZ] + q * rows[j + ZZ] + p * q * dz * dz;
+  rows[i + TRACE] = rows[i + XX] + rows[i + YY] + rows[i + ZZ];
+  rows[i + X] += q * dx;
+  rows[i + Y] += q * dy;
+  rows[i + Z] += q * dz;
+  rows[i + RED] = p * rows[i + RED] + q * rows[j + RED];
+  rows[i + GREEN] = p * rows[i + GREEN] + q * rows[j + GREEN];
+  rows[i + BLUE] = p * rows[i + BLUE] + q * rows[j + BLUE];
+  const area = areaOf(rows, i, low);
+  rows[i + OPACITY] = area > 0 ? opacityOfCover(cover / area) : largest;
+  rows[i + MASS] = mass;
 }
 
 /**
  * Area that two splats cover together, in units of 2π, summed over the views along the three axes, all variances larger by `low`: what each covers, less what both do,
  * ∫ G₁ G₂ = 2π √|Σ₁| √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
  */
-function jointCover(b: Block, i: number, j: number, low: number): number {
-  const dx = b.x[j] - b.x[i];
-  const dy = b.y[j] - b.y[i];
-  const dz = b.z[j] - b.z[i];
-  const first = coverOfOpacity(b.opacity[i]);
-  const second = coverOfOpacity(b.opacity[j]);
+function jointCover(rows: Float64Array, i: number, j: number, low: number): number {
+  const dx = rows[j + X] - rows[i + X];
+  const dy = rows[j + Y] - rows[i + Y];
+  const dz = rows[j + Z] - rows[i + Z];
+  const first = coverOfOpacity(rows[i + OPACITY]);
+  const second = coverOfOpacity(rows[j + OPACITY]);
   return (
-    jointCoverAlong(b.xx, b.xy, b.yy, dx, dy, first, second, i, j, low) +
-    jointCoverAlong(b.xx, b.xz, b.zz, dx, dz, first, second, i, j, low) +
-    jointCoverAlong(b.yy, b.yz, b.zz, dy, dz, first, second, i, j, low)
+    jointCoverAlong(rows, i, j, XX, XY, YY, dx, dy, first, second, low) +
+    jointCoverAlong(rows, i, j, XX, XZ, ZZ, dx, dz, first, second, low) +
+    jointCoverAlong(rows, i, j, YY, YZ, ZZ, dy, dz, first, second, low)
   );
 }
 
 function jointCoverAlong(
-  uu: Float64Array,
-  uv: Float64Array,
-  vv: Float64Array,
+  rows: Float64Array,
+  i: number,
+  j: number,
+  uu: number,
+  uv: number,
+  vv: number,
   du: number,
   dv: number,
   first: number,
   second: number,
-  i: number,
-  j: number,
   low: number,
 ): number {
-  const areaI = Math.sqrt(Math.max(0, (uu[i] + low) * (vv[i] + low) - uv[i] * uv[i]));
-  const areaJ = Math.sqrt(Math.max(0, (uu[j] + low) * (vv[j] + low) - uv[j] * uv[j]));
-  const [a, c, d] = [uu[i] + uu[j] + 2 * low, uv[i] + uv[j], vv[i] + vv[j] + 2 * low];
+  const ui = rows[i + uu] + low;
+  const vi = rows[i + vv] + low;
+  const uj = rows[j + uu] + low;
+  const vj = rows[j + vv] + low;
+  const areaI = Math.sqrt(Math.max(0, ui * vi - rows[i + uv] * rows[i + uv]));
+  const areaJ = Math.sqrt(Math.max(0, uj * vj - rows[j + uv] * rows[j + uv]));
+  const a = ui + uj;
+  const c = rows[i + uv] + rows[j + uv];
+  const d = vi + vj;
   const both = a * d - c * c;
   const alone = first * areaI + second * areaJ;
   if (!(both > 0)) return alone;

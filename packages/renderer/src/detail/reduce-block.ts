@@ -1,37 +1,45 @@
 import { BLOCK, type Block } from './block.js';
-import { mergeCost, mergePair, traitsOf } from './merge-pair.js';
+import { mergeCost, mergePair } from './merge-pair.js';
+import { ROW } from './splat-rows.js';
 
 /** How many of the splats that follow in the order may become a splat's partner. */
 const WINDOW = 6;
-/** Share of the pairs that want each other that are merged in one round, the cheapest. */
-const ROUND_SHARE = 1;
+/** In place of a cost, which is 0 or more. */
+const UNKNOWN = -1;
 
 /** Merges pairs of near neighbours until a number of splats is left. */
 export class BlockReducer {
   readonly #best = new Int32Array(BLOCK);
   readonly #bestCost = new Float64Array(BLOCK);
   readonly #partOf = new Int32Array(BLOCK);
-  /** Costs of the pairs of one round, ascending after {@link #cheapEnough}. */
+  /** Costs of the pairs of one round. */
   readonly #pairCosts = new Float64Array(BLOCK);
+  /** For each splat the costs of merging it with those that follow, as far as they are known: most pairs outlive a round. */
+  readonly #costs = new Float64Array(WINDOW * BLOCK);
+  /** Of each splat that is left after a round, its number before. */
+  readonly #before = new Int32Array(BLOCK);
 
-  /** In each round those pairs are merged that are each other's best partner, the cheapest first. */
+  /** In each round those pairs are merged that are each other's best partner; in the last, the cheapest of them. */
   reduce(block: Block, target: number): void {
+    this.#costs.fill(UNKNOWN, 0, WINDOW * block.count);
     while (block.count > target) {
-      const traits = traitsOf(block);
-      this.#findPartners(traits, block.count);
-      this.#mergePairs(block, traits, block.count - target);
+      this.#findPartners(block.rows, block.count);
+      this.#mergePairs(block, block.count - target);
+      this.#keepCosts(block.count);
       block.closeRanks(this.#partOf);
     }
   }
 
-  #findPartners(traits: Float64Array, count: number): void {
+  #findPartners(rows: Float64Array, count: number): void {
     const best = this.#best;
     const bestCost = this.#bestCost;
+    const costs = this.#costs;
     bestCost.fill(Infinity, 0, count);
     for (let i = 0; i < count; i++) {
       const end = Math.min(count, i + WINDOW + 1);
-      for (let j = i + 1; j < end; j++) {
-        const cost = mergeCost(traits, i, j);
+      for (let j = i + 1, at = WINDOW * i; j < end; j++, at++) {
+        let cost = costs[at];
+        if (cost === UNKNOWN) costs[at] = cost = mergeCost(rows, ROW * i, ROW * j);
         if (cost < bestCost[i]) {
           bestCost[i] = cost;
           best[i] = j;
@@ -45,17 +53,43 @@ export class BlockReducer {
   }
 
   /** Merges at most so many pairs; always at least one, for the cheapest pair of all wants each other. */
-  #mergePairs(block: Block, traits: Float64Array, most: number): void {
-    this.#partOf.fill(-1, 0, block.count);
+  #mergePairs(block: Block, most: number): void {
+    const best = this.#best;
+    const partOf = this.#partOf;
+    partOf.fill(-1, 0, block.count);
     const limit = this.#dearest(block.count, most);
     let merged = 0;
     for (let i = 0; i < block.count && merged < most; i++) {
-      const j = this.#best[i];
-      if (j <= i || this.#best[j] !== i || this.#bestCost[i] > limit) continue;
-      mergePair(block, traits, i, j);
-      this.#partOf[j] = i;
+      const j = best[i];
+      if (j <= i || best[j] !== i || this.#bestCost[i] > limit) continue;
+      mergePair(block.rows, ROW * i, ROW * j, block.dilation);
+      partOf[j] = i;
       merged++;
     }
+  }
+
+  /** Costs of the pairs of the next round that are pairs of this one, neither splat having been merged. */
+  #keepCosts(count: number): void {
+    const partOf = this.#partOf;
+    const before = this.#before;
+    const costs = this.#costs;
+    let left = 0;
+    for (let k = 0; k < count; k++) if (partOf[k] < 0) before[left++] = k;
+    for (let i = 0; i < left; i++) {
+      const old = before[i];
+      for (let step = 1; step <= WINDOW && i + step < left; step++) {
+        const other = before[i + step];
+        const isKept = other - old <= WINDOW && !this.#isMerged(old) && !this.#isMerged(other);
+        // What is read never lies before what is written.
+        costs[WINDOW * i + step - 1] = isKept ? costs[WINDOW * old + other - old - 1] : UNKNOWN;
+      }
+    }
+  }
+
+  /** True for a splat that has taken another in in this round. */
+  #isMerged(k: number): boolean {
+    const partner = this.#best[k];
+    return this.#partOf[partner] === k;
   }
 
   /** Cost of the dearest pair that is merged in this round. */
@@ -66,7 +100,6 @@ export class BlockReducer {
       const j = this.#best[i];
       if (j > i && this.#best[j] === i) costs[pairs++] = this.#bestCost[i];
     }
-    const sorted = costs.subarray(0, pairs).sort();
-    return sorted[Math.max(0, Math.min(most, Math.ceil(ROUND_SHARE * pairs)) - 1)];
+    return pairs <= most ? Infinity : costs.subarray(0, pairs).sort()[most - 1];
   }
 }

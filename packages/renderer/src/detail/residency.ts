@@ -21,6 +21,7 @@ export class Residency {
   readonly #below: Uint16Array;
   readonly #coming = new Set<number>();
   #look = 0;
+  #residents = 0;
 
   constructor(list: PageList, slots: number) {
     this.#list = list;
@@ -37,7 +38,7 @@ export class Residency {
 
   /** Pages that are there. */
   get residents(): number {
-    return this.pageIn.reduce((sum, page) => sum + (page === NONE ? 0 : 1), 0);
+    return this.#residents;
   }
 
   /** Takes note of a look: for each page the pixels that doing without it would cost, 0 for those that nobody wishes for. */
@@ -55,9 +56,14 @@ export class Residency {
     const pages: number[] = [];
     for (let page = 0; page < this.#list.count; page++) {
       const isFine = parent[page] === NONE || this.isResident(parent[page]);
-      if (this.#wish[page] > 0 && !this.isResident(page) && !this.#coming.has(page) && isFine) pages.push(page);
+      if (this.#wish[page] > 0 && isFine && this.lacks(page)) pages.push(page);
     }
     return pages.sort((a, b) => this.#wish[b] - this.#wish[a]);
+  }
+
+  /** True for a page that is neither there nor on its way. */
+  lacks(page: number): boolean {
+    return !this.isResident(page) && !this.#coming.has(page);
   }
 
   /** Starts bringing a page if there is room for it, or something to leave that is needed less. */
@@ -80,7 +86,8 @@ export class Residency {
   settle(page: number): { slot: number; left: number } | undefined {
     let slot = this.pageIn.indexOf(NONE);
     let left = NONE;
-    if (slot < 0) {
+    if (slot >= 0) this.#residents++;
+    else {
       left = this.#leaver(page);
       if (left === NONE) {
         this.giveUp(page);

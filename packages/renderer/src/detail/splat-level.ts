@@ -5,8 +5,8 @@ import { scaleRotationFactor } from '../pack/factor.js';
 /** Numbers of the lower triangular root of a covariance: xx, yx, yy, zx, zy, zz. */
 export const FACTOR_NUMBERS = 6;
 
-/** One level of detail of a scene, splats in an order in which neighbours in space are mostly neighbours. */
-export interface SplatLevel {
+/** What a coarser level is made of: splats in an order in which neighbours in space are mostly neighbours. */
+export interface LevelSource {
   readonly count: number;
   /** [N, 3] world units, relative to the origin of the cloud. */
   readonly positions: Float32Array;
@@ -14,15 +14,21 @@ export interface SplatLevel {
   readonly factors: Float32Array;
   /** [N] opacities; those of merged splats may exceed 1 (see `opacityOfCover`). */
   readonly opacities: Float32Array;
+  /** [N] mean square displacement of what each splat stands for, in world units². */
+  readonly spreads: Float32Array;
+  readonly shDegree: ShDegree;
+  /** What the renderer adds to screen variances without taking it from opacities, in px²: see `mergePair`. */
+  readonly dilation: number;
+  /** Writes the harmonics of `count` splats from `first` on, {@link shNumbers} of each, to the start of `out`. */
+  readonly readSh: (first: number, count: number, out: Float32Array) => void;
+}
+
+/** One level of detail of a scene. */
+export interface SplatLevel extends LevelSource {
   /** Spherical harmonics, {@link shNumbers} of each splat. */
   readonly sh: Float32Array;
   /** Where in `sh`, in splats, those of each splat lie; undefined if in order. */
   readonly shOrder?: Uint32Array;
-  readonly shDegree: ShDegree;
-  /** What the renderer adds to screen variances without taking it from opacities, in px²: see `mergePair`. */
-  readonly dilation: number;
-  /** [N] mean square displacement of what each splat stands for, in world units². */
-  readonly spreads: Float32Array;
 }
 
 /** Spherical-harmonics numbers of one splat. */
@@ -32,16 +38,16 @@ export const shNumbers = (degree: ShDegree): number => 3 * shCoefficientCount(de
 export const chunksOf = (splats: number): number => Math.ceil(splats / constants.CULL_GROUP);
 
 /** Room for a level of merged splats. */
-export function emptyLevel(count: number, { shDegree, dilation }: SplatLevel): SplatLevel {
+export function emptyLevel(count: number, { shDegree, dilation }: LevelSource): SplatLevel {
+  const stride = shNumbers(shDegree);
+  const sh = new Float32Array(stride * count);
   return {
-    count,
+    ...{ count, sh, shDegree, dilation },
     positions: new Float32Array(3 * count),
     factors: new Float32Array(FACTOR_NUMBERS * count),
     opacities: new Float32Array(count),
-    sh: new Float32Array(shNumbers(shDegree) * count),
-    shDegree,
-    dilation,
     spreads: new Float32Array(count),
+    readSh: (first, some, out) => out.set(sh.subarray(stride * first, stride * (first + some))),
   };
 }
 
@@ -54,13 +60,25 @@ export function leafLevel(cloud: GaussianCloud, kept: Uint32Array): SplatLevel {
   const factor = new Float64Array(FACTOR_NUMBERS);
   for (let k = 0; k < count; k++) {
     const i = kept[k];
-    for (let axis = 0; axis < 3; axis++) positions[3 * k + axis] = cloud.positions[3 * i + axis];
+    positions[3 * k] = cloud.positions[3 * i];
+    positions[3 * k + 1] = cloud.positions[3 * i + 1];
+    positions[3 * k + 2] = cloud.positions[3 * i + 2];
     scaleRotationFactor(cloud, i, factor);
-    factors.set(factor, FACTOR_NUMBERS * k);
+    for (let n = 0; n < FACTOR_NUMBERS; n++) factors[FACTOR_NUMBERS * k + n] = factor[n];
     opacities[k] = Math.min(1, Math.max(0, cloud.opacities[i]));
   }
   const { sh, shDegree, antialiased } = cloud;
   const dilation = antialiased ? 0 : constants.DILATION;
   const spreads = new Float32Array(count);
-  return { count, positions, factors, opacities, sh, shOrder: kept, shDegree, dilation, spreads };
+  const readSh = gatherer(sh, shNumbers(shDegree), kept);
+  return { count, positions, factors, opacities, sh, shOrder: kept, shDegree, dilation, spreads, readSh };
+}
+
+function gatherer(sh: Float32Array, stride: number, order: Uint32Array): LevelSource['readSh'] {
+  return (first, count, out) => {
+    for (let k = 0; k < count; k++) {
+      const from = stride * order[first + k];
+      for (let n = 0; n < stride; n++) out[stride * k + n] = sh[from + n];
+    }
+  };
 }

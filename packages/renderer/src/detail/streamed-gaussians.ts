@@ -4,9 +4,9 @@ import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
 import type { ShPrecision } from '../pack/sh.js';
-import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
 import { PAGE_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
-import { childrenOf, Residency } from './residency.js';
+import { ARRIVED, PageRows } from './page-rows.js';
+import { Residency } from './residency.js';
 import { listPages, NONE, type PageList } from './page-list.js';
 import { movePage, PagePool, slotBytes } from './page-pool.js';
 import { WishReader } from './wish-reader.js';
@@ -16,6 +16,10 @@ export interface StreamOptions {
   readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>;
   /** Bytes of GPU memory that resident splats may take, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */
   readonly memoryBudget?: number;
+  /**
+   * Milliseconds in which a page that has come takes the place of what stood for it, in {@link LEAST_STEPS} frames at least; 0 for at once. Default 400.
+   */
+  readonly arrivalMs?: number;
   /** Called when another frame is asked for: a page has come, or what the last view lacks is not known yet. */
   readonly onChange?: () => void;
   /** Called when a page does not come; what is above it stays on show, and it is asked for again after a while. */
@@ -29,6 +33,9 @@ const MOST_COMING = 8;
 const MOST_UPLOADS = 4;
 /** Milliseconds before a page that did not come is asked for again. */
 const RETRY_MS = 4_000;
+const ARRIVAL_MS = 400;
+/** Frames that a page takes to arrive at least, however slow they are. */
+const LEAST_STEPS = 16;
 
 interface Arrival {
   readonly page: number;
@@ -59,8 +66,13 @@ export class StreamedGaussians implements GaussianScene {
   readonly #reservation: Reservation;
   readonly #pool: PagePool;
   readonly #residency: Residency;
-  /** Detail rows of each slot, as on the GPU. */
-  readonly #rows: Float32Array<ArrayBuffer>[];
+  /** Of each slot. */
+  readonly #rows: PageRows[];
+  /** How much of their time has passed, 0 to 1, for the pages that arrive now. */
+  readonly #arriving = new Map<number, number>();
+  #steppedAt = 0;
+  /** Pages that the last look asks for, the most needed first. */
+  #wanted: number[] = [];
   readonly #abort = new AbortController();
   readonly #failedAt = new Map<number, number>();
   #arrivals: Arrival[] = [];
@@ -92,7 +104,7 @@ export class StreamedGaussians implements GaussianScene {
     }
     this.pages = this.#pool.pages;
     this.#residency = new Residency(this.#list, slots);
-    this.#rows = Array.from({ length: slots }, () => new Float32Array(DETAIL_NUMBERS * PAGE_CHUNKS));
+    this.#rows = Array.from({ length: slots }, () => new PageRows());
   }
 
   /**
@@ -124,12 +136,12 @@ export class StreamedGaussians implements GaussianScene {
     return this.#memory.byteLength;
   }
 
-  /** Pages on the GPU, all pages, and pages on their way. */
+  /** Pages on the GPU, all pages, and pages that are on their way or still taking the place of others. */
   get progress(): { readonly resident: number; readonly total: number; readonly coming: number } {
     return {
       resident: this.#residency.residents,
       total: this.#list.count,
-      coming: this.#coming + this.#arrivals.length,
+      coming: this.#coming + this.#arrivals.length + this.#arriving.size,
     };
   }
 
@@ -138,11 +150,12 @@ export class StreamedGaussians implements GaussianScene {
     return Array.from(this.#residency.pageIn, (page) => (page === NONE ? undefined : page));
   }
 
-  /** Uploads some of what has come. The renderer calls it before each frame. */
+  /** Uploads some of what has come, and lets what came before arrive further. The renderer calls it before each frame. */
   update(): void {
     const arrivals = this.#arrivals.splice(0, MOST_UPLOADS);
+    this.#step();
     for (const arrival of arrivals) this.#place(arrival);
-    if (this.#arrivals.length > 0) queueMicrotask(() => this.#options.onChange?.());
+    if (this.#arrivals.length + this.#arriving.size > 0) queueMicrotask(() => this.#options.onChange?.());
   }
 
   destroy(): void {
@@ -158,58 +171,82 @@ export class StreamedGaussians implements GaussianScene {
     const place = this.#residency.settle(page);
     if (place === undefined) return;
     const { slot, left } = place;
-    const chunks = this.#list.chunks[page];
-    movePage(words, this.#list.translate(page), this.#manifest, chunks);
-    this.#pool.write(slot, words, chunks);
-    if (left !== NONE) this.#setError(left, 'none');
-    this.#rows[slot].set(this.#rowsOf(page, words));
-    this.#pool.writeDetails(slot, this.#rows[slot]);
-    if (this.#list.parent[page] !== NONE) this.#setError(page, 'full');
+    const { upper, parent, parentChunk, chunks } = this.#list;
+    movePage(words, this.#list.translate(page), this.#manifest, chunks[page]);
+    this.#pool.write(slot, words, chunks[page]);
+    if (left !== NONE) this.#leave(left);
+    const rows = this.#rows[slot];
+    rows.load(this.#list, this.#manifest, page, words);
+    if (parent[page] !== NONE) rows.setAbove(upper[page], this.#rowsOf(parent[page]).above(parentChunk[page]));
+    const isAtOnce = parent[page] === NONE || this.#options.arrivalMs === 0;
+    if (!isAtOnce) this.#arriving.set(page, 0);
+    this.#setArrived(page, isAtOnce ? ARRIVED : 0);
     this.#version++;
   }
 
-  /** Rows of a page as they must be now: nothing below its finest chunks yet, and what is above them as that is in its slot. */
-  #rowsOf(page: number, words: Uint32Array<ArrayBuffer>): Float32Array<ArrayBuffer> {
-    const layout = pageLayout(this.#manifest, this.#list.chunks[page]);
-    const rows = new Float32Array(DETAIL_NUMBERS * PAGE_CHUNKS);
-    rows.set(new Float32Array(words.buffer, words.byteOffset + 4 * layout.chunks, layout.details));
-    const numbers = new Uint32Array(rows.buffer);
-    childrenOf(this.#list, page).forEach((child, chunk) => {
-      const at = DETAIL_NUMBERS * chunk;
-      numbers[at + DETAIL_PLACES.children] = child;
-      if (child !== NONE) rows[at + DETAIL_PLACES.error] = 0;
-    });
-    if (this.#list.parent[page] !== NONE) this.#takeParent(page, rows);
-    return rows;
-  }
-
-  /** The first chunks of a page, which have their parent in another, take its sphere and error over. */
-  #takeParent(page: number, rows: Float32Array): void {
-    const above = this.#rows[this.#residency.slotOf[this.#list.parent[page]]];
-    const at = DETAIL_NUMBERS * this.#list.parentChunk[page];
-    const sphere = above.subarray(at + DETAIL_PLACES.sphere, at + DETAIL_PLACES.sphere + 4);
-    for (let chunk = 0; chunk < this.#list.upper[page]; chunk++) {
-      rows.set(sphere, DETAIL_NUMBERS * chunk + DETAIL_PLACES.parentSphere);
-      rows[DETAIL_NUMBERS * chunk + DETAIL_PLACES.parentError] = above[at + DETAIL_PLACES.fullError];
+  /** Lets arriving pages take the place of what stood for them by another step; none before the page above it. */
+  #step(): void {
+    const now = performance.now();
+    const passed = (now - this.#steppedAt) / (this.#options.arrivalMs ?? ARRIVAL_MS);
+    this.#steppedAt = now;
+    if (this.#arriving.size === 0) return;
+    const step = Math.min(1 / LEAST_STEPS, passed);
+    for (const [page, before] of this.#arriving) {
+      const most = this.#arriving.get(this.#list.parent[page]) ?? 1;
+      const passedNow = Math.min(most, before + step);
+      if (passedNow === 1) this.#arriving.delete(page);
+      else this.#arriving.set(page, passedNow);
+      this.#setArrived(page, Math.round(ARRIVED * eased(passedNow)));
     }
+    this.#version++;
   }
 
-  /** The chunk above a page gives way to it, or does not. */
-  #setError(page: number, which: 'full' | 'none'): void {
-    const slot = this.#residency.slotOf[this.#list.parent[page]];
-    const at = DETAIL_NUMBERS * this.#list.parentChunk[page];
-    const rows = this.#rows[slot];
-    rows[at + DETAIL_PLACES.error] = which === 'full' ? rows[at + DETAIL_PLACES.fullError] : 0;
-    this.#pool.writeDetails(slot, rows);
+  #rowsOf(page: number): PageRows {
+    return this.#rows[this.#residency.slotOf[page]];
+  }
+
+  /** How far a page has arrived: so far the chunk above gives way to it. */
+  #setArrived(page: number, arrived: number): void {
+    this.#rowsOf(page).setArrived(arrived);
+    this.#write(page);
+    this.#setBelow(page, arrived);
+  }
+
+  /** A page that is about to be overwritten: the chunk above is drawn again. */
+  #leave(page: number): void {
+    this.#arriving.delete(page);
+    this.#setBelow(page, 0);
+  }
+
+  #setBelow(page: number, arrived: number): void {
+    const parent = this.#list.parent[page];
+    if (parent === NONE) return;
+    this.#rowsOf(parent).setBelow(this.#list.parentChunk[page], arrived);
+    this.#write(parent);
+  }
+
+  #write(page: number): void {
+    const slot = this.#residency.slotOf[page];
+    this.#pool.writeDetails(slot, this.#rows[slot].numbers);
   }
 
   #take(wishes: Float32Array): void {
     if (this.#abort.signal.aborted) return;
     this.#residency.note(wishes);
-    for (const page of this.#residency.missing) {
-      if (this.#coming >= MOST_COMING) break;
-      if (performance.now() - (this.#failedAt.get(page) ?? -Infinity) < RETRY_MS) continue;
+    this.#wanted = this.#residency.missing;
+    this.#fetchWanted();
+  }
+
+  /** Sends for the pages that are needed most, as many as may be on their way. */
+  #fetchWanted(): void {
+    while (this.#coming < MOST_COMING && this.#wanted.length > 0) {
+      const page = this.#wanted.shift()!;
+      const hasFailed = performance.now() - (this.#failedAt.get(page) ?? -Infinity) < RETRY_MS;
+      // What was above it may have left since the look.
+      if (hasFailed || !this.#residency.lacks(page) || !this.#residency.isResident(this.#list.parent[page])) continue;
       if (this.#residency.begin(page)) void this.#bring(page);
+      // What is needed less finds no room either.
+      else this.#wanted = [];
     }
   }
 
@@ -225,7 +262,9 @@ export class StreamedGaussians implements GaussianScene {
     } finally {
       this.#coming--;
     }
-    if (!this.#abort.signal.aborted) this.#options.onChange?.();
+    if (this.#abort.signal.aborted) return;
+    this.#fetchWanted();
+    this.#options.onChange?.();
   }
 
   async #fetch(page: number): Promise<Uint32Array<ArrayBuffer>> {
@@ -242,6 +281,9 @@ export class StreamedGaussians implements GaussianScene {
     });
   }
 }
+
+/** Slow at both ends: an opaque splat in the share w has the opacity 1 − (1 − a)^w, which is a third at the first of sixteen even steps. */
+const eased = (t: number): number => t * t * (3 - 2 * t);
 
 function slotsFor(manifest: DetailManifest, pages: number, budget: number): number {
   const slots = Math.min(pages, Math.floor(budget / slotBytes(manifest)));

@@ -11,7 +11,7 @@ const { CULL_GROUP } = constants;
 export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): DetailTree {
   const top = tree.levels.length - 1;
   const finest = copiesOf(tree.levels[top], places);
-  const levels = [...levelsAbove(finest)];
+  const levels = [finest, ...levelsAbove(finest)];
   const { radius } = tree.bounds;
   return {
     ...treeOf(levels, errorsOfCopies(tree.errors[top], places)),

@@ -52,18 +52,10 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
 /**
  * Packs a cloud for {@link GaussianBuffers.upload}: neighbours in space become neighbours in memory, 32 bytes of geometry a
  * splat (positions in float32, the covariance's root to 14 significant bits, opacities to 20) and its spherical
- * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`.
+ * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`. Of a cloud with `levelRuns` all splats are drawn; `packLevelRuns` chooses.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
-  return packUsable(given, options).packed;
-}
-
-/** {@link packGaussians}, with the cloud that was packed and the index in it of each packed splat. */
-export function packUsable(
-  given: GaussianCloud,
-  options: PackOptions,
-): { packed: PackedGaussians; cloud: GaussianCloud; kept: Uint32Array } {
   validateCloud(given);
   const cloud = recentred(given);
   const { shDegree, antialiased, origin } = cloud;
@@ -71,13 +63,21 @@ export function packUsable(
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
-  const packed = {
-    ...{ count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount },
+  const facts = { count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount };
+  return { ...facts, ...packKept(cloud, kept, shPrecision) };
+}
+
+/** The bytes of some splats of a cloud, in that order. */
+export function packKept(
+  cloud: GaussianCloud,
+  kept: Uint32Array,
+  shPrecision: ShPrecision,
+): Pick<PackedGaussians, 'geometry' | 'sh' | 'chunks'> {
+  return {
     geometry: packGeometry(cloud, kept),
     sh: packSh(cloud, kept, shPrecision),
     chunks: boundChunks(cloud, kept),
   };
-  return { packed, cloud, kept };
 }
 
 /** Index in the cloud of each packed splat. */
@@ -85,7 +85,8 @@ export function packedOrder(cloud: GaussianCloud): Uint32Array {
   return mortonOrder(cloud.positions, usableIndices(cloud));
 }
 
-function usableIndices(cloud: GaussianCloud): Uint32Array {
+/** Indices of the splats that can be drawn, ascending. */
+export function usableIndices(cloud: GaussianCloud): Uint32Array {
   const indices = new Uint32Array(cloud.count);
   let kept = 0;
   for (let i = 0; i < cloud.count; i++) if (isUsable(cloud, i)) indices[kept++] = i;

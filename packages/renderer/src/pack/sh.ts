@@ -8,13 +8,13 @@ export type ShPrecision = 'int8' | 'float16';
 export const SH_PRECISION: Record<ShPrecision, number> = { int8: 0, float16: 1 };
 
 /** Coefficients, three channels each, of bands 1, 2 and 3. */
-const BAND_SIZES = [3, 5, 7] as const;
+export const BAND_SIZES = [3, 5, 7] as const;
 /** Where the scale of each band lies, in bytes from the start of a splat. */
-const SCALE_BYTES = [6, 7, 53] as const;
-const FIRST_CODE_BYTE = 8;
+export const SCALE_BYTES = [6, 7, 53] as const;
+export const FIRST_CODE_BYTE = 8;
 /** A scale of code k is 2^(k / 8 - 16). */
-const SCALE_STEPS = 8;
-const SCALE_BIAS = 16;
+export const SCALE_STEPS = 8;
+export const SCALE_BIAS = 16;
 const MAX_CODE = 255;
 
 /** PSNR of a single splat, rounded as `int8`, that {@link choosePrecision} asks for on average: images then lose no more than 75 dB of noise. */
@@ -93,7 +93,7 @@ function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
       bytes[at + SCALE_BYTES[band]] = packBand(sh, first, size, codes);
       // Degree 1 has nine codes and room for eight: the last takes the place of the scale of band 2.
       const behind = Math.min(size, stride - (code - at));
-      bytes.set(codes.subarray(0, behind), code);
+      for (let k = 0; k < behind; k++) bytes[code + k] = codes[k];
       if (behind < size) bytes[at + SCALE_BYTES[1]] = codes[behind];
       first += size;
       code += size;

@@ -1,0 +1,116 @@
+import type { DetailChoice } from '../attributes.js';
+import type { DetailLevers, GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+
+/** Splats of a scene from which on levels are worth building unasked: below, what is slow is not the number of splats. */
+const LEAST_SPLATS = 50_000;
+/** Splats up to which they are built unasked: all of them are read back and merged in the page's memory, some 150 bytes of each. */
+const MOST_SPLATS = 8_000_000;
+/** How long moving pictures must have been less than the whole before levels are built, ms: the first frames of a scene are often slow. */
+const PATIENCE_MS = 1_500;
+
+export interface DetailOptions {
+  /** The attribute. */
+  readonly detail: () => DetailChoice;
+  readonly loader: () => SceneLoader;
+  readonly memoryBudget: () => number | undefined;
+  /** Another picture is due. */
+  readonly onChange: () => void;
+  readonly warn: (sentence: string) => void;
+}
+
+/** Sees to levels of detail: built when the page asks for them, or when pictures in motion cannot be drawn whole; and drawn as far as the page allows. */
+export class DetailController {
+  readonly #options: DetailOptions;
+  #scene: GpuScene | null = null;
+  /** What a streamed scene came with. */
+  #own: DetailLevers = {};
+  /** Splats whose levels are there, on their way, or not to be had. */
+  #of: OwnedGaussians | undefined;
+  #running = new AbortController();
+  #choice: DetailChoice = 'auto';
+  #isPressed = false;
+  #patience: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(options: DetailOptions) {
+    this.#options = options;
+  }
+
+  /** Looks at the scene that is on show whole, or null for none, and at the attribute. Safe to call as often as one likes. */
+  update(scene: GpuScene | null): void {
+    if (scene !== this.#scene) this.#begin(scene);
+    if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
+    this.#allow(scene, this.#options.detail());
+    if (scene.hasOwnLevels) return;
+    if (this.#choice === 'off') return this.#dismiss(scene);
+    if (this.#of === scene.gaussians || !this.#isWorthIt(scene)) return;
+    void this.#build(scene);
+  }
+
+  /** Tells whether pictures in motion are drawn whole. */
+  notePace(isWhole: boolean): void {
+    if (isWhole) clearTimeout(this.#patience);
+    if (isWhole) this.#patience = undefined;
+    if (isWhole || this.#isPressed) return;
+    this.#patience ??= setTimeout(() => {
+      this.#isPressed = true;
+      if (this.#scene) this.update(this.#scene);
+    }, PATIENCE_MS);
+  }
+
+  #begin(scene: GpuScene | null): void {
+    this.#stop();
+    clearTimeout(this.#patience);
+    this.#patience = undefined;
+    this.#isPressed = false;
+    this.#scene = scene;
+    this.#own = scene?.detail ?? {};
+    this.#choice = 'auto';
+  }
+
+  #stop(): void {
+    this.#running.abort();
+    this.#running = new AbortController();
+    this.#of = undefined;
+  }
+
+  /** Lets pictures be off by so much from now on. */
+  #allow(scene: GpuScene, choice: DetailChoice): void {
+    if (choice === this.#choice) return;
+    this.#choice = choice;
+    const pixels = choice === 'auto' ? this.#own.detail : choice === 'off' ? 0 : choice;
+    scene.setDetail({ ...this.#own, detail: pixels });
+    this.#options.onChange();
+  }
+
+  #dismiss(scene: GpuScene): void {
+    this.#stop();
+    scene.setLevels(undefined);
+  }
+
+  #isWorthIt({ gaussians: { count } }: GpuScene): boolean {
+    if (typeof this.#choice === 'number') return this.#choice > 0;
+    return this.#isPressed && count >= LEAST_SPLATS && count <= MOST_SPLATS;
+  }
+
+  async #build(scene: GpuScene): Promise<void> {
+    this.#stop();
+    const { gaussians } = scene;
+    this.#of = gaussians;
+    const { signal } = this.#running;
+    const { loader, memoryBudget, onChange, warn } = this.#options;
+    try {
+      const { buildLevels } = await import('../detail/build-levels.js');
+      signal.throwIfAborted();
+      const levels = await buildLevels(scene, loader(), memoryBudget(), signal);
+      // An economy may have put other splats in their place meanwhile.
+      if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
+      scene.setLevels(levels);
+      onChange();
+    } catch (error) {
+      if (signal.aborted || scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
+      const reason = error instanceof Error ? error.message : String(error);
+      warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);
+    }
+  }
+}

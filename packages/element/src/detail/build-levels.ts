@@ -1,0 +1,27 @@
+/** Loaded only where levels of detail are asked for, or the GPU is too slow without. */
+import { DetailedGaussians, readPacked } from '@gaussian-splat/renderer';
+import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
+
+/**
+ * Builds levels of detail of the splats that a scene has on the GPU, in the worker, and puts them beside these. undefined where there are none to be had: see
+ * `SceneLoader.buildLevels`.
+ * @param memoryBudget bytes of GPU memory that the scene and its levels may take together; undefined for no limit but the device's
+ * @throws GaussianSplatError `out-of-memory/*`, or the signal's reason
+ */
+export async function buildLevels(
+  { device, gaussians }: GpuScene,
+  loader: SceneLoader,
+  memoryBudget: number | undefined,
+  signal: AbortSignal,
+): Promise<DetailedGaussians | undefined> {
+  const packed = await readPacked(device, gaussians);
+  signal.throwIfAborted();
+  const levels = await loader.buildLevels(packed, signal);
+  if (levels === undefined) return undefined;
+  const left = memoryBudget === undefined ? undefined : memoryBudget - gaussians.byteLength;
+  const detailed = await DetailedGaussians.upload(device, gaussians, levels, { memoryBudget: left });
+  if (!signal.aborted) return detailed;
+  detailed.destroy();
+  throw signal.reason;
+}

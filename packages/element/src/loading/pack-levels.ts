@@ -1,0 +1,9 @@
+/** Loaded only for files that bring levels of detail. */
+import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import { packLevelRuns } from '@gaussian-splat/renderer';
+import type { LoadedScene, SceneRequest } from './protocol.js';
+
+export const packLevels = (cloud: GaussianCloud, sh: SceneRequest['sh']): LoadedScene => ({
+  packed: packLevelRuns(cloud, { sh }),
+  bounds: boundsOf(cloud),
+});

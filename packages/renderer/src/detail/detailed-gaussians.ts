@@ -1,0 +1,94 @@
+import type { ShDegree, Vector3 } from '@gaussian-splat/core';
+import { GaussianBuffers, type UploadOptions } from '../gaussian-buffers.js';
+import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
+import { constants } from '../generated/shaders.js';
+import { BUFFER_USAGE } from '../gpu/kernel.js';
+import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
+import type { ShPrecision } from '../pack/sh.js';
+import { DETAIL_NUMBERS } from './chunk-detail.js';
+import type { PackedLevels } from './packed-levels.js';
+
+/**
+ * A scene on the GPU to which levels of detail have been added: its own splats, where they are, and the coarser ones beside them. With the lever `detail` at 0 the
+ * picture is that of the scene, byte for byte.
+ */
+export class DetailedGaussians implements GaussianScene {
+  /** Splats of all levels together. */
+  readonly count: number;
+  readonly shDegree: ShDegree;
+  readonly shPrecision: ShPrecision;
+  readonly antialiased: boolean;
+  readonly origin: Vector3;
+  readonly pages: readonly GaussianPage[];
+  readonly #leaves: GaussianScene;
+  readonly #coarser: GaussianBuffers;
+  readonly #memory: GpuMemory;
+
+  private constructor(device: GPUDevice, leaves: GaussianScene, details: Float32Array, coarser: GaussianBuffers) {
+    this.#leaves = leaves;
+    this.#coarser = coarser;
+    this.#memory = new GpuMemory(device);
+    ({
+      shDegree: this.shDegree,
+      shPrecision: this.shPrecision,
+      antialiased: this.antialiased,
+      origin: this.origin,
+    } = leaves);
+    this.count = leaves.count + coarser.count;
+    try {
+      this.pages = [...withDetails(leaves.pages, details, this.#memory), ...coarser.pages];
+    } catch (error) {
+      this.#memory.destroy();
+      throw error;
+    }
+  }
+
+  /**
+   * Adds levels to a scene that is on the GPU; it stays the caller's, and must live as long as this.
+   * @param levels of exactly this scene, from `buildPackedLevels`
+   * @throws GaussianSplatError `out-of-memory/budget` if the levels alone take more than `memoryBudget`, `out-of-memory/allocation` if there is no room.
+   */
+  static async upload(
+    device: GPUDevice,
+    leaves: GaussianScene,
+    { leafDetails, coarser }: PackedLevels,
+    options: UploadOptions = {},
+  ): Promise<DetailedGaussians> {
+    const own = await GaussianBuffers.upload(device, coarser, options);
+    try {
+      const what = `levels of detail of ${leaves.count} splats`;
+      return await withMemoryCheck(device, what, () => new DetailedGaussians(device, leaves, leafDetails, own));
+    } catch (error) {
+      own.destroy();
+      throw error;
+    }
+  }
+
+  get version(): number {
+    return this.#leaves.version;
+  }
+
+  /** Bytes of GPU memory that the levels take, the scene itself not counted. */
+  get byteLength(): number {
+    return this.#memory.byteLength + this.#coarser.byteLength;
+  }
+
+  /** Frees the levels, and leaves the scene alone. */
+  destroy(): void {
+    this.#memory.destroy();
+    this.#coarser.destroy();
+  }
+}
+
+/** The same pages, each with the rows of its chunks. */
+function withDetails(pages: readonly GaussianPage[], details: Float32Array, memory: GpuMemory): GaussianPage[] {
+  const words = new Uint32Array(details.buffer, details.byteOffset, details.length);
+  const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
+  let start = 0;
+  return pages.map((page) => {
+    const end = start + DETAIL_NUMBERS * Math.ceil(page.count / constants.CULL_GROUP);
+    const rows = memory.buffer('gs.gaussians.details', 4 * (end - start), usage, words.subarray(start, end));
+    start = end;
+    return { ...page, details: rows };
+  });
+}

@@ -1,0 +1,165 @@
+import { validateCloud, type GaussianCloud, type LevelRun } from '@gaussian-splat/core';
+import { constants } from '../generated/shaders.js';
+import { CHUNK_NUMBERS } from '../pack/chunks.js';
+import { GEOMETRY_WORDS, packKept, usableIndices, type PackedGaussians, type PackOptions } from '../pack/pack.js';
+import { recentred } from '../pack/recentre.js';
+import { mortonOrder } from '../pack/morton.js';
+import { choosePrecision, shWords, type ShPrecision } from '../pack/sh.js';
+import { detailRows, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
+import { packFiller } from './pack-level.js';
+import { chunksOf } from './splat-level.js';
+
+const { CULL_GROUP } = constants;
+
+/** A run of usable splats, neighbours together. */
+interface PackedRun extends LevelRun {
+  readonly kept: Uint32Array;
+  /** See {@link spacingOf}, world units. */
+  readonly spacing: number;
+}
+
+/**
+ * Packs a cloud whose file has levels of detail of its own (`levelRuns`), each run from a chunk's start on: of every node the level is drawn whose error on screen is small
+ * enough, by the rule of all levels of detail.
+ * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
+ */
+export function packLevelRuns(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
+  validateCloud(given);
+  const cloud = recentred(given);
+  const usable = usableIndices(cloud);
+  const { sh = 'auto' } = options;
+  const droppedCount = cloud.droppedCount + cloud.count - usable.length;
+  return { ...packRuns(cloud, usable, sh === 'auto' ? choosePrecision(cloud, usable) : sh), droppedCount };
+}
+
+function packRuns(
+  cloud: GaussianCloud,
+  usable: Uint32Array,
+  shPrecision: ShPrecision,
+): Omit<PackedGaussians, 'droppedCount'> {
+  const runs = keptRuns(cloud, usable);
+  const count = CULL_GROUP * runs.reduce((sum, { kept }) => sum + chunksOf(kept.length), 0);
+  const { shDegree, antialiased, origin } = cloud;
+  const stride = shWords(shDegree, shPrecision);
+  const packed = {
+    ...{ count, shDegree, shPrecision, antialiased, origin },
+    geometry: new Uint32Array(GEOMETRY_WORDS * count),
+    sh: new Uint32Array(stride * count),
+    chunks: new Float32Array((CHUNK_NUMBERS * count) / CULL_GROUP),
+    details: new Float32Array((DETAIL_NUMBERS * count) / CULL_GROUP),
+    leafCount: finestOf(runs).reduce((sum, { kept }) => sum + kept.length, 0),
+  };
+  let start = 0;
+  const firstChunks = runs.map(({ kept }) => {
+    const part = packKept(cloud, kept, shPrecision);
+    packed.geometry.set(part.geometry, GEOMETRY_WORDS * start);
+    packed.sh.set(part.sh, stride * start);
+    packed.chunks.set(part.chunks, (CHUNK_NUMBERS * start) / CULL_GROUP);
+    const end = start + CULL_GROUP * chunksOf(kept.length);
+    packFiller(packed.geometry, start + kept.length, end);
+    const firstChunk = start / CULL_GROUP;
+    start = end;
+    return firstChunk;
+  });
+  writeDetails(packed, runs, firstChunks);
+  return packed;
+}
+
+/** Runs with anything in them, those of one node together, the finest of it first. */
+function keptRuns({ positions, levelRuns = [] }: GaussianCloud, usable: Uint32Array): PackedRun[] {
+  const byPlace = [...levelRuns].sort((a, b) => a.first - b.first);
+  let at = 0;
+  return byPlace
+    .map((run) => {
+      const from = at;
+      while (at < usable.length && usable[at] < run.first + run.count) at++;
+      const kept = mortonOrder(positions, usable.slice(from, at));
+      return { ...run, kept, spacing: spacingOf(positions, kept) };
+    })
+    .filter(({ kept }) => kept.length > 0)
+    .sort((a, b) => a.node - b.node || a.level - b.level);
+}
+
+const finestOf = (runs: readonly PackedRun[]): PackedRun[] => runs.filter(({ node }, r) => runs[r - 1]?.node !== node);
+
+/** Splats whose nearest neighbour is looked for, and among how many before and behind them in the order. */
+const SAMPLE = 128;
+const REACH = 512;
+
+/** Width of the cells that the splats of a surface have each to itself: scattered at random, twice the distance of nearest neighbours. Their median. */
+function spacingOf(positions: Float32Array, kept: Uint32Array): number {
+  const count = Math.min(SAMPLE, kept.length);
+  const distances = Float64Array.from({ length: count }, (_, s) => {
+    const k = Math.floor((s * kept.length) / count);
+    let nearest = Infinity;
+    for (let j = Math.max(0, k - REACH); j < Math.min(kept.length, k + REACH); j++) {
+      if (j !== k) nearest = Math.min(nearest, squaredDistance(positions, 3 * kept[k], 3 * kept[j]));
+    }
+    return Math.sqrt(nearest);
+  }).sort();
+  const median = 2 * distances[count >> 1];
+  return Number.isFinite(median) ? median : 0;
+}
+
+function squaredDistance(positions: Float32Array, p: number, q: number): number {
+  const x = positions[p] - positions[q];
+  const y = positions[p + 1] - positions[q + 1];
+  const z = positions[p + 2] - positions[q + 2];
+  return x * x + y * y + z * z;
+}
+
+/**
+ * Twice the root mean square of how far points of a surface are from the nearest of splats scattered over it, 2 √(1/π) for cells 1 wide, and as much again (in squares)
+ * for the shape of a splat that is as wide as its cell.
+ */
+const CELL_ERROR = 1.6;
+
+/**
+ * How far a level displaces what it shows, world units: the file does not say, so it is taken from how far apart its splats are, and those of the finest
+ * level of its node. Grows from level to level.
+ */
+function errorsOf(runs: readonly PackedRun[]): number[] {
+  const errors: number[] = [];
+  let finest = 0;
+  runs.forEach(({ node, spacing }, r) => {
+    const isFinest = r === 0 || runs[r - 1].node !== node;
+    if (isFinest) finest = spacing;
+    const displaced = CELL_ERROR * Math.sqrt(Math.max(0, spacing ** 2 - finest ** 2));
+    errors.push(isFinest ? 0 : Math.max(displaced, 1.001 * errors[r - 1], Number.EPSILON * spacing));
+  });
+  return errors;
+}
+
+/** All levels of a node have one sphere, so that only their errors decide. */
+function writeDetails(
+  { chunks, details = new Float32Array(0) }: Pick<PackedGaussians, 'chunks' | 'details'>,
+  runs: readonly PackedRun[],
+  firstChunks: readonly number[],
+): void {
+  const errors = errorsOf(runs);
+  for (let from = 0; from < runs.length;) {
+    let end = from + 1;
+    while (end < runs.length && runs[end].node === runs[from].node) end++;
+    const lastChunk = firstChunks[end - 1] + chunksOf(runs[end - 1].kept.length);
+    const sphere = sphereAround(chunks, firstChunks[from], lastChunk);
+    const one = (error: number): ChunkErrors => ({ count: 1, spheres: sphere, errors: Float32Array.of(error) });
+    for (let r = from; r < end; r++) {
+      const row = detailRows(one(errors[r]), r + 1 < end ? one(errors[r + 1]) : undefined);
+      for (let c = 0; c < chunksOf(runs[r].kept.length); c++) details.set(row, DETAIL_NUMBERS * (firstChunks[r] + c));
+    }
+    from = end;
+  }
+}
+
+/** Centre and radius of a ball around the boxes of some chunks. */
+function sphereAround(chunks: Float32Array, first: number, end: number): Float32Array {
+  const corner = (axis: number, place: number, pick: (a: number, b: number) => number): number => {
+    let found = chunks[CHUNK_NUMBERS * first + place + axis];
+    for (let c = first; c < end; c++) found = pick(found, chunks[CHUNK_NUMBERS * c + place + axis]);
+    return found;
+  };
+  const low = [0, 1, 2].map((axis) => corner(axis, 0, Math.min));
+  const high = [0, 1, 2].map((axis) => corner(axis, 4, Math.max));
+  const center = low.map((x, axis) => (x + high[axis]) / 2);
+  return Float32Array.of(...center, Math.hypot(...high.map((x, axis) => x - center[axis])));
+}

@@ -1,0 +1,95 @@
+import { constants } from '../generated/shaders.js';
+import { CHUNK_NUMBERS } from '../pack/chunks.js';
+import { GEOMETRY_WORDS, type PackedGaussians } from '../pack/pack.js';
+import { shWords } from '../pack/sh.js';
+import { buildLevelsAbove } from './build-levels.js';
+import { boundLevel, detailRows, DETAIL_NUMBERS, leafErrors, parentErrors, type ChunkErrors } from './chunk-detail.js';
+import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
+import { packedLeaves } from './packed-leaves.js';
+import { chunksOf, type SplatLevel } from './splat-level.js';
+
+const { CULL_GROUP } = constants;
+
+/** The coarser levels of a packed scene, apart from it. Plain data with transferable buffers, so that a worker can make it. */
+export interface PackedLevels {
+  /** [ceil(N / 256), 12] numbers: `ChunkDetail` of each chunk of the scene itself. */
+  readonly leafDetails: Float32Array;
+  /** All coarser levels, one after the other, each from a chunk's start on, with `details`. */
+  readonly coarser: PackedGaussians;
+}
+
+/**
+ * Builds the levels of detail of a packed scene: a third as many splats as it has, that stand for four, sixteen and more of them. In steps of some ten
+ * milliseconds: take them with `next()` until `done`; undefined for a scene that is too small to have any.
+ */
+export function* buildPackedLevels(leaves: PackedGaussians): Generator<void, PackedLevels | undefined> {
+  if (chunksOf(leaves.count) <= 1) return undefined;
+  const levels = yield* buildLevelsAbove(packedLeaves(leaves));
+  const chunks = [leaves.chunks, ...levels.map(boundLevel)];
+  const details = detailsOf(levels, chunks);
+  const count = CULL_GROUP * levels.reduce((sum, level) => sum + chunksOf(level.count), 0);
+  const coarser = {
+    ...{ ...leaves, count, droppedCount: 0, leafCount: undefined },
+    geometry: new Uint32Array(GEOMETRY_WORDS * count),
+    sh: new Uint32Array(shWords(leaves.shDegree, leaves.shPrecision) * count),
+    chunks: concatenated(chunks.slice(1)),
+    details: concatenated(details.slice(1)),
+  };
+  yield* packLevels(levels, coarser);
+  return { leafDetails: details[0], coarser };
+}
+
+/** Splats that are packed in one step. */
+const PACKED_A_STEP = 64 * CULL_GROUP;
+
+function* packLevels(levels: readonly SplatLevel[], { geometry, sh, shPrecision }: PackedGaussians): Generator<void> {
+  let start = 0;
+  for (const level of levels) {
+    const stride = shWords(level.shDegree, shPrecision);
+    for (let from = 0; from < level.count; from += PACKED_A_STEP) {
+      const end = Math.min(level.count, from + PACKED_A_STEP);
+      packLevelGeometry(level, geometry, start + from, from, end);
+      sh.set(packLevelSh(level, shPrecision, from, end), stride * (start + from));
+      yield;
+    }
+    const end = start + CULL_GROUP * chunksOf(level.count);
+    packFiller(geometry, start + level.count, end);
+    start = end;
+  }
+}
+
+/** Rows of each level, the leaves first. */
+function detailsOf(levels: readonly SplatLevel[], chunks: readonly Float32Array[]): Float32Array[] {
+  const errors: ChunkErrors[] = [leafErrors(chunks[0])];
+  levels.forEach((level, k) => errors.push(parentErrors(level, chunks[k + 1], errors[k])));
+  return errors.map((own, k) => detailRows(own, errors[k + 1]));
+}
+
+/** A scene and its levels in one. */
+export function joinLevels(leaves: PackedGaussians, { leafDetails, coarser }: PackedLevels): PackedGaussians {
+  const start = CULL_GROUP * (leafDetails.length / DETAIL_NUMBERS);
+  const count = start + coarser.count;
+  const stride = shWords(leaves.shDegree, leaves.shPrecision);
+  const geometry = new Uint32Array(GEOMETRY_WORDS * count);
+  const sh = new Uint32Array(stride * count);
+  const chunks = new Float32Array((CHUNK_NUMBERS * count) / CULL_GROUP);
+  geometry.set(leaves.geometry);
+  geometry.set(coarser.geometry, GEOMETRY_WORDS * start);
+  packFiller(geometry, leaves.count, start);
+  sh.set(leaves.sh);
+  sh.set(coarser.sh, stride * start);
+  chunks.set(leaves.chunks);
+  chunks.set(coarser.chunks, leaves.chunks.length);
+  const details = concatenated([leafDetails, coarser.details!]);
+  return { ...leaves, count, geometry, sh, chunks, details, leafCount: leaves.count };
+}
+
+function concatenated(parts: readonly Float32Array[]): Float32Array {
+  const whole = new Float32Array(parts.reduce((sum, { length }) => sum + length, 0));
+  let at = 0;
+  for (const part of parts) {
+    whole.set(part, at);
+    at += part.length;
+  }
+  return whole;
+}

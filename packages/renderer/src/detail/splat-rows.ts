@@ -1,0 +1,64 @@
+/**
+ * Splats while they are merged, {@link ROW} float64 numbers of each in one piece: pairs of near neighbours are compared by the million, and then lie
+ * next to each other. The constants are places in a row.
+ */
+export const ROW = 16;
+
+export const [X, Y, Z] = [0, 1, 2] as const;
+/** Covariance, and its trace. */
+export const [XX, YY, ZZ, XY, XZ, YZ, TRACE] = [3, 4, 5, 6, 7, 8, 9] as const;
+/** Mean colour, of degree 0 alone. */
+export const [RED, GREEN, BLUE] = [10, 11, 12] as const;
+/** What a splat weighs in every mean: opacity times area of the splats that it stands for. */
+export const MASS = 13;
+export const OPACITY = 14;
+/** Mean square displacement so far. */
+export const SPREAD = 15;
+
+/** Area of the splat at `p`, its variances larger by `low`, in units of 2π: the sum of what the three axes see. */
+export function areaOf(rows: Float64Array, p: number, low = 0): number {
+  const xx = rows[p + XX] + low;
+  const yy = rows[p + YY] + low;
+  const zz = rows[p + ZZ] + low;
+  const xy = rows[p + XY];
+  const xz = rows[p + XZ];
+  const yz = rows[p + YZ];
+  return (
+    Math.sqrt(Math.max(0, xx * yy - xy * xy)) +
+    Math.sqrt(Math.max(0, xx * zz - xz * xz)) +
+    Math.sqrt(Math.max(0, yy * zz - yz * yz))
+  );
+}
+
+/** Writes a covariance from its lower triangular root, which is at `at` of `factors` as xx, yx, yy, zx, zy, zz. */
+export function covarianceOf(factors: Float32Array, at: number, rows: Float64Array, p: number): void {
+  const xx = factors[at];
+  const yx = factors[at + 1];
+  const yy = factors[at + 2];
+  const zx = factors[at + 3];
+  const zy = factors[at + 4];
+  const zz = factors[at + 5];
+  rows[p + XX] = xx * xx;
+  rows[p + XY] = xx * yx;
+  rows[p + XZ] = xx * zx;
+  rows[p + YY] = yx * yx + yy * yy;
+  rows[p + YZ] = yx * zx + yy * zy;
+  rows[p + ZZ] = zx * zx + zy * zy + zz * zz;
+  rows[p + TRACE] = rows[p + XX] + rows[p + YY] + rows[p + ZZ];
+}
+
+/** The root of a covariance (Cholesky); of flat splats and needles with zeros where rounding has left less than nothing. */
+export function factorOf(rows: Float64Array, p: number, out: Float32Array, at: number): void {
+  const xx = Math.sqrt(Math.max(0, rows[p + XX]));
+  const inverseX = xx > 0 ? 1 / xx : 0;
+  const yx = rows[p + XY] * inverseX;
+  const zx = rows[p + XZ] * inverseX;
+  const yy = Math.sqrt(Math.max(0, rows[p + YY] - yx * yx));
+  const zy = yy > 0 ? (rows[p + YZ] - yx * zx) / yy : 0;
+  out[at] = xx;
+  out[at + 1] = yx;
+  out[at + 2] = yy;
+  out[at + 3] = zx;
+  out[at + 4] = zy;
+  out[at + 5] = Math.sqrt(Math.max(0, rows[p + ZZ] - zx * zx - zy * zy));
+}
