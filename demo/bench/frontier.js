@@ -2,7 +2,7 @@
  * The frontier page: accuracy and time of every configuration of scripts/frontier/configurations.mjs on one scene, path and
  * size. All comparing is done here, so that only numbers leave the machine that it runs on.
  */
-import { configurations, ladder } from '../../scripts/frontier/configurations.mjs';
+import { configurations as table } from '../../scripts/frontier/configurations.mjs';
 import { camerasAlong } from './scene/paths.js';
 import { showError, showProgress, showResults } from './page/show.js';
 import { DEFAULTS, readConfigurations, readRun } from './run/configuration.js';
@@ -17,7 +17,7 @@ import { makeReferences } from './quality/reference.js';
 
 const query = new URLSearchParams(location.search);
 
-/** The lines of the table (`table=ladder`: of the ladder) that `only` (a regular expression over names) leaves, on the scene that the address describes. */
+/** The table's lines that `only` (a regular expression over names) leaves, on the scene that the address describes. */
 async function chosen() {
   const [base] = await readConfigurations(query, () => []);
   const only = new RegExp(query.get('only') ?? '', 'i');
@@ -27,7 +27,6 @@ async function chosen() {
       base[key],
     ]),
   );
-  const table = query.get('table') === 'ladder' ? ladder : configurations;
   const entries = table.filter(({ name }) => only.test(name)).map((line) => ({ ...DEFAULTS, ...line, ...common }));
   if (entries.length === 0) throw new RangeError(`only: no configuration's name matches ${only}`);
   return { common, entries };

@@ -42,24 +42,3 @@ export const configurations = [
   { name: 'Spark', tier: 'peer', peer: 'spark' },
   { name: 'Spark, parity', tier: 'peer', peer: 'spark', parity: true },
 ];
-
-const BALANCED = { depthKeyBits: 16, occludedBelow: 0.03, transmittanceMin: 1 / 255, alphaMin: 1.1 / 255 };
-const FAST = { depthKeyBits: 16, occludedBelow: 0.1, transmittanceMin: 1 / 100, alphaMin: 1.25 / 255 };
-const SCALES = [0.84, 0.71, 0.59, 0.5, 0.42, 0.35, 0.25];
-
-/**
- * The ladder of pictures in motion (packages/element/src/pace/ladder.ts) rung by rung, and fewer pixels alone, to tell in which order the levers come. Measured by
- * `npm run frontier -- --ladder`; tests/element/ladder.test.ts holds the two tables together.
- */
-export const ladder = [
-  { name: 'whole', tier: 'rung' },
-  { name: 'balanced', tier: 'rung', options: BALANCED },
-  { name: 'fast', tier: 'rung', options: FAST },
-  ...SCALES.map((resolutionScale) => ({
-    name: `fast at ${resolutionScale}`,
-    tier: 'rung',
-    options: { ...FAST, resolutionScale },
-  })),
-  { name: 'whole at 0.84', tier: 'lever', options: { resolutionScale: 0.84 } },
-  { name: 'whole at 0.5', tier: 'lever', options: { resolutionScale: 0.5 } },
-];

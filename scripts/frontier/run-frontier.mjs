@@ -17,7 +17,6 @@ const USAGE = `usage: npm run frontier -- [options]
   --views N         views that are compared with the reference (default 4)
   --frames N        frames of each visit (default 5)
   --rounds N        visits to each configuration, in alternating order (default 2)
-  --ladder          the rungs of pictures in motion instead; writes ladder-ADAPTER.json, and no chart
   --only REGEX      only configurations whose name matches
   --scene FILE      a scene of yours instead of the one that ships
   --query TEXT      anything else for the page's address, for example "reference=renderer"
@@ -41,7 +40,6 @@ function readOptions() {
       frames: text('5'),
       rounds: text('2'),
       only: text(''),
-      ladder: { type: 'boolean', default: false },
       scene: { type: 'string' },
       query: text(''),
       from: { type: 'string' },
@@ -52,7 +50,7 @@ function readOptions() {
   return values;
 }
 
-async function collect({ size, splats, path, distance, views, frames, rounds, only, ladder, scene, query }) {
+async function collect({ size, splats, path, distance, views, frames, rounds, only, scene, query }) {
   const asked = {
     sizes: size,
     splats,
@@ -64,7 +62,6 @@ async function collect({ size, splats, path, distance, views, frames, rounds, on
     only,
     warmup: '2',
     phases: 'gpu,wall',
-    ...(ladder ? { table: 'ladder' } : {}),
   };
   const more = Object.fromEntries(new URLSearchParams(query));
   return runPage(
@@ -86,15 +83,6 @@ function slugOf(adapter) {
     .replace(/[^a-z0-9]+/g, '-')
     .replace(/^-|-$/g, '')
     .slice(0, 40);
-}
-
-/** What the ladder needs of a report: for each rung the least time that a frame took (others may use the machine, too) and its accuracy. */
-function ladderOf({ environment: { date, adapter, versions }, run, scene, results }) {
-  const rungs = results.map(({ configuration, error, quality, span, wall }) => {
-    if (error) throw new Error(`${configuration.name}: ${error}`);
-    return { name: configuration.name, options: configuration.options, ms: (span ?? wall).least, psnr: quality.psnr };
-  });
-  return { kind: 'ladder', environment: { date, adapter, versions }, run, scene, rungs };
 }
 
 function describe(report) {
@@ -121,13 +109,11 @@ async function main() {
   if (report.error) throw new Error(report.error);
   const folder = resolve(from, options.out);
   mkdirSync(folder, { recursive: true });
-  const slug = slugOf(report.environment.adapter);
-  const name = join(folder, `${options.ladder ? 'ladder' : 'frontier'}-${slug}`);
-  const figures = options.ladder ? ladderOf(report) : report;
-  writeFileSync(`${name}.json`, `${JSON.stringify(figures, null, 2)}\n`);
-  if (!options.ladder) writeFileSync(`${name}.svg`, drawChart(report));
+  const name = join(folder, `frontier-${slugOf(report.environment.adapter)}`);
+  writeFileSync(`${name}.json`, `${JSON.stringify(report, null, 2)}\n`);
+  writeFileSync(`${name}.svg`, drawChart(report));
   console.log(describe(report));
-  console.log(`${name}.${options.ladder ? 'json' : 'svg'}`);
+  console.log(`${name}.svg`);
   if (report.errors.length > 0) throw new Error(`WebGPU: ${report.errors.join('\n')}`);
 }
 

@@ -9,15 +9,9 @@ export function quantile(values, share) {
 
 const rounded = (value) => (value === undefined ? undefined : Number(value.toFixed(4)));
 
-/** Median, 95th percentile and the least of all, in the unit of the values. */
+/** Median and 95th percentile, in the unit of the values. */
 export const summarize = (values) =>
-  values.length === 0
-    ? undefined
-    : {
-        p50: rounded(quantile(values, 0.5)),
-        p95: rounded(quantile(values, 0.95)),
-        least: rounded(Math.min(...values)),
-      };
+  values.length === 0 ? undefined : { p50: rounded(quantile(values, 0.5)), p95: rounded(quantile(values, 0.95)) };
 
 /** From the first pass's begin to the last one's end: passes may overlap, so their sum would say too much. */
 export function spanOf(passes) {
