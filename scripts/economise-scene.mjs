@@ -3,7 +3,7 @@ import { readFileSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
-import { dealtViewsAround, dealViews, economise, GpuScorer, Studio } from '@gaussian-splat/economise';
+import { dealtViewsAround, dealViews, economise, GpuScorer, Studio, viewsBetween } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
@@ -13,7 +13,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
   --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
-                  ten are held out, one is for the search. Default: 86 views around the subject, 6 of them held out
+                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 86 views around the subject, 6 of them held out
   --scorer NAME   what measures contributions: gpu (the compute rasterizer), cpu, or auto (default): gpu where there is one
   --report FILE   the figures as JSON
 `;
@@ -60,7 +60,7 @@ function readViews(path, bounds) {
   if (path === undefined) return dealtViewsAround(bounds);
   const { views } = JSON.parse(readFileSync(resolve(from, path), 'utf8'));
   const dealt = dealViews(views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`)));
-  if (dealt.heldOut.length > 0) return dealt;
+  if (dealt.heldOut.length > 0) return { ...dealt, scored: [...dealt.scored, ...viewsBetween(dealt.scored)] };
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
 }
 

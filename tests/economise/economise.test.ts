@@ -1,7 +1,7 @@
 /** What the economiser measures, chooses and writes. Images are drawn on the CPU, but for one that the renderer is held against. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, eyeOf, type GaussianCloud } from '@gaussian-splat/core';
 import {
   cpuPainter,
   cpuScorer,
@@ -18,6 +18,7 @@ import {
   scoreSplats,
   Studio,
   viewsAround,
+  viewsBetween,
 } from '@gaussian-splat/economise';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
@@ -42,7 +43,12 @@ function ball(): GaussianCloud {
 
 const scene = ball();
 const views = dealtViewsAround(boundsOf(scene), SIZE);
-const scored = scoreSplats(scene, views.scored.slice(0, 24), cpuScorer(scene));
+const fewer = {
+  scored: views.scored.slice(0, 24),
+  searched: views.searched.slice(0, 3),
+  heldOut: views.heldOut.slice(0, 3),
+};
+const scored = scoreSplats(scene, fewer.scored, cpuScorer(scene));
 
 test("the CPU's images are the renderer's", async () => {
   const studio = new Studio(await nodeDevice(), 'default');
@@ -73,6 +79,47 @@ test('the compute rasterizer finds the contributions that the CPU finds', async 
   gpu.destroy();
 });
 
+test('what a splat is said to cost is what the image lacks without it', async () => {
+  const [view] = fewer.heldOut;
+  const { removal, peak } = await cpuScorer(scene)(view);
+  const said = removal.slice();
+  const [whole] = await cpuPainter.draw(scene, [view]);
+  const tried = [...peak.keys()].filter((i) => peak[i] > 0.05).slice(0, 6);
+  assert.equal(tried.length, 6);
+  for (const missing of tried) {
+    const opacities = scene.opacities.slice();
+    opacities[missing] = 0;
+    const [without] = await cpuPainter.draw({ ...scene, opacities }, [view]);
+    const colours = whole.map((value, k) => (k % 4 === 3 ? 0 : (value - without[k]) ** 2));
+    const found = colours.reduce((sum, square) => sum + square, 0) / (3 * view.width * view.height);
+    assert.ok(
+      Math.abs(found - said[missing]) < 0.02 * found,
+      `splat ${missing}: ${said[missing]} said, ${found} found`,
+    );
+  }
+});
+
+test('fewer bands, set anew, come nearer to the colours than those that stay would', async () => {
+  const count = 400;
+  const numbers = 27;
+  const sh = scene.sh.slice(0, numbers * count);
+  // Dim enough that no colour is black.
+  for (let k = 0; k < sh.length; k++) sh[k] *= k % numbers < 3 ? 0.3 : 0.2;
+  const cloud = { ...scene, count, sh };
+  const { scored: all, heldOut } = dealtViewsAround(boundsOf(scene), { width: 60, height: 40 });
+  const { lowered } = await scoreSplats(cloud, all, cpuScorer(cloud));
+  const cut = new Float32Array(12 * count);
+  for (let i = 0; i < count; i++) cut.set(sh.subarray(numbers * i, numbers * i + 12), 12 * i);
+  const whole = await cpuPainter.draw(cloud, heldOut);
+  const figure = async (fewerBands: Float32Array): Promise<number> => {
+    const images = await cpuPainter.draw({ ...cloud, sh: fewerBands, shDegree: 1 }, heldOut);
+    return decibels(images.reduce((sum, image, k) => sum + meanSquare(image, whole[k]), 0) / images.length);
+  };
+  const [plain, anew] = [await figure(cut), await figure(lowered[1].sh)];
+  console.log(`degree 1 instead of 2: ${plain.toFixed(1)} dB, set anew ${anew.toFixed(1)} dB`);
+  assert.ok(anew > plain + 2, `${anew} dB, without ${plain} dB`);
+});
+
 test('splats that nobody sees contribute nothing, and go without a trace', async () => {
   const scores = await scored;
   const median = (of: Float32Array): number => of.slice().sort()[of.length >> 1];
@@ -80,10 +127,10 @@ test('splats that nobody sees contribute nothing, and go without a trace', async
   const outside = scores.contribution.filter((_, i) => i % 3 !== 0);
   assert.ok(median(inside) < 1 / 255, `inside: ${median(inside)}`);
   assert.ok(median(outside) > 0.1, `outside: ${median(outside)}`);
-  const { cloud } = reduce(scene, scores, { minContribution: 1 / 255, colourPrice: 0 });
+  const { cloud } = reduce(scene, scores, { minContribution: 1 / 255 });
   assert.ok(cloud.count < 0.75 * scene.count, `${cloud.count} of ${scene.count}`);
-  const before = await cpuPainter.draw(scene, views.heldOut);
-  const now = await cpuPainter.draw(cloud, views.heldOut);
+  const before = await cpuPainter.draw(scene, fewer.heldOut);
+  const now = await cpuPainter.draw(cloud, fewer.heldOut);
   const errors = now.map((image, k) => meanSquare(image, before[k]));
   const found = decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
   assert.ok(found > 50, `${found} dB`);
@@ -97,7 +144,7 @@ test('degrees go where colour does not depend on the view, at any price', async 
 
 test('the most seen come first', async () => {
   const scores = await scored;
-  const { cloud } = reduce(scene, scores, { minContribution: 0, colourPrice: 0 });
+  const { cloud } = reduce(scene, scores, {});
   const half = { ...cloud, count: 450 };
   const radius = (c: GaussianCloud, i: number): number => Math.hypot(...c.positions.subarray(3 * i, 3 * i + 3));
   const shell = Array.from({ length: half.count }, (_, i) => radius(cloud, i)).filter((r) => r > 0.9).length;
@@ -111,7 +158,7 @@ for (const name of ['a.glb', 'a.ply', 'a.spz']) {
     const read = await readScene(await encoding.write(reduced), { name });
     assert.equal(read.count, reduced.cloud.count);
     const [before, now] = [reduced.cloud, read];
-    const images = [await cpuPainter.draw(before, views.heldOut), await cpuPainter.draw(now, views.heldOut)];
+    const images = [await cpuPainter.draw(before, fewer.heldOut), await cpuPainter.draw(now, fewer.heldOut)];
     const found = decibels(meanSquare(images[1][0], images[0][0]));
     assert.ok(found >= (name === 'a.spz' ? 38 : 70), `${name}: ${found} dB`);
   });
@@ -119,7 +166,7 @@ for (const name of ['a.glb', 'a.ply', 'a.spz']) {
 
 test('the asked figure is met in views that had no say, with less than there was', async () => {
   const studio = cpuPainter;
-  const result = await economise(scene, { minDecibels: 50, name: 'a.glb', views, studio });
+  const result = await economise(scene, { minDecibels: 50, name: 'a.glb', views: fewer, studio });
   assert.ok(result.decibels >= 50, `${result.decibels} dB`);
   assert.ok(result.splats.after <= 0.75 * result.splats.before, `${result.splats.after} splats`);
   assert.ok(result.coefficients.after <= 0.5 * result.coefficients.before, `${result.coefficients.after} coefficients`);
@@ -127,7 +174,7 @@ test('the asked figure is met in views that had no say, with less than there was
 });
 
 test('a format that cannot reach the figure is refused with what it can', async () => {
-  const options = { minDecibels: 70, name: 'a.spz', views, studio: cpuPainter };
+  const options = { minDecibels: 70, name: 'a.spz', views: fewer, studio: cpuPainter };
   await assert.rejects(economise(scene, options), /70 dB or more.*at most \d+\.\d dB, with every splat kept/);
   assert.throws(() => encodingsFor('a.obj'), /\.spz, \.glb, \.ply/);
 });
@@ -157,12 +204,28 @@ test('views are dealt out without sharing one', () => {
   assert.equal(new Set([...a, ...b, ...c]).size, 40);
 });
 
+test('between cameras there are views that are no camera, each halfway to its nearest neighbour', () => {
+  const cameras = viewsAround(boundsOf(scene), 12);
+  const between = viewsBetween(cameras);
+  assert.ok(between.length >= 6 && between.length <= 12, `${between.length} views`);
+  for (const { worldToCamera } of between) {
+    const eye = eyeOf(worldToCamera);
+    const away = cameras.map((camera) => Math.hypot(...eyeOf(camera.worldToCamera).map((v, k) => v - eye[k])));
+    const [first, second] = away.slice().sort((a, b) => a - b);
+    assert.ok(first > 0 && second - first < 1e-9, 'as far from two cameras');
+    for (const row of [0, 1, 2]) {
+      assert.ok(Math.abs(Math.hypot(...worldToCamera.slice(4 * row, 4 * row + 3)) - 1) < 1e-9, 'axes of length 1');
+    }
+  }
+  assert.deepEqual(viewsBetween(cameras.slice(0, 1)), []);
+});
+
 test('a file in this order is a coarse picture while it arrives', async () => {
-  const reduced = reduce(scene, await scored, { minContribution: 0, colourPrice: 0 });
+  const reduced = reduce(scene, await scored, {});
   const bytes = await encodingsFor('a.ply')[0].write(reduced);
   const part = await readPrefix(bytes.subarray(0, Math.floor(0.6 * bytes.length)), { name: 'a.ply' });
   assert.ok(part && part.count > 500 && part.count < 560, `${part?.count}`);
-  const [whole, coarse] = [await cpuPainter.draw(scene, views.heldOut), await cpuPainter.draw(part, views.heldOut)];
+  const [whole, coarse] = [await cpuPainter.draw(scene, fewer.heldOut), await cpuPainter.draw(part, fewer.heldOut)];
   const found = decibels(meanSquare(coarse[0], whole[0]));
   assert.ok(found > 20, `${found} dB with 60 % of the file`);
 });

@@ -7,7 +7,7 @@ const folder = join(root, 'docs/frontier');
 
 export default function frontiers() {
   return readdirSync(folder)
-    .filter((name) => name.endsWith('.json'))
+    .filter((name) => name.startsWith('frontier-') && name.endsWith('.json'))
     .map((name) => describe(name.replace('.json', ''), JSON.parse(readFileSync(join(folder, name), 'utf8'))));
 }
 

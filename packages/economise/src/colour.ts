@@ -1,4 +1,4 @@
-import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
+import type { ShDegree } from '@gaussian-splat/core';
 
 /** The real spherical harmonics up to a degree at a unit direction, with the signs of 3D Gaussian Splatting. */
 export function shBasis(degree: ShDegree, x: number, y: number, z: number, out: Float64Array): Float64Array {
@@ -29,10 +29,4 @@ export function shBasis(degree: ShDegree, x: number, y: number, z: number, out: 
     out[15] = -a * x * (x * x - 3 * y * y);
   }
   return out;
-}
-
-/** Where a camera is, in world units. */
-export function eyeOf({ worldToCamera: m }: Camera): Vector3 {
-  const at = (column: number): number => -(m[column] * m[3] + m[4 + column] * m[7] + m[8 + column] * m[11]);
-  return [at(0), at(1), at(2)];
 }

@@ -1,26 +1,13 @@
-import { shCoefficientCount, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { eyeOf, shBasis } from './colour.js';
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { ALPHA_MIN, coloursOf, factors, project, type Projected } from './cpu-project.js';
 import type { Image, Painter } from './measure.js';
-import type { ContributionScorer } from './scorer.js';
+import type { ContributionScorer, Contributions } from './scorer.js';
 
-/** Screen-space dilation of 3D Gaussian Splatting, px². */
-const DILATION = 0.3;
-const ALPHA_MIN = 1 / 255;
 const ALPHA_MAX = 0.99;
 /** Behind so much nothing more is seen. */
 const OPAQUE = 1e-4;
-const JACOBIAN_MARGIN = 0.3;
-
-/** Splats on the screen, one array for each quantity. */
-interface Projected {
-  readonly count: number;
-  readonly source: Uint32Array;
-  readonly depths: Float32Array;
-  /** [count, 6]: centre x and y, conic xx, xy, yy, opacity. */
-  readonly ellipses: Float32Array;
-  /** [count, 2]: half the size of the box in which alpha reaches 1/255. */
-  readonly extents: Float32Array;
-}
+/** Counts are below this: a depth's 32 bits and a number fit the 53 bits of a float64. */
+const MAX_COUNT = 2 ** 21;
 
 /**
  * A scorer that blends on the CPU, front to back, by the rules of the renderer: for tools where there is no GPU, and the one whose
@@ -28,17 +15,17 @@ interface Projected {
  */
 export function cpuScorer(cloud: GaussianCloud): ContributionScorer {
   const roots = factors(cloud);
-  const peak = new Float32Array(cloud.count);
-  const energy = new Float32Array(cloud.count);
+  const none = (): Float32Array => new Float32Array(cloud.count);
+  const found = { peak: none(), energy: none(), removal: none() };
   return (camera) => {
-    peak.fill(0);
-    energy.fill(0);
-    const pixels = camera.width * camera.height;
-    blend(project(cloud, roots, camera), camera, (source, most, squares) => {
-      peak[source] = most;
-      energy[source] = squares / pixels;
-    });
-    return { peak, energy };
+    const projected = project(cloud, roots, camera);
+    const colours = coloursOf(cloud, projected, camera);
+    const order = nearToFar(projected);
+    const image = newImage(camera);
+    paint(projected, order, camera, colours, image);
+    for (const values of Object.values(found)) values.fill(0);
+    weigh(projected, order, camera, colours, image, found);
+    return found;
   };
 }
 
@@ -48,149 +35,134 @@ export const cpuPainter: Painter = {
     const roots = factors(cloud);
     return views.map((camera) => {
       const projected = project(cloud, roots, camera);
-      const image: Image = new Float32Array(4 * camera.width * camera.height);
-      blend(projected, camera, () => undefined, { image, colours: coloursOf(cloud, projected, camera) });
+      const image = newImage(camera);
+      paint(projected, nearToFar(projected), camera, coloursOf(cloud, projected, camera), image);
       return image;
     });
   },
 };
 
-/** Colours of the splats on the screen, [count, 3]; negative ones are black, as in the renderer. */
-function coloursOf(cloud: GaussianCloud, { count, source }: Projected, camera: Camera): Float32Array {
-  const { positions, origin, sh, shDegree } = cloud;
-  const numbers = shCoefficientCount(shDegree);
-  const basis = new Float64Array(16);
-  const eye = eyeOf(camera);
-  const colours = new Float32Array(3 * count);
-  for (let k = 0; k < count; k++) {
-    const i = source[k];
-    const x = positions[3 * i] + origin[0] - eye[0];
-    const y = positions[3 * i + 1] + origin[1] - eye[1];
-    const z = positions[3 * i + 2] + origin[2] - eye[2];
-    const norm = 1 / Math.sqrt(x * x + y * y + z * z);
-    shBasis(shDegree, x * norm, y * norm, z * norm, basis);
-    for (let channel = 0; channel < 3; channel++) {
-      let value = 0.5;
-      for (let c = 0; c < numbers; c++) value += basis[c] * sh[3 * (numbers * i + c) + channel];
-      colours[3 * k + channel] = Math.max(0, value);
-    }
+const newImage = ({ width, height }: Camera): Image => new Float32Array(4 * width * height);
+
+/** Places of the splats by depth, equal ones by number. */
+function nearToFar({ count, depths }: Projected): Uint32Array {
+  if (count > MAX_COUNT) {
+    return Uint32Array.from({ length: count }, (_, k) => k).sort((a, b) => depths[a] - depths[b] || a - b);
   }
-  return colours;
+  // Positive floats are in the order of their bits; numbers sort many times faster than a comparison does.
+  const bits = new Uint32Array(depths.buffer, 0, count);
+  const keys = Float64Array.from({ length: count }, (_, k) => bits[k] * MAX_COUNT + k).sort();
+  return Uint32Array.from(keys, (key) => key % MAX_COUNT);
 }
 
-/** R·S of every splat, [N, 9], rows outermost. */
-function factors({ count, rotations, scales }: GaussianCloud): Float32Array {
-  const out = new Float32Array(9 * count);
-  for (let i = 0; i < count; i++) {
-    const [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
-    const [a, b, c] = [scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]];
-    const at = 9 * i;
-    out[at] = (1 - 2 * (y * y + z * z)) * a;
-    out[at + 1] = 2 * (x * y - w * z) * b;
-    out[at + 2] = 2 * (x * z + w * y) * c;
-    out[at + 3] = 2 * (x * y + w * z) * a;
-    out[at + 4] = (1 - 2 * (x * x + z * z)) * b;
-    out[at + 5] = 2 * (y * z - w * x) * c;
-    out[at + 6] = 2 * (x * z - w * y) * a;
-    out[at + 7] = 2 * (y * z + w * x) * b;
-    out[at + 8] = (1 - 2 * (x * x + y * y)) * c;
-  }
-  return out;
+/** The part of a row of pixels that an ellipse covers, and how its alpha runs along it. */
+interface Span {
+  first: number;
+  last: number;
+  /** Alpha in the first pixel, before it is capped. */
+  alpha: number;
+  /** Its ratio from there to the next pixel, and what that is multiplied by from pixel to pixel. */
+  ratio: number;
+  bend: number;
 }
 
-function project(cloud: GaussianCloud, roots: Float32Array, camera: Camera): Projected {
-  const { count, positions, opacities, origin, antialiased } = cloud;
-  const { fx, fy, cx, cy, width, height, near, far, worldToCamera: m } = camera;
-  const source = new Uint32Array(count);
-  const depths = new Float32Array(count);
-  const ellipses = new Float32Array(6 * count);
-  const extents = new Float32Array(2 * count);
-  const shift = [3, 7, 11].map((k) => m[k - 3] * origin[0] + m[k - 2] * origin[1] + m[k - 1] * origin[2] + m[k]);
-  const [marginX, marginY] = [(JACOBIAN_MARGIN * width) / (2 * fx), (JACOBIAN_MARGIN * height) / (2 * fy)];
-  const clamp = (value: number, low: number, high: number): number => Math.min(high, Math.max(low, value));
-  let kept = 0;
-  for (let i = 0; i < count; i++) {
-    const [px, py, pz] = [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]];
-    const z = m[8] * px + m[9] * py + m[10] * pz + shift[2];
-    if (!(z > near && z < far)) continue;
-    const x = m[0] * px + m[1] * py + m[2] * pz + shift[0];
-    const y = m[4] * px + m[5] * py + m[6] * pz + shift[1];
-    const slopeX = clamp(x / z, -cx / fx - marginX, (width - cx) / fx + marginX);
-    const slopeY = clamp(y / z, -cy / fy - marginY, (height - cy) / fy + marginY);
-    let [xx, xy, yy] = [0, 0, 0];
-    for (let k = 0; k < 3; k++) {
-      const [rx, ry, rz] = [roots[9 * i + k], roots[9 * i + 3 + k], roots[9 * i + 6 + k]];
-      const depth = m[8] * rx + m[9] * ry + m[10] * rz;
-      const u = (fx / z) * (m[0] * rx + m[1] * ry + m[2] * rz - slopeX * depth);
-      const v = (fy / z) * (m[4] * rx + m[5] * ry + m[6] * rz - slopeY * depth);
-      xx += u * u;
-      xy += u * v;
-      yy += v * v;
-    }
-    const exact = Math.max(0, xx * yy - xy * xy);
-    [xx, yy] = [xx + DILATION, yy + DILATION];
-    const determinant = xx * yy - xy * xy;
-    const opacity = opacities[i] * (antialiased ? Math.sqrt(exact / determinant) : 1);
-    if (!(opacity >= ALPHA_MIN) || !(determinant > 0)) continue;
-    const [centreX, centreY] = [(fx * x) / z + cx, (fy * y) / z + cy];
-    const reach = Math.sqrt(2 * Math.log(opacity / ALPHA_MIN));
-    const [halfX, halfY] = [reach * Math.sqrt(xx), reach * Math.sqrt(yy)];
-    if (!(centreX + halfX > 0 && centreX - halfX < width && centreY + halfY > 0 && centreY - halfY < height)) continue;
-    source[kept] = i;
-    depths[kept] = z;
-    ellipses.set([centreX, centreY, yy / determinant, -xy / determinant, xx / determinant, opacity], 6 * kept);
-    extents.set([halfX, halfY], 2 * kept);
-    kept++;
-  }
-  return { count: kept, source, depths, ellipses, extents };
+/** The span of splat k in a row; false if it paints nothing there. Writes to `span`. */
+function spanIn(ellipses: Float32Array, k: number, row: number, { width }: Camera, span: Span): boolean {
+  const at = 6 * k;
+  const [xx, xy, yy] = [ellipses[at + 2], ellipses[at + 3], ellipses[at + 4]];
+  const opacity = ellipses[at + 5];
+  const dy = row + 0.5 - ellipses[at + 1];
+  // Where xx·dx² + 2·xy·dx·dy + yy·dy² = 2·ln(opacity / ALPHA_MIN).
+  const middle = xy * dy;
+  const inside = middle * middle - xx * (yy * dy * dy - 2 * Math.log(opacity / ALPHA_MIN));
+  if (!(inside > 0)) return false;
+  const reach = Math.sqrt(inside);
+  const centre = ellipses[at] - 0.5;
+  span.first = Math.max(0, Math.ceil(centre - (middle + reach) / xx));
+  span.last = Math.min(width - 1, Math.floor(centre - (middle - reach) / xx));
+  if (span.last < span.first) return false;
+  const dx = span.first - centre;
+  span.alpha = opacity * Math.exp(-0.5 * (xx * dx * dx + yy * dy * dy) - xy * dx * dy);
+  span.ratio = Math.exp(-xx * (dx + 0.5) - xy * dy);
+  span.bend = Math.exp(-xx);
+  return true;
 }
 
-/** Tells the largest weight, and the sum of all squared, of each splat that paints anything, and paints an image where one is wanted. */
-function blend(
-  { count, source, depths, ellipses, extents }: Projected,
-  { width, height }: Camera,
-  tell: (source: number, most: number, squares: number) => void,
-  paint?: { readonly image: Image; readonly colours: Float32Array },
-): void {
-  const order = Uint32Array.from({ length: count }, (_, k) => k).sort((a, b) => depths[a] - depths[b] || a - b);
-  const transmittance = new Float32Array(width * height).fill(1);
-  for (let n = 0; n < count; n++) {
-    const k = order[n];
-    const at = 6 * k;
-    const [centreX, centreY, opacity] = [ellipses[at], ellipses[at + 1], ellipses[at + 5]];
-    const [xx, xy, yy] = [ellipses[at + 2], ellipses[at + 3], ellipses[at + 4]];
-    const [halfX, halfY] = [extents[2 * k], extents[2 * k + 1]];
-    const left = Math.max(0, Math.floor(centreX - halfX));
-    const right = Math.min(width - 1, Math.ceil(centreX + halfX));
-    const bottom = Math.min(height - 1, Math.ceil(centreY + halfY));
-    let most = 0;
-    let squares = 0;
-    for (let row = Math.max(0, Math.floor(centreY - halfY)); row <= bottom; row++) {
-      const dy = row + 0.5 - centreY;
-      for (let column = left; column <= right; column++) {
-        const pixel = row * width + column;
-        const behind = transmittance[pixel];
-        if (behind < OPAQUE) continue;
-        const dx = column + 0.5 - centreX;
-        const power = -0.5 * (xx * dx * dx + yy * dy * dy) - xy * dx * dy;
-        // exp(-5.55) is 1/255: less than that no opacity makes visible.
-        if (power < -5.55) continue;
-        const alpha = Math.min(ALPHA_MAX, opacity * Math.exp(power));
-        if (alpha < ALPHA_MIN) continue;
-        const weight = alpha * behind;
-        if (weight > most) most = weight;
-        squares += weight * weight;
-        if (paint) addColour(paint.image, 4 * pixel, paint.colours, 3 * k, weight);
-        transmittance[pixel] = behind - weight;
+const newSpan = (): Span => ({ first: 0, last: 0, alpha: 0, ratio: 1, bend: 1 });
+
+/** First and last row that a splat reaches. */
+function rowsOf({ ellipses, halfHeights }: Projected, k: number, { height }: Camera): readonly [number, number] {
+  const [centre, half] = [ellipses[6 * k + 1] - 0.5, halfHeights[k]];
+  return [Math.max(0, Math.ceil(centre - half)), Math.min(height - 1, Math.floor(centre + half))];
+}
+
+/** Blends the splats into an image. @param colours [count, 3] */
+function paint(projected: Projected, order: Uint32Array, camera: Camera, colours: Float32Array, image: Image): void {
+  const { width } = camera;
+  const span = newSpan();
+  for (const k of order) {
+    const [red, green, blue] = [colours[3 * k], colours[3 * k + 1], colours[3 * k + 2]];
+    const [top, bottom] = rowsOf(projected, k, camera);
+    for (let row = top; row <= bottom; row++) {
+      if (!spanIn(projected.ellipses, k, row, camera, span)) continue;
+      const { bend } = span;
+      let { alpha, ratio } = span;
+      const end = 4 * (row * width + span.last);
+      for (let at = 4 * (row * width + span.first); at <= end; at += 4, alpha *= ratio, ratio *= bend) {
+        const behind = 1 - image[at + 3];
+        if (behind < OPAQUE || alpha < ALPHA_MIN) continue;
+        const weight = Math.min(ALPHA_MAX, alpha) * behind;
+        image[at] += weight * red;
+        image[at + 1] += weight * green;
+        image[at + 2] += weight * blue;
+        image[at + 3] += weight;
       }
     }
-    if (most > 0) tell(source[k], most, squares);
   }
 }
 
-function addColour(image: Image, at: number, colours: Float32Array, from: number, weight: number): void {
-  image[at] += weight * colours[from];
-  image[at + 1] += weight * colours[from + 1];
-  image[at + 2] += weight * colours[from + 2];
-  image[at + 3] += weight;
+/**
+ * Blends once more, against the finished image: what lies in front of and on a splat is known by then, so that the rest of the image is what lies
+ * behind, and what it would be if the splat did not stand before it.
+ */
+function weigh(
+  projected: Projected,
+  order: Uint32Array,
+  camera: Camera,
+  colours: Float32Array,
+  image: Image,
+  found: Contributions,
+): void {
+  const { width, height } = camera;
+  const painted = newImage(camera);
+  const span = newSpan();
+  for (const k of order) {
+    const [red, green, blue] = [colours[3 * k], colours[3 * k + 1], colours[3 * k + 2]];
+    const [top, bottom] = rowsOf(projected, k, camera);
+    let [peak, energy, removal] = [0, 0, 0];
+    for (let row = top; row <= bottom; row++) {
+      if (!spanIn(projected.ellipses, k, row, camera, span)) continue;
+      const { bend } = span;
+      let { alpha, ratio } = span;
+      const end = 4 * (row * width + span.last);
+      for (let at = 4 * (row * width + span.first); at <= end; at += 4, alpha *= ratio, ratio *= bend) {
+        const behind = 1 - painted[at + 3];
+        if (behind < OPAQUE || alpha < ALPHA_MIN) continue;
+        const capped = Math.min(ALPHA_MAX, alpha);
+        const weight = capped * behind;
+        if (weight > peak) peak = weight;
+        energy += weight * weight;
+        const brighter = capped / (1 - capped);
+        const r = brighter * (image[at] - (painted[at] += weight * red)) - weight * red;
+        const g = brighter * (image[at + 1] - (painted[at + 1] += weight * green)) - weight * green;
+        const b = brighter * (image[at + 2] - (painted[at + 2] += weight * blue)) - weight * blue;
+        painted[at + 3] += weight;
+        removal += r * r + g * g + b * b;
+      }
+    }
+    const i = projected.source[k];
+    found.peak[i] = peak;
+    found.energy[i] = energy / (width * height);
+    found.removal[i] = removal / (3 * width * height);
+  }
 }

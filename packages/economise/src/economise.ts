@@ -5,7 +5,7 @@ import { decibels, mean, meanSquare, meanSquareOf, type Image, type Painter } fr
 import { keptCoefficients, reduce, type Cut, type ReducedCloud } from './reduce.js';
 import { scoreSplats, type Scores } from './score.js';
 import type { ContributionScorer } from './scorer.js';
-import { Curve } from './search.js';
+import { bestTrades, measureTrades, type TradeCurve } from './search.js';
 import type { DealtViews } from './views.js';
 import { encodingsFor, type Encoding } from './write/index.js';
 
@@ -44,20 +44,24 @@ export interface Economised {
 
 /** Share of the error that goes to rounding at most, before a finer encoding is tried. */
 const ROUNDING_SHARE = 0.6;
-/** Share of what is left that goes to dropped splats. */
-const DROP_SHARE = 0.5;
 /** How much of what is left is used at first; it shrinks until the figure is met. */
 const FIRST_FILLING = 0.95;
 /** Bounds on that shrinking in one step. */
 const SHRINK: readonly [number, number] = [0.3, 0.9];
 const MAX_TRIES = 8;
-const CONTRIBUTION_RANGE: readonly [number, number] = [1e-4, 0.3];
-const PRICE_RANGE: readonly [number, number] = [1e-16, 1e-8];
+/** Shares of the splats whose absence is measured, the least missed first. */
+const DROPPED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5];
+/** The share at which two scores are held against one another. */
+const TRIAL_SHARE = 0.06;
+/** Prices of a coefficient that are measured. */
+const PRICES = Array.from({ length: 14 }, (_, k) => 10 ** (-14.5 + 0.5 * k));
+/** Numbers that a splat has besides its harmonics. */
+const OTHER_NUMBERS = 11;
 
 /**
- * Makes a scene smaller without going below a figure: scores all splats by what they contribute to the views, drops the least seen,
- * takes view-dependent colour from splats where it does not show, orders the rest from coarse to fine, and writes it. The figure is
- * measured on the written file, read again, in views that had no say in the choice.
+ * Makes a scene smaller without going below a figure: scores all splats by what the views would lack without them, drops the least missed,
+ * takes view-dependent colour from splats where it does not show, orders the rest from coarse to fine, and writes it. How much of the error goes to
+ * which of the two is what saves most. The figure is measured on the written file, read again, in views that had no say in the choice.
  *
  * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, or the file's name is of no known format.
  */
@@ -74,15 +78,11 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   };
   const target = meanSquareOf(minDecibels);
   const { encoding, rounding } = await chooseEncoding(cloud, scores, encodings, target, errorOf, options);
-  const curves = curvesOf(cloud, scores, errorOf);
+  const budget = target - rounding;
+  const curves = await curvesOf(cloud, scores, errorOf, budget, onStep);
   for (let tries = 0, filling = FIRST_FILLING; tries < MAX_TRIES; tries++) {
-    const budget = filling * (target - rounding);
-    onStep(`searching thresholds, ${Math.round(100 * filling)} % of the error that is allowed`);
-    const hasColour = cloud.shDegree > 0;
-    const drop = await curves.drop.thresholdFor(hasColour ? DROP_SHARE * budget : budget, ...CONTRIBUTION_RANGE);
-    // What dropping leaves of its share goes to colour.
-    const colour = hasColour ? await curves.colour.thresholdFor(budget - drop.error, ...PRICE_RANGE) : undefined;
-    const cut: Cut = { minContribution: drop.threshold, colourPrice: colour?.threshold ?? 0 };
+    const [drop, colour] = bestTrades(curves.drop, curves.colour, filling * budget);
+    const cut: Cut = { ...curves.cutAt(drop.threshold), colourPrice: colour.threshold };
     const reduced = reduce(cloud, scores, cut);
     const bytes = await encoding.write(reduced);
     const written = await readScene(bytes, { name: options.name, signal });
@@ -98,7 +98,7 @@ function errors(images: readonly Image[], references: readonly Image[]): number[
   return images.map((image, k) => meanSquare(image, references[k]));
 }
 
-const NOTHING: Cut = { minContribution: 0, colourPrice: 0 };
+const NOTHING: Cut = {};
 
 /** The smallest way to write the scene whose rounding leaves room for more. */
 async function chooseEncoding(
@@ -121,16 +121,65 @@ async function chooseEncoding(
   throw unreachable(options, `at most ${decibels(best).toFixed(1)} dB, with every splat kept`);
 }
 
-function curvesOf(
+/** What can be traded for error. */
+interface Curves {
+  readonly drop: TradeCurve;
+  readonly colour: TradeCurve;
+  /** The cut that a threshold of `drop` stands for. */
+  readonly cutAt: (threshold: number) => Cut;
+}
+
+/** What dropping alone costs, and what fewer bands of colour alone. */
+async function curvesOf(
   cloud: GaussianCloud,
   scores: Scores,
   errorOf: (cloud: GaussianCloud) => Promise<number>,
-): { drop: Curve; colour: Curve } {
-  const at = (cut: Partial<Cut>): Promise<number> => errorOf(reduce(cloud, scores, { ...NOTHING, ...cut }).cloud);
-  return {
-    drop: new Curve((minContribution) => at({ minContribution })),
-    colour: new Curve((colourPrice) => at({ colourPrice })),
-  };
+  budget: number,
+  onStep: (step: string) => void,
+): Promise<Curves> {
+  const numbersOf = ({ degrees }: ReducedCloud): number =>
+    degrees.reduce((sum, degree) => sum + OTHER_NUMBERS + 3 * (degree + 1) ** 2, 0);
+  const all = numbersOf(reduce(cloud, scores, NOTHING));
+  const along = (thresholds: readonly number[], cutAt: (threshold: number) => Cut): Promise<TradeCurve> =>
+    measureTrades(
+      thresholds,
+      async (threshold) => {
+        const reduced = reduce(cloud, scores, cutAt(threshold));
+        return { threshold, error: await errorOf(reduced.cloud), saved: all - numbersOf(reduced) };
+      },
+      budget,
+    );
+  onStep('measuring what dropped splats cost');
+  const { prices, cutAt } = await dropsOf(cloud, scores, errorOf);
+  const drop = await along(prices, cutAt);
+  onStep('measuring what fewer bands of colour cost');
+  const colour = await along(cloud.shDegree > 0 ? PRICES : [], (colourPrice) => ({ colourPrice }));
+  return { drop, colour, cutAt };
+}
+
+/**
+ * Thresholds for dropping, in the score that does better at the trial share: what single views would lack, or the largest weight in a pixel. The former
+ * knows what lies behind a splat and how large it is, the latter is the more careful with what goes together; which counts for more depends on the scene.
+ */
+async function dropsOf(
+  cloud: GaussianCloud,
+  scores: Scores,
+  errorOf: (cloud: GaussianCloud) => Promise<number>,
+): Promise<{ prices: readonly number[]; cutAt: (threshold: number) => Cut }> {
+  const candidates = [
+    { values: scores.removalError, cutAt: (removalPrice: number): Cut => ({ removalPrice }) },
+    { values: scores.contribution, cutAt: (minContribution: number): Cut => ({ minContribution }) },
+  ].map(({ values, cutAt }) => {
+    const sorted = values.slice().sort();
+    const at = (share: number): number => sorted[Math.floor(share * (sorted.length - 1))];
+    return { at, cutAt };
+  });
+  const trials: number[] = [];
+  for (const { at, cutAt } of candidates)
+    trials.push(await errorOf(reduce(cloud, scores, cutAt(at(TRIAL_SHARE))).cloud));
+  const { at, cutAt } = candidates[trials[0] <= trials[1] ? 0 : 1];
+  const prices = [...new Set(DROPPED_SHARES.map(at))].filter((price) => price > 0 && Number.isFinite(price));
+  return { prices, cutAt };
 }
 
 function summary(

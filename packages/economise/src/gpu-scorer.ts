@@ -6,12 +6,15 @@ import type { ContributionScorer, Contributions } from './scorer.js';
 const [MAP_READ, COPY_SOURCE, COPY_DESTINATION, STORAGE] = [1, 4, 8, 128];
 const RENDER_ATTACHMENT = 16;
 
+/** Squared difference of a splat's colour to what lies behind it, a channel: the mean of three captured scenes. */
+const USUAL_CONTRAST = 0.02;
+
 /** Splats of a chunk: the buffer of contributions has whole ones. */
 const CHUNK = 256;
 
 /**
  * Scores with the project's compute rasterizer, which notes the largest weight of every splat as it paints. Energies are not noted; they
- * are those of an ellipse of that peak and the splat's size on the screen.
+ * are those of an ellipse of that peak and the splat's size on the screen. Nor is what lies behind: as if it differed from every splat by as much.
  */
 export class GpuScorer {
   readonly #device: GPUDevice;
@@ -33,7 +36,8 @@ export class GpuScorer {
     const usage = STORAGE | COPY_SOURCE | COPY_DESTINATION;
     this.#noted = device.createBuffer({ label: 'gs.economise.contributions', size, usage });
     this.#staging = device.createBuffer({ label: 'gs.economise.read', size, usage: MAP_READ | COPY_DESTINATION });
-    this.#result = { peak: new Float32Array(cloud.count), energy: new Float32Array(cloud.count) };
+    const none = (): Float32Array => new Float32Array(cloud.count);
+    this.#result = { peak: none(), energy: none(), removal: none() };
   }
 
   /** @throws GaussianSplatError `out-of-memory/*` */
@@ -70,14 +74,14 @@ export class GpuScorer {
     this.#device.queue.submit([encoder.finish()]);
     await this.#staging.mapAsync(MAP_READ);
     const weights = new Float32Array(this.#staging.getMappedRange());
-    const { peak, energy } = this.#result;
-    peak.fill(0);
-    energy.fill(0);
+    const { peak, energy, removal } = this.#result;
+    for (const values of [peak, energy, removal]) values.fill(0);
     for (let slot = 0; slot < this.#order.length; slot++) {
       if (weights[slot] === 0) continue;
       const i = this.#order[slot];
       peak[i] = weights[slot];
       energy[i] = weights[slot] ** 2 * screenArea(this.#cloud, i, camera);
+      removal[i] = USUAL_CONTRAST * energy[i];
     }
     this.#staging.unmap();
   }

@@ -14,5 +14,5 @@ export { decibels, meanSquare, Studio, type Image, type Painter } from './measur
 export { reduce, type Cut, type ReducedCloud } from './reduce.js';
 export { scoreSplats, type Scores } from './score.js';
 export type { ContributionScorer } from './scorer.js';
-export { dealtViewsAround, dealViews, viewsAround, type DealtViews, type ViewOptions } from './views.js';
+export { dealtViewsAround, dealViews, viewsAround, viewsBetween, type DealtViews, type ViewOptions } from './views.js';
 export { encodingsFor, type Encoding } from './write/index.js';

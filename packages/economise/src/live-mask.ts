@@ -29,7 +29,18 @@ export interface ViewSize {
   readonly height: number;
 }
 
-const VIEW_SIZE: ViewSize = { width: 480, height: 270 };
+const LARGEST_VIEW: ViewSize = { width: 480, height: 270 };
+/** Fewer splats are larger, and seen as well in smaller views: so many pixels for each, and at least a quarter of each side. */
+const PIXELS_OF_SPLAT = 16;
+const LEAST_SCALE = 0.25;
+
+/** Pixels of the views that so many splats are looked at in. */
+function viewSizeOf(count: number): ViewSize {
+  const { width, height } = LARGEST_VIEW;
+  const scale = Math.min(1, Math.max(LEAST_SCALE, Math.sqrt((PIXELS_OF_SPLAT * count) / (width * height))));
+  return { width: Math.round(scale * width), height: Math.round(scale * height) };
+}
+
 /** A splat that fewer views looked at is kept: another view may show it in full. */
 const MIN_LOOKS = 3;
 const MOST_TRIES = 4;
@@ -43,7 +54,7 @@ const TURN_MS = 8;
 
 export interface LiveMaskOptions {
   readonly signal?: AbortSignal;
-  /** Pixels of the views; default 480 x 270. */
+  /** Pixels of the views; default 480 x 270, and less for scenes of less than 8,100 splats. */
   readonly viewSize?: ViewSize;
   /** Once looking has taken so long, ms, 12 of the 32 views must do; default 8 s. The mask then depends on how fast the GPU is. */
   readonly patienceMs?: number;
@@ -89,7 +100,7 @@ export class LiveMask {
     device: GPUDevice,
     scene: GaussianScene,
     bounds: Bounds,
-    { signal, viewSize = VIEW_SIZE, patienceMs = LONG_MS }: LiveMaskOptions = {},
+    { signal, viewSize = viewSizeOf(scene.count), patienceMs = LONG_MS }: LiveMaskOptions = {},
   ): Promise<LiveMask> {
     const views = viewsAround(bounds, SCORED, viewSize);
     const { weights, seen } = await contributionsIn(device, scene, views, patienceMs, signal);

@@ -36,5 +36,5 @@ export function contributionOfShare({ contribution }: Pick<Scores, 'contribution
 
 /** The splats of a scene that are shown at a share. */
 export function economical(cloud: GaussianCloud, scores: Scores, share: EconomyShare): ReducedCloud {
-  return reduce(cloud, scores, { minContribution: contributionOfShare(scores, share), colourPrice: 0 });
+  return reduce(cloud, scores, { minContribution: contributionOfShare(scores, share) });
 }

@@ -6,6 +6,8 @@ export interface Contributions {
   readonly peak: Float32Array;
   /** [N] the sum of the squares of the weights in all pixels, over the number of pixels of the image. */
   readonly energy: Float32Array;
+  /** [N] the mean squared error of the image's three colours, peak 1, if this splat alone were missing. */
+  readonly removal: Float32Array;
 }
 
 /** Measures an image. The caller may keep the arrays until the next call. */

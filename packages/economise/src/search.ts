@@ -1,40 +1,59 @@
-/** A threshold and the mean squared error there. */
-export interface Found {
+/** What a threshold takes away, and what that costs. */
+export interface Trade {
   readonly threshold: number;
+  /** Mean squared error, peak 1. */
   readonly error: number;
+  /** Numbers of the file that go. */
+  readonly saved: number;
 }
 
-/** How much of a quantity goes with a threshold, measured at some and told between them. */
-export class Curve {
-  readonly #samples: Found[] = [];
-  readonly #measure: (threshold: number) => Promise<number>;
+/** Nothing taken, nothing lost: where every curve begins. */
+const NOTHING: Trade = { threshold: 0, error: 0, saved: 0 };
 
-  /** @param measure mean squared error at a threshold; grows with it. */
-  constructor(measure: (threshold: number) => Promise<number>) {
-    this.#measure = measure;
+/** Shares of the error that are tried for the first of two curves. */
+const SHARES = Array.from({ length: 21 }, (_, k) => k / 20);
+
+/** How the error grows with what goes: measured at some thresholds, and told between them. */
+export class TradeCurve {
+  readonly #trades: readonly Trade[];
+
+  /** @param trades by ascending threshold */
+  constructor(trades: readonly Trade[]) {
+    // Noise must not make more cost less.
+    let most = 0;
+    this.#trades = [NOTHING, ...trades.map((trade) => ({ ...trade, error: (most = Math.max(most, trade.error)) }))];
   }
 
-  /**
-   * The largest threshold in `low`..`high`, both above 0, whose error stays within `budget`; `low` if even that exceeds it. Bisects the
-   * logarithm, and measures only where it has not yet.
-   */
-  async thresholdFor(budget: number, low: number, high: number, steps = 7): Promise<Found> {
-    const atHigh = await this.#errorAt(high);
-    if (atHigh <= budget) return { threshold: high, error: atHigh };
-    let [below, above] = [low, high];
-    for (let step = 0; step < steps; step++) {
-      const middle = Math.sqrt(below * above);
-      if ((await this.#errorAt(middle)) <= budget) below = middle;
-      else above = middle;
-    }
-    return { threshold: below, error: await this.#errorAt(below) };
+  /** As much as an error allows. */
+  within(error: number): Trade {
+    const above = this.#trades.findIndex((trade) => trade.error > error);
+    if (above === -1) return this.#trades[this.#trades.length - 1];
+    const [a, b] = [this.#trades[above - 1], this.#trades[above]];
+    // Below the first measured threshold nothing is known.
+    if (above === 1) return a;
+    const share = (error - a.error) / (b.error - a.error);
+    const threshold = a.threshold * (b.threshold / a.threshold) ** share;
+    return { threshold, error, saved: a.saved + share * (b.saved - a.saved) };
   }
+}
 
-  async #errorAt(threshold: number): Promise<number> {
-    const known = this.#samples.find((sample) => Math.abs(Math.log(sample.threshold / threshold)) < 1e-9);
-    if (known) return known.error;
-    const error = await this.#measure(threshold);
-    this.#samples.push({ threshold, error });
-    return error;
+/** The two trades that save most within an error that they share. */
+export function bestTrades(a: TradeCurve, b: TradeCurve, error: number): readonly [Trade, Trade] {
+  const choices = SHARES.map((share) => [a.within(share * error), b.within((1 - share) * error)] as const);
+  const saved = ([first, second]: readonly [Trade, Trade]): number => first.saved + second.saved;
+  return choices.reduce((best, choice) => (saved(choice) > saved(best) ? choice : best));
+}
+
+/** Measures at thresholds, from the least to the largest, until the error is larger than any that matters. */
+export async function measureTrades(
+  thresholds: readonly number[],
+  measure: (threshold: number) => Promise<Trade>,
+  mostError: number,
+): Promise<TradeCurve> {
+  const trades: Trade[] = [];
+  for (const threshold of thresholds) {
+    trades.push(await measure(threshold));
+    if (trades[trades.length - 1].error > mostError) break;
   }
+  return new TradeCurve(trades);
 }

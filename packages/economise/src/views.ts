@@ -1,4 +1,4 @@
-import { DEFAULT_FAR, lookAt, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { DEFAULT_FAR, eyeOf, lookAt, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
 
 export interface ViewOptions {
   readonly width?: number;
@@ -56,6 +56,37 @@ export interface DealtViews {
   readonly searched: readonly Camera[];
   /** Nothing but the result is measured here. */
   readonly heldOut: readonly Camera[];
+}
+
+/**
+ * Views halfway between each camera and its nearest neighbour: what people see who move on from where pictures were taken. Scores of few cameras take
+ * their very places for all there are.
+ */
+export function viewsBetween(views: readonly Camera[]): Camera[] {
+  const eyes = views.map(({ worldToCamera }) => eyeOf(worldToCamera));
+  const pairs = new Set<string>();
+  views.forEach((_, k) => {
+    const distances = eyes.map((eye, other) =>
+      other === k ? Infinity : Math.hypot(...eye.map((value, axis) => value - eyes[k][axis])),
+    );
+    const nearest = distances.indexOf(Math.min(...distances));
+    if (Number.isFinite(distances[nearest])) pairs.add([k, nearest].sort((a, b) => a - b).join());
+  });
+  return [...pairs].map((pair) => {
+    const [a, b] = pair.split(',').map(Number);
+    return { ...views[a], worldToCamera: halfway(views[a], views[b]) };
+  });
+}
+
+/** A pose between two: the eye in the middle, the axes the mean ones, set at right angles again. */
+function halfway(a: Camera, b: Camera): Camera['worldToCamera'] {
+  const [eyeA, eyeB] = [eyeOf(a.worldToCamera), eyeOf(b.worldToCamera)];
+  const eye = eyeA.map((value, axis) => (value + eyeB[axis]) / 2) as [number, number, number];
+  const axis = (row: number): Vector3 =>
+    [0, 1, 2].map((k) => a.worldToCamera[4 * row + k] + b.worldToCamera[4 * row + k]) as [number, number, number];
+  const [down, forward] = [axis(1), axis(2)];
+  const target = eye.map((value, k) => value + forward[k]) as [number, number, number];
+  return lookAt(eye, target, [-down[0], -down[1], -down[2]]);
 }
 
 /** Deals views out: of ten that follow one another, one is for the search, two are held out, and splats are scored in the rest. */

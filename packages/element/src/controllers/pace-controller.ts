@@ -2,12 +2,13 @@ import type { FrameLevers } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
 import { LADDER } from '../pace/ladder.js';
 import { INITIAL_PACE, keepPace, quantile, type Pace, type PaceReason } from '../pace/pace.js';
+import { waitForRest } from '../pace/rest.js';
 
 /** Share of the display's interval that frames may take on the GPU: the page and its compositor need the rest. */
 const SHARE_OF_INTERVAL = 0.8;
-/** Without a change for so long, ms, the picture has come to rest. */
-const REST_MS = 150;
-/** Where frames take longer than that, a change within so many of them still belongs to the one before; at most ms. */
+/** A change so soon after another, ms, belongs to the same motion. */
+const MOTION_MS = 150;
+/** Where frames take longer than that, a change within so many of them still does; at most ms. */
 const FRAMES_OF_MOTION = 2;
 const LONGEST_PAUSE_MS = 2_000;
 
@@ -59,7 +60,7 @@ export interface PaceOptions {
 
 /**
  * Keeps moving pictures in time with the display: measures what frames take, and draws those in motion with as much as there is time for. A picture at
- * rest is the true image, at most 300 ms after the last motion.
+ * rest is the true image, 300 ms after the last motion where that takes 230 ms or less.
  */
 export class PaceController {
   readonly #options: PaceOptions;
@@ -68,6 +69,8 @@ export class PaceController {
   #drawn = 0;
   /** What the last frame took, of those that are known. */
   #lastMs = 0;
+  /** What the last true image took, of those that are known. */
+  #wholeMs = 0;
   #restTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(options: PaceOptions) {
@@ -91,20 +94,22 @@ export class PaceController {
    * How to draw the next frame. A single change after a rest is drawn whole at once; what goes on to change is in motion.
    */
   plan({ now, hasChanged, goesOn }: FrameOccasion): FramePlan {
-    const pause = Math.max(REST_MS, Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * this.#lastMs));
+    const pause = Math.max(MOTION_MS, Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * this.#lastMs));
     const isMotion = hasChanged && (goesOn || now - this.#changedAt < pause);
     if (hasChanged) this.#changedAt = now;
     clearTimeout(this.#restTimer);
     const { level } = this.#pace;
     this.#drawn = isMotion && this.#options.isOn() ? level : 0;
     if (this.#drawn === 0) return WHOLE;
-    this.#restTimer = setTimeout(this.#options.requestFrame, REST_MS);
+    const wait = waitForRest(this.#wholeMs, this.#options.scheduler().displayInterval);
+    this.#restTimer = setTimeout(this.#options.requestFrame, wait);
     return { level, levers: LADDER[level].levers };
   }
 
   /** What a frame took. */
   sample(level: number, milliseconds: number): void {
     this.#lastMs = milliseconds;
+    if (level === 0) this.#wholeMs = milliseconds;
     if (!this.#options.isOn()) return;
     const sample = { now: performance.now(), level, milliseconds };
     this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS });
@@ -118,6 +123,7 @@ export class PaceController {
     this.#changedAt = -Infinity;
     this.#drawn = 0;
     this.#lastMs = 0;
+    this.#wholeMs = 0;
   }
 
   /** No frame follows. */

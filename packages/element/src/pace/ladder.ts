@@ -13,11 +13,11 @@ export interface Rung {
 /** Shares of the picture's width and height, each with about 0.7 of the pixels of the one before. */
 const SCALES = [0.84, 0.71, 0.59, 0.5, 0.42, 0.35, 0.25];
 /**
- * Costs of the levers that leave the pixels alone: what shorter keys alone won on SwiftShader, and little more. They are only where the search begins: what
- * frames really take decides (docs/decisions/0014).
+ * Costs of the levers that leave the pixels alone, as docs/frontier/ladder-swiftshader.json has them (`npm run frontier:ladder`; both measured 0.73). They are only
+ * where the search begins: what frames really take decides (docs/decisions/0014).
  */
-const BALANCED_COST = 0.87;
-const FAST_COST = 0.8;
+const BALANCED_COST = 0.73;
+const FAST_COST = 0.72;
 
 /** The levers of a quality that a frame can have without other memory. */
 function frameLeversOf({ depthKeyBits, occludedBelow, transmittanceMin, alphaMin }: Levers): Partial<FrameLevers> {

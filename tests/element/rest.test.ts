@@ -1,0 +1,43 @@
+/** When the true image comes, once a picture rests: the controller itself, with a clock of the test's and a GPU that is a figure. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
+import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
+import { waitForRest } from '../../packages/element/src/pace/rest.js';
+
+const INTERVAL = 1000 / 60;
+const display = { displayInterval: INTERVAL, clients: 1 } as FrameScheduler;
+
+for (const wholeMs of [20, 100, 200, 230]) {
+  test(`a true image of ${wholeMs} ms is on show 300 ms after rest, and not begun before 50 ms`, (context) => {
+    context.mock.timers.enable({ apis: ['setTimeout'] });
+    let asked = false;
+    const pace = new PaceController({
+      isOn: () => true,
+      scheduler: () => display,
+      requestFrame: () => (asked = true),
+    });
+    // A motion that is drawn whole at first, and soon no longer.
+    let now = 1000;
+    for (let frame = 0; frame < 20; frame++, now += INTERVAL) {
+      const { level } = pace.plan({ now, hasChanged: true, goesOn: true });
+      pace.sample(level, level === 0 ? wholeMs : 10);
+    }
+    const { level } = pace.plan({ now, hasChanged: true, goesOn: false });
+    assert.ok(level > 0, 'in motion with less');
+    assert.equal(asked, false);
+    let waited = 0;
+    for (; !asked && waited < 1000; waited++) context.mock.timers.tick(1);
+    assert.ok(waited >= 50 && waited <= 150, `begun after ${waited} ms`);
+    assert.ok(waited + INTERVAL + wholeMs <= 300, `on show after ${waited + INTERVAL + wholeMs} ms`);
+    assert.equal(pace.plan({ now: now + waited, hasChanged: false, goesOn: false }).level, 0, 'the true image');
+    // A hand that goes on right away moves as it did.
+    assert.ok(pace.plan({ now: now + waited + 5, hasChanged: true, goesOn: true }).level > 0);
+    pace.stop();
+  });
+}
+
+test('true images that can not be in time are begun as soon as rest can be told, those of unknown time as late as may be', () => {
+  assert.equal(waitForRest(900, INTERVAL), 50);
+  assert.equal(waitForRest(0, INTERVAL), 150);
+});
