@@ -16,6 +16,7 @@ for (const wholeMs of [20, 100, 200, 230]) {
       isOn: () => true,
       scheduler: () => display,
       requestFrame: () => (asked = true),
+      onPace: () => undefined,
     });
     // A motion that is drawn whole at first, and soon no longer.
     let now = 1000;
