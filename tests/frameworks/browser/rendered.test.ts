@@ -9,8 +9,8 @@ describe('an element that something else renders', () => {
     place.setHTMLUnsafe(`<gaussian-splat src="${COMPASS}" alt="A compass" loading="eager">
       <template shadowrootmode="open"><div id="view"><canvas></canvas><p role="status">From the server</p></div></template></gaussian-splat>`);
     const element = place.firstElementChild as GaussianSplatElement;
-    const root = element.shadowRoot;
-    assert(root?.textContent?.includes('From the server'), 'the parser made a shadow root');
+    const root = element.shadowRoot!;
+    assert(root.textContent?.includes('From the server'), 'the parser made a shadow root');
     document.body.append(place);
     await element.ready;
     assert(element.loaded, element.error?.message ?? 'not loaded');
