@@ -1,6 +1,7 @@
 /** `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, what editors know of the element, and the demo as a static site. */
-import { readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, existsSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { writeIntegrity } from '../packages/element/scripts/integrity.mjs';
 import { ensureDependencies } from './lib/prepare.mjs';
 import { must, root } from './lib/run.mjs';
 
@@ -24,6 +25,7 @@ must(process.execPath, [
   '--silent',
 ]);
 writeLicences();
+console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
 describeElement();
 await buildDemo();
 
@@ -33,8 +35,12 @@ function projects() {
   );
 }
 
-/** The bundle is without comments, and the licences of what is in it ask for their text. */
+/** The bundle is without comments, and the licences of what is in it ask for their text. npm takes a licence from the package's own folder only. */
 function writeLicences() {
+  for (const name of readdirSync(join(root, 'packages'))) {
+    const folder = join(root, 'packages', name);
+    if (existsSync(join(folder, 'package.json'))) copyFileSync(join(root, 'LICENSE'), join(folder, 'LICENSE'));
+  }
   const own = readFileSync(join(root, 'LICENSE'), 'utf8');
   const lit = readFileSync(join(root, 'node_modules/lit/LICENSE'), 'utf8');
   const text = `gaussian-splat\n\n${own}\n\nLit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js\n\n${lit}`;

@@ -1,7 +1,7 @@
 /** A React app around the element: mount, unmount, another source, a ref, events, a property by reference, all under StrictMode. */
 import { GaussianSplat, type GaussianSplatElement } from '@gaussian-splat/react';
 import type {} from '@gaussian-splat/react/jsx';
-import { StrictMode, useRef, useState } from 'react';
+import { StrictMode, useEffect, useRef, useState } from 'react';
 import { createRoot } from 'react-dom/client';
 
 const query = new URLSearchParams(location.search);
@@ -17,7 +17,11 @@ function App() {
   const [status, setStatus] = useState('waiting');
   const [loads, setLoads] = useState(0);
   const [moves, setMoves] = useState(0);
+  const [times, setTimes] = useState(0);
   const [view, setView] = useState('');
+  const [mounts, setMounts] = useState(0);
+  // Twice under StrictMode in React's development build, which mounts everything, takes it away and mounts it again.
+  useEffect(() => setMounts((count) => count + 1), []);
   const describe = () => {
     const element = splat.current;
     setView(
@@ -52,6 +56,7 @@ function App() {
             setLoads((count) => count + 1);
           }}
           onError={({ detail }) => setStatus(`${detail.code}: ${detail.message}`)}
+          onTimeUpdate={() => setTimes((count) => count + 1)}
           onCameraChange={() => setMoves((count) => count + 1)}
         >
           <button slot="hotspot-middle" data-position="0m 0m 0m">
@@ -60,7 +65,8 @@ function App() {
         </GaussianSplat>
       )}
       <p role="status">
-        <output id="status">{status}</output> <output id="loads">{loads}</output> <output id="moves">{moves}</output>
+        <output id="status">{status}</output> <output id="loads">{loads}</output> <output id="moves">{moves}</output>{' '}
+        <output id="times">{times}</output> <output id="mounts">{mounts}</output>
       </p>
       <p>
         <output id="where">{view}</output>

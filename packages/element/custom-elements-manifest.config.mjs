@@ -8,6 +8,36 @@ import { customElementVsCodePlugin } from 'custom-element-vs-code-integration';
 /** What people import is the compiled module. */
 const published = (path) => path?.replace(/^src\//, 'dist/').replace(/\.ts$/, '.js');
 
+/**
+ * Types as the sources write them, where the analyzer has none: it lets a `@returns` without a type stand for the type of a method, and
+ * does not look at what a field is made with.
+ */
+const typesOfSources = {
+  name: 'types-of-sources',
+  analyzePhase({ ts, node, moduleDoc }) {
+    if (!ts.isClassDeclaration(node)) return;
+    const declaration = moduleDoc.declarations?.find(({ name }) => name === node.name?.getText());
+    for (const member of node.members) {
+      const described = declaration?.members?.find(({ name }) => name === member.name?.getText());
+      if (described === undefined) continue;
+      if (ts.isMethodDeclaration(member)) describeMethod(ts, described, member);
+      else if (member.initializer && ts.isNewExpression(member.initializer)) {
+        described.type ??= { text: member.initializer.expression.getText() };
+      }
+    }
+  },
+};
+
+function describeMethod(ts, described, { type, parameters }) {
+  if (type) described.return = { ...described.return, type: { text: type.getText() } };
+  for (const [i, parameter] of (described.parameters ?? []).entries()) {
+    // One that is taken apart in the signature has no name of its own.
+    if (parameter.name.startsWith('{')) Object.assign(parameter, { name: 'options', optional: true });
+    const { initializer } = parameters[i];
+    if (initializer && ts.isStringLiteral(initializer)) parameter.type ??= { text: 'string' };
+  }
+}
+
 /** Keeps what pages may rely on: one class with all that it inherits from ours, and nothing private, protected or internal. */
 const publicOnly = {
   name: 'public-only',
@@ -21,6 +51,8 @@ const publicOnly = {
       for (const item of module.declarations ?? []) {
         item.superclass = { name: 'LitElement', package: 'lit' };
         item.members = item.members?.filter(isPublic);
+        // The empty text is as good as none, and nothing for an editor to offer.
+        for (const { type } of item.attributes ?? []) if (type) type.text = type.text.replace(" | ''", '');
         for (const part of [...(item.members ?? []), ...(item.attributes ?? [])]) delete part.inheritedFrom;
       }
     }
@@ -41,6 +73,7 @@ export default {
   litelement: true,
   packagejson: false,
   plugins: [
+    typesOfSources,
     publicOnly,
     customElementVsCodePlugin({ ...files, cssFileName: null, hideLogs: true }),
     customElementJetBrainsPlugin({ ...files, hideLogs: true }),

@@ -13,10 +13,17 @@ interface Named {
   readonly name: string;
   readonly description?: string;
 }
+interface Member extends Named {
+  readonly kind: string;
+  readonly static?: boolean;
+  readonly type?: { readonly text: string };
+  readonly return?: { readonly type?: { readonly text: string } };
+  readonly parameters?: readonly (Named & { readonly type?: { readonly text: string } })[];
+}
 interface Declaration {
   readonly tagName?: string;
   readonly attributes: readonly (Named & { readonly type?: { readonly text: string } })[];
-  readonly members: readonly (Named & { readonly kind: string; readonly static?: boolean })[];
+  readonly members: readonly Member[];
   readonly events: readonly (Named & { readonly type?: { readonly text: string } })[];
   readonly slots: readonly Named[];
   readonly cssParts: readonly Named[];
@@ -105,6 +112,27 @@ check('names members that exist, and no private one', () => {
   }
 });
 
+check('every member has a type and a description, every parameter a name and a type', () => {
+  for (const { name, kind, type, description, parameters = [], return: returned } of element?.members ?? []) {
+    assert.ok(kind === 'method' ? returned?.type?.text : type?.text, `${name}: type`);
+    assert.ok(description, `${name}: description`);
+    for (const parameter of parameters) {
+      assert.match(parameter.name, /^\w+$/, `${name}: name of a parameter`);
+      assert.ok(parameter.type?.text, `${name}: type of ${parameter.name}`);
+    }
+  }
+  const typeOf = (name: string): string | undefined => {
+    const member = element?.members.find((one) => one.name === name);
+    return (member?.return ?? member)?.type?.text;
+  };
+  assert.deepEqual(['play', 'toBlob', 'positionFromPoint', 'sharedDevice'].map(typeOf), [
+    'Promise<void>',
+    'Promise<Blob>',
+    'Promise<ScenePoint | null>',
+    'SharedDevice',
+  ]);
+});
+
 check('its keywords are those that the attributes take, the default first', async () => {
   const { readAttributes } = (await import(`${folder}dist/attributes.js`)) as {
     readAttributes: (raw: object, warn: (sentence: string) => void) => Record<string, unknown>;
@@ -131,7 +159,7 @@ check('its keywords are those that the attributes take, the default first', asyn
 
 check('custom data and web-types name the same attributes', () => {
   const data = JSON.parse(readFileSync(`${folder}vscode.html-custom-data.json`, 'utf8')) as {
-    tags: { name: string; attributes: Named[] }[];
+    tags: { name: string; attributes: (Named & { values?: Named[] })[] }[];
   };
   const types = JSON.parse(readFileSync(`${folder}web-types.json`, 'utf8')) as {
     contributions: { html: { elements: { name: string; attributes: Named[] }[] } };
@@ -140,5 +168,8 @@ check('custom data and web-types name the same attributes', () => {
   for (const tags of [data.tags, types.contributions.html.elements]) {
     const tag = tags.find(({ name }) => name === 'gaussian-splat');
     assert.deepEqual(unique(namesOf(tag?.attributes)), observed);
+  }
+  for (const { name, values = [] } of data.tags.flatMap(({ attributes }) => attributes)) {
+    for (const value of values) assert.match(value.name, /^[\w-]+$/, `a word that editors offer for ${name}`);
   }
 });

@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
-import { existsSync, readFileSync } from 'node:fs';
+import { createHash } from 'node:crypto';
+import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 
@@ -25,6 +26,24 @@ test(
     const bytes = sizes.plyPageSize();
     t.diagnostic(`${bytes} bytes of gzip in ${files.length} files`);
     assert.ok(bytes < sizes.BUDGET, `${bytes} bytes`);
+  },
+);
+
+test(
+  'integrity.json has the hash of every script of the CDN build',
+  { skip: isBuilt ? false : 'no CDN build: npm run build' },
+  () => {
+    const cdn = `${root}packages/element/cdn/`;
+    const hashes = JSON.parse(readFileSync(`${cdn}integrity.json`, 'utf8')) as Record<string, string>;
+    const scripts = readdirSync(cdn, { recursive: true, encoding: 'utf8' }).filter((file) => /\.m?js$/.test(file));
+    assert.ok(scripts.includes('gaussian-splat.min.js') && scripts.length > 10, scripts.join());
+    assert.deepEqual(Object.keys(hashes).sort(), scripts.sort());
+    for (const file of scripts) {
+      const digest = createHash('sha384')
+        .update(readFileSync(cdn + file))
+        .digest('base64');
+      assert.equal(hashes[file], `sha384-${digest}`, file);
+    }
   },
 );
 

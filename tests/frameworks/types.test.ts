@@ -1,4 +1,4 @@
-/** The apps of React and Vue type-check with their frameworks' own checkers, and their wrappers know every event. */
+/** The apps of React and Vue, and what their types take and refuse, checked by their frameworks' own checkers; their wrappers know every event. */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
@@ -11,8 +11,8 @@ const skip = existsSync(`${root}packages/react/dist`) ? false : 'not built: npm 
 const CHECKERS = { react: 'typescript/bin/tsc', vue: 'vue-tsc/bin/vue-tsc.js' };
 
 for (const [name, checker] of Object.entries(CHECKERS)) {
-  test(`the app of ${name} is well typed`, { skip }, () => {
-    const args = [`node_modules/${checker}`, '--project', `demo/${name}`];
+  test(`the app of ${name} is well typed, and its types refuse what would not work`, { skip }, () => {
+    const args = [`node_modules/${checker}`, '--project', `tests/frameworks/${name}`];
     const { status, stdout, stderr } = spawnSync(process.execPath, args, { cwd: root, encoding: 'utf8' });
     assert.equal(status, 0, stdout + stderr);
   });

@@ -36,3 +36,44 @@ for (const name of packages) {
     assert.equal(result.status, 0, result.stdout + result.stderr);
   });
 }
+
+/** Most bytes of a tarball. The element's has the CDN build with its source maps, and not ONNX Runtime, which is a dependency. */
+const MOST_BYTES = { element: 2_000_000, others: 500_000 };
+
+test('every tarball has its licence, its README and nothing that weighs', { skip }, (t) => {
+  const result = spawnSync('npm', ['pack', '--dry-run', '--json', '--workspaces'], {
+    cwd: root,
+    encoding: 'utf8',
+    shell: process.platform === 'win32',
+    maxBuffer: 1 << 26,
+  });
+  assert.equal(result.status, 0, result.stderr);
+  const tarballs = JSON.parse(result.stdout) as { name: string; size: number; files: { path: string }[] }[];
+  assert.equal(tarballs.length, packages.length);
+  for (const { name, size, files } of tarballs) {
+    const paths = files.map(({ path }) => path);
+    for (const needed of ['LICENSE', 'README.md', 'package.json'])
+      assert.ok(paths.includes(needed), `${name}: ${needed}`);
+    t.diagnostic(`${name}: ${size} bytes in ${files.length} files`);
+    const most = name === '@gaussian-splat/element' ? MOST_BYTES.element : MOST_BYTES.others;
+    assert.ok(size < most, `${name}: ${size} bytes`);
+  }
+  const element = tarballs.find(({ name }) => name === '@gaussian-splat/element')?.files.map(({ path }) => path) ?? [];
+  assert.ok(element.includes('cdn/gaussian-splat.min.js') && element.includes('cdn/integrity.json'), element.join());
+  assert.deepEqual(
+    element.filter((path) => path.startsWith('cdn/onnxruntime/')),
+    [],
+  );
+});
+
+test('packages that say where their sources are say it as the workspace does', () => {
+  const read = (folder: string) =>
+    JSON.parse(readFileSync(`${folder}/package.json`, 'utf8')) as Record<string, unknown>;
+  const workspace = read(root) as { repository?: { url: string } };
+  for (const name of packages) {
+    const { repository, license, keywords } = read(`${root}packages/${name}`);
+    const expected = workspace.repository && { ...workspace.repository, directory: `packages/${name}` };
+    assert.deepEqual([repository, license], [expected, 'MIT'], name);
+    assert.ok(Array.isArray(keywords) && keywords.includes('gaussian-splatting'), `${name}: keywords`);
+  }
+});

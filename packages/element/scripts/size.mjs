@@ -1,11 +1,11 @@
 /**
  * `npm run size -w @gaussian-splat/element`: bytes of the CDN build, and of what a page with a PLY scene fetches of it.
  */
-import { createHash } from 'node:crypto';
 import { readdirSync, readFileSync } from 'node:fs';
 import { basename, dirname, join, relative } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
+import { integrityOf } from './integrity.mjs';
 
 const CDN = fileURLToPath(new URL('../cdn/', import.meta.url));
 /** Most that the element may weigh: bytes of gzip, readers of the other formats not counted. */
@@ -54,8 +54,7 @@ function print() {
     console.log(`${mark} ${file.padEnd(40)}${String(raw).padStart(7)}${String(gzip).padStart(10)}`);
   }
   console.log(`* fetched for a PLY scene: ${plyPageSize()} bytes of gzip (at most ${BUDGET})`);
-  const entry = readFileSync(join(CDN, 'gaussian-splat.min.js'));
-  console.log(`integrity of gaussian-splat.min.js: sha384-${createHash('sha384').update(entry).digest('base64')}`);
+  console.log(`integrity of gaussian-splat.min.js: ${integrityOf(join(CDN, 'gaussian-splat.min.js'))}`);
 }
 
 if (basename(process.argv[1] ?? '') === 'size.mjs') print();

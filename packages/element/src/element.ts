@@ -178,6 +178,7 @@ export class GaussianSplatElement extends ViewingMethods {
     return this.stage.updateStats();
   }
 
+  /** Gives the keyboard to the scene, where the camera can be moved; else as of HTMLElement. */
   override focus(options?: FocusOptions): void {
     const surface = this.renderRoot?.querySelector<HTMLElement>('#view[tabindex]');
     if (surface) surface.focus(options);
@@ -203,6 +204,12 @@ export class GaussianSplatElement extends ViewingMethods {
   /** `moveBefore()` takes the element elsewhere as it is: its being here lets the browser spare both callbacks above. */
   connectedMoveCallback(): void {
     this.requestUpdate();
+  }
+
+  protected override createRenderRoot(): HTMLElement | DocumentFragment {
+    // What a server put into a declarative shadow root gives way, in the same task, to the element's own first rendering.
+    if (!isServer) this.shadowRoot?.replaceChildren();
+    return super.createRenderRoot();
   }
 
   protected override willUpdate(changed: PropertyValues<this>): void {

@@ -30,6 +30,12 @@ export interface PreviewDetail {
   readonly splats: number;
 }
 
+/** `detail` of the event `hotspot-visibility`, which is fired on a hotspot itself. */
+export interface HotspotVisibilityDetail {
+  /** Whether anybody can see the hotspot's point: it is before the camera, faces it, and nothing hides it. */
+  readonly visible: boolean;
+}
+
 /** Events of `<gaussian-splat>`. None of them bubbles. */
 export interface GaussianSplatEventMap {
   /** The scene's first frame is on the screen. */
@@ -69,4 +75,11 @@ export interface GaussianSplatEventMap {
   contextlost: Event;
   /** The picture is back after a loss. */
   contextrestored: Event;
+}
+
+declare global {
+  interface HTMLElementEventMap {
+    /** A hotspot of a `<gaussian-splat>` has come into sight, or is hidden now. */
+    'hotspot-visibility': CustomEvent<HotspotVisibilityDetail>;
+  }
 }

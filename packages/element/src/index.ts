@@ -7,6 +7,7 @@ export type {
   CameraChangeSource,
   FallbackDetail,
   GaussianSplatEventMap,
+  HotspotVisibilityDetail,
   LoadDetail,
   PreviewDetail,
   VisibilityDetail,
@@ -14,6 +15,7 @@ export type {
 export { GaussianSplatElement, type SceneStatistics } from './element.js';
 export type { SceneStats } from './stats.js';
 export type { PaceReport } from './controllers/pace-controller.js';
+export type { SettableProperties } from './settable.js';
 export type { PictureOptions } from './viewing.js';
 export type {
   InteractionPrompt,
@@ -32,12 +34,10 @@ export { SceneTimeRanges } from './time-ranges.js';
 export type { ControlValues, Numbers, Picture } from './live/values.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 
-/** What a page may put into `globalThis.GaussianSplatElement` before this module runs: statics of the class. */
-export type GaussianSplatConfiguration = Partial<
-  Pick<typeof GaussianSplatElement, 'runtimeLocation' | 'urlModifier' | 'releaseDelay' | 'sharedDevice'>
->;
+const CONFIGURABLE = ['runtimeLocation', 'urlModifier', 'releaseDelay', 'sharedDevice', 'memoryBudget'] as const;
 
-const CONFIGURABLE = ['runtimeLocation', 'urlModifier', 'releaseDelay', 'sharedDevice'] as const;
+/** What a page may put into `globalThis.GaussianSplatElement` before this module runs: statics of the class. */
+export type GaussianSplatConfiguration = Partial<Pick<typeof GaussianSplatElement, (typeof CONFIGURABLE)[number]>>;
 
 /** Script tags without a build step cannot set statics before the first element is upgraded. */
 function configure(): void {

@@ -27,10 +27,12 @@ export abstract class MediaProperties extends SplatProperties {
     return this.stage.playback.duration;
   }
 
+  /** Whether the time stands still; true where nothing moves. */
   get paused(): boolean {
     return this.stage.playback.paused;
   }
 
+  /** Whether the time has come to its end. */
   get ended(): boolean {
     return this.stage.playback.ended;
   }
@@ -74,6 +76,7 @@ export abstract class MediaProperties extends SplatProperties {
     this.stage.playback.play();
   }
 
+  /** Lets the time stand still. */
   pause(): void {
     this.stage.playback.pause();
   }

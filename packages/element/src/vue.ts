@@ -5,26 +5,7 @@
 import type { HTMLAttributes, PublicProps } from 'vue';
 import type { GaussianSplatElement } from './element.js';
 import type { GaussianSplatEventMap } from './events.js';
-import type { SplatProperties } from './properties.js';
-
-/** The properties that are the element's own, and that attributes set. */
-type OwnProps = Partial<Omit<SplatProperties, Exclude<keyof HTMLElement, 'autoplay'> | keyof LitMembers>>;
-type LitMembers = Pick<
-  SplatProperties,
-  Extract<
-    keyof SplatProperties,
-    | 'renderOptions'
-    | 'renderRoot'
-    | 'isUpdatePending'
-    | 'hasUpdated'
-    | 'updateComplete'
-    | 'requestUpdate'
-    | 'addController'
-    | 'removeController'
-    | 'addEventListener'
-    | 'removeEventListener'
-  >
->;
+import type { SettableProperties } from './settable.js';
 
 /** `camera-change` as Vue names its listeners: `onCameraChange`. */
 type ListenerName<Type extends string> = Type extends `${infer Head}-${infer Tail}`
@@ -39,7 +20,7 @@ type Listeners = {
 /** What Vue looks at in a component, for a tag of the platform. */
 type CustomElement = new () => GaussianSplatElement & {
   /** @deprecated Only for the types of templates. */
-  readonly $props: Omit<HTMLAttributes, keyof Listeners> & Listeners & OwnProps & PublicProps;
+  readonly $props: Omit<HTMLAttributes, keyof Listeners> & Listeners & SettableProperties & PublicProps;
 };
 
 declare module 'vue' {

@@ -1,49 +1,48 @@
 import type { GaussianSplatEventMap } from '@gaussian-splat/element';
 import type { EventName } from '@lit/react';
 
-/** `camera-change` as React names its handlers: `onCameraChange`. */
-type HandlerName<Type extends string> = Type extends `${infer Head}-${infer Tail}`
-  ? `${Capitalize<Head>}${Capitalize<Tail>}`
-  : Capitalize<Type>;
+/** Which event a handler is for. Where React has a name for the event's handler, it is that one. */
+const EVENTS = {
+  onLoad: 'load',
+  onProgress: 'progress',
+  onPreview: 'preview',
+  onError: 'error',
+  onCameraChange: 'camera-change',
+  onPosterDismissed: 'poster-dismissed',
+  onModelVisibility: 'model-visibility',
+  onGeneratorError: 'generator-error',
+  onGeneratorFallback: 'generator-fallback',
+  onPlay: 'play',
+  onPlaying: 'playing',
+  onPause: 'pause',
+  onTimeUpdate: 'timeupdate',
+  onSeeking: 'seeking',
+  onSeeked: 'seeked',
+  onEnded: 'ended',
+  onRateChange: 'ratechange',
+  onDurationChange: 'durationchange',
+  onLoadedMetadata: 'loadedmetadata',
+  onLoadStart: 'loadstart',
+  onLoadedData: 'loadeddata',
+  onCanPlay: 'canplay',
+  onEmptied: 'emptied',
+  onContextLost: 'contextlost',
+  onContextRestored: 'contextrestored',
+} as const satisfies Readonly<Record<`on${string}`, keyof GaussianSplatEventMap>>;
 
-/** A handler for every event of the element, each with that event's type. */
-export type Handlers = {
-  readonly [Type in string & keyof GaussianSplatEventMap as `on${HandlerName<Type>}`]: EventName<
-    GaussianSplatEventMap[Type]
-  >;
-};
+/** Name of a handler, such as `onTimeUpdate`. */
+export type HandlerName = keyof typeof EVENTS;
 
-const event = <Type extends string & keyof GaussianSplatEventMap>(type: Type): EventName<GaussianSplatEventMap[Type]> =>
-  type as unknown as EventName<GaussianSplatEventMap[Type]>;
+type EventOf<Name extends HandlerName> = GaussianSplatEventMap[(typeof EVENTS)[Name]];
+
+/** The handlers as the wrapper takes them. */
+export type Handlers = { readonly [Name in HandlerName]: EventName<EventOf<Name>> };
+
+/** The handlers as an app writes them, each with its event's own type. */
+export type Listeners = { [Name in HandlerName]?: (event: EventOf<Name>) => void };
 
 /**
- * Which event a handler is for. React keeps `onLoad`, `onError`, `onProgress`, `onPlay` and their like to itself on custom elements; a handler
- * here listens to the element.
+ * React keeps `onLoad`, `onError`, `onTimeUpdate`, `onPlay` and their like to itself on custom elements, where they never fire; these handlers
+ * listen to the element.
  */
-export const HANDLERS: Handlers = {
-  onLoad: event('load'),
-  onProgress: event('progress'),
-  onPreview: event('preview'),
-  onError: event('error'),
-  onCameraChange: event('camera-change'),
-  onPosterDismissed: event('poster-dismissed'),
-  onModelVisibility: event('model-visibility'),
-  onGeneratorError: event('generator-error'),
-  onGeneratorFallback: event('generator-fallback'),
-  onPlay: event('play'),
-  onPlaying: event('playing'),
-  onPause: event('pause'),
-  onTimeupdate: event('timeupdate'),
-  onSeeking: event('seeking'),
-  onSeeked: event('seeked'),
-  onEnded: event('ended'),
-  onRatechange: event('ratechange'),
-  onDurationchange: event('durationchange'),
-  onLoadedmetadata: event('loadedmetadata'),
-  onLoadstart: event('loadstart'),
-  onLoadeddata: event('loadeddata'),
-  onCanplay: event('canplay'),
-  onEmptied: event('emptied'),
-  onContextlost: event('contextlost'),
-  onContextrestored: event('contextrestored'),
-};
+export const HANDLERS = EVENTS as unknown as Handlers;

@@ -1,13 +1,22 @@
 'use client';
 /** `<gaussian-splat>` for React 18 and 19. */
 import '@gaussian-splat/element';
-import { GaussianSplatElement } from '@gaussian-splat/element';
+import { GaussianSplatElement, type SettableProperties } from '@gaussian-splat/element';
 import { createComponent } from '@lit/react';
 import * as React from 'react';
-import { HANDLERS } from './events.js';
+import { HANDLERS, type Listeners } from './events.js';
 
-export type { Handlers } from './events.js';
+export type { HandlerName, Handlers, Listeners } from './events.js';
 export type { GaussianSplatElement } from '@gaussian-splat/element';
+
+/** What {@link GaussianSplat} takes: the element's properties, its events' handlers, what React gives every tag, and `ref`. */
+export type GaussianSplatProps = Omit<
+  React.HTMLAttributes<GaussianSplatElement>,
+  keyof Listeners | keyof SettableProperties
+> &
+  Listeners &
+  SettableProperties &
+  React.RefAttributes<GaussianSplatElement>;
 
 /**
  * The element as a component: its properties by reference, its events as handlers, its element by `ref`.
@@ -16,13 +25,10 @@ export type { GaussianSplatElement } from '@gaussian-splat/element';
  * <GaussianSplat src="scene.ply" alt="A skull" cameraControls onLoad={({ detail }) => console.log(detail.url)} />
  * ```
  */
-export const GaussianSplat = createComponent({
+export const GaussianSplat: React.ForwardRefExoticComponent<GaussianSplatProps> = createComponent({
   react: React,
   tagName: 'gaussian-splat',
   elementClass: GaussianSplatElement,
   events: HANDLERS,
   displayName: 'GaussianSplat',
 });
-
-/** What {@link GaussianSplat} takes. */
-export type GaussianSplatProps = React.ComponentProps<typeof GaussianSplat>;

@@ -62,6 +62,27 @@ describe('the CDN build', () => {
     assertEqual(report.violations, [], 'violations');
   });
 
+  it('takes what a page has put into globalThis.GaussianSplatElement', async () => {
+    const frame = document.createElement('iframe');
+    frame.srcdoc = `<!doctype html><title>Configured</title>
+      <script>
+        globalThis.GaussianSplatElement = { memoryBudget: 1, releaseDelay: 7, runtimeLocation: '/elsewhere/', urlModifier: () => '${location.origin}${COMPASS}' };
+      </script>
+      <script type="module">
+        const { GaussianSplatElement: Class } = await import('/packages/element/cdn/gaussian-splat.min.js');
+        const element = document.querySelector('gaussian-splat');
+        await element.ready;
+        parent.postMessage({ delay: Class.releaseDelay, runtime: Class.runtimeLocation, reason: element.error?.reason }, '*');
+      </script>
+      <gaussian-splat src="nowhere.splat" loading="eager"></gaussian-splat>`;
+    const answer = nextEvent<MessageEvent<Record<string, unknown>>>(window, 'message', 60_000);
+    document.body.append(frame);
+    const { data } = await answer;
+    assertEqual([data.delay, data.runtime], [7, '/elsewhere/'], 'releaseDelay, runtimeLocation');
+    // Found where urlModifier sends it, and then refused by the budget.
+    assertEqual(data.reason, 'out-of-memory/budget', 'reason');
+  });
+
   it('is one tag with integrity on a page of another origin, generators included, without isolation', async () => {
     const report = await reportOf('/net/cdn-page');
     assertEqual(

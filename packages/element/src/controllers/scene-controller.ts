@@ -5,6 +5,7 @@ import type { GpuScene } from '../gpu/gpu-scene.js';
 import { openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { SharedDevice } from '../gpu/shared-device.js';
 import type { SceneRequest } from '../loading/protocol.js';
+import { isSameContract } from '../loading/same-contract.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
 /** `waiting`: there is a scene to load, but the element is not in sight yet. */
@@ -298,7 +299,7 @@ function unrecoverable(cause: unknown): GaussianSplatError {
 const isSame = (a: SceneRequest, b: SceneRequest | null): boolean =>
   a.url === b?.url &&
   a.credentials === b.credentials &&
-  a.contract === b.contract &&
+  isSameContract(a.contract, b.contract) &&
   (a.chain ?? []).join(' ') === (b.chain ?? []).join(' ');
 
 const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));

@@ -1,11 +1,11 @@
 /** Servers as the web has them: slow, broken, lying, strict, and elsewhere. */
-import { createHash } from 'node:crypto';
 import { createReadStream, existsSync, readFileSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { extname, join, normalize } from 'node:path';
 import { Readable } from 'node:stream';
 import { setTimeout as delay } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
+import { DEVELOPMENT_APP, developmentScript, plainApp } from './apps.mjs';
 
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
 const fixtures = fileURLToPath(new URL('../fixtures/', import.meta.url));
@@ -186,8 +186,8 @@ const ANSWERS = {
 
   /** A page as the README has it: one script tag from another origin, with its integrity. */
   'cdn-page'(context, _rest, otherOrigin) {
-    const script = readFileSync(join(root, 'packages/element/cdn/gaussian-splat.min.js'));
-    const integrity = `sha384-${createHash('sha384').update(script).digest('base64')}`;
+    const hashes = JSON.parse(readFileSync(join(root, 'packages/element/cdn/integrity.json'), 'utf8'));
+    const integrity = hashes['gaussian-splat.min.js'];
     context.type = 'text/html';
     context.body = `<!doctype html><title>CDN</title>
       <script type="module" src="${otherOrigin}/cdn/gaussian-splat.min.js" integrity="${integrity}" crossorigin></script>
@@ -201,6 +201,18 @@ const ANSWERS = {
         parent.postMessage({ definedMs, loaded: elements.map(({ loaded }) => loaded), errors: elements.map(({ error }) => error?.message),
           isolated: crossOriginIsolated, scripts: performance.getEntriesByType('resource').map(({ name }) => name).filter((name) => /[.](m?js|wasm)$/.test(name)) }, '*');
       </script>`;
+  },
+
+  /** The app of React in React's development build. */
+  async 'react-development'(context, name) {
+    context.type = name === 'app.js' ? 'text/javascript' : 'text/html';
+    context.body = name === 'app.js' ? await developmentScript() : DEVELOPMENT_APP;
+  },
+
+  /** The same app without any framework. */
+  'plain-app'(context, _rest, otherOrigin) {
+    context.type = 'text/html';
+    context.body = plainApp(`${otherOrigin}/cdn/gaussian-splat.min.js`);
   },
 
   'strict-script'(context) {

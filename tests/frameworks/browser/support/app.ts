@@ -1,9 +1,11 @@
-/** Real apps of React (under StrictMode) and Vue, as their own tools have built them, driven as a person would. */
-import { assert, assertEqual, COMPASS, FIXTURES, nextEvent, until } from '../../element/browser/support/harness.js';
+/** The same app, in whatever it is made with, driven as a person would. */
+import { executeServerCommand } from '@web/test-runner-commands';
+import { assert, assertEqual, COMPASS, delay, nextEvent, until } from '../../../element/browser/support/harness.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
   readonly src: string;
+  currentTime: number;
   readonly cameraControls: boolean;
   getCameraOrbit(): object;
 }
@@ -35,16 +37,33 @@ class App {
   }
 
   async shown(name: string, loads: number): Promise<Splat> {
-    await until(() => Number(this.text('loads')) >= loads && this.text('status').includes(name), `load ${loads}`);
+    const isShown = (): boolean => Number(this.text('loads')) >= loads && this.text('status').includes(name);
+    await until(isShown, `load ${loads}`, 50_000);
     assert(this.splat?.loaded, 'loaded');
     return this.splat;
   }
 }
 
-async function open(name: string): Promise<App> {
+/** Elements that may still be held: React keeps the trees of its last two renderings, and a stack or a frame has another. A leak holds all of them. */
+const MAX_HELD = 4;
+
+/** An app and what is known of it. */
+export interface AppUnderTest {
+  /** Its address. */
+  readonly page: string;
+  /** How often it is mounted in the test of leaks. */
+  readonly mounts: number;
+  /** How often React calls the effects of one mount, where it is React's. */
+  readonly effects?: number;
+}
+
+/** A scene that moves: three frames of a tenth of a second. */
+const MOVING = '/net/sequence/three.json?count=3&fps=10';
+
+async function open(page: string): Promise<App> {
   const frame = document.createElement('iframe');
-  const scenes = new URLSearchParams({ first: COMPASS, second: `${FIXTURES}green.splat` });
-  frame.src = `/demo/dist/${name}/index.html?${scenes}`;
+  const scenes = new URLSearchParams({ first: COMPASS, second: MOVING });
+  frame.src = `${page}?${scenes}`;
   frame.style.cssText = 'width: 500px; height: 500px; border: 0';
   const loaded = nextEvent(frame, 'load');
   document.body.append(frame);
@@ -52,12 +71,14 @@ async function open(name: string): Promise<App> {
   return new App(frame);
 }
 
-for (const name of ['react', 'vue']) {
+/** What an app with the element does when a person drives it, whatever it is made with. */
+export function describeApp(name: string, { page, mounts, effects }: AppUnderTest): void {
   describe(`an app of ${name}`, () => {
     it('shows a scene once: properties by reference, events, a ref, children in slots', async () => {
-      const app = await open(name);
+      const app = await open(page);
       const splat = await app.shown('compass', 1);
       assertEqual([app.text('loads'), splat.cameraControls], ['1', true], 'loads, camera-controls');
+      if (effects !== undefined) assertEqual(app.text('mounts'), String(effects), 'mounts by React');
       app.click('view');
       await until(() => app.text('where') !== '', 'the words of the ref');
       assertEqual(app.text('where'), `${String(splat.getCameraOrbit())}, controls by reference: true`);
@@ -66,23 +87,26 @@ for (const name of ['react', 'vue']) {
       await until(() => Number(app.text('moves')) > 3, 'camera-change');
     });
 
-    it('swaps its source on the same element', async () => {
-      const app = await open(name);
+    it('swaps its source on the same element, and hears the time of a scene that moves', async () => {
+      const app = await open(page);
       const before = await app.shown('compass', 1);
       app.click('swap');
-      const after = await app.shown('green', 2);
-      assertEqual([after === before, app.text('loads')], [true, '2'], 'the same element, one more load');
+      const splat = await app.shown('three', 2);
+      assertEqual([splat === before, app.text('loads')], [true, '2'], 'the same element, one more load');
+      const times = Number(app.text('times'));
+      splat.currentTime = 0.2;
+      await until(() => Number(app.text('times')) > times, 'timeupdate');
     });
 
     it('tells an error with its code', async () => {
-      const app = await open(name);
+      const app = await open(page);
       const splat = await app.shown('compass', 1);
       splat.setAttribute('src', '/net/status/404');
       await until(() => app.text('status').startsWith('network: '), 'the error');
     });
 
-    it('200 mounts leave one device and not a buffer', async () => {
-      const app = await open(name);
+    it(`${mounts} mounts leave one device, not a buffer and not an element`, async () => {
+      const app = await open(page);
       await app.shown('compass', 1);
       const alive = new Set<object>();
       let devices = 0;
@@ -114,15 +138,28 @@ for (const name of ['react', 'vue']) {
       await until(() => app.text('toggle') === 'Bring it back' && resident.loaded, 'the first unmount');
       await until(() => resident.loaded, 'the resident');
       const before = alive.size;
-      for (let i = 0; i < 200; i++) {
+      const elements: WeakRef<Splat>[] = [];
+      for (let i = 0; i < mounts; i++) {
         app.click('toggle');
         await until(() => app.text('toggle') === 'Take it away', `mount ${i}`);
+        elements.push(new WeakRef(appSplat(app, resident)!));
         if (i % 20 === 0) await until(() => appSplat(app, resident)?.loaded === true, `the scene of mount ${i}`);
         app.click('toggle');
         await until(() => app.text('toggle') === 'Bring it back', `unmount ${i}`);
       }
       await until(() => alive.size === before, `the buffers to go: ${alive.size} instead of ${before}`);
       assert(devices === 0, `${devices} more devices`);
+      const held = async (): Promise<number> => {
+        await executeServerCommand('heap-size');
+        return elements.filter((element) => element.deref()).length;
+      };
+      let count = await held();
+      for (let tries = 0; count > MAX_HELD && tries < 5; tries++) {
+        await delay(400);
+        count = await held();
+      }
+      console.log(`${name}: ${count} of ${mounts} elements are held`);
+      assert(count <= MAX_HELD, `${count} elements are still held`);
     }).timeout(120_000);
   });
 }

@@ -1,0 +1,43 @@
+/** What renderers do to the element that people do not: markup from a server with a shadow root in it, a new object for every render. */
+import '@gaussian-splat/element';
+import { assert, assertEqual, COMPASS, frames, showLoaded } from '../../element/browser/support/harness.js';
+import type { GaussianSplatElement } from '@gaussian-splat/element';
+
+describe('an element that something else renders', () => {
+  it('takes over the declarative shadow root of a server', async () => {
+    const place = document.createElement('div');
+    place.setHTMLUnsafe(`<gaussian-splat src="${COMPASS}" alt="A compass" loading="eager">
+      <template shadowrootmode="open"><div id="view"><canvas></canvas><p role="status">From the server</p></div></template></gaussian-splat>`);
+    const element = place.firstElementChild as GaussianSplatElement;
+    const root = element.shadowRoot!;
+    assert(root.textContent?.includes('From the server'), 'the parser made a shadow root');
+    document.body.append(place);
+    await element.ready;
+    assert(element.loaded, element.error?.message ?? 'not loaded');
+    const count = (selector: string): number => element.shadowRoot!.querySelectorAll(selector).length;
+    assertEqual([count('#view'), count('canvas')], [1, 1], 'views and canvases');
+    assert(
+      element.shadowRoot === root && !root.textContent?.includes('From the server'),
+      'one root, of our own content',
+    );
+  });
+
+  it('loads anew for another contract, and not for another object that says the same', async () => {
+    const element = await showLoaded();
+    let starts = 0;
+    element.addEventListener('loadstart', () => starts++);
+    const render = async (contract: object | null | undefined): Promise<number> => {
+      Object.assign(element, { contract });
+      await element.updateComplete;
+      await element.ready;
+      await frames();
+      return starts;
+    };
+    assertEqual(await render(undefined), 0, 'no contract either way');
+    assertEqual(await render({ version: 1, duration: 2 }), 1, 'a contract');
+    assertEqual(await render({ version: 1, duration: 2 }), 1, 'the same again');
+    assertEqual(await render({ version: 1, duration: 3 }), 2, 'another one');
+    // With a contract a scene is read as a generator. This file is none; what counts here is how often it is asked for.
+    assertEqual(element.error?.code, 'decode', 'error');
+  });
+});

@@ -1,0 +1,44 @@
+/** What the types of React's wrapper and of the bare tag take and refuse. Only type-checked, by types.test.ts. */
+import { GaussianSplat, type HandlerName } from '@gaussian-splat/react';
+import type { GaussianSplatEventMap } from '@gaussian-splat/element';
+import type {} from '@gaussian-splat/react/jsx';
+import type { DOMAttributes } from 'react';
+
+type Ours = Lowercase<`on${keyof GaussianSplatEventMap}`>;
+/** Names that React has for handlers of our events: on the component each must be ours, or React swallows it. */
+type Reacts = { [Name in keyof DOMAttributes<Element>]-?: Lowercase<Name> extends Ours ? Name : never };
+type Swallowed = Exclude<Reacts[keyof Reacts], HandlerName>;
+/** Fails to compile where a name is swallowed, and says which. */
+export const noneIsSwallowed: [Swallowed] extends [never] ? true : Swallowed = true;
+
+export const component = (
+  <GaussianSplat
+    currentTime={1}
+    playbackRate={2}
+    pose={[0, 1]}
+    onTimeUpdate={({ currentTarget, type }) => console.log(currentTarget, type)}
+    onLoadedMetadata={() => undefined}
+    onCameraChange={({ detail }) => console.log(detail.source)}
+    onClick={({ clientX }) => console.log(clientX)}
+  />
+);
+// @ts-expect-error The name is React's own.
+export const misspelt = <GaussianSplat onTimeupdate={() => undefined} />;
+// @ts-expect-error It can only be read.
+export const readOnly = <GaussianSplat duration={1} />;
+// @ts-expect-error It is a method.
+export const method = <GaussianSplat play={async () => undefined} />;
+
+export const bare = <gaussian-splat src="a.ply" currentTime={1} onload={({ detail }) => console.log(detail.url)} />;
+// @ts-expect-error It would never fire.
+export const deadLoad = <gaussian-splat onLoad={() => undefined} />;
+// @ts-expect-error It would never fire.
+export const deadTime = <gaussian-splat onTimeUpdate={() => undefined} />;
+// @ts-expect-error It would never fire.
+export const deadCamera = <gaussian-splat onCameraChange={() => undefined} />;
+// @ts-expect-error It can only be read.
+export const readOnlyBare = <gaussian-splat error={null} />;
+
+document.createElement('button').addEventListener('hotspot-visibility', ({ detail }) => {
+  detail.visible satisfies boolean;
+});
