@@ -1,6 +1,7 @@
 /** The committed runs of `npm run frontier`: for each chart of docs/frontier what was measured, on what, and when. */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { timeOf } from '../../../scripts/frontier/front.mjs';
 import { root } from '../../../scripts/lib/run.mjs';
 
 const folder = join(root, 'docs/frontier');
@@ -11,23 +12,24 @@ export default function frontiers() {
     .map((name) => describe(name.replace('.json', ''), JSON.parse(readFileSync(join(folder, name), 'utf8'))));
 }
 
-function describe(name, { environment, scene, results }) {
+function describe(name, { environment, scene, results, standard }) {
   const { vendor, architecture, description } = environment.adapter;
   return {
     name,
     adapter: [vendor, architecture, description].filter(Boolean).join(' '),
     date: environment.date.slice(0, 10),
     scene: { ...scene, splats: scene.splats.toLocaleString('en') },
-    rows: results.filter(({ error }) => !error).map(rowOf),
+    rows: results.filter(({ error }) => !error).map((result) => rowOf(result, standard)),
   };
 }
 
-function rowOf({ configuration, quality, span, sortedWall, wall }) {
-  const cost = span ?? sortedWall ?? wall;
+function rowOf(result, standard) {
+  const { configuration, quality } = result;
+  const { kind, ms } = timeOf(result, standard);
   return {
     name: configuration.name,
-    milliseconds: cost ? Number(cost.p50.toPrecision(3)).toLocaleString('en') : '',
-    clock: span ? 'GPU' : 'wall',
+    milliseconds: Number(ms.toPrecision(3)).toLocaleString('en'),
+    clock: kind === 'span' ? 'GPU' : 'wall',
     psnr: quality.psnr.toFixed(1),
     worst: quality.worst.toFixed(1),
   };
