@@ -195,6 +195,7 @@ export class Stage {
         this.#live.post.attach(null);
         if (clear) this.playback.setDuration(NaN);
         if (clear) this.#drawnFrom = undefined;
+        if (clear) this.hotspots.forget();
         if (clear) this.#view.clear();
         else this.#view.pause();
       },

@@ -76,6 +76,9 @@ export const styles = css`
     opacity: var(--max-hotspot-opacity, 1);
     transition: opacity 0.3s;
   }
+  .hotspot:not(.placed) {
+    visibility: hidden;
+  }
   .hotspot ::slotted(*) {
     pointer-events: auto;
   }

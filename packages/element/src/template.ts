@@ -41,7 +41,7 @@ const KEYS_HELP = {
 /** The element's shadow tree. */
 export function template(model: TemplateModel): TemplateResult {
   return html`
-    ${view(model)} ${hotspots(model.hotspots)} ${prompt(model)} ${poster(model)}
+    ${view(model)} ${hotspots(model)} ${prompt(model)} ${poster(model)}
     ${model.isLoading ? progressBar(model.progress) : nothing} ${model.error ? message(model.error) : nothing}
     <div class="for-screen-readers" role="status">${model.spoken}</div>
   `;
@@ -68,10 +68,10 @@ function view({ label, controls, navigation, onReveal }: TemplateModel): Templat
   `;
 }
 
-/** A box for each name, in their order; where it lies is up to the controller of the hotspots. */
-function hotspots(names: readonly string[]): TemplateResult {
-  return html`<div id="hotspots" class="layer">
-    ${names.map((name) => html`<div class="hotspot hidden"><slot name=${name}></slot></div>`)}
+/** A box for each name, in their order; where it lies is up to the controller of the hotspots. Under a poster nobody reaches them. */
+function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
+  return html`<div id="hotspots" class="layer ${showPoster ? 'gone' : ''}">
+    ${hotspots.map((name) => html`<div class="hotspot hidden"><slot name=${name}></slot></div>`)}
   </div>`;
 }
 

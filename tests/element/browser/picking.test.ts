@@ -2,7 +2,7 @@
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { GaussianSplatElement as ElementClass } from '@gaussian-splat/element';
-import { sendMouse } from '@web/test-runner-commands';
+import { sendKeys, sendMouse } from '@web/test-runner-commands';
 import {
   assert,
   assertEqual,
@@ -164,6 +164,51 @@ describe('hotspots', () => {
     assertEqual(getComputedStyle(behind).visibility, 'hidden', 'behind the camera');
     behind.focus();
     assert(document.activeElement !== behind, 'what cannot be seen takes no focus');
+  });
+
+  it('are neither seen nor reached without a frame, without a position, and under a poster', async () => {
+    const isGone = async (element: GaussianSplatElement, button: HTMLElement): Promise<boolean> => {
+      await element.updateComplete;
+      await frames();
+      (document.activeElement as HTMLElement | null)?.blur();
+      await sendKeys({ press: 'Tab' });
+      return getComputedStyle(button).visibility === 'hidden' && document.activeElement !== button;
+    };
+    const slow = show({ src: '/net/slow/compass.ply?ms=800' });
+    const early = label(slow, 'early', '0m 0m 1m');
+    assert(await isGone(slow, early), 'while the scene loads');
+    await slow.ready;
+    await frames();
+    assertEqual(await isGone(slow, early), false, 'gone once the scene is there');
+    slow.remove();
+
+    const missing = show({ src: '/net/status/404' });
+    const lost = label(missing, 'lost', '0m 0m 1m');
+    await missing.ready;
+    assert(await isGone(missing, lost), 'after an error');
+    missing.remove();
+
+    const element = await compass();
+    const [placed, nowhere] = [label(element, 'placed', '0m 0m 1m'), label(element, 'nowhere', '')];
+    delete nowhere.dataset.position;
+    await frames(3);
+    assertEqual([await isGone(element, placed), await isGone(element, nowhere)], [false, true], 'without a position');
+    element.showPoster();
+    assert(await isGone(element, placed), 'under the poster');
+    element.dismissPoster();
+    assertEqual(await isGone(element, placed), false, 'gone after the poster');
+    element.src = null;
+    assert(await isGone(element, placed), 'over an empty canvas');
+    assertEqual(element.queryHotspot('hotspot-placed')?.canvasPosition, null, 'where it is');
+  });
+
+  it('that replace one another are told whether they are visible', async () => {
+    const element = await compass();
+    const first = label(element, 'same', '0m 0m 1m', { visibilityAttribute: 'seen' });
+    await until(() => first.hasAttribute('data-seen'), 'the first label to be seen');
+    first.remove();
+    const second = label(element, 'same', '0m 0m 1m', { visibilityAttribute: 'seen' });
+    await until(() => second.hasAttribute('data-seen'), 'the second one to be told as well', 3_000);
   });
 
   it('cost nothing while nothing moves, and can be clicked', async () => {
