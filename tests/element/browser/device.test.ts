@@ -87,6 +87,19 @@ describe('the loss of the device', () => {
     assert(element.loaded && element.error === null, 'loaded');
   });
 
+  it('is over with the scene that was set in the middle of it', async () => {
+    const element = await showLoaded();
+    const seen: string[] = [];
+    for (const type of ['contextlost', 'contextrestored', 'load'])
+      element.addEventListener(type, () => seen.push(type));
+    devices[devices.length - 1].destroy();
+    await nextEvent(element, 'contextlost');
+    element.src = `${FIXTURES}green.splat`;
+    await nextEvent(element, 'load');
+    await frames();
+    assertEqual(seen, ['contextlost', 'load', 'contextrestored'], 'events');
+  });
+
   it('leaves the camera where a person has put it', async () => {
     const element = await showLoaded({ 'camera-controls': '' });
     element.shadowRoot?.querySelector('#view')?.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight' }));
