@@ -166,6 +166,14 @@ export const styles = css`
     clip-path: inset(50%);
     white-space: nowrap;
   }
+  @media (forced-colors: active) {
+    [part='progress-track'] {
+      background: CanvasText;
+    }
+    [part='progress-bar'] {
+      background: Highlight;
+    }
+  }
   @media (prefers-reduced-motion: reduce) {
     .poster,
     .hotspot {

@@ -20,7 +20,7 @@ export interface TemplateModel {
   readonly prompt: 'none' | 'basic' | 'wiggle';
   /** What screen readers are told of the prompt, where the page has its own words. */
   readonly promptText: string | undefined;
-  /** What screen readers are told of the camera. */
+  /** What screen readers are told: of an error, else of the camera. */
   readonly spoken: string;
   /** Slots of the hotspots. */
   readonly hotspots: readonly string[];
@@ -125,14 +125,17 @@ function progressBar(progress: number | null): TemplateResult {
   </div>`;
 }
 
-/** What went wrong: a sentence for visitors, and the details for those who made the page. */
+/**
+ * What went wrong: a sentence for visitors, and the details for those who made the page. Screen readers announce only what comes into a
+ * region that was there before, so the sentence is told in that, too.
+ */
 function message(error: ElementError): TemplateResult {
   const text = html`<p>${visitorMessage(error)}</p>
     <details>
       <summary>Details</summary>
       ${error.message}
     </details>`;
-  return html`<div class="layer message" role="status">
+  return html`<div class="layer message">
     ${
       error.code === 'unsupported'
         ? html`<slot name="fallback"><div part="fallback">${text}</div></slot>`

@@ -64,6 +64,16 @@ describe('positionFromPoint', () => {
     assertEqual(await element.positionFromPoint(-50, 900), null, 'beside the element');
   });
 
+  it('finds it as well in an element with a border that transforms have scaled', async () => {
+    const element = await compass();
+    const [x, y] = pageOf(element, [1, 0, 0]);
+    element.style.cssText +=
+      'border: 10px solid; box-sizing: content-box; transform: scale(2, 1.5); transform-origin: 0 0';
+    await frames(3);
+    const point = await element.positionFromPoint(2 * (x + 10), 1.5 * (y + 10));
+    near(point?.x ?? NaN, 1, 0.05, 'the red ball');
+  });
+
   it('reads from the GPU only when asked, and knows the frame that is on the screen', async () => {
     const element = await compass();
     await frames(3);
@@ -248,6 +258,15 @@ describe('pictures', () => {
     }
     assert((await element.toBlob({ mimeType: 'image/webp', qualityArgument: 0.5 })).type === 'image/webp', 'webp');
     assertEqual((await screenOf(element)).differences(screen), 0, 'the page afterwards');
+  });
+
+  it('count attributes that were set just before', async () => {
+    const element = await compass();
+    element.maxPixelRatio = 0.5;
+    const image = new Image();
+    image.src = element.toDataURL();
+    await image.decode();
+    assertEqual([image.naturalWidth, image.naturalHeight], [100, 80], 'size');
   });
 
   it('are refused where there is no scene', async () => {

@@ -24,7 +24,9 @@ export class VisibilityController implements ReactiveController {
   }
 
   hostConnected(): void {
-    this.#observer = new IntersectionObserver((entries) => this.#set(entries[entries.length - 1].isIntersecting), { threshold: THRESHOLD });
+    this.#observer = new IntersectionObserver((entries) => this.#set(entries[entries.length - 1].isIntersecting), {
+      threshold: THRESHOLD,
+    });
     this.#observer.observe(this.#element);
   }
 
