@@ -2,7 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
-import { openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
+import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { SharedDevice } from '../gpu/shared-device.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
@@ -125,6 +125,10 @@ export class SceneController implements ReactiveController {
       this.#request = request;
       this.#setState('waiting');
       if (isSwap) this.#options.onEmptied();
+    } else if (request.sh !== this.#request?.sh) {
+      if (!this.isOutgoing) this.#shownRequest = request;
+      this.#request = request;
+      void this.#refine();
     }
     if (this.#state === 'waiting' && mayStart) void this.#load(request);
   }
@@ -166,6 +170,23 @@ export class SceneController implements ReactiveController {
     this.#setState('ready');
     this.#options.onLoad(request.url);
     this.#tellRestored();
+    void this.#refine();
+  }
+
+  /** The same scene with colours as exact as they are asked for now. What is on show stays until they are there, and if they cannot be had. */
+  async #refine(): Promise<void> {
+    const [request, scene] = [this.#request, this.#scene];
+    if (this.#state !== 'ready' || request === null || scene === null || scene.live || isStreamed(request)) return;
+    const { shPrecision, shDegree } = scene.gaussians;
+    if (request.sh === 'auto' || request.sh === shPrecision || shDegree === 0) return;
+    this.#abort();
+    const { signal } = this.#running;
+    try {
+      await this.#open(request, signal, false, () => undefined);
+    } catch {
+      if (!signal.aborted && this.#scene !== scene) await this.#attempt(request, signal, false, () => undefined);
+    }
+    this.#host.requestUpdate();
   }
 
   /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
@@ -178,7 +199,9 @@ export class SceneController implements ReactiveController {
     this.#isContextLost = true;
     await pageVisible(signal);
     if (!signal.aborted) await this.#attempt(request, signal, false, () => undefined);
-    if (!signal.aborted && this.#scene !== null) this.#tellRestored();
+    if (signal.aborted || this.#scene === null) return;
+    this.#tellRestored();
+    void this.#refine();
   }
 
   #tellRestored(): void {
@@ -244,7 +267,7 @@ export class SceneController implements ReactiveController {
       if (this.#scene !== scene) return;
       // What will take its place has its own way back.
       if (this.isOutgoing) this.#drop(false);
-      else void this.#restore(request);
+      else void this.#restore(this.#request ?? request);
     });
   }
 
