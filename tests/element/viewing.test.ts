@@ -24,6 +24,7 @@ interface OrbitCameraModule {
     moving: boolean;
     pivot: string;
     lookBy(theta: number, phi: number): void;
+    turnBy(theta: number): void;
     step(stepMs: number, decayMs: number): boolean;
   };
 }
@@ -95,6 +96,25 @@ test('a camera that flies keeps its eye all the way while it looks around, and c
       assert.ok(!camera.moving, 'the motion ends');
       // The start may be an object without a prototype.
       assert.deepEqual({ ...camera.now }, { ...camera.goal });
+    }),
+  );
+});
+
+test('a camera that flies turns by itself about its eye, at rest and on its way', async () => {
+  const { OrbitCamera } = await load<OrbitCameraModule>('orbit-camera');
+  const { eyeOfPose } = await load<OrbitModule>('orbit');
+  fc.assert(
+    fc.property(pose, finite(2), fc.boolean(), (start, theta, isOnItsWay) => {
+      const camera = new OrbitCamera(start);
+      camera.pivot = 'eye';
+      const eye = eyeOfPose(camera.now);
+      if (isOnItsWay) camera.lookBy(1, 0);
+      const before = camera.now.theta;
+      camera.turnBy(theta);
+      assert.ok(Math.abs(camera.now.theta - before - theta) < 1e-9, 'it turns');
+      const now = eyeOfPose(camera.now);
+      assert.ok(Math.hypot(...now.map((v, axis) => v - eye[axis])) < 1e-9 * (1 + start.radius), `${now.join()}`);
+      assert.equal(camera.moving, isOnItsWay, 'it rests as before');
     }),
   );
 });

@@ -1,6 +1,6 @@
 import { isServer, type PropertyValues, type TemplateResult } from 'lit';
 import { readAttributes, type Attributes } from './attributes.js';
-import type { ElementError } from './errors.js';
+import { visitorMessage, type ElementError } from './errors.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
@@ -187,9 +187,10 @@ export class GaussianSplatElement extends ViewingMethods {
 
   override connectedCallback(): void {
     super.connectedCallback();
-    // Names of controls are the model's: no list of observed attributes can hold them.
+    // Names of controls are the model's: no list of observed attributes can hold them. Lit observes those of its own properties.
     this.#controlObserver ??= new MutationObserver((records) => {
-      if (!records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) return;
+      const counts = (name: string | null): boolean => name === 'aria-label' || !!name?.startsWith(CONTROL_PREFIX);
+      if (!records.some(({ attributeName }) => counts(attributeName))) return;
       this.requestUpdate();
       this.stage.requestFrame();
     });
@@ -245,7 +246,7 @@ export class GaussianSplatElement extends ViewingMethods {
       error: scene.error,
       prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
       strings: this.#strings,
-      spoken: announcer.text,
+      spoken: scene.error ? this.#spokenError(scene.error) : announcer.text,
       hotspots: hotspots.names,
     });
   }
@@ -264,6 +265,7 @@ export class GaussianSplatElement extends ViewingMethods {
       economy: () => this.economy ?? null,
       loops: () => this.loop,
       autoplays: () => this.autoplay,
+      startTime: () => (Number.isFinite(this.#startTime) ? this.#startTime : 0),
       autoRotates: () => this.autoRotate,
       retargets: () => !this.disableTap && !this.disablePan,
       strings: () => this.#strings,
@@ -273,6 +275,12 @@ export class GaussianSplatElement extends ViewingMethods {
       hotspotLayer: () => part('#hotspots') ?? null,
       warn: (sentence) => this.#warn(sentence),
     });
+  }
+
+  /** The page's own words, where it has some. */
+  #spokenError(error: ElementError): string {
+    const slotted = this.querySelector(`:scope > [slot=${error.code === 'unsupported' ? 'fallback' : 'error'}]`);
+    return slotted?.textContent ?? visitorMessage(error, this.#strings);
   }
 
   /** A person clicked the poster: the keyboard goes on in the scene. */
@@ -306,8 +314,13 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#strings = strings ?? {};
   }
 
+  /** The attribute `time`; NaN where it says nothing. */
+  get #startTime(): number {
+    return this.time === null || this.time === '' ? NaN : Number(this.time);
+  }
+
   #seekToAttribute(): void {
-    const seconds = this.time === null || this.time === '' ? NaN : Number(this.time);
+    const seconds = this.#startTime;
     if (Number.isFinite(seconds)) this.currentTime = seconds;
     else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
   }

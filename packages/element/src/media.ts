@@ -1,3 +1,4 @@
+import { notPlayed } from './controllers/playback-controller.js';
 import { SplatProperties } from './properties.js';
 import type { Stage } from './stage.js';
 import { SceneTimeRanges } from './time-ranges.js';
@@ -68,12 +69,20 @@ export abstract class MediaProperties extends SplatProperties {
 
   /**
    * Lets the time run, once the scene is there. Frames are drawn as the page has them; the generator follows as fast as it can.
-   * @returns rejects with a `NotSupportedError` where there is no scene that moves.
+   * A poster that waits for a person gives way, and a lazy scene out of sight is loaded.
+   * @returns rejects with a `NotSupportedError` where there is no scene that moves, and with an `AbortError` if `pause()` or another
+   * `src` comes before it does.
    */
   async play(): Promise<void> {
-    await this.ready;
-    if (!this.stage.playback.canPlay) throw new DOMException('There is no scene that moves', 'NotSupportedError');
-    this.stage.playback.play();
+    const { playback } = this.stage;
+    const { pauses } = playback;
+    // A scene that was set a moment ago is asked for first: the end of the one before is no reason to give up.
+    await this.updateComplete;
+    if (playback.pauses !== pauses) throw notPlayed();
+    this.stage.prepareToPlay();
+    await playback.waitFor(this.ready);
+    if (!playback.canPlay) throw new DOMException('There is no scene that moves', 'NotSupportedError');
+    playback.play();
   }
 
   /** Lets the time stand still. */

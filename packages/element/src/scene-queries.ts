@@ -46,10 +46,13 @@ export class SceneQueries {
   async positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
     const { camera, scene, drawnFrom, element } = this.#options;
     const [drawn, gpuScene] = [drawnFrom(), scene()];
-    const { left, top } = element.getBoundingClientRect();
+    const { left, top, width, height } = element.getBoundingClientRect();
     if (drawn === undefined || gpuScene === null || element.clientWidth === 0) return null;
-    const x = ((clientX - left - element.clientLeft) * drawn.width) / element.clientWidth;
-    const y = ((clientY - top - element.clientTop) * drawn.height) / element.clientHeight;
+    // The page's pixels are the element's own, scaled by transforms and zooms around it.
+    const ownX = ((clientX - left) * element.offsetWidth) / width;
+    const ownY = ((clientY - top) * element.offsetHeight) / height;
+    const x = ((ownX - element.clientLeft) * drawn.width) / element.clientWidth;
+    const y = ((ownY - element.clientTop) * drawn.height) / element.clientHeight;
     if (!(x >= 0 && y >= 0 && x < drawn.width && y < drawn.height)) return null;
     try {
       const [answer] = await gpuScene.probe([{ x, y }]);

@@ -39,6 +39,8 @@ export interface StageOptions {
   readonly economy: () => string | null;
   readonly loops: () => boolean;
   readonly autoplays: () => boolean;
+  /** The attribute `time`, in seconds; 0 without. */
+  readonly startTime: () => number;
   readonly autoRotates: () => boolean;
   /** A double click picks the point to turn around. */
   readonly retargets: () => boolean;

@@ -43,6 +43,8 @@ export class Stage {
   readonly #view: ViewController;
   readonly #live: LiveWiring;
   #source: Source = { src: null, contract: null, chain: null, postprocess: null };
+  /** A script plays the scene, or waits to: it is loaded wherever it is. */
+  #isWanted = false;
   #drawnFrom: Camera | undefined;
   #counts: ReadCounts | undefined;
   /** Bytes that have arrived, and how many there are. */
@@ -56,6 +58,7 @@ export class Stage {
     this.#size = new SizeController(host, options.canvas, () => this.#onSize());
     this.playback = new PlaybackController({
       loops: options.loops,
+      startTime: options.startTime,
       requestFrame: () => this.#view.requestFrame(),
       dispatch: (type) => {
         this.#dispatch(new Event(type));
@@ -108,8 +111,16 @@ export class Stage {
       pick: (x, y) => void this.#retarget(x, y),
       togglePlayback: () => this.#togglePlayback(),
     });
-    // Put back after a while, an eager element loads again though nothing has come into sight.
-    host.addController({ hostConnected: () => this.#requestScene(), hostUpdated: () => this.#onUpdate() });
+    const onPageVisibility = (): void => this.playback.suspend();
+    host.addController({
+      hostConnected: () => {
+        document.addEventListener('visibilitychange', onPageVisibility);
+        // Put back after a while, an eager element loads again though nothing has come into sight.
+        this.#requestScene();
+      },
+      hostUpdated: () => this.#onUpdate(),
+      hostDisconnected: () => document.removeEventListener('visibilitychange', onPageVisibility),
+    });
   }
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
@@ -156,6 +167,13 @@ export class Stage {
     this.#requestScene();
   }
 
+  /** Somebody wants the time to run: the poster gives way, and a scene out of sight is loaded. */
+  prepareToPlay(): void {
+    this.#isWanted = true;
+    if (!this.reveal.mayReveal) this.reveal.dismiss();
+    this.#host.requestUpdate();
+  }
+
   /** Asks for a frame: a changed attribute may concern the picture, for example its pixel ratio. */
   requestFrame(): void {
     this.#view.requestFrame();
@@ -177,7 +195,10 @@ export class Stage {
         this.#drawnFrom = camera;
         this.hotspots.frameDrawn(camera);
       },
-      onFrame: (scene, camera, now) => this.#live.advance(scene, camera, now),
+      onFrame: (scene, camera, now) => {
+        // The last picture of a scene whose place another will take stays as it is.
+        if (!this.scene.isOutgoing) this.#live.advance(scene, camera, now);
+      },
       onCameraChange: (source) => {
         this.behaviours.announcer.cameraMoved();
         this.#dispatch(new CustomEvent('camera-change', { detail: { source } }));
@@ -203,10 +224,12 @@ export class Stage {
       },
       hide: (clear) => {
         this.#live.post.attach(null);
-        if (clear) this.playback.setDuration(NaN);
-        if (clear) this.#drawnFrom = undefined;
-        if (clear) this.#view.clear();
-        else this.#view.pause();
+        this.playback.suspend();
+        if (!clear) return this.#view.pause();
+        this.playback.empty();
+        this.#drawnFrom = undefined;
+        this.hotspots.forget();
+        this.#view.clear();
       },
       frameUrl: (url) => this.#options.services().urlModifier?.(url) ?? url,
       loops: this.#options.loops,
@@ -226,7 +249,12 @@ export class Stage {
       onProgress: (loaded, total) => this.#onProgress(loaded, total),
       onStart: () => this.#dispatch(new Event('loadstart')),
       onLoad: (url) => this.#onLoad(url),
-      onEmptied: () => this.#dispatch(new Event('emptied')),
+      onEmptied: () => {
+        this.#isWanted = false;
+        this.playback.empty();
+        this.playback.stopWaits();
+        this.#dispatch(new Event('emptied'));
+      },
       onError: (error) => this.#dispatch(new CustomEvent('error', { detail: error })),
       onContext: (type) => this.#dispatch(new Event(type)),
     });
@@ -246,7 +274,7 @@ export class Stage {
           chain: this.#urlsOf(chain),
         }
       : null;
-    const mayStart = loading === 'eager' || (this.#visibility.isVisible && this.reveal.mayReveal);
+    const mayStart = loading === 'eager' || this.#isWanted || (this.#visibility.isVisible && this.reveal.mayReveal);
     if (this.#host.isConnected) this.scene.want(request, mayStart);
   }
 

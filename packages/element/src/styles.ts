@@ -77,6 +77,9 @@ export const styles = css`
     opacity: var(--max-hotspot-opacity, 1);
     transition: opacity 0.3s;
   }
+  .hotspot:not(.placed) {
+    visibility: hidden;
+  }
   .hotspot ::slotted(*) {
     pointer-events: auto;
   }
@@ -170,6 +173,14 @@ export const styles = css`
     overflow: hidden;
     clip-path: inset(50%);
     white-space: nowrap;
+  }
+  @media (forced-colors: active) {
+    [part='progress-track'] {
+      background: CanvasText;
+    }
+    [part='progress-bar'] {
+      background: Highlight;
+    }
   }
   @media (prefers-reduced-motion: reduce) {
     .poster,

@@ -21,7 +21,7 @@ export interface TemplateModel {
   readonly prompt: 'none' | 'basic' | 'wiggle';
   /** Words of the page in place of the English ones. */
   readonly strings: SpokenStrings;
-  /** What screen readers are told of the camera. */
+  /** What screen readers are told: of an error, else of the camera. */
   readonly spoken: string;
   /** Slots of the hotspots. */
   readonly hotspots: readonly string[];
@@ -30,7 +30,7 @@ export interface TemplateModel {
 /** The element's shadow tree. */
 export function template(model: TemplateModel): TemplateResult {
   return html`
-    ${view(model)} ${hotspots(model.hotspots)} ${prompt(model)} ${poster(model)}
+    ${view(model)} ${hotspots(model)} ${prompt(model)} ${poster(model)}
     ${model.isLoading ? progressBar(model) : nothing} ${model.error ? message(model.error, model.strings) : nothing}
     <div class="for-screen-readers" role="status" lang=${languageOf(model.strings) ?? nothing}>${model.spoken}</div>
   `;
@@ -61,10 +61,10 @@ function view({ label, controls, navigation, onReveal, strings }: TemplateModel)
 const help = (text: string, strings: SpokenStrings): TemplateResult =>
   html`<span id="keys" class="for-screen-readers" hidden lang=${languageOf(strings) ?? nothing}>${text}</span>`;
 
-/** A box for each name, in their order; where it lies is up to the controller of the hotspots. */
-function hotspots(names: readonly string[]): TemplateResult {
-  return html`<div id="hotspots" class="layer">
-    ${names.map((name) => html`<div class="hotspot hidden"><slot name=${name}></slot></div>`)}
+/** A box for each name, in their order; where it lies is up to the controller of the hotspots. Under a poster nobody reaches them. */
+function hotspots({ hotspots, showPoster }: TemplateModel): TemplateResult {
+  return html`<div id="hotspots" class="layer ${showPoster ? 'gone' : ''}">
+    ${hotspots.map((name) => html`<div class="hotspot hidden"><slot name=${name}></slot></div>`)}
   </div>`;
 }
 
@@ -139,7 +139,10 @@ function progressBar({ progress, strings }: TemplateModel): TemplateResult {
   </div>`;
 }
 
-/** What went wrong: a sentence for visitors, and the details for those who made the page. */
+/**
+ * What went wrong: a sentence for visitors, and the details for those who made the page. Screen readers announce only what comes into a
+ * region that was there before, so the sentence is told in that, too.
+ */
 function message(error: ElementError, strings: SpokenStrings): TemplateResult {
   const lang = languageOf(strings) ?? nothing;
   // The details are for the person who made the page, and always English.
@@ -148,7 +151,7 @@ function message(error: ElementError, strings: SpokenStrings): TemplateResult {
       <summary lang=${lang}>${word(strings, 'details')}</summary>
       <span lang="en">${error.message}</span>
     </details>`;
-  return html`<div class="layer message" role="status">
+  return html`<div class="layer message">
     ${
       error.code === 'unsupported'
         ? html`<slot name="fallback"><div part="fallback">${text}</div></slot>`

@@ -106,6 +106,7 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   #drawnCanvas(): HTMLCanvasElement {
+    this.applyAttributes();
     const canvas = this.stage.drawNow();
     if (canvas === null) throw new DOMException('There is no scene on show to take a picture of', 'InvalidStateError');
     return canvas;

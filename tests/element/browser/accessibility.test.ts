@@ -1,5 +1,6 @@
 /** axe-core on the element in all its states. The pages of the site: tests/site. */
 import '@gaussian-splat/element';
+import { emulateMedia } from '@web/test-runner-commands';
 import { assert, assertEqual, COMPASS, nextEvent, show, showLoaded, until } from './support/harness.js';
 
 interface AxeResults {
@@ -83,5 +84,36 @@ describe('axe finds nothing in the element', () => {
       (await violations(document, ELEMENT_ONLY)).some((text) => text.startsWith('label')),
       'an input without a label',
     );
+  });
+});
+
+describe('screen readers', () => {
+  it('hear of an error in a region that was there before, in the words of the page if it has some', async () => {
+    const element = show({ src: '/net/slow/compass.ply?ms=400' });
+    const own = show({ src: '/net/status/404' });
+    own.innerHTML = '<p slot="error">Leider nein.</p>';
+    await element.updateComplete;
+    const regions = element.shadowRoot?.querySelectorAll('[role=status]');
+    assertEqual([regions?.length, regions?.[0].textContent], [1, ''], 'regions and text at first');
+    element.src = '/net/status/404';
+    await nextEvent(element, 'error');
+    await Promise.all([element.updateComplete, own.ready]);
+    assertEqual(element.shadowRoot?.querySelectorAll('[role=status]').length, 1, 'regions after the error');
+    assert(/\w+ \w+/.test(regions?.[0].textContent ?? ''), 'a sentence in the first one');
+    await own.updateComplete;
+    assertEqual(own.shadowRoot?.querySelector('[role=status]')?.textContent, 'Leider nein.', 'the words of the page');
+  });
+});
+
+describe('forced colours', () => {
+  it('leave the progress bar visible', async () => {
+    const element = show({ src: '/net/slow/compass.ply?ms=20000' });
+    const part = (name: string): HTMLElement | null | undefined =>
+      element.shadowRoot?.querySelector<HTMLElement>(`[part=progress-${name}]`);
+    await until(() => !!part('bar'), 'the progress bar');
+    await emulateMedia({ forcedColors: 'active' });
+    const colours = ['bar', 'track'].map((name) => getComputedStyle(part(name) as HTMLElement).backgroundColor);
+    await emulateMedia({ forcedColors: 'none' });
+    assert(colours[0] !== colours[1], `bar and track are ${colours.join(' and ')}`);
   });
 });

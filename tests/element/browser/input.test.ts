@@ -340,6 +340,10 @@ describe('accessibility', () => {
     await element.updateComplete;
     assertEqual(described(), ['presentation', null], 'decorative');
     const labelled = await showLoaded({ 'aria-label': 'From the host' });
-    assertEqual(labelled.shadowRoot?.querySelector('#view')?.getAttribute('aria-label'), 'From the host');
+    const name = (): string | null | undefined =>
+      labelled.shadowRoot?.querySelector('#view')?.getAttribute('aria-label');
+    assertEqual(name(), 'From the host');
+    labelled.ariaLabel = 'Another';
+    await until(() => name() === 'Another', 'the new name', 2_000);
   });
 });

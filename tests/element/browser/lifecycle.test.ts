@@ -14,6 +14,7 @@ import {
   submits,
   until,
 } from './support/harness.js';
+import { whileHidden } from './support/hidden.js';
 import { isGreen, isRed, screenOf } from './support/screen.js';
 
 const canvasOf = (element: GaussianSplatElement): HTMLCanvasElement => {
@@ -25,18 +26,6 @@ const canvasSize = (element: GaussianSplatElement): [number, number] => [
   canvasOf(element).width,
   canvasOf(element).height,
 ];
-
-/** Runs work with the page hidden, as far as scripts can tell. */
-async function whileHidden(work: () => Promise<void>): Promise<void> {
-  Object.defineProperty(document, 'visibilityState', { configurable: true, get: () => 'hidden' });
-  document.dispatchEvent(new Event('visibilitychange'));
-  try {
-    await work();
-  } finally {
-    Reflect.deleteProperty(document, 'visibilityState');
-    document.dispatchEvent(new Event('visibilitychange'));
-  }
-}
 
 describe('power', () => {
   it('an idle page submits nothing to the GPU for 3 s', async () => {
@@ -166,6 +155,13 @@ describe('moves and removals', () => {
     await delay(300);
     assert(element.loaded, 'still loaded');
     assertEqual([progress, alive() - before], [0, 0], 'progress events and new devices');
+    const seen: boolean[] = [];
+    element.addEventListener('model-visibility', ({ detail }) => seen.push(detail.visible));
+    element.remove();
+    assertEqual(seen, [false], 'out of sight with its removal');
+    box.append(element);
+    await until(() => seen.length > 1, 'its being seen again');
+    assertEqual(seen, [false, true], 'one event for each change');
     assert((await screenOf(element)).middleOf(isRed), 'still seen');
   });
 

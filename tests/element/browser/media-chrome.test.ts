@@ -7,9 +7,9 @@ import { assert, assertEqual, delay, nextEvent, until } from './support/harness.
 
 GaussianSplatElement.runtimeLocation = '/node_modules/onnxruntime-web/dist/';
 
-const PLAYER = `
+const player = (source: string): string => `
   <media-controller style="width: 320px; height: 240px; display: block">
-    <gaussian-splat slot="media" src="/tests/fixtures/generators/packed.onnx" loop camera-controls
+    <gaussian-splat slot="media" ${source} camera-controls
       style="width: 320px; height: 240px"></gaussian-splat>
     <media-control-bar>
       <media-play-button></media-play-button>
@@ -25,10 +25,10 @@ interface Player {
   click(target: HTMLElement, shareOfWidth?: number): Promise<void>;
 }
 
-async function makePlayer(): Promise<Player> {
+async function makePlayer(source = 'src="/tests/fixtures/generators/packed.onnx" loop'): Promise<Player> {
   document.body.style.margin = '0';
   const page = document.createElement('div');
-  page.innerHTML = PLAYER;
+  page.innerHTML = player(source);
   document.body.append(page);
   const part = (selector: string): HTMLElement => {
     const found = page.querySelector<HTMLElement>(selector);
@@ -36,8 +36,8 @@ async function makePlayer(): Promise<Player> {
     return found;
   };
   const element = part('gaussian-splat') as GaussianSplatElement;
-  await element.ready;
-  assert(element.loaded, element.error?.message ?? 'not loaded');
+  if (element.reveal !== 'manual') await element.ready;
+  assert(element.loaded || element.reveal === 'manual', element.error?.message ?? 'not loaded');
   const click = async (target: HTMLElement, shareOfWidth = 0.5): Promise<void> => {
     const { x, y, width, height } = target.getBoundingClientRect();
     await sendMouse({ type: 'click', position: [Math.round(x + width * shareOfWidth), Math.round(y + height / 2)] });
@@ -84,5 +84,18 @@ describe('media-chrome', () => {
     await delay(300);
     assertEqual([changes, element.paused], [1, false], 'one toggle, by the controller');
     element.pause();
+  });
+
+  it('loads a scene behind its poster with its button, and starts anew with another one', async () => {
+    const { element, part, click } = await makePlayer('src="/net/sequence/movie.json" reveal="manual"');
+    const controller = part('media-controller');
+    await until(() => customElements.get('media-play-button') !== undefined, 'the button');
+    await click(part('media-play-button'));
+    await until(() => controller.hasAttribute('mediaended'), 'its end');
+    element.src = '/net/sequence/movie.json?another';
+    await nextEvent(element, 'load');
+    await until(() => !controller.hasAttribute('mediaended'), 'no end any more');
+    await until(() => Number(controller.getAttribute('mediacurrenttime')) === 0, 'the time to be shown as 0');
+    assertEqual(controller.getAttribute('mediaduration'), '1.2', 'duration');
   });
 });

@@ -2,7 +2,7 @@
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
 import { GaussianSplatElement as ElementClass } from '@gaussian-splat/element';
-import { sendMouse } from '@web/test-runner-commands';
+import { sendKeys, sendMouse } from '@web/test-runner-commands';
 import {
   assert,
   assertEqual,
@@ -62,6 +62,16 @@ describe('positionFromPoint', () => {
     }
     assertEqual(await element.positionFromPoint(3, 3), null, 'beside the scene');
     assertEqual(await element.positionFromPoint(-50, 900), null, 'beside the element');
+  });
+
+  it('finds it as well in an element with a border that transforms have scaled', async () => {
+    const element = await compass();
+    const [x, y] = pageOf(element, [1, 0, 0]);
+    element.style.cssText +=
+      'border: 10px solid; box-sizing: content-box; transform: scale(2, 1.5); transform-origin: 0 0';
+    await frames(3);
+    const point = await element.positionFromPoint(2 * (x + 10), 1.5 * (y + 10));
+    near(point?.x ?? NaN, 1, 0.05, 'the red ball');
   });
 
   it('reads from the GPU only when asked, and knows the frame that is on the screen', async () => {
@@ -166,6 +176,51 @@ describe('hotspots', () => {
     assert(document.activeElement !== behind, 'what cannot be seen takes no focus');
   });
 
+  it('are neither seen nor reached without a frame, without a position, and under a poster', async () => {
+    const isGone = async (element: GaussianSplatElement, button: HTMLElement): Promise<boolean> => {
+      await element.updateComplete;
+      await frames();
+      (document.activeElement as HTMLElement | null)?.blur();
+      await sendKeys({ press: 'Tab' });
+      return getComputedStyle(button).visibility === 'hidden' && document.activeElement !== button;
+    };
+    const slow = show({ src: '/net/slow/compass.ply?ms=800' });
+    const early = label(slow, 'early', '0m 0m 1m');
+    assert(await isGone(slow, early), 'while the scene loads');
+    await slow.ready;
+    await frames();
+    assertEqual(await isGone(slow, early), false, 'gone once the scene is there');
+    slow.remove();
+
+    const missing = show({ src: '/net/status/404' });
+    const lost = label(missing, 'lost', '0m 0m 1m');
+    await missing.ready;
+    assert(await isGone(missing, lost), 'after an error');
+    missing.remove();
+
+    const element = await compass();
+    const [placed, nowhere] = [label(element, 'placed', '0m 0m 1m'), label(element, 'nowhere', '')];
+    delete nowhere.dataset.position;
+    await frames(3);
+    assertEqual([await isGone(element, placed), await isGone(element, nowhere)], [false, true], 'without a position');
+    element.showPoster();
+    assert(await isGone(element, placed), 'under the poster');
+    element.dismissPoster();
+    assertEqual(await isGone(element, placed), false, 'gone after the poster');
+    element.src = null;
+    assert(await isGone(element, placed), 'over an empty canvas');
+    assertEqual(element.queryHotspot('hotspot-placed')?.canvasPosition, null, 'where it is');
+  });
+
+  it('that replace one another are told whether they are visible', async () => {
+    const element = await compass();
+    const first = label(element, 'same', '0m 0m 1m', { visibilityAttribute: 'seen' });
+    await until(() => first.hasAttribute('data-seen'), 'the first label to be seen');
+    first.remove();
+    const second = label(element, 'same', '0m 0m 1m', { visibilityAttribute: 'seen' });
+    await until(() => second.hasAttribute('data-seen'), 'the second one to be told as well', 3_000);
+  });
+
   it('cost nothing while nothing moves, and can be clicked', async () => {
     const element = await compass({ 'camera-controls': '' });
     const button = label(element, 'front', '0m 0m 1m');
@@ -203,6 +258,15 @@ describe('pictures', () => {
     }
     assert((await element.toBlob({ mimeType: 'image/webp', qualityArgument: 0.5 })).type === 'image/webp', 'webp');
     assertEqual((await screenOf(element)).differences(screen), 0, 'the page afterwards');
+  });
+
+  it('count attributes that were set just before', async () => {
+    const element = await compass();
+    element.maxPixelRatio = 0.5;
+    const image = new Image();
+    image.src = element.toDataURL();
+    await image.decode();
+    assertEqual([image.naturalWidth, image.naturalHeight], [100, 80], 'size');
   });
 
   it('are refused where there is no scene', async () => {

@@ -17,6 +17,19 @@ import { isBlue, isGreen, isRed, screenOf } from './support/screen.js';
 const states = (element: GaussianSplatElement): string[] =>
   ['loading', 'ready', 'error', 'unsupported'].filter((state) => element.matches(`:state(${state})`));
 
+/** Splats whose colours change a little with the direction: harmonics of degree 1, that 8 bits are enough for. */
+function glossy(): string {
+  const numbered = (name: string, count: number): string[] => Array.from({ length: count }, (_, i) => `${name}_${i}`);
+  const colours = [...numbered('f_dc', 3), ...numbered('f_rest', 9)];
+  const names = ['x', 'y', 'z', ...colours, 'opacity', ...numbered('scale', 3), ...numbered('rot', 4)];
+  const rows = Array.from({ length: 50 }, (_, i) => {
+    const place = [Math.sin(7 * i), Math.sin(11 * i), Math.sin(13 * i)];
+    return [...place, ...colours.map((_, k) => 0.05 * Math.sin(i + 3 * k)), 2, -2, -2, -2, 1, 0, 0, 0].join(' ');
+  });
+  const head = ['ply', 'format ascii 1.0', 'element vertex 50', ...names.map((name) => `property float ${name}`)];
+  return [...head, 'end_header', ...rows, ''].join('\n');
+}
+
 describe('a scene', () => {
   it("is drawn the right way round, on the page's own background", async () => {
     const element = await showLoaded({}, 'width: 120px; height: 120px; background: rgb(200, 100, 220)');
@@ -29,6 +42,27 @@ describe('a scene', () => {
     assertEqual(screen.at(2, 2), [200, 100, 220], 'background in the corner');
     const between = screen.at(60, 45);
     assert(Math.abs(between[0] - between[2]) < 60, `no colour fringe at a half-transparent pixel: ${between.join()}`);
+  });
+
+  it('asked for as reference after it was loaded has the colours of one that was loaded as such', async () => {
+    const src = `${URL.createObjectURL(new Blob([glossy()]))}#glossy.ply`;
+    const asked = await showLoaded({ src, quality: 'reference' });
+    const element = await showLoaded({ src });
+    const bytes = (): number => element.statistics?.bytes ?? 0;
+    const rounded = bytes();
+    element.cameraOrbit = '40deg 80deg 5m';
+    element.jumpCameraToGoal();
+    await frames();
+    const orbit = String(element.getCameraOrbit());
+    let events = 0;
+    for (const type of ['loadstart', 'emptied', 'load', 'error']) element.addEventListener(type, () => events++);
+    element.quality = 'reference';
+    await until(() => bytes() > rounded, 'more exact colours', 10_000);
+    assertEqual([bytes(), events, element.loaded], [asked.statistics?.bytes, 0, true], 'bytes, events, loaded');
+    assertEqual(String(element.getCameraOrbit()), orbit, 'the camera');
+    element.quality = 'default';
+    await frames();
+    assertEqual(bytes(), asked.statistics?.bytes, 'what is there stays');
   });
 
   it('fires first and last progress, then load, none of which bubbles', async () => {

@@ -1,7 +1,19 @@
 /** Scene files that follow one another in time, with the words of HTMLMediaElement. */
 import '@gaussian-splat/element';
-import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, delay, frames, nextEvent, show, showLoaded, until } from './support/harness.js';
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  devices,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
+import { whileHidden } from './support/hidden.js';
 import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
 
 const MOVIE = '/net/sequence/movie.json';
@@ -92,5 +104,114 @@ describe('a sequence of files', () => {
     await seek(element, 0.25);
     assert(await shows(element, isBlue), 'the frame behind it');
     assertEqual(messages, ['network/status'], 'errors');
+  });
+});
+
+const TOLD = ['emptied', 'loadstart', 'durationchange', 'loadedmetadata', 'loadeddata', 'canplay', 'error'];
+
+function eventsOf(element: GaussianSplatElement): string[] {
+  const told: string[] = [];
+  for (const type of TOLD) element.addEventListener(type, () => told.push(type));
+  return told;
+}
+
+/** The name of the error that a promise is rejected with. */
+const refusal = (promise: Promise<void>): Promise<string> =>
+  promise.then(
+    () => 'none',
+    (error: Error) => error.name,
+  );
+
+describe('the clock', () => {
+  it('starts anew with another scene, of the same length or of none', async () => {
+    const element = await showLoaded({ src: MOVIE });
+    const ended = nextEvent(element, 'ended');
+    element.playbackRate = 8;
+    await element.play();
+    await ended;
+    const told = eventsOf(element);
+    element.src = `${MOVIE}?another`;
+    await nextEvent(element, 'load');
+    assertEqual([element.currentTime, element.ended, element.paused], [0, false, true], 'time, ended, paused');
+    const fresh = ['emptied', 'loadstart', 'durationchange', 'loadedmetadata', 'loadeddata', 'canplay'];
+    assertEqual(told.splice(0), ['durationchange', ...fresh], 'events');
+    element.src = '/net/status/404';
+    await nextEvent(element, 'error');
+    assertEqual(told.splice(0), ['durationchange', 'emptied', 'loadstart', 'error'], 'events of one that fails');
+    assertEqual(element.duration, NaN, 'its duration');
+  });
+
+  it('begins at the attribute time whenever a scene comes', async () => {
+    const { releaseDelay } = GaussianSplatElement;
+    GaussianSplatElement.releaseDelay = 0;
+    try {
+      const element = await showLoaded({ src: MOVIE, time: '0.3' });
+      await seek(element, 0.8);
+      element.remove();
+      await until(() => !element.loaded, 'the release');
+      document.body.append(element);
+      await nextEvent(element, 'load');
+      assertEqual(element.currentTime, 0.3, 'after the release');
+      await seek(element, 0.8);
+      element.src = COMPASS;
+      await nextEvent(element, 'load');
+      element.src = MOVIE;
+      await nextEvent(element, 'load');
+      assertEqual(element.currentTime, 0.3, 'after a scene that does not move');
+    } finally {
+      GaussianSplatElement.releaseDelay = releaseDelay;
+    }
+  });
+
+  it('stands still while nothing is drawn', async () => {
+    const element = await showLoaded({ src: `${MOVIE}?count=600&fps=2` });
+    await element.play();
+    const goesOnFrom = async (seconds: number, what: string): Promise<void> => {
+      // Told before the clock goes on.
+      await nextEvent(element, 'playing');
+      assertEqual(element.currentTime, seconds, what);
+      await until(() => element.currentTime > seconds, 'the time to go on');
+    };
+    await until(() => element.currentTime > 0, 'the time to run');
+    let before = 0;
+    await whileHidden(async () => {
+      before = element.currentTime;
+      await delay(200);
+    });
+    await goesOnFrom(before, 'after the page was hidden');
+    element.remove();
+    before = element.currentTime;
+    await delay(200);
+    document.body.append(element);
+    await goesOnFrom(before, 'after the element was away');
+    element.addEventListener('contextlost', () => (before = element.currentTime));
+    devices[devices.length - 1].destroy();
+    await nextEvent(element, 'contextlost');
+    await goesOnFrom(before, 'after the device was lost');
+  });
+});
+
+describe('play()', () => {
+  it('loads a scene that waits for a click, or for somebody to see it', async () => {
+    const covered = show({ src: MOVIE, reveal: 'manual' });
+    const below = show({ src: MOVIE }, 'width: 100px; height: 100px; margin-top: 5000px');
+    await Promise.all([covered.play(), below.play()]);
+    assertEqual([covered.paused, covered.revealed, below.paused], [false, true, false], 'paused, revealed, paused');
+  });
+
+  it('that waits is taken back by pause() and by another scene', async () => {
+    const element = show({ src: MOVIE });
+    const paused = refusal(element.play());
+    element.pause();
+    assertEqual(await paused, 'AbortError', 'after pause()');
+    await element.ready;
+    assertEqual(element.paused, true, 'paused');
+    element.src = '/net/slow/compass.ply?ms=20000';
+    const replaced = refusal(element.play());
+    await nextEvent(element, 'loadstart');
+    element.src = `${MOVIE}?another`;
+    // Asked of the scene that was set just now.
+    await element.play();
+    assertEqual([await replaced, element.paused], ['AbortError', false], 'after another src');
   });
 });

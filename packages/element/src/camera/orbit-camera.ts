@@ -124,11 +124,15 @@ export class OrbitCamera {
     return this.#pivot === 'target' ? pose : withTargetAhead(pose);
   }
 
-  /** Turns camera and goal alike around the target, without any damping: radians. */
+  /** Turns camera and goal alike around the {@link pivot}, without any damping: radians. */
   turnBy(theta: number): void {
     const before = this.#goal.theta;
-    this.setGoal({ theta: before + theta });
-    this.#now = { ...this.#now, theta: this.#now.theta + this.#goal.theta - before };
+    const isStill = !this.moving;
+    if (this.#pivot === 'eye') this.lookBy(theta, 0);
+    else this.setGoal({ theta: before + theta });
+    if (isStill) return void (this.#now = this.#goal);
+    const from = this.#onCourse(this.#now);
+    this.#now = this.#offCourse({ ...from, theta: from.theta + this.#goal.theta - before });
   }
 
   /** Turns the goal's view around its own eye by angles in radians. */

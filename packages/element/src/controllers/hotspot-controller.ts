@@ -42,7 +42,7 @@ interface Hotspot {
   depth: number;
   facesCamera: boolean;
   isOccluded: boolean;
-  isVisible: boolean | undefined;
+  isVisible: boolean;
 }
 
 const PREFIX = 'hotspot-';
@@ -60,6 +60,8 @@ export class HotspotController implements ReactiveController {
   #hotspots = new Map<string, Hotspot>();
   #observer: MutationObserver | undefined;
   #camera: Camera | undefined;
+  /** What each label was told last. */
+  readonly #told = new WeakMap<HTMLElement, boolean>();
   #isProbing = false;
   #isStale = false;
 
@@ -97,6 +99,12 @@ export class HotspotController implements ReactiveController {
     void this.#look();
   }
 
+  /** Nothing is on show any more: labels are gone until the next frame. */
+  forget(): void {
+    this.#camera = undefined;
+    this.#place();
+  }
+
   /** Where a hotspot is; null for a name that no child has, or one without a position. */
   query(name: string): HotspotPlace | null {
     const hotspot = this.#hotspots.get(name);
@@ -107,7 +115,7 @@ export class HotspotController implements ReactiveController {
       normal: normal && new ScenePoint(...normal),
       canvasPosition: depth > 0 ? { x, y } : null,
       facingCamera: facesCamera,
-      visible: hotspot.isVisible ?? false,
+      visible: hotspot.isVisible,
     };
   }
 
@@ -133,29 +141,34 @@ export class HotspotController implements ReactiveController {
     };
     const position = read('data-position', dataset.position);
     const normal = read('data-normal', dataset.normal);
-    const fresh = { x: 0, y: 0, depth: 0, facesCamera: true, isOccluded: false, isVisible: undefined };
+    const fresh = { x: 0, y: 0, depth: 0, facesCamera: true, isOccluded: false, isVisible: false };
     return { ...fresh, ...before, elements, position, normal };
   }
 
-  /** Moves the boxes to where the last frame has their points. */
+  /** Moves the boxes to where the last frame has their points, and hides those that are in no frame. */
   #place(): void {
-    const layer = this.#options.layer();
-    const camera = this.#camera;
-    if (layer === null || camera === undefined || this.#hotspots.size === 0) return;
-    const { clientWidth, clientHeight } = this.#host;
+    const boxes = this.#options.layer()?.children;
     [...this.#hotspots.values()].forEach((hotspot, i) => {
-      const box = layer.children[i] as HTMLElement | undefined;
-      if (box === undefined || hotspot.position === null) return;
-      const { x, y, depth } = project(camera, toScene(this.#options.viewerFrame(), hotspot.position));
-      hotspot.x = (x * clientWidth) / camera.width;
-      hotspot.y = (y * clientHeight) / camera.height;
-      hotspot.depth = depth > camera.near ? depth : 0;
-      hotspot.facesCamera = this.#facesCamera(hotspot, camera);
-      const isBehind = hotspot.depth === 0;
-      box.style.visibility = isBehind ? 'hidden' : '';
-      if (!isBehind) box.style.transform = `translate(${hotspot.x}px, ${hotspot.y}px) translate(-50%, -50%)`;
+      const box = boxes?.[i] as HTMLElement | undefined;
+      if (box === undefined) return;
+      this.#locate(hotspot);
+      const isPlaced = hotspot.depth > 0;
+      box.classList.toggle('placed', isPlaced);
+      if (isPlaced) box.style.transform = `translate(${hotspot.x}px, ${hotspot.y}px) translate(-50%, -50%)`;
       this.#show(hotspot, box);
     });
+  }
+
+  #locate(hotspot: Hotspot): void {
+    const camera = this.#camera;
+    hotspot.depth = 0;
+    if (camera === undefined || hotspot.position === null) return;
+    const { clientWidth, clientHeight } = this.#host;
+    const { x, y, depth } = project(camera, toScene(this.#options.viewerFrame(), hotspot.position));
+    hotspot.x = (x * clientWidth) / camera.width;
+    hotspot.y = (y * clientHeight) / camera.height;
+    hotspot.depth = depth > camera.near ? depth : 0;
+    hotspot.facesCamera = this.#facesCamera(hotspot, camera);
   }
 
   #facesCamera({ position, normal }: Hotspot, { worldToCamera: m }: Camera): boolean {
@@ -171,9 +184,10 @@ export class HotspotController implements ReactiveController {
   #show(hotspot: Hotspot, box: HTMLElement): void {
     const isVisible = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
     box.classList.toggle('hidden', !isVisible);
-    if (isVisible === hotspot.isVisible) return;
     hotspot.isVisible = isVisible;
     for (const element of hotspot.elements) {
+      if (this.#told.get(element) === isVisible) continue;
+      this.#told.set(element, isVisible);
       const { visibilityAttribute } = element.dataset;
       if (visibilityAttribute) element.toggleAttribute(`data-${visibilityAttribute}`, isVisible);
       element.dispatchEvent(new CustomEvent('hotspot-visibility', { detail: { visible: isVisible } }));

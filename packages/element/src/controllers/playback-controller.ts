@@ -17,6 +17,8 @@ export type PlaybackEvent =
 
 export interface PlaybackOptions {
   readonly loops: () => boolean;
+  /** Seconds at which a scene begins. */
+  readonly startTime: () => number;
   /** Asks for a frame: while it plays, or after a seek. */
   readonly requestFrame: () => void;
   readonly dispatch: (type: PlaybackEvent) => void;
@@ -36,6 +38,9 @@ export class PlaybackController {
   #seekTarget: number | undefined;
   #lastTick: number | undefined;
   #lastUpdate = -Infinity;
+  /** Give up waiting to play. */
+  readonly #waits = new Set<(reason: DOMException) => void>();
+  #pauses = 0;
 
   constructor(options: PlaybackOptions) {
     this.#options = options;
@@ -102,19 +107,41 @@ export class PlaybackController {
     this.#options.requestFrame();
   }
 
+  /** How often it was told to {@link pause}. */
+  get pauses(): number {
+    return this.#pauses;
+  }
+
+  /** Waits for a scene to play. Rejects with an `AbortError` once it need not any more: see {@link stopWaits}. */
+  waitFor(ready: Promise<void>): Promise<void> {
+    return new Promise((resolve, reject) => {
+      this.#waits.add(reject);
+      void ready.then(resolve).finally(() => this.#waits.delete(reject));
+    });
+  }
+
+  /** Takes back every play that waits. */
+  stopWaits(): void {
+    for (const reject of this.#waits) reject(notPlayed());
+  }
+
   pause(): void {
+    this.#pauses++;
+    this.stopWaits();
+    this.#rest();
+  }
+
+  #rest(): void {
     if (this.#isPaused) return;
     this.#isPaused = true;
     this.#options.dispatch('timeupdate');
     this.#options.dispatch('pause');
   }
 
-  /** A scene is there; NaN: none, or one that does not move. */
+  /** The scene is there, or is there again; NaN: it does not move. */
   setDuration(seconds: number): void {
     if (Object.is(seconds, this.#duration)) return;
     this.#duration = seconds;
-    this.#seekTarget = undefined;
-    if (Number.isNaN(seconds)) return this.#reset();
     this.#time = Math.min(this.#time, seconds);
     this.#options.dispatch('durationchange');
     this.#options.dispatch('loadedmetadata');
@@ -135,9 +162,21 @@ export class PlaybackController {
     if (!this.#isPaused) this.#options.requestFrame();
   }
 
-  /** A pause of the picture is not time that passes: the element was out of sight. */
+  /** A pause of the picture is not time that passes: nothing is drawn until the next tick. */
   suspend(): void {
-    if (this.#lastTick !== undefined) this.#lastTick = undefined;
+    this.#lastTick = undefined;
+  }
+
+  /** The scene is gone, or another was asked for, whose time starts anew. */
+  empty(): void {
+    const couldPlay = this.canPlay;
+    this.#duration = NaN;
+    this.#seekTarget = undefined;
+    this.#time = Math.max(0, this.#options.startTime());
+    this.#hasEnded = false;
+    this.suspend();
+    this.#rest();
+    if (couldPlay) this.#options.dispatch('durationchange');
   }
 
   /** The frame of a time is on show. */
@@ -168,13 +207,8 @@ export class PlaybackController {
     for (const type of ['timeupdate', 'pause', 'ended'] as const) this.#options.dispatch(type);
     this.#options.requestFrame();
   }
-
-  #reset(): void {
-    this.#time = 0;
-    this.#hasEnded = false;
-    this.#lastTick = undefined;
-    if (this.#isPaused) return;
-    this.#isPaused = true;
-    this.#options.dispatch('pause');
-  }
 }
+
+/** Why a scene that was to be played is not. */
+export const notPlayed = (): DOMException =>
+  new DOMException('play() was taken back by pause() or another src', 'AbortError');

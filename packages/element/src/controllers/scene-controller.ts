@@ -2,7 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
-import { openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
+import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { SharedDevice } from '../gpu/shared-device.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import { isSameContract } from '../loading/same-contract.js';
@@ -38,7 +38,7 @@ export interface SceneOptions {
   readonly onProgress: (loaded: number, total: number | undefined) => void;
   readonly onStart: () => void;
   readonly onLoad: (url: string) => void;
-  /** There is no scene any more. */
+  /** There is no scene any more, or another is wanted in its place. */
   readonly onEmptied: () => void;
   readonly onError: (error: ElementError) => void;
   readonly onContext: (event: 'contextlost' | 'contextrestored') => void;
@@ -67,10 +67,14 @@ export class SceneController implements ReactiveController {
   #error: ElementError | null = null;
   #scene: GpuScene | null = null;
   #isPreview = false;
+  /** What the scene on show was asked for by. */
+  #shownRequest: SceneRequest | null = null;
   #request: SceneRequest | null = null;
   #running = new AbortController();
   #releaseTimer: ReturnType<typeof setTimeout> | undefined;
   #waiters: (() => void)[] = [];
+  /** A loss was told that no recovery has answered yet; another scene may do so. */
+  #isContextLost = false;
   /** Grows with every loss of the device: a frame that ran too long for the driver may have been the cause. */
   #submissions = 1;
 
@@ -98,6 +102,11 @@ export class SceneController implements ReactiveController {
     return this.#isPreview && this.#scene !== null;
   }
 
+  /** Another scene will take the place of the one on show. */
+  get isOutgoing(): boolean {
+    return this.#shownRequest !== this.#request;
+  }
+
   /** Fulfils, and never rejects, once nothing is left to wait for: shown, failed or given up. */
   get settled(): Promise<void> {
     if (this.#state !== 'waiting' && this.#state !== 'loading') return Promise.resolve();
@@ -111,10 +120,16 @@ export class SceneController implements ReactiveController {
   want(request: SceneRequest | null, mayStart: boolean): void {
     if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
     if (!isSame(request, this.#request)) {
+      const isSwap = this.#request !== null;
       this.#abort();
       this.#submissions = 1;
       this.#request = request;
       this.#setState('waiting');
+      if (isSwap) this.#options.onEmptied();
+    } else if (request.sh !== this.#request?.sh) {
+      if (!this.isOutgoing) this.#shownRequest = request;
+      this.#request = request;
+      void this.#refine();
     }
     if (this.#state === 'waiting' && mayStart) void this.#load(request);
   }
@@ -122,9 +137,11 @@ export class SceneController implements ReactiveController {
   /** Gives up: the scene cannot be drawn. */
   fail(error: unknown): void {
     this.#abort();
+    const wasShown = this.#state === 'ready' || (this.#scene !== null && !this.isOutgoing);
     this.#drop(true);
     this.#error = toElementError(error);
     this.#setState('failed');
+    if (wasShown) this.#options.onEmptied();
     this.#options.onError(this.#error);
   }
 
@@ -153,6 +170,24 @@ export class SceneController implements ReactiveController {
     if (loaded !== total) report(loaded, loaded);
     this.#setState('ready');
     this.#options.onLoad(request.url);
+    this.#tellRestored();
+    void this.#refine();
+  }
+
+  /** The same scene with colours as exact as they are asked for now. What is on show stays until they are there, and if they cannot be had. */
+  async #refine(): Promise<void> {
+    const [request, scene] = [this.#request, this.#scene];
+    if (this.#state !== 'ready' || request === null || scene === null || scene.live || isStreamed(request)) return;
+    const { shPrecision, shDegree } = scene.gaussians;
+    if (request.sh === 'auto' || request.sh === shPrecision || shDegree === 0) return;
+    this.#abort();
+    const { signal } = this.#running;
+    try {
+      await this.#open(request, signal, false, () => undefined);
+    } catch {
+      if (!signal.aborted && this.#scene !== scene) await this.#attempt(request, signal, false, () => undefined);
+    }
+    this.#host.requestUpdate();
   }
 
   /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
@@ -161,10 +196,19 @@ export class SceneController implements ReactiveController {
     this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
     const { signal } = this.#running;
     this.#drop(false);
-    this.#options.onContext('contextlost');
+    if (!this.#isContextLost) this.#options.onContext('contextlost');
+    this.#isContextLost = true;
     await pageVisible(signal);
     if (!signal.aborted) await this.#attempt(request, signal, false, () => undefined);
-    if (!signal.aborted && this.#scene !== null) this.#options.onContext('contextrestored');
+    if (signal.aborted || this.#scene === null) return;
+    this.#tellRestored();
+    void this.#refine();
+  }
+
+  #tellRestored(): void {
+    if (!this.#isContextLost) return;
+    this.#isContextLost = false;
+    this.#options.onContext('contextrestored');
   }
 
   /** Opens and shows a scene, again if the device is lost meanwhile. Afterwards there is a scene, or an error. */
@@ -221,7 +265,10 @@ export class SceneController implements ReactiveController {
     if (signal.aborted) return;
     if (scene.isLost) throw new DeviceLostError((await scene.lost).message);
     void scene.lost.then(() => {
-      if (this.#scene === scene) void this.#restore(request);
+      if (this.#scene !== scene) return;
+      // What will take its place has its own way back.
+      if (this.isOutgoing) this.#drop(false);
+      else void this.#restore(this.#request ?? request);
     });
   }
 
@@ -240,6 +287,7 @@ export class SceneController implements ReactiveController {
   #replace(scene: GpuScene, isPreview: boolean): void {
     this.#drop(false);
     this.#scene = scene;
+    this.#shownRequest = this.#request;
     this.#isPreview = isPreview;
   }
 

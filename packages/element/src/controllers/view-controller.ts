@@ -71,9 +71,7 @@ export class ViewController implements FrameClient {
 
   /** Asks for a frame, if one would be seen. Free to call often. */
   requestFrame(): void {
-    if (this.#scene === null || this.#scene.isLost) return;
-    if (this.#first === undefined && !this.#options.isVisible()) return;
-    this.#options.scheduler().request(this);
+    if (this.#isDrawable) this.#options.scheduler().request(this);
   }
 
   /**
@@ -107,7 +105,8 @@ export class ViewController implements FrameClient {
 
   drawFrame(now: number): void {
     const scene = this.#scene;
-    if (scene === null || scene.isLost) return;
+    // It may have left the viewport since it asked.
+    if (scene === null || !this.#isDrawable) return;
     const { size, camera, maxPixelRatio, decayMs, onCameraChange, onError } = this.#options;
     const pixels = size.pixelSize(maxPixelRatio(), scene.device.limits.maxTextureDimension2D);
     // Without a size nothing is drawn; the observer of the size asks again when there is one.
@@ -142,6 +141,11 @@ export class ViewController implements FrameClient {
     this.#applyRendering(scene);
     scene.render(this.#frameRequest(scene, pixels));
     return canvas;
+  }
+
+  /** There is a scene, and somebody sees it or waits for its first frame. */
+  get #isDrawable(): boolean {
+    return this.#scene?.isLost === false && (this.#first !== undefined || this.#options.isVisible());
   }
 
   #render(scene: GpuScene, request: Frame, now: number, cameraMoved: boolean): void {

@@ -24,17 +24,18 @@ export class VisibilityController implements ReactiveController {
   }
 
   hostConnected(): void {
-    this.#observer = new IntersectionObserver((entries) => this.#update(entries), { threshold: THRESHOLD });
+    this.#observer = new IntersectionObserver((entries) => this.#set(entries[entries.length - 1].isIntersecting), {
+      threshold: THRESHOLD,
+    });
     this.#observer.observe(this.#element);
   }
 
   hostDisconnected(): void {
     this.#observer?.disconnect();
-    this.#isVisible = false;
+    this.#set(false);
   }
 
-  #update(entries: IntersectionObserverEntry[]): void {
-    const isVisible = entries[entries.length - 1].isIntersecting;
+  #set(isVisible: boolean): void {
     if (isVisible === this.#isVisible) return;
     this.#isVisible = isVisible;
     this.#onChange();

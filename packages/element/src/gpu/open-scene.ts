@@ -111,7 +111,7 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
 }
 
 /** A folder that `npm run detail` wrote is known by the name of its manifest. */
-function isStreamed({ url }: SceneRequest): boolean {
+export function isStreamed({ url }: SceneRequest): boolean {
   return URL.canParse(url) && /(^|\/)detail\.json$/.test(new URL(url).pathname);
 }
 
