@@ -1,7 +1,8 @@
 /**
- * Turns shaders/*.wgsl into packages/renderer/src/generated/shaders.ts: code with its `#import`s resolved, and every
+ * Turns shaders/*.wgsl into packages/renderer/src/generated/: code with its `#import`s resolved, and every
  * binding number, struct layout, workgroup size and numeric constant reflected from the WGSL itself, so that nobody
- * counts padding or repeats a number by hand.
+ * counts padding or repeats a number by hand. `shaders.ts` has what every scene needs, `live-shaders.ts` what only generators and
+ * picture models do: pages without them never load it.
  */
 import { mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
@@ -11,6 +12,8 @@ const shaderFolder = fileURLToPath(new URL('../shaders/', import.meta.url));
 const outputFolder = fileURLToPath(new URL('../packages/renderer/src/generated/', import.meta.url));
 
 const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
+/** Stages of generators and picture models. */
+const LIVE = ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'];
 const IMPORT = /^#import (\S+)$/gm;
 
 /** A shader and all files that it imports, each once, before whoever asks for it. */
@@ -98,9 +101,13 @@ const constants = {};
 /** Each file once, however many stages import it: a page loads them all. */
 const parts = new Map();
 const partName = (path) => `${camelCase(path.replace('/', '_'))}Part`;
-const sections = stages.map((stage) => {
+const partsIn = { shaders: new Set(), live: new Set() };
+const sections = { shaders: [], live: [] };
+for (const stage of stages) {
+  const home = LIVE.includes(stage) ? 'live' : 'shaders';
   const paths = partsOf(stage);
   for (const path of paths) parts.set(path, ownCode(path));
+  for (const path of paths) partsIn[home].add(path);
   const code = paths.map((path) => parts.get(path)).join('\n');
   const reflection = reflect(stage, code);
   for (const struct of reflection.structs) structs.set(struct.name, reflectStruct(struct));
@@ -110,23 +117,35 @@ const sections = stages.map((stage) => {
   }
   const joined = paths.map(partName).join(" + '\\n' + ");
   const bindings = literal(reflectBindings(reflection));
-  return `export const ${camelCase(stage)} = {\n  name: '${stage}',\n  bindings: ${bindings},\n  code: ${joined},\n} as const;\n`;
-});
+  sections[home].push(
+    `export const ${camelCase(stage)} = {\n  name: '${stage}',\n  bindings: ${bindings},\n  code: ${joined},\n} as const;\n`,
+  );
+}
 
 const header = '/** Written by scripts/build-shaders.mjs from shaders/. Do not edit. */\n/* eslint-disable */\n';
-const layouts = Object.fromEntries([...structs].sort(([a], [b]) => (a < b ? -1 : 1)));
-mkdirSync(outputFolder, { recursive: true });
-writeFileSync(
-  `${outputFolder}shaders.ts`,
-  [
-    header,
-    ...[...parts].map(([path, code]) => `const ${partName(path)} = ${JSON.stringify(code)};`),
-    '',
-    ...sections,
+const define = ([name, value]) => `export const ${name} = ${literal(value)} as const;`;
+const part = (path) => `export const ${partName(path)} = ${JSON.stringify(parts.get(path))};`;
+const shared = [...partsIn.live].filter((path) => partsIn.shaders.has(path));
+const files = {
+  // Modules and not objects, so that bundlers leave out what nobody uses.
+  layouts: [
     '/** Byte sizes and offsets of the WGSL structs. */',
-    `export const layouts = ${literal(layouts)} as const;\n`,
-    '/** Numeric constants of the WGSL, by their names there. */',
-    `export const constants = ${literal(constants)} as const;\n`,
-  ].join('\n'),
-);
+    ...[...structs].sort(([a], [b]) => (a < b ? -1 : 1)).map(define),
+  ],
+  constants: ['/** Numeric constants of the WGSL, by their names there. */', ...Object.entries(constants).map(define)],
+  shaders: [
+    "export * as layouts from './layouts.js';",
+    "export * as constants from './constants.js';",
+    ...[...partsIn.shaders].map(part),
+    ...sections.shaders,
+  ],
+  'live-shaders': [
+    ...(shared.length > 0 ? [`import { ${shared.map(partName).join(', ')} } from './shaders.js';`] : []),
+    ...[...partsIn.live].filter((path) => !shared.includes(path)).map(part),
+    ...sections.live,
+  ],
+};
+mkdirSync(outputFolder, { recursive: true });
+for (const [name, lines] of Object.entries(files))
+  writeFileSync(`${outputFolder}${name}.ts`, `${header}${lines.join('\n')}\n`);
 console.log(`shaders: ${stages.length} stages, ${structs.size} structs`);

@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { constants, imageToTensor, layouts } from '../generated/shaders.js';
+import { imageToTensor } from '../generated/live-shaders.js';
+import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE, kernelOf, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';

@@ -1,4 +1,4 @@
-import { ingest } from '../generated/shaders.js';
+import { ingest } from '../generated/live-shaders.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import { cullGroups } from './cull.js';
 
