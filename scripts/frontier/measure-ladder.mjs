@@ -112,6 +112,7 @@ for (const step of views) {
       result.psnr = Math.min(result.psnr, Number(decibels(await draw(result.levers), whole).toFixed(2)));
   }
 }
+const { rasterizer, accumulation, threads, sort } = renderer.levers;
 const report = {
   kind: 'ladder',
   date: new Date().toISOString(),
@@ -123,7 +124,7 @@ const report = {
     width: WIDTH,
     height: HEIGHT,
     views: views.length,
-    variants: isProcessor ? ofProcessor : renderer.variants,
+    variants: { rasterizer, accumulation, threads, sort },
   },
   rungs: results.map(({ psnr, ...rest }) => ({ ...rest, psnr: Number.isFinite(psnr) ? psnr : null })),
 };
