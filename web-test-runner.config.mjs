@@ -56,7 +56,7 @@ function slowestReporter(count = 12) {
   };
 }
 
-/** One closing line that counts every test of every group, in the words that `npm test` reads. */
+/** The files that failed, and one closing line that counts every test of every group, in the words that `npm test` reads. */
 function countReporter() {
   const countOf = (suite) => {
     const own = { passed: 0, failed: 0, skipped: 0 };
@@ -71,6 +71,7 @@ function countReporter() {
       const broken = sessions.filter(
         ({ passed: fine, testResults }) => !fine && countOf(testResults).failed === 0,
       ).length;
+      for (const { testFile } of sessions.filter((session) => !session.passed)) console.log(`Failed: ${testFile}`);
       console.log(`Chromium: ${passed} passed, ${failed + broken} failed, ${skipped} skipped`);
     },
   };
