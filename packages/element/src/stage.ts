@@ -15,8 +15,8 @@ import { ViewController } from './controllers/view-controller.js';
 import { VisibilityController } from './controllers/visibility-controller.js';
 import type { GaussianSplatEventMap } from './events.js';
 import { LiveWiring } from './live/live-wiring.js';
-import type { SceneRequest } from './loading/protocol.js';
 import { SceneQueries } from './scene-queries.js';
+import { addressesOf, requestOf } from './source-request.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 import type { Source, StageOptions } from './stage-options.js';
 
@@ -76,14 +76,14 @@ export class Stage {
     this.scene = this.#createScene();
     this.economy = new EconomyController({
       economy: options.economy,
-      memoryBudget: () => options.services().memoryBudget ?? defaultMemoryBudget(),
+      memoryBudget: () => this.#memoryBudget(),
       onChange: () => this.#onOtherSplats(),
       warn: options.warn,
     });
     this.detail = new DetailController({
       detail: () => options.attributes().detail,
       loader: () => options.services().sceneLoader,
-      memoryBudget: () => options.services().memoryBudget ?? defaultMemoryBudget(),
+      memoryBudget: () => this.#memoryBudget(),
       onChange: () => this.#onOtherSplats(),
       warn: options.warn,
     });
@@ -163,7 +163,7 @@ export class Stage {
   /** The scene to show. Called after every update; only changes act. */
   setSource(source: Source): void {
     this.#source = source;
-    this.#live.post.want(this.#urlsOf(source.postprocess));
+    this.#live.post.want(addressesOf(source.postprocess, this.#options.services().urlModifier));
     this.#requestScene();
   }
 
@@ -235,7 +235,7 @@ export class Stage {
       loops: this.#options.loops,
       wantsPreviews: () => this.#visibility.isVisible,
       onPreview: ({ gaussians }) => this.#onPreview(gaussians.count),
-      memoryBudget: () => services().memoryBudget ?? defaultMemoryBudget(),
+      memoryBudget: () => this.#memoryBudget(),
       live: () => ({
         runtimeLocation: services().runtimeLocation,
         state: () => this.#live.state,
@@ -261,33 +261,15 @@ export class Stage {
   }
 
   #requestScene(): void {
-    const { loading, credentials, quality, detail } = this.#options.attributes();
-    const sh = quality === 'reference' ? 'float16' : 'auto';
-    const { src, contract, chain } = this.#source;
-    const request: SceneRequest | null = src
-      ? {
-          url: this.#urlOf(src),
-          credentials,
-          sh,
-          levels: typeof detail === 'number' && detail > 0,
-          contract,
-          chain: this.#urlsOf(chain),
-        }
-      : null;
-    const mayStart = loading === 'eager' || this.#isWanted || (this.#visibility.isVisible && this.reveal.mayReveal);
+    const attributes = this.#options.attributes();
+    const request = requestOf(this.#source, attributes, this.#options.services().urlModifier);
+    const isInSight = this.#visibility.isVisible && this.reveal.mayReveal;
+    const mayStart = attributes.loading === 'eager' || this.#isWanted || isInSight;
     if (this.#host.isConnected) this.scene.want(request, mayStart);
   }
 
-  #urlOf(src: string): string {
-    const url = absoluteUrl(src);
-    return this.#options.services().urlModifier?.(url) ?? url;
-  }
-
-  #urlsOf(urls: string | null): readonly string[] {
-    return (urls ?? '')
-      .split(/\s+/)
-      .filter(Boolean)
-      .map((url) => this.#urlOf(url));
+  #memoryBudget(): number | undefined {
+    return this.#options.services().memoryBudget ?? defaultMemoryBudget();
   }
 
   #createBehaviours(): Behaviours {
@@ -374,11 +356,6 @@ export class Stage {
 
 /** Width and height, in pixels, that a generator hears of before the picture has a size: those of an element without style. */
 const FIRST_SIZE = [300, 150] as const;
-
-/** The worker has a base URL of its own, so it is given whole ones. What is no URL stays as it is, and fails there. */
-function absoluteUrl(src: string): string {
-  return URL.canParse(src, document.baseURI) ? new URL(src, document.baseURI).href : src;
-}
 
 /** The GPU's share of a device is known to nobody; half of the memory is what shared memory can spare. Browsers round it, and end at 8 GB or more. */
 function defaultMemoryBudget(): number | undefined {
