@@ -6,6 +6,8 @@ import type { Camera } from '@gaussian-splat/core';
 interface Spoken {
   readonly VIEW_NAMES: readonly string[];
   viewName(theta: number, phi: number): string;
+}
+interface Words {
   readSpokenStrings(value: unknown): object | null;
 }
 interface Projection {
@@ -54,7 +56,7 @@ test('names of views: quarters around, thirds from above to below, any number of
 });
 
 test('words of the page: JSON or an object; anything else is malformed', async () => {
-  const { readSpokenStrings } = await load<Spoken>('spoken');
+  const { readSpokenStrings } = await load<Words>('../words');
   assert.deepEqual(readSpokenStrings('{"front": "vorn", "back": 7}'), { front: 'vorn' });
   assert.deepEqual(readSpokenStrings(null), {});
   for (const malformed of ['{', '[]', '7', 'null', 7])

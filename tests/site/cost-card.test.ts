@@ -51,8 +51,8 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
       [...document.querySelectorAll<Splat>('gaussian-splat')].map(({ error }) => error!.reason),
     );
     assert.deepEqual(reasons, ['unsupported/no-webgpu', 'unsupported/no-webgpu']);
-    assert.ok(await tab.locator('#plain').getByText('This 3D scene needs WebGPU').isVisible());
-    assert.ok(await tab.getByText('A picture of the scene').isVisible());
+    assert.ok(await tab.locator('#plain p').getByText('This 3D scene needs WebGPU').isVisible());
+    assert.ok(await tab.locator('figure[slot=fallback]').getByText('A picture of the scene').isVisible());
     assert.deepEqual(
       requests.filter((url) => url.endsWith('.spz')),
       [],

@@ -280,7 +280,7 @@ export class GaussianSplatElement extends ViewingMethods {
   /** The page's own words, where it has some. */
   #spokenError(error: ElementError): string {
     const slotted = this.querySelector(`:scope > [slot=${error.code === 'unsupported' ? 'fallback' : 'error'}]`);
-    return slotted?.textContent ?? visitorMessage(error, this.#strings);
+    return slotted?.textContent.trim() || visitorMessage(error, this.#strings);
   }
 
   /** A person clicked the poster: the keyboard goes on in the scene. */

@@ -51,13 +51,13 @@ export class MemoryLedger {
    * @throws GaussianSplatError `out-of-memory/budget` if it is more than that, or more than the budget leaves.
    */
   reserve(label: string, bytes: number, most = Infinity): Reservation {
-    if (bytes > most) throw overBudget(label, bytes, `${megabytes(most)}, the memoryBudget that was given`);
+    if (bytes > most) throw overBudget(label, bytes, `${inBytes(most)}, the memoryBudget that was given`);
     const left = this.budgetBytes - this.bytes;
     if (bytes > left)
       throw overBudget(
         label,
         bytes,
-        `${megabytes(Math.max(0, left))}, what is left of a budget of ${megabytes(this.budgetBytes)}`,
+        `${inBytes(Math.max(0, left))}, what is left of a budget of ${inBytes(this.budgetBytes)}`,
       );
     const reservation: Reservation = { label, bytes, release: () => void this.#held.delete(reservation) };
     this.#held.add(reservation);
@@ -67,13 +67,13 @@ export class MemoryLedger {
 
 const LEDGERS = new WeakMap<GPUDevice, MemoryLedger>();
 
-const megabytes = (value: number): string => `${(value / 1e6).toFixed(1)} MB`;
+const inBytes = (value: number): string => `${Math.floor(value)} bytes (${(value / 1e6).toFixed(1)} MB)`;
 
 function overBudget(label: string, bytes: number, most: string): GaussianSplatError {
   return new GaussianSplatError('out-of-memory/budget', {
     where: label,
     expected: `at most ${most}`,
-    found: megabytes(bytes),
+    found: inBytes(bytes),
     remedy:
       'show a smaller scene (npm run economise makes one), remove other scenes, or raise the budget (memoryBudget, MemoryLedger.budgetBytes) if the device is known to have the memory',
   });
