@@ -1,7 +1,7 @@
 /**
  * `npm test`: installs what is missing (Node packages, a Chromium), builds, and runs every test: lint and types, then
  * everything that runs in Node (units, stages on Dawn, images against the oracle), then real Chromium with WebGPU.
- * `npm test -- PATTERN` runs only the Node test files whose path contains PATTERN.
+ * `npm test -- PATTERN` runs only the Node test files whose path contains PATTERN; `npm test -- --full` runs whole lists where otherwise a part stands for all.
  */
 import { spawnSync } from 'node:child_process';
 import { readdirSync } from 'node:fs';
@@ -16,8 +16,10 @@ const chromium = ensureChromium();
 console.log(`Chromium: ${chromiumVersion(chromium)} at ${chromium}`);
 build();
 
-const pattern = process.argv[2];
-const env = { ...gpuEnvironment(), CHROMIUM: chromium };
+const words = process.argv.slice(2);
+const pattern = words.find((word) => word !== '--full');
+const extent = words.includes('--full') ? { TESTS: 'full', STABILITY: 'full', SITE: 'full' } : {};
+const env = { ...gpuEnvironment(), ...extent, CHROMIUM: chromium };
 const totals = { passed: 0, failed: 0, skipped: 0 };
 
 if (pattern === undefined) {

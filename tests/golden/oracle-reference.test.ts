@@ -7,6 +7,7 @@ import { renderOracle, type Mode, type OracleOptions } from '../oracle/oracle.js
 import { RULES, type Rules } from '../oracle/rules.js';
 import { referenceImage, referenceViews, type ReferenceView } from '../support/cameras.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
+import { isFull } from '../support/extent.js';
 import { maxAbs, psnr, shareAbove } from '../support/metrics.js';
 
 /**
@@ -66,8 +67,9 @@ describe('the oracle reproduces gsplat', { skip: needsSharedData }, () => {
 
   test('there are 12 views, each in two modes', () => assert.equal(views.length, 12));
 
-  for (const view of views) {
-    for (const mode of MODES) {
+  for (const [i, view] of views.entries()) {
+    // Each view in one of the two modes, by turns, says of both what there is to say.
+    for (const mode of isFull ? MODES : [MODES[i % 2]]) {
       test(`${view.name} ${mode}`, (context) => {
         const comparison = compare(view, mode, 'gsplat');
         context.diagnostic(row(`${view.name} ${mode}`, comparison));
