@@ -67,6 +67,8 @@ describe('levels of detail of a plain file', () => {
     element.cameraOrbit = AT_REST;
     element.jumpCameraToGoal();
     await frames(2);
+    await until(() => element.stats?.pace.drawn === 'whole', 'the true image');
+    await frames(2);
     // After a turn splats of nearly one depth may be in another order than before it, with levels or without.
     const rested = await pixelsOf(element);
     const error = rested.reduce((sum, value, i) => sum + (value - whole[i]) ** 2, 0) / rested.length;

@@ -71,7 +71,10 @@ describe('the pace of pictures', () => {
     assertEqual(fixed.stats?.why, [], 'and nothing is done to it');
     assert(pace.moving !== 'whole' && pace.drawn === pace.moving, `drawn with ${pace.drawn}`);
     assertEqual(pace.reason, 'slow', 'the reason');
-    assert(why.length === 1 && why[0].includes(pace.moving), `says: ${why.join(' ')}`);
+    assert(
+      why.some((sentence) => sentence.includes(pace.moving)),
+      `says: ${why.join(' ')}`,
+    );
     assert(paced < 0.8 * whole, `${paced} ms instead of ${whole}`);
 
     const rested = await comeToRest(auto);

@@ -17,7 +17,9 @@ import {
 } from './support.js';
 
 const FAMILIES = '/tests/fixtures/families/';
-const ROWS = 80 * 13;
+const ROWS = 80;
+/** Numbers of a Gaussian in each of the avatar's outputs. */
+const WIDTHS: Readonly<Record<string, number>> = { positions: 3, covariances: 6, colors: 3, opacities: 1 };
 
 /** Runs of the runtime, whoever asks for them. */
 const runs = { count: 0 };
@@ -31,9 +33,13 @@ class NumberSink implements GaussianSink {
     this.#device = device;
   }
 
-  ingest({ gaussians }: Readonly<Record<string, GPUBuffer>>, _rows: number, instance: number): void {
-    const numbers = readBuffer(this.#device, gaussians).then((bytes) => numbersOf(bytes, 'float32'));
-    this.rows.push(numbers.then((all) => all.slice(instance * ROWS, (instance + 1) * ROWS)));
+  ingest(tensors: Readonly<Record<string, GPUBuffer>>, _rows: number, instance: number): void {
+    const parts = Object.entries(tensors).map(async ([name, buffer]) => {
+      const numbers = ROWS * WIDTHS[name];
+      const all = numbersOf(await readBuffer(this.#device, buffer), 'float32');
+      return all.slice(instance * numbers, (instance + 1) * numbers);
+    });
+    this.rows.push(Promise.all(parts).then((all) => all.flat()));
   }
 }
 
@@ -45,7 +51,7 @@ const stateAt = (number: number): GeneratorState => ({
 
 let device: GPUDevice;
 
-const open = (name: string, onError: (error: unknown) => void = reportError): Promise<Generator> =>
+const open = (name: string, onError: (error: unknown) => void = (error) => reportError(error)): Promise<Generator> =>
   Generator.open({ url: `${FAMILIES}${name}.onnx` }, device, { onError });
 
 describe('instances of one generator', () => {

@@ -158,7 +158,8 @@ describe('generators', () => {
       await generator.idle;
       const { values } = (await runOnCpu(`${FIXTURES}reshaped.onnx`, { timeSeconds })).gaussians;
       const error = relativeError(numbersOf(await sink.runs[i].tensors.gaussians, 'float32'), values);
-      assert(error < 1e-5, `relative error ${error} at ${timeSeconds} s`);
+      // SwiftShader's sine is good to 1e-4.
+      assert(error < 1e-4, `relative error ${error} at ${timeSeconds} s`);
     }
     assertEqual(generator.kind, 'webgpu', 'kind');
   });
