@@ -11,6 +11,9 @@ import { gpuEnvironment } from './lib/gpu-environment.mjs';
 import { build, ensureDependencies } from './lib/prepare.mjs';
 import { must, root } from './lib/run.mjs';
 
+/** Files that are given a second chance alone, at most: more than that is no matter of a busy machine. */
+const MOST_UNSTEADY = 3;
+
 ensureDependencies();
 const chromium = ensureChromium();
 console.log(`Chromium: ${chromiumVersion(chromium)} at ${chromium}`);
@@ -52,9 +55,6 @@ function runNodeTests() {
   totals.skipped += count('skipped') + count('todo');
   if (output.status !== 0 && totals.failed === 0) totals.failed++;
 }
-
-/** Files that are given a second chance alone, at most: more than that is no matter of a busy machine. */
-const MOST_UNSTEADY = 3;
 
 /**
  * The pages draw on the processor, and some tests look at what a page does in time: a few files that fail while the machine is busy with something else

@@ -1,7 +1,7 @@
 /** A camera that turns while a generator takes 300 ms a run: frames are drawn at the page's rate, each from one whole run, and what is shown in the end is new. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, nextEvent, showLoaded, until } from '../../element/browser/support/harness.js';
+import { assert, assertEqual, atRest, nextEvent, showLoaded } from '../../element/browser/support/harness.js';
 import { screenOf } from '../../element/browser/support/screen.js';
 import { FIXTURES, RUNTIME } from './support.js';
 
@@ -81,9 +81,10 @@ it('turning the camera while a generator takes 300 ms a run draws as many frames
   element.currentTime = 2;
   await seeked;
   // The turn and the seek, one soon after the other, are motion: the true image follows when both are over.
-  await until(() => element.stats?.pace?.drawn === 'whole', 'the true image');
+  await atRest(element);
   const shown = await screenOf(element);
   element.remove();
   const fresh = await showLoaded({ ...attributes, ...place, time: '2' });
+  await atRest(fresh);
   assertEqual((await screenOf(fresh)).differences(shown, 4), 0, 'pixels that differ');
 }).timeout(60_000);

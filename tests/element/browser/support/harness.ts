@@ -68,6 +68,21 @@ export async function showLoaded(
   return element;
 }
 
+/**
+ * Waits until an element shows its true image and the page has drawn nothing for a while: a single frame that says so may still be followed by one of a
+ * motion that has just begun.
+ */
+export async function atRest(element: GaussianSplatElement, quietMs = 400, limitMs = 30_000): Promise<void> {
+  let [seen, since] = [submits, performance.now()];
+  const isQuiet = (): boolean => {
+    const now = performance.now();
+    if (submits !== seen || element.stats?.pace.drawn !== 'whole') [seen, since] = [submits, now];
+    return now - since > quietMs;
+  };
+  await until(isQuiet, 'the true image', limitMs);
+  await frames(2);
+}
+
 /** All calls of GPUQueue.submit since the page was opened. */
 export let submits = 0;
 const submit = GPUQueue.prototype.submit;
