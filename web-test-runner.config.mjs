@@ -40,18 +40,21 @@ export default {
   plugins: [typescript(), pageCommands()],
 };
 
-/** The files that took longest, in whole seconds: where to look when the tests have become slow. */
+/** The files and the single tests that took longest, in whole seconds: where to look when the tests have become slow. */
 function slowestReporter(count = 12) {
-  const secondsOf = (suite) =>
-    [
-      ...(suite?.tests ?? []).map(({ duration = 0 }) => duration / 1000),
-      ...(suite?.suites ?? []).map(secondsOf),
-    ].reduce((sum, seconds) => sum + seconds, 0);
+  const testsOf = (suite) => [...(suite?.tests ?? []), ...(suite?.suites ?? []).flatMap(testsOf)];
+  const print = (rows) => {
+    const slowest = rows.sort((a, b) => b.ms - a.ms).slice(0, count);
+    for (const { name, ms } of slowest) console.log(`${(ms / 1000).toFixed(0).padStart(4)} s ${name}`);
+  };
   return {
     onTestRunFinished({ sessions }) {
-      const files = sessions.map(({ testFile, testResults }) => ({ testFile, seconds: secondsOf(testResults) }));
-      const slowest = files.sort((a, b) => b.seconds - a.seconds).slice(0, count);
-      for (const { testFile, seconds } of slowest) console.log(`${seconds.toFixed(0).padStart(4)} s ${testFile}`);
+      const files = sessions.map(({ testFile, testResults }) => {
+        const tests = testsOf(testResults).map(({ name, duration: ms = 0 }) => ({ name, ms }));
+        return { name: testFile, ms: tests.reduce((sum, { ms }) => sum + ms, 0), tests };
+      });
+      print(files.flatMap(({ tests }) => tests));
+      print(files);
     },
   };
 }
