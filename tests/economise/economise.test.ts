@@ -22,7 +22,7 @@ import {
 } from '@gaussian-splat/economise';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 
 const SIZE = { width: 120, height: 80 };
 
@@ -51,7 +51,7 @@ const fewer = {
 const scored = scoreSplats(scene, fewer.scored, cpuScorer(scene));
 
 test("the CPU's images are the renderer's", async () => {
-  const studio = new Studio(await nodeDevice(), 'default');
+  const studio = new Studio(await serialDevice(), 'default');
   const two = viewsAround(boundsOf(scene), 2, SIZE);
   const [ours, theirs] = [await cpuPainter.draw(scene, two), await studio.draw(scene, two)];
   studio.destroy();
@@ -62,7 +62,7 @@ test("the CPU's images are the renderer's", async () => {
 });
 
 test('the compute rasterizer finds the contributions that the CPU finds', async () => {
-  const gpu = await GpuScorer.create(await nodeDevice(), scene);
+  const gpu = await GpuScorer.create(await serialDevice(), scene);
   const cpu = cpuScorer(scene);
   for (const view of viewsAround(boundsOf(scene), 2, SIZE)) {
     const [theirs, ours] = [await gpu.score(view), await cpu(view)];

@@ -6,7 +6,7 @@ import { decibels, heaviest, LiveMask, meanSquare, parseEconomyGoal, viewsAround
 import { capture, GaussianBuffers, packGaussians, readPacked, Renderer, selectPacked } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
-import { nodeDevice } from '../support/node-device.js';
+import { serialDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
 
 const random = randomSource(11);
@@ -59,7 +59,7 @@ test('the heaviest stay, ties by their order, and the weightless never', () => {
 });
 
 test('a scene read back is what was uploaded, and a part of it draws as a cloud of that part', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const packed = packGaussians(ball());
   const gaussians = await GaussianBuffers.upload(device, packed);
   const read = await readPacked(device, gaussians);
@@ -83,7 +83,7 @@ test('a scene read back is what was uploaded, and a part of it draws as a cloud 
 });
 
 test('what no view sees goes first, and a figure is kept in views that had no say', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const cloud = ball();
   const bounds = boundsOf(cloud);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));

@@ -18,7 +18,7 @@ import {
 } from '@gaussian-splat/core';
 import { bindInputs, type GeneratorState, type InputNumbers } from '@gaussian-splat/generator';
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 
 const root = fileURLToPath(new URL('../../demo/generators/', import.meta.url));
 const names = readdirSync(root).filter((name) => existsSync(`${root}${name}/model.onnx`));
@@ -93,7 +93,7 @@ async function drawView(name: string, view: View): Promise<Float32Array> {
   };
   const pictures = Object.entries(view.pictures ?? {}).map(([input, file]) => [input, planes(read(`${name}/${file}`))]);
   const written = await run(bytes, { ...bindInputs(header, contract, state), ...Object.fromEntries(pictures) });
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const layout = gaussianLayout(header, contract);
   assert.ok(layout, 'a model that writes Gaussians');
   const gaussians = await DynamicGaussians.create(device, layout, { antialiased: contract.antialiased });

@@ -8,12 +8,12 @@ import { renderOracle } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
 import { closeness, describeCloseness } from '../support/compare.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
 
 /** The image of a camera that has just turned: only then are the visible splats sorted by short keys. */
 async function renderTurning(cloud: GaussianCloud, camera: Camera, depthKeyBits: 16 | 24 | 32): Promise<Float32Array> {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased: false }));
   const renderer = new Renderer(device, { depthKeyBits });
   const [x, y, z] = [0, 4, 8].map((row) => Array.from(camera.worldToCamera).slice(row, row + 4));

@@ -10,7 +10,7 @@ import { closeness, compareWithOracle, describeCloseness, renderCloud } from '..
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { psnr } from '../support/metrics.js';
 import { isFull } from '../support/extent.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { resized } from '../support/scenes.js';
 
 /** dB to the image of the PLY file that each format must keep, a little under what it was seen to keep. */
@@ -59,7 +59,7 @@ test('one scene through every format', { skip: needsSharedData }, async () => {
     if (isTwin && !isFull) continue;
     const cloud = await load(file, level);
     const oracle = draw(cloud);
-    const close = closeness(await renderCloud(await nodeDevice(), cloud, camera, 'classic'), oracle);
+    const close = closeness(await renderCloud(await serialDevice(), cloud, camera, 'classic'), oracle);
     const kept = psnr(oracle.color, ply.color, { mask: ply.contributors });
     console.log(`${describeCloseness(file, close)}, to the PLY ${kept.toFixed(2)} dB`);
     assert.ok(close.psnr >= 59, `${file}: ${close.psnr} dB to its own oracle`);
@@ -70,7 +70,7 @@ test('one scene through every format', { skip: needsSharedData }, async () => {
 test('captured scenes in SOG of both versions', { skip: needsSharedData }, async () => {
   const camera = viewOfAll();
   for (const file of OTHERS) {
-    const close = await compareWithOracle(await nodeDevice(), await load(file), camera, 'classic');
+    const close = await compareWithOracle(await serialDevice(), await load(file), camera, 'classic');
     console.log(describeCloseness(file, close));
     assert.ok(close.psnr >= 59, `${file}: ${close.psnr} dB to its own oracle`);
   }

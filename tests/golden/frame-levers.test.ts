@@ -13,7 +13,7 @@ import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
-import { nodeDevice } from '../support/node-device.js';
+import { serialDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { countWork } from '../support/work-counters.js';
@@ -44,7 +44,7 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
   // Every mix of shader levers is seconds of compiling for tiles here.
   const mixes = rasterizer === 'quads' ? MIXES : MIXES.slice(1);
   test(`${rasterizer}: a frame's levers draw what a renderer of those levers draws, and the next frame without is whole`, async () => {
-    const device = await nodeDevice();
+    const device = await serialDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const own = new Renderer(device, { rasterizer });
     const plain = new Renderer(device, { rasterizer });
@@ -70,7 +70,7 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
   test(`${rasterizer}: once prepared and seen, steps allocate and compile nothing`, async () => {
     // Tiles take seconds to compile here: those of the test before are good enough for them.
     const isFresh = rasterizer === 'quads';
-    const device = isFresh ? await (await requestNodeAdapter()).requestDevice() : await nodeDevice();
+    const device = isFresh ? await (await requestNodeAdapter()).requestDevice() : await serialDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const renderer = new Renderer(device, { rasterizer });
     const format = 'rgba8unorm';
@@ -101,7 +101,7 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
 }
 
 test('a lever out of range is refused', async () => {
-  const renderer = new Renderer(await nodeDevice());
+  const renderer = new Renderer(await serialDevice());
   assert.throws(() => renderer.prepare([{ resolutionScale: 0 }], 'rgba8unorm'), { code: 'argument/value' });
   renderer.destroy();
 });

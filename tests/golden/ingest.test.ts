@@ -6,7 +6,7 @@ import { capture, DynamicGaussians, GaussianBuffers, packGaussians, Renderer } f
 import { mortonOrder } from '@gaussian-splat/renderer/stages';
 import { writeTensors, type TensorSpec, type WrittenTensors } from '../support/generator-tensors.js';
 import { psnr } from '../support/metrics.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { brightColors, edgeOnDiscs, hugeSplats, needles, opacityLadder, resized, room } from '../support/scenes.js';
 
 const LIMIT_DB = 55;
@@ -47,7 +47,7 @@ function inDrawnOrder(cloud: GaussianCloud, spec: TensorSpec): GaussianCloud {
 
 /** Premultiplied pixels, and a mask of those that any splat covers. */
 async function drawCloud(cloud: GaussianCloud, camera: Camera): Promise<{ pixels: Float32Array; mask: Uint8Array }> {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud, { sh: 'float16' }));
   const renderer = new Renderer(device);
   const pixels = await capture(device, renderer, { gaussians, camera });
@@ -57,7 +57,7 @@ async function drawCloud(cloud: GaussianCloud, camera: Camera): Promise<{ pixels
 }
 
 async function uploadTensors({ tensors }: WrittenTensors): Promise<Record<string, GPUBuffer>> {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   return Object.fromEntries(
     Object.entries(tensors).map(([name, words]) => {
       const buffer = device.createBuffer({ size: words.byteLength, usage: 0x80 | 0x8 | 0x4 });
@@ -70,7 +70,7 @@ async function uploadTensors({ tensors }: WrittenTensors): Promise<Record<string
 for (const dtype of ['float32', 'float16'] as const) {
   for (const one of SPECS) {
     test(`ingest, ${one.layout}, ${one.shape}, ${dtype}: the frame of the CPU's packing`, async () => {
-      const device = await nodeDevice();
+      const device = await serialDevice();
       for (const make of [room, needles, hugeSplats, opacityLadder, brightColors, edgeOnDiscs]) {
         const { name, cloud, cameras } = make();
         const written = writeTensors(inDrawnOrder(cloud, { ...one, dtype }), { ...one, dtype });
@@ -95,7 +95,7 @@ for (const dtype of ['float32', 'float16'] as const) {
  * colours. Beside ours stands the best that any reader could make of the same numbers, their nearest positive semi-definite matrix.
  */
 test('ingest, float16: needles and discs lose digits as covariances, by the format and not by the reader, and none as axes', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   for (const make of [needles, edgeOnDiscs]) {
     const { name, cloud, cameras } = make();
     const camera = resized(cameras[0], 240);
@@ -122,7 +122,7 @@ test('ingest, float16: needles and discs lose digits as covariances, by the form
 });
 
 test('ingest: a new run replaces all of the old one, also for a camera that stands still', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const { cloud, cameras } = room();
   const spec = { ...SPECS[0], dtype: 'float32' } as const;
   const moved = { ...cloud, positions: cloud.positions.map((x, i) => (i % 3 === 2 ? x + 1.5 : x)) };
@@ -156,7 +156,7 @@ test('ingest: a new run replaces all of the old one, also for a camera that stan
 });
 
 test('ingest: bounds come from what is drawn', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const { cloud } = room();
   const written = writeTensors(cloud, { ...SPECS[0], dtype: 'float32' });
   const gaussians = await DynamicGaussians.create(device, written.layout);
@@ -170,7 +170,7 @@ test('ingest: bounds come from what is drawn', async () => {
 });
 
 test('ingest: a tensor that is missing or too small, or too many rows, is refused and changes nothing', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const { cloud } = room();
   const { layout } = writeTensors(cloud, { ...SPECS[0], dtype: 'float32' });
   const gaussians = await DynamicGaussians.create(device, layout);

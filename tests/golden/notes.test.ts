@@ -5,7 +5,7 @@ import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { GaussianBuffers, packedOrder, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { toCamera, worldPosition } from '../oracle/projection.js';
 import { renderOracle } from '../oracle/oracle.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { resized, room } from '../support/scenes.js';
 
@@ -55,7 +55,7 @@ async function notesOf(device: GPUDevice, cloud: GaussianCloud, cameras: readonl
 }
 
 test('contributions are the largest weights that the oracle finds, over all frames; the image stays as it is', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const { cloud, cameras } = room();
   const views = cameras.slice(0, 2).map((camera) => resized(camera, 240));
   const { weights, image, plain } = await notesOf(device, cloud, views);
@@ -74,7 +74,7 @@ test('contributions are the largest weights that the oracle finds, over all fram
 });
 
 test('depth is that of the splat at which a pixel becomes half transparent', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const { cloud, cameras } = room();
   const camera = resized(cameras[0], 240);
   const { depths } = await notesOf(device, cloud, [camera]);
@@ -97,7 +97,7 @@ test('depth is that of the splat at which a pixel becomes half transparent', asy
 });
 
 test('quads refuse to take notes, by name', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const { cloud, cameras } = room();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const renderer = new Renderer(device, { rasterizer: 'quads' });

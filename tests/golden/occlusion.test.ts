@@ -7,7 +7,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
 import { isFull } from '../support/extent.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 
 const SIZE = { width: 192, height: 128 };
@@ -56,7 +56,7 @@ for (const { path, occludedBelow, least } of [
 ]) {
   const move = PATHS[path];
   test(`${path}, ${occludedBelow}: few splats behind the wall are drawn, and every frame keeps ${least} dB`, async () => {
-    const device = await nodeDevice();
+    const device = await serialDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(wallAndBeyond()));
     let redraws = 0;
     const options: RendererOptions = { rasterizer: 'tiles', occludedBelow, onIncomplete: () => redraws++ };
@@ -83,7 +83,7 @@ for (const { path, occludedBelow, least } of [
 }
 
 test('a jump is drawn whole, and so is a scene whose content changed', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(wallAndBeyond()));
   const [some, all] = [0.1, 0].map((occludedBelow) => new Renderer(device, { rasterizer: 'tiles', occludedBelow }));
   const front = cameraAlong(PATHS.strafing, 0);

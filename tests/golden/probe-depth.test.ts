@@ -5,7 +5,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer, type RasterizerName } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
 
 /** 1500 balls of all opacities around the origin. */
@@ -25,7 +25,7 @@ const RASTERIZERS: readonly RasterizerName[] = ['quads', 'tiles'];
 
 for (const rasterizer of RASTERIZERS) {
   test(`${rasterizer}: the opacity of a point is the alpha of its pixel, in a frame that was sorted and in one that was not`, async () => {
-    const device = await nodeDevice();
+    const device = await serialDevice();
     const cloud = randomCloud();
     const near = cameraAt([0, 0, -6], [0, 0, 0], { width: 96, height: 64 });
     const turned = cameraAt([3, 1, -6], [0, 0, 0], { width: 96, height: 64 });
@@ -58,7 +58,7 @@ for (const rasterizer of RASTERIZERS) {
 }
 
 test('a wall behind a veil: the depth is that of the wall, and only what is behind it is hidden', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const sheet = (z: number, opacity: number) =>
     repeat(40 * 40, (i) => ({
       position: [((i % 40) - 20) / 8, (Math.floor(i / 40) - 20) / 8, z] as const,

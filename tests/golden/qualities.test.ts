@@ -7,7 +7,7 @@ import { readScene } from '@gaussian-splat/formats';
 import { readFileSync } from 'node:fs';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, describeCloseness } from '../support/compare.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt, room } from '../support/scenes.js';
 
 /** dB against the oracle, worst view. */
@@ -26,7 +26,7 @@ const views: { name: string; cloud: GaussianCloud; camera: Camera }[] = [
 
 for (const { name, cloud, camera } of views) {
   test(name, async () => {
-    const device = await nodeDevice();
+    const device = await serialDevice();
     const mode = cloud.antialiased ? 'antialiased' : 'classic';
     const oracle = renderOracle(cloud, camera, { rules: 'gsplat', mode });
     for (const quality of Object.keys(LIMITS) as Quality[]) {

@@ -11,7 +11,7 @@ import {
 } from '@gaussian-splat/renderer';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { writeTensors, type TensorSpec } from '../support/generator-tensors.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
 
 const SPEC: TensorSpec = {
   layout: 'split',
@@ -23,7 +23,7 @@ const SPEC: TensorSpec = {
 };
 
 test('what is declared is what the buffers take', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const ledger = MemoryLedger.of(device);
   for (const degree of [0, 1, 2, 3] as const) {
     for (const sh of ['int8', 'float16'] as const) {
@@ -38,7 +38,7 @@ test('what is declared is what the buffers take', async () => {
 });
 
 test('room for what a generator writes is declared, and given back', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const ledger = MemoryLedger.of(device);
   const gaussians = await DynamicGaussians.create(device, writeTensors(smallCloud(512, 1), SPEC).layout);
   assert.equal(ledger.bytes, 512 * bytesPerSplat(1, 'float16'));
@@ -47,7 +47,7 @@ test('room for what a generator writes is declared, and given back', async () =>
 });
 
 test('a scene beyond the budget is refused before the device hears of it', async () => {
-  const device = await nodeDevice();
+  const device = await serialDevice();
   const ledger = MemoryLedger.of(device);
   const packed = packGaussians(smallCloud(512, 1), { sh: 'int8' });
   ledger.budgetBytes = 1.5 * 512 * bytesPerSplat(1, 'int8');

@@ -45,6 +45,7 @@ export class Occlusion {
     this.#isUsed = isUsed;
     this.#memory = new GpuMemory(device);
     this.#stage = new OcclusionDepthsStage(device);
+    if (isUsed) this.#stage.prepare();
     const { uniform, copyDestination } = BUFFER_USAGE;
     this.#view = this.#memory.buffer('gs.occlusion.view', layouts.OcclusionView.size, uniform | copyDestination);
     this.#words = isUsed ? wordsOf(tilesOf(...USUAL)) : 1;
@@ -78,6 +79,7 @@ export class Occlusion {
   /** Frames to come may leave out what is hidden. */
   use(): void {
     this.#isUsed = true;
+    this.#stage.prepare();
   }
 
   /** Sees to room for an image. @returns true if the buffers are other ones now */

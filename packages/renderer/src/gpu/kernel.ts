@@ -72,22 +72,37 @@ function asBindingResource(resource: Resource): GPUBindingResource {
 /** Values for `override`s of a shader, by their names there. */
 export type Overrides = Readonly<Record<string, number>>;
 
-/** A compute shader ready to be dispatched. Its entry point is `main`. */
+/** A compute shader that can be dispatched. Its entry point is `main`. */
 export class ComputeKernel<S extends ShaderDescription> {
+  readonly #device: GPUDevice;
+  readonly #name: string;
+  readonly #overrides: Overrides;
   readonly #program: ShaderProgram<S>;
-  readonly #pipeline: GPUComputePipeline;
+  #made: GPUComputePipeline | undefined;
 
   constructor(device: GPUDevice, shader: S, overrides: Overrides = {}) {
+    this.#device = device;
+    this.#name = shader.name;
+    this.#overrides = overrides;
     this.#program = new ShaderProgram(device, shader, SHADER_STAGE.compute);
-    this.#pipeline = device.createComputePipeline({
-      label: `gs.${shader.name}`,
+  }
+
+  /** Makes the pipeline, by far the dearest part, so that no frame has to. */
+  prepare(): this {
+    this.#made ??= this.#device.createComputePipeline({
+      label: `gs.${this.#name}`,
       layout: this.#program.pipelineLayout,
-      compute: { module: this.#program.module, entryPoint: 'main', constants: overrides },
+      compute: { module: this.#program.module, entryPoint: 'main', constants: this.#overrides },
     });
+    return this;
   }
 
   bind(resources: Resources<S>): GPUBindGroup {
     return this.#program.bind(resources);
+  }
+
+  get #pipeline(): GPUComputePipeline {
+    return this.prepare().#made!;
   }
 
   /** Dispatches a grid of workgroups, each side at most 65,535. */
@@ -151,8 +166,17 @@ export function perDevice<T>(device: GPUDevice, key: string, make: () => T): T {
   return made.get(key) as T;
 }
 
-/** The kernel of a compute shader with the given overrides, made once for a device. */
+/** The kernel of a compute shader with the given overrides, made once for a device and ready for the next frame. */
 export function kernelOf<S extends ShaderDescription>(
+  device: GPUDevice,
+  shader: S,
+  overrides: Overrides = {},
+): ComputeKernel<S> {
+  return rareKernelOf(device, shader, overrides).prepare();
+}
+
+/** The same for what few scenes need: {@link ComputeKernel.prepare} it when such a scene comes. */
+export function rareKernelOf<S extends ShaderDescription>(
   device: GPUDevice,
   shader: S,
   overrides: Overrides = {},

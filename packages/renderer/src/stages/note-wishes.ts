@@ -1,5 +1,5 @@
 import { constants, noteWishes } from '../generated/shaders.js';
-import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
+import { rareKernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import { cullGroups } from './cull.js';
 
 /** Which pages of a streamed scene a view asks for. */
@@ -7,7 +7,12 @@ export class NoteWishesStage {
   readonly #kernel: ComputeKernel<typeof noteWishes>;
 
   constructor(device: GPUDevice) {
-    this.#kernel = kernelOf(device, noteWishes);
+    this.#kernel = rareKernelOf(device, noteWishes);
+  }
+
+  /** Of a streamed scene: makes the pipeline. */
+  prepare(): void {
+    this.#kernel.prepare();
   }
 
   bind(resources: Resources<typeof noteWishes>): GPUBindGroup {

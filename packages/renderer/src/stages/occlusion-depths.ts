@@ -1,12 +1,17 @@
 import { constants, occlusionDepths } from '../generated/shaders.js';
-import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
+import { rareKernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 
 /** How far one sees in each tile and block of tiles, from how far one saw in the last frame. */
 export class OcclusionDepthsStage {
   readonly #kernel: ComputeKernel<typeof occlusionDepths>;
 
   constructor(device: GPUDevice) {
-    this.#kernel = kernelOf(device, occlusionDepths);
+    this.#kernel = rareKernelOf(device, occlusionDepths);
+  }
+
+  /** Of a renderer that leaves out what is hidden: makes the pipeline. */
+  prepare(): void {
+    this.#kernel.prepare();
   }
 
   bind(resources: Resources<typeof occlusionDepths>): GPUBindGroup {
