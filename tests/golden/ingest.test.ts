@@ -7,9 +7,22 @@ import { mortonOrder } from '@gaussian-splat/renderer/stages';
 import { writeTensors, type TensorSpec, type WrittenTensors } from '../support/generator-tensors.js';
 import { psnr } from '../support/metrics.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
-import { brightColors, edgeOnDiscs, hugeSplats, needles, opacityLadder, resized, room } from '../support/scenes.js';
+import {
+  brightColors,
+  edgeOnDiscs,
+  hugeSplats,
+  needles,
+  opacityLadder,
+  resized,
+  room,
+  thinned,
+} from '../support/scenes.js';
+import type { Scene } from '../support/scenes.js';
 
 const LIMIT_DB = 55;
+let made: Scene | undefined;
+/** Generators' tensors are written and read here in plain code, number by number: fewer splats than the whole room has. */
+const smallRoom = (): Scene => (made ??= thinned(room(), 8_000));
 /**
  * Rounded to float16, covariances of needles and discs are indefinite: there is no true picture of them, only a bound of how far apart
  * two ways to mend them are. What either has to do with the truth: see below.
@@ -71,7 +84,7 @@ for (const dtype of ['float32', 'float16'] as const) {
   for (const one of SPECS) {
     test(`ingest, ${one.layout}, ${one.shape}, ${dtype}: the frame of the CPU's packing`, async () => {
       const device = await serialDevice();
-      for (const make of [room, needles, hugeSplats, opacityLadder, brightColors, edgeOnDiscs]) {
+      for (const make of [smallRoom, needles, hugeSplats, opacityLadder, brightColors, edgeOnDiscs]) {
         const { name, cloud, cameras } = make();
         const written = writeTensors(inDrawnOrder(cloud, { ...one, dtype }), { ...one, dtype });
         const gaussians = await DynamicGaussians.create(device, written.layout);
@@ -123,7 +136,7 @@ test('ingest, float16: needles and discs lose digits as covariances, by the form
 
 test('ingest: a new run replaces all of the old one, also for a camera that stands still', async () => {
   const device = await serialDevice();
-  const { cloud, cameras } = room();
+  const { cloud, cameras } = smallRoom();
   const spec = { ...SPECS[0], dtype: 'float32' } as const;
   const moved = { ...cloud, positions: cloud.positions.map((x, i) => (i % 3 === 2 ? x + 1.5 : x)) };
   const written = writeTensors(cloud, spec);
@@ -157,7 +170,7 @@ test('ingest: a new run replaces all of the old one, also for a camera that stan
 
 test('ingest: bounds come from what is drawn', async () => {
   const device = await serialDevice();
-  const { cloud } = room();
+  const { cloud } = smallRoom();
   const written = writeTensors(cloud, { ...SPECS[0], dtype: 'float32' });
   const gaussians = await DynamicGaussians.create(device, written.layout);
   gaussians.ingest(await uploadTensors(written), cloud.count);
@@ -171,7 +184,7 @@ test('ingest: bounds come from what is drawn', async () => {
 
 test('ingest: a tensor that is missing or too small, or too many rows, is refused and changes nothing', async () => {
   const device = await serialDevice();
-  const { cloud } = room();
+  const { cloud } = smallRoom();
   const { layout } = writeTensors(cloud, { ...SPECS[0], dtype: 'float32' });
   const gaussians = await DynamicGaussians.create(device, layout);
   const before = gaussians.version;

@@ -6,7 +6,7 @@ import { brightColors, equalDepthPlane, offCentre, opacityLadder } from './scene
 
 export { withHostileSplats, type HostileCloud } from './hostile.js';
 export { room } from './scenes/room.js';
-export { cameraAt, resized, type Scene } from './scenes/scene.js';
+export { cameraAt, resized, thinned, type Scene } from './scenes/scene.js';
 export { edgeOnDiscs, hugeSplats, needles, pixelSplats } from './scenes/shapes.js';
 export { brightColors, equalDepthPlane, movedBy, offCentre, OPACITY_STEPS, opacityLadder } from './scenes/values.js';
 

@@ -18,6 +18,35 @@ export function resized(camera: Camera, width: number): Camera {
   return { ...camera, width, height, fx: camera.fx * s, fy: camera.fy * s, cx: camera.cx * s, cy: camera.cy * s };
 }
 
+/** The same scene of fewer splats, taken from all over it: a fraction of the work where a test looks at every number. */
+export function thinned({ name, cloud, cameras }: Scene, count: number): Scene {
+  const step = Math.max(1, cloud.count / count);
+  const kept = Math.min(count, cloud.count);
+  const part = (values: Float32Array): Float32Array => {
+    const width = values.length / cloud.count;
+    const out = new Float32Array(width * kept);
+    for (let i = 0; i < kept; i++) {
+      const from = width * Math.floor(i * step);
+      out.set(values.subarray(from, from + width), width * i);
+    }
+    return out;
+  };
+  const { positions, scales, rotations, opacities, sh } = cloud;
+  return {
+    name,
+    cameras,
+    cloud: {
+      ...cloud,
+      count: kept,
+      positions: part(positions),
+      scales: part(scales),
+      rotations: part(rotations),
+      opacities: part(opacities),
+      sh: part(sh),
+    },
+  };
+}
+
 /** A camera of the given size and horizontal field of view that looks from one point to another. */
 export function cameraAt(
   eye: Vector3,
