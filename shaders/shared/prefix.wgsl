@@ -1,13 +1,9 @@
 // Prefix sums over the 256 threads of a workgroup, by doubling steps between two halves of one array: one barrier a step.
+#import shared/saturating
+
 const PREFIX_THREADS = 256u;
 
 var<workgroup> ladder: array<u32, 2u * PREFIX_THREADS>;
-
-// Sums stop at the largest number: one that wrapped around would look like room for everything.
-fn add_saturating(a: u32, b: u32) -> u32 {
-  let sum = a + b;
-  return select(sum, 0xffffffffu, sum < a);
-}
 
 // Sum of `own` over all threads of the same row up to and including this one; rows are `width` threads wide (a power of
 // two). Must be called by all threads. Ends with a barrier after which another call may follow.

@@ -40,10 +40,10 @@ export function makeStages(
     noteWishes: new NoteWishesStage(device),
     cullChunks: new CullChunksStage(device),
     cull: new CullStage(device, { alpha_min, min_contribution }, threads),
-    scan: new ScanStage(device),
+    scan: new ScanStage(device, threads),
     plan: new PlanStage(device),
     compact: new CompactStage(device),
-    thin: new ThinStage(device),
+    thin: new ThinStage(device, threads),
     project: new ProjectStage(device),
     sort: new SortStage(device, sort),
   };

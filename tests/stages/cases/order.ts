@@ -24,7 +24,13 @@ function permutation(count: number, seed: number): Uint32Array {
   return order;
 }
 
-async function checkThin(bench: Bench, length: number, share: number, capacity: number): Promise<void> {
+async function checkThin(
+  bench: Bench,
+  threads: 'parallel' | 'serial',
+  length: number,
+  share: number,
+  capacity: number,
+): Promise<void> {
   const order = permutation(length, length);
   const random = randomSource(length + 1);
   const flags = Array.from({ length }, () => random() < share);
@@ -33,7 +39,7 @@ async function checkThin(bench: Bench, length: number, share: number, capacity: 
   const blocks = thinBlocks(length);
   const survivors = bench.buffer(new Uint32Array(capacity).fill(0xffffffff));
   const blockOffsets = bench.buffer(4 * (blocks + 1));
-  const stage = new ThinStage(bench.device);
+  const stage = new ThinStage(bench.device, threads);
   const bindings = stage.bind({
     thin: bench.uniform(length, 0, 0, 0),
     scan: bench.uniform(blocks, 0, 0, 0),
@@ -57,16 +63,18 @@ async function checkThin(bench: Bench, length: number, share: number, capacity: 
 }
 
 export const orderCases: readonly StageCase[] = [
-  ...[0, 0.1, 0.5, 1].map((share) => ({
-    name: `thin: keeps the order of ${100 * share} % survivors`,
-    run: async (bench: Bench) => {
-      for (const length of [256, 2048, 2304, 50_176]) await checkThin(bench, length, share, length);
+  ...(['parallel', 'serial'] as const).flatMap((threads): StageCase[] => [
+    ...[0, 0.1, 0.5, 1].map((share) => ({
+      name: `thin, ${threads}: keeps the order of ${100 * share} % survivors`,
+      run: async (bench: Bench) => {
+        for (const length of [256, 2048, 2304, 50_176]) await checkThin(bench, threads, length, share, length);
+      },
+    })),
+    {
+      name: `thin, ${threads}: over capacity the nearest survivors stay and nothing else is touched`,
+      run: (bench) => checkThin(bench, threads, 20_224, 0.5, 1000),
     },
-  })),
-  {
-    name: 'thin: over capacity the nearest survivors stay and nothing else is touched',
-    run: (bench) => checkThin(bench, 20_224, 0.5, 1000),
-  },
+  ]),
   {
     name: 'order keys: grow with depth on both sides of the camera, what fills up the last chunk last of all',
     run: async (bench) => {

@@ -9,11 +9,13 @@ function scanTwin(values: Uint32Array): Uint32Array {
 }
 
 async function checkScan(bench: Bench, values: Uint32Array): Promise<void> {
-  const stage = new ScanStage(bench.device);
-  const buffer = bench.buffer(Uint32Array.of(...values, 0));
-  const bindings = stage.bind({ values: buffer, scan: bench.uniform(values.length) });
-  bench.compute((pass) => stage.record(pass, bindings));
-  checkEqual(await bench.read(buffer), scanTwin(values), 'prefix sums');
+  for (const threads of ['parallel', 'serial'] as const) {
+    const stage = new ScanStage(bench.device, threads);
+    const buffer = bench.buffer(Uint32Array.of(...values, 0));
+    const bindings = stage.bind({ values: buffer, scan: bench.uniform(values.length) });
+    bench.compute((pass) => stage.record(pass, bindings));
+    checkEqual(await bench.read(buffer), scanTwin(values), `${threads} prefix sums`);
+  }
 }
 
 const step = constants.PREFIX_THREADS * constants.PER_THREAD;

@@ -1,12 +1,13 @@
-import { scan } from '../generated/shaders.js';
+import { scan, scanSerial } from '../generated/shaders.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
+import type { Threads } from './threads.js';
 
 /** Exclusive prefix sums of an array in place; the total goes behind its last element. */
 export class ScanStage {
-  readonly #kernel: ComputeKernel<typeof scan>;
+  readonly #kernel: ComputeKernel<typeof scan> | ComputeKernel<typeof scanSerial>;
 
-  constructor(device: GPUDevice) {
-    this.#kernel = kernelOf(device, scan);
+  constructor(device: GPUDevice, threads: Threads = 'parallel') {
+    this.#kernel = threads === 'serial' ? kernelOf(device, scanSerial) : kernelOf(device, scan);
   }
 
   bind(resources: Resources<typeof scan>): GPUBindGroup {

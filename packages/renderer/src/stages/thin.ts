@@ -1,6 +1,7 @@
-import { constants, thinCount, thinWrite } from '../generated/shaders.js';
+import { constants, thinCount, thinCountSerial, thinWrite, thinWriteSerial } from '../generated/shaders.js';
 import { kernelOf, type ComputeKernel } from '../gpu/kernel.js';
 import { ScanStage } from './scan.js';
+import type { Threads } from './threads.js';
 
 /** What {@link ThinStage} works on. */
 export interface ThinBuffers {
@@ -26,14 +27,17 @@ interface ThinBindings {
 
 /** Thins an order of all splats to the visible ones. */
 export class ThinStage {
-  readonly #count: ComputeKernel<typeof thinCount>;
+  readonly #count: ComputeKernel<typeof thinCount> | ComputeKernel<typeof thinCountSerial>;
   readonly #scan: ScanStage;
-  readonly #write: ComputeKernel<typeof thinWrite>;
+  readonly #write: ComputeKernel<typeof thinWrite> | ComputeKernel<typeof thinWriteSerial>;
+  readonly #blocksPerGroup: number;
 
-  constructor(device: GPUDevice) {
-    this.#count = kernelOf(device, thinCount);
-    this.#scan = new ScanStage(device);
-    this.#write = kernelOf(device, thinWrite);
+  constructor(device: GPUDevice, threads: Threads = 'parallel') {
+    const isSerial = threads === 'serial';
+    this.#count = isSerial ? kernelOf(device, thinCountSerial) : kernelOf(device, thinCount);
+    this.#scan = new ScanStage(device, threads);
+    this.#write = isSerial ? kernelOf(device, thinWriteSerial) : kernelOf(device, thinWrite);
+    this.#blocksPerGroup = isSerial ? constants.BLOCKS_PER_SERIAL_GROUP : 1;
   }
 
   bind({ thin, scan, order, visibleBits, blockOffsets, survivors }: ThinBuffers): ThinBindings {
@@ -45,12 +49,16 @@ export class ThinStage {
   }
 
   recordCount(pass: GPUComputePassEncoder, bindings: ThinBindings, length: number): void {
-    this.#count.dispatch(pass, bindings.count, thinBlocks(length));
+    this.#count.dispatch(pass, bindings.count, this.#groups(length));
     this.#scan.record(pass, bindings.scan);
   }
 
   recordWrite(pass: GPUComputePassEncoder, bindings: ThinBindings, length: number): void {
-    this.#write.dispatch(pass, bindings.write, thinBlocks(length));
+    this.#write.dispatch(pass, bindings.write, this.#groups(length));
+  }
+
+  #groups(length: number): number {
+    return Math.ceil(thinBlocks(length) / this.#blocksPerGroup);
   }
 }
 
