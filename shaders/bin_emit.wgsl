@@ -74,6 +74,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let bin = vec2u((rect & 255u) + nth % columns, ((rect >> 8u) & 255u) + nth / columns);
     let slot = order[first_rank + owner];
     bins[base + p] = bin.y * view.bins.x + bin.x;
-    pairs[base + p] = vec2u(slot, touched_tiles(coverage_of(splats[slot]), bin));
+    pairs[base + p] = vec2u(slot, touched_tiles(coverage_of(splats[slot], view.alpha_min), bin));
   }
 }

@@ -16,7 +16,8 @@ struct ProbePoint {
   pixel: vec2f,
   // World units along the camera's axis.
   depth: f32,
-  unused: f32,
+  // Least alpha that the image was painted with.
+  alpha_min: f32,
 }
 
 struct ProbeAnswer {
@@ -35,9 +36,9 @@ var<workgroup> runs: array<f32, PROBE_LANES>;
 var<workgroup> runs_in_front: array<f32, PROBE_LANES>;
 
 // Share of the light that a splat lets through at a pixel.
-fn passes(s: ProjectedSplat, pixel: vec2f) -> f32 {
-  let alpha = alpha_at(pixel - s.shape.xy, s.shape.z, s.shape.w, bitcast<f32>(s.paint.x), bitcast<f32>(s.paint.w));
-  return select(1.0, 1.0 - alpha, alpha >= alpha_min);
+fn passes(s: ProjectedSplat, point: ProbePoint) -> f32 {
+  let alpha = alpha_at(point.pixel - s.shape.xy, s.shape.z, s.shape.w, bitcast<f32>(s.paint.x), bitcast<f32>(s.paint.w));
+  return select(1.0, 1.0 - alpha, alpha >= point.alpha_min);
 }
 
 @compute @workgroup_size(PROBE_LANES)
@@ -50,7 +51,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var light_in_front = 1.0;
   for (var rank = first; rank < end; rank++) {
     let s = splats[order[rank]];
-    let share = passes(s, point.pixel);
+    let share = passes(s, point);
     light *= share;
     if (splat_depth(s) < point.depth) { light_in_front *= share; }
   }
@@ -73,7 +74,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var median = 0.0;
   for (var rank = crossing * length; rank < min((crossing + 1u) * length, plan.visible); rank++) {
     let s = splats[order[rank]];
-    before *= passes(s, point.pixel);
+    before *= passes(s, point);
     if (before < 0.5) {
       median = splat_depth(s);
       break;

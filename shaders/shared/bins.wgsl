@@ -28,4 +28,10 @@ struct BinView {
   pair_capacity: u32,
   // First tile, across and down, of the part of the image that is painted: a frame with much to do is painted part by part.
   first_tile: vec2u,
+  // Least alpha that paints: ALPHA_MIN, or more as a lever.
+  alpha_min: f32,
+  // A pixel is finished before a splat that would take its transmittance to this or below.
+  transmittance_min: f32,
+  // A pixel with this transmittance or less hides what lies behind from the next frame.
+  occluded_below: f32,
 }

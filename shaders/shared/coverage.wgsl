@@ -13,11 +13,11 @@ struct Coverage {
   half_chord: f32,
 }
 
-fn coverage_of(s: ProjectedSplat) -> Coverage {
+fn coverage_of(s: ProjectedSplat, alpha_min: f32) -> Coverage {
   let sigma_x = 1.0 / s.shape.z;
   let slope = s.shape.w;
   let sigma_v = 1.0 / bitcast<f32>(s.paint.x);
-  let radius = cutoff_radius(bitcast<f32>(s.paint.w));
+  let radius = cutoff_radius(bitcast<f32>(s.paint.w), alpha_min);
   let sheared = slope * sigma_x;
   let sigma_y = sqrt(sheared * sheared + sigma_v * sigma_v);
   return Coverage(

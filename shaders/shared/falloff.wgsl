@@ -2,13 +2,11 @@
 
 // A splat paints a pixel only with an alpha of at least this: what scenes are trained with.
 const ALPHA_MIN = 1.0 / 255.0;
-// The same, as a lever.
-override alpha_min: f32 = ALPHA_MIN;
 // No splat is more opaque than this: gsplat's limit. INRIA's is 0.99, which the reference images refuse.
 const ALPHA_MAX = 0.999;
 
-// Distance from the centre, in standard deviations, at which alpha falls to alpha_min. 0 for opacities up to that.
-fn cutoff_radius(opacity: f32) -> f32 {
+// Distance from the centre, in standard deviations, at which alpha falls to a least one. 0 for opacities up to that.
+fn cutoff_radius(opacity: f32, alpha_min: f32) -> f32 {
   return sqrt(2.0 * log(max(opacity / alpha_min, 1.0)));
 }
 

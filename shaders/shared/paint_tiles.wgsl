@@ -17,10 +17,8 @@
 @group(0) @binding(6) var<storage, read_write> last_depths: array<u32>;
 @group(0) @binding(7) var image: texture_storage_2d<rgba16float, write>;
 
-// A pixel is finished before a splat that would take its transmittance to this or below.
-override transmittance_min: f32 = 1e-4;
-// A pixel with this transmittance or less hides what lies behind from the next frame.
-override occluded_below: f32 = 0.01;
+// True to note how far one sees in each tile.
+override notes_depth: bool = true;
 // True to write premultiplied colour over the background, false for colour and transmittance.
 override is_final: bool = false;
 
@@ -66,7 +64,7 @@ fn pixel_in_tile(lane: u32) -> vec2u {
 
 // Notes splat k of the batch for the blocks of the tile that it touches.
 fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
-  let c = coverage_of(s);
+  let c = coverage_of(s, view.alpha_min);
   let word = k / 32u;
   let bit = 1u << (k % 32u);
   let size = vec2f(f32(BLOCK_WIDTH), f32(BLOCK_HEIGHT));
@@ -147,13 +145,13 @@ fn blend(pixel: ptr<function, Pixel>, k: u32, shape: vec4f, paint: vec4u, center
   let u = offset.x * shape.z;
   let v = (offset.y - shape.w * offset.x) * bitcast<f32>(paint.x);
   let power = bitcast<f32>(paint.w) - u * u - v * v;
-  let reaches = is_there && power >= log2(alpha_min) && !(*pixel).finished;
+  let reaches = is_there && power >= log2(view.alpha_min) && !(*pixel).finished;
   let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), reaches);
   let before = (*pixel).transmittance;
   // The last one to be blended while the pixel is transparent is the one that ends it.
-  if (occluded_below > 0.0) { (*pixel).last_seen = select((*pixel).last_seen, paint.z, reaches && before > occluded_below); }
+  if (notes_depth) { (*pixel).last_seen = select((*pixel).last_seen, paint.z, reaches && before > view.occluded_below); }
   let remaining = before * (1.0 - alpha);
-  (*pixel).finished |= remaining <= transmittance_min;
+  (*pixel).finished |= remaining <= view.transmittance_min;
   let after = select(remaining, before, (*pixel).finished);
   let weight = select(before * alpha, 0.0, (*pixel).finished);
   note_blend(k, weight, before, after, paint.z);
@@ -247,7 +245,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (lane == 0u) { is_open = atomicLoad(&unfinished); }
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
   }
-  let is_seen_through = !pixel.finished && pixel.transmittance > occluded_below;
+  let is_seen_through = !pixel.finished && pixel.transmittance > view.occluded_below;
   let columns = (u32(view.viewport.x) + TILE - 1u) / TILE;
   note_depth(tile.y * columns + tile.x, lane, is_seen_through, pixel.last_seen);
   if (is_outside) { return; }

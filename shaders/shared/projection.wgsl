@@ -53,17 +53,17 @@ fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
   );
 }
 
-// Half width and half height, in pixels, of the box of all points with alpha >= ALPHA_MIN.
-fn half_extent(e: Ellipse) -> vec2f {
-  let radius = cutoff_radius(e.opacity);
+// Half width and half height, in pixels, of the box of all points with alpha >= alpha_min.
+fn half_extent(view: View, e: Ellipse) -> vec2f {
+  let radius = cutoff_radius(e.opacity, view.alpha_min);
   let sheared = e.slope * e.sigma_x;
   return radius * vec2f(e.sigma_x, sqrt(sheared * sheared + e.sigma_v * e.sigma_v));
 }
 
 // True if the box of the ellipse holds the centre of at least one pixel of the image.
 fn covers_a_pixel(view: View, e: Ellipse) -> bool {
-  let extent = half_extent(e);
+  let extent = half_extent(view, e);
   let first = max(ceil(e.center - extent - 0.5), vec2f(0.0));
   let last = min(floor(e.center + extent - 0.5), view.viewport - 1.0);
-  return e.opacity >= alpha_min && all(first <= last);
+  return e.opacity >= view.alpha_min && all(first <= last);
 }

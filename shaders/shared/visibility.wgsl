@@ -6,9 +6,6 @@
 // Depths beyond which nothing shows, of tiles and then of blocks of tiles: see shared/occlusion.
 @group(0) @binding(6) var<storage, read> occlusion: array<u32>;
 
-// Splats with less than this opacity times their area in px² are left out. A lever: 0 leaves out none.
-override min_contribution: f32 = 0.0;
-
 const TWO_PI = 6.283185307179586;
 
 // Tiles, across or down, that are looked at one by one; splats that cover more are judged by blocks, those that cover as many
@@ -18,7 +15,7 @@ const LOOKED_AT = 4u;
 // True if nothing of the splat can show, because it lies behind what finished the pixels of all its tiles in the last frame.
 fn is_occluded(view: View, e: Ellipse) -> bool {
   if (view.occlusion_tiles.x == 0u) { return false; }
-  let extent = half_extent(e);
+  let extent = half_extent(view, e);
   let low = clamp(e.center - extent - 0.5, vec2f(0.0), view.viewport - 1.0);
   let high = clamp(e.center + extent + 0.5, vec2f(0.0), view.viewport - 1.0);
   var first = vec2u(low) / TILE;
@@ -46,9 +43,9 @@ fn visible_depth(packed: PackedGaussian, share: f32) -> f32 {
   g.opacity = shared_opacity(g.opacity, share);
   // The cheap tests first: most splats of a scene fail one of them.
   let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
-  if (g.opacity < alpha_min || !is_in_depth_range(view, depth)) { return 0.0; }
+  if (g.opacity < view.alpha_min || !is_in_depth_range(view, depth)) { return 0.0; }
   let e = project_ellipse(view, g);
-  let contributes = e.opacity * TWO_PI * e.sigma_x * e.sigma_v >= min_contribution;
+  let contributes = e.opacity * TWO_PI * e.sigma_x * e.sigma_v >= view.min_contribution;
   if (!contributes || !covers_a_pixel(view, e) || is_occluded(view, e)) { return 0.0; }
   return depth;
 }

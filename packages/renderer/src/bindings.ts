@@ -1,5 +1,5 @@
 import type { DepthOrder } from './depth-order.js';
-import { BUFFER_USAGE, type Overrides } from './gpu/kernel.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import type { Wishes } from './gaussian-scene.js';
 import type { PageTable } from './page-table.js';
@@ -30,16 +30,12 @@ export interface Stages {
   readonly sort: SortStage;
 }
 
-export function makeStages(
-  device: GPUDevice,
-  { alpha_min, min_contribution }: Overrides,
-  { threads, sort }: Pick<Variants, 'threads' | 'sort'>,
-): Stages {
+export function makeStages(device: GPUDevice, { threads, sort }: Pick<Variants, 'threads' | 'sort'>): Stages {
   return {
     detailBudget: new DetailBudgetStage(device),
     noteWishes: new NoteWishesStage(device),
     cullChunks: new CullChunksStage(device),
-    cull: new CullStage(device, { alpha_min, min_contribution }, threads),
+    cull: new CullStage(device, threads),
     scan: new ScanStage(device, threads),
     plan: new PlanStage(device),
     compact: new CompactStage(device),

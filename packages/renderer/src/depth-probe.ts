@@ -1,5 +1,5 @@
 import { layouts } from './generated/shaders.js';
-import { BUFFER_USAGE, type Overrides } from './gpu/kernel.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { ProbeDepthStage } from './stages/probe-depth.js';
 
@@ -37,22 +37,27 @@ export interface ProbeSource {
 const { storage, copySource, copyDestination, mapRead } = BUFFER_USAGE;
 const WORDS_PER_ANSWER = layouts.ProbeAnswer.size / 4;
 
-/** Looks into the frame that was drawn last, whatever rasterizer drew it. Reads back: for clicks and labels, not for every frame. */
+/**
+ * Looks into the frame that was drawn last, whatever rasterizer drew it. Reads back: for clicks and labels, not for every frame.
+ * @param alphaMin least alpha that it was painted with
+ */
 export async function probe(
   device: GPUDevice,
   source: ProbeSource,
   points: readonly ProbePoint[],
-  overrides: Overrides,
+  alphaMin: number,
 ): Promise<ProbeAnswer[]> {
   if (points.length === 0) return [];
   const memory = new GpuMemory(device);
   try {
-    const words = new Float32Array(points.flatMap(({ x, y, depth }) => [x, y, depth ?? Infinity, 0]).map(finite));
+    const words = new Float32Array(
+      points.flatMap(({ x, y, depth }) => [x, y, depth ?? Infinity, alphaMin]).map(finite),
+    );
     const bytes = points.length * layouts.ProbeAnswer.size;
     const asked = memory.buffer('gs.probe_depth.points', words.byteLength, storage, new Uint32Array(words.buffer));
     const answers = memory.buffer('gs.probe_depth.answers', bytes, storage | copySource);
     const staging = memory.buffer('gs.probe_depth.staging', bytes, mapRead | copyDestination);
-    const stage = new ProbeDepthStage(device, overrides);
+    const stage = new ProbeDepthStage(device);
     const encoder = device.createCommandEncoder({ label: 'gs.probe_depth' });
     const pass = encoder.beginComputePass({ label: 'gs.probe_depth' });
     stage.record(pass, stage.bind({ ...source, points: asked, answers }), points.length);

@@ -1,8 +1,7 @@
 import type { Camera } from '@gaussian-splat/core';
-import { FrameBindings } from './bindings.js';
+import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
-import type { FrameMix } from './frame-mix.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { Occlusion } from './occlusion.js';
 import { OrderPolicy } from './order-policy.js';
@@ -23,7 +22,7 @@ export interface Resources {
 }
 
 export interface ResourceOptions {
-  readonly stages: FrameMix['stages'];
+  readonly stages: Stages;
   readonly sort: SortName;
   readonly rasterizer: Rasterizer;
   readonly occlusion: Occlusion;

@@ -1,5 +1,4 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { Overrides } from './gpu/kernel.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
 import type { SortName } from './stages/sort.js';
 import type { Threads } from './stages/threads.js';
@@ -171,14 +170,4 @@ function invalid(name: string, expected: string, found: unknown, where = 'Render
     found: String(found),
     remedy: 'leave the option out for the default, or choose a value in the range',
   });
-}
-
-/** The levers that the shaders know, by their names there. */
-export function overridesOf({ alphaMin, minContribution, transmittanceMin, occludedBelow }: Levers): Overrides {
-  return {
-    alpha_min: alphaMin,
-    min_contribution: minContribution,
-    transmittance_min: transmittanceMin,
-    occluded_below: occludedBelow,
-  };
 }

@@ -86,7 +86,7 @@ export class PageTable {
   /** Points every page at a camera, for the commands that are submitted next. */
   look(
     camera: Camera,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
+    { shDegree, depthKeyBits, detail, detailFade, splatBudget, alphaMin, minContribution }: Levers,
     isOrdered: boolean,
     occlusionTiles: readonly [number, number],
   ): void {
@@ -98,6 +98,8 @@ export class PageTable {
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
+      alpha_min: alphaMin,
+      min_contribution: minContribution,
     };
     let page = 0;
     for (const scene of this.#scenes) {

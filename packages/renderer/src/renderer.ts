@@ -1,5 +1,6 @@
 import { validateCamera, type Camera } from '@gaussian-splat/core';
 import { AccumulationTexture } from './accumulation.js';
+import { makeStages, type Stages } from './bindings.js';
 import { probe, type ProbeAnswer, type ProbePoint } from './depth-probe.js';
 import { recordProjection } from './frame.js';
 import type { FrameRequest, RendererOptions } from './frame-request.js';
@@ -9,7 +10,6 @@ import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import { mixOf, sortedOrder, type FrameMix } from './frame-mix.js';
 import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
 import { Occlusion } from './occlusion.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
@@ -17,6 +17,7 @@ import type { OrderKind, Painting, Rasterizer, RasterizerName, Surface } from '.
 import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage } from './stages/compose.js';
+import { sortedOrder } from './stages/sort.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
 import { chooseVariants } from './choice/choose.js';
@@ -57,9 +58,9 @@ export class Renderer {
   /** The levers in force; nothing is left `auto`. */
   readonly levers: Levers & Variants;
   readonly #device: GPUDevice;
-  /** How frames are drawn that ask for nothing else, and how those are that do. */
-  readonly #mix: FrameMix;
-  readonly #mixes = new WeakMap<Partial<FrameLevers>, FrameMix>();
+  /** Those of frames that ask for other ones. */
+  readonly #frameLevers = new WeakMap<Partial<FrameLevers>, Levers & Variants>();
+  readonly #stages: Stages;
   readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
   readonly #occlusion: Occlusion;
@@ -72,19 +73,21 @@ export class Renderer {
   readonly #resources: FrameResources;
   #accumulation: Accumulation | undefined;
   /** Where the slots of the last frame are listed, in which buffers, and its pixels for each of the target; undefined before there is one. */
-  #last: { readonly order: OrderKind; readonly scratch: Scratch; readonly scale: number } | undefined;
+  #last:
+    | { readonly order: OrderKind; readonly scratch: Scratch; readonly scale: number; readonly alphaMin: number }
+    | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
     this.#device = device;
     this.levers = settle(device, leversOf(options));
     this.#onIncomplete = options.onIncomplete ?? (() => undefined);
-    this.#mix = mixOf(device, this.levers);
+    this.#stages = makeStages(device, this.levers);
     this.#compose = new ComposeStage(device);
-    this.#rasterizer = makeRasterizer(device, this.levers, this.#mix.overrides);
+    this.#rasterizer = makeRasterizer(device, this.levers);
     this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
     this.#resources = new FrameResources(device, {
-      stages: this.#mix.stages,
+      stages: this.#stages,
       sort: this.levers.sort,
       rasterizer: this.#rasterizer,
       occlusion: this.#occlusion,
@@ -123,7 +126,7 @@ export class Renderer {
    * @throws GaussianSplatError `argument/value` for a lever out of range.
    */
   prepare(levers: readonly Partial<FrameLevers>[], targetFormat: GPUTextureFormat): void {
-    for (const changes of levers) this.#rasterizer.prepare(this.#mixOf(changes).overrides, targetFormat);
+    for (const changes of levers) this.#rasterizer.prepare(this.#leversOf(changes), targetFormat);
   }
 
   /**
@@ -138,8 +141,7 @@ export class Renderer {
     if (notes) requireNotes(this.#rasterizer);
     const target = this.#targetOf(request);
     const scenes = Array.isArray(request.gaussians) ? request.gaussians : [request.gaussians as GaussianScene];
-    const mix = this.#mixOf(request.levers);
-    const { levers } = mix;
+    const levers = this.#leversOf(request.levers);
     const detail = detailOf(request, levers);
     const drawn = scaled(camera, levers.resolutionScale);
     const resources = this.#resources.fit(scenes, drawn, detail.splatBudget);
@@ -152,7 +154,7 @@ export class Renderer {
     this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
     table.look(drawn, { ...levers, ...detail }, isOrdered, this.#occlusion.tiles);
     const wishes = recordProjection(encoder, {
-      stages: mix.stages,
+      stages: this.#stages,
       bindings,
       scratch,
       keyBits: levers.depthKeyBits,
@@ -164,14 +166,14 @@ export class Renderer {
     const { pairPlan } = this.#rasterizer;
     const isWatched = monitor.isDue(pairPlan !== undefined);
     const submissions = this.#submissionsFor(isWatched);
-    const order = isOrdered ? 'identity' : sortedOrder(levers);
-    const how = { order, overrides: mix.overrides, notes, timer } as const;
+    const order = isOrdered ? 'identity' : sortedOrder(levers.sort, levers.depthKeyBits);
+    const how = { order, levers, notes, timer } as const;
     const last = this.#paint(encoder, target, drawn, how, background, submissions);
     timer?.endFrame?.(last);
     if (isWatched) monitor.record(last, scratch.plan, pairPlan);
     this.#submit(last, submissions);
     timer?.submitted?.();
-    this.#last = { order, scratch, scale: drawn.width / camera.width };
+    this.#last = { order, scratch, scale: drawn.width / camera.width, alphaMin: levers.alphaMin };
     const counts = isWatched ? monitor.read() : undefined;
     if (counts && submissions.watch) {
       void this.#pacer.learn(
@@ -213,11 +215,11 @@ export class Renderer {
    */
   async probeDepth(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
     if (this.#last === undefined || this.#last.scratch !== this.#resources.current?.scratch) return [];
-    const { scale, scratch } = this.#last;
+    const { scale, scratch, alphaMin } = this.#last;
     const { plan, splats, order, keys } = scratch;
     const nearToFar = { first: order[0], second: order[1], identity: keys[0] }[this.#last.order];
     const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
-    return probe(this.#device, { plan, splats, order: nearToFar }, drawn, this.#mix.overrides);
+    return probe(this.#device, { plan, splats, order: nearToFar }, drawn, alphaMin);
   }
 
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
@@ -234,7 +236,7 @@ export class Renderer {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'order' | 'overrides' | 'notes' | 'timer'>,
+    how: Pick<Painting, 'order' | 'levers' | 'notes' | 'timer'>,
     background: readonly [number, number, number, number],
     submissions: Submissions,
   ): GPUCommandEncoder {
@@ -284,13 +286,13 @@ export class Renderer {
     return current;
   }
 
-  #mixOf(changes: Partial<FrameLevers> | undefined): FrameMix {
-    if (changes === undefined) return this.#mix;
-    const known = this.#mixes.get(changes);
+  #leversOf(changes: Partial<FrameLevers> | undefined): Levers & Variants {
+    if (changes === undefined) return this.levers;
+    const known = this.#frameLevers.get(changes);
     if (known) return known;
-    const made = mixOf(this.#device, leversOfFrame(this.levers, changes));
-    if (made.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles') this.#occlusion.use();
-    this.#mixes.set(changes, made);
+    const made = leversOfFrame(this.levers, changes);
+    if (made.occludedBelow > 0 && this.#rasterizer.name === 'tiles') this.#occlusion.use();
+    this.#frameLevers.set(changes, made);
     return made;
   }
 

@@ -27,6 +27,8 @@ export type CameraValues = Omit<
   | 'detail'
   | 'detail_fade'
   | 'splat_budget'
+  | 'alpha_min'
+  | 'min_contribution'
 >;
 
 /**

@@ -101,7 +101,14 @@ export const orderCases: readonly StageCase[] = [
       };
       const firstGroup = 2;
       const page = { splat_count: packed.count, page: 0, first_group: firstGroup };
-      const detail = { has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 };
+      const detail = {
+        has_detail: 0,
+        detail: 0,
+        detail_fade: 0,
+        splat_budget: 0,
+        alpha_min: constants.ALPHA_MIN,
+        min_contribution: 0,
+      };
       writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...flags, ...page, ...detail }, bytes);
       const length = constants.CULL_GROUP * (firstGroup + cullGroups(packed.count));
       const keys = bench.buffer(4 * length);

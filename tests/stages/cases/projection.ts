@@ -43,7 +43,14 @@ function uploadScene(
     key_bits: 32,
     is_ordered: 0,
     occlusion_tiles: occlusionTiles,
-    ...{ has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },
+    ...{
+      has_detail: 0,
+      detail: 0,
+      detail_fade: 0,
+      splat_budget: 0,
+      alpha_min: constants.ALPHA_MIN,
+      min_contribution: 0,
+    },
   };
   const sh = { sh_degree: packed.shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[packed.shPrecision] };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...sh, ...flags }, bytes);

@@ -1,4 +1,3 @@
-import type { Overrides } from '../gpu/kernel.js';
 import { requireBlendable } from '../requirements.js';
 import type { Variants } from '../variants.js';
 import { QuadsRasterizer } from './quads.js';
@@ -6,12 +5,8 @@ import type { Rasterizer } from './rasterizer.js';
 import { TilesRasterizer } from './tiles.js';
 
 /** @throws GaussianSplatError `unsupported/limits` if the variant needs a feature that the device lacks. */
-export function makeRasterizer(
-  device: GPUDevice,
-  { rasterizer, accumulation, sort }: Variants,
-  overrides: Overrides,
-): Rasterizer {
-  if (rasterizer === 'tiles') return new TilesRasterizer(device, accumulation, overrides, sort);
+export function makeRasterizer(device: GPUDevice, { rasterizer, accumulation, sort }: Variants): Rasterizer {
+  if (rasterizer === 'tiles') return new TilesRasterizer(device, accumulation, sort);
   requireBlendable(device, accumulation);
-  return new QuadsRasterizer(device, accumulation, overrides);
+  return new QuadsRasterizer(device, accumulation);
 }

@@ -1,5 +1,5 @@
 import { constants as shaderConstants, layouts, rasterizeQuads } from '../generated/shaders.js';
-import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram, type Overrides } from '../gpu/kernel.js';
+import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
 import type { AccumulationFormat, OrderKind, Painting, Rasterizer, RasterizerInputs, Slice } from './rasterizer.js';
@@ -19,7 +19,7 @@ export class QuadsRasterizer implements Rasterizer {
   #bindings: Readonly<Record<OrderKind, GPUBindGroup>> | undefined;
   #plan: GPUBuffer | undefined;
 
-  constructor(device: GPUDevice, format: AccumulationFormat, overrides: Overrides) {
+  constructor(device: GPUDevice, format: AccumulationFormat) {
     this.#device = device;
     this.#format = format;
     this.#program = perDevice(
@@ -27,11 +27,11 @@ export class QuadsRasterizer implements Rasterizer {
       'quads',
       () => new ShaderProgram(device, rasterizeQuads, SHADER_STAGE.vertex | SHADER_STAGE.fragment),
     );
-    this.prepare(overrides);
+    this.prepare();
     this.#indices = perDevice(device, 'quads indices', () => makeIndices(device));
     this.#uniform = device.createBuffer({
       label: 'gs.rasterize.view',
-      size: 16,
+      size: layouts.RasterView.size,
       usage: BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination,
     });
   }
@@ -57,18 +57,19 @@ export class QuadsRasterizer implements Rasterizer {
     };
   }
 
-  prepare(overrides: Overrides): void {
-    this.#pipeline(overrides);
+  /** One pipeline serves all levers. */
+  prepare(): void {
+    this.#pipeline();
   }
 
   /** Quads are drawn from what the stages before have left. */
   prepareFrame(): void {}
 
-  record(encoder: GPUCommandEncoder, { surface, order, overrides, timer }: Painting, slice: Slice): void {
+  record(encoder: GPUCommandEncoder, { surface, order, levers, timer }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
     writeStruct(
       layouts.RasterView,
-      { viewport: [width, height], slice: slice.index, slices: slice.count },
+      { viewport: [width, height], slice: slice.index, slices: slice.count, alpha_min: levers.alphaMin },
       this.#uniformBytes,
     );
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
@@ -88,7 +89,7 @@ export class QuadsRasterizer implements Rasterizer {
     if (this.#plan !== undefined && this.#bindings !== undefined) {
       // The image may be a part of the texture.
       pass.setViewport(0, 0, width, height, 0, 1);
-      pass.setPipeline(this.#pipeline(overrides));
+      pass.setPipeline(this.#pipeline());
       pass.setBindGroup(0, this.#bindings[order]);
       pass.setIndexBuffer(this.#indices, 'uint16');
       pass.drawIndexedIndirect(this.#plan, planOffsets.quads);
@@ -100,19 +101,14 @@ export class QuadsRasterizer implements Rasterizer {
     this.#uniform.destroy();
   }
 
-  #pipeline({ alpha_min }: Overrides): GPURenderPipeline {
-    return perDevice(this.#device, `quads ${this.#format} ${alpha_min}`, () =>
-      makePipeline(this.#device, this.#program, this.#format, { alpha_min }),
+  #pipeline(): GPURenderPipeline {
+    return perDevice(this.#device, `quads ${this.#format}`, () =>
+      makePipeline(this.#device, this.#program, this.#format),
     );
   }
 }
 
-function makePipeline(
-  device: GPUDevice,
-  program: Program,
-  format: AccumulationFormat,
-  constants: Overrides,
-): GPURenderPipeline {
+function makePipeline(device: GPUDevice, program: Program, format: AccumulationFormat): GPURenderPipeline {
   const { module, pipelineLayout } = program;
   const blend: GPUBlendState = {
     color: { srcFactor: 'one', dstFactor: 'one-minus-src-alpha', operation: 'add' },
@@ -122,8 +118,8 @@ function makePipeline(
   return device.createRenderPipeline({
     label: `gs.rasterize.quads.${format}`,
     layout: pipelineLayout,
-    vertex: { module, entryPoint: 'vertex', constants },
-    fragment: { module, entryPoint: 'fragment', targets: [{ format, blend }], constants },
+    vertex: { module, entryPoint: 'vertex' },
+    fragment: { module, entryPoint: 'fragment', targets: [{ format, blend }] },
     primitive: { topology: 'triangle-list', cullMode: 'none' },
   });
 }

@@ -1,5 +1,5 @@
-import type { Overrides } from '../gpu/kernel.js';
 import type { FrameTimer } from '../gpu/pass-timer.js';
+import type { Levers } from '../levers.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
@@ -55,13 +55,15 @@ export interface FrameNotes {
   readonly depth?: GPUTexture;
 }
 
+/** Levers that rasterizers know. */
+export type PaintingLevers = Pick<Levers, 'alphaMin' | 'transmittanceMin' | 'occludedBelow'>;
+
 /** One frame to draw. */
 export interface Painting {
   readonly notes?: FrameNotes;
   readonly surface: Surface;
   readonly order: OrderKind;
-  /** Levers that the shaders know. */
-  readonly overrides: Overrides;
+  readonly levers: PaintingLevers;
   /**
    * Premultiplied colour to lay the splats over; the surface is then the final image. Without it the surface receives colour, and
    * transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
@@ -93,7 +95,7 @@ export interface Rasterizer {
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Makes the pipelines for other levers, so that no frame has to. @param format of the targets */
-  prepare(overrides: Overrides, format: GPUTextureFormat): void;
+  prepare(levers: PaintingLevers, format: GPUTextureFormat): void;
   /** Records what the parts of one frame have in common, before the first of them. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;
   /** Records the drawing of one part of one frame. Parts of a frame are submitted one by one. */

@@ -16,7 +16,6 @@ import {
   kernelOf,
   perDevice,
   specialise,
-  type Overrides,
   type ShaderDescription,
 } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
@@ -28,6 +27,7 @@ import type {
   FrameNotes,
   OrderKind,
   Painting,
+  PaintingLevers,
   Rasterizer,
   RasterizerInputs,
   Slice,
@@ -105,11 +105,11 @@ export class TilesRasterizer implements Rasterizer {
   /** Where notes go that nobody asked for. */
   #nowhere: Required<FrameNotes> | undefined;
 
-  constructor(device: GPUDevice, accumulation: AccumulationFormat, overrides: Overrides, sort: SortName) {
+  constructor(device: GPUDevice, accumulation: AccumulationFormat, sort: SortName) {
     this.#device = device;
     this.#accumulation = accumulation;
     this.#memory = new GpuMemory(device);
-    this.#kernels = makeKernels(device, overrides);
+    this.#kernels = makeKernels(device);
     this.#sort = new SortStage(device, sort, 'pairs');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
@@ -135,24 +135,23 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = this.#allocate(inputs);
   }
 
-  prepare(overrides: Overrides, format: GPUTextureFormat): void {
-    makeKernels(this.#device, overrides);
-    const variant = { overrides, isNoting: false };
+  prepare(levers: PaintingLevers, format: GPUTextureFormat): void {
+    const variant = { notesDepth: levers.occludedBelow > 0, isNoting: false };
     if (this.finishes(format)) rasterizeKernel(this.#device, { ...variant, format, isFinal: true });
     rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false });
   }
 
   /** Lists the splats for the bins. */
-  prepareFrame(encoder: GPUCommandEncoder, { surface, order, overrides, background, timer }: Painting): void {
+  prepareFrame(encoder: GPUCommandEncoder, { surface, order, levers, background, timer }: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const { plan } = this.#inputs;
     const buffers = this.#buffers;
     const bound = this.#gridFor(surface, this.#inputs, buffers);
-    this.#writeView(surface, bound.grid, [0, 0], background);
+    this.#writeView(surface, bound.grid, [0, 0], levers, background);
     encoder.clearBuffer(buffers.groupPairs);
     encoder.clearBuffer(bound.ranges);
 
-    const { count, scan: scanKernel, plan: planKernel, emit, index } = makeKernels(this.#device, overrides);
+    const { count, scan: scanKernel, plan: planKernel, emit, index } = this.#kernels;
     const listing = bound.listing[order];
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
     count.dispatchIndirect(bin, listing.count, plan, planOffsets.visible);
@@ -165,14 +164,14 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, overrides, background, notes, timer } = painting;
+    const { surface, levers, background, notes, timer } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
     const { format, width, height } = surface;
     const { column, row, columns, rows } = sliceOfTiles(Math.ceil(width / TILE), Math.ceil(height / TILE), slice);
     if (columns * rows === 0) return;
     // A whole frame has the view that its splats were listed with.
-    if (slice.count > 1) this.#writeView(surface, bound.grid, [column, row], background);
+    if (slice.count > 1) this.#writeView(surface, bound.grid, [column, row], levers, background);
     const paint = encoder.beginComputePass({
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
@@ -181,7 +180,7 @@ export class TilesRasterizer implements Rasterizer {
       format,
       isFinal: background !== undefined,
       isNoting: notes !== undefined,
-      overrides,
+      notesDepth: levers.occludedBelow > 0,
     });
     const image = notes
       ? this.#bindNoting(kernel, bound, surface.view, notes)
@@ -331,11 +330,13 @@ export class TilesRasterizer implements Rasterizer {
     { width, height }: Surface,
     { columns, rows }: Grid,
     first_tile: readonly [number, number],
+    { alphaMin, transmittanceMin, occludedBelow }: PaintingLevers,
     background: Painting['background'] = TRANSPARENT,
   ): void {
     const pair_capacity = this.#inputs!.pairCapacity;
-    const values = { viewport: [width, height], bins: [columns, rows], pair_capacity, background, first_tile };
-    writeStruct(layouts.BinView, values, this.#viewBytes);
+    const image = { viewport: [width, height], bins: [columns, rows], pair_capacity, background, first_tile };
+    const ends = { alpha_min: alphaMin, transmittance_min: transmittanceMin, occluded_below: occludedBelow };
+    writeStruct(layouts.BinView, { ...image, ...ends }, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
 }
@@ -346,12 +347,12 @@ export function maxPairs(device: GPUDevice): number {
   return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / PAIR_BYTES);
 }
 
-function makeKernels(device: GPUDevice, { alpha_min }: Overrides) {
+function makeKernels(device: GPUDevice) {
   return {
-    count: kernelOf(device, binCount, { alpha_min }),
+    count: kernelOf(device, binCount),
     scan: kernelOf(device, scan),
     plan: kernelOf(device, binPlan),
-    emit: kernelOf(device, binEmit, { alpha_min }),
+    emit: kernelOf(device, binEmit),
     index: kernelOf(device, binIndex),
   };
 }
@@ -363,14 +364,13 @@ interface RasterizeVariant {
   readonly format: GPUTextureFormat;
   readonly isFinal: boolean;
   readonly isNoting: boolean;
-  readonly overrides: Overrides;
+  readonly notesDepth: boolean;
 }
 
 function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
-  const { format, isFinal, isNoting, overrides } = variant;
+  const { format, isFinal, isNoting, notesDepth } = variant;
   const shader: ShaderDescription = isNoting ? rasterizeTilesNoting : rasterizeTiles;
-  const { alpha_min, transmittance_min, occluded_below } = overrides;
-  const constants = { alpha_min, transmittance_min, occluded_below, is_final: isFinal ? 1 : 0 };
+  const constants = { notes_depth: notesDepth ? 1 : 0, is_final: isFinal ? 1 : 0 };
   return perDevice(device, `${shader.name} ${format} ${JSON.stringify(constants)}`, () => {
     const { image } = rasterizeTiles.bindings;
     const writing = specialise(shader, format, `texture_storage_2d<${image.format}`, `texture_storage_2d<${format}`);

@@ -1,5 +1,5 @@
 import { constants, cull, cullChunks, cullSerial } from '../generated/shaders.js';
-import { kernelOf, type ComputeKernel, type Overrides, type Resources } from '../gpu/kernel.js';
+import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import type { Threads } from './threads.js';
 
 /** Which chunks of a page may hold visible splats. */
@@ -23,8 +23,8 @@ export class CullChunksStage {
 export class CullStage {
   readonly #kernel: ComputeKernel<typeof cull> | ComputeKernel<typeof cullSerial>;
 
-  constructor(device: GPUDevice, overrides: Overrides = {}, threads: Threads = 'parallel') {
-    this.#kernel = threads === 'serial' ? kernelOf(device, cullSerial, overrides) : kernelOf(device, cull, overrides);
+  constructor(device: GPUDevice, threads: Threads = 'parallel') {
+    this.#kernel = threads === 'serial' ? kernelOf(device, cullSerial) : kernelOf(device, cull);
   }
 
   bind(resources: Resources<typeof cull>): GPUBindGroup {

@@ -1,12 +1,12 @@
 import { probeDepth } from '../generated/shaders.js';
-import { kernelOf, type ComputeKernel, type Overrides, type Resources } from '../gpu/kernel.js';
+import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 
 /** Opacity and depth under single points of the last frame; a workgroup a point. */
 export class ProbeDepthStage {
   readonly #kernel: ComputeKernel<typeof probeDepth>;
 
-  constructor(device: GPUDevice, { alpha_min }: Overrides = {}) {
-    this.#kernel = kernelOf(device, probeDepth, alpha_min === undefined ? {} : { alpha_min });
+  constructor(device: GPUDevice) {
+    this.#kernel = kernelOf(device, probeDepth);
   }
 
   bind(resources: Resources<typeof probeDepth>): GPUBindGroup {

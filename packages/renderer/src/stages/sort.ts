@@ -76,6 +76,10 @@ export type SortValues = 'indices' | 'pairs';
 /** Which of the two key and value buffers holds the result for keys of so many bits: the first (0) or the second (1). */
 export const sortedIn = (name: SortName, keyBits: number): 0 | 1 => (passCount(name, keyBits) % 2 === 0 ? 0 : 1);
 
+/** The same by the name of a list of slots. */
+export const sortedOrder = (name: SortName, keyBits: number): 'first' | 'second' =>
+  sortedIn(name, keyBits) === 0 ? 'first' : 'second';
+
 /**
  * Stable least-significant-digit radix sort of keys of up to 32 bits: for each digit a pass of count, scan, scatter.
  * Counts are reduced and scanned between dispatches, so no workgroup ever waits for another.
