@@ -9,14 +9,7 @@ import { ensureDependencies, noteBuilt } from './lib/prepare.mjs';
 import { must, root } from './lib/run.mjs';
 
 /** Scripts of pages, each beside its page. */
-const SCRIPTS = [
-  'home.js',
-  'check/check.js',
-  'compare/compare.js',
-  'examples/examples.js',
-  'playground/playground.js',
-  'stability/stability.js',
-];
+const SCRIPTS = ['home.js', 'check/check.js', 'compare/compare.js', 'examples/examples.js', 'playground/playground.js'];
 
 const isWhole = !process.argv.includes('--element');
 
@@ -72,6 +65,8 @@ async function buildDemo() {
   const to = join(root, 'demo/dist');
   rmSync(to, { recursive: true, force: true });
   must(process.execPath, ['node_modules/@11ty/eleventy/cmd.cjs', '--quiet', '--config=demo/site/eleventy.config.mjs']);
+  const { writeSequence } = await import('../demo/site/sequence-scene.mjs');
+  await writeSequence(join(to, 'scenes/knot'));
   // Its packages were not there when this script started on a fresh clone.
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));
