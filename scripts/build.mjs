@@ -64,9 +64,9 @@ async function buildDemo() {
   const from = join(root, 'demo');
   const to = join(root, 'demo/dist');
   rmSync(to, { recursive: true, force: true });
-  must(process.execPath, ['node_modules/@11ty/eleventy/cmd.cjs', '--quiet', '--config=demo/site/eleventy.config.mjs']);
   const { writeSequence } = await import('../demo/site/sequence-scene.mjs');
   await writeSequence(join(to, 'scenes/knot'));
+  must(process.execPath, ['node_modules/@11ty/eleventy/cmd.cjs', '--quiet', '--config=demo/site/eleventy.config.mjs']);
   // Its packages were not there when this script started on a fresh clone.
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));

@@ -50,7 +50,7 @@ function knotAt(share) {
     const wave = Math.sin(3 * along - 2 * Math.PI * share) ** 2;
     const { point, tangent } = tubeAt(along, around, 0.22 + 0.14 * wave);
     cloud.positions.set(point, 3 * i);
-    cloud.scales.set([0.045, 0.02, 0.02], 3 * i);
+    cloud.scales.set([0.06, 0.045, 0.03], 3 * i);
     cloud.rotations.set(turnTo(tangent), 4 * i);
     cloud.sh.set(colourAt(along, around, wave), 3 * i);
   }
