@@ -2,7 +2,7 @@
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { measureFrames } from '../site/measure.js';
 import { differenceOf } from './difference.js';
-import { keepInStep } from './in-step.js';
+import { align, keepInStep } from './in-step.js';
 
 const byId = (id) => document.getElementById(id);
 const query = new URLSearchParams(location.search);
@@ -35,6 +35,7 @@ async function measure() {
   try {
     const times = [];
     for (const element of sides) times.push(await measureFrames(element));
+    align(left, right);
     const { decibels, worst } = await differenceOf(left, right);
     const rows = sides.map((element, i) => [
       byId(`${element.id}-name`).textContent,

@@ -110,6 +110,8 @@ takeFiles(byId('drop'), (file) => {
   form.elements.alt.value = '';
   for (const name of Object.keys(VIEW)) form.elements[name].value = '';
   show();
+  // On a phone the field lies below the scene, which waits until it is seen.
+  scene.scrollIntoView({ block: 'nearest' });
 });
 recall();
 show();

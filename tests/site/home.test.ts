@@ -1,6 +1,7 @@
 /** The first page: tabs, the copied view, errors for people. Its scene is a small one here; pages.test.ts waits for the real one. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
+import { checkPage } from './page-check.js';
 import { isBuilt, openSite, withCompass, type OpenSite, type Visit } from './support.js';
 
 interface Splat extends HTMLElement {
@@ -85,5 +86,8 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     await status(/web page|HTML/);
     await tab.click('[data-source="scenes/skull.spz"]');
     await status(/^\d+ splats/);
+    only.faults.length = 0;
   });
+
+  it('is a page as every other', () => checkPage(only));
 });
