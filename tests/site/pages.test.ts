@@ -14,6 +14,8 @@ const QUERIES: Readonly<Record<string, string>> = {
 };
 /** Pages whose own tests do the same, while they are open: `checkPage`. */
 const ELSEWHERE = ['/', '/compare/', '/playground/', '/without-webgpu/'];
+/** The app of React stands for both: tests/frameworks drives them, and their pages have one layout. */
+const ALIKE = ['/vue/'];
 /** Pages whose scenes others test: theirs stay on their way here, which spares the processor that draws them. */
 const WITHOUT_SCENES = ['/examples/', '/react/', '/vue/'];
 
@@ -21,7 +23,8 @@ const WITHOUT_SCENES = ['/examples/', '/react/', '/vue/'];
 const LONGEST = '/docs/packages/element/';
 const isDocument = (url: string): boolean => /^\/docs\/./.test(url);
 /** Documents have no scripts and one layout: `npm run test:site` opens all of them, `npm test` one that has everything. */
-const isVisited = (url: string): boolean => isFull || (isDocument(url) ? url === LONGEST : !ELSEWHERE.includes(url));
+const isVisited = (url: string): boolean =>
+  isFull || (isDocument(url) ? url === LONGEST : ![...ELSEWHERE, ...ALIKE].includes(url));
 
 describe('every page of the site', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
@@ -40,7 +43,9 @@ describe('every page of the site', { skip: isBuilt ? false : 'no site: npm run b
       const release = !isFull && WITHOUT_SCENES.includes(url) ? await withScenesToCome(tab) : undefined;
       await open.go(only, url + (QUERIES[url] ?? ''));
       // Documents share layout, markup and colours: once over each is enough, and a third of the time.
-      await checkPage(only, { colors: !isDocument(url) || url === LONGEST, bothScreens: !isDocument(url) });
+      // Pages that measure on opening have the form and the table of their index.
+      const bothScreens = !isDocument(url) && (isFull || QUERIES[url] === undefined);
+      await checkPage(only, { colors: !isDocument(url) || url === LONGEST, bothScreens });
       await release?.();
     });
   }

@@ -4,7 +4,7 @@ import { after, before, describe, it } from 'node:test';
 import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
 import { checkPage } from './page-check.js';
-import { isBuilt, openSite, root, type OpenSite, type Visit } from './support.js';
+import { isBuilt, openSite, root, withCompass, type OpenSite, type Visit } from './support.js';
 
 interface Splat extends Element {
   readonly loaded: boolean;
@@ -37,7 +37,11 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
   let visit: Visit;
   before(async () => {
     open = await openSite();
-    visit = await open.visit(`/playground/?src=${COMPASS}&camera-controls=`, { width: 240, height: 400 });
+    visit = await open.visit(`/playground/?src=${COMPASS}&camera-controls=`, {
+      width: 240,
+      height: 400,
+      prepare: withCompass,
+    });
   });
   after(() => open.close());
 
@@ -77,7 +81,8 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
 
   it('copies the view, opens a file of the visitor, and starts over', { timeout: 120_000 }, async () => {
     const { tab, faults } = visit;
-    await open.go(visit, `/playground/?src=${COMPASS}&alt=A+compass&camera-controls=`);
+    await tab.click('#reset');
+    await tab.evaluate(() => scrollTo(0, 0));
     await loaded(tab);
     await tab.evaluate(() => document.querySelector<HTMLElement>('gaussian-splat')!.focus());
     await tab.keyboard.press('ArrowRight');
