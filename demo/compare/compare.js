@@ -16,6 +16,7 @@ function apply(element) {
   element.setAttribute('quality', quality);
   element.setAttribute('max-sh-degree', degree);
   byId(`${element.id}-name`).textContent = `${quality}, degree ${degree}`;
+  markPrepared();
 }
 
 function choose(element, words) {
@@ -27,6 +28,29 @@ function choose(element, words) {
 
 function moveLine() {
   byId('pair').style.setProperty('--split', `${byId('split').value}%`);
+}
+
+/** The line goes where a finger or a mouse drags it; the keyboard has the slider below. */
+function dragLine(divider) {
+  const follow = ({ clientX }) => {
+    const { left: start, width } = byId('pair').getBoundingClientRect();
+    byId('split').value = (100 * (clientX - start)) / width;
+    moveLine();
+  };
+  divider.addEventListener('pointerdown', (event) => {
+    divider.setPointerCapture(event.pointerId);
+    follow(event);
+  });
+  divider.addEventListener('pointermove', (event) => divider.hasPointerCapture(event.pointerId) && follow(event));
+}
+
+/** Which of the prepared pairs is on show, if one is. */
+function markPrepared() {
+  const chosen = sides.map(({ id }) => `${byId(`${id}-quality`).value},${byId(`${id}-degree`).value}`);
+  for (const button of document.querySelectorAll('[data-left]')) {
+    const isShown = button.dataset.left === chosen[0] && button.dataset.right === chosen[1];
+    button.setAttribute('aria-pressed', String(isShown));
+  }
 }
 
 async function measure() {
@@ -69,6 +93,7 @@ for (const element of sides) {
 }
 keepInStep(left, right);
 byId('split').addEventListener('input', moveLine);
+dragLine(byId('divider'));
 byId('measure').addEventListener('click', measure);
 for (const button of document.querySelectorAll('[data-left]')) {
   button.addEventListener('click', () => {

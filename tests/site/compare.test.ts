@@ -77,6 +77,12 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
     const clips = await tab.evaluate(() =>
       [...document.querySelectorAll('gaussian-splat')].map((each) => getComputedStyle(each).clipPath),
     );
+    const { x, y, width } = (await tab.locator('#pair').boundingBox())!;
+    await tab.mouse.move(x + 0.4 * width, y + 20);
+    await tab.mouse.down();
+    await tab.mouse.move(x + 0.75 * width, y + 20, { steps: 3 });
+    await tab.mouse.up();
+    assert.equal(await tab.inputValue('#split'), '75', 'the line goes where it is dragged');
     assert.deepEqual(clips, ['inset(0px 60% 0px 0px)', 'inset(0px 0px 0px 40%)']);
     assert.deepEqual(faults, []);
   });

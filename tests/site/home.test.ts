@@ -6,7 +6,7 @@ import { isBuilt, openSite, withCompass, type OpenSite, type Visit } from './sup
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
-  getCameraOrbit(): object;
+  getCameraOrbit(): { readonly theta: number; readonly phi: number };
   jumpCameraToGoal(): void;
 }
 const PATIENCE = { timeout: 100_000, polling: 100 };
@@ -44,10 +44,11 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     const orbit = await tab.evaluate(() => {
       const hero = document.querySelector<Splat>('#hero')!;
       hero.jumpCameraToGoal();
-      return String(hero.getCameraOrbit());
+      const { theta, phi } = hero.getCameraOrbit();
+      return [theta, phi].map((radians) => `${Number(((radians * 180) / Math.PI).toFixed(2))}deg`).join(' ');
     });
     await tab.click('#copy-view');
-    assert.ok((await tab.locator('#snippet').textContent())!.includes(`camera-orbit="${orbit}"`));
+    assert.ok((await tab.locator('#snippet').textContent())!.includes(`camera-orbit="${orbit} `));
     await tab.waitForFunction(() => document.querySelector('#copied')!.textContent !== '', undefined, PATIENCE);
     assert.deepEqual(faults, []);
   });

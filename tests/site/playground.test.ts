@@ -88,7 +88,15 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     await tab.keyboard.press('ArrowRight');
     await tab.click('#copy-view');
     const { view } = await stateOf(tab);
-    assert.ok((await tab.locator('#html').textContent())!.includes(`camera-orbit="${view[0]}"`));
+    const copied = /camera-orbit="(-?[\d.]+)deg (-?[\d.]+)deg ([\d.]+)m"/.exec(
+      (await tab.locator('#html').textContent())!,
+    );
+    const [theta, phi, radius] = view[0].split(' ').map(parseFloat);
+    const wanted = [(theta * 180) / Math.PI, (phi * 180) / Math.PI, radius];
+    assert.ok(Math.abs(theta) > 0.01, 'the key has turned it');
+    wanted.forEach((value, i) =>
+      assert.ok(Math.abs(Number(copied?.[i + 1]) - value) < 0.01, `${copied?.[0]}, ${wanted}`),
+    );
 
     const buffer = readFileSync(`${root}tests/element/browser/fixtures/compass.ply`);
     const file = { name: 'mine & yours.ply', mimeType: '', buffer };
