@@ -1,6 +1,7 @@
 /** What the first page adds to the element: tabs, copying a view, opening a file, and showing an error. */
 import { copy } from './site/copy.js';
 import { addressOf, takeFiles } from './site/local-file.js';
+import { viewOf } from './site/view.js';
 import { bringTabsToLife } from './site/tabs.js';
 
 const byId = (id) => document.getElementById(id);
@@ -8,11 +9,8 @@ const byId = (id) => document.getElementById(id);
 bringTabsToLife(document.querySelector('.tabs'));
 
 byId('copy-view').addEventListener('click', async () => {
-  const hero = byId('hero');
-  const html =
-    `<gaussian-splat src="skull.spz" alt="A skull" camera-controls\n` +
-    `  camera-orbit="${hero.getCameraOrbit()}" camera-target="${hero.getCameraTarget()}"\n` +
-    `  field-of-view="${hero.getFieldOfView()}"></gaussian-splat>`;
+  const view = Object.entries(viewOf(byId('hero'))).map(([name, value]) => `  ${name}="${value}"`);
+  const html = `<gaussian-splat src="skull.spz" alt="A skull" camera-controls\n${view.join('\n')}></gaussian-splat>`;
   byId('snippet').textContent = `<script type="module" src="cdn/gaussian-splat.min.js"></script>\n${html}`;
   byId('copied').textContent = await copy(html);
 });

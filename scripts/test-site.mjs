@@ -6,7 +6,7 @@ import { run } from './lib/run.mjs';
 ensureDependencies();
 const CHROMIUM = ensureChromium();
 build();
-const files = ['pages', 'links', 'home', 'playground', 'compare', 'cost-card'].map(
+const files = ['pages', 'links', 'snippets', 'home', 'playground', 'compare', 'cost-card'].map(
   (name) => `tests/site/${name}.test.ts`,
 );
 process.exit(run(process.execPath, ['--import', 'tsx', '--test', ...files], { env: { CHROMIUM, SITE: 'full' } }));

@@ -208,6 +208,7 @@ async function measure() {
 async function publish() {
   const text = JSON.stringify(report, null, 1);
   document.getElementById('json').textContent = text;
+  document.getElementById('raw').hidden = false;
   globalThis.report = report;
   if (query.has('report')) await fetch(query.get('report'), { method: 'POST', body: text });
 }

@@ -66,7 +66,7 @@ async function measure(device, url, instances) {
   };
 }
 
-const figures = document.getElementById('figures');
+const [status, figures] = ['status', 'figures'].map((id) => document.getElementById(id));
 const report = { kind: 'generators', runs: RUNS, results: [] };
 try {
   const adapter = await navigator.gpu.requestAdapter({ powerPreference: 'high-performance' });
@@ -75,12 +75,15 @@ try {
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   for (const asked of (query.get('models') ?? DEFAULT_MODELS).split(',')) {
     const [url, instances = '1'] = asked.split('*');
+    status.textContent = `Running ${asked}…`;
     const result = await measure(device, url, Number(instances));
     report.results.push(result);
+    figures.hidden = false;
     figures.textContent += `${asked}: ${result.rows} Gaussians, ${result.millisecondsPerRun.toFixed(2)} ms a run, ${result.kind}\n`;
   }
+  status.textContent = 'Done.';
 } catch (error) {
   report.error = String(error.stack ?? error);
-  figures.textContent += report.error;
+  status.textContent = `It did not work: ${error.message ?? error}`;
 }
 await sendReport(report, query.get('report'));

@@ -2,7 +2,7 @@
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { measureFrames } from '../site/measure.js';
 import { differenceOf } from './difference.js';
-import { keepInStep } from './in-step.js';
+import { align, keepInStep } from './in-step.js';
 
 const byId = (id) => document.getElementById(id);
 const query = new URLSearchParams(location.search);
@@ -16,6 +16,7 @@ function apply(element) {
   element.setAttribute('quality', quality);
   element.setAttribute('max-sh-degree', degree);
   byId(`${element.id}-name`).textContent = `${quality}, degree ${degree}`;
+  markPrepared();
 }
 
 function choose(element, words) {
@@ -29,12 +30,36 @@ function moveLine() {
   byId('pair').style.setProperty('--split', `${byId('split').value}%`);
 }
 
+/** The line goes where a finger or a mouse drags it; the keyboard has the slider below. */
+function dragLine(divider) {
+  const follow = ({ clientX }) => {
+    const { left: start, width } = byId('pair').getBoundingClientRect();
+    byId('split').value = (100 * (clientX - start)) / width;
+    moveLine();
+  };
+  divider.addEventListener('pointerdown', (event) => {
+    divider.setPointerCapture(event.pointerId);
+    follow(event);
+  });
+  divider.addEventListener('pointermove', (event) => divider.hasPointerCapture(event.pointerId) && follow(event));
+}
+
+/** Which of the prepared pairs is on show, if one is. */
+function markPrepared() {
+  const chosen = sides.map(({ id }) => `${byId(`${id}-quality`).value},${byId(`${id}-degree`).value}`);
+  for (const button of document.querySelectorAll('[data-left]')) {
+    const isShown = button.dataset.left === chosen[0] && button.dataset.right === chosen[1];
+    button.setAttribute('aria-pressed', String(isShown));
+  }
+}
+
 async function measure() {
   byId('status').textContent = 'Measuring…';
   byId('measure').disabled = true;
   try {
     const times = [];
     for (const element of sides) times.push(await measureFrames(element));
+    align(left, right);
     const { decibels, worst } = await differenceOf(left, right);
     const rows = sides.map((element, i) => [
       byId(`${element.id}-name`).textContent,
@@ -68,6 +93,7 @@ for (const element of sides) {
 }
 keepInStep(left, right);
 byId('split').addEventListener('input', moveLine);
+dragLine(byId('divider'));
 byId('measure').addEventListener('click', measure);
 for (const button of document.querySelectorAll('[data-left]')) {
   button.addEventListener('click', () => {

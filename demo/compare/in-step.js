@@ -6,13 +6,26 @@ export function keepInStep(a, b) {
   follow(b, a);
 }
 
+/** Puts both cameras where the first is, to the last bit: attributes are rounded, so that whoever only follows is a hair aside. */
+export function align(a, b) {
+  const view = viewOf(a);
+  for (const element of [a, b]) show(element, view);
+}
+
 function follow(leader, follower) {
   leader.addEventListener('camera-change', ({ detail }) => {
     // What a page does to a camera is `none`: the follower's own move must not come back.
-    if (detail.source === 'none') return;
-    follower.cameraOrbit = String(leader.getCameraOrbit());
-    follower.cameraTarget = String(leader.getCameraTarget());
-    follower.fieldOfView = String(leader.getFieldOfView());
-    follower.jumpCameraToGoal();
+    if (detail.source !== 'none') show(follower, viewOf(leader));
   });
+}
+
+const viewOf = (element) => ({
+  cameraOrbit: String(element.getCameraOrbit()),
+  cameraTarget: String(element.getCameraTarget()),
+  fieldOfView: String(element.getFieldOfView()),
+});
+
+function show(element, view) {
+  Object.assign(element, view);
+  element.jumpCameraToGoal();
 }

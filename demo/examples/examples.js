@@ -29,7 +29,7 @@ function factsOf({ bytes, contract, record }) {
 }
 
 /** Play, pause and a slider that follows. */
-function conductPlant(card) {
+function conductTime(card) {
   const element = card.querySelector('gaussian-splat');
   const [button, slider] = [card.querySelector('[data-play]'), card.querySelector('[data-time]')];
   button.addEventListener('click', async () => {
@@ -101,7 +101,7 @@ function conductWalker(card, joints) {
   pose();
 }
 
-/** The painter runs where somebody asks for it: it is the one example that a slow GPU has no patience for. */
+/** Post-processors run where somebody asks for them: they are the examples that a slow GPU has no patience for. */
 function conductPainter(card, facts) {
   card.querySelector('[data-paint]').addEventListener('click', ({ target }) => {
     target.remove();
@@ -128,13 +128,13 @@ function showModel(card) {
       const facts = factsOf(read);
       fillCostCard(card.querySelector('.cost'), facts, card.querySelector('gaussian-splat'));
       if (name === 'walker') conductWalker(card, read.contract.inputs.pose.joints);
-      if (name === 'oil') conductPainter(card, facts);
+      if (card.querySelector('[data-paint]')) conductPainter(card, facts);
     },
     (error) => (card.querySelector('.cost').textContent = error.message),
   );
 }
 
-conductPlant(exampleOf('plant'));
+for (const name of ['sequence', 'plant']) conductTime(exampleOf(name));
 conductPictures(exampleOf('statue')).catch((error) => console.error(error));
 for (const card of document.querySelectorAll('[data-example]')) {
   if (card.dataset.facts) showFile(card);

@@ -1,6 +1,7 @@
 /** Fields to attributes, attributes to HTML. The fields are made from the element's manifest when the site is built. */
 import { copy } from '../site/copy.js';
 import { addressOf, takeFiles } from '../site/local-file.js';
+import { viewOf } from '../site/view.js';
 import { SCRIPT, tagOf } from './html.js';
 
 const byId = (id) => document.getElementById(id);
@@ -10,11 +11,7 @@ const form = byId('attributes');
 const ADDRESSES = ['src', 'poster', 'contract'];
 /** And those that are several, with spaces between them. */
 const LISTS = ['chain', 'postprocess'];
-const VIEW = {
-  'camera-orbit': 'getCameraOrbit',
-  'camera-target': 'getCameraTarget',
-  'field-of-view': 'getFieldOfView',
-};
+const VIEW = ['camera-orbit', 'camera-target', 'field-of-view'];
 
 /** The file that was dropped, while its name stands in the field of the source. */
 let local = { name: '', address: '' };
@@ -79,7 +76,7 @@ function recall() {
 
 /** Where the camera is, as attributes: into the fields, the HTML and the clipboard. */
 async function copyView() {
-  for (const [name, method] of Object.entries(VIEW)) form.elements[name].value = String(scene[method]());
+  for (const [name, value] of Object.entries(viewOf(scene))) form.elements[name].value = value;
   show();
   byId('copied').textContent = await copy(byId('html').textContent);
 }
@@ -108,8 +105,10 @@ takeFiles(byId('drop'), (file) => {
   local = { name: file.name, address: addressOf(file) };
   form.elements.src.value = file.name;
   form.elements.alt.value = '';
-  for (const name of Object.keys(VIEW)) form.elements[name].value = '';
+  for (const name of VIEW) form.elements[name].value = '';
   show();
+  // On a phone the field lies below the scene, which waits until it is seen.
+  scene.scrollIntoView({ block: 'nearest' });
 });
 recall();
 show();

@@ -6,7 +6,7 @@ import { createRoot } from 'react-dom/client';
 
 const query = new URLSearchParams(location.search);
 /** The scenes that the app goes to and fro between. */
-const SCENES = [query.get('first') ?? '../scenes/skull.spz', query.get('second') ?? '../scenes/skull.spz#again'];
+const SCENES = [query.get('first') ?? '../scenes/skull.spz', query.get('second') ?? '../scenes/knot/knot.json'];
 /** Sliders of a generator: an object that must arrive as it is. */
 const CONTROLS = { smile: 0.4 };
 
@@ -65,8 +65,11 @@ function App() {
         </GaussianSplat>
       )}
       <p role="status">
-        <output id="status">{status}</output> <output id="loads">{loads}</output> <output id="moves">{moves}</output>{' '}
-        <output id="times">{times}</output> <output id="mounts">{mounts}</output>
+        <output id="status">{status}</output>
+      </p>
+      <p>
+        Events: load <output id="loads">{loads}</output>, camera-change <output id="moves">{moves}</output>, timeupdate{' '}
+        <output id="times">{times}</output>; effects of the mount: <output id="mounts">{mounts}</output>
       </p>
       <p>
         <output id="where">{view}</output>

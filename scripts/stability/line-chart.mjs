@@ -3,7 +3,9 @@ import { scaleLinear, scaleLog } from 'd3-scale';
 
 const WIDTH = 560;
 const HEIGHT = 300;
-const MARGIN = { top: 34, right: 16, bottom: 44, left: 54 };
+const SIDES = { top: 30, right: 16, bottom: 44, left: 54 };
+/** Names of curves stand above the plot, a line each, where no curve is. */
+const LINE = 13;
 const COLORS = ['#2166ac', '#b2182b', '#1b7837', '#762a83'];
 /** dB that stand for equal images. */
 const MOST = 130;
@@ -17,39 +19,46 @@ const escape = (text) =>
  * @param options.line {{y: number, name: string}} a horizontal one
  */
 export function lineChart(curves, { title, x: xTitle, y: yTitle, log = false, marks = [], line }) {
+  const margin = { ...SIDES, top: SIDES.top + LINE * curves.length };
   const points = curves.flatMap((curve) => curve.points);
   const xs = points.map(([x]) => x);
   const ys = [...points.map(([, y]) => Math.min(MOST, y)), ...(line ? [line.y] : [])];
   const x = (log ? scaleLog() : scaleLinear())
     .domain([Math.min(...xs), Math.max(...xs)])
-    .range([MARGIN.left, WIDTH - MARGIN.right]);
+    .range([margin.left, WIDTH - margin.right]);
   const y = scaleLinear()
     .domain([Math.min(...ys) - 3, Math.max(...ys) + 3])
-    .range([HEIGHT - MARGIN.bottom, MARGIN.top]);
+    .range([HEIGHT - margin.bottom, margin.top]);
   const text = (at, down, words, more = '') =>
     `<text x="${at.toFixed(1)}" y="${down.toFixed(1)}" ${more}>${escape(words)}</text>`;
+  // A name that would leave the picture on the right stands to the left of its line.
+  const nameOf = (mark, i) => {
+    const isLate = x(mark.x) > WIDTH / 2;
+    const [at, anchor] = isLate ? [x(mark.x) - 4, 'end'] : [x(mark.x) + 4, 'start'];
+    return text(at, HEIGHT - margin.bottom - 6 - LINE * i, mark.name, `text-anchor="${anchor}" fill="#666"`);
+  };
   const parts = [
     `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${HEIGHT}" width="${WIDTH}" height="${HEIGHT}" font-family="system-ui, sans-serif" font-size="11" role="img" aria-label="${escape(title)}">`,
     `<rect width="100%" height="100%" fill="#fff"/>`,
-    text(MARGIN.left, 16, title, 'font-size="13" font-weight="bold" fill="#111"'),
+    text(margin.left, 16, title, 'font-size="13" font-weight="bold" fill="#111"'),
     ...y
       .ticks(6)
       .map(
         (tick) =>
-          `<path d="M${MARGIN.left} ${y(tick)}H${WIDTH - MARGIN.right}" stroke="#ddd"/>${text(MARGIN.left - 6, y(tick) + 4, tick, 'text-anchor="end" fill="#444"')}`,
+          `<path d="M${margin.left} ${y(tick)}H${WIDTH - margin.right}" stroke="#ddd"/>${text(margin.left - 6, y(tick) + 4, tick, 'text-anchor="end" fill="#444"')}`,
       ),
     ...(log ? xs.filter((v, i) => xs.indexOf(v) === i) : x.ticks(8)).map((tick) =>
-      text(x(tick), HEIGHT - MARGIN.bottom + 16, shortNumber(tick), 'text-anchor="middle" fill="#444"'),
+      text(x(tick), HEIGHT - margin.bottom + 16, shortNumber(tick), 'text-anchor="middle" fill="#444"'),
     ),
-    text((MARGIN.left + WIDTH - MARGIN.right) / 2, HEIGHT - 8, xTitle, 'text-anchor="middle" fill="#111"'),
+    text((margin.left + WIDTH - margin.right) / 2, HEIGHT - 8, xTitle, 'text-anchor="middle" fill="#111"'),
     text(0, 0, yTitle, `transform="translate(14 ${HEIGHT / 2}) rotate(-90)" text-anchor="middle" fill="#111"`),
     ...marks.map(
-      (mark) =>
-        `<path d="M${x(mark.x)} ${MARGIN.top}V${HEIGHT - MARGIN.bottom}" stroke="#999" stroke-dasharray="2 3"/>${text(x(mark.x) + 3, HEIGHT - MARGIN.bottom - 6, mark.name, 'fill="#666"')}`,
+      (mark, i) =>
+        `<path d="M${x(mark.x)} ${margin.top}V${HEIGHT - margin.bottom}" stroke="#999" stroke-dasharray="2 3"/>${nameOf(mark, i)}`,
     ),
     ...(line
       ? [
-          `<path d="M${MARGIN.left} ${y(line.y)}H${WIDTH - MARGIN.right}" stroke="#111" stroke-dasharray="5 3"/>${text(WIDTH - MARGIN.right, y(line.y) - 4, line.name, 'text-anchor="end" fill="#111"')}`,
+          `<path d="M${margin.left} ${y(line.y)}H${WIDTH - margin.right}" stroke="#111" stroke-dasharray="5 3"/>${text(WIDTH - margin.right, y(line.y) - 4, line.name, 'text-anchor="end" fill="#111"')}`,
         ]
       : []),
     ...curves.flatMap((curve, i) => {
@@ -58,7 +67,7 @@ export function lineChart(curves, { title, x: xTitle, y: yTitle, log = false, ma
       return [
         `<path d="M${places.map((p) => p.map((v) => v.toFixed(1)).join(' ')).join('L')}" fill="none" stroke="${color}" stroke-width="2"/>`,
         ...places.map(([a, b]) => `<circle cx="${a.toFixed(1)}" cy="${b.toFixed(1)}" r="3" fill="${color}"/>`),
-        text(WIDTH - MARGIN.right, MARGIN.top - 6 + 13 * (i + 1), curve.name, `text-anchor="end" fill="${color}"`),
+        text(WIDTH - margin.right, SIDES.top + LINE * i, curve.name, `text-anchor="end" fill="${color}"`),
       ];
     }),
     '</svg>',

@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
 import type { Page } from 'playwright-core';
-import { isBuilt, openSite, type OpenSite } from './support.js';
+import { checkPage } from './page-check.js';
+import { isBuilt, openSite, type OpenSite, type Visit } from './support.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
@@ -41,11 +42,19 @@ function glossy(): string {
 
 describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
-  before(async () => (open = await openSite()));
+  let visit: Visit;
+  before(async () => {
+    open = await openSite();
+    visit = await open.visit('/compare/?src=/glossy.ply&left=default,3&right=default,0&frames=3', {
+      width: 240,
+      height: 400,
+      prepare: (page) => page.route('**/glossy.ply', (route) => route.fulfill({ body: glossy() })),
+    });
+  });
   after(() => open.close());
 
   it('whoever turns one picture turns both, and the keyboard moves the line', { timeout: 120_000 }, async () => {
-    const { tab, faults } = await open.visit('/compare/?src=/fixtures/compass.splat', { width: 240, height: 400 });
+    const { tab, faults } = visit;
     await bothLoaded(tab);
     for (const [leader, key] of [
       ['left', 'ArrowRight'],
@@ -68,18 +77,18 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
     const clips = await tab.evaluate(() =>
       [...document.querySelectorAll('gaussian-splat')].map((each) => getComputedStyle(each).clipPath),
     );
+    const { x, y, width } = (await tab.locator('#pair').boundingBox())!;
+    await tab.mouse.move(x + 0.4 * width, y + 20);
+    await tab.mouse.down();
+    await tab.mouse.move(x + 0.75 * width, y + 20, { steps: 3 });
+    await tab.mouse.up();
+    assert.equal(await tab.inputValue('#split'), '75', 'the line goes where it is dragged');
     assert.deepEqual(clips, ['inset(0px 60% 0px 0px)', 'inset(0px 0px 0px 40%)']);
     assert.deepEqual(faults, []);
-    await tab.close();
   });
 
   it('measures both, and how far harmonics of degree 0 are from those of degree 2', { timeout: 200_000 }, async () => {
-    const { tab, faults } = await open.visit('/compare/?src=/glossy.ply&left=default,3&right=default,0&frames=3', {
-      width: 240,
-      height: 400,
-      prepare: (page) => page.route('**/glossy.ply', (route) => route.fulfill({ body: glossy() })),
-    });
-    await bothLoaded(tab);
+    const { tab, faults } = visit;
     await tab.click('#measure');
     await tab.waitForFunction(
       () => document.querySelector('#status')!.textContent !== 'Measuring…',
@@ -94,7 +103,6 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.ok(Number(cells[1]) > 0, 'it took time');
     assert.ok(decibels > 5 && decibels < 40, `${decibels} dB`);
     assert.ok(worst > 5, `${worst} of 255`);
-    assert.deepEqual(faults, []);
     // The same on both sides is the same picture.
     await tab.selectOption('#right-degree', '2');
     await tab.click('#measure');
@@ -103,6 +111,8 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
       undefined,
       PATIENCE,
     );
-    await tab.close();
+    assert.deepEqual(faults, []);
   });
+
+  it('is a page as every other', () => checkPage(visit));
 });

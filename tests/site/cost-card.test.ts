@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
 import { statSync } from 'node:fs';
+import { checkPage } from './page-check.js';
 import { isBuilt, openSite, root, type OpenSite } from './support.js';
 
 interface Splat extends HTMLElement {
@@ -57,7 +58,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
       requests.filter((url) => url.endsWith('.spz')),
       [],
     );
-    assert.deepEqual(faults, []);
+    await checkPage({ tab, faults });
     await tab.close();
   });
 });

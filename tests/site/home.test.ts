@@ -1,11 +1,12 @@
 /** The first page: tabs, the copied view, errors for people. Its scene is a small one here; pages.test.ts waits for the real one. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
+import { checkPage } from './page-check.js';
 import { isBuilt, openSite, withCompass, type OpenSite, type Visit } from './support.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
-  getCameraOrbit(): object;
+  getCameraOrbit(): { readonly theta: number; readonly phi: number };
   jumpCameraToGoal(): void;
 }
 const PATIENCE = { timeout: 100_000, polling: 100 };
@@ -43,10 +44,11 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     const orbit = await tab.evaluate(() => {
       const hero = document.querySelector<Splat>('#hero')!;
       hero.jumpCameraToGoal();
-      return String(hero.getCameraOrbit());
+      const { theta, phi } = hero.getCameraOrbit();
+      return [theta, phi].map((radians) => `${Number(((radians * 180) / Math.PI).toFixed(2))}deg`).join(' ');
     });
     await tab.click('#copy-view');
-    assert.ok((await tab.locator('#snippet').textContent())!.includes(`camera-orbit="${orbit}"`));
+    assert.ok((await tab.locator('#snippet').textContent())!.includes(`camera-orbit="${orbit} `));
     await tab.waitForFunction(() => document.querySelector('#copied')!.textContent !== '', undefined, PATIENCE);
     assert.deepEqual(faults, []);
   });
@@ -85,5 +87,8 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     await status(/web page|HTML/);
     await tab.click('[data-source="scenes/skull.spz"]');
     await status(/^\d+ splats/);
+    only.faults.length = 0;
   });
+
+  it('is a page as every other', () => checkPage(only));
 });

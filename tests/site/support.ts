@@ -48,6 +48,13 @@ const MAY_BE_MISSING = /\.contract\.json$/;
 export const withCompass = (tab: Page): Promise<unknown> =>
   tab.route('**/skull.spz', (route) => route.fulfill({ body: compass, contentType: 'application/octet-stream' }));
 
+/** Scenes and models that never arrive, until the function that this returns is called: the page is as it is while they load. */
+export async function withScenesToCome(tab: Page): Promise<() => Promise<void>> {
+  const scenes = /\.(spz|onnx)$|knot\.json$/;
+  await tab.route(scenes, () => undefined);
+  return () => tab.unroute(scenes);
+}
+
 /** Serves the site and the scenes of the element's tests (`/fixtures/`), and starts the browser. */
 export async function openSite(): Promise<OpenSite> {
   const { serve } = await scripts('server.mjs');

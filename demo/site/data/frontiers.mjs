@@ -16,11 +16,19 @@ function describe(name, { environment, scene, results, standard }) {
   const { vendor, architecture, description } = environment.adapter;
   return {
     name,
-    adapter: [vendor, architecture, description].filter(Boolean).join(' '),
+    adapter: adapterName({ vendor, architecture, description }),
     date: environment.date.slice(0, 10),
     scene: { ...scene, splats: scene.splats.toLocaleString('en') },
     rows: results.filter(({ error }) => !error).map((result) => rowOf(result, standard)),
   };
+}
+
+/** As people call it: makers and models say the same thing twice. */
+function adapterName({ vendor, architecture, description }) {
+  if (architecture === 'swiftshader') return 'SwiftShader, a processor';
+  return description?.toLowerCase().startsWith(vendor)
+    ? description
+    : [vendor, architecture, description].filter(Boolean).join(' ');
 }
 
 function rowOf(result, standard) {

@@ -19,7 +19,7 @@ export {
   type MakeSink,
 } from './gaussian-models.js';
 export { sameInputs, type GpuTensor, type InputNumbers, type Inputs, type InputValue } from './input-value.js';
-export { PostProcessor, type PictureInput, type PostProcessorOptions } from './post-processor.js';
+export { PostProcessor, type FinishedPicture, type PictureInput, type PostProcessorOptions } from './post-processor.js';
 export { GeneratorSession } from './runtime/generator-session.js';
 export type { RunOutputs, SessionKind } from './runtime/live-session.js';
 export { isRuntimeRequested, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';

@@ -16,11 +16,14 @@ export interface PictureInput {
   readonly dtype: 'float32' | 'float16';
 }
 
+/** A picture that a model has made, on the GPU: [1,3,H,W], planes of red, green and blue in 0..1. */
+export type FinishedPicture = GpuTensor & { readonly dtype: 'float32' | 'float16' };
+
 export interface PostProcessorOptions extends AcquireOptions {
   /**
    * Takes the finished picture, [1,3,H,W]. It must submit its work before it returns: afterwards the buffer is the runtime's again.
    */
-  readonly onPicture: (picture: GpuTensor) => void;
+  readonly onPicture: (picture: FinishedPicture) => void;
   /** A run failed. The next request tries again. */
   readonly onError?: (error: unknown) => void;
 }
@@ -121,7 +124,7 @@ export class PostProcessor {
   }
 
   #run({ inputs }: Wish): Promise<void> {
-    const { name, dtype } = this.#chain.models.at(-1)!.outputs[0];
+    const { name, dtype } = this.#chain.models.at(-1)!.outputs[0] as { name: string; dtype: FinishedPicture['dtype'] };
     return this.#chain.run(inputs, ({ tensors, dims }) => {
       if (this.#loop.isClosed) return;
       this.#shown = inputs;

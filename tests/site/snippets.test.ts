@@ -1,0 +1,255 @@
+/** What people copy out of documents works: TypeScript has the right types, commands exist, and HTML shows a picture. */
+import assert from 'node:assert/strict';
+import { spawnSync, type SpawnSyncReturns } from 'node:child_process';
+import { copyFileSync, mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import type { Page } from 'playwright-core';
+import ts from 'typescript';
+import { compileTemplate, parse } from 'vue/compiler-sfc';
+import { isBuilt, openSite, root } from './support.js';
+import { snippets, type Snippet } from './snippets.js';
+
+const skip = isBuilt ? false : 'no site: npm run build';
+const isFull = process.env.SITE === 'full';
+
+/** What the reader of a snippet has at hand: names that the text around it speaks of, or that the snippet before it imports. */
+const AT_HAND = `
+import type * as React from 'react';
+import type * as core from '@gaussian-splat/core';
+import type * as economise from '@gaussian-splat/economise';
+import type * as models from '@gaussian-splat/generator';
+import type * as drawing from '@gaussian-splat/renderer';
+import type { GaussianSplatElement } from '@gaussian-splat/react';
+declare global {
+  const adapter: GPUAdapter;
+  const device: GPUDevice;
+  const texture: GPUTextureView;
+  const canvasTexture: GPUTexture;
+  const tensor: GPUBuffer;
+  const rows: number;
+  const width: number;
+  const height: number;
+  const imageBitmap: ImageBitmap;
+  const bytes: Uint8Array<ArrayBuffer>;
+  const ref: React.RefObject<GaussianSplatElement | null>;
+  const camera: core.Camera;
+  const cloud: core.GaussianCloud;
+  const bounds: ReturnType<typeof core.boundsOf>;
+  const header: core.OnnxHeader;
+  const contract: core.Contract;
+  const boundsOf: typeof core.boundsOf;
+  const gaussianLayout: typeof core.gaussianLayout;
+  const views: { readonly scored: Parameters<typeof economise.scoreSplats>[1] };
+  const { scoreSplats, cpuScorer, economical, parseEconomy, LiveMask }: typeof economise;
+  const gaussians: drawing.GaussianBuffers;
+  const { DynamicGaussians }: typeof drawing;
+  const generator: models.Generator;
+  const renderer: drawing.Renderer;
+}
+`;
+
+/** What `npm run page` makes of a scene whose name has to be written in another way in addresses and in HTML. */
+function makePage(folder: string): SpawnSyncReturns<string> {
+  const scene = join(folder, '../mine & yours.ply');
+  copyFileSync(join(root, 'tests/element/browser/fixtures/compass.ply'), scene);
+  return spawnSync(process.execPath, ['scripts/page.mjs', scene, folder, '--no-serve'], {
+    cwd: root,
+    encoding: 'utf8',
+  });
+}
+
+describe('what documents tell people to write', { skip }, () => {
+  const made = { folder: '', index: '' };
+  before(() => {
+    made.folder = join(mkdtempSync(join(tmpdir(), 'page-')), 'my page');
+    const { stderr, status } = makePage(made.folder);
+    assert.equal(status, 0, stderr);
+    made.index = readFileSync(join(made.folder, 'index.html'), 'utf8');
+  });
+  after(() => rmSync(join(made.folder, '..'), { recursive: true }));
+
+  it('TypeScript has the types that it needs', () => {
+    const folder = join(root, '.cache/snippets');
+    rmSync(folder, { recursive: true, force: true });
+    mkdirSync(folder, { recursive: true });
+    writeFileSync(join(folder, 'at-hand.ts'), AT_HAND);
+    // A line for the browser's console has no types.
+    const typed = snippets('ts', 'tsx', 'js').filter(
+      ({ language, code }) => language !== 'js' || code.includes('import '),
+    );
+    const files = typed.map(({ language, code, place }, i) => {
+      const path = join(folder, `${i}.${language === 'js' ? 'ts' : language}`);
+      // Whatever stands in a document is a module, so that its names are its own.
+      writeFileSync(path, `// ${place}\n${code}\nexport {};\n`);
+      return path;
+    });
+    assert.ok(files.length > 10, `${files.length} snippets`);
+    const program = ts.createProgram([join(folder, 'at-hand.ts'), ...files], {
+      target: ts.ScriptTarget.ES2022,
+      module: ts.ModuleKind.ESNext,
+      moduleResolution: ts.ModuleResolutionKind.Bundler,
+      jsx: ts.JsxEmit.ReactJSX,
+      lib: ['lib.es2023.d.ts', 'lib.dom.d.ts', 'lib.dom.iterable.d.ts'],
+      types: ['@webgpu/types', 'react'],
+      strict: true,
+      noEmit: true,
+      skipLibCheck: true,
+    });
+    const found = ts.getPreEmitDiagnostics(program).map(({ file, messageText }) => {
+      const place = file?.text.split('\n', 1)[0].replace('// ', '') ?? '';
+      return `${place}: ${ts.flattenDiagnosticMessageText(messageText, '\n')}`;
+    });
+    assert.deepEqual(found, []);
+  });
+
+  it('Vue compiles what the first page says', () => {
+    const [{ code }] = snippets('vue');
+    const { descriptor, errors } = parse(code);
+    assert.deepEqual(errors, []);
+    const { errors: inTemplate } = compileTemplate({
+      ...{ source: descriptor.template!.content, filename: 'App.vue', id: 'app' },
+      compilerOptions: { isCustomElement: (tag) => tag === 'gaussian-splat' },
+    });
+    assert.deepEqual(inTemplate, []);
+  });
+
+  it('commands are scripts of this repository, and the tarballs to install are all that the element asks for', () => {
+    const { scripts } = JSON.parse(readFileSync(join(root, 'package.json'), 'utf8')) as { scripts: object };
+    const shell = snippets('sh').map(({ code }) => code);
+    const asked = shell.flatMap((code) => [...code.matchAll(/npm run ([\w:-]+)(?! .*-w )/g)].map(([, name]) => name));
+    assert.ok(asked.length > 20, `${asked.length} commands`);
+    assert.deepEqual([...new Set(asked)].filter((name) => !(name in scripts)), []); // prettier-ignore
+    const [, list] = /gaussian-splat-\{([\w,]+)\}/.exec(shell.join('\n'))!;
+    assert.deepEqual(list.split(',').sort(), [...needed('react')].sort());
+  });
+
+  it('npm run page makes a page, and leaves alone one that is there', () => {
+    assert.match(made.index, /<script type="module" src="cdn\/gaussian-splat\.min\.js"><\/script>/);
+    assert.match(made.index, /<gaussian-splat src="mine%20%26%20yours\.ply" alt="mine &amp; yours" camera-controls>/);
+    const files = readdirSync(made.folder, { recursive: true }) as string[];
+    assert.ok(['mine & yours.ply', 'index.html', 'cdn/scene-worker.js'].every((name) => files.includes(name)));
+    assert.deepEqual(files.filter((name) => /\.map$|onnxruntime/.test(name)), []); // prettier-ignore
+    writeFileSync(join(made.folder, 'index.html'), 'mine');
+    const { stdout } = makePage(made.folder);
+    assert.equal(readFileSync(join(made.folder, 'index.html'), 'utf8'), 'mine');
+    assert.match(stdout, /is there already[\s\S]*<script type="module"[\s\S]*<gaussian-splat src=/);
+  });
+
+  it('HTML shows a picture', { timeout: 200_000 }, async () => {
+    const copied = snippets('html').filter(({ code }) => isFull || !code.includes('.onnx'));
+    const all = [...copied, { place: 'npm run page', language: 'html', code: made.index }];
+    assert.ok(all.length > 5, `${all.length} snippets`);
+    const open = await openSite();
+    try {
+      const { tab, faults } = await open.visit('/docs/', { width: 640, height: 900 });
+      const { origin } = new URL(tab.url());
+      await serveScenes(tab, origin);
+      await tab.route(`${origin}/copied.html`, (route) =>
+        route.fulfill({ contentType: 'text/html', body: pageOf(all, origin) }),
+      );
+      await tab.goto(`${origin}/copied.html`);
+      const states = await stateOf(tab);
+      assert.deepEqual(states.map((state, i) => ({ place: all[i]?.place, ...state })), all.map(wantedOf)); // prettier-ignore
+      assert.deepEqual(faults, []);
+    } finally {
+      await open.close();
+    }
+  });
+});
+
+/** Packages that one of ours needs, itself included. */
+function needed(name: string, found = new Set<string>()): Set<string> {
+  found.add(name);
+  const { dependencies = {} } = JSON.parse(readFileSync(join(root, `packages/${name}/package.json`), 'utf8')) as {
+    dependencies?: Record<string, string>;
+  };
+  for (const dependency of Object.keys(dependencies)) {
+    const [, own] = /^@gaussian-splat\/(.+)$/.exec(dependency) ?? [];
+    if (own !== undefined && !found.has(own)) needed(own, found);
+  }
+  return found;
+}
+
+const fixture = (path: string): Buffer => readFileSync(join(root, 'tests', path));
+
+/** Whatever address a snippet names, a small scene of that kind is there. */
+async function serveScenes(tab: Page, origin: string): Promise<void> {
+  const knot = join(root, 'demo/dist/scenes/knot');
+  const bodies = new Map(readdirSync(knot).map((name) => [name, readFileSync(join(knot, name))]));
+  const headers = { 'access-control-allow-origin': '*' };
+  await tab.route(/\/(skull|scene|garden|mine%20%26%20yours)\.(ply|spz|glb)$/, (route) =>
+    route.fulfill({ headers, body: fixture('element/browser/fixtures/compass.ply') }),
+  );
+  await tab.route(/\/copied\/|^https:\/\/[a-z]+\.example\//, async (route) => {
+    const name = new URL(route.request().url()).pathname.split('/').pop()!;
+    if (name.endsWith('.min.js')) return route.fulfill({ headers: { ...headers, location: `${origin}/cdn/${name}` }, status: 302 }); // prettier-ignore
+    return route.fallback();
+  });
+  await tab.route('**/dancer.json', (route) => route.fulfill({ body: bodies.get('knot.json') }));
+  await tab.route('**/frame-*.spz', (route) => route.fulfill({ body: bodies.get(new URL(route.request().url()).pathname.slice(1)) })); // prettier-ignore
+  await tab.route('**/style.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/post-fixed.onnx') }));
+  await tab.route('**/walker.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/packed.onnx') }));
+}
+
+/** All of them on one page, each in a frame of its own document would be a device each: here they share one, as on any page. */
+function pageOf(all: readonly Snippet[], origin: string): string {
+  const sections = all.map(({ code }) => {
+    const body = code
+      .replace(/<!doctype html>|<title>.*?<\/title>|<meta[^>]*>|<style>[\s\S]*?<\/style>/g, '')
+      .replace(/<script[^>]*gaussian-splat\.min\.js[\s\S]*?<\/script>/g, '')
+      // Alone on its page a script means the page's first element; here it means that of its section.
+      .replaceAll(
+        "document.querySelector('gaussian-splat')",
+        "document.currentSection().querySelector('gaussian-splat')",
+      );
+    return `<section>${body}</section>`;
+  });
+  return `<!doctype html><title>Copied</title><link rel="icon" href="data:,">
+    <style>section { display: inline-block } gaussian-splat { display: block; width: 120px; height: 90px }</style>
+    <script type="module" src="${origin}/cdn/gaussian-splat.min.js"></script>
+    <script>
+      const scripts = () => [...document.querySelectorAll('section script[type=module]')];
+      let next = 0;
+      document.currentSection = () => scripts()[next++].closest('section');
+    </script>${sections.join('\n')}`;
+}
+
+interface State {
+  readonly shown: boolean;
+  readonly error: string;
+  readonly covered: boolean;
+  readonly plays: boolean;
+}
+
+const wantedOf = ({ place, code }: Snippet): State & { place: string } => ({
+  ...{ place, shown: true, error: '', covered: true },
+  plays: /\.play\(\)|autoplay/.test(code),
+});
+
+/** Of each section: is its scene on show, is anything in the picture, does its time run. */
+function stateOf(tab: Page): Promise<State[]> {
+  return tab.evaluate(async () => {
+    interface Splat extends HTMLElement {
+      readonly ready: Promise<void>;
+      readonly loaded: boolean;
+      readonly error: { readonly message: string } | null;
+      readonly paused: boolean;
+      toBlob(): Promise<Blob>;
+    }
+    await customElements.whenDefined('gaussian-splat');
+    const states = [];
+    for (const scene of document.querySelectorAll<Splat>('section gaussian-splat')) {
+      scene.scrollIntoView();
+      await scene.ready;
+      const picture = await createImageBitmap(await scene.toBlob());
+      const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d')!;
+      context.drawImage(picture, 0, 0);
+      const { data } = context.getImageData(0, 0, picture.width, picture.height);
+      const covered = data.some((value, i) => i % 4 === 3 && value > 128);
+      states.push({ shown: scene.loaded, error: scene.error?.message ?? '', covered, plays: !scene.paused });
+    }
+    return states;
+  });
+}
