@@ -321,8 +321,10 @@ export class GaussianSplatElement extends ViewingMethods {
 
   #seekToAttribute(): void {
     const seconds = this.#startTime;
-    if (Number.isFinite(seconds)) this.currentTime = seconds;
-    else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
+    if (Number.isFinite(seconds)) {
+      // A scene that is still to come begins there anyway.
+      if (this.stage.playback.canPlay && !this.stage.isLeavingFor(this)) this.currentTime = seconds;
+    } else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
   }
 
   #warn(sentence: string): void {

@@ -165,6 +165,19 @@ export class Stage {
     this.#source = source;
     this.#live.post.want(addressesOf(source.postprocess, this.#options.services().urlModifier));
     this.#requestScene();
+    if (!this.isLeavingFor(source)) this.playback.keepScene();
+  }
+
+  /** Whether a source asks for another scene than the one that is shown or loaded. */
+  isLeavingFor(source: Source): boolean {
+    const { attributes, services } = this.#options;
+    return this.scene.isOther(requestOf(source, attributes(), services().urlModifier));
+  }
+
+  /** Puts the clock of a scene to a time: the one on show, or the next if `source` asks for another. */
+  seek(seconds: number, source: Source): void {
+    if (this.isLeavingFor(source)) this.playback.startNextAt(seconds);
+    else this.playback.currentTime = seconds;
   }
 
   /** Somebody wants the time to run: the poster gives way, and a scene out of sight is loaded. */

@@ -113,13 +113,18 @@ export class SceneController implements ReactiveController {
     return new Promise((resolve) => this.#waiters.push(resolve));
   }
 
+  /** Whether a request, null for none, is for another scene than the last one. */
+  isOther(request: SceneRequest | null): boolean {
+    return request === null ? this.#request !== null : !isSame(request, this.#request);
+  }
+
   /**
    * The scene that ought to be shown, or null for none. Safe to call as often as one likes: only a real change acts.
    * @param mayStart false while a lazy element is out of sight.
    */
   want(request: SceneRequest | null, mayStart: boolean): void {
     if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
-    if (!isSame(request, this.#request)) {
+    if (this.isOther(request)) {
       const isSwap = this.#request !== null;
       this.#abort();
       this.#submissions = 1;
