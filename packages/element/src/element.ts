@@ -45,6 +45,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart poster-button - The button around it with `reveal="manual"`.
  * @csspart poster-cue - The sign in the middle of that button.
  * @csspart prompt - The default interaction prompt.
+ * @csspart pause-button - The visitor's button for what `auto-rotate` and `autoplay` move.
  * @csspart progress-track - The progress bar's ground.
  * @csspart progress-bar - The progress bar.
  * @csspart fallback - The default text where there is no WebGPU.
@@ -57,6 +58,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty [--interaction-prompt-display=flex] - `none` hides the interaction prompt.
  * @cssproperty --interaction-prompt-background - Ground of the default prompt.
  * @cssproperty --interaction-prompt-color - Its colour.
+ * @cssproperty [--pause-button-display=block] - `none` takes the pause button away: for pages that bring a control of their own.
  * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
  * @cssproperty [--max-hotspot-opacity=1] - Opacity of the others.
  * @cssproperty --message-background - Ground of the default texts.
@@ -232,7 +234,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   protected override render(): TemplateResult {
     const { scene, reveal, behaviours, hotspots, progress } = this.stage;
-    const { prompt, promptWiggles, announcer } = behaviours;
+    const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
       controls: this.cameraControls,
@@ -245,6 +247,8 @@ export class GaussianSplatElement extends ViewingMethods {
       progress,
       error: scene.error,
       prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
+      motion: motion.switch,
+      onMotion: this.#onMotion,
       strings: this.#strings,
       spoken: scene.error ? this.#spokenError(scene.error) : announcer.text,
       hotspots: hotspots.names,
@@ -288,6 +292,8 @@ export class GaussianSplatElement extends ViewingMethods {
     this.dismissPoster();
     void this.updateComplete.then(() => this.focus());
   };
+
+  readonly #onMotion = (): void => void this.stage.behaviours.motion.toggle();
 
   /** Attributes count at once for those who call a method right after setting one. */
   protected override applyAttributes(): void {

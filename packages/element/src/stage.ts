@@ -109,7 +109,7 @@ export class Stage {
     new InputController(host, options.surface, options.input, {
       act: (action) => this.behaviours.act(action),
       pick: (x, y) => void this.#retarget(x, y),
-      togglePlayback: () => this.#togglePlayback(),
+      toggleMotion: () => this.#toggleMotion(),
     });
     const onPageVisibility = (): void => this.playback.suspend();
     host.addController({
@@ -286,11 +286,13 @@ export class Stage {
   }
 
   #createBehaviours(): Behaviours {
-    const { attributes, autoRotates, strings, surface, input } = this.#options;
+    const { attributes, autoRotates, autoplays, strings, surface, input } = this.#options;
     return new Behaviours(this.#host, this.camera, {
       attributes,
       hasControls: () => input().enabled,
       autoRotates,
+      autoplays,
+      playback: this.playback,
       strings,
       isOnShow: () => !this.reveal.isCovered && this.#visibility.isVisible,
       surface,
@@ -325,11 +327,12 @@ export class Stage {
   #onRevealed(): void {
     this.#dispatch(new Event('poster-dismissed'));
     const mayPlay = this.playback.canPlay && this.playback.paused && !prefersReducedMotion();
-    if (this.#options.autoplays() && mayPlay) this.playback.play();
+    if (this.#options.autoplays() && mayPlay && !this.behaviours.motion.isHeld) this.playback.play();
   }
 
-  /** A player's controls around the element have keys of their own. */
-  #togglePlayback(): boolean {
+  /** The space bar, for all that moves. A player's controls around the element have keys of their own. */
+  #toggleMotion(): boolean {
+    if (this.behaviours.motion.toggle()) return true;
     if (!this.playback.canPlay || this.#host.slot === 'media') return false;
     if (this.playback.paused) this.playback.play();
     else this.playback.pause();

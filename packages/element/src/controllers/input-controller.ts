@@ -27,7 +27,7 @@ export interface InputListener {
   /** A double click or a double tap, in CSS pixels of the page. */
   readonly pick: (clientX: number, clientY: number) => void;
   /** The space bar; false if it means nothing here. */
-  readonly togglePlayback: () => boolean;
+  readonly toggleMotion: () => boolean;
 }
 
 const LEFT_BUTTON = 0;
@@ -174,7 +174,7 @@ export class InputController implements ReactiveController {
 
   readonly #onKey = (event: KeyboardEvent): void => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (event.key === ' ' && !event.repeat && this.#listener.togglePlayback()) return event.preventDefault();
+    if (event.key === ' ' && !event.repeat && this.#listener.toggleMotion()) return event.preventDefault();
     const action = keyOf(event.key, event.shiftKey);
     if (action !== null && this.#perform(action)) event.preventDefault();
   };
