@@ -146,7 +146,10 @@ export class GaussianSplatElement extends ViewingMethods {
     return this.updateComplete.then(() => this.stage.scene.settled);
   }
 
-  /** Share of the scene that has been loaded, 0..1; 0 too while its size is not known. */
+  /**
+   * Share of the loading that is done, 0..1; 0 too while its size is not known. Of a generator: the bytes of its models and of ONNX Runtime are three
+   * quarters, warming up is the rest.
+   */
   get progress(): number {
     return this.loaded ? 1 : (this.stage.progress ?? 0);
   }

@@ -34,7 +34,7 @@ export class Stage {
   readonly behaviours: Behaviours;
   readonly hotspots: HotspotController;
   readonly queries: SceneQueries;
-  /** Share of the bytes that have arrived, 0..1; null while their number is not known. */
+  /** Share of the loading that is done, 0..1; null while it is not known. */
   progress: number | null = null;
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #options: StageOptions;
@@ -259,7 +259,7 @@ export class Stage {
         },
         listeners: this.#live.listeners,
       }),
-      onProgress: (loaded, total) => this.#onProgress(loaded, total),
+      onProgress: (...progress) => this.#onProgress(...progress),
       onStart: () => this.#dispatch(new Event('loadstart')),
       onLoad: (url) => this.#onLoad(url),
       onEmptied: () => {
@@ -357,9 +357,9 @@ export class Stage {
     this.#view.requestFrame();
   }
 
-  #onProgress(loaded: number, total: number | undefined): void {
+  #onProgress(loaded: number, total: number | undefined, share = total ? loaded / total : undefined): void {
     this.#bytes = [loaded, total];
-    this.progress = total ? Math.min(1, loaded / total) : null;
+    this.progress = share === undefined ? null : Math.min(1, share);
     this.#host.requestUpdate();
     const lengthComputable = total !== undefined;
     this.#dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));

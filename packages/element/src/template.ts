@@ -14,7 +14,7 @@ export interface TemplateModel {
   /** The poster waits for a person: what dismisses it. */
   readonly onReveal: (() => void) | null;
   readonly isLoading: boolean;
-  /** Share of the bytes that have arrived, 0..1; null while their number is not known. */
+  /** Share of the loading that is done, 0..1; null while it is not known. */
   readonly progress: number | null;
   readonly error: ElementError | null;
   /** How people learn that they can move the scene. */
