@@ -7,6 +7,7 @@ import { AnnouncerController } from './controllers/announcer-controller.js';
 import { AutoRotateController } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import { FlyController } from './controllers/fly-controller.js';
+import { MotionController, type MotionOptions } from './controllers/motion-controller.js';
 import { prefersReducedMotion, type Mover } from './controllers/mover.js';
 import { PromptController } from './controllers/prompt-controller.js';
 
@@ -15,6 +16,8 @@ export interface BehaviourOptions {
   readonly attributes: () => Attributes;
   readonly hasControls: () => boolean;
   readonly autoRotates: () => boolean;
+  readonly autoplays: () => boolean;
+  readonly playback: MotionOptions['playback'];
   readonly strings: () => SpokenStrings;
   /** The scene is on show, in sight, and no poster covers it. */
   readonly isOnShow: () => boolean;
@@ -26,6 +29,7 @@ export interface BehaviourOptions {
 export class Behaviours {
   readonly prompt: PromptController;
   readonly announcer: AnnouncerController;
+  readonly motion: MotionController;
   readonly #camera: CameraController;
   readonly #options: BehaviourOptions;
   readonly #autoRotate: AutoRotateController;
@@ -36,8 +40,15 @@ export class Behaviours {
     this.#options = options;
     const { attributes, requestFrame, surface } = options;
     const turnBy = (theta: number): void => camera.turnBy(theta);
+    this.motion = new MotionController(host, {
+      ...options,
+      rotates: options.autoRotates,
+      prefersReducedMotion,
+      startTurning: () => this.#autoRotate.start(),
+    });
+    const mayMove = (): boolean => options.isOnShow() && !prefersReducedMotion() && !this.motion.isHeld;
     this.#autoRotate = new AutoRotateController(host, {
-      mayTurn: () => options.autoRotates() && options.isOnShow() && !prefersReducedMotion() && !hasKeyboard(surface()),
+      mayTurn: () => options.autoRotates() && mayMove() && !hasKeyboard(surface()),
       delayMs: () => attributes().autoRotateDelay,
       radiansPerSecond: () => attributes().rotationPerSecond,
       turnBy,

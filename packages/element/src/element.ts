@@ -45,6 +45,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart poster-button - The button around it with `reveal="manual"`.
  * @csspart poster-cue - The sign in the middle of that button.
  * @csspart prompt - The default interaction prompt.
+ * @csspart pause-button - The visitor's button for what `auto-rotate` and `autoplay` move.
  * @csspart progress-track - The progress bar's ground.
  * @csspart progress-bar - The progress bar.
  * @csspart fallback - The default text where there is no WebGPU.
@@ -57,6 +58,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty [--interaction-prompt-display=flex] - `none` hides the interaction prompt.
  * @cssproperty --interaction-prompt-background - Ground of the default prompt.
  * @cssproperty --interaction-prompt-color - Its colour.
+ * @cssproperty [--pause-button-display=block] - `none` takes the pause button away: for pages that bring a control of their own.
  * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
  * @cssproperty [--max-hotspot-opacity=1] - Opacity of the others.
  * @cssproperty --message-background - Ground of the default texts.
@@ -144,7 +146,10 @@ export class GaussianSplatElement extends ViewingMethods {
     return this.updateComplete.then(() => this.stage.scene.settled);
   }
 
-  /** Share of the scene that has been loaded, 0..1; 0 too while its size is not known. */
+  /**
+   * Share of the loading that is done, 0..1; 0 too while its size is not known. Of a generator: the bytes of its models and of ONNX Runtime are three
+   * quarters, warming up is the rest.
+   */
   get progress(): number {
     return this.loaded ? 1 : (this.stage.progress ?? 0);
   }
@@ -232,7 +237,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   protected override render(): TemplateResult {
     const { scene, reveal, behaviours, hotspots, progress } = this.stage;
-    const { prompt, promptWiggles, announcer } = behaviours;
+    const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
       controls: this.cameraControls,
@@ -245,6 +250,8 @@ export class GaussianSplatElement extends ViewingMethods {
       progress,
       error: scene.error,
       prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
+      motion: motion.switch,
+      onMotion: this.#onMotion,
       strings: this.#strings,
       spoken: scene.error ? this.#spokenError(scene.error) : announcer.text,
       hotspots: hotspots.names,
@@ -289,6 +296,8 @@ export class GaussianSplatElement extends ViewingMethods {
     void this.updateComplete.then(() => this.focus());
   };
 
+  readonly #onMotion = (): void => void this.stage.behaviours.motion.toggle();
+
   /** Attributes count at once for those who call a method right after setting one. */
   protected override applyAttributes(): void {
     const before = this.#attributes;
@@ -321,8 +330,10 @@ export class GaussianSplatElement extends ViewingMethods {
 
   #seekToAttribute(): void {
     const seconds = this.#startTime;
-    if (Number.isFinite(seconds)) this.currentTime = seconds;
-    else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
+    if (Number.isFinite(seconds)) {
+      // A scene that is still to come begins there anyway.
+      if (this.stage.playback.canPlay && !this.stage.isLeavingFor(this)) this.currentTime = seconds;
+    } else if (this.time) this.#warn(`<gaussian-splat>: time expects seconds, found ${JSON.stringify(this.time)}.`);
   }
 
   #warn(sentence: string): void {

@@ -14,13 +14,14 @@ export abstract class MediaProperties extends SplatProperties {
   /** Fulfils when there is nothing left to wait for. */
   abstract get ready(): Promise<void>;
 
-  /** Seconds into a scene that moves; setting it seeks. */
+  /** Seconds into a scene that moves; setting it seeks. Set before there is one, or just after another `src`, it is where that one begins. */
   get currentTime(): number {
-    return this.stage.playback.currentTime;
+    const { playback } = this.stage;
+    return this.isUpdatePending && this.stage.isLeavingFor(this) ? playback.nextStart : playback.currentTime;
   }
 
   set currentTime(seconds: number) {
-    this.stage.playback.currentTime = seconds;
+    this.stage.seek(seconds, this);
   }
 
   /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */

@@ -136,7 +136,7 @@ export class SplatProperties extends LitElement {
   declare interactionPromptStyle: 'basic' | 'wiggle' | null;
   /** Rest before the prompt is shown, in milliseconds; default 3000. */
   declare interactionPromptThreshold: number | string | null;
-  /** Keeps the camera's target where it is on a double click, which otherwise picks the point to turn around. */
+  /** Keeps the camera's target where it is on a double click or a double tap, which otherwise pick the point to turn around. */
   declare disableTap: boolean;
   /** Plays a scene that moves as soon as it is on show; not for people who want less motion. */
   declare autoplay: boolean;

@@ -42,7 +42,7 @@ export interface StageOptions {
   /** The attribute `time`, in seconds; 0 without. */
   readonly startTime: () => number;
   readonly autoRotates: () => boolean;
-  /** A double click picks the point to turn around. */
+  /** A double click or a double tap picks the point to turn around. */
   readonly retargets: () => boolean;
   readonly strings: () => SpokenStrings;
   readonly liveValues: () => Omit<LiveState, 'timeSeconds'>;

@@ -34,7 +34,7 @@ export class Stage {
   readonly behaviours: Behaviours;
   readonly hotspots: HotspotController;
   readonly queries: SceneQueries;
-  /** Share of the bytes that have arrived, 0..1; null while their number is not known. */
+  /** Share of the loading that is done, 0..1; null while it is not known. */
   progress: number | null = null;
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #options: StageOptions;
@@ -109,7 +109,7 @@ export class Stage {
     new InputController(host, options.surface, options.input, {
       act: (action) => this.behaviours.act(action),
       pick: (x, y) => void this.#retarget(x, y),
-      togglePlayback: () => this.#togglePlayback(),
+      toggleMotion: () => this.#toggleMotion(),
     });
     const onPageVisibility = (): void => this.playback.suspend();
     host.addController({
@@ -165,6 +165,19 @@ export class Stage {
     this.#source = source;
     this.#live.post.want(addressesOf(source.postprocess, this.#options.services().urlModifier));
     this.#requestScene();
+    if (!this.isLeavingFor(source)) this.playback.keepScene();
+  }
+
+  /** Whether a source asks for another scene than the one that is shown or loaded. */
+  isLeavingFor(source: Source): boolean {
+    const { attributes, services } = this.#options;
+    return this.scene.isOther(requestOf(source, attributes(), services().urlModifier));
+  }
+
+  /** Puts the clock of a scene to a time: the one on show, or the next if `source` asks for another. */
+  seek(seconds: number, source: Source): void {
+    if (this.isLeavingFor(source)) this.playback.startNextAt(seconds);
+    else this.playback.currentTime = seconds;
   }
 
   /** Somebody wants the time to run: the poster gives way, and a scene out of sight is loaded. */
@@ -246,7 +259,7 @@ export class Stage {
         },
         listeners: this.#live.listeners,
       }),
-      onProgress: (loaded, total) => this.#onProgress(loaded, total),
+      onProgress: (...progress) => this.#onProgress(...progress),
       onStart: () => this.#dispatch(new Event('loadstart')),
       onLoad: (url) => this.#onLoad(url),
       onEmptied: () => {
@@ -273,11 +286,13 @@ export class Stage {
   }
 
   #createBehaviours(): Behaviours {
-    const { attributes, autoRotates, strings, surface, input } = this.#options;
+    const { attributes, autoRotates, autoplays, strings, surface, input } = this.#options;
     return new Behaviours(this.#host, this.camera, {
       attributes,
       hasControls: () => input().enabled,
       autoRotates,
+      autoplays,
+      playback: this.playback,
       strings,
       isOnShow: () => !this.reveal.isCovered && this.#visibility.isVisible,
       surface,
@@ -312,11 +327,12 @@ export class Stage {
   #onRevealed(): void {
     this.#dispatch(new Event('poster-dismissed'));
     const mayPlay = this.playback.canPlay && this.playback.paused && !prefersReducedMotion();
-    if (this.#options.autoplays() && mayPlay) this.playback.play();
+    if (this.#options.autoplays() && mayPlay && !this.behaviours.motion.isHeld) this.playback.play();
   }
 
-  /** A player's controls around the element have keys of their own. */
-  #togglePlayback(): boolean {
+  /** The space bar, for all that moves. A player's controls around the element have keys of their own. */
+  #toggleMotion(): boolean {
+    if (this.behaviours.motion.toggle()) return true;
     if (!this.playback.canPlay || this.#host.slot === 'media') return false;
     if (this.playback.paused) this.playback.play();
     else this.playback.pause();
@@ -341,9 +357,9 @@ export class Stage {
     this.#view.requestFrame();
   }
 
-  #onProgress(loaded: number, total: number | undefined): void {
+  #onProgress(loaded: number, total: number | undefined, share = total ? loaded / total : undefined): void {
     this.#bytes = [loaded, total];
-    this.progress = total ? Math.min(1, loaded / total) : null;
+    this.progress = share === undefined ? null : Math.min(1, share);
     this.#host.requestUpdate();
     const lengthComputable = total !== undefined;
     this.#dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));

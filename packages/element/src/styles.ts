@@ -111,6 +111,24 @@ export const styles = css`
     left: 50%;
     translate: -50% -50%;
   }
+  [part='pause-button'] {
+    display: var(--pause-button-display, block);
+    position: absolute;
+    inset-block-end: 8px;
+    inset-inline-end: 8px;
+    padding: 8px;
+    border: 0;
+    border-radius: 50%;
+    line-height: 0;
+    cursor: pointer;
+    background: var(--interaction-prompt-background, rgb(0 0 0 / 0.45));
+    color: var(--interaction-prompt-color, rgb(255 255 255));
+  }
+  @media (hover: hover) {
+    :host(:not(:hover, :focus-within)) [part='pause-button'] {
+      opacity: 0;
+    }
+  }
   [part='prompt'].wiggle {
     animation: wiggle 4.5s;
   }

@@ -14,11 +14,14 @@ export interface TemplateModel {
   /** The poster waits for a person: what dismisses it. */
   readonly onReveal: (() => void) | null;
   readonly isLoading: boolean;
-  /** Share of the bytes that have arrived, 0..1; null while their number is not known. */
+  /** Share of the loading that is done, 0..1; null while it is not known. */
   readonly progress: number | null;
   readonly error: ElementError | null;
   /** How people learn that they can move the scene. */
   readonly prompt: 'none' | 'basic' | 'wiggle';
+  /** What the button for all that moves by itself does; `none` where nothing does. */
+  readonly motion: 'none' | 'pause' | 'play';
+  readonly onMotion: () => void;
   /** Words of the page in place of the English ones. */
   readonly strings: SpokenStrings;
   /** What screen readers are told: of an error, else of the camera. */
@@ -27,10 +30,12 @@ export interface TemplateModel {
   readonly hotspots: readonly string[];
 }
 
+const PLAY_SIGN = 'M8 5v14l11-7z';
+
 /** The element's shadow tree. */
 export function template(model: TemplateModel): TemplateResult {
   return html`
-    ${view(model)} ${hotspots(model)} ${prompt(model)} ${poster(model)}
+    ${view(model)} ${hotspots(model)} ${prompt(model)} ${pauseButton(model)} ${poster(model)}
     ${model.isLoading ? progressBar(model) : nothing} ${model.error ? message(model.error, model.strings) : nothing}
     <div class="for-screen-readers" role="status" lang=${languageOf(model.strings) ?? nothing}>${model.spoken}</div>
   `;
@@ -89,6 +94,22 @@ function prompt({ prompt, strings }: TemplateModel): TemplateResult | typeof not
   </div>`;
 }
 
+/** Seen while the pointer is over the scene or the keyboard in it, and always where nothing hovers. */
+function pauseButton({ motion, onMotion, strings }: TemplateModel): TemplateResult | typeof nothing {
+  if (motion === 'none') return nothing;
+  return html`<button
+    type="button"
+    part="pause-button"
+    aria-label=${word(strings, motion)}
+    lang=${languageOf(strings) ?? nothing}
+    @click=${onMotion}
+  >
+    <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true" fill="currentColor">
+      <path d=${motion === 'pause' ? 'M6 5h4v14H6zM14 5h4v14h-4z' : PLAY_SIGN} />
+    </svg>
+  </button>`;
+}
+
 /**
  * The poster is scenery of the same scene, so it needs no text of its own. One that waits for a person is a button around the image, the page's
  * own included, with a sign that there is something to start.
@@ -115,7 +136,7 @@ function revealButton(
     ${content}
     <span part="poster-cue">
       <svg viewBox="0 0 24 24" width="44" height="44" aria-hidden="true" fill="currentColor">
-        <path d="M8 5v14l11-7z" />
+        <path d=${PLAY_SIGN} />
       </svg>
     </span>
   </button>`;

@@ -15,6 +15,8 @@ export const WORDS = {
   'interaction-prompt': 'Drag to look around',
   show: 'Show …',
   loading: 'Loading the 3D scene',
+  pause: 'Stop the motion',
+  play: 'Start the motion',
   details: 'Details',
 } as const;
 

@@ -28,6 +28,11 @@ export interface GeneratedFrame {
 }
 
 export interface GeneratorOptions extends AcquireOptions {
+  /**
+   * Bytes so far of all models and of the runtime, if that is not there yet, and of how many. Goes on after {@link Generator.open}, until the
+   * runtime has come with the first run; warming up comes after that.
+   */
+  readonly onProgress?: AcquireOptions['onProgress'];
   readonly onFrame?: (frame: GeneratedFrame) => void;
   /** A run failed; what was shown before stays. The next request tries again. */
   readonly onError?: (error: unknown) => void;

@@ -198,6 +198,78 @@ describe('auto-rotate', () => {
   });
 });
 
+describe('what moves by itself', () => {
+  const rotating = { 'auto-rotate': '', 'auto-rotate-delay': '60', 'rotation-per-second': '60deg' };
+  const MOVIE = '/net/sequence/movie.json?count=600&fps=2';
+  const buttonOf = (element: GaussianSplatElement): HTMLElement | null => partOf(element, '[part=pause-button]');
+  const does = (element: GaussianSplatElement): string | null => buttonOf(element)?.getAttribute('aria-label') ?? null;
+
+  async function isMoving(element: GaussianSplatElement): Promise<boolean> {
+    const before = [theta(element), element.currentTime];
+    await delay(250);
+    return String(before) !== String([theta(element), element.currentTime]);
+  }
+
+  it('has a button that stops it and starts it again, seen under the pointer and the keyboard', async () => {
+    await showLoaded();
+    const element = await showLoaded(rotating);
+    await until(() => theta(element) < -1, 'the camera to turn');
+    const button = buttonOf(element);
+    assert(button, 'a button');
+    const opacity = (): string => getComputedStyle(button).opacity;
+    assertEqual([does(element), opacity()], ['Stop the motion', '0'], 'at first');
+    await sendKeys({ press: 'Tab' });
+    assertEqual([element.shadowRoot?.activeElement, opacity()], [button, '1'], 'under the keyboard');
+    await sendKeys({ press: 'Space' });
+    await element.updateComplete;
+    assertEqual([does(element), await isMoving(element)], ['Start the motion', false], 'stopped');
+    button.blur();
+    assertEqual(opacity(), '0', 'without the keyboard');
+    const { x, y, width, height } = button.getBoundingClientRect();
+    assert(width >= 24 && height >= 24, `${width} x ${height} px`);
+    // A start by hand does not wait.
+    element.autoRotateDelay = 60_000;
+    await sendMouse({ type: 'click', position: [Math.round(x + width / 2), Math.round(y + height / 2)] });
+    await element.updateComplete;
+    assertEqual([does(element), opacity(), await isMoving(element)], ['Stop the motion', '1', true], 'started');
+    element.style.setProperty('--pause-button-display', 'none');
+    assertEqual(getComputedStyle(button).display, 'none', 'where the page brings its own');
+    element.autoRotate = false;
+    await element.updateComplete;
+    assertEqual(does(element), null, 'nothing moves by itself');
+  });
+
+  it('stops by the space bar, and stays so with another scene', async () => {
+    const element = await showLoaded({ src: MOVIE, autoplay: '', 'camera-controls': '', ...rotating });
+    await until(() => element.currentTime > 0 && theta(element) < 0, 'time and camera to go on');
+    element.focus();
+    await sendKeys({ press: 'Space' });
+    await element.updateComplete;
+    assertEqual([element.paused, does(element)], [true, 'Start the motion'], 'paused, button');
+    partOf(element, '#view')?.blur();
+    assert(!(await isMoving(element)), 'all stands still');
+    element.src = `${MOVIE}&another`;
+    await nextEvent(element, 'load');
+    assert(element.paused && !(await isMoving(element)), 'and stays so');
+    buttonOf(element)?.click();
+    await until(() => element.currentTime > 0, 'the time to go on');
+  });
+
+  it("what a script plays, a still scene, and a player's scene have no button; less motion has one to start", async () => {
+    const elements = [await showLoaded({ src: MOVIE }), await showLoaded({ src: MOVIE, slot: 'media', autoplay: '' })];
+    await elements[0].play();
+    elements.push(await showLoaded({ autoplay: '' }));
+    assertEqual(elements.map(does), [null, null, null], 'buttons');
+    await emulateMedia({ reducedMotion: 'reduce' });
+    const calm = await showLoaded({ src: MOVIE, autoplay: '', ...rotating });
+    await calm.updateComplete;
+    assertEqual([calm.paused, does(calm)], [true, 'Start the motion'], 'for less motion');
+    buttonOf(calm)?.click();
+    await until(() => !calm.paused, 'a scene that was asked for');
+    assertEqual(theta(calm), 0, 'which the camera does not turn around');
+  });
+});
+
 describe('fly', () => {
   it('W moves the camera ahead, D to the right, and a drag looks around from where it is', async () => {
     const element = await showLoaded({

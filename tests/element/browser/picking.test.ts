@@ -15,7 +15,7 @@ import {
   submits,
   until,
 } from './support/harness.js';
-import { isGreen, isRed, screenOf } from './support/screen.js';
+import { isGreen, isRed, screenOf, sendTouch } from './support/screen.js';
 
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
 
@@ -116,6 +116,43 @@ describe('positionFromPoint', () => {
     await element.updateComplete;
     await doubleClick();
     near(element.getCameraTarget().x, 1, 0.03, 'without');
+  });
+
+  it('a double tap picks it as well, once, and taps that are none do not', async () => {
+    const element = await compass({ 'camera-controls': '', 'disable-tap': '' });
+    const [x, y] = pageOf(element, [1, 0, 0]);
+    const tap = async (dx = 0): Promise<void> => {
+      await sendTouch('touchStart', [{ x: x + dx, y, id: 1 }]);
+      await sendTouch('touchEnd', []);
+    };
+    let picks = 0;
+    const { queries } = (element as unknown as { stage: { queries: { positionFromPoint: () => Promise<unknown> } } })
+      .stage;
+    const ask = queries.positionFromPoint.bind(queries);
+    queries.positionFromPoint = (...place) => (picks++, ask(...place));
+    await tap();
+    await tap();
+    await delay(400);
+    near(element.getCameraTarget().x, 0, 1e-9, 'with disable-tap');
+    element.disableTap = false;
+    await element.updateComplete;
+    for (const [pause, dx] of [
+      [500, 0],
+      [0, 60],
+    ]) {
+      picks = 0;
+      await tap();
+      await delay(pause);
+      await tap(dx);
+      await delay(500);
+      assertEqual(picks, 0, `picks of taps ${pause} ms and ${dx} px apart`);
+    }
+    await tap();
+    await tap();
+    await until(() => picks > 0, 'a pick');
+    await delay(500);
+    assertEqual(picks, 1, 'picks');
+    near(element.getCameraTarget().x, 1, 0.03, 'where it was tapped');
   });
 });
 

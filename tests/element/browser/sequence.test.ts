@@ -191,6 +191,104 @@ describe('the clock', () => {
   });
 });
 
+/** A second and a fifth of silence, for the platform's own element. */
+function silence(): string {
+  const [rate, count] = [8_000, 9_600];
+  const bytes = new DataView(new ArrayBuffer(44 + count));
+  const write = (at: number, text: string): void =>
+    [...text].forEach((c, i) => bytes.setUint8(at + i, c.charCodeAt(0)));
+  write(0, 'RIFF');
+  bytes.setUint32(4, 36 + count, true);
+  write(8, 'WAVEfmt ');
+  for (const [at, value] of [
+    [16, 16],
+    [20, 0x10001],
+    [24, rate],
+    [28, rate],
+    [32, 0x80001],
+  ])
+    bytes.setUint32(at, value, true);
+  write(36, 'data');
+  bytes.setUint32(40, count, true);
+  for (let i = 0; i < count; i++) bytes.setUint8(44 + i, 128);
+  return URL.createObjectURL(new Blob([bytes], { type: 'audio/wav' }));
+}
+
+type Timed = Pick<HTMLMediaElement, 'currentTime' | 'readyState' | 'seeking'> & { src: string | null };
+
+/** What a page may say of a source and a time within one task, and where the clock is then and in the end. */
+const SCRIPTS: Readonly<Record<string, (media: Timed, a: string, b: string) => void>> = {
+  'another src, then a time': (media, _, b) => {
+    media.src = b;
+    media.currentTime = 0.5;
+  },
+  'a time, then another src': (media, _, b) => {
+    media.currentTime = 0.5;
+    media.src = b;
+  },
+  'a time beyond the end': (media, _, b) => {
+    media.src = b;
+    media.currentTime = 99;
+  },
+  'another src, a time, and the first src again': (media, a, b) => {
+    media.src = b;
+    media.currentTime = 0.5;
+    media.src = a;
+  },
+  'a source that nobody waits for': (media, a, b) => {
+    media.src = b;
+    media.currentTime = 0.5;
+    media.src = `${b}#`;
+    media.currentTime = 0.75;
+    media.src = a;
+  },
+};
+
+describe('a source and a time in one task', () => {
+  async function timesOf(media: Timed, a: string, b: string): Promise<unknown[]> {
+    const told: unknown[] = [];
+    const settled = (): Promise<void> => until(() => media.readyState > 0 && !media.seeking, 'the source');
+    for (const isFirst of [true, false]) {
+      for (const [name, script] of Object.entries(SCRIPTS)) {
+        media.src = isFirst ? null : a;
+        if (isFirst && 'load' in media) (media as HTMLAudioElement).removeAttribute('src');
+        await frames(2);
+        if (!isFirst) await settled();
+        script(media, a, b);
+        const now = media.currentTime;
+        await frames(2);
+        await settled();
+        told.push([name, isFirst, now, media.currentTime]);
+      }
+    }
+    return told;
+  }
+
+  it('are those of the audio element', async () => {
+    const [a, b] = [silence(), silence()];
+    const expected = await timesOf(new Audio(), a, b);
+    // Another element keeps the device: a new one takes seconds here.
+    await showLoaded();
+    const element = show({});
+    assertEqual(await timesOf(element, MOVIE, `${MOVIE}?another`), expected, 'times');
+  });
+
+  it('whichever of the attributes src and time comes first', async () => {
+    const element = await showLoaded({ src: MOVIE });
+    let seeks = 0;
+    element.addEventListener('seeking', () => seeks++);
+    for (const order of [
+      ['src', 'time'],
+      ['time', 'src'],
+    ]) {
+      const values = { src: `${MOVIE}?${order[0]}`, time: order[0] === 'src' ? '0.25' : '0.35' };
+      for (const name of order as (keyof typeof values)[]) element.setAttribute(name, values[name]);
+      await nextEvent(element, 'load');
+      assertEqual([element.currentTime, seeks], [Number(values.time), 0], `${order.join(', then ')}: time, seeks`);
+    }
+  });
+});
+
 describe('play()', () => {
   it('loads a scene that waits for a click, or for somebody to see it', async () => {
     const covered = show({ src: MOVIE, reveal: 'manual' });

@@ -4,6 +4,7 @@ import { GaussianSplatElement, type ElementError } from '@gaussian-splat/element
 import {
   assert,
   assertEqual,
+  claimFault,
   COMPASS,
   delay,
   devices,
@@ -13,9 +14,9 @@ import {
   until,
 } from '../../element/browser/support/harness.js';
 import { screenOf } from '../../element/browser/support/screen.js';
-import { calls, FIXTURES, RUNTIME } from './support.js';
+import { calls, FIXTURES } from './support.js';
 
-GaussianSplatElement.runtimeLocation = RUNTIME;
+GaussianSplatElement.runtimeLocation = '/net/compressed/onnxruntime-web/dist/';
 
 const BALL = `${FIXTURES}packed.onnx`;
 const OUTPUTS = { layout: 'packed', gaussians: 'gaussians', color: 'rgb', opacityActivation: 'linear' };
@@ -24,6 +25,8 @@ const contractWith = (more: object, inputs: object = { time: { role: 'time', uni
 
 const resources = (part: string): number =>
   performance.getEntriesByType('resource').filter(({ name }) => name.includes(part)).length;
+
+const sizeOf = async (url: string): Promise<number> => (await (await fetch(url)).arrayBuffer()).byteLength;
 
 /** Covered pixels of the picture on the screen, and where their middle is. */
 async function pictureOf(element: GaussianSplatElement): Promise<{ count: number; x: number; y: number }> {
@@ -37,6 +40,46 @@ describe('a generator in the element', () => {
       [resources('onnxruntime-web'), resources('open-live-model'), resources('packages/generator')].slice(0, 2),
       [0, 0],
     );
+  });
+
+  it('has a progress of model, runtime and warming up, that is not full before they are done', async () => {
+    const watch = (element: GaussianSplatElement) => {
+      const told: { loaded: number; total: number; share: number; bar: number }[] = [];
+      element.addEventListener('progress', ({ loaded, total }) => {
+        void element.updateComplete.then(() => {
+          const bar = element.shadowRoot?.querySelector('[role=progressbar]')?.getAttribute('aria-valuenow');
+          told.push({ loaded, total, share: element.progress, bar: Number(bar ?? NaN) });
+        });
+      });
+      return told;
+    };
+    const element = show({ src: BALL });
+    const told = watch(element);
+    await element.ready;
+    assert(element.loaded, String(element.error?.message));
+    const [model, runtime] = [await sizeOf(BALL), 'Suspending' in WebAssembly ? 16_758_545 : 26_781_914];
+    const known = told.filter(({ total }) => total > 0);
+    assertEqual([...new Set(known.map(({ total }) => total))], [model + runtime], 'bytes in all');
+    const between = known.filter(({ loaded }) => loaded > model + runtime / 10 && loaded < runtime);
+    assert(between.length > 0, `none while the runtime comes: ${known.map(({ loaded }) => loaded).join(' ')}`);
+    assert(
+      known.every(({ share }, i) => i === 0 || share >= known[i - 1].share),
+      'never back',
+    );
+    const whole = known.filter(({ loaded, total }) => loaded === total);
+    assert(whole.length > 0 && whole.every(({ share, bar }) => share === 0.75 && bar === 75), JSON.stringify(whole));
+    assertEqual(element.progress, 1, 'in the end');
+    // What is there already is nobody's wait; files beside a model count.
+    for (const src of [BALL, `${FIXTURES}external.onnx`]) {
+      const next = show({ src });
+      const toldNext = watch(next);
+      await next.ready;
+      const size = (await sizeOf(src)) + (src === BALL ? 0 : await sizeOf(`${FIXTURES}external.weights`));
+      assertEqual(toldNext.at(-1)?.total, size, `bytes of ${src}`);
+    }
+    // It carries no contract.
+    claimFault(/external\.onnx: input time is time/);
+    claimFault(/external\.onnx: outputs are packed/);
   });
 
   it('is shown, with its duration, and fires load', async () => {

@@ -36,11 +36,15 @@ export class AutoRotateController implements ReactiveController, Mover {
   rest(): void {
     this.#stop();
     if (!this.#options.mayTurn()) return;
-    this.#timer = setTimeout(() => {
-      this.#timer = undefined;
-      this.#isTurning = true;
-      this.#options.requestFrame();
-    }, this.#options.delayMs());
+    this.#timer = setTimeout(() => this.start(), this.#options.delayMs());
+  }
+
+  /** Turns without a rest before it. */
+  start(): void {
+    this.#stop();
+    if (!this.#options.mayTurn()) return;
+    this.#isTurning = true;
+    this.#options.requestFrame();
   }
 
   advance(now: number): boolean {

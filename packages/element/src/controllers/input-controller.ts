@@ -1,4 +1,5 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import { DoubleTap } from '../camera/double-tap.js';
 import {
   isCameraDrag,
   keyOf,
@@ -23,10 +24,10 @@ export interface InputOptions {
 /** What the controller tells. */
 export interface InputListener {
   readonly act: (action: CameraAction) => void;
-  /** A double click, in CSS pixels of the page. */
+  /** A double click or a double tap, in CSS pixels of the page. */
   readonly pick: (clientX: number, clientY: number) => void;
   /** The space bar; false if it means nothing here. */
-  readonly togglePlayback: () => boolean;
+  readonly toggleMotion: () => boolean;
 }
 
 const LEFT_BUTTON = 0;
@@ -45,6 +46,9 @@ export class InputController implements ReactiveController {
   readonly #options: () => InputOptions;
   readonly #surfaceOf: () => HTMLElement | null;
   readonly #pointers = new Map<number, Pointer>();
+  readonly #doubleTap = new DoubleTap();
+  /** The last pointer was a finger: whether its second tap is a double click, too, differs from browser to browser, and it counts once. */
+  #isTouched = false;
   #surface: HTMLElement | null = null;
   #listening: AbortController | undefined;
   #wheel: AbortController | undefined;
@@ -115,6 +119,7 @@ export class InputController implements ReactiveController {
     this.#listening = undefined;
     this.#stopWheel();
     this.#pointers.clear();
+    this.#doubleTap.cancel();
   }
 
   #stopWheel(): void {
@@ -125,7 +130,9 @@ export class InputController implements ReactiveController {
   readonly #onDown = (event: PointerEvent): void => {
     if (event.button !== LEFT_BUTTON && event.button !== RIGHT_BUTTON) return;
     const pans = event.button === RIGHT_BUTTON || event.shiftKey || event.ctrlKey || event.metaKey;
-    const owner = event.pointerType === 'touch' ? 'undecided' : 'camera';
+    this.#isTouched = event.pointerType === 'touch';
+    if (this.#isTouched) this.#doubleTap.down(positionOf(event), event.timeStamp, this.#pointers.size === 0);
+    const owner = this.#isTouched ? 'undecided' : 'camera';
     this.#pointers.set(event.pointerId, { ...positionOf(event), pans, owner });
     this.#capture(event.pointerId);
   };
@@ -159,17 +166,26 @@ export class InputController implements ReactiveController {
   }
 
   readonly #onUp = (event: PointerEvent): void => {
-    this.#pointers.delete(event.pointerId);
+    const wasDown = this.#pointers.delete(event.pointerId);
+    if (!wasDown || event.pointerType !== 'touch') return;
+    if (event.type !== 'pointerup') this.#doubleTap.cancel();
+    else if (this.#doubleTap.up(positionOf(event), event.timeStamp)) this.#pick(event);
   };
 
   readonly #onKey = (event: KeyboardEvent): void => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (event.key === ' ' && !event.repeat && this.#listener.togglePlayback()) return event.preventDefault();
+    if (event.key === ' ' && !event.repeat && this.#listener.toggleMotion()) return event.preventDefault();
     const action = keyOf(event.key, event.shiftKey);
     if (action !== null && this.#perform(action)) event.preventDefault();
   };
 
-  readonly #onDoubleClick = (event: MouseEvent): void => this.#listener.pick(event.clientX, event.clientY);
+  readonly #onDoubleClick = (event: MouseEvent): void => {
+    if (!this.#isTouched) this.#pick(event);
+  };
+
+  #pick({ clientX, clientY }: MouseEvent): void {
+    this.#listener.pick(clientX, clientY);
+  }
 
   readonly #onWheel = (event: WheelEvent): void => {
     event.preventDefault();

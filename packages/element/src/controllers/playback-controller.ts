@@ -31,6 +31,8 @@ const UPDATE_INTERVAL_MS = 250;
 export class PlaybackController {
   readonly #options: PlaybackOptions;
   #time = 0;
+  /** Where the next scene begins, if somebody has said so: HTML's default playback start position. */
+  #nextStart: number | undefined;
   #duration = NaN;
   #rate = 1;
   #isPaused = true;
@@ -56,22 +58,40 @@ export class PlaybackController {
     return !Number.isNaN(this.#duration);
   }
 
+  /** Where the time is; without a scene that moves, where one will begin. */
   get currentTime(): number {
-    return this.#time;
+    return this.canPlay && this.#nextStart === undefined ? this.#time : this.nextStart;
   }
 
-  /** Seeks: events follow once the frame of that time is on show. */
+  /** Where the next scene begins. */
+  get nextStart(): number {
+    return this.#nextStart ?? Math.max(0, this.#options.startTime());
+  }
+
+  /** Seeks: events follow once the frame of that time is on show. Before there is a scene this is where it starts. */
   set currentTime(seconds: number) {
-    if (!Number.isFinite(seconds))
-      throw new TypeError(`currentTime expects a finite number of seconds, found ${seconds}`);
-    const end = Number.isNaN(this.#duration) ? Infinity : this.#duration;
-    this.#time = Math.min(end, Math.max(0, seconds));
+    if (!this.canPlay) {
+      this.startNextAt(seconds);
+      return;
+    }
+    requireFinite(seconds);
+    this.#nextStart = undefined;
+    this.#time = Math.min(this.#duration, Math.max(0, seconds));
     this.#hasEnded = false;
-    // Before there is a scene this is where it starts.
-    if (Number.isNaN(this.#duration)) return;
     this.#seekTarget = this.#time;
     this.#options.dispatch('seeking');
     this.#options.requestFrame();
+  }
+
+  /** The next scene that moves begins there. A scene that is on show and stays is sought there by {@link keepScene}. */
+  startNextAt(seconds: number): void {
+    requireFinite(seconds);
+    this.#nextStart = Math.max(0, seconds);
+  }
+
+  /** No other scene will take the place of the one on show after all. */
+  keepScene(): void {
+    if (this.canPlay && this.#nextStart !== undefined) this.currentTime = this.#nextStart;
   }
 
   get seeking(): boolean {
@@ -141,8 +161,11 @@ export class PlaybackController {
   /** The scene is there, or is there again; NaN: it does not move. */
   setDuration(seconds: number): void {
     if (Object.is(seconds, this.#duration)) return;
+    if (!Number.isNaN(seconds)) {
+      this.#time = Math.min(this.currentTime, seconds);
+      this.#nextStart = undefined;
+    }
     this.#duration = seconds;
-    this.#time = Math.min(this.#time, seconds);
     this.#options.dispatch('durationchange');
     this.#options.dispatch('loadedmetadata');
     this.#options.requestFrame();
@@ -172,7 +195,6 @@ export class PlaybackController {
     const couldPlay = this.canPlay;
     this.#duration = NaN;
     this.#seekTarget = undefined;
-    this.#time = Math.max(0, this.#options.startTime());
     this.#hasEnded = false;
     this.suspend();
     this.#rest();
@@ -207,6 +229,11 @@ export class PlaybackController {
     for (const type of ['timeupdate', 'pause', 'ended'] as const) this.#options.dispatch(type);
     this.#options.requestFrame();
   }
+}
+
+function requireFinite(seconds: number): void {
+  if (!Number.isFinite(seconds))
+    throw new TypeError(`currentTime expects a finite number of seconds, found ${seconds}`);
 }
 
 /** Why a scene that was to be played is not. */

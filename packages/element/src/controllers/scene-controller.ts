@@ -4,7 +4,7 @@ import { toElementError, type ElementError } from '../errors.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { SharedDevice } from '../gpu/shared-device.js';
-import type { SceneRequest } from '../loading/protocol.js';
+import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { isSameContract } from '../loading/same-contract.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
@@ -35,7 +35,7 @@ export interface SceneOptions {
   readonly memoryBudget: () => number | undefined;
   /** What a generator needs to know beyond the request. */
   readonly live: OpenOptions['live'];
-  readonly onProgress: (loaded: number, total: number | undefined) => void;
+  readonly onProgress: ProgressListener;
   readonly onStart: () => void;
   readonly onLoad: (url: string) => void;
   /** There is no scene any more, or another is wanted in its place. */
@@ -113,13 +113,18 @@ export class SceneController implements ReactiveController {
     return new Promise((resolve) => this.#waiters.push(resolve));
   }
 
+  /** Whether a request, null for none, is for another scene than the last one. */
+  isOther(request: SceneRequest | null): boolean {
+    return request === null ? this.#request !== null : !isSame(request, this.#request);
+  }
+
   /**
    * The scene that ought to be shown, or null for none. Safe to call as often as one likes: only a real change acts.
    * @param mayStart false while a lazy element is out of sight.
    */
   want(request: SceneRequest | null, mayStart: boolean): void {
     if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
-    if (!isSame(request, this.#request)) {
+    if (this.isOther(request)) {
       const isSwap = this.#request !== null;
       this.#abort();
       this.#submissions = 1;
@@ -159,9 +164,9 @@ export class SceneController implements ReactiveController {
     this.#setState('loading');
     let loaded = 0;
     let total: number | undefined;
-    const report = (nextLoaded: number, nextTotal: number | undefined): void => {
+    const report: ProgressListener = (nextLoaded, nextTotal, share) => {
       [loaded, total] = [nextLoaded, nextTotal];
-      if (!signal.aborted) this.#options.onProgress(loaded, total);
+      if (!signal.aborted) this.#options.onProgress(loaded, total, share);
     };
     this.#options.onStart();
     report(0, undefined);
@@ -216,7 +221,7 @@ export class SceneController implements ReactiveController {
     request: SceneRequest,
     signal: AbortSignal,
     isNew: boolean,
-    onProgress: (loaded: number, total: number | undefined) => void,
+    onProgress: ProgressListener,
   ): Promise<void> {
     for (let failures = 0; ;) {
       try {
@@ -233,12 +238,7 @@ export class SceneController implements ReactiveController {
     }
   }
 
-  async #open(
-    request: SceneRequest,
-    signal: AbortSignal,
-    isNew: boolean,
-    onProgress: (loaded: number, total: number | undefined) => void,
-  ): Promise<void> {
+  async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
     const { device, loader, show, live, memoryBudget, wantsPreviews, frameUrl, loops } = this.#options;
     const onPreview = isNew && wantsPreviews() ? (preview: GpuScene) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {

@@ -86,6 +86,12 @@ async function openSequence(
   return scene;
 }
 
+/**
+ * Share of the work before a generator's first frame that comes after its bytes: compiling the runtime, making a session, the first runs. How long that
+ * takes is known to nobody beforehand; but a bar that is full must not stand still.
+ */
+const WARM_UP = 0.25;
+
 async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
   const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
   const opening = import('../live/open-live-model.js');
@@ -100,7 +106,7 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
       { ...options.live(), url, chain, contract, credentials, memoryBudget },
       lease.device,
       signal,
-      onProgress,
+      (loaded, total) => onProgress(loaded, total, total && ((1 - WARM_UP) * loaded) / total),
     );
     beforeUpload(live.gaussians.byteLength);
     return new GpuScene(lease, live.gaussians, live.bounds, submissions, { live });

@@ -38,7 +38,11 @@ export interface LoadedSequence {
  */
 export type PreviewListener = (preview: LoadedScene) => void;
 
-export type ProgressListener = (loaded: number, total: number | undefined) => void;
+/**
+ * Hears how many bytes have arrived, and of how many; undefined while that is not known.
+ * @param share of all that there is to do, 0..1; absent where that is the bytes alone.
+ */
+export type ProgressListener = (loaded: number, total: number | undefined, share?: number) => void;
 
 export type PageMessage =
   | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest; readonly wantsPreviews: boolean }

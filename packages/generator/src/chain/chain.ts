@@ -4,6 +4,8 @@ import type { GeneratorSession } from '../runtime/generator-session.js';
 import type { RunOutputs, SessionKind } from '../runtime/live-session.js';
 import type { GeneratorModel, ModelSource } from '../runtime/open-model.js';
 import { acquireSession, type AcquireOptions, type SessionLease } from '../runtime/shared-sessions.js';
+import { watchRuntimeBytes } from '../runtime/runtime-progress.js';
+import { sumProgress } from '../runtime/sum-progress.js';
 import type { GeneratorState } from '../state.js';
 import { connect } from './connect.js';
 import { HandOver } from './hand-over.js';
@@ -15,10 +17,12 @@ export class Chain {
   readonly #handOvers: readonly HandOver[];
   /** Inputs of the page that each model ran with last; undefined where what it wrote last is not to be relied on. */
   readonly #ran: (Inputs | undefined)[] = [];
+  readonly #endProgress: () => void;
 
-  private constructor(leases: readonly SessionLease[], device: GPUDevice) {
+  private constructor(leases: readonly SessionLease[], device: GPUDevice, endProgress: () => void) {
     this.device = device;
     this.#leases = leases;
+    this.#endProgress = endProgress;
     const models = leases.map(({ session }) => session.model);
     requireNoneBefore(models[0]);
     if (models.length > 1) requireNoInstances(models);
@@ -35,11 +39,20 @@ export class Chain {
     options: AcquireOptions,
   ): Promise<Chain> {
     const list = Array.isArray(sources) ? (sources as readonly ModelSource[]) : [sources as ModelSource];
-    const reports = progressOf(list.length, options.onProgress);
-    const opening = list.map((source, i) => acquireSession(source, device, { ...options, onProgress: reports[i] }));
+    const reports = sumProgress(list.length + 1, options.onProgress ?? ignore);
+    const endProgress = watchRuntimeBytes(reports[list.length]);
+    const opening = list.map(async (source, i) => {
+      const lease = await acquireSession(source, device, { ...options, onProgress: reports[i] });
+      // Another generator may have fetched it, or be about to.
+      const { bytes, externalData } = lease.session.model;
+      const size = externalData.reduce((sum, { data }) => sum + data.length, bytes.length);
+      reports[i](size, size);
+      return lease;
+    });
     try {
-      return new Chain(await Promise.all(opening), device);
+      return new Chain(await Promise.all(opening), device, endProgress);
     } catch (error) {
+      endProgress();
       for (const lease of opening) lease.then(({ release }) => release(), ignore);
       throw error;
     }
@@ -86,6 +99,7 @@ export class Chain {
 
   /** Gives its models back. @param idle fulfils when the last run has ended: until then it may read what was handed over */
   release(idle: Promise<void> = Promise.resolve()): void {
+    this.#endProgress();
     for (const { release } of this.#leases) release();
     void idle.then(() => this.#handOvers.forEach((handOver) => handOver.destroy()));
   }
@@ -96,22 +110,6 @@ export class Chain {
 }
 
 const SLOWEST_FIRST: readonly SessionKind[] = ['wasm', 'webgpu', 'captured'];
-
-/** Listeners for each of several downloads, that tell one of their sum. */
-function progressOf(count: number, onProgress: AcquireOptions['onProgress']): AcquireOptions['onProgress'][] {
-  if (onProgress === undefined || count === 1) return new Array<typeof onProgress>(count).fill(onProgress);
-  const loads: { loaded: number; total: number | undefined }[] = Array.from({ length: count }, () => {
-    return { loaded: 0, total: undefined };
-  });
-  return loads.map((_, i) => (loaded: number, total: number | undefined) => {
-    loads[i] = { loaded, total };
-    const isKnown = loads.every((load) => load.total !== undefined);
-    onProgress(
-      loads.reduce((sum, load) => sum + load.loaded, 0),
-      isKnown ? loads.reduce((sum, load) => sum + load.total!, 0) : undefined,
-    );
-  });
-}
 
 /** The first of a chain must not wait for another model. */
 function requireNoneBefore({ header, contract }: GeneratorModel): void {

@@ -1,12 +1,15 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import type { ProgressListener } from './sum-progress.js';
 
 /** How files are fetched. */
 export interface FetchOptions {
   /** Which cookies are sent; default `same-origin`. */
   readonly credentials?: RequestCredentials;
   readonly signal?: AbortSignal;
-  /** Bytes so far, and the number of all of them where the server tells. */
-  readonly onProgress?: (loaded: number, total: number | undefined) => void;
+  /** Bytes so far, and the number of all of them where the server tells, or it is expected. */
+  readonly onProgress?: ProgressListener;
+  /** Length of the file as far as it is known, in bytes: servers that compress do not tell it. */
+  readonly expected?: number;
 }
 
 /**
@@ -40,25 +43,32 @@ export async function fetchBytes(
   }
 }
 
-async function readBody(response: Response, { onProgress }: FetchOptions): Promise<Uint8Array<ArrayBuffer>> {
+/** Room for a file of unknown length at first, and the most that a length is believed that has only been said, bytes. */
+const FIRST_BYTES = 65_536;
+const MOST_AT_ONCE = 2 ** 28;
+
+async function readBody(response: Response, { onProgress, expected }: FetchOptions): Promise<Uint8Array<ArrayBuffer>> {
   if (onProgress === undefined || response.body === null) return new Uint8Array(await response.arrayBuffer());
   const length = Number(response.headers.get('Content-Length')) || undefined;
-  const total = response.headers.get('Content-Encoding') ? undefined : length;
-  const pieces: Uint8Array[] = [];
+  const total = (response.headers.get('Content-Encoding') ? undefined : length) ?? expected;
+  let bytes = new Uint8Array(Math.min(total ?? FIRST_BYTES, MOST_AT_ONCE));
   let loaded = 0;
   const reader = response.body.getReader();
   for (let step = await reader.read(); !step.done; step = await reader.read()) {
-    pieces.push(step.value);
-    loaded += step.value.length;
-    onProgress(loaded, total);
+    const end = loaded + step.value.length;
+    if (end > bytes.length) bytes = grown(bytes, Math.max(end, 2 * bytes.length));
+    bytes.set(step.value, loaded);
+    loaded = end;
+    // A file that is longer than it was said to be ends somewhere behind what has arrived.
+    onProgress(loaded, total && Math.max(loaded, total));
   }
-  const bytes = new Uint8Array(loaded);
-  let at = 0;
-  for (const piece of pieces) {
-    bytes.set(piece, at);
-    at += piece.length;
-  }
-  return bytes;
+  return loaded === bytes.length ? bytes : bytes.slice(0, loaded);
+}
+
+function grown(bytes: Uint8Array, length: number): Uint8Array<ArrayBuffer> {
+  const larger = new Uint8Array(length);
+  larger.set(bytes);
+  return larger;
 }
 
 const shorten = (url: string): string => url.slice(0, 200);

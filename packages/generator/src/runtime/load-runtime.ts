@@ -1,6 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type * as OnnxRuntime from 'onnxruntime-web/webgpu';
 import { fetchBytes } from './fetch-bytes.js';
+import { noteRuntimeBytes, WASM_BYTES, wasmBuild } from './runtime-progress.js';
 
 export type Ort = typeof OnnxRuntime;
 
@@ -106,14 +107,15 @@ export async function loadRuntime(): Promise<Runtime> {
 
 async function load(): Promise<Runtime> {
   const folder = location ?? new URL('./onnxruntime/', import.meta.url).href;
-  const build = 'Suspending' in WebAssembly ? 'jspi' : 'asyncify';
+  const build = wasmBuild();
   const script = `${folder}ort.${build === 'jspi' ? 'jspi' : 'webgpu'}.bundle.min.mjs`;
-  // Fetched by us: a copy of the runtime that did not find its WebAssembly never works again.
-  const [ort, wasmBinary] = await Promise.all([
-    importScript(script),
-    fetchBytes(`${folder}ort-wasm-simd-threaded.${build}.wasm`),
-  ]);
-  requireWasm(wasmBinary, folder);
+  const [ort, wasmBinary] = await Promise.all([importScript(script), fetchWasm(folder, build)]).catch(
+    (error: unknown) => {
+      noteRuntimeBytes(undefined);
+      throw error;
+    },
+  );
+  noteRuntimeBytes(null);
   // What it has to say comes with its errors, which are passed on.
   ort.env.logLevel = 'fatal';
   ort.env.wasm.numThreads = 1;
@@ -135,6 +137,17 @@ async function importScript(script: string): Promise<Ort> {
       cause,
     });
   }
+}
+
+/** Fetched by us: a copy of the runtime that did not find its WebAssembly never works again. */
+async function fetchWasm(folder: string, build: keyof typeof WASM_BYTES): Promise<Uint8Array<ArrayBuffer>> {
+  const expected = WASM_BYTES[build];
+  const bytes = await fetchBytes(`${folder}ort-wasm-simd-threaded.${build}.wasm`, {
+    expected,
+    onProgress: (loaded, total = expected) => noteRuntimeBytes([loaded, total]),
+  });
+  requireWasm(bytes, folder);
+  return bytes;
 }
 
 function requireWasm(bytes: Uint8Array, folder: string): void {

@@ -18,6 +18,7 @@ import {
 } from '@gaussian-splat/core';
 import { fetchBytes, type FetchOptions } from './fetch-bytes.js';
 import { modelOutputs, type ModelOutput } from './model-outputs.js';
+import { sumProgress, type ProgressListener } from './sum-progress.js';
 
 /** Where a generator is. */
 export interface ModelSource {
@@ -53,7 +54,7 @@ export interface GeneratorModel {
  */
 export async function openModel(
   source: ModelSource,
-  options: Omit<FetchOptions, 'credentials'> = {},
+  options: Pick<FetchOptions, 'signal' | 'onProgress'> = {},
 ): Promise<GeneratorModel> {
   const { credentials = 'same-origin' } = source;
   const request = { credentials, signal: options.signal };
@@ -63,8 +64,13 @@ export async function openModel(
   const faults = checkContract(header, contract);
   if (faults.length > 0) throw new ContractError(faults);
   const layout = gaussianLayout(header, contract);
-  const externalData = await fetchExternal(source, header, contract, request);
-  const bytes = await wholeFile(url, source.url, { ...request, onProgress: options.onProgress });
+  const { externalFiles } = header;
+  const reports = sumProgress(externalFiles.length + 1, options.onProgress ?? (() => undefined));
+  // What is known beforehand: the sum of all has a length before the first of them has come.
+  externalFiles.forEach(({ byteLength }, i) => reports[i](0, byteLength));
+  reports[externalFiles.length](0, url.size);
+  const externalData = await fetchExternal(source, header, contract, request, reports);
+  const bytes = await wholeFile(url, source.url, { ...request, onProgress: reports[externalFiles.length] });
   // What was fetched piece by piece may have been replaced since.
   await readOnnxHeader(bytesSource(bytes, header.name));
   return {
@@ -96,11 +102,13 @@ async function fetchExternal(
   header: OnnxHeader,
   contract: Contract,
   request: FetchOptions,
+  reports: readonly ProgressListener[],
 ): Promise<GeneratorModel['externalData']> {
   const files = await Promise.all(
-    header.externalFiles.map(async ({ location: path }) => {
+    header.externalFiles.map(async ({ location: path, byteLength: expected }, i) => {
       const address = new URL(path, new URL(source.url, globalThis.location?.href)).href;
-      return { path, data: await fetchBytes(address, { ...request, mayBeMissing: true }) };
+      const options = { ...request, expected, onProgress: reports[i], mayBeMissing: true } as const;
+      return { path, data: await fetchBytes(address, options) };
     }),
   );
   const found = files.filter(
@@ -116,7 +124,7 @@ async function fetchExternal(
 async function wholeFile(opened: UrlSource & ByteSource, url: string, request: FetchOptions): Promise<Uint8Array> {
   const { size, chunk, whole } = opened;
   const known = whole ?? (size <= chunk ? await opened.read(0, size) : undefined);
-  if (known === undefined) return fetchBytes(url, request);
+  if (known === undefined) return fetchBytes(url, { ...request, expected: size });
   request.onProgress?.(known.length, known.length);
   return known;
 }

@@ -19,7 +19,7 @@ interface Entry {
 
 const devices = new WeakMap<GPUDevice, Map<string, Entry>>();
 
-export interface AcquireOptions extends Omit<FetchOptions, 'credentials'> {
+export interface AcquireOptions extends Pick<FetchOptions, 'signal' | 'onProgress'> {
   /** The model runs on the CPU, because of the reason given. */
   readonly onFallback?: (reason: string) => void;
 }

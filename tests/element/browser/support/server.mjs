@@ -5,6 +5,7 @@ import { extname, join, normalize } from 'node:path';
 import { Readable } from 'node:stream';
 import { setTimeout as delay } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
+import { gzipSync } from 'node:zlib';
 import { DEVELOPMENT_APP, developmentScript, plainApp } from './apps.mjs';
 
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
@@ -135,6 +136,14 @@ const ANSWERS = {
   renamed(context, name) {
     if (!name.endsWith('.onnx')) return void (context.status = 404);
     context.body = readFileSync(join(generators, name));
+  },
+
+  /** Files of onnxruntime-web as servers send them that compress: their length is not told. */
+  compressed(context, path) {
+    const bytes = readFileSync(join(root, 'node_modules', normalize(`/${path}`)));
+    context.type = TYPES[extname(path)];
+    context.set('Content-Encoding', 'gzip');
+    context.body = gzipSync(bytes, { level: 1 });
   },
 
   /** Without Content-Length. */
