@@ -23,7 +23,7 @@ const SCENES = {
   'the skull that ships': { src: '/scenes/skull.spz' },
   'a generator': { src: '/generators/packed.onnx' },
   'levels of detail': { src: '/scenes/skull.spz', detail: '2px' },
-  'a post-processor': { src: '/scenes/skull.spz', postprocess: '/generators/post.onnx' },
+  'a post-processor': { src: '/scenes/skull.spz', postprocess: '/generators/post.onnx', 'control-gain': '0.2' },
 };
 
 const server = await serve({
