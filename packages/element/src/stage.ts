@@ -10,13 +10,15 @@ import { PlaybackController } from './controllers/playback-controller.js';
 import { InputController } from './controllers/input-controller.js';
 import { RevealController } from './controllers/reveal-controller.js';
 import { SceneController } from './controllers/scene-controller.js';
+import { SourceController } from './controllers/source-controller.js';
 import { SizeController } from './controllers/size-controller.js';
 import { ViewController } from './controllers/view-controller.js';
 import { VisibilityController } from './controllers/visibility-controller.js';
 import type { GaussianSplatEventMap } from './events.js';
+import { defaultMemoryBudget } from './gpu/memory-budget.js';
 import { LiveWiring } from './live/live-wiring.js';
 import { SceneQueries } from './scene-queries.js';
-import { addressesOf, requestOf } from './source-request.js';
+import { addressesOf } from './source-request.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 import type { Source, StageOptions } from './stage-options.js';
 
@@ -42,9 +44,7 @@ export class Stage {
   readonly #size: SizeController;
   readonly #view: ViewController;
   readonly #live: LiveWiring;
-  #source: Source = { src: null, contract: null, chain: null, postprocess: null };
-  /** A script plays the scene, or waits to: it is loaded wherever it is. */
-  #isWanted = false;
+  readonly #source: SourceController;
   #drawnFrom: Camera | undefined;
   #counts: ReadCounts | undefined;
   /** Bytes that have arrived, and how many there are. */
@@ -74,6 +74,13 @@ export class Stage {
       dispatch: (event) => this.#dispatch(event),
     });
     this.scene = this.#createScene();
+    this.#source = new SourceController({
+      ...options,
+      isInSight: () => this.#visibility.isVisible && this.reveal.mayReveal,
+      isConnected: () => host.isConnected,
+      want: (request, mayStart) => this.scene.want(request, mayStart),
+      isOther: (request) => this.scene.isOther(request),
+    });
     this.economy = new EconomyController({
       economy: options.economy,
       memoryBudget: () => this.#memoryBudget(),
@@ -116,7 +123,7 @@ export class Stage {
       hostConnected: () => {
         document.addEventListener('visibilitychange', onPageVisibility);
         // Put back after a while, an eager element loads again though nothing has come into sight.
-        this.#requestScene();
+        this.#source.request();
       },
       hostUpdated: () => this.#onUpdate(),
       hostDisconnected: () => document.removeEventListener('visibilitychange', onPageVisibility),
@@ -162,16 +169,14 @@ export class Stage {
 
   /** The scene to show. Called after every update; only changes act. */
   setSource(source: Source): void {
-    this.#source = source;
     this.#live.post.want(addressesOf(source.postprocess, this.#options.services().urlModifier));
-    this.#requestScene();
+    this.#source.set(source);
     if (!this.isLeavingFor(source)) this.playback.keepScene();
   }
 
   /** Whether a source asks for another scene than the one that is shown or loaded. */
   isLeavingFor(source: Source): boolean {
-    const { attributes, services } = this.#options;
-    return this.scene.isOther(requestOf(source, attributes(), services().urlModifier));
+    return this.#source.isOther(source);
   }
 
   /** Puts the clock of a scene to a time: the one on show, or the next if `source` asks for another. */
@@ -182,7 +187,7 @@ export class Stage {
 
   /** Somebody wants the time to run: the poster gives way, and a scene out of sight is loaded. */
   prepareToPlay(): void {
-    this.#isWanted = true;
+    this.#source.needNow(true);
     if (!this.reveal.mayReveal) this.reveal.dismiss();
     this.#host.requestUpdate();
   }
@@ -263,7 +268,7 @@ export class Stage {
       onStart: () => this.#dispatch(new Event('loadstart')),
       onLoad: (url) => this.#onLoad(url),
       onEmptied: () => {
-        this.#isWanted = false;
+        this.#source.needNow(false);
         this.playback.empty();
         this.playback.stopWaits();
         this.#dispatch(new Event('emptied'));
@@ -271,14 +276,6 @@ export class Stage {
       onError: (error) => this.#dispatch(new CustomEvent('error', { detail: error })),
       onContext: (type) => this.#dispatch(new Event(type)),
     });
-  }
-
-  #requestScene(): void {
-    const attributes = this.#options.attributes();
-    const request = requestOf(this.#source, attributes, this.#options.services().urlModifier);
-    const isInSight = this.#visibility.isVisible && this.reveal.mayReveal;
-    const mayStart = attributes.loading === 'eager' || this.#isWanted || isInSight;
-    if (this.#host.isConnected) this.scene.want(request, mayStart);
   }
 
   #memoryBudget(): number | undefined {
@@ -345,7 +342,7 @@ export class Stage {
   }
 
   #onVisibility(): void {
-    this.#requestScene();
+    this.#source.request();
     if (!this.#visibility.isVisible) this.playback.suspend();
     this.#dispatch(new CustomEvent('model-visibility', { detail: { visible: this.#visibility.isVisible } }));
     this.#host.requestUpdate();
@@ -372,9 +369,3 @@ export class Stage {
 
 /** Width and height, in pixels, that a generator hears of before the picture has a size: those of an element without style. */
 const FIRST_SIZE = [300, 150] as const;
-
-/** The GPU's share of a device is known to nobody; half of the memory is what shared memory can spare. Browsers round it, and end at 8 GB or more. */
-function defaultMemoryBudget(): number | undefined {
-  const { deviceMemory } = navigator as { deviceMemory?: number };
-  return deviceMemory === undefined ? undefined : deviceMemory * 2 ** 29;
-}

@@ -1,0 +1,56 @@
+import type { Attributes } from '../attributes.js';
+import type { SceneRequest } from '../loading/protocol.js';
+import { requestOf } from '../source-request.js';
+import type { Services, Source } from '../stage-options.js';
+
+export interface SourceOptions {
+  readonly attributes: () => Attributes;
+  readonly services: () => Services;
+  /** Somebody would see the scene. */
+  readonly isInSight: () => boolean;
+  /** Whether an element is in the page: those that are not ask for nothing. */
+  readonly isConnected: () => boolean;
+  readonly want: (request: SceneRequest | null, mayStart: boolean) => void;
+  /** Whether a request is for another scene than the last one that was wanted. */
+  readonly isOther: (request: SceneRequest | null) => boolean;
+}
+
+/** What the attributes ask for, and whether it may be loaded yet. */
+export class SourceController {
+  readonly #options: SourceOptions;
+  #source: Source = { src: null, contract: null, chain: null, postprocess: null };
+  /** A script plays the scene, or waits to: it is loaded wherever it is. */
+  #isWanted = false;
+
+  constructor(options: SourceOptions) {
+    this.#options = options;
+  }
+
+  /** Called after every update; only changes act. */
+  set(source: Source): void {
+    this.#source = source;
+    this.request();
+  }
+
+  /** Loads the scene although nobody may see it, until another is wanted. */
+  needNow(isWanted: boolean): void {
+    this.#isWanted = isWanted;
+  }
+
+  /** Asks for the scene of now, and for its bytes if it is time. */
+  request(): void {
+    const { attributes, isInSight, isConnected, want } = this.#options;
+    const mayStart = attributes().loading === 'eager' || this.#isWanted || isInSight();
+    if (isConnected()) want(this.#requestOf(this.#source), mayStart);
+  }
+
+  /** Whether a source asks for another scene than the one that is shown or loaded. */
+  isOther(source: Source): boolean {
+    return this.#options.isOther(this.#requestOf(source));
+  }
+
+  #requestOf(source: Source): SceneRequest | null {
+    const { attributes, services } = this.#options;
+    return requestOf(source, attributes(), services().urlModifier);
+  }
+}

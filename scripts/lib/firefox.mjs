@@ -1,0 +1,136 @@
+/**
+ * A Firefox that scripts can drive, by WebDriver BiDi and nothing else: Playwright drives only builds of its own. Needs Node's WebSocket
+ * (`node --experimental-websocket` before Node 22).
+ */
+import { spawn } from 'node:child_process';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+
+const START_MS = 60_000;
+
+/** @param preferences of `about:config`, by name */
+export async function launchFirefox({ executable = 'firefox-esr', preferences = {}, env = {} } = {}) {
+  const profile = mkdtempSync(join(tmpdir(), 'firefox-'));
+  const lines = Object.entries(preferences).map(([name, value]) => `user_pref("${name}", ${JSON.stringify(value)});`);
+  writeFileSync(join(profile, 'user.js'), lines.join('\n'));
+  const child = spawn(
+    executable,
+    ['--headless', '--no-remote', '--profile', profile, '--remote-debugging-port', '0', 'about:blank'],
+    { env: { ...process.env, ...env }, stdio: ['ignore', 'ignore', 'pipe'] },
+  );
+  const close = () =>
+    new Promise((resolve) => {
+      child.once('exit', () => {
+        rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
+        resolve();
+      });
+      child.kill();
+    });
+  try {
+    const socket = await connect(`${await addressOf(child)}/session`);
+    const { capabilities } = await socket.send('session.new', { capabilities: {} });
+    const { contexts } = await socket.send('browsingContext.getTree', {});
+    return { ...socket, tab: contexts[0].context, version: capabilities.browserVersion, close };
+  } catch (error) {
+    await close();
+    throw error;
+  }
+}
+
+/** Where it listens, which it says when it is ready. */
+function addressOf(child) {
+  return new Promise((resolve, reject) => {
+    const timer = setTimeout(() => reject(new Error('Firefox does not answer')), START_MS);
+    child.once('error', reject);
+    child.once('exit', (code) => reject(new Error(`Firefox ended with ${code}`)));
+    let said = '';
+    child.stderr.on('data', (data) => {
+      said += data;
+      const [, address] = /WebDriver BiDi listening on (ws:\S+)/.exec(said) ?? [];
+      if (address === undefined) return;
+      clearTimeout(timer);
+      resolve(address);
+    });
+  });
+}
+
+async function connect(address) {
+  const socket = new WebSocket(address);
+  const waiting = new Map();
+  const listeners = [];
+  let last = 0;
+  socket.addEventListener('message', ({ data }) => {
+    const { type, id, method, params, result, error, message } = JSON.parse(data);
+    if (type === 'event') for (const listener of listeners) listener(method, params);
+    else if (type === 'error') waiting.get(id)?.reject(new Error(`${error}: ${message}`));
+    else waiting.get(id)?.resolve(result);
+    waiting.delete(id);
+  });
+  await new Promise((resolve, reject) => {
+    socket.addEventListener('open', resolve, { once: true });
+    socket.addEventListener('error', () => reject(new Error(`no connection to ${address}`)), { once: true });
+  });
+  const send = (method, params) =>
+    new Promise((resolve, reject) => {
+      waiting.set(++last, { resolve, reject });
+      socket.send(JSON.stringify({ id: last, method, params }));
+    });
+  return { send, onEvent: (listener) => listeners.push(listener) };
+}
+
+/** A tab of Firefox, and what it has thrown. */
+export class FirefoxTab {
+  #firefox;
+  #origin;
+  #exceptions = [];
+  #isSubscribed;
+
+  /** @param origin of the pages that it opens */
+  constructor(firefox, origin) {
+    this.#firefox = firefox;
+    this.#origin = origin;
+    firefox.onEvent((method, { type, level, text }) => {
+      if (method === 'log.entryAdded' && type === 'javascript' && level === 'error') this.#exceptions.push(text);
+    });
+    this.#isSubscribed = firefox.send('session.subscribe', { events: ['log.entryAdded'] });
+  }
+
+  async open(path) {
+    await this.#isSubscribed;
+    await this.#firefox.send('browsingContext.navigate', {
+      context: this.#firefox.tab,
+      url: this.#origin + path,
+      wait: 'complete',
+    });
+  }
+
+  /** The value of an expression, or of what it promises. */
+  async evaluate(expression) {
+    const answer = await this.#firefox.send('script.evaluate', {
+      expression,
+      target: { context: this.#firefox.tab },
+      awaitPromise: true,
+    });
+    if (answer.type === 'exception') throw new Error(answer.exceptionDetails.text);
+    return answer.result.value;
+  }
+
+  /** The top left corner of the page as it is on the screen: bytes of a PNG. */
+  async screenshot({ width, height }) {
+    const { data } = await this.#firefox.send('browsingContext.captureScreenshot', {
+      context: this.#firefox.tab,
+      clip: { type: 'box', x: 0, y: 0, width, height },
+    });
+    return Buffer.from(data, 'base64');
+  }
+
+  async perform(source) {
+    await this.#firefox.send('input.performActions', { context: this.#firefox.tab, actions: [source] });
+    await this.#firefox.send('input.releaseActions', { context: this.#firefox.tab });
+  }
+
+  takeExceptions() {
+    return this.#exceptions.splice(0);
+  }
+}
