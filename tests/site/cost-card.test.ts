@@ -41,7 +41,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
   });
 
   it('a sequence plays, and pauses where its slider is moved', { skip, timeout: 200_000 }, async () => {
-    const { tab, faults } = await open.visit('/examples/', { width: 240, height: 300 });
+    const { tab, faults } = await open.visit('/examples/', { width: 800, height: 600 });
     const card = tab.locator('[data-example=sequence]');
     const scene = card.locator('gaussian-splat');
     await scene.scrollIntoViewIfNeeded();
@@ -68,7 +68,10 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
       await card.locator('[data-paint]').click();
       await card.locator('gaussian-splat').evaluate((element: Splat) => element.ready);
       assert.equal(await card.locator('gaussian-splat').evaluate((element: Splat) => element.loaded), true);
-      assert.deepEqual([await card.locator('img').count(), await card.getByRole('status').textContent()], [0, '']);
+      assert.deepEqual(
+        [await card.locator('img').count(), await card.locator('.words [role=status]').textContent()],
+        [0, ''],
+      );
       assert.deepEqual(faults, []);
       await tab.close();
     });
