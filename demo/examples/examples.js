@@ -44,8 +44,10 @@ function conductTime(card) {
   }
   element.addEventListener('timeupdate', () => (slider.value = element.currentTime));
   slider.addEventListener('input', () => {
+    // The pause tells the time, which the slider follows.
+    const wanted = slider.valueAsNumber;
     element.pause();
-    element.currentTime = slider.valueAsNumber;
+    element.currentTime = wanted;
   });
 }
 

@@ -7,6 +7,8 @@ import { isBuilt, openSite, root, type OpenSite } from './support.js';
 
 interface Splat extends HTMLElement {
   readonly loaded: boolean;
+  readonly ready: Promise<void>;
+  readonly currentTime: number;
   readonly error: { readonly reason: string } | null;
 }
 const PATIENCE = { timeout: 100_000, polling: 100 };
@@ -37,6 +39,43 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
     assert.deepEqual(faults, []);
     await tab.close();
   });
+
+  it('a sequence plays, and pauses where its slider is moved', { skip, timeout: 200_000 }, async () => {
+    const { tab, faults } = await open.visit('/examples/', { width: 800, height: 600 });
+    const card = tab.locator('[data-example=sequence]');
+    const scene = card.locator('gaussian-splat');
+    await scene.scrollIntoViewIfNeeded();
+    await scene.evaluate((element: Splat) => element.ready);
+    await card.getByRole('button', { name: 'Play' }).click();
+    await tab.waitForFunction(
+      () => document.querySelector<Splat>('[data-example=sequence] gaussian-splat')!.currentTime > 0.3,
+      undefined,
+      PATIENCE,
+    );
+    await card.locator('[data-time]').fill('1');
+    await card.getByRole('button', { name: 'Play' }).waitFor();
+    assert.equal(await scene.evaluate((element: Splat) => element.currentTime), 1);
+    assert.deepEqual(faults, []);
+    await tab.close();
+  });
+
+  // SwiftShader takes longer with their networks than anybody waits: the scene is on show while the first picture is made.
+  for (const name of ['oil', 'denoise']) {
+    it(`${name}: a click puts the scene where the picture was`, { skip, timeout: 200_000 }, async () => {
+      const { tab, faults } = await open.visit('/examples/', { width: 240, height: 300 });
+      const card = tab.locator(`[data-example=${name}]`);
+      await card.locator('.cost dd').first().waitFor();
+      await card.locator('[data-paint]').click();
+      await card.locator('gaussian-splat').evaluate((element: Splat) => element.ready);
+      assert.equal(await card.locator('gaussian-splat').evaluate((element: Splat) => element.loaded), true);
+      assert.deepEqual(
+        [await card.locator('img').count(), await card.locator('.words [role=status]').textContent()],
+        [0, ''],
+      );
+      assert.deepEqual(faults, []);
+      await tab.close();
+    });
+  }
 
   it('without WebGPU: a sentence, or the fallback of the page, and not a byte of the scene', async () => {
     const requests: string[] = [];
