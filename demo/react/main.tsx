@@ -59,8 +59,8 @@ function App() {
           onTimeUpdate={() => setTimes((count) => count + 1)}
           onCameraChange={() => setMoves((count) => count + 1)}
         >
-          <button slot="hotspot-middle" data-position="0m 0m 0m">
-            The middle
+          <button slot="hotspot-forehead" data-position="0m 0.33m 0.25m">
+            The forehead
           </button>
         </GaussianSplat>
       )}

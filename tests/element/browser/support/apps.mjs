@@ -52,7 +52,7 @@ export function plainApp(address) {
 
       function mount() {
         place.innerHTML = '<gaussian-splat alt="A scene" loading="eager" camera-controls style="width: 320px; height: 240px">' +
-          '<button slot="hotspot-middle" data-position="0m 0m 0m">The middle</button></gaussian-splat>';
+          '<button slot="hotspot-forehead" data-position="0m 0.33m 0.25m">The forehead</button></gaussian-splat>';
         const splat = place.firstElementChild;
         splat.src = scenes[scene];
         splat.controls = controls;

@@ -82,7 +82,7 @@ export function describeApp(name: string, { page, mounts, effects }: AppUnderTes
       app.click('view');
       await until(() => app.text('where') !== '', 'the words of the ref');
       assertEqual(app.text('where'), `${String(splat.getCameraOrbit())}, controls by reference: true`);
-      assertEqual(splat.querySelector('button')?.assignedSlot?.name, 'hotspot-middle', 'the hotspot');
+      assertEqual(splat.querySelector('button')?.assignedSlot?.name, 'hotspot-forehead', 'the hotspot');
       splat.setAttribute('camera-orbit', '40deg 75deg auto');
       await until(() => Number(app.text('moves')) > 3, 'camera-change');
     });
