@@ -28,13 +28,14 @@ process.env.CHROMIUM = ensureChromium();
 const cache = join(root, '.cache/stability');
 mkdirSync(cache, { recursive: true });
 const figures = join(cache, 'figures.jsonl');
+const peers = join(cache, 'peers.json');
+seedFromReport();
 
 let status = 0;
 if (!values.only) status = runRows() | runBrowserRows();
-if (values.peers) status |= run(process.execPath, ['scripts/stability/run-peers.mjs', join(cache, 'peers.json')]);
+if (values.peers) status |= run(process.execPath, ['scripts/stability/run-peers.mjs', peers]);
 if (values.report) {
   const { writeReport } = await import('./stability/report.mjs');
-  const peers = join(cache, 'peers.json');
   writeReport({
     lines: readLines(figures),
     peers: existsSync(peers) ? JSON.parse(readFileSync(peers, 'utf8')) : undefined,
@@ -57,8 +58,21 @@ function runRows() {
   const lines = readLines(fresh);
   const rows = new Set(lines.map(({ row }) => row));
   const kept = readLines(figures).filter(({ row }) => !rows.has(row));
-  writeFileSync(figures, [...kept, ...lines].map((line) => `${JSON.stringify(line)}\n`).join(''));
+  writeLines(figures, [...kept, ...lines]);
   return status;
+}
+
+/** What a fresh copy knows of rows that it has not run is what the published report says of them. */
+function seedFromReport() {
+  const published = join(root, 'docs/stability/figures.json');
+  if (existsSync(figures) || !existsSync(published)) return;
+  const report = JSON.parse(readFileSync(published, 'utf8'));
+  writeLines(figures, [...report.rows.flatMap((row) => row.figures), ...report.curves]);
+  if (report.peers) writeFileSync(peers, JSON.stringify(report.peers));
+}
+
+function writeLines(file, lines) {
+  writeFileSync(file, lines.map((line) => `${JSON.stringify(line)}\n`).join(''));
 }
 
 function readLines(file) {
