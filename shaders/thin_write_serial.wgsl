@@ -7,12 +7,10 @@
 
 @compute @workgroup_size(BLOCKS_PER_SERIAL_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let block_id = group_index(workgroup_id) * BLOCKS_PER_SERIAL_GROUP + lane;
-  let start = block_id * THIN_BLOCK / 4u;
-  let end = min(start + THIN_BLOCK / 4u, thin.length / 4u);
-  if (start >= end) { return; }
-  var slot = block_offsets[block_id];
-  for (var word = start; word < end; word++) {
+  let run = serial_block(workgroup_id, lane);
+  if (run.y >= run.z) { return; }
+  var slot = block_offsets[run.x];
+  for (var word = run.y; word < run.z; word++) {
     let numbers = order[word];
     let flags = visible_flags(numbers);
     for (var k = 0u; k < 4u; k++) {

@@ -13,6 +13,7 @@ import { levelStarts, pathOf, screenError, shareDrawn, type DetailView } from '.
 import { check, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
 import { cameraAt } from '../../support/scenes.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
+import { WITHOUT_LEVERS } from './view.js';
 
 const NOT_WRITTEN = -1;
 
@@ -68,14 +69,7 @@ function viewWords(packed: PackedGaussians, { camera, allowed, fade }: DetailVie
       ...cameraValues(camera, origin),
       ...{ splat_count: count, page: 0, first_group: 0, antialiased: 0, key_bits: 24, is_ordered: 0 },
       ...{ sh_degree: shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[shPrecision], occlusion_tiles: [0, 0] },
-      ...{
-        has_detail: 1,
-        detail: allowed,
-        detail_fade: fade,
-        splat_budget: budget,
-        alpha_min: constants.ALPHA_MIN,
-        min_contribution: 0,
-      },
+      ...{ ...WITHOUT_LEVERS, has_detail: 1, detail: allowed, detail_fade: fade, splat_budget: budget },
     },
     bytes,
   );

@@ -12,6 +12,7 @@ import {
 import { cloudOf, repeat } from '../../support/clouds.js';
 import { check, checkEqual, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
 import { cameraAt } from '../../support/scenes.js';
+import { WITHOUT_LEVERS } from './view.js';
 
 /** A random permutation of 0 ... count - 1. */
 function permutation(count: number, seed: number): Uint32Array {
@@ -101,15 +102,11 @@ export const orderCases: readonly StageCase[] = [
       };
       const firstGroup = 2;
       const page = { splat_count: packed.count, page: 0, first_group: firstGroup };
-      const detail = {
-        has_detail: 0,
-        detail: 0,
-        detail_fade: 0,
-        splat_budget: 0,
-        alpha_min: constants.ALPHA_MIN,
-        min_contribution: 0,
-      };
-      writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...flags, ...page, ...detail }, bytes);
+      writeStruct(
+        layouts.View,
+        { ...cameraValues(camera, packed.origin), ...flags, ...page, ...WITHOUT_LEVERS },
+        bytes,
+      );
       const length = constants.CULL_GROUP * (firstGroup + cullGroups(packed.count));
       const keys = bench.buffer(4 * length);
       const stage = new OrderKeysStage(bench.device);

@@ -26,6 +26,7 @@ import {
   thinned,
   type Scene,
 } from '../../support/scenes.js';
+import { WITHOUT_LEVERS } from './view.js';
 
 const { CULL_GROUP, WORDS_PER_GROUP, PROJECT_GROUP } = constants;
 
@@ -43,14 +44,7 @@ function uploadScene(
     key_bits: 32,
     is_ordered: 0,
     occlusion_tiles: occlusionTiles,
-    ...{
-      has_detail: 0,
-      detail: 0,
-      detail_fade: 0,
-      splat_budget: 0,
-      alpha_min: constants.ALPHA_MIN,
-      min_contribution: 0,
-    },
+    ...WITHOUT_LEVERS,
   };
   const sh = { sh_degree: packed.shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[packed.shPrecision] };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...sh, ...flags }, bytes);
