@@ -16,7 +16,9 @@ import { serve } from './lib/server.mjs';
 const { values } = parseArgs({ options: { firefox: { type: 'string', default: 'firefox-esr' } } });
 const WEBGPU = { 'dom.webgpu.enabled': true, 'gfx.webgpu.ignore-blocklist': true };
 /** What pictures on the screen may differ by from Chromium's: both have been rounded to 8 bits twice, by us and by the compositor. */
-const LEAST_DB = 45;
+const LEAST_DB = 57;
+/** Not understood yet: held where they are, so that they get no worse unseen. */
+const KNOWN_GAPS = { 'the skull that ships': 49, 'levels of detail': 49 };
 const SIZE = { width: 300, height: 240 };
 const SCENES = {
   'a PLY': { src: '/fixtures/compass.ply' },
@@ -120,7 +122,8 @@ async function checkWithWebGpu(tab, version) {
     await check(`${name}, against Chromium`, async () => {
       await tab.evaluate(drawing(attributes));
       const decibels = psnr(await tab.screenshot(SIZE), expected[name]);
-      assert(decibels >= LEAST_DB, `${decibels.toFixed(1)} dB`);
+      const least = KNOWN_GAPS[name] ?? LEAST_DB;
+      assert(decibels >= least, `${decibels.toFixed(1)} dB, expected at least ${least}`);
       return `${decibels.toFixed(1)} dB`;
     });
   }
