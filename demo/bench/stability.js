@@ -1,8 +1,12 @@
-/** The page that draws rows of the stability catalogue with every subject. `?only=S7` runs one row, `?peers=0` ours alone. */
+/**
+ * The page that draws rows of the stability catalogue with every subject. `?only=S7` runs one row, `?peers=0` ours alone, `?report=URL` is where
+ * the figures are POSTed as JSON.
+ */
 import { chooseVariants, deviceDescriptor, GaussianBuffers, packGaussians } from '@gaussian-splat/renderer';
 import { renderOracle } from '../../tests/oracle/oracle.ts';
 import { OwnRenderer } from './run/own-renderer.js';
 import { openPeer } from './run/peer.js';
+import { sendReport } from './run/report.js';
 import { writePly } from './peers/ply.js';
 import { CASES, truthOf } from './stability/cases.js';
 import { judge } from './stability/judge.js';
@@ -22,13 +26,15 @@ const status = document.querySelector('#status');
 const table = document.createElement('table');
 document.querySelector('#results').append(table);
 
+let report;
 try {
-  window.report = await run();
+  report = await run();
   status.textContent = 'Done.';
 } catch (error) {
-  window.report = { error: String(error?.stack ?? error) };
-  status.textContent = window.report.error;
+  report = { error: String(error?.stack ?? error) };
+  status.textContent = report.error;
 }
+await sendReport(report, query.get('report'));
 
 async function run() {
   const adapter = await navigator.gpu.requestAdapter();

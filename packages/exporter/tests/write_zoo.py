@@ -6,12 +6,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from .zoo import every_family
+from .zoo import every_family, halves
 
 
 def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    for name, (model, _) in every_family().items():
+    models = {name: model for name, (model, _) in every_family().items()}
+    models |= {f"{name}-half": model for name, model in halves().items()}
+    for name, model in models.items():
         (folder / f"{name}.onnx").write_bytes(model.SerializeToString(deterministic=True))
 
 

@@ -63,3 +63,18 @@ def every_family() -> dict[str, Case]:
         octree = test_scaffold.scaffold(levels=test_scaffold.levels(60, rule))
         cases[f"octree-{rule}"] = (export_scaffold(octree, FACTS), {**camera, **level})
     return cases
+
+
+def halves() -> dict[str, onnx.ModelProto]:
+    """The families once more, writing float16: for GPUs that have it."""
+    half = Options(dtype="float16")
+    octree = test_scaffold.scaffold(levels=test_scaffold.levels(60, "round"))
+    return {
+        "classic": export_classic(test_classic.cloud(), FACTS, half),
+        "classic-view": export_classic(test_classic.cloud(), FACTS, half, colours="view"),
+        "scaffold": export_scaffold(test_scaffold.scaffold(), FACTS, half),
+        "octree-round": export_scaffold(octree, FACTS, half),
+        "hexplane": export_hexplane(test_hexplane.small(), test_hexplane.deformation(), FACTS, half),
+        "avatar": export_avatar(test_avatar.avatar(degree=1), FACTS, half),
+        "feed-forward-1": export_feed_forward(test_networks.feed_forward(1), FACTS, half),
+    }

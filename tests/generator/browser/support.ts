@@ -28,11 +28,13 @@ export const CAMERA: Camera = {
   worldToCamera: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1],
 };
 
-export async function makeDevice(): Promise<GPUDevice> {
+/** A device with those of the optional features that the adapter has. */
+export async function makeDevice(optional: readonly GPUFeatureName[] = []): Promise<GPUDevice> {
   const adapter = await navigator.gpu.requestAdapter();
   if (adapter === null) throw new Error('no WebGPU adapter in this browser');
   const { maxStorageBuffersPerShaderStage } = adapter.limits;
-  return adapter.requestDevice({ requiredLimits: { maxStorageBuffersPerShaderStage } });
+  const requiredFeatures = optional.filter((feature) => adapter.features.has(feature));
+  return adapter.requestDevice({ requiredFeatures, requiredLimits: { maxStorageBuffersPerShaderStage } });
 }
 
 /** Keeps what runs write. */
