@@ -8,8 +8,8 @@
 // Camera depth, in world units, of the splat that leaves a pixel half transparent or less; 0 where none does.
 @group(0) @binding(10) var depths: texture_storage_2d<r32float, write>;
 
-// Largest weight of each splat of the batch.
-var<workgroup> weights: array<atomic<u32>, TILE_THREADS>;
+// Largest weight of each splat of the batch, and of the one that takes the place of a missing one.
+var<workgroup> weights: array<atomic<u32>, TILE_THREADS + 1u>;
 var<private> half_depth: f32;
 
 fn clear_notes(lane: u32) {

@@ -1,5 +1,5 @@
 // Second third: for each digit the exclusive prefix sums of its counts over the blocks, and the total. A workgroup
-// serves eight digits, one in each row of 32 threads.
+// serves four digits, one in each row of 64 threads.
 #import shared/plan
 #import shared/sort
 #import shared/prefix
@@ -9,7 +9,7 @@
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> digit_totals: array<u32>;
 
-const ROW_THREADS = 32u;
+const ROW_THREADS = 64u;
 const DIGITS_PER_GROUP = PREFIX_THREADS / ROW_THREADS;
 const BLOCKS_PER_THREAD = 8u;
 

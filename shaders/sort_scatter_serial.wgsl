@@ -20,6 +20,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u) {
     next[digit] = place + 1u;
     if (place >= plan.visible) { continue; }
     keys_out[place] = key;
-    for (var word = 0u; word < VALUE_WORDS; word++) { values_out[place * VALUE_WORDS + word] = value_word(i, word); }
+    values_out[place] = value_of(i);
   }
 }

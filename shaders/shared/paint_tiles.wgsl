@@ -31,6 +31,9 @@ const BLOCK_COLUMNS = TILE / BLOCK_WIDTH;
 const BLOCK_ROWS = TILE / BLOCK_HEIGHT;
 const BLOCK_THREADS = BLOCK_WIDTH * BLOCK_HEIGHT;
 const BLOCKS = BLOCK_COLUMNS * BLOCK_ROWS;
+// Where the splat lies that takes the place of a missing one, and log2 of its opacity.
+const NO_SPLAT = TILE_THREADS;
+const NO_POWER = -1e30;
 // sqrt(log2(e) / 2): in axes stretched by it a Gaussian is 2^-(u² + v²).
 const BASE_2_AXIS = 0.8493218002880191;
 
@@ -38,12 +41,12 @@ const BASE_2_AXIS = 0.8493218002880191;
 var<workgroup> window: array<u32, TILE_THREADS>;
 var<workgroup> found_upto: array<u32, TILE_THREADS>;
 var<workgroup> found: u32;
-// Slots of the splats at hand, a batch, front to back;
+// Slots of the splats at hand, a batch, front to back, and behind the last place of the batch one that reaches no pixel;
 var<workgroup> slots: array<u32, TILE_THREADS>;
 // centre, 1 / sigma_x in those axes, slope;
-var<workgroup> shapes: array<vec4f, TILE_THREADS>;
+var<workgroup> shapes: array<vec4f, TILE_THREADS + 1u>;
 // 1 / sigma_v in those axes, red and green, blue and depth, log2 of the opacity;
-var<workgroup> paints: array<vec4u, TILE_THREADS>;
+var<workgroup> paints: array<vec4u, TILE_THREADS + 1u>;
 // for each block of the tile a bit for each splat that touches it.
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
@@ -132,28 +135,40 @@ fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
 struct Pixel {
   color: vec3f,
   transmittance: f32,
-  // Whether nothing behind can be seen, or there is nothing to paint.
-  finished: bool,
+  // Transmittance to which no splat may take the pixel; once one would have, or there is nothing to paint, FINISHED.
+  least: f32,
   // Blue and depth of the last splat that was blended while the pixel was transparent.
   last_seen: u32,
 }
 
-// Blends splat k of the batch, if there is one. Without a branch, which takes a third more time: where the splat does not reach, and
-// where the pixel is finished, it is blended with an alpha of 0.
-fn blend(pixel: ptr<function, Pixel>, k: u32, shape: vec4f, paint: vec4u, center: vec2f, is_there: bool) {
+// No splat leaves more.
+const FINISHED = 2.0;
+
+fn is_finished(pixel: Pixel) -> bool {
+  return pixel.least >= FINISHED;
+}
+
+// Blends splat k of the batch. Without a branch, which takes a third more time: where the splat does not reach, and where the pixel is finished, nothing
+// is added.
+fn blend(pixel: ptr<function, Pixel>, k: u32, shape: vec4f, paint: vec4u, center: vec2f, least_power: f32) {
   let offset = center - shape.xy;
   let u = offset.x * shape.z;
   let v = (offset.y - shape.w * offset.x) * bitcast<f32>(paint.x);
   let power = bitcast<f32>(paint.w) - u * u - v * v;
-  let reaches = is_there && power >= log2(view.alpha_min) && !(*pixel).finished;
+  let reaches = power >= least_power;
   let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), reaches);
   let before = (*pixel).transmittance;
   // The last one to be blended while the pixel is transparent is the one that ends it.
-  if (notes_depth) { (*pixel).last_seen = select((*pixel).last_seen, paint.z, reaches && before > view.occluded_below); }
-  let remaining = before * (1.0 - alpha);
-  (*pixel).finished |= remaining <= view.transmittance_min;
-  let after = select(remaining, before, (*pixel).finished);
-  let weight = select(before * alpha, 0.0, (*pixel).finished);
+  if (notes_depth) {
+    let is_seen = reaches && before > view.occluded_below && !is_finished(*pixel);
+    (*pixel).last_seen = select((*pixel).last_seen, paint.z, is_seen);
+  }
+  let full_weight = before * alpha;
+  let remaining = before - full_weight;
+  let ends = remaining <= (*pixel).least;
+  (*pixel).least = select((*pixel).least, FINISHED, ends);
+  let after = select(remaining, before, ends);
+  let weight = select(full_weight, 0.0, ends);
   note_blend(k, weight, before, after, paint.z);
   (*pixel).color += weight * vec3f(unpack2x16float(paint.y), unpack2x16float(paint.z).x);
   (*pixel).transmittance = after;
@@ -187,7 +202,9 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let tile_in_bin = in_bin.y * BIN_COLUMNS + in_bin.x;
   let range = ranges[bin.y * view.bins.x + bin.x];
 
-  var pixel = Pixel(vec3f(0.0), 1.0, is_outside, 0u);
+  var pixel = Pixel(vec3f(0.0), 1.0, select(view.transmittance_min, FINISHED, is_outside), 0u);
+  let least_power = log2(view.alpha_min);
+  if (lane == 0u) { paints[NO_SPLAT] = vec4u(0u, 0u, 0u, bitcast<u32>(NO_POWER)); }
   // First word of the window and the one behind it, and how many of the pairs found in it have been painted.
   var first_word = range.x / 32u;
   var next_word = first_word;
@@ -221,31 +238,30 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     workgroupBarrier();
 
     for (var word = 0u; word < BATCH_WORDS; word++) {
-      if (pixel.finished) { break; }
+      if (is_finished(pixel)) { break; }
       // Of these 32 splats those that touch the block, two at once: the second is read while the first is blended.
       var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
       while (ahead > 0u) {
-        let k = word * 32u + countTrailingZeros(ahead);
+        let k = word * 32u + firstTrailingBit(ahead);
         ahead &= ahead - 1u;
-        let is_pair = ahead != 0u;
-        let next = select(k, word * 32u + countTrailingZeros(ahead), is_pair);
+        let next = select(NO_SPLAT, word * 32u + firstTrailingBit(ahead), ahead != 0u);
         ahead &= ahead - 1u;
         let shape = shapes[k];
         let paint = paints[k];
         let next_shape = shapes[next];
         let next_paint = paints[next];
-        blend(&pixel, k, shape, paint, center, true);
-        blend(&pixel, next, next_shape, next_paint, center, is_pair);
+        blend(&pixel, k, shape, paint, center, least_power);
+        blend(&pixel, next, next_shape, next_paint, center, least_power);
       }
     }
-    if (!pixel.finished) { atomicStore(&unfinished, 1u); }
+    if (!is_finished(pixel)) { atomicStore(&unfinished, 1u); }
     workgroupBarrier();
 
     if (lane < count) { keep_notes(lane, slots[lane]); }
     if (lane == 0u) { is_open = atomicLoad(&unfinished); }
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
   }
-  let is_seen_through = !pixel.finished && pixel.transmittance > view.occluded_below;
+  let is_seen_through = !is_finished(pixel) && pixel.transmittance > view.occluded_below;
   let columns = (u32(view.viewport.x) + TILE - 1u) / TILE;
   note_depth(tile.y * columns + tile.x, lane, is_seen_through, pixel.last_seen);
   if (is_outside) { return; }

@@ -7,8 +7,6 @@ import type { FrameClock } from './frame-clock.js';
 
 /** Keys whose order is checked: several blocks, the last one not full. */
 const CHECKED = 3 * constants.SORT_BLOCK + 1234;
-/** Keys that are timed: so many that the order takes longer than a browser needs to say so. */
-const TIMED = 64 * constants.SORT_BLOCK;
 const KEY_BITS = 24;
 /** Timed runs; the first also makes the pipelines. */
 const RUNS = 4;
@@ -27,9 +25,9 @@ export async function sortsRight(device: GPUDevice, name: SortName): Promise<boo
   }
 }
 
-/** Milliseconds that the variant takes, the fastest of a few runs. */
-export async function timeSort(device: GPUDevice, name: SortName, clock: FrameClock): Promise<number> {
-  const sorting = new ProbedSort(device, name, probeKeys(TIMED));
+/** Milliseconds that the variant takes for so many keys, the fastest of a few runs. */
+export async function timeSort(device: GPUDevice, name: SortName, count: number, clock: FrameClock): Promise<number> {
+  const sorting = new ProbedSort(device, name, probeKeys(count));
   let best = Infinity;
   try {
     for (let run = 0; run < RUNS; run++) {

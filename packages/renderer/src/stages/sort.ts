@@ -163,8 +163,21 @@ function withDigits<S extends ShaderDescription>(shader: S, bits: 4 | 8): S {
   return specialise(narrower, 'digits', 'const DIGITS = 256u', `const DIGITS = ${2 ** bits}u`);
 }
 
-function movingShader<S extends ShaderDescription>(shader: S, moving: SortValues): S {
-  return moving === 'indices' ? shader : specialise(shader, 'pairs', 'const VALUE_WORDS = 1u', 'const VALUE_WORDS = 2u');
+/** What is replaced in `shared/sort_scatter` where two words move along with a key. */
+const PAIRS = [
+  ['alias Value = u32', 'alias Value = vec2u'],
+  ['const VALUE_WORDS = 1u', 'const VALUE_WORDS = 2u'],
+  ['return value;', 'return value[word];'],
+  ['return bits;', 'return select(value, vec2u(bits), vec2u(word) == vec2u(0u, 1u));'],
+] as const;
+
+function movingShader(shader: ShaderDescription, moving: SortValues): ShaderDescription {
+  if (moving === 'indices') return shader;
+  const code = PAIRS.reduce(
+    (text, [from, to]) => specialise({ ...shader, code: text }, '', from, to).code,
+    shader.code,
+  );
+  return { ...shader, name: `${shader.name}.pairs`, code };
 }
 
 function makePassUniforms(device: GPUDevice, moving: SortValues, bits: number): GPUBuffer[] {
