@@ -21,6 +21,8 @@
 override notes_depth: bool = true;
 // True to write premultiplied colour over the background, false for colour and transmittance.
 override is_final: bool = false;
+// True if the image holds float16.
+override writes_half: bool = true;
 
 const TILE_THREADS = TILE * TILE;
 const BATCH_WORDS = TILE_THREADS / 32u;
@@ -174,6 +176,13 @@ fn note_depth(tile: u32, lane: u32, is_seen_through: bool, last_seen: u32) {
   last_depths[tile] = select(OPEN, bitcast<u32>(depth), is_known && atomicLoad(&is_transparent) == 0u);
 }
 
+// The nearest float32 numbers that float16 can hold, in its normal range. Storing may cut off what float16 has no room for, which costs 5 dB.
+fn nearest_half(v: vec4f) -> vec4f {
+  let bits = bitcast<vec4u>(v);
+  let is_odd = (bits >> vec4u(13u)) & vec4u(1u);
+  return bitcast<vec4f>((bits + vec4u(0xfffu) + is_odd) & vec4u(0xffffe000u));
+}
+
 @compute @workgroup_size(TILE_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let tile = view.first_tile + workgroup_id.xy;
@@ -252,5 +261,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   note_pixel(position);
   var result = vec4f(pixel.color, pixel.transmittance);
   if (is_final) { result = vec4f(pixel.color, 1.0 - pixel.transmittance) + pixel.transmittance * view.background; }
+  if (writes_half) { result = nearest_half(result); }
   textureStore(image, position, result);
 }

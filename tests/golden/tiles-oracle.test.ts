@@ -4,8 +4,9 @@ import { after, test } from 'node:test';
 import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { renderOracle } from '../oracle/oracle.js';
-import { closeness, compareWithOracle, describeCloseness } from '../support/compare.js';
+import { closeness, compareWithOracle, describeCloseness, renderCloud } from '../support/compare.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { faultyDevice } from '../stability/support/devices.js';
 import {
   brightColors,
   cameraAt,
@@ -14,6 +15,7 @@ import {
   needles,
   offCentre,
   opacityLadder,
+  resized,
 } from '../support/scenes.js';
 
 /** Colours around 4 cost more in a float16 target than those around 1. */
@@ -37,6 +39,24 @@ for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDisc
     }
   });
 }
+
+test('tiles: an adapter that cuts off what float16 has no room for stores the same bytes', async () => {
+  const { cloud, cameras } = brightColors();
+  const camera = resized(cameras[0], 100);
+  const { device, befallen } = await faultyDevice([
+    {
+      shader: /rasterize_tiles/,
+      from: 'textureStore(image, position, result)',
+      to: 'textureStore(image, position, bitcast<vec4f>(bitcast<vec4u>(result) & vec4u(0xffffe000u)))',
+    },
+  ]);
+  const [exact, cut] = await Promise.all(
+    [await nodeDevice(), device].map((each) => renderCloud(each, cloud, camera, 'classic', { rasterizer: 'tiles' })),
+  );
+  assert.ok(befallen.length > 0, 'the shader was changed');
+  assert.deepEqual(cut, exact);
+  device.destroy();
+});
 
 /** 2,400 splats over all 30 bins of the image: 72,000 pairs, and room for 65,536. The nearest few hide all others. */
 const crowd = cloudOf(
