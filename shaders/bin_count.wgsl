@@ -19,8 +19,9 @@ fn bin_rect(s: ProjectedSplat) -> u32 {
   // Pixel centres are what counts, half a pixel inside the edges.
   let low = clamp(c.center - c.extent - 0.5, vec2f(0.0), view.viewport - 1.0);
   let high = clamp(c.center + c.extent + 0.5, vec2f(0.0), view.viewport - 1.0);
-  let first = vec2u(low / size);
-  let count = vec2u(high / size) - first + 1u;
+  // Whole numbers within the image, whatever was rounded: a bin that is not there would be written over others' ranges.
+  let first = min(vec2u(low / size), view.bins - 1u);
+  let count = clamp(vec2u(high / size), first, view.bins - 1u) - first + 1u;
   return first.x | (first.y << 8u) | (count.x << 16u) | (count.y << 24u);
 }
 

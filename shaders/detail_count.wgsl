@@ -31,7 +31,7 @@ fn count_chunk(chunk: u32) {
   if (view.has_detail != 0u) {
     let d = details[chunk];
     // While what is finer arrives, both are drawn.
-    if (arrived_below(d) >= 1.0) { own = screen_error(view, d.sphere, d.full_error); }
+    if (arrived_below(d) == ARRIVAL_STEPS) { own = screen_error(view, d.sphere, d.full_error); }
     above = screen_error(view, d.parent_sphere, d.parent_error) * exp2(view.detail_fade);
   }
   // Places of a streamed scene that hold nothing have nothing above them.

@@ -24,7 +24,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   if (page >= arrayLength(&wishes)) { return; }
   let allowed = max(view.detail, chunk_shares[arrayLength(&chunk_shares) - 1u]);
   let pixels = screen_error(view, d.sphere, d.full_error);
-  if (refined(pixels, allowed, view.detail_fade) <= 0.0) { return; }
+  if (refined(pixels, allowed, view.detail_fade) == 0u) { return; }
   let wish = select(UNSEEN * pixels, pixels, may_be_visible(view, chunks[chunk]));
   atomicMax(&wishes[page], bitcast<u32>(wish));
 }

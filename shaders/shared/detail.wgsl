@@ -33,28 +33,45 @@ fn screen_error(view: View, sphere: vec4f, error: f32) -> f32 {
   return max(view.focal.x, view.focal.y) * error / distance;
 }
 
-// Share, 0 to 1, in which what is off by so many pixels has given way to what is finer.
-fn refined(pixels: f32, allowed: f32, fade: f32) -> f32 {
-  if (pixels > allowed) { return 1.0; }
-  if (fade <= 0.0 || pixels < SMALLEST_ERROR) { return 0.0; }
-  return clamp(1.0 + log2(pixels / allowed) / fade, 0.0, 1.0);
+// Shares are counted in whole steps, for sums and differences of floats depend on how a compiler rounds, fuses and divides: so many of a fade,
+// times so many of a page that arrives. All of them together are less than 2^24, which float32 holds exactly.
+const FADE_STEPS = 65536u;
+const ARRIVAL_STEPS = 255u;
+const ALL_STEPS = FADE_STEPS * ARRIVAL_STEPS;
+
+fn nearest_step(share: f32, steps: u32) -> u32 { return u32(clamp(share, 0.0, 1.0) * f32(steps) + 0.5); }
+
+// Steps of a fade in which what is off by so many pixels has given way to what is finer.
+fn refined(pixels: f32, allowed: f32, fade: f32) -> u32 {
+  if (pixels > allowed) { return FADE_STEPS; }
+  if (fade <= 0.0 || pixels < SMALLEST_ERROR) { return 0u; }
+  return nearest_step(1.0 + log2(pixels / allowed) / fade, FADE_STEPS);
 }
 
-// Share, 0 to 1, in which what a chunk stands for has arrived.
-fn arrived_below(d: ChunkDetail) -> f32 {
-  if (d.full_error <= 0.0) { return 0.0; }
-  return min(1.0, d.error / d.full_error);
+// Steps in which what a chunk stands for has arrived. The quotient of equal numbers need not be 1, but is nearest to it.
+fn arrived_below(d: ChunkDetail) -> u32 {
+  if (d.full_error <= 0.0) { return 0u; }
+  return nearest_step(d.error / d.full_error, ARRIVAL_STEPS);
 }
 
 // The same for the chunk itself.
-fn arrived(d: ChunkDetail) -> f32 { return f32(d.children >> CHILD_PAGE_BITS) / 255.0; }
+fn arrived(d: ChunkDetail) -> u32 { return d.children >> CHILD_PAGE_BITS; }
 
-// Share, 0 to 1, in which a chunk is drawn. The shares of a chunk, the one above, and so on add up to 1, for what is below has never arrived further
-// than what is above.
+// Share, 0 to 1, in which a chunk is drawn: the steps in which the one above has given way, less those in which it has itself. What a chunk finds for
+// the one above must be what that one finds for itself: then the shares of a chunk, the one above, and so on add up to 1, for what is below has
+// never arrived further than what is above. So both go through the same instructions, a loop whose end no compiler knows. One that copied the body
+// and rounded the copies differently would be off by a step where levels fade, and by nothing where they do not (decision 13).
 fn share_drawn(view: View, d: ChunkDetail, allowed: f32) -> f32 {
-  let own = arrived_below(d) * refined(screen_error(view, d.sphere, d.full_error), allowed, view.detail_fade);
-  let above = arrived(d) * refined(screen_error(view, d.parent_sphere, d.parent_error), allowed, view.detail_fade);
-  return max(0.0, above - own);
+  var own = 0u;
+  var steps = 0u;
+  for (var side = 0u; side <= view.has_detail; side++) {
+    let is_above = side > 0u;
+    let pixels = screen_error(view, select(d.sphere, d.parent_sphere, is_above), select(d.full_error, d.parent_error, is_above));
+    own = steps;
+    steps = select(arrived_below(d), arrived(d), is_above) * refined(pixels, allowed, view.detail_fade);
+  }
+  let drawn = max(steps, own) - own;
+  return select(f32(drawn) / f32(ALL_STEPS), 1.0, drawn == ALL_STEPS);
 }
 
 // Opacity of a splat that is drawn to a share: what all shares together let through is the (weighted geometric) mean of what each would.

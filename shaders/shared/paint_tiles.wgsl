@@ -21,6 +21,9 @@
 override notes_depth: bool = true;
 // True to write premultiplied colour over the background, false for colour and transmittance.
 override is_final: bool = false;
+// True if the image holds float16, and if it holds bytes. Neither: float32.
+override writes_half: bool = true;
+override writes_bytes: bool = false;
 
 const TILE_THREADS = TILE * TILE;
 const BATCH_WORDS = TILE_THREADS / 32u;
@@ -189,6 +192,19 @@ fn note_depth(tile: u32, lane: u32, is_seen_through: bool, last_seen: u32) {
   last_depths[tile] = select(OPEN, bitcast<u32>(depth), is_known && atomicLoad(&is_transparent) == 0u);
 }
 
+// Storing may cut off what the image has no room for, which costs 5 dB. So what is stored is the nearest of the numbers that float16 can hold, in its
+// normal range,
+fn nearest_half(v: vec4f) -> vec4f {
+  let bits = bitcast<vec4u>(v);
+  let is_odd = (bits >> vec4u(13u)) & vec4u(1u);
+  return bitcast<vec4f>((bits + vec4u(0xfffu) + is_odd) & vec4u(0xffffe000u));
+}
+
+// or the nearest byte, and so little more that it is that byte rounded as well as cut off.
+fn nearest_byte(v: vec4f) -> vec4f {
+  return (floor(v * 255.0 + 0.5) + 0.25) / 255.0;
+}
+
 @compute @workgroup_size(TILE_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let tile = view.first_tile + workgroup_id.xy;
@@ -268,5 +284,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   note_pixel(position);
   var result = vec4f(pixel.color, pixel.transmittance);
   if (is_final) { result = vec4f(pixel.color, 1.0 - pixel.transmittance) + pixel.transmittance * view.background; }
+  if (writes_half) { result = nearest_half(result); }
+  if (writes_bytes) { result = nearest_byte(result); }
   textureStore(image, position, result);
 }

@@ -1,12 +1,14 @@
 /** The default image, in float before rounding, against the float64 oracle: real captures and procedural scenes. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import type { Mode } from '../oracle/oracle.js';
 import { referenceViews } from '../support/cameras.js';
-import { compareWithOracle, describeCloseness, type Closeness } from '../support/compare.js';
+import { compareWithOracle, describeCloseness } from '../support/compare.js';
 import { hasSharedData, needsSharedData, sharedFile } from '../support/data.js';
 import { isFull } from '../support/extent.js';
+import { limitOn, type Limit } from '../support/limit.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { proceduralScenes } from '../support/scenes.js';
 
@@ -15,11 +17,23 @@ const MODES: readonly Mode[] = ['classic', 'antialiased'];
 const LIMIT_DB = 59;
 /** 99.9 % of the channels are at most this far off. */
 const LIMIT_P999 = 1 / 255;
+/**
+ * The same for colours up to 4, where a step of float16 is four times one at 1. Blending in float16 is rounded as the adapter likes: 0.93/255 on SwiftShader; an NVIDIA H200,
+ * which also rounds what is blended, has 1.11.
+ */
+const LIMIT_P999_BRIGHT: Limit = { swiftshader: 1 / 255, hardware: 1.25 / 255 };
 
-function assertClose(name: string, closeness: Closeness): void {
+async function assertClose(
+  name: string,
+  scene: GaussianCloud,
+  camera: Camera,
+  mode: Mode,
+  p999 = LIMIT_P999,
+): Promise<void> {
+  const closeness = await compareWithOracle(await nodeDevice(), scene, camera, mode);
   console.log(describeCloseness(name, closeness));
   assert.ok(closeness.psnr >= LIMIT_DB, `${name}: ${closeness.psnr} dB`);
-  assert.ok(closeness.p999 <= LIMIT_P999, `${name}: 99.9th percentile ${255 * closeness.p999}/255`);
+  assert.ok(closeness.p999 <= p999, `${name}: 99.9th percentile ${255 * closeness.p999}/255`);
 }
 
 if (!hasSharedData) {
@@ -31,7 +45,7 @@ if (!hasSharedData) {
       test(`${view.name}, ${mode}`, async () => {
         if (!clouds.has(view.file)) clouds.set(view.file, readScene(sharedFile(view.file), { name: view.file }));
         const cloud = await clouds.get(view.file)!;
-        assertClose(`${view.name} ${mode}`, await compareWithOracle(await nodeDevice(), cloud, view.camera, mode));
+        await assertClose(`${view.name} ${mode}`, cloud, view.camera, mode);
       });
     }
   }
@@ -41,8 +55,9 @@ for (const makeScene of proceduralScenes) {
   for (const mode of MODES) {
     test(`${makeScene.name}, ${mode}`, async () => {
       const { name, cloud, cameras } = makeScene();
+      const p999 = name === 'brightColors' ? limitOn(await nodeDevice(), LIMIT_P999_BRIGHT) : LIMIT_P999;
       for (const [i, camera] of cameras.entries()) {
-        assertClose(`${name} ${i} ${mode}`, await compareWithOracle(await nodeDevice(), cloud, camera, mode));
+        await assertClose(`${name} ${i} ${mode}`, cloud, camera, mode, p999);
       }
     });
   }

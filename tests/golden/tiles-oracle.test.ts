@@ -1,11 +1,13 @@
 /** The compute rasterizer against the oracle. It blends in float32 and stops as the reference does, so it is held tighter. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { renderOracle } from '../oracle/oracle.js';
-import { closeness, compareWithOracle, describeCloseness } from '../support/compare.js';
+import { closeness, compareWithOracle, describeCloseness, renderCloud } from '../support/compare.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { faultyDevice } from '../stability/support/devices.js';
 import {
   brightColors,
   cameraAt,
@@ -14,6 +16,7 @@ import {
   needles,
   offCentre,
   opacityLadder,
+  resized,
 } from '../support/scenes.js';
 
 /** Colours around 4 cost more in a float16 target than those around 1. */
@@ -36,6 +39,71 @@ for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDisc
       assert.ok(close.max <= worstOf(name), `${name}: worst ${255 * close.max}/255`);
     }
   });
+}
+
+/** Stages before the tiles that SwiftShader compiles quickly. */
+const SERIAL = { rasterizer: 'tiles', threads: 'serial', sort: 'serial' } as const;
+
+/** Storing that cuts off what the format has no room for, as an NVIDIA H200 does with float16. */
+const cutsOff = (stored: string): Promise<{ device: GPUDevice; befallen: string[] }> =>
+  faultyDevice([
+    {
+      shader: /rasterize_tiles/,
+      from: 'textureStore(image, position, result)',
+      to: `textureStore(image, position, ${stored})`,
+    },
+  ]);
+
+test('tiles: an adapter that cuts off what float16 has no room for stores the same', async () => {
+  const { cloud, cameras } = brightColors();
+  const camera = resized(cameras[0], 100);
+  const { device, befallen } = await cutsOff('bitcast<vec4f>(bitcast<vec4u>(result) & vec4u(0xffffe000u))');
+  const [exact, cut] = await Promise.all(
+    [await nodeDevice(), device].map((each) => renderCloud(each, cloud, camera, 'classic', SERIAL)),
+  );
+  assert.ok(befallen.length > 0, 'the shader was changed');
+  assert.deepEqual(cut, exact);
+  device.destroy();
+});
+
+test('tiles: bytes are the nearest, on an adapter that cuts off, too', async () => {
+  const { cloud, cameras } = offCentre();
+  const camera = resized(cameras[0], 100);
+  const { device, befallen } = await cutsOff('floor(saturate(result) * 255.0) / 255.0');
+  const [exact, cut] = [await bytesOf(await nodeDevice(), cloud, camera), await bytesOf(device, cloud, camera)];
+  assert.ok(befallen.length > 0, 'the shader was changed');
+  assert.deepEqual(cut, exact);
+  device.destroy();
+  const floats = await renderCloud(await nodeDevice(), cloud, camera, 'classic', SERIAL);
+  // Half a step, and what float16 rounds.
+  const worst = floats.reduce((most, x, i) => Math.max(most, Math.abs(255 * Math.min(1, x) - exact[i])), 0);
+  assert.ok(worst <= 0.5 + 255 * 2 ** -12, `${worst} steps`);
+});
+
+/** [height, width, 4] bytes that tiles write into a texture of 8 bits themselves. */
+async function bytesOf(device: GPUDevice, cloud: GaussianCloud, camera: Camera): Promise<Uint8Array> {
+  const { width, height } = camera;
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device, SERIAL);
+  const usage = GPUTextureUsage.STORAGE_BINDING | GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
+  const target = device.createTexture({ size: [width, height], format: 'rgba8unorm', usage });
+  const bytesPerRow = 256 * Math.ceil((4 * width) / 256);
+  const staging = device.createBuffer({
+    size: bytesPerRow * height,
+    usage: GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ,
+  });
+  renderer.render({ gaussians, camera, target });
+  const encoder = device.createCommandEncoder();
+  encoder.copyTextureToBuffer({ texture: target }, { buffer: staging, bytesPerRow }, [width, height]);
+  device.queue.submit([encoder.finish()]);
+  await staging.mapAsync(GPUMapMode.READ);
+  const rows = new Uint8Array(staging.getMappedRange());
+  const bytes = new Uint8Array(4 * width * height);
+  for (let y = 0; y < height; y++)
+    bytes.set(rows.subarray(y * bytesPerRow, y * bytesPerRow + 4 * width), 4 * width * y);
+  renderer.destroy();
+  gaussians.destroy();
+  return bytes;
 }
 
 /** 2,400 splats over all 30 bins of the image: 72,000 pairs, and room for 65,536. The nearest few hide all others. */

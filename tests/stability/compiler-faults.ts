@@ -22,7 +22,8 @@ import {
 } from '@gaussian-splat/renderer';
 import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
 import { offCentre } from '../support/scenes.js';
-import { faultyDevice, fullDevice, type Miscompilation } from './support/devices.js';
+import type { Miscompilation } from '../support/miscompilation.js';
+import { faultyDevice, fullDevice } from './support/devices.js';
 import { compareImage, resized, truth } from './support/pictures.js';
 import { fullTest, holds, note, sized } from './support/row.js';
 

@@ -35,19 +35,23 @@ export function screenError(rows: Float32Array, chunk: number, camera: Camera, i
   return (Math.max(camera.fx, camera.fy) * error) / Math.max(distance - rows[sphere + 3], camera.near);
 }
 
+const { FADE_STEPS, ARRIVAL_STEPS, ALL_STEPS } = constants;
+
 function refined(pixels: number, { allowed, fade }: DetailView): number {
-  if (pixels > allowed) return 1;
+  if (pixels > allowed) return FADE_STEPS;
   if (fade <= 0 || pixels < constants.SMALLEST_ERROR) return 0;
-  return Math.min(1, Math.max(0, 1 + Math.log2(pixels / allowed) / fade));
+  return nearestStep(1 + Math.log2(pixels / allowed) / fade, FADE_STEPS);
 }
+
+const nearestStep = (share: number, steps: number): number => Math.floor(Math.min(1, Math.max(0, share)) * steps + 0.5);
 
 /** Share in which a chunk is drawn. */
 export function shareDrawn(rows: Float32Array, chunk: number, view: DetailView): number {
   const at = DETAIL_NUMBERS * chunk;
   const full = rows[at + DETAIL_PLACES.fullError];
-  const below = full > 0 ? Math.min(1, rows[at + DETAIL_PLACES.error] / full) : 0;
+  const below = full > 0 ? nearestStep(rows[at + DETAIL_PLACES.error] / full, ARRIVAL_STEPS) : 0;
   const bits = new Uint32Array(rows.buffer, rows.byteOffset + 4 * (at + DETAIL_PLACES.children), 1)[0];
-  const arrived = (bits >>> constants.CHILD_PAGE_BITS) / 255;
   const own = below * refined(screenError(rows, chunk, view.camera, false), view);
-  return Math.max(0, arrived * refined(screenError(rows, chunk, view.camera, true), view) - own);
+  const above = (bits >>> constants.CHILD_PAGE_BITS) * refined(screenError(rows, chunk, view.camera, true), view);
+  return Math.max(0, above - own) / ALL_STEPS;
 }

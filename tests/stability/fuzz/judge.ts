@@ -1,4 +1,4 @@
-/** Draws a case of the fuzzer and says how far it is from the float64 image, and why. */
+/** Draws a case, of the fuzzer or of a row, and says how far it is from the float64 image, and why. */
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import type { RasterizerName } from '@gaussian-splat/renderer';
 import { renderOracle, type Mode, type OracleImage, type Rules } from '../../oracle/oracle.js';
@@ -43,9 +43,22 @@ const DEPTH_ROUNDING = 1e-6;
 /** A pixel is decided by a rounding if the images on both sides of the limit differ by this much in it. */
 const VISIBLE = 2e-4;
 
-export async function judge(recipe: SceneRecipe, { device, precise, rasterizer }: Subject): Promise<Verdict> {
+export async function judge(recipe: SceneRecipe, subject: Subject): Promise<Verdict> {
   const { mode, turning } = recipe;
-  const [cloud, camera] = [cloudOfRecipe(recipe), cameraOfRecipe(recipe.camera)];
+  return judgeView({ cloud: cloudOfRecipe(recipe), camera: cameraOfRecipe(recipe.camera), mode, turning }, subject);
+}
+
+/** What is drawn: `turning` as the `DrawOptions` of the rows have it. */
+export interface JudgedView {
+  readonly cloud: GaussianCloud;
+  readonly camera: Camera;
+  readonly mode: Mode;
+  readonly turning: boolean;
+}
+
+/** The same for a scene and a camera that no recipe made. */
+export async function judgeView(view: JudgedView, { device, precise, rasterizer }: Subject): Promise<Verdict> {
+  const { cloud, camera, mode, turning } = view;
   const pixels = await draw(device, cloud, camera, { rasterizer, mode, turning, threads: 'serial' });
   const oracle = renderOracle(cloud, camera, { rules: 'gsplat', mode });
   const decibels = compareImage(pixels, oracle).psnr;

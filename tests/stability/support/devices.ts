@@ -1,6 +1,7 @@
 /** Devices of Dawn other than the common one: with features and limits of choice, or with a compiler that errs. */
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../../scripts/lib/node-gpu.mjs';
+import { miscompile, type Miscompilation } from '../../support/miscompilation.js';
 
 let full: Promise<GPUDevice> | undefined;
 
@@ -16,14 +17,6 @@ export async function deviceWith(features: readonly GPUFeatureName[]): Promise<G
   return adapter.requestDevice({ requiredFeatures: features.filter((feature) => adapter.features.has(feature)) });
 }
 
-/** A change that a faulty compiler might make. */
-export interface Miscompilation {
-  /** Label of the shaders that it befalls, for example `gs.project`; their variants too. */
-  readonly shader: RegExp;
-  readonly from: string;
-  readonly to: string;
-}
-
 /** A new device whose compiler errs in the given ways. `befallen` lists the labels of the shaders that were changed. */
 export async function faultyDevice(
   faults: readonly Miscompilation[],
@@ -32,14 +25,7 @@ export async function faultyDevice(
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   const befallen: string[] = [];
   const compile = device.createShaderModule.bind(device);
-  device.createShaderModule = (descriptor) => {
-    let { code } = descriptor;
-    for (const { shader, from, to } of faults) {
-      if (!shader.test(descriptor.label ?? '') || !code.includes(from)) continue;
-      code = code.replaceAll(from, to);
-      befallen.push(descriptor.label ?? '');
-    }
-    return compile({ ...descriptor, code });
-  };
+  device.createShaderModule = (descriptor) =>
+    compile({ ...descriptor, code: miscompile(descriptor, faults, befallen) });
   return { device, befallen };
 }

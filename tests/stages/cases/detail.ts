@@ -11,6 +11,7 @@ import {
 } from '@gaussian-splat/renderer/stages';
 import { levelStarts, pathOf, screenError, shareDrawn, type DetailView } from '../../support/detail-twin.js';
 import { check, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
+import { miscompiling, type Miscompilation } from '../../support/miscompilation.js';
 import { cameraAt } from '../../support/scenes.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
 import { WITHOUT_LEVERS } from './view.js';
@@ -26,7 +27,12 @@ interface Cut {
 }
 
 /** Chunks that are drawn, and to what share; with a budget, the pixels that it allows as well. */
-async function cutOnGpu(bench: Bench, packed: PackedGaussians, view: DetailView, budget = 0): Promise<Cut> {
+async function cutOnGpu(
+  bench: Bench,
+  packed: PackedGaussians,
+  view: DetailView,
+  { budget = 0, device = bench.device }: { budget?: number; device?: GPUDevice } = {},
+): Promise<Cut> {
   const groups = cullGroups(packed.count);
   const words = viewWords(packed, view, budget);
   const [uniform, chunks] = [bench.uniform(...words), bench.buffer(new Uint32Array(packed.chunks.buffer))];
@@ -36,7 +42,7 @@ async function cutOnGpu(bench: Bench, packed: PackedGaussians, view: DetailView,
   const shares = bench.buffer(new Uint32Array(initial.buffer));
   const [list, args] = [bench.buffer(4 * groups), bench.buffer(Uint32Array.of(0, 1, 1))];
   const counts = bench.buffer(4 * constants.DETAIL_COUNTS);
-  const [stage, budgetStage] = [new CullChunksStage(bench.device), new DetailBudgetStage(bench.device)];
+  const [stage, budgetStage] = [new CullChunksStage(device), new DetailBudgetStage(device)];
   const bindings = stage.bind({
     ...{ view: uniform, chunks, details, chunk_shares: shares, chunk_list: list, chunk_args: args },
     group_counts: bench.buffer(4 * groups),
@@ -103,7 +109,7 @@ function checkCovered(cut: Cut, view: DetailView, what: string): number {
       if (cut.listed.has(chunk)) looked++;
       // Where a share changes fast, the rounding of a distance shows.
       const slack = 1e-3 / Math.max(view.fade, 0.05);
-      const isOnEdge = view.fade < 0.05 && isNearEdge(rows, chunk, view);
+      const isOnEdge = view.fade < 0.05 && isNear(rows, chunk, view, view.fade + 1e-4);
       check(isOnEdge || Math.abs(share - twin) <= slack, `${what}: chunk ${chunk} has ${share}, expected ${twin}`);
       sum += share;
       if (share > 0) drawn++;
@@ -111,12 +117,66 @@ function checkCovered(cut: Cut, view: DetailView, what: string): number {
     check(Math.abs(sum - 1) < 1e-4, `${what}: leaf ${leaf} is covered ${sum} times`);
     if (view.fade === 0) check(drawn === 1, `${what}: leaf ${leaf} is drawn by ${drawn} chunks`);
   }
+  checkWhole(cut, view, what);
   return looked;
 }
 
-function isNearEdge(rows: Float32Array, chunk: number, { camera, allowed, fade }: DetailView): boolean {
-  const near = (pixels: number): boolean => Math.abs(Math.log2(pixels / allowed)) < fade + 1e-4;
-  return near(screenError(rows, chunk, camera, false)) || near(screenError(rows, chunk, camera, true));
+/** Octaves by which an error on screen may be rounded: a distance from a sphere is a small difference of large numbers. */
+const ROUNDING = 0.01;
+
+/** What is neither finer nor coarser than where levels fade is drawn wholly or not at all: nothing is looked at in vain. */
+function checkWhole({ listed, shares }: Cut, view: DetailView, what: string): void {
+  for (const chunk of listed) {
+    if (isNear(packed.details!, chunk, view, view.fade + ROUNDING)) continue;
+    check(shares[chunk] === 1, `${what}: chunk ${chunk}, which does not fade, has a share of ${shares[chunk]}`);
+  }
+}
+
+/** Whether the error of a chunk, or of the one above it, is within so many octaves of what is allowed. */
+function isNear(rows: Float32Array, chunk: number, { camera, allowed }: DetailView, octaves: number): boolean {
+  return [false, true].some(
+    (above) => Math.abs(Math.log2(screenError(rows, chunk, camera, above) / allowed)) < octaves,
+  );
+}
+
+const CULL_CHUNKS = /gs\.cull_chunks/;
+
+/** Quotients of one rounding more, and sums of products of one less: WGSL leaves both to compilers. */
+const ROUNDED_OTHERWISE: readonly Miscompilation[] = [
+  { shader: CULL_CHUNKS, from: 'd.error / d.full_error', to: 'd.error * (1.0 / d.full_error)' },
+  { shader: CULL_CHUNKS, from: 'pixels / allowed', to: 'pixels * (1.0 / allowed)' },
+  {
+    shader: CULL_CHUNKS,
+    from: 'length(sphere.xyz - view.eye)',
+    to: 'length_fused(sphere.xyz - view.eye)',
+  },
+  {
+    shader: CULL_CHUNKS,
+    from: 'fn screen_error',
+    to: 'fn length_fused(v: vec3f) -> f32 { return sqrt(fma(v.x, v.x, fma(v.y, v.y, v.z * v.z))); }\nfn screen_error',
+  },
+];
+
+/** What a chunk finds for itself is larger by 2^-21 than what is found for the same chunk as the one above another. */
+const ROUNDED_APART: readonly Miscompilation[] = [
+  { shader: CULL_CHUNKS, from: 'd.error / d.full_error', to: 'd.error * (1.0 / d.full_error)' },
+  {
+    shader: CULL_CHUNKS,
+    from: 'refined(pixels, allowed, view.detail_fade)',
+    to: 'refined(select(pixels * 1.00000048, pixels, is_above), allowed, view.detail_fade)',
+  },
+];
+
+/** Draws random views with a compiler of that kind. */
+async function checkMiscompiled(bench: Bench, faults: readonly Miscompilation[], fades: boolean): Promise<void> {
+  const random = randomSource(14);
+  const { device, befallen } = miscompiling(bench.device, faults);
+  for (let k = 0; k < 40; k++) {
+    const view = randomView(random, k);
+    if (fades && view.fade < 0.1) continue;
+    checkCovered(await cutOnGpu(bench, packed, view, { device }), view, `view ${k}`);
+  }
+  check(befallen.length === faults.length, `${befallen.length} of ${faults.length} changes were made`);
 }
 
 export const detailCases: readonly StageCase[] = [
@@ -146,6 +206,14 @@ export const detailCases: readonly StageCase[] = [
     },
   },
   {
+    name: 'detail: so it is where a compiler rounds quotients and sums of products otherwise',
+    run: (bench) => checkMiscompiled(bench, ROUNDED_OTHERWISE, false),
+  },
+  {
+    name: 'detail: where it does so for a chunk and not for the one above, only what fades is off, by a step',
+    run: (bench) => checkMiscompiled(bench, ROUNDED_APART, true),
+  },
+  {
     name: 'detail: a budget of splats is kept, and allows an error that moves with it',
     async run(bench) {
       const random = randomSource(13);
@@ -155,7 +223,7 @@ export const detailCases: readonly StageCase[] = [
         const all = (await cutOnGpu(bench, packed, view)).listed.size * constants.CULL_GROUP;
         let last = Infinity;
         for (const budget of budgets) {
-          const { listed, allowed } = await cutOnGpu(bench, packed, view, budget);
+          const { listed, allowed } = await cutOnGpu(bench, packed, view, { budget });
           const splats = listed.size * constants.CULL_GROUP;
           // A chunk at its end may be partly filled, and is counted as such.
           check(splats <= budget + constants.CULL_GROUP, `view ${k}: ${splats} splats for a budget of ${budget}`);

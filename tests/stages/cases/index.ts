@@ -6,12 +6,14 @@ import { occlusionCases } from './occlusion.js';
 import { orderCases } from './order.js';
 import { probeCases } from './probe.js';
 import { projectionCases } from './projection.js';
+import { roundedApartCases } from './rounded-apart.js';
 import { scanCases } from './scan.js';
 import { sortCases } from './sort.js';
 
 export const stageCases: readonly StageCase[] = [
   ...scanCases,
   ...projectionCases,
+  ...roundedApartCases,
   ...compactCases,
   ...detailCases,
   ...orderCases,

@@ -147,10 +147,12 @@ function halfToNumber(half: number): number {
   return sign * (exponent === 0 ? mantissa * 2 ** -24 : (1024 + mantissa) * 2 ** (exponent - 25));
 }
 
-async function projectOnGpu(
+/** Projected splats and keys of all splats, visible or not, with the kernels of `device`. */
+export async function projectOnGpu(
   bench: Bench,
   packed: PackedGaussians,
   camera: Camera,
+  device = bench.device,
 ): Promise<{ splats: Uint32Array; keys: Uint32Array }> {
   const { view, gaussians, sh } = uploadScene(bench, packed, camera);
   const { count } = packed;
@@ -161,7 +163,7 @@ async function projectOnGpu(
   const keys = bench.buffer(4 * count);
   const survivors = bench.buffer(Uint32Array.from({ length: count }, (_, i) => i));
   const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
-  const stage = new ProjectStage(bench.device);
+  const stage = new ProjectStage(device);
   const chunk_shares = bench.buffer(new Uint32Array(new Float32Array(cullGroups(count) + 1).fill(1).buffer));
   const bindings = stage.bind({
     view,

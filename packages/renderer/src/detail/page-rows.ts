@@ -4,10 +4,10 @@ import { PAGE_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
 import { NONE, type PageList } from './page-list.js';
 import { childrenOf } from './residency.js';
 
-const { CHILD_PAGE_BITS, CHILD_PAGE_MASK } = constants;
+const { ARRIVAL_STEPS, CHILD_PAGE_BITS, CHILD_PAGE_MASK } = constants;
 
 /** A page that has arrived, in the steps in which pages do. */
-export const ARRIVED = 255;
+export const ARRIVED = ARRIVAL_STEPS;
 
 /**
  * The detail rows of a page in its slot, as on the GPU: what the page's file says of its chunks, and how far the page and those below it have arrived. What is

@@ -370,7 +370,11 @@ interface RasterizeVariant {
 function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
   const { format, isFinal, isNoting, notesDepth } = variant;
   const shader: ShaderDescription = isNoting ? rasterizeTilesNoting : rasterizeTiles;
-  const constants = { notes_depth: notesDepth ? 1 : 0, is_final: isFinal ? 1 : 0 };
+  const [writesHalf, writesBytes] = [format === 'rgba16float', format.endsWith('8unorm')];
+  const constants = {
+    ...{ notes_depth: +notesDepth, is_final: +isFinal },
+    ...{ writes_half: +writesHalf, writes_bytes: +writesBytes },
+  };
   return perDevice(device, `${shader.name} ${format} ${JSON.stringify(constants)}`, () => {
     const { image } = rasterizeTiles.bindings;
     const writing = specialise(shader, format, `texture_storage_2d<${image.format}`, `texture_storage_2d<${format}`);
