@@ -4,12 +4,12 @@ import { adapterName } from '../../demo/bench/run/environment.js';
 import { nonDominated, pointsOf } from './front.mjs';
 import { placeLabels } from './labels.mjs';
 
-/** The whole chart, and one that can be read on a phone: there levers are dots without a name. */
+/** The whole chart, and one that can be read on a phone: there most levers are dots without a name. */
 const LAYOUTS = {
   whole: { width: 920, height: 620, margin: { left: 64, right: 24, top: 64, bottom: 96 }, font: 12, isSmall: false },
   small: { width: 460, height: 470, margin: { left: 52, right: 10, top: 74, bottom: 92 }, font: 15, isSmall: true },
 };
-/** What the small chart names. */
+/** What the small chart names, besides the front. */
 const NAMED_TIERS = ['tier', 'variant', 'peer'];
 
 /** Tiers of accuracy and where they begin, in dB of the worst view. */
@@ -134,7 +134,7 @@ function drawFront(front, { x, y }) {
 }
 
 function drawPoints(points, front, { x, y }, { width, height, margin, font, isSmall }) {
-  const isNamed = ({ tier }) => !isSmall || NAMED_TIERS.includes(tier);
+  const isNamed = (point) => !isSmall || NAMED_TIERS.includes(point.tier) || front.includes(point);
   const placed = placeLabels(
     points.filter(isNamed).map((point) => ({
       x: x(point.ms),
