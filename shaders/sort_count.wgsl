@@ -14,9 +14,15 @@ var<workgroup> histogram: array<atomic<u32>, DIGITS>;
 @compute @workgroup_size(SORT_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let block_id = group_index(workgroup_id);
-  let end = min(block_id * SORT_BLOCK + SORT_BLOCK, plan.visible);
-  for (var i = block_id * SORT_BLOCK + lane; i < end; i += SORT_THREADS) {
-    atomicAdd(&histogram[digit_of(keys[i], digit_pass.shift)], 1u);
+  let first = block_id * SORT_BLOCK + lane;
+  // All keys are on their way before the first is counted.
+  var own: array<u32, SORT_BLOCK / SORT_THREADS>;
+  for (var r = 0u; r < SORT_BLOCK / SORT_THREADS; r++) {
+    let i = first + r * SORT_THREADS;
+    if (i < plan.visible) { own[r] = keys[i]; }
+  }
+  for (var r = 0u; r < SORT_BLOCK / SORT_THREADS; r++) {
+    if (first + r * SORT_THREADS < plan.visible) { atomicAdd(&histogram[digit_of(own[r], digit_pass.shift)], 1u); }
   }
   workgroupBarrier();
   if (lane < DIGITS && block_id < plan.sort_blocks) {

@@ -11,7 +11,7 @@
 
 const ROW_THREADS = 32u;
 const DIGITS_PER_GROUP = PREFIX_THREADS / ROW_THREADS;
-const BLOCKS_PER_THREAD = 4u;
+const BLOCKS_PER_THREAD = 8u;
 
 var<workgroup> row_totals: array<u32, DIGITS_PER_GROUP>;
 
@@ -23,11 +23,14 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var carry = 0u;
   for (var start = 0u; start < blocks; start += ROW_THREADS * BLOCKS_PER_THREAD) {
     let first = start + (lane % ROW_THREADS) * BLOCKS_PER_THREAD;
-    var own = vec4u(0u);
+    var own: array<u32, BLOCKS_PER_THREAD>;
+    var sum = 0u;
     for (var k = 0u; k < BLOCKS_PER_THREAD; k++) {
+      // Written in every round: a compiler was seen to keep a variable of the loop body from one round to the next.
+      own[k] = 0u;
       if (first + k < blocks) { own[k] = counts[digit * blocks + first + k]; }
+      sum += own[k];
     }
-    let sum = own.x + own.y + own.z + own.w;
     let inclusive = inclusive_sum(sum, lane, ROW_THREADS);
     if (lane % ROW_THREADS == ROW_THREADS - 1u) { row_totals[row] = inclusive; }
     var running = carry + inclusive - sum;

@@ -4,48 +4,46 @@
 
 const WORDS = SORT_THREADS / 32u;
 
-// Bit t of [word][digit]: thread 32·word + t of this round has the digit. Threads that walk over digits side by side
-// then touch neighbouring words.
-var<workgroup> members: array<atomic<u32>, DIGITS * WORDS>;
+// Keys with each digit in the rounds before.
+var<workgroup> ranked: array<u32, DIGITS>;
 
 @compute @workgroup_size(SORT_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let block_id = group_index(workgroup_id);
-  find_first_places(block_id, lane);
-  let word = lane / 32u;
+  let own_first = block_id * SORT_BLOCK + lane;
+  var keys = items_at(own_first, SORT_THREADS);
+  var places: Items;
+  let own_word = lane / 32u;
   let bit = 1u << (lane % 32u);
-  var coming = item_at(block_id * SORT_BLOCK + lane);
-  for (var start = 0u; start < SORT_BLOCK; start += SORT_THREADS) {
-    let i = block_id * SORT_BLOCK + start + lane;
-    let is_key = i < plan.visible;
-    let key = coming.key;
-    let value = coming.value;
-    // The next round's, which are on their way while this round ranks.
-    if (start + SORT_THREADS < SORT_BLOCK) { coming = item_at(i + SORT_THREADS); }
-    let digit = digit_of(key, digit_pass.shift);
-    if (is_key) { atomicOr(&members[word * DIGITS + digit], bit); }
+  for (var r = 0u; r < ITEMS; r++) {
+    let is_key = own_first + r * SORT_THREADS < plan.visible;
+    let digit = digit_of(keys[r], digit_pass.shift);
+    // Bit t of [word][digit]: thread 32·word + t of this round has the digit. Threads that walk over digits side by side
+    // then touch neighbouring words.
+    if (is_key) { atomicOr(&exchange[own_word * DIGITS + digit], bit); }
     workgroupBarrier();
 
-    let first = next[digit];
+    let first = ranked[digit];
     var before = 0u;
     var count = 0u;
     for (var w = 0u; w < WORDS; w++) {
-      let mask = atomicLoad(&members[w * DIGITS + digit]);
+      let mask = atomicLoad(&exchange[w * DIGITS + digit]);
       count += countOneBits(mask);
-      before += select(0u, countOneBits(mask), w < word) + select(0u, countOneBits(mask & (bit - 1u)), w == word);
+      before += select(0u, countOneBits(mask), w < own_word) + select(0u, countOneBits(mask & (bit - 1u)), w == own_word);
     }
-    let place = first + before;
-    if (is_key && place < plan.visible) {
-      keys_out[place] = key;
-      values_out[place] = value;
-    }
+    places[r] = first + before;
     workgroupBarrier();
 
     // The last thread with a digit leaves the bitmap of that digit empty for the next round.
     if (is_key && before == count - 1u) {
-      next[digit] = first + count;
-      for (var w = 0u; w < WORDS; w++) { atomicStore(&members[w * DIGITS + digit], 0u); }
+      ranked[digit] = first + count;
+      for (var w = 0u; w < WORDS; w++) { atomicStore(&exchange[w * DIGITS + digit], 0u); }
     }
     workgroupBarrier();
   }
+  var count = 0u;
+  if (lane < DIGITS) { count = ranked[lane]; }
+  find_first_places(block_id, lane, count);
+  for (var r = 0u; r < ITEMS; r++) { places[r] += first_in_block[digit_of(keys[r], digit_pass.shift)]; }
+  write_items(block_id, lane, own_first, SORT_THREADS, &keys, &places);
 }

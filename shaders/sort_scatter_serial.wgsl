@@ -18,11 +18,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u) {
     let digit = digit_of(key, digit_pass.shift);
     let place = next[digit];
     next[digit] = place + 1u;
-    var value = Value(i);
-    if (digit_pass.makes_indices == 0u) { value = values_in[i]; }
-    if (place < plan.visible) {
-      keys_out[place] = key;
-      values_out[place] = value;
-    }
+    if (place >= plan.visible) { continue; }
+    keys_out[place] = key;
+    for (var word = 0u; word < VALUE_WORDS; word++) { values_out[place * VALUE_WORDS + word] = value_word(i, word); }
   }
 }

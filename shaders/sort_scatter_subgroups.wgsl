@@ -1,33 +1,41 @@
-// `sort_scatter` for devices with subgroups: keys with the same digit find each other by votes, one for each bit. Threads of a subgroup
-// must be neighbours in the workgroup; where they are not, the known answer of the probe rules this variant out.
+// `sort_scatter` for devices with subgroups: keys with the same digit find each other by votes, one for each bit, and each subgroup ranks a
+// part of the block by itself. Threads of a subgroup must be neighbours in the workgroup and run in step; where they do not, the known answer
+// of the probe rules this variant out.
 #import shared/sort_places
 
-// Subgroups of a workgroup, at most: replaced by what the device has.
+// Subgroups of a workgroup at most, and words with a bit for each thread of a subgroup: replaced by what the device has.
 const SUBGROUPS = 8u;
+const VOTE_WORDS = 4u;
 
-// [subgroup][digit] keys of this round in the lower half, the number of the round in the upper.
-var<workgroup> counts: array<u32, DIGITS * SUBGROUPS>;
+alias Votes = array<u32, VOTE_WORDS>;
 
 // The threads of the subgroup whose keys have this digit.
-fn peers_of(digit: u32, is_key: bool) -> vec4u {
-  var peers = subgroupBallot(is_key);
+fn peers_of(digit: u32, is_key: bool) -> Votes {
+  var peers: Votes;
+  let voters = subgroupBallot(is_key);
+  for (var w = 0u; w < VOTE_WORDS; w++) { peers[w] = voters[w]; }
   for (var b = 0u; b < DIGIT_BITS; b++) {
     let is_set = ((digit >> b) & 1u) != 0u;
     let votes = subgroupBallot(is_set);
-    peers &= select(~votes, votes, is_set);
+    for (var w = 0u; w < VOTE_WORDS; w++) { peers[w] &= select(~votes[w], votes[w], is_set); }
   }
   return peers;
 }
 
-fn ones(mask: vec4u) -> u32 {
-  let each = countOneBits(mask);
-  return each.x + each.y + each.z + each.w;
-}
-
-// A bit for each thread of the subgroup before this one.
-fn threads_before(own: u32) -> vec4u {
-  let bits = clamp(vec4i(i32(own)) - vec4i(0, 32, 64, 96), vec4i(0), vec4i(32));
-  return select((vec4u(1u) << vec4u(bits % 32)) - 1u, vec4u(0xffffffffu), bits == vec4i(32));
+// How many of them there are, how many before thread `own`, and the first.
+fn summary_of(peers: Votes, own: u32) -> vec3u {
+  var count = 0u;
+  var before = 0u;
+  var first = 0u;
+  for (var w = 0u; w < VOTE_WORDS; w++) {
+    let mask = peers[w];
+    if (count == 0u && mask != 0u) { first = 32u * w + countTrailingZeros(mask); }
+    count += countOneBits(mask);
+    let threads_before = clamp(i32(own) - i32(32u * w), 0, 32);
+    let upto = select((1u << u32(threads_before % 32)) - 1u, 0xffffffffu, threads_before == 32);
+    before += countOneBits(mask & upto);
+  }
+  return vec3u(count, before, first);
 }
 
 @compute @workgroup_size(SORT_THREADS)
@@ -38,41 +46,35 @@ fn main(
   @builtin(subgroup_invocation_id) own: u32,
 ) {
   let block_id = group_index(workgroup_id);
-  find_first_places(block_id, lane);
   let subgroup = lane / subgroup_size;
-  let subgroups = SORT_THREADS / subgroup_size;
-  var coming = item_at(block_id * SORT_BLOCK + lane);
-  for (var round = 0u; round < SORT_BLOCK / SORT_THREADS; round++) {
-    let i = block_id * SORT_BLOCK + round * SORT_THREADS + lane;
-    let is_key = i < plan.visible;
-    let key = coming.key;
-    let value = coming.value;
-    // The next round's, which are on their way while this round ranks.
-    if (round + 1u < SORT_BLOCK / SORT_THREADS) { coming = item_at(i + SORT_THREADS); }
-    let digit = digit_of(key, digit_pass.shift);
-    let peers = peers_of(digit, is_key);
-    let rank = ones(peers & threads_before(own));
-    let stamp = (round + 1u) << 16u;
-    if (is_key && rank == 0u) { counts[subgroup * DIGITS + digit] = stamp | ones(peers); }
-    workgroupBarrier();
-
-    let first = next[digit];
-    var before = 0u;
-    var total = 0u;
-    for (var s = 0u; s < subgroups; s++) {
-      let count = counts[s * DIGITS + digit] ^ stamp;
-      // What another round has left there differs in the upper half.
-      if (count > 0xffffu) { continue; }
-      total += count;
-      before += select(0u, count, s < subgroup);
-    }
-    let place = first + before + rank;
-    if (is_key && place < plan.visible) {
-      keys_out[place] = key;
-      values_out[place] = value;
-    }
-    workgroupBarrier();
-    // The first thread with a digit moves its place on; the next round reads it behind its own barrier.
-    if (is_key && before + rank == 0u) { next[digit] = first + total; }
+  let own_first = block_id * SORT_BLOCK + subgroup * subgroup_size * ITEMS + own;
+  var keys = items_at(own_first, subgroup_size);
+  var places: Items;
+  // [subgroup][digit] keys of the rounds before.
+  for (var r = 0u; r < ITEMS; r++) {
+    let is_key = own_first + r * subgroup_size < plan.visible;
+    let digit = digit_of(keys[r], digit_pass.shift);
+    let found = summary_of(peers_of(digit, is_key), own);
+    var ranked = 0u;
+    if (is_key && own == found.z) { ranked = atomicAdd(&exchange[subgroup * DIGITS + digit], found.x); }
+    places[r] = subgroupShuffle(ranked, select(own, found.z, is_key)) + found.y;
   }
+  workgroupBarrier();
+
+  // What subgroups before have ranked.
+  var count = 0u;
+  if (lane < DIGITS) {
+    for (var s = 0u; s < SUBGROUPS; s++) {
+      let ranked = atomicLoad(&exchange[s * DIGITS + lane]);
+      atomicStore(&exchange[s * DIGITS + lane], count);
+      count += ranked;
+    }
+  }
+  find_first_places(block_id, lane, count);
+  for (var r = 0u; r < ITEMS; r++) {
+    let digit = digit_of(keys[r], digit_pass.shift);
+    places[r] += first_in_block[digit] + atomicLoad(&exchange[subgroup * DIGITS + digit]);
+  }
+  workgroupBarrier();
+  write_items(block_id, lane, own_first, subgroup_size, &keys, &places);
 }

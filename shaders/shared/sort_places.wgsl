@@ -1,14 +1,70 @@
-// Where the keys of a block go: for each digit the place of the next key that has it.
+// How a block of keys is written. It is put in order in workgroup memory first, so that keys with the same digit, which lie side by side
+// afterwards, are written side by side: written one by one as they come, each would cost a memory transaction of its own.
 #import shared/sort_scatter
 #import shared/prefix
 
-var<workgroup> next: array<u32, DIGITS>;
+// Keys of one thread.
+const ITEMS = SORT_BLOCK / SORT_THREADS;
+alias Items = array<u32, ITEMS>;
 
-// next[digit] = keys with smaller digits + keys with this digit in earlier blocks. Ends with a barrier.
-fn find_first_places(block_id: u32, lane: u32) {
-  var own = 0u;
-  if (lane < DIGITS) { own = digit_totals[lane]; }
-  let smaller = inclusive_sum(own, lane, DIGITS) - own;
-  if (lane < DIGITS) { next[lane] = smaller + block_offsets[lane * plan.sort_blocks + block_id]; }
+// What a variant counts in while it ranks; afterwards words on their way from one thread to another.
+var<workgroup> exchange: array<atomic<u32>, SORT_BLOCK>;
+// For each digit the place in the block of the first key that has it, and what leads from a place in the block to that among all keys.
+var<workgroup> first_in_block: array<u32, DIGITS>;
+var<workgroup> to_all: array<u32, DIGITS>;
+
+// Takes the number of the block's keys with digit `lane`. Ends with a barrier.
+fn find_first_places(block_id: u32, lane: u32, count: u32) {
+  let is_digit = lane < DIGITS;
+  let before = inclusive_sum(select(0u, count, is_digit), lane, DIGITS) - count;
+  var total = 0u;
+  if (is_digit) { total = digit_totals[lane]; }
+  let smaller = inclusive_sum(total, lane, DIGITS) - total;
+  if (is_digit) {
+    first_in_block[lane] = before;
+    // Keys with smaller digits, and keys with this digit in earlier blocks.
+    to_all[lane] = smaller + block_offsets[lane * plan.sort_blocks + block_id] - before;
+  }
   workgroupBarrier();
+}
+
+// Writes keys number first, first + step, ... of the list, whose places in the block are known. A place that a wrong rank leads to is not written.
+fn write_items(block_id: u32, lane: u32, first: u32, step: u32, keys: ptr<function, Items>, places: ptr<function, Items>) {
+  let first_of_block = block_id * SORT_BLOCK;
+  let length = min(plan.visible - min(first_of_block, plan.visible), SORT_BLOCK);
+  for (var r = 0u; r < ITEMS; r++) {
+    if (first + r * step < plan.visible) { atomicStore(&exchange[(*places)[r]], (*keys)[r]); }
+  }
+  workgroupBarrier();
+  var goals: Items;
+  for (var r = 0u; r < ITEMS; r++) {
+    let place = r * SORT_THREADS + lane;
+    goals[r] = plan.visible;
+    if (place >= length) { continue; }
+    let key = atomicLoad(&exchange[place]);
+    goals[r] = to_all[digit_of(key, digit_pass.shift)] + place;
+    if (goals[r] < plan.visible) { keys_out[goals[r]] = key; }
+  }
+  for (var word = 0u; word < VALUE_WORDS; word++) {
+    workgroupBarrier();
+    for (var r = 0u; r < ITEMS; r++) {
+      let i = first + r * step;
+      if (i < plan.visible) { atomicStore(&exchange[(*places)[r]], value_word(i, word)); }
+    }
+    workgroupBarrier();
+    for (var r = 0u; r < ITEMS; r++) {
+      let place = r * SORT_THREADS + lane;
+      if (goals[r] < plan.visible) { values_out[goals[r] * VALUE_WORDS + word] = atomicLoad(&exchange[place]); }
+    }
+  }
+}
+
+// Keys number first, first + step, ... of the list, as far as there are any.
+fn items_at(first: u32, step: u32) -> Items {
+  var keys: Items;
+  for (var r = 0u; r < ITEMS; r++) {
+    let i = first + r * step;
+    if (i < plan.visible) { keys[r] = keys_in[i]; }
+  }
+  return keys;
 }

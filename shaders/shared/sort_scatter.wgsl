@@ -1,4 +1,4 @@
-// What both variants of `sort_scatter` read and write.
+// What all variants of `sort_scatter` read and write.
 #import shared/plan
 #import shared/group
 #import shared/sort
@@ -6,27 +6,19 @@
 @group(0) @binding(0) var<uniform> digit_pass: SortPass;
 @group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> keys_in: array<u32>;
-@group(0) @binding(3) var<storage, read> values_in: array<Value>;
+// [key][word]
+@group(0) @binding(3) var<storage, read> values_in: array<u32>;
 // Exclusive prefix sums over the blocks: [digit][block]
 @group(0) @binding(4) var<storage, read> block_offsets: array<u32>;
 @group(0) @binding(5) var<storage, read> digit_totals: array<u32>;
 @group(0) @binding(6) var<storage, read_write> keys_out: array<u32>;
-@group(0) @binding(7) var<storage, read_write> values_out: array<Value>;
+@group(0) @binding(7) var<storage, read_write> values_out: array<u32>;
 
-// What moves along with a key.
-alias Value = u32;
+// Words that move along with a key.
+const VALUE_WORDS = 1u;
 
-struct Item {
-  key: u32,
-  value: Value,
-}
-
-// Key number i and what moves along with it; nothing of meaning behind the last one.
-fn item_at(i: u32) -> Item {
-  var item = Item(0u, Value(i));
-  if (i < plan.visible) {
-    item.key = keys_in[i];
-    if (digit_pass.makes_indices == 0u) { item.value = values_in[i]; }
-  }
-  return item;
+// Word of what moves along with key number i.
+fn value_word(i: u32, word: u32) -> u32 {
+  if (digit_pass.makes_indices != 0u) { return i; }
+  return values_in[i * VALUE_WORDS + word];
 }

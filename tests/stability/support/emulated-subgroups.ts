@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { constants } from '@gaussian-splat/renderer/stages';
 import { deviceWith } from './devices.js';
 
-/** What `subgroupBallot` does for subgroups of neighbouring threads, in WGSL without subgroups. */
+/** What `subgroupBallot` and `subgroupShuffle` do for subgroups of neighbouring threads, in WGSL without subgroups. */
 const ballotOf = (size: number): string => `
 const EMULATED_SIZE = ${size}u;
 var<workgroup> emulated_votes: array<atomic<u32>, ${constants.SORT_THREADS / 32}>;
@@ -24,6 +24,14 @@ fn emulated_ballot(vote: bool) -> vec4u {
   }
   return ballot;
 }
+var<workgroup> emulated_words: array<u32, ${constants.SORT_THREADS}>;
+fn emulated_shuffle(word: u32, thread: u32) -> u32 {
+  let lane = emulated_lane;
+  workgroupBarrier();
+  emulated_words[lane] = word;
+  workgroupBarrier();
+  return emulated_words[lane / EMULATED_SIZE * EMULATED_SIZE + thread];
+}
 `;
 
 /** The shader with its subgroups replaced by those of the given size. */
@@ -33,6 +41,7 @@ function emulated(code: string, size: number): string {
     .replace(/@builtin\(subgroup_size\)\s*(\w+)\s*:\s*u32\s*,?/, '')
     .replace(/@builtin\(subgroup_invocation_id\)\s*(\w+)\s*:\s*u32\s*,?/, '')
     .replaceAll('subgroupBallot(', 'emulated_ballot(')
+    .replaceAll('subgroupShuffle(', 'emulated_shuffle(')
     .replace(
       /(fn main\([^{]*\{)/,
       `$1 emulated_lane = lane; let subgroup_size = EMULATED_SIZE; let own = lane % EMULATED_SIZE;`,
@@ -55,7 +64,7 @@ export async function deviceWithSubgroups(
   device.createShaderModule = (descriptor) => {
     if (!descriptor.code.includes('subgroupBallot(')) return compile(descriptor);
     const code = emulated(descriptor.code, size);
-    assert.ok(!/subgroup(?:Ballot|_invocation_id)/.test(code), 'nothing of the device is left in the shader');
+    assert.ok(!/subgroup(?:Ballot|Shuffle|_invocation_id)/.test(code), 'nothing of the device is left in the shader');
     changed.push(descriptor.label ?? '');
     return compile({ ...descriptor, code });
   };

@@ -79,7 +79,7 @@ const fill = (count: number, value: (i: number) => number): Uint32Array =>
   Uint32Array.from({ length: count }, (_, i) => value(i));
 
 const block = constants.SORT_BLOCK;
-const sizes = [0, 1, 2, 255, 256, 257, block - 1, block, block + 1, 3 * block + 17, 300 * block + 5];
+const sizes = [0, 1, 2, 255, 256, 257, block - 1, block, block + 1, 3 * block + 17, 258 * block + 5];
 
 export const sortCases: StageCase[] = [
   ...sizes.map((size) => ({

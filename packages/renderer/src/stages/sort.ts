@@ -64,6 +64,11 @@ function subgroupsOf(device: GPUDevice): number {
   return SORT_THREADS / Math.max(4, least);
 }
 
+/** Words with a bit for each thread of a subgroup. */
+function voteWordsOf(device: GPUDevice): number {
+  return Math.ceil((device.adapterInfo?.subgroupMaxSize ?? 128) / 32);
+}
+
 /** True if the device has what the variant needs. */
 export function canSort(device: GPUDevice, name: SortName): boolean {
   if (!name.startsWith('subgroup')) return true;
@@ -143,8 +148,11 @@ function scatterShader(device: GPUDevice, name: SortName): ShaderDescription {
   if (name === 'serial') return sortScatterSerial;
   const bits = digitBits(name);
   if (!name.startsWith('subgroup')) return withDigits(sortScatter, bits);
-  const count = subgroupsOf(device);
-  const sized = specialise(sortScatterSubgroups, `${count}`, 'const SUBGROUPS = 8u', `const SUBGROUPS = ${count}u`);
+  const replaced = { SUBGROUPS: [8, subgroupsOf(device)], VOTE_WORDS: [4, voteWordsOf(device)] };
+  let sized: ShaderDescription = sortScatterSubgroups;
+  for (const [name, [usual, own]] of Object.entries(replaced)) {
+    sized = specialise(sized, `${own}`, `const ${name} = ${usual}u`, `const ${name} = ${own}u`);
+  }
   const { code, ...rest } = withDigits(sized, bits);
   return { ...rest, code: `enable subgroups;\n${code}` };
 }
@@ -156,7 +164,7 @@ function withDigits<S extends ShaderDescription>(shader: S, bits: 4 | 8): S {
 }
 
 function movingShader<S extends ShaderDescription>(shader: S, moving: SortValues): S {
-  return moving === 'indices' ? shader : specialise(shader, 'pairs', 'alias Value = u32', 'alias Value = vec2u');
+  return moving === 'indices' ? shader : specialise(shader, 'pairs', 'const VALUE_WORDS = 1u', 'const VALUE_WORDS = 2u');
 }
 
 function makePassUniforms(device: GPUDevice, moving: SortValues, bits: number): GPUBuffer[] {
