@@ -14,7 +14,8 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 86 views around the subject, 6 of them held out
-  --scorer NAME   what measures contributions: gpu (the compute rasterizer), cpu, or auto (default): gpu where there is one
+  --scorer NAME   what measures contributions: gpu (the compute rasterizer), cpu, or auto (default): gpu where there is one. The images of the
+                  search are drawn by the GPU where there is one, else by plain code
   --report FILE   the figures as JSON
 `;
 
@@ -71,12 +72,14 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer 
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   const views = readViews(viewsFile, boundsOf(cloud));
   // SwiftShader is a processor in disguise, slower than plain code on the same.
-  const isGpu = scorer === 'auto' ? !/swiftshader/i.test(adapter.info.description) : scorer === 'gpu';
-  const gpu = isGpu ? await GpuScorer.create(device, cloud) : undefined;
+  const isHardware = !/swiftshader/i.test(adapter.info.description);
+  const scoresOnGpu = scorer === 'auto' ? isHardware : scorer === 'gpu';
+  const gpu = scoresOnGpu ? await GpuScorer.create(device, cloud) : undefined;
   const studio = new Studio(device, 'default');
   const start = performance.now();
   const result = await economise(cloud, {
     ...{ minDecibels, name: out, views, studio, scorer: gpu?.score },
+    sketcher: isHardware ? studio : undefined,
     onStep: (step) => console.log(`${((performance.now() - start) / 1000).toFixed(0).padStart(5)} s  ${step}`),
   });
   writeFileSync(out, result.bytes);

@@ -1,14 +1,18 @@
 /**
- * `npm run stability`: every row of the catalogue at full length, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
- * `-- --report` also writes docs/stability.md, its charts and the demo's copies; `-- --peers` puts the peers through the rows that a page can.
+ * `npm run stability`: every row of the catalogue at full length, each in a process of its own, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
+ * `-- --peers` puts the peers through the rows that a page can; `-- --report` also writes docs/stability.md, its charts and figures.json, from which the demo takes its own;
+ * `-- --merge FILE...` runs nothing and adds what was measured on another machine: its .cache/stability/runs.jsonl, or what the page POSTed.
  */
-import { existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { join } from 'node:path';
+import { appendFileSync, existsSync, mkdirSync, statSync } from 'node:fs';
+import { basename, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
-import { ensureChromium } from './lib/chromium.mjs';
+import { ensureChromium, findSwiftShader } from './lib/chromium.mjs';
 import { gpuEnvironment } from './lib/gpu-environment.mjs';
 import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
 import { root, run } from './lib/run.mjs';
+import { readFiles } from './stability/figures.mjs';
+import { rowFiles } from './stability/headers.mjs';
+import { writeReport } from './stability/report.mjs';
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
@@ -17,68 +21,73 @@ const { values, positionals } = parseArgs({
     peers: { type: 'boolean', default: false },
     /** The short recipes of `npm test`. */
     fast: { type: 'boolean', default: false },
-    /** Writes the report from the figures of the last run. */
+    /** Writes the report from the figures of the last runs. */
     only: { type: 'boolean', default: false },
+    /** Positional arguments are files of figures. */
+    merge: { type: 'boolean', default: false },
   },
 });
 
-ensureDependencies();
-ensureBuilt();
-process.env.CHROMIUM = ensureChromium();
+/** Folder that a person's relative paths start from: npm itself runs scripts in the project's root. */
+const from = process.env.INIT_CWD ?? process.cwd();
 const cache = join(root, '.cache/stability');
-mkdirSync(cache, { recursive: true });
-const figures = join(cache, 'figures.jsonl');
+/** What was measured on this machine: lines are only ever added, the latest of a row counts. */
+const figures = join(cache, 'runs.jsonl');
 const peers = join(cache, 'peers.json');
-seedFromReport();
 
-let status = 0;
-if (!values.only) status = runRows() | runBrowserRows();
-if (values.peers) status |= run(process.execPath, ['scripts/stability/run-peers.mjs', peers]);
-if (values.report) {
-  const { writeReport } = await import('./stability/report.mjs');
-  writeReport({
-    lines: readLines(figures),
-    peers: existsSync(peers) ? JSON.parse(readFileSync(peers, 'utf8')) : undefined,
-  });
+process.exit(values.merge ? merge() : measure());
+
+function merge() {
+  if (positionals.length === 0) throw new Error('--merge: expected files of figures, found none');
+  writeReport(readFiles(positionals.map((path) => resolve(from, path))));
+  return 0;
 }
-process.exit(status);
 
-function runRows() {
-  const fresh = join(cache, 'figures-new.jsonl');
-  rmSync(fresh, { force: true });
-  const env = {
-    ...gpuEnvironment(),
-    STABILITY: values.fast ? 'fast' : 'full',
-    STABILITY_FIGURES: fresh,
-    STABILITY_ROWS: positionals[0] ?? '',
-  };
-  const args = ['--import', 'tsx', '--test', '--test-reporter', 'spec', 'tests/stability/catalogue.test.ts'];
-  const status = run(process.execPath, args, { env });
-  // Rows that were not run keep the figures of their last run.
-  const lines = readLines(fresh);
-  const rows = new Set(lines.map(({ row }) => row));
-  const kept = readLines(figures).filter(({ row }) => !rows.has(row));
-  writeLines(figures, [...kept, ...lines]);
+function measure() {
+  ensureDependencies();
+  ensureBuilt();
+  mkdirSync(cache, { recursive: true });
+  const needsChromium = values.peers || (!values.only && positionals.length === 0);
+  const needsSwiftShader = process.platform === 'linux' && process.env.GAUSSIAN_SPLAT_GPU !== 'system';
+  if (needsChromium || (needsSwiftShader && !findSwiftShader())) process.env.CHROMIUM = ensureChromium();
+  let status = 0;
+  if (!values.only) status = runRows() | runBrowserRows();
+  if (values.peers) status |= run(process.execPath, ['scripts/stability/run-peers.mjs', peers]);
+  if (values.report) writeReport(readFiles([figures, peers].filter(existsSync)));
+  else console.log(`Figures of this machine: ${figures}. Published are those that --report or --merge has taken up.`);
   return status;
 }
 
-/** What a fresh copy knows of rows that it has not run is what the published report says of them. */
-function seedFromReport() {
-  const published = join(root, 'docs/stability/figures.json');
-  if (existsSync(figures) || !existsSync(published)) return;
-  const report = JSON.parse(readFileSync(published, 'utf8'));
-  writeLines(figures, [...report.rows.flatMap((row) => row.figures), ...report.curves]);
-  if (report.peers) writeFileSync(peers, JSON.stringify(report.peers));
+/** Figures of a row that fails are kept, and that it failed. */
+function runRows() {
+  const chosen = rowFiles().filter(({ file }) => basename(file).includes(positionals[0] ?? ''));
+  const failed = chosen.filter(({ file, id }) => {
+    const before = sizeOf(figures);
+    const passed = runRow(basename(file)) === 0;
+    // Nothing was noted where not even an adapter was found.
+    if (id !== undefined && sizeOf(figures) > before) {
+      appendFileSync(figures, `${JSON.stringify({ row: id, passed })}\n`);
+    }
+    return !passed;
+  });
+  console.log(`${chosen.length - failed.length} of ${chosen.length} files pass`);
+  for (const { file } of failed) console.log(`  failed: ${file}`);
+  return failed.length === 0 ? 0 : 1;
 }
 
-function writeLines(file, lines) {
-  writeFileSync(file, lines.map((line) => `${JSON.stringify(line)}\n`).join(''));
+function sizeOf(file) {
+  return existsSync(file) ? statSync(file).size : 0;
 }
 
-function readLines(file) {
-  if (!existsSync(file)) return [];
-  const lines = readFileSync(file, 'utf8').split('\n').filter(Boolean);
-  return lines.map((line) => JSON.parse(line));
+function runRow(name) {
+  const env = {
+    ...gpuEnvironment(),
+    STABILITY: values.fast ? 'fast' : 'full',
+    STABILITY_FIGURES: figures,
+    STABILITY_ROWS: name,
+  };
+  const args = ['--import', 'tsx', '--test', '--test-reporter', 'spec', 'tests/stability/catalogue.test.ts'];
+  return run(process.execPath, args, { env });
 }
 
 function runBrowserRows() {

@@ -4,10 +4,13 @@ import { adapterName } from '../../demo/bench/run/environment.js';
 import { nonDominated, pointsOf } from './front.mjs';
 import { placeLabels } from './labels.mjs';
 
-const WIDTH = 920;
-const HEIGHT = 620;
-const MARGIN = { left: 64, right: 24, top: 64, bottom: 96 };
-const FONT = 12;
+/** The whole chart, and one that can be read on a phone: there most levers are dots without a name. */
+const LAYOUTS = {
+  whole: { width: 920, height: 620, margin: { left: 64, right: 24, top: 64, bottom: 96 }, font: 12, isSmall: false },
+  small: { width: 460, height: 470, margin: { left: 52, right: 10, top: 74, bottom: 92 }, font: 15, isSmall: true },
+};
+/** What the small chart names, besides the front. */
+const NAMED_TIERS = ['tier', 'variant', 'peer'];
 
 /** Tiers of accuracy and where they begin, in dB of the worst view. */
 const TIERS = [
@@ -18,12 +21,12 @@ const TIERS = [
   ['fast', 36],
 ];
 
-const STYLE = `
+const styleOf = ({ font }) => `
   svg { --ink: #1d1b18; --quiet: #6b645b; --ground: #fffdf9; --line: #e2dcd2; --own: #b3541e; --peer: #1f6fb2; }
   @media (prefers-color-scheme: dark) {
     svg { --ink: #ece7df; --quiet: #a59d92; --ground: #14120f; --line: #3a332a; --own: #f0a35c; --peer: #7db8ea; }
   }
-  svg { font: ${FONT}px system-ui, sans-serif; }
+  svg { font: ${font}px system-ui, sans-serif; }
   text { fill: var(--ink); }
   .label { paint-order: stroke; stroke: var(--ground); stroke-width: 3px; stroke-linejoin: round; }
   .quiet { fill: var(--quiet); }
@@ -31,6 +34,7 @@ const STYLE = `
   .own { fill: var(--own); } .peer { fill: var(--peer); }
   .wall { fill: var(--ground); stroke-width: 2; } .own.wall { stroke: var(--own); } .peer.wall { stroke: var(--peer); }
   .front { fill: none; stroke: var(--own); stroke-width: 1.5; stroke-dasharray: 5 4; }
+  .unnamed { opacity: 0.35; }
   .leader { stroke: var(--quiet); stroke-width: 0.7; }`;
 
 const escape = (text) =>
@@ -43,59 +47,62 @@ const tag = (name, attributes, content = '') => {
 };
 const words = (x, y, content, attributes = {}) => tag('text', { x, y, ...attributes }, escape(content));
 
-/** @param report of the frontier page. */
-export function drawChart(report) {
+/**
+ * @param report of the frontier page.
+ * @param size {'whole' | 'small'}
+ */
+export function drawChart(report, size = 'whole') {
   const points = pointsOf(report);
   if (points.length === 0) throw new RangeError('a chart needs at least one configuration that worked');
-  const scales = makeScales(points);
+  const layout = LAYOUTS[size];
+  const { width, height } = layout;
+  const scales = makeScales(points, layout);
   const front = nonDominated(points);
   const parts = [
-    tag('style', {}, STYLE),
-    tag('rect', { width: WIDTH, height: HEIGHT, fill: 'var(--ground)' }),
-    drawTitle(report),
-    drawAxes(scales),
+    tag('style', {}, styleOf(layout)),
+    tag('rect', { width, height, fill: 'var(--ground)' }),
+    drawTitle(report, layout),
+    drawAxes(scales, layout),
     drawFront(front, scales),
-    drawPoints(points, front, scales),
-    drawCaption(report),
+    drawPoints(points, front, scales, layout),
+    drawCaption(report, layout),
   ];
   const title = tag('title', {}, 'Speed against accuracy of Gaussian splat renderers');
-  const box = { xmlns: 'http://www.w3.org/2000/svg', viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img' };
+  const box = { xmlns: 'http://www.w3.org/2000/svg', viewBox: `0 0 ${width} ${height}`, role: 'img' };
   return `${tag('svg', box, `${title}\n${parts.join('\n')}\n`)}\n`;
 }
 
-function makeScales(points) {
+function makeScales(points, { width, height, margin }) {
   const times = points.map(({ ms }) => ms);
   const accuracies = points.map(({ psnr }) => psnr);
-  const x = scaleLog([Math.min(...times) / 1.35, Math.max(...times) * 1.5], [MARGIN.left, WIDTH - MARGIN.right]);
+  const x = scaleLog([Math.min(...times) / 1.35, Math.max(...times) * 1.5], [margin.left, width - margin.right]);
   const low = Math.min(34, Math.floor(Math.min(...accuracies) / 5) * 5 - 1);
-  const y = scaleLinear([low, Math.max(...accuracies, 60) + 4], [HEIGHT - MARGIN.bottom, MARGIN.top]);
+  const y = scaleLinear([low, Math.max(...accuracies, 60) + 4], [height - margin.bottom, margin.top]);
   return { x, y };
 }
 
-function drawTitle({ environment, scene }) {
+function drawTitle({ environment, scene }, { margin, isSmall, font }) {
+  const about = `${adapterName(environment.adapter)}, ${scene.width}×${scene.height}, ${scene.splats.toLocaleString('en')} splats`;
+  const left = isSmall ? font : margin.left;
+  const lines = isSmall ? [`${about}.`, 'Left is faster, up is truer.'] : [`${about}. Left is faster, up is truer.`];
   return [
-    words(MARGIN.left, 26, 'Time of a frame against accuracy of its image', { 'font-size': 18, 'font-weight': 600 }),
-    words(
-      MARGIN.left,
-      46,
-      `${adapterName(environment.adapter)}, ${scene.width}×${scene.height}, ${scene.splats.toLocaleString('en')} splats. Left is faster, up is truer.`,
-      { class: 'quiet' },
-    ),
+    words(left, 26, isSmall ? 'Time of a frame against accuracy' : 'Time of a frame against accuracy of its image', {
+      'font-size': 1.15 * font + (isSmall ? 0 : 4),
+      'font-weight': 600,
+    }),
+    ...lines.map((line, i) => words(left, 46 + 18 * i, line, { class: 'quiet' })),
   ].join('\n');
 }
 
-function drawAxes({ x, y }) {
+function drawAxes({ x, y }, { isSmall, font }) {
   const [left, right] = x.range();
   const [bottom, top] = y.range();
   const [low, high] = y.domain();
-  const marks = x
-    .ticks()
-    .filter((ms) =>
-      ['1', '2', '5'].includes(String(ms.toPrecision(1))[0] === '0' ? ms.toExponential()[0] : String(ms)[0]),
-    );
+  const firsts = isSmall ? ['1'] : ['1', '2', '5'];
+  const marks = x.ticks().filter((ms) => firsts.includes(ms.toExponential()[0]));
   const columns = marks.flatMap((ms) => [
     tag('line', { class: 'grid', x1: x(ms), x2: x(ms), y1: top, y2: bottom }),
-    words(x(ms), bottom + 18, ms, { 'text-anchor': 'middle', class: 'quiet' }),
+    words(x(ms), bottom + 1.5 * font, ms, { 'text-anchor': 'middle', class: 'quiet' }),
   ]);
   const rows = y
     .ticks(8)
@@ -105,10 +112,13 @@ function drawAxes({ x, y }) {
     ]);
   const tiers = TIERS.filter(([, dB]) => dB > low && dB < high).flatMap(([name, dB]) => [
     tag('line', { class: 'grid', x1: left, x2: right, y1: y(dB), y2: y(dB) }),
-    words(right, y(dB) - 4, `${name}: ${dB} dB`, { 'text-anchor': 'end', class: 'quiet', 'font-size': 11 }),
+    ...(isSmall
+      ? []
+      : [words(right, y(dB) - 4, `${name}: ${dB} dB`, { 'text-anchor': 'end', class: 'quiet', 'font-size': 11 })]),
   ]);
+  const unit = isSmall ? 'milliseconds a frame (logarithmic)' : 'milliseconds a frame, median (logarithmic)';
   const titles = [
-    words((left + right) / 2, bottom + 38, 'milliseconds a frame, median (logarithmic)', { 'text-anchor': 'middle' }),
+    words((left + right) / 2, bottom + 3.1 * font, unit, { 'text-anchor': 'middle' }),
     words(0, 0, 'PSNR of the worst view, dB', {
       'text-anchor': 'middle',
       transform: `translate(18 ${(top + bottom) / 2}) rotate(-90)`,
@@ -123,20 +133,22 @@ function drawFront(front, { x, y }) {
   return tag('path', { class: 'front', d: path.replace(/\d+\.\d+/g, (n) => Number(n).toFixed(1)) });
 }
 
-function drawPoints(points, front, { x, y }) {
+function drawPoints(points, front, { x, y }, { width, height, margin, font, isSmall }) {
+  const isNamed = (point) => !isSmall || NAMED_TIERS.includes(point.tier) || front.includes(point);
   const placed = placeLabels(
-    points.map((point) => ({
+    points.filter(isNamed).map((point) => ({
       x: x(point.ms),
       y: y(point.psnr),
       text: point.name,
-      weight: front.includes(point) ? 1 : 0,
+      weight: front.includes(point) || point.tier === 'tier' ? 1 : 0,
     })),
-    { left: MARGIN.left, right: WIDTH - MARGIN.right, top: MARGIN.top, bottom: HEIGHT - MARGIN.bottom, font: FONT },
+    { left: margin.left, right: width - margin.right, top: margin.top, bottom: height - margin.bottom, font },
   );
   const marks = points.map((point) => {
-    const kind = `${point.peer ? 'peer' : 'own'}${point.clock === 'wall' ? ' wall' : ''}`;
+    const kind = [point.peer ? 'peer' : 'own', point.clock === 'wall' && 'wall', !isNamed(point) && 'unnamed'];
     const note = `${point.name}: ${point.ms.toFixed(2)} ms (${point.clock}), ${point.psnr.toFixed(1)} dB, worst pixel ${point.worst.toFixed(1)}/255, SSIM ${point.ssim.toFixed(4)}`;
-    return tag('circle', { class: kind, cx: x(point.ms), cy: y(point.psnr), r: 5 }, tag('title', {}, escape(note)));
+    const circle = { class: kind.filter(Boolean).join(' '), cx: x(point.ms), cy: y(point.psnr), r: 5 };
+    return tag('circle', circle, tag('title', {}, escape(note)));
   });
   const labels = placed.map(({ text, at, anchor, point, far }) => {
     const line = far ? tag('line', { class: 'leader', x1: point.x, y1: point.y, x2: at.x, y2: at.y - 4 }) : '';
@@ -146,16 +158,31 @@ function drawPoints(points, front, { x, y }) {
   return [...marks, ...labels].join('\n');
 }
 
-function drawCaption({ environment, scene, reference, run, standard }) {
+function drawCaption(report, { margin, height, isSmall, font }) {
+  const lines = isSmall ? smallCaption(report) : wholeCaption(report);
+  const size = isSmall ? 0.8 * font : 11;
+  const left = isSmall ? font : margin.left - 40;
+  return lines
+    .map((line, i) =>
+      words(left, height - 8 - 1.4 * size * (lines.length - 1 - i), line, { class: 'quiet', 'font-size': size }),
+    )
+    .join('\n');
+}
+
+function wholeCaption({ environment, scene, reference, run, standard }) {
   const { versions, date, userAgent } = environment;
   const browser = /(?:Headless)?(?:Chrome|Firefox|Version)\/[\d.]+/.exec(userAgent)?.[0] ?? userAgent;
   const against = reference.kind === 'oracle' ? 'the float64 oracle' : 'our compute rasterizer in float32';
-  const lines = [
+  return [
     `Orange: ours (${versions.commit}); blue: PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}. Filled: GPU time, first pass to last; hollow: wall time, queue drained.`,
-    `Dashed, bold: nothing else is both faster and truer. ${scene.views} views of the path “${scene.path}”, covered pixels, against ${against}.`,
+    `Dashed: nothing else is both faster and truer; bold: those, and the qualities. ${scene.views} views of the path “${scene.path}”, covered pixels, against ${against}.`,
     `Scene ${scene.scene.split('/').at(-1)}, ${scene.antialiased ? 'antialiased' : 'classic'}; ${run.rounds} × ${run.frames} frames${standard ? ', each beside the default in turns' : ''}; ${browser}; ${date.slice(0, 10)}.`,
   ];
-  return lines
-    .map((line, i) => words(MARGIN.left - 40, HEIGHT - 40 + 15 * i, line, { class: 'quiet', 'font-size': 11 }))
-    .join('\n');
+}
+
+function smallCaption({ environment }) {
+  return [
+    `Orange: ours, pale: single levers; blue: others. ${environment.date.slice(0, 10)}.`,
+    'Filled: GPU time; hollow: wall time.',
+  ];
 }

@@ -21,6 +21,7 @@ const USAGE = `usage: npm run frontier -- [options]
   --scene FILE      a scene of yours instead of the one that ships
   --query TEXT      anything else for the page's address, for example "reference=renderer"
   --from FILE       draws a report that the page posted on another machine; measures nothing
+  --adapter NAME    the GPU's name, where the browser tells no more than its vendor
   --out FOLDER      where frontier-ADAPTER.json and .svg go (default docs/frontier)
 
 The table is scripts/frontier/configurations.mjs. SwiftShader draws; GAUSSIAN_SPLAT_GPU=system takes this machine's GPU.
@@ -43,6 +44,7 @@ function readOptions() {
       scene: { type: 'string' },
       query: text(''),
       from: { type: 'string' },
+      adapter: { type: 'string' },
       out: text(join(root, 'docs/frontier')),
       help: { type: 'boolean' },
     },
@@ -109,11 +111,13 @@ async function main() {
   if (report.kind !== 'frontier')
     throw new Error(`expected the report of bench/frontier.html, found kind "${report.kind}"`);
   if (report.error) throw new Error(report.error);
+  if (options.adapter) report.environment.adapter.description = options.adapter;
   const folder = resolve(from, options.out);
   mkdirSync(folder, { recursive: true });
   const name = join(folder, `frontier-${slugOf(report.environment.adapter)}`);
   writeFileSync(`${name}.json`, `${JSON.stringify(report, null, 2)}\n`);
   writeFileSync(`${name}.svg`, drawChart(report));
+  writeFileSync(`${name}-small.svg`, drawChart(report, 'small'));
   console.log(describe(report));
   console.log(`${name}.svg`);
   if (report.errors.length > 0) throw new Error(`WebGPU: ${report.errors.join('\n')}`);

@@ -1,21 +1,12 @@
 /** Opens one page of the built demo in headless Chromium and waits for the report that it leaves in `window.report`. */
 import { basename, dirname, resolve, sep } from 'node:path';
 import { chromium } from 'playwright-core';
-import { findChromium, SWIFTSHADER_FLAGS } from './chromium.mjs';
+import { findChromium, gpuFlags } from './chromium.mjs';
 import { root } from './run.mjs';
 import { serve } from './server.mjs';
 
 /** Exact timestamps: browsers round them to 100 µs unless told otherwise. */
 const MEASURING_FLAGS = ['--disable-dawn-features=timestamp_quantization'];
-const SYSTEM_FLAGS = ['--no-sandbox', '--enable-unsafe-webgpu', '--ignore-gpu-blocklist'];
-const LINUX_FLAGS = ['--enable-features=Vulkan', '--use-angle=vulkan'];
-
-/** SwiftShader, the same everywhere; GAUSSIAN_SPLAT_GPU=system takes the machine's own GPU. */
-function flags() {
-  if (process.env.GAUSSIAN_SPLAT_GPU !== 'system') return [...SWIFTSHADER_FLAGS, ...MEASURING_FLAGS];
-  return [...SYSTEM_FLAGS, ...(process.platform === 'linux' ? LINUX_FLAGS : []), ...MEASURING_FLAGS];
-}
-
 /**
  * @param page path in demo/dist, for example `bench/index.html`.
  * @param query {Record<string, string>} of its address.
@@ -26,7 +17,7 @@ export async function runPage(page, query, { scene, minutes = 30, onProgress = (
   const mounts = { '/': `${root}demo/dist` };
   if (scene) mounts['/local/'] = dirname(resolve(scene)) + sep;
   const server = await serve(mounts);
-  const browser = await chromium.launch({ executablePath: findChromium(), args: flags() });
+  const browser = await chromium.launch({ executablePath: findChromium(), args: [...gpuFlags(), ...MEASURING_FLAGS] });
   try {
     const address = new URL(page, `http://localhost:${server.address().port}/`);
     for (const [key, value] of Object.entries(query)) if (value !== undefined) address.searchParams.set(key, value);

@@ -54,6 +54,15 @@ export const SWIFTSHADER_FLAGS = [
   '--use-vulkan=swiftshader',
 ];
 
+const SYSTEM_FLAGS = ['--no-sandbox', '--enable-unsafe-webgpu', '--ignore-gpu-blocklist'];
+const SYSTEM_LINUX_FLAGS = ['--enable-features=Vulkan', '--use-angle=vulkan'];
+
+/** Flags for SwiftShader, the same everywhere; GAUSSIAN_SPLAT_GPU=system takes the machine's own GPU. */
+export function gpuFlags() {
+  if (process.env.GAUSSIAN_SPLAT_GPU !== 'system') return SWIFTSHADER_FLAGS;
+  return [...SYSTEM_FLAGS, ...(process.platform === 'linux' ? SYSTEM_LINUX_FLAGS : [])];
+}
+
 /** Version line of a Chromium, for logs. */
 export function chromiumVersion(executable) {
   return execFileSync(executable, ['--version'], { encoding: 'utf8' }).trim();

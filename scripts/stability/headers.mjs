@@ -7,15 +7,18 @@ const FOLDERS = ['tests/stability', 'tests/stability/browser'];
 
 /** All rows in the order of their numbers. Throws for a file whose header lacks a part. */
 export function readHeaders() {
-  const rows = FOLDERS.flatMap((folder) =>
-    readdirSync(join(root, folder))
-      .filter((name) => name.endsWith('.ts') && !['catalogue.test.ts', 'support.ts'].includes(name))
-      .map((name) => readHeader(`${folder}/${name}`))
-      .filter(Boolean),
-  );
+  const rows = FOLDERS.flatMap(sourcesIn).map(readHeader).filter(Boolean);
   const order = ({ id }) => parseFloat(id.slice(1)) + (id.endsWith('b') ? 0.5 : 0);
   return rows.sort((a, b) => order(a) - order(b));
 }
+
+/** The files that Node runs, with the id of the row; the corpus of the fuzzer is no row. */
+export const rowFiles = () => sourcesIn(FOLDERS[0]).map((file) => ({ file, id: readHeader(file)?.id }));
+
+const sourcesIn = (folder) =>
+  readdirSync(join(root, folder))
+    .filter((name) => name.endsWith('.ts') && !['catalogue.test.ts', 'support.ts'].includes(name))
+    .map((name) => `${folder}/${name}`);
 
 function readHeader(file) {
   const [, comment] = /^\/\*\*([\s\S]*?)\*\//.exec(readFileSync(join(root, file), 'utf8')) ?? [];

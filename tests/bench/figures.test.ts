@@ -16,6 +16,7 @@ const { visit, visitInTurns } = await benchModule('run/measure.js');
 const { compareImages } = await benchModule('quality/metrics.js');
 const { nonDominated, hypervolume, pointsOf } = await scriptModule('frontier/front.mjs');
 const { configurations } = await scriptModule('frontier/configurations.mjs');
+const { placeLabels } = await scriptModule('frontier/labels.mjs');
 const { drawChart } = await scriptModule('frontier/chart.mjs');
 
 const noJson = () => assert.fail('no JSON is loaded');
@@ -120,6 +121,38 @@ test('beside a standard a clock that changes within the run changes nothing', as
   assert.equal((await visit(subject(2), cameras, how)).ratios, undefined);
 });
 
+test('a lever that saves in most frames and pays in some is charged for both', async () => {
+  const subject = (spanOfFrame: (frame: number) => number) => {
+    const frames: { label: string; begin: number; end: number }[][] = [];
+    return {
+      draw: (frame: number, timed: boolean) => {
+        if (timed) frames.push([{ label: 'a', begin: 0, end: spanOfFrame(frame) }]);
+      },
+      finish: async () => {},
+      readTimes: async () => frames.splice(0),
+    };
+  };
+  const cameras = Array.from({ length: 40 }, (_, i) => i);
+  const how = { warmUp: 0, busyMs: 0, phases: ['gpu'], standard: subject(() => 2) };
+  const summary = summarizeVisits([
+    await visit(
+      subject((frame) => (frame % 10 === 7 ? 11 : 1)),
+      cameras,
+      how,
+    ),
+  ]);
+  assert.equal(summary.span.p50, 1);
+  assert.equal(summary.ratio.span.p50, 1);
+  const dear = summarizeVisits([
+    await visit(
+      subject((frame) => (frame % 10 === 7 ? 21 : 1)),
+      cameras,
+      how,
+    ),
+  ]);
+  assert.equal(dear.ratio.span.p50, 1.5);
+});
+
 test('images are compared as a display shows them, where anything is seen', () => {
   const [width, height] = [16, 12];
   const covered = Uint8Array.from({ length: width * height }, (_, i) => (i < 96 ? 1 : 0));
@@ -170,8 +203,11 @@ test('the chart names every configuration that worked and no other', () => {
   const names = new Set(configurations.map(({ name }: { name: string }) => name));
   assert.equal(names.size, configurations.length, 'names are unique');
   const quality = { psnr: 60, worst: 1, ssim: 0.99 };
-  const result = (name: string, p50: number) => ({ configuration: { name }, quality, span: { p50, p95: p50 } });
-  const svg: string = drawChart({
+  const result = (name: string, p50: number, tier: string) => ({
+    ...{ configuration: { name, tier }, quality },
+    span: { p50, p95: p50 },
+  });
+  const report = {
     environment: {
       adapter: { description: 'A <GPU> & more' },
       versions: { commit: 'abc', playcanvas: '1', spark: '2' },
@@ -181,8 +217,9 @@ test('the chart names every configuration that worked and no other', () => {
     scene: { scene: 'a/skull.spz', splats: 5, width: 4, height: 3, views: 2, path: 'orbit', antialiased: false },
     reference: { kind: 'oracle' },
     run: { rounds: 1, frames: 1 },
-    results: [result('one', 1), result('two', 10), { configuration: { name: 'broken' }, error: 'no' }],
-  });
+    results: [result('one', 1, 'tier'), result('two', 10, 'lever'), { configuration: { name: 'broken' }, error: 'no' }],
+  };
+  const svg: string = drawChart(report);
   assert.match(svg, /^<svg xmlns="http:\/\/www.w3.org\/2000\/svg"/);
   assert.match(svg, />one<\/text>/);
   assert.match(svg, />two<\/text>/);
@@ -190,4 +227,23 @@ test('the chart names every configuration that worked and no other', () => {
   assert.match(svg, /A &lt;GPU&gt; &amp; more/);
   assert.doesNotMatch(svg, /NaN|undefined/);
   assert.match(svg, /prefers-color-scheme: dark/);
+  const small: string = drawChart(report, 'small');
+  assert.match(small, /viewBox="0 0 460 /);
+  assert.match(small, />one<\/text>/);
+  assert.doesNotMatch(small, />two<\/text>/, 'levers have no names there');
+});
+
+test('points that lie on one another share a label, and no label covers another', () => {
+  const names = ['default', 'tiles', 'a', 'b', 'c', 'd'];
+  const points = [
+    ...names.map((text, i) => ({ x: 100 + 0.5 * i, y: 100, text, weight: i === 0 ? 1 : 0 })),
+    ...Array.from({ length: 12 }, (_, i) => ({ x: 90 + 3 * (i % 5), y: 130 + 9 * i, text: `lever ${i}`, weight: 0 })),
+  ];
+  const placed = placeLabels(points, { left: 0, right: 600, top: 0, bottom: 400, font: 12 });
+  assert.equal(placed.length, 13);
+  assert.equal(placed[0].text, 'default, tiles, a and 3 more');
+  const boxes = (placed as { box: { x: number; y: number; width: number; height: number } }[]).map(({ box }) => box);
+  for (const [i, a] of boxes.entries())
+    for (const b of boxes.slice(i + 1))
+      assert.ok(a.x >= b.x + b.width || b.x >= a.x + a.width || a.y >= b.y + b.height || b.y >= a.y + a.height);
 });

@@ -74,7 +74,8 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const renderer = new Renderer(device, { rasterizer });
     const format = 'rgba8unorm';
-    const target = device.createTexture({ size: [size.width, size.height], format, usage: 0x10 });
+    // What an element's canvas allows: drawing, and storing by tiles.
+    const target = device.createTexture({ size: [size.width, size.height], format, usage: 0x18 });
     const made: string[] = [];
     renderer.prepare(mixes, format);
     for (const name of ['createComputePipeline', 'createRenderPipeline', 'createShaderModule'] as const) {
@@ -99,6 +100,26 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
     if (isFresh) device.destroy();
   });
 }
+
+test('a smaller picture is enlarged the same by a compute shader as by drawing', async () => {
+  const device = await serialDevice();
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const tiles = new Renderer(device, { rasterizer: 'tiles' });
+  const counter = countWork(device);
+  const background = [0.1, 0.2, 0.3, 0.5] as const;
+  for (const levers of MIXES) {
+    const request = { gaussians, camera: views[0], background, levers };
+    counter.take();
+    const stored = await readFrame(device, tiles, request);
+    assert.equal(counter.take().renderPasses, 0, 'stored');
+    const drawn = await readFrame(device, tiles, request, GPUTextureUsage.RENDER_ATTACHMENT);
+    assert.equal(counter.take().renderPasses, 1, 'drawn');
+    const worst = stored.reduce((most, value, i) => Math.max(most, Math.abs(value - drawn[i])), 0);
+    assert.ok(stored.some((value) => value > 0.6) && worst < 1e-5, `${JSON.stringify(levers)}: ${worst}`);
+  }
+  tiles.destroy();
+  gaussians.destroy();
+});
 
 test('a lever out of range is refused', async () => {
   const renderer = new Renderer(await serialDevice());

@@ -6,6 +6,7 @@ import { readdirSync } from 'node:fs';
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { scriptModule } from '../bench/load.js';
+import { noteAdapter } from './support/row.js';
 
 test('27 rows, and each says who fails it, what is run, and when it passes', async () => {
   const { readHeaders } = await scriptModule('stability/headers.mjs');
@@ -14,6 +15,7 @@ test('27 rows, and each says who fails it, what is run, and when it passes', asy
   assert.deepEqual(ids, [...numbers.slice(0, 5), 'S5b', ...numbers.slice(5)]);
 });
 
+await noteAdapter();
 const rows = readdirSync(new URL('.', import.meta.url)).filter((name) => /^[a-z-]+\.ts$/.test(name));
 for (const row of rows.filter((name) => name.includes(process.env.STABILITY_ROWS ?? ''))) {
   await import(new URL(row, import.meta.url).href);

@@ -1,13 +1,17 @@
 import type { FrameRequest, Renderer } from '@gaussian-splat/renderer';
 
-/** One frame as a renderer draws it at this moment, in float32: unlike `capture` it is never drawn again. */
+/**
+ * One frame as a renderer draws it at this moment, in float32: unlike `capture` it is never drawn again.
+ * @param allowed how the target may be written; by default as the renderer likes
+ */
 export async function readFrame(
   device: GPUDevice,
   renderer: Renderer,
   request: Omit<FrameRequest, 'target' | 'targetFormat'>,
+  allowed: GPUTextureUsageFlags = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.STORAGE_BINDING,
 ): Promise<Float32Array> {
   const { width, height } = request.camera;
-  const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.STORAGE_BINDING | GPUTextureUsage.COPY_SRC;
+  const usage = allowed | GPUTextureUsage.COPY_SRC;
   const texture = device.createTexture({ size: [width, height], format: 'rgba32float', usage });
   const bytesPerRow = Math.ceil((width * 16) / 256) * 256;
   const staging = device.createBuffer({

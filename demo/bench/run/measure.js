@@ -8,7 +8,7 @@
  *   settle?(camera)       promise: an asynchronous depth order has caught up with this camera
  */
 
-import { quantile, spanOf } from './summary.js';
+import { spanOf } from './summary.js';
 
 export const PHASES = ['gpu', 'wall', 'throughput'];
 
@@ -20,7 +20,7 @@ const BUSY_IN_FLIGHT = 16;
 /** Milliseconds of work before a visit measures: GPUs that were idle run at a fraction of their clock. */
 const BUSY_MS = 400;
 
-/** Frames of a subject between two turns of the standard: long enough for a median, short against changes of a GPU's clock. */
+/** Frames of a subject between two turns of the standard: short against changes of a GPU's clock. */
 const BURST = 10;
 
 /**
@@ -54,30 +54,30 @@ export async function visit(subject, cameras, { warmUp, phases = PHASES, busyMs 
 }
 
 const wallsOf = (frames) => frames.map(({ wall }) => wall);
-const medianWall = (frames) => quantile(wallsOf(frames), 0.5);
-const medianSpan = (frames) =>
-  quantile(
-    frames.map(spanOf).filter((span) => span !== undefined),
-    0.5,
-  );
+const mean = (times) => times.reduce((sum, time) => sum + time, 0) / times.length;
+const meanWall = (frames) => mean(wallsOf(frames));
+const meanSpan = (frames) => mean(frames.map(spanOf).filter((span) => span !== undefined));
 
-/** How a burst of frames of a subject is timed, how one of the standard beside it, and what a burst took. */
+/**
+ * How a burst of frames of a subject is timed, how one of the standard beside it, and what a burst took for each frame: the mean, since a lever may save in
+ * most frames and pay in some.
+ */
 const KINDS = {
-  span: { ofSubject: timePasses, ofStandard: timePasses, median: medianSpan },
-  wall: { ofSubject: timeFrames, ofStandard: timeFrames, median: medianWall },
-  sortedWall: { ofSubject: timeSortedFrames, ofStandard: timeFrames, median: medianWall },
+  span: { ofSubject: timePasses, ofStandard: timePasses, mean: meanSpan },
+  wall: { ofSubject: timeFrames, ofStandard: timeFrames, mean: meanWall },
+  sortedWall: { ofSubject: timeSortedFrames, ofStandard: timeFrames, mean: meanWall },
 };
 
 /**
  * Bursts of a subject between bursts of a standard, if there is one, so that both see the same clock: a burst's ratio is that to the mean of the
  * standard's bursts before and after it.
  */
-async function timeBeside(subject, standard, cameras, { ofSubject, ofStandard, median }) {
+async function timeBeside(subject, standard, cameras, { ofSubject, ofStandard, mean }) {
   const [own, others, ratios] = [[], [], []];
   const turnOfStandard = async (some) => {
     const frames = await ofStandard(standard, some);
     others.push(...frames);
-    return median(frames);
+    return mean(frames);
   };
   if (!standard || (ofStandard === timePasses && !standard.readTimes))
     return { own: await ofSubject(subject, cameras), others, ratios };
@@ -87,7 +87,7 @@ async function timeBeside(subject, standard, cameras, { ofSubject, ofStandard, m
     const frames = await ofSubject(subject, some);
     own.push(...frames);
     const after = await turnOfStandard(some);
-    const ratio = median(frames) / ((before + after) / 2);
+    const ratio = mean(frames) / ((before + after) / 2);
     if (Number.isFinite(ratio)) ratios.push(ratio);
     before = after;
   }

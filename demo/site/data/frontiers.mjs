@@ -37,6 +37,7 @@ function rowOf(result, standard) {
   return {
     name: configuration.name,
     milliseconds: Number(ms.toPrecision(3)).toLocaleString('en'),
+    ratio: result.ratio?.[kind]?.p50.toFixed(2) ?? '',
     clock: kind === 'span' ? 'GPU' : 'wall',
     psnr: quality.psnr.toFixed(1),
     worst: quality.worst.toFixed(1),

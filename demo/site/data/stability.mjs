@@ -1,57 +1,64 @@
 /** The report of `npm run stability -- --report` as the page shows it: charts, rows with others beside ours, and every row of the catalogue. */
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { latestOf, titleOf } from '../../../scripts/stability/figures.mjs';
+import { isWhole, linesOf, subjectsOf } from '../../../scripts/stability/tables.mjs';
 import { root } from '../../../scripts/lib/run.mjs';
 
 const CHARTS = { S1: 'popping', S7: 'distance', S8: 'key-bits', S21: 'zoom' };
 
 export default function stability() {
-  const { rows, curves, peers } = JSON.parse(readFileSync(join(root, 'docs/stability/figures.json'), 'utf8'));
-  const charts = Object.entries(CHARTS).filter(([row]) => curves.some((curve) => curve.row === row));
+  const { rows, runs, pages } = JSON.parse(readFileSync(join(root, 'docs/stability/figures.json'), 'utf8'));
+  const charts = Object.entries(CHARTS).filter(([id]) => runs.some(({ rows }) => rows[id]?.curves.length > 0));
   return {
     charts: charts.map(([row, file]) => ({ row, file, title: rows.find(({ id }) => id === row).title })),
-    peers: peers && describePeers(peers),
-    rows: rows.map(describeRow),
+    adapters: runs.map((run) => ({
+      name: titleOf(run.adapter),
+      driver: run.adapter.description,
+      date: latestOf(run).slice(0, 10),
+    })),
+    peers: pages.length > 0 && describePages(pages),
+    rows: rows.map((row) => describeRow(row, runs)),
   };
 }
 
 const number = (value) => String(typeof value === 'number' ? Number(value.toPrecision(4)) : value);
 
-function describePeers({ adapter, rows }) {
+function describePages(pages) {
+  const subjects = subjectsOf(pages);
+  const { adapter, rows } = pages[0];
   return {
     adapter: adapter === 'google swiftshader' || !adapter ? 'SwiftShader' : adapter,
-    subjects: rows[0].results.map(({ subject }) => subject),
-    rows: rows.map(({ row, title, least, results }) => ({
+    subjects: subjects.map(({ name }) => name),
+    rows: rows.map(({ row, title, least }) => ({
       id: row === '-' ? '' : row,
       title,
       limit: least ? `${least} dB` : '0 bytes',
-      results: results.map(({ figure, unit, passes, error }) => ({
-        text: error ?? `${number(figure)} ${unit}`,
-        passes,
-      })),
+      results: subjects.map(({ results }) => {
+        const { figure, unit, passes, error } = results.get(`${row} ${title}`) ?? {};
+        return { text: error ?? (passes === undefined ? '' : `${number(figure)} ${unit}`), passes: passes ?? true };
+      }),
     })),
   };
 }
 
-function describeRow({ id, title, fails, recipe, passes, figures }) {
+function describeRow({ id, title, fails, recipe, passes }, runs) {
+  const able = runs.filter(({ rows }) => rows[id] !== undefined);
+  const columns = able.map(({ rows }) => rows[id].figures);
   return {
     ...{ id, title, fails, recipe, passes },
     anchor: id.toLowerCase(),
-    isWhole: figures.length > 0 && figures.every(({ isFull }) => isFull),
-    figures: figures.map((figure) => ({
-      what: figure.what,
-      measured: `${number(figure.value)} ${figure.unit}`,
-      limit: limitOf(figure),
-      isKept: isKept(figure),
-      recipe: figure.isFull ? 'whole' : 'a part',
+    adapters: able.map(({ adapter, rows }) => `${titleOf(adapter)}${isWhole(rows[id]) ? '' : ', a part'}`),
+    failed: able.filter(({ rows }) => rows[id].passed === false).map(({ adapter }) => titleOf(adapter)),
+    figures: linesOf(columns).map(({ what, unit, limit, figures }) => ({
+      ...{ what, limit },
+      measured: figures.map((figure) => ({
+        text: figure === undefined ? '' : `${number(figure.value)} ${unit}`,
+        isKept: figure === undefined || isKept(figure),
+      })),
     })),
-    summary: summaryOf(figures),
+    summary: summaryOf(columns.flat()),
   };
-}
-
-function limitOf({ atLeast, atMost }) {
-  const parts = [atLeast !== undefined && `at least ${atLeast}`, atMost !== undefined && `at most ${atMost}`];
-  return parts.filter(Boolean).join(', ');
 }
 
 const hasLimit = ({ atLeast, atMost }) => atLeast !== undefined || atMost !== undefined;

@@ -102,7 +102,13 @@ export function project(cloud: GaussianCloud, roots: Float32Array, camera: Camer
     if (!(centreX + halfX > 0 && centreX - halfX < width && centreY + halfY > 0 && centreY - halfY < height)) continue;
     source[kept] = i;
     depths[kept] = z;
-    ellipses.set([centreX, centreY, yy / determinant, -xy / determinant, xx / determinant, opacity], 6 * kept);
+    const at = 6 * kept;
+    ellipses[at] = centreX;
+    ellipses[at + 1] = centreY;
+    ellipses[at + 2] = yy / determinant;
+    ellipses[at + 3] = -xy / determinant;
+    ellipses[at + 4] = xx / determinant;
+    ellipses[at + 5] = opacity;
     halfHeights[kept] = halfY;
     kept++;
   }

@@ -51,44 +51,71 @@ function nearToFar({ count, depths }: Projected): Uint32Array {
   }
   // Positive floats are in the order of their bits; numbers sort many times faster than a comparison does.
   const bits = new Uint32Array(depths.buffer, 0, count);
-  const keys = Float64Array.from({ length: count }, (_, k) => bits[k] * MAX_COUNT + k).sort();
-  return Uint32Array.from(keys, (key) => key % MAX_COUNT);
+  const keys = new Float64Array(count);
+  for (let k = 0; k < count; k++) keys[k] = bits[k] * MAX_COUNT + k;
+  keys.sort();
+  const order = new Uint32Array(count);
+  for (let k = 0; k < count; k++) order[k] = keys[k] % MAX_COUNT;
+  return order;
 }
 
 /** The part of a row of pixels that an ellipse covers, and how its alpha runs along it. */
-interface Span {
-  first: number;
-  last: number;
+class Span {
+  first = 0;
+  last = 0;
   /** Alpha in the first pixel, before it is capped. */
-  alpha: number;
+  alpha = 0;
   /** Its ratio from there to the next pixel, and what that is multiplied by from pixel to pixel. */
-  ratio: number;
-  bend: number;
-}
+  ratio = 1;
+  bend = 1;
+  readonly #ellipses: Float32Array;
+  readonly #width: number;
+  #centreX = 0;
+  #centreY = 0;
+  #xx = 0;
+  #xy = 0;
+  #yy = 0;
+  #opacity = 0;
+  /** The largest xx·dx² + 2·xy·dx·dy + yy·dy² that paints. */
+  #most = 0;
 
-/** The span of splat k in a row; false if it paints nothing there. Writes to `span`. */
-function spanIn(ellipses: Float32Array, k: number, row: number, { width }: Camera, span: Span): boolean {
-  const at = 6 * k;
-  const [xx, xy, yy] = [ellipses[at + 2], ellipses[at + 3], ellipses[at + 4]];
-  const opacity = ellipses[at + 5];
-  const dy = row + 0.5 - ellipses[at + 1];
-  // Where xx·dx² + 2·xy·dx·dy + yy·dy² = 2·ln(opacity / ALPHA_MIN).
-  const middle = xy * dy;
-  const inside = middle * middle - xx * (yy * dy * dy - 2 * Math.log(opacity / ALPHA_MIN));
-  if (!(inside > 0)) return false;
-  const reach = Math.sqrt(inside);
-  const centre = ellipses[at] - 0.5;
-  span.first = Math.max(0, Math.ceil(centre - (middle + reach) / xx));
-  span.last = Math.min(width - 1, Math.floor(centre - (middle - reach) / xx));
-  if (span.last < span.first) return false;
-  const dx = span.first - centre;
-  span.alpha = opacity * Math.exp(-0.5 * (xx * dx * dx + yy * dy * dy) - xy * dx * dy);
-  span.ratio = Math.exp(-xx * (dx + 0.5) - xy * dy);
-  span.bend = Math.exp(-xx);
-  return true;
-}
+  constructor({ ellipses }: Projected, { width }: Camera) {
+    this.#ellipses = ellipses;
+    this.#width = width;
+  }
 
-const newSpan = (): Span => ({ first: 0, last: 0, alpha: 0, ratio: 1, bend: 1 });
+  /** Looks at a splat: what its rows share. */
+  begin(k: number): void {
+    const ellipses = this.#ellipses;
+    const at = 6 * k;
+    this.#centreX = ellipses[at] - 0.5;
+    this.#centreY = ellipses[at + 1];
+    this.#xx = ellipses[at + 2];
+    this.#xy = ellipses[at + 3];
+    this.#yy = ellipses[at + 4];
+    this.#opacity = ellipses[at + 5];
+    this.#most = 2 * Math.log(this.#opacity / ALPHA_MIN);
+    this.bend = Math.exp(-this.#xx);
+  }
+
+  /** Looks at a row of it; false if it paints nothing there. */
+  enter(row: number): boolean {
+    const xx = this.#xx;
+    const yy = this.#yy;
+    const dy = row + 0.5 - this.#centreY;
+    const middle = this.#xy * dy;
+    const inside = middle * middle - xx * (yy * dy * dy - this.#most);
+    if (!(inside > 0)) return false;
+    const reach = Math.sqrt(inside);
+    this.first = Math.max(0, Math.ceil(this.#centreX - (middle + reach) / xx));
+    this.last = Math.min(this.#width - 1, Math.floor(this.#centreX - (middle - reach) / xx));
+    if (this.last < this.first) return false;
+    const dx = this.first - this.#centreX;
+    this.alpha = this.#opacity * Math.exp(-0.5 * (xx * dx * dx + yy * dy * dy) - this.#xy * dx * dy);
+    this.ratio = Math.exp(-xx * (dx + 0.5) - middle);
+    return true;
+  }
+}
 
 /** First and last row that a splat reaches. */
 function rowsOf({ ellipses, halfHeights }: Projected, k: number, { height }: Camera): readonly [number, number] {
@@ -99,12 +126,13 @@ function rowsOf({ ellipses, halfHeights }: Projected, k: number, { height }: Cam
 /** Blends the splats into an image. @param colours [count, 3] */
 function paint(projected: Projected, order: Uint32Array, camera: Camera, colours: Float32Array, image: Image): void {
   const { width } = camera;
-  const span = newSpan();
+  const span = new Span(projected, camera);
   for (const k of order) {
     const [red, green, blue] = [colours[3 * k], colours[3 * k + 1], colours[3 * k + 2]];
     const [top, bottom] = rowsOf(projected, k, camera);
+    span.begin(k);
     for (let row = top; row <= bottom; row++) {
-      if (!spanIn(projected.ellipses, k, row, camera, span)) continue;
+      if (!span.enter(row)) continue;
       const { bend } = span;
       let { alpha, ratio } = span;
       const end = 4 * (row * width + span.last);
@@ -135,13 +163,14 @@ function weigh(
 ): void {
   const { width, height } = camera;
   const painted = newImage(camera);
-  const span = newSpan();
+  const span = new Span(projected, camera);
   for (const k of order) {
     const [red, green, blue] = [colours[3 * k], colours[3 * k + 1], colours[3 * k + 2]];
     const [top, bottom] = rowsOf(projected, k, camera);
     let [peak, energy, removal] = [0, 0, 0];
+    span.begin(k);
     for (let row = top; row <= bottom; row++) {
-      if (!spanIn(projected.ellipses, k, row, camera, span)) continue;
+      if (!span.enter(row)) continue;
       const { bend } = span;
       let { alpha, ratio } = span;
       const end = 4 * (row * width + span.last);

@@ -16,7 +16,7 @@ import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
 import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
-import { ComposeStage } from './stages/compose.js';
+import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { sortedOrder } from './stages/sort.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { readStatistics, type FrameStatistics } from './statistics.js';
@@ -27,7 +27,7 @@ import { scaled } from './view.js';
 /** What an image size needs where the rasterizer cannot write the target. */
 interface Accumulation {
   readonly texture: AccumulationTexture;
-  readonly compose: GPUBindGroup;
+  readonly compose: ComposeBindings;
 }
 
 /** In how many parts the painting of a frame is handed over, and who times them. */
@@ -127,6 +127,8 @@ export class Renderer {
    */
   prepare(levers: readonly Partial<FrameLevers>[], targetFormat: GPUTextureFormat): void {
     for (const changes of levers) this.#rasterizer.prepare(this.#leversOf(changes), targetFormat);
+    const isSmaller = levers.some(({ resolutionScale = 1 }) => resolutionScale < 1);
+    if (isSmaller) this.#compose.prepare(targetFormat, this.#rasterizer.finishes(targetFormat));
   }
 
   /**
@@ -241,7 +243,8 @@ export class Renderer {
     submissions: Submissions,
   ): GPUCommandEncoder {
     const isFullSize = camera.width === target.width && camera.height === target.height;
-    if (isFullSize && target.isStorable && this.#rasterizer.finishes(target.format)) {
+    const isStored = target.isStorable && this.#rasterizer.finishes(target.format);
+    if (isFullSize && isStored) {
       return this.#recordParts(encoder, { ...how, surface: target, background }, submissions);
     }
     const { texture, compose } = this.#accumulationOf(camera, target);
@@ -252,7 +255,8 @@ export class Renderer {
     const { view, format } = texture;
     const surface = { view, format, width: camera.width, height: camera.height };
     const last = this.#recordParts(encoder, { ...how, surface }, submissions);
-    this.#compose.record(last, compose, target.view, target.format, how.timer);
+    if (isStored) this.#compose.store(last, compose, target, how.timer);
+    else this.#compose.draw(last, compose, target, how.timer);
     return last;
   }
 

@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { appendFileSync } from 'node:fs';
 import { test, type TestContext } from 'node:test';
+import { requestNodeAdapter } from '../../../scripts/lib/node-gpu.mjs';
 
 /** True under `npm run stability`: whole recipes. `npm test` runs a part of each. */
 export const isFull = process.env.STABILITY === 'full';
@@ -20,14 +21,24 @@ export interface Limit {
   readonly unit: string;
 }
 
+/** Begins a run in the file of figures: what follows was measured on this adapter. */
+export async function noteAdapter(): Promise<void> {
+  if (!process.env.STABILITY_FIGURES) return;
+  const { vendor, architecture, device, description } = (await requestNodeAdapter()).info;
+  append({ date: new Date().toISOString(), adapter: { vendor, architecture, device, description } });
+}
+
+function append(line: object): void {
+  const file = process.env.STABILITY_FIGURES;
+  if (file) appendFileSync(file, `${JSON.stringify(line)}\n`);
+}
+
 /** Notes a figure of a row for the report; `limit` is undefined for figures that nothing depends on. */
 export function note(row: string, what: string, value: number, limit: Limit): void {
   const shown = Number.isFinite(value) ? Number(value.toPrecision(4)) : value;
   console.log(`${row.padEnd(4)} ${what.padEnd(58)} ${shown} ${limit.unit}`);
-  const file = process.env.STABILITY_FIGURES;
   // JSON has no infinity: equal images have one.
-  const figure = { row, what, value: Number.isFinite(value) ? value : String(value), ...limit, isFull };
-  if (file) appendFileSync(file, `${JSON.stringify(figure)}\n`);
+  append({ row, what, value: Number.isFinite(value) ? value : String(value), ...limit, isFull });
 }
 
 /** Notes a figure of a row and fails the test if it is beyond its limit. A NaN is beyond every limit. */
@@ -39,7 +50,5 @@ export function holds(row: string, what: string, value: number, limit: Limit): v
 
 /** Points of a curve for the report. */
 export function chart(row: string, name: string, points: readonly (readonly [x: number, y: number])[]): void {
-  const file = process.env.STABILITY_FIGURES;
-  const finite = points.map(([x, y]) => [x, Number.isFinite(y) ? y : 150]);
-  if (file) appendFileSync(file, `${JSON.stringify({ row, chart: name, points: finite })}\n`);
+  append({ row, chart: name, points: points.map(([x, y]) => [x, Number.isFinite(y) ? y : 150]) });
 }

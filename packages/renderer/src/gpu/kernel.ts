@@ -194,3 +194,14 @@ export function specialise<S extends ShaderDescription>(shader: S, variant: stri
   if (!shader.code.includes(from)) throw new Error(`shader ${shader.name} has no "${from}"`);
   return { ...shader, name: `${shader.name}.${variant}`, code: shader.code.replace(from, to) };
 }
+
+/** A shader whose storage texture `image` has another format than in its text. */
+export function storingInto<S extends ShaderDescription & { bindings: { image: ShaderBinding } }>(
+  shader: S,
+  format: GPUTextureFormat,
+): S {
+  const { image } = shader.bindings;
+  const from = `texture_storage_2d<${image.format}`;
+  const storing = specialise<ShaderDescription>(shader, format, from, `texture_storage_2d<${format}`);
+  return { ...storing, bindings: { ...shader.bindings, image: { ...image, format } } } as S;
+}

@@ -9,15 +9,7 @@ import {
   rasterizeTilesNoting,
   scan,
 } from '../generated/shaders.js';
-import {
-  BUFFER_USAGE,
-  TEXTURE_USAGE,
-  ComputeKernel,
-  kernelOf,
-  perDevice,
-  specialise,
-  type ShaderDescription,
-} from '../gpu/kernel.js';
+import { BUFFER_USAGE, TEXTURE_USAGE, ComputeKernel, kernelOf, perDevice, storingInto } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
@@ -369,16 +361,12 @@ interface RasterizeVariant {
 
 function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
   const { format, isFinal, isNoting, notesDepth } = variant;
-  const shader: ShaderDescription = isNoting ? rasterizeTilesNoting : rasterizeTiles;
+  const shader = isNoting ? (rasterizeTilesNoting as unknown as typeof rasterizeTiles) : rasterizeTiles;
   const [writesHalf, writesBytes] = [format === 'rgba16float', format.endsWith('8unorm')];
   const constants = {
     ...{ notes_depth: +notesDepth, is_final: +isFinal },
     ...{ writes_half: +writesHalf, writes_bytes: +writesBytes },
   };
-  return perDevice(device, `${shader.name} ${format} ${JSON.stringify(constants)}`, () => {
-    const { image } = rasterizeTiles.bindings;
-    const writing = specialise(shader, format, `texture_storage_2d<${image.format}`, `texture_storage_2d<${format}`);
-    const bindings = { ...shader.bindings, image: { ...image, format } };
-    return new ComputeKernel(device, { ...writing, bindings } as unknown as typeof rasterizeTiles, constants);
-  });
+  const key = `${shader.name} ${format} ${JSON.stringify(constants)}`;
+  return perDevice(device, key, () => new ComputeKernel(device, storingInto(shader, format), constants));
 }

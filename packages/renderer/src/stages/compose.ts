@@ -1,8 +1,21 @@
-import { compose } from '../generated/shaders.js';
+import { compose, composeStored, constants } from '../generated/shaders.js';
 import type { FrameTimer } from '../gpu/pass-timer.js';
-import { perDevice, SHADER_STAGE, ShaderProgram, type Resources } from '../gpu/kernel.js';
+import { ComputeKernel, perDevice, SHADER_STAGE, ShaderProgram, storingInto, type Resources } from '../gpu/kernel.js';
+import type { Surface } from '../rasterizers/rasterizer.js';
 
-/** Lays the accumulated splats over the background, into a view of any renderable colour format. */
+const { COMPOSE_SIDE } = constants;
+
+/** What is composed, bound for drawing; for storing it is bound to each view of a target when that is first met. */
+export interface ComposeBindings {
+  readonly resources: Resources<typeof compose>;
+  readonly drawn: GPUBindGroup;
+  readonly stored: WeakMap<GPUTextureView, GPUBindGroup>;
+}
+
+/**
+ * Lays the accumulated splats over the background: `draw` into a view of any renderable colour format, `store` into one that a compute shader may write. The picture
+ * is the same to the rounding of its format. A GPU with few units that draw (an H200 has them in a small part of it) takes longer for one triangle than for all tiles.
+ */
 export class ComposeStage {
   readonly #device: GPUDevice;
   readonly #program: ShaderProgram<typeof compose>;
@@ -16,26 +29,47 @@ export class ComposeStage {
     );
   }
 
-  bind(resources: Resources<typeof compose>): GPUBindGroup {
-    return this.#program.bind(resources);
+  bind(resources: Resources<typeof compose>): ComposeBindings {
+    return { resources, drawn: this.#program.bind(resources), stored: new WeakMap() };
   }
 
-  record(
-    encoder: GPUCommandEncoder,
-    bindings: GPUBindGroup,
-    target: GPUTextureView,
-    format: GPUTextureFormat,
-    timer?: FrameTimer,
-  ): void {
+  /** Makes the pipeline for targets of a format, so that no frame has to. */
+  prepare(format: GPUTextureFormat, isStored: boolean): void {
+    if (isStored) this.#kernel(format).prepare();
+    else this.#pipeline(format);
+  }
+
+  draw(encoder: GPUCommandEncoder, bindings: ComposeBindings, { view, format }: Surface, timer?: FrameTimer): void {
     const pass = encoder.beginRenderPass({
       label: 'gs.compose',
-      colorAttachments: [{ view: target, loadOp: 'clear', storeOp: 'store' }],
+      colorAttachments: [{ view, loadOp: 'clear', storeOp: 'store' }],
       timestampWrites: timer?.timestampWrites('compose'),
     });
     pass.setPipeline(this.#pipeline(format));
-    pass.setBindGroup(0, bindings);
+    pass.setBindGroup(0, bindings.drawn);
     pass.draw(3);
     pass.end();
+  }
+
+  store(encoder: GPUCommandEncoder, bindings: ComposeBindings, target: Surface, timer?: FrameTimer): void {
+    const kernel = this.#kernel(target.format);
+    let bound = bindings.stored.get(target.view);
+    if (bound === undefined) {
+      bound = kernel.bind({ ...bindings.resources, image: target.view });
+      bindings.stored.set(target.view, bound);
+    }
+    const pass = encoder.beginComputePass({ label: 'gs.compose', timestampWrites: timer?.timestampWrites('compose') });
+    const [columns, rows] = [target.width, target.height].map((pixels) => Math.ceil(pixels / COMPOSE_SIDE));
+    kernel.dispatchGrid(pass, bound, columns, rows);
+    pass.end();
+  }
+
+  #kernel(format: GPUTextureFormat): ComputeKernel<typeof composeStored> {
+    return perDevice(
+      this.#device,
+      `${composeStored.name} ${format}`,
+      () => new ComputeKernel(this.#device, storingInto(composeStored, format)),
+    );
   }
 
   #pipeline(format: GPUTextureFormat): GPURenderPipeline {
