@@ -156,7 +156,9 @@ test('whatever is wished for, comes or fails, what is above a page is there, and
   const coming: number[] = [];
   for (let step = 0; step < 3000; step++) {
     residency.note(Float32Array.from({ length: list.count }, () => (random() < 0.5 ? 0 : 10 * random())));
-    for (const page of residency.missing) if (coming.length < 3 && residency.begin(page)) coming.push(page);
+    for (let page = residency.nextMissing(); page !== NONE && coming.length < 3; page = residency.nextMissing()) {
+      if (residency.begin(page)) coming.push(page);
+    }
     const [page] = coming.splice(Math.floor(random() * coming.length), 1);
     if (page !== undefined && random() < 0.2) residency.giveUp(page);
     else if (page !== undefined) residency.settle(page);

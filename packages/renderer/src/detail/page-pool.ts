@@ -24,7 +24,8 @@ export class PagePool {
   readonly pages: readonly GaussianPage[];
   readonly #device: GPUDevice;
   readonly #manifest: DetailManifest;
-  readonly #slotsPerPage: number;
+  /** Slots that lie in one buffer. */
+  readonly slotsPerBuffer: number;
 
   constructor(device: GPUDevice, memory: GpuMemory, manifest: DetailManifest, slots: number) {
     this.#device = device;
@@ -32,11 +33,11 @@ export class PagePool {
     const stride = shWords(manifest.shDegree, manifest.shPrecision);
     const bytes = 4 * Math.max(GEOMETRY_WORDS, stride);
     const capacity = Math.min(pageCapacity(device, bytes), Math.floor(LARGEST_BUFFER / bytes));
-    this.#slotsPerPage = Math.max(1, Math.floor(capacity / SLOT_SPLATS));
+    this.slotsPerBuffer = Math.max(1, Math.floor(capacity / SLOT_SPLATS));
     const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
     const buffer = (name: string, words: number): GPUBuffer => memory.buffer(`gs.pool.${name}`, 4 * words, usage);
-    this.pages = Array.from({ length: Math.ceil(slots / this.#slotsPerPage) }, (_, p) => {
-      const own = Math.min(this.#slotsPerPage, slots - p * this.#slotsPerPage);
+    this.pages = Array.from({ length: Math.ceil(slots / this.slotsPerBuffer) }, (_, p) => {
+      const own = Math.min(this.slotsPerBuffer, slots - p * this.slotsPerBuffer);
       return {
         count: SLOT_SPLATS * own,
         geometry: buffer('geometry', GEOMETRY_WORDS * SLOT_SPLATS * own),
@@ -59,14 +60,14 @@ export class PagePool {
     queue.writeBuffer(page.sh, 4 * stride * SLOT_SPLATS * place, words, geometryAt + layout.geometry, layout.sh);
   }
 
-  /** Writes the detail rows of a slot: all {@link PAGE_CHUNKS} of them. */
-  writeDetails(slot: number, rows: Float32Array<ArrayBuffer>): void {
-    const { page, place } = this.#find(slot);
+  /** Writes detail rows, {@link PAGE_CHUNKS} for each slot from the given one on; all of them lie in one buffer. */
+  writeDetails(first: number, rows: Float32Array<ArrayBuffer>): void {
+    const { page, place } = this.#find(first);
     this.#device.queue.writeBuffer(page.details!, 4 * DETAIL_NUMBERS * PAGE_CHUNKS * place, rows);
   }
 
   #find(slot: number): { page: GaussianPage; place: number } {
-    return { page: this.pages[Math.floor(slot / this.#slotsPerPage)], place: slot % this.#slotsPerPage };
+    return { page: this.pages[Math.floor(slot / this.slotsPerBuffer)], place: slot % this.slotsPerBuffer };
   }
 }
 
