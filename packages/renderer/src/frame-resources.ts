@@ -1,6 +1,6 @@
 import type { Camera } from '@gaussian-splat/core';
 import { FrameBindings, type Stages } from './bindings.js';
-import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
+import { CapacityMonitor, initialCapacity, LEAST_CAPACITY, type Capacity } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { Occlusion } from './occlusion.js';
@@ -103,6 +103,13 @@ export class FrameResources {
     return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
   }
 
+  /** A streamed scene within a budget keeps the room for splats that it is given at first: flights turn from a near wall to everything within a frame. */
+  #leastFor(table: PageTable): Capacity {
+    const isBudgeted = table.isStreamed && Number.isFinite(this.#mostSplats);
+    if (!isBudgeted) return LEAST_CAPACITY;
+    return { ...LEAST_CAPACITY, visible: initialCapacity(table.splats, this.#mostFor(table)).visible };
+  }
+
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
   #rebind(table: PageTable): Resources {
     const { stages, sort, occlusion } = this.#options;
@@ -138,7 +145,8 @@ export class FrameResources {
   }
 
   #watch(table: PageTable, capacity: Capacity): CapacityMonitor {
-    return new CapacityMonitor(this.#device, capacity, this.#mostFor(table), (wished, overflowed) => {
+    const bounds = { least: this.#leastFor(table), most: this.#mostFor(table) };
+    return new CapacityMonitor(this.#device, capacity, bounds, (wished, overflowed) => {
       this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
       this.#capacity = wished;
       if (overflowed) this.#options.onIncomplete();

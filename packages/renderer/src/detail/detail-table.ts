@@ -35,7 +35,7 @@ export class DetailTable {
     if (!this.#hasChanged) return;
     this.#hasChanged = false;
     const changed = this.#isChanged;
-    for (let first = changed.indexOf(1); first >= 0; ) {
+    for (let first = changed.indexOf(1); first >= 0;) {
       const end = Math.min(changed.length, slotsPerBuffer * (Math.floor(first / slotsPerBuffer) + 1));
       let last = first;
       for (let slot = first + 1; slot < end && slot <= last + BRIDGED + 1; slot++) if (changed[slot] === 1) last = slot;

@@ -46,7 +46,7 @@ export class PageHeap {
   }
 
   #sink(start: number): void {
-    for (let at = start; ; ) {
+    for (let at = start; ;) {
       let largest = at;
       for (let below = 2 * at + 1; below <= 2 * at + 2 && below < this.#count; below++) {
         if (this.#ranks[below] > this.#ranks[largest]) largest = below;
