@@ -2,7 +2,7 @@ import { NONE } from './page-list.js';
 import type { Residency } from './residency.js';
 
 /** Pages being fetched at a time, and those together with what waits for its upload: at most 21 MB of the page's memory. */
-const MOST_FETCHES = 8;
+export const MOST_FETCHES = 8;
 export const MOST_UNDER_WAY = 32;
 /** Milliseconds before a page that did not come is asked for again. */
 const RETRY_MS = 4_000;
