@@ -9,9 +9,9 @@ export interface Capacity {
   readonly pairs: number;
 }
 
-/** Between which bounds the room stays. */
+/** Between which bounds the room stays; the lower one is asked for whenever there might be less. */
 export interface CapacityBounds {
-  readonly least: Capacity;
+  readonly least: () => Capacity;
   readonly most: Capacity;
 }
 
@@ -131,9 +131,10 @@ export class CapacityMonitor {
       pairs: Math.max(this.#recent.pairs, used.pairs),
     };
     if (++this.#idleLooks < PATIENCE) return;
+    const least = this.#bounds.least();
     const shrunk = {
-      visible: shrink(this.#recent.visible, this.#capacity.visible, this.#bounds.least.visible),
-      pairs: shrink(this.#recent.pairs, this.#capacity.pairs, this.#bounds.least.pairs),
+      visible: shrink(this.#recent.visible, this.#capacity.visible, least.visible),
+      pairs: shrink(this.#recent.pairs, this.#capacity.pairs, least.pairs),
     };
     if (bytesOf(this.#capacity) - bytesOf(shrunk) >= LEAST_SAVING) this.#wish(shrunk, false);
     this.#idleLooks = 0;

@@ -26,6 +26,8 @@ export interface ResourceOptions {
   readonly sort: SortName;
   readonly rasterizer: Rasterizer;
   readonly occlusion: Occlusion;
+  /** Pairs of splat and bin that are painted in one submission. */
+  readonly pairsAtOnce: () => number;
   /** A frame lacked room, and the next one has it. */
   readonly onIncomplete: () => void;
 }
@@ -103,11 +105,14 @@ export class FrameResources {
     return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
   }
 
-  /** A streamed scene within a budget keeps the room for splats that it is given at first: flights turn from a near wall to everything within a frame. */
+  /**
+   * A streamed scene within a budget keeps the room that it is given at first, that for pairs as far as it does not divide the painting: flights turn from a near wall to
+   * everything within a frame.
+   */
   #leastFor(table: PageTable): Capacity {
-    const isBudgeted = table.isStreamed && Number.isFinite(this.#mostSplats);
-    if (!isBudgeted) return LEAST_CAPACITY;
-    return { ...LEAST_CAPACITY, visible: initialCapacity(table.splats, this.#mostFor(table)).visible };
+    if (!table.isStreamed || !Number.isFinite(this.#mostSplats)) return LEAST_CAPACITY;
+    const { visible, pairs } = initialCapacity(table.splats, this.#mostFor(table));
+    return { visible, pairs: Math.max(LEAST_CAPACITY.pairs, Math.min(pairs, this.#options.pairsAtOnce())) };
   }
 
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
@@ -145,7 +150,7 @@ export class FrameResources {
   }
 
   #watch(table: PageTable, capacity: Capacity): CapacityMonitor {
-    const bounds = { least: this.#leastFor(table), most: this.#mostFor(table) };
+    const bounds = { least: () => this.#leastFor(table), most: this.#mostFor(table) };
     return new CapacityMonitor(this.#device, capacity, bounds, (wished, overflowed) => {
       this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
       this.#capacity = wished;
