@@ -72,29 +72,24 @@ export class PagePool {
 }
 
 /** Moves everything in a page's file that is a position. */
-export function movePage(
-  words: Uint32Array<ArrayBuffer>,
-  [x, y, z]: Vector3,
-  manifest: DetailManifest,
-  chunks: number,
-): void {
-  if (x === 0 && y === 0 && z === 0) return;
+export function movePage(words: Uint32Array<ArrayBuffer>, by: Vector3, manifest: DetailManifest, chunks: number): void {
+  if (by.every((value) => value === 0)) return;
   const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
   const layout = pageLayout(manifest, chunks);
-  const move = (at: number): void => {
+  const [details, geometry] = [layout.chunks, layout.chunks + layout.details];
+  // The two corners of a box.
+  for (const corner of [0, 4]) movePoints(floats, corner, details, CHUNK_NUMBERS, by);
+  for (const sphere of [DETAIL_PLACES.sphere, DETAIL_PLACES.parentSphere]) {
+    movePoints(floats, details + sphere, geometry, DETAIL_NUMBERS, by);
+  }
+  movePoints(floats, geometry, geometry + layout.geometry, GEOMETRY_WORDS, by);
+}
+
+/** Moves the points that begin at every so many numbers. No closure, no array: of what a page costs the thread this is the largest part. */
+function movePoints(floats: Float32Array, first: number, end: number, stride: number, [x, y, z]: Vector3): void {
+  for (let at = first; at < end; at += stride) {
     floats[at] += x;
     floats[at + 1] += y;
     floats[at + 2] += z;
-  };
-  for (let at = 0; at < layout.chunks; at += CHUNK_NUMBERS) {
-    move(at);
-    move(at + 4);
   }
-  const details = layout.chunks;
-  for (let at = details; at < details + layout.details; at += DETAIL_NUMBERS) {
-    move(at + DETAIL_PLACES.sphere);
-    move(at + DETAIL_PLACES.parentSphere);
-  }
-  const geometry = details + layout.details;
-  for (let at = geometry; at < geometry + layout.geometry; at += GEOMETRY_WORDS) move(at);
 }
