@@ -2,6 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { PackedGaussians, PackedLevels } from '@gaussian-splat/renderer';
 import { buffersOf } from './buffers-of.js';
 import type {
+  FileRequest,
   LoadedScene,
   LoadedSequence,
   PageMessage,
@@ -21,7 +22,7 @@ interface Listeners {
 }
 
 interface Pending extends Listeners {
-  /** Gets what the worker answered: a scene, a sequence or levels, as was asked for. */
+  /** Gets what the worker answered: a scene, a sequence, levels or a file, as was asked for. */
   readonly resolve: (answer: never) => void;
   readonly reject: (reason: unknown) => void;
 }
@@ -74,6 +75,16 @@ export class SceneLoader {
     const id = this.#nextId++;
     const message: PageMessage = { type: 'load', id, request, wantsPreviews: onPreview !== undefined };
     return this.#ask<LoadedScene | LoadedSequence>(worker, message, signal, { onProgress, onPreview });
+  }
+
+  /** The bytes of one file. Rejects with GaussianSplatError `network/*`, `out-of-memory/allocation`, or with the signal's reason as soon as that is aborted. */
+  async fetchFile(request: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
+    signal.throwIfAborted();
+    clearTimeout(this.#idleTimer);
+    const worker = await (this.#worker ??= this.#start());
+    signal.throwIfAborted();
+    if (worker === null) return (await import('./scene-worker.js')).fetchFile(request, signal);
+    return this.#ask<ArrayBuffer>(worker, { type: 'file', id: this.#nextId++, request }, signal, {});
   }
 
   /**
@@ -156,6 +167,7 @@ export class SceneLoader {
     else if (message.type === 'scene') pending?.resolve(message.scene as never);
     else if (message.type === 'sequence') pending?.resolve(message.sequence as never);
     else if (message.type === 'levels') pending?.resolve(message.levels as never);
+    else if (message.type === 'file') pending?.resolve(message.bytes as never);
     else pending?.reject(GaussianSplatError.fromData(message.error));
   }
 
