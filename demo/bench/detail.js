@@ -4,6 +4,7 @@ import { checkManifest, MemoryLedger, PassTimer, Renderer, StreamedGaussians } f
 import { Progress, within } from './run/bounded.js';
 import { describeEnvironment, openDevice } from './run/environment.js';
 import { readPixels } from './run/read-pixels.js';
+import { startFetching } from './run/worker-fetch.js';
 
 const query = new URLSearchParams(location.search);
 const number = (name, fallback) => Number(query.get(name) ?? fallback);
@@ -37,21 +38,15 @@ const report = {
   ...{ warmUp: [], flight: [], atRest: [] },
 };
 
-/** A file, or an error that names it: one of the wrong kind, or one that does not come, must not be waited for forever. */
-async function get(url, signal) {
-  const response = await fetch(url, { signal: AbortSignal.any([signal, AbortSignal.timeout(1000 * FETCH_SECONDS)]) });
-  if (!response.ok) throw new Error(`${url}: HTTP ${response.status}`);
-  return response;
-}
-
 async function open(device) {
   const url = new URL(query.get('scene'), location.href);
-  const fetched = get(url, new AbortController().signal).then((response) => response.json());
-  const manifest = checkManifest(await progress.wait('the manifest', fetched), url.href);
+  const fetchFile = startFetching(FETCH_SECONDS);
+  const fetched = await progress.wait('the manifest', fetchFile(url, new AbortController().signal));
+  const manifest = checkManifest(JSON.parse(new TextDecoder().decode(fetched)), url.href);
   const traffic = { requests: 0, bytes: 0, errors: [] };
   report.fetched = traffic;
   const fetchPage = async (file, signal) => {
-    const bytes = await (await get(new URL(file, url), signal)).arrayBuffer();
+    const bytes = await fetchFile(new URL(file, url), signal);
     traffic.requests++;
     traffic.bytes += bytes.byteLength;
     return bytes;

@@ -15,7 +15,10 @@ import { UploadPace } from './upload-pace.js';
 import { WishReader } from './wish-reader.js';
 
 export interface StreamOptions {
-  /** Fetches a page's file, named relative to the manifest. Aborted when no view wishes for it any more, and when the scene is destroyed. */
+  /**
+   * Fetches a page's file, named relative to the manifest; 8 at a time at most. Aborted when no view wishes for it any more, and when the scene is destroyed. Best done in a
+   * worker: reading a response costs a thread more than all else that a page needs.
+   */
   readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>;
   /** Bytes of GPU memory that resident splats may take, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */
   readonly memoryBudget?: number;
