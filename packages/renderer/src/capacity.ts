@@ -9,7 +9,7 @@ export interface Capacity {
   readonly pairs: number;
 }
 
-/** Between which bounds the room stays; the lower one is asked for whenever there might be less. */
+/** Between which bounds the room stays; the lower one may change, and is asked for at every look. */
 export interface CapacityBounds {
   readonly least: () => Capacity;
   readonly most: Capacity;
@@ -118,9 +118,10 @@ export class CapacityMonitor {
 
   /** Takes note of what a frame would have needed. */
   judge(used: Capacity, overflowed: boolean): void {
+    const least = this.#bounds.least();
     const grown = {
-      visible: grow(used.visible, this.#capacity.visible, this.#bounds.most.visible),
-      pairs: grow(used.pairs, this.#capacity.pairs, this.#bounds.most.pairs),
+      visible: Math.max(least.visible, grow(used.visible, this.#capacity.visible, this.#bounds.most.visible)),
+      pairs: Math.max(least.pairs, grow(used.pairs, this.#capacity.pairs, this.#bounds.most.pairs)),
     };
     if (grown.visible > this.#capacity.visible || grown.pairs > this.#capacity.pairs) {
       this.#wish(grown, overflowed);
@@ -131,7 +132,6 @@ export class CapacityMonitor {
       pairs: Math.max(this.#recent.pairs, used.pairs),
     };
     if (++this.#idleLooks < PATIENCE) return;
-    const least = this.#bounds.least();
     const shrunk = {
       visible: shrink(this.#recent.visible, this.#capacity.visible, least.visible),
       pairs: shrink(this.#recent.pairs, this.#capacity.pairs, least.pairs),

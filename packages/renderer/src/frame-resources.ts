@@ -11,6 +11,9 @@ import { maxPairs } from './rasterizers/tiles.js';
 import { maxVisible, Scratch } from './scratch.js';
 import type { SortName } from './stages/sort.js';
 
+/** Room for pairs that the pacer learns from what one costs. */
+const TELLING_ROOM = 1 << 18;
+
 /** What a set of scenes needs on the GPU between the stages. */
 export interface Resources {
   readonly table: PageTable;
@@ -39,6 +42,7 @@ export class FrameResources {
   #current: Resources | undefined;
   #capacity: Capacity | undefined;
   #hasOtherPairs = false;
+  #hasQuickPairs = false;
   /** The largest budget of splats that a frame has been given. */
   #mostSplats: number | undefined;
 
@@ -106,13 +110,15 @@ export class FrameResources {
   }
 
   /**
-   * A streamed scene within a budget keeps the room that it is given at first, that for pairs as far as it does not divide the painting: flights turn from a near wall to
-   * everything within a frame.
+   * A streamed scene within a budget keeps the room that it is given at first: flights turn from a near wall to everything within a frame. That for pairs, by which the painting
+   * is divided, it keeps as soon as one submission is known to paint them all.
    */
   #leastFor(table: PageTable): Capacity {
     if (!table.isStreamed || !Number.isFinite(this.#mostSplats)) return LEAST_CAPACITY;
     const { visible, pairs } = initialCapacity(table.splats, this.#mostFor(table));
-    return { visible, pairs: Math.max(LEAST_CAPACITY.pairs, Math.min(pairs, this.#options.pairsAtOnce())) };
+    // Never taken back: room that comes and goes would be allocated each time.
+    this.#hasQuickPairs ||= this.#options.pairsAtOnce() >= pairs;
+    return { visible, pairs: this.#hasQuickPairs ? pairs : Math.min(pairs, TELLING_ROOM) };
   }
 
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
