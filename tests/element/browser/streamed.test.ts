@@ -1,7 +1,7 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
-import { assert, assertEqual, show, until } from './support/harness.js';
+import { assert, assertEqual, claimFault, show, until } from './support/harness.js';
 
 const folder = detailFolder(pebbles(40_000));
 
@@ -94,5 +94,20 @@ describe('a streamed scene', () => {
     assertEqual(broken.error?.reason, 'network/status');
     broken.remove();
     none.stop();
+  });
+
+  it("comes by way of the page's own thread where workers are refused", async () => {
+    const original = GaussianSplatElement.sceneLoader;
+    const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
+    GaussianSplatElement.sceneLoader = new Loader(() => new Worker('/net/status/404', { type: 'module' }));
+    const { requests, own, bytes, stop } = serve('/refused/');
+    const element = show({ src: '/refused/detail.json', 'camera-orbit': '200deg 80deg 1m' });
+    await element.ready;
+    await until(() => requests.length > 3 && bytes() > 0, 'pages');
+    assert(own.length > 3, 'the page fetches them');
+    await close(element);
+    stop();
+    GaussianSplatElement.sceneLoader = original;
+    claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
   });
 });
