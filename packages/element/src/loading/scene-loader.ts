@@ -15,6 +15,8 @@ import { spawnSceneWorker } from './spawn-worker.js';
 
 /** An unused worker is kept this long: pages with several elements load one scene after another. */
 const IDLE_MS = 5_000;
+/** And one that has fetched for a streamed scene this long: its camera may move again at any time. */
+const STREAMING_IDLE_MS = 60_000;
 
 interface Listeners {
   readonly onProgress?: ProgressListener;
@@ -123,7 +125,8 @@ export class SceneLoader {
     } finally {
       signal.removeEventListener('abort', cancel);
       this.#pending.delete(id);
-      if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#end(worker), IDLE_MS);
+      const idleMs = message.type === 'file' ? STREAMING_IDLE_MS : IDLE_MS;
+      if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#end(worker), idleMs);
     }
   }
 
