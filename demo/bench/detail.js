@@ -4,6 +4,7 @@ import { checkManifest, MemoryLedger, PassTimer, Renderer, StreamedGaussians } f
 import { Progress, within } from './run/bounded.js';
 import { describeEnvironment, openDevice } from './run/environment.js';
 import { readPixels } from './run/read-pixels.js';
+import { startFetching } from './run/worker-fetch.js';
 
 const query = new URLSearchParams(location.search);
 const number = (name, fallback) => Number(query.get(name) ?? fallback);
@@ -12,10 +13,19 @@ const [splats, megabytes, seconds] = [number('splats', 1e6), number('megabytes',
 /** Pixels that what is drawn may be displaced, if the budget allows. */
 const detail = number('detail', 1);
 
+/** Seconds at the first place of the flight before it begins, reported apart: what a visitor waits through. */
+const warm = number('warm', 3);
+/** `display`: a frame for each that the display shows, as on any page; `free`: the next as soon as the GPU is done. */
+const pace = query.get('pace') ?? 'display';
+
 /** Seconds that a view may take to have all its pages, and after which everything is reported as far as it has come. */
-const [settleSeconds, limit] = [number('settle', 5), number('limit', seconds + 60)];
+const [settleSeconds, limit] = [number('settle', 5), number('limit', warm + seconds + 60)];
 /** Seconds that one file may take. */
 const FETCH_SECONDS = 20;
+/** Milliseconds that a frame may take at 60 a second, and between two frames where one was left out. */
+const [FRAME_MS, LATE_MS] = [1000 / 60, 1500 / 60];
+/** Frames between two looks at whether a frame lacked anything. */
+const LOOK = 8;
 
 const say = (text) => {
   document.getElementById('status').textContent = text;
@@ -23,23 +33,20 @@ const say = (text) => {
 
 const progress = new Progress(limit, say);
 /** Grows while there is something to measure; what stands in it is reported, whatever happens. */
-const report = { ...{ width, height, detail, splatBudget: splats, megabytes, seconds, limit }, flight: [], atRest: [] };
-
-/** A file, or an error that names it: one of the wrong kind, or one that does not come, must not be waited for forever. */
-async function get(url, signal) {
-  const response = await fetch(url, { signal: AbortSignal.any([signal, AbortSignal.timeout(1000 * FETCH_SECONDS)]) });
-  if (!response.ok) throw new Error(`${url}: HTTP ${response.status}`);
-  return response;
-}
+const report = {
+  ...{ width, height, detail, splatBudget: splats, megabytes, warm, seconds, limit, pace },
+  ...{ warmUp: [], flight: [], atRest: [] },
+};
 
 async function open(device) {
   const url = new URL(query.get('scene'), location.href);
-  const fetched = get(url, new AbortController().signal).then((response) => response.json());
-  const manifest = checkManifest(await progress.wait('the manifest', fetched), url.href);
+  const fetchFile = startFetching(FETCH_SECONDS);
+  const fetched = await progress.wait('the manifest', fetchFile(url, new AbortController().signal));
+  const manifest = checkManifest(JSON.parse(new TextDecoder().decode(fetched)), url.href);
   const traffic = { requests: 0, bytes: 0, errors: [] };
   report.fetched = traffic;
   const fetchPage = async (file, signal) => {
-    const bytes = await (await get(new URL(file, url), signal)).arrayBuffer();
+    const bytes = await fetchFile(new URL(file, url), signal);
     traffic.requests++;
     traffic.bytes += bytes.byteLength;
     return bytes;
@@ -78,59 +85,135 @@ function cameraAt(share, { center, min, max }) {
 const percentile = (values, share) => [...values].sort((a, b) => a - b)[Math.floor(share * (values.length - 1))];
 const rounded = (value) => Math.round(1000 * value) / 1000;
 
-/** Span of the passes of each frame on the GPU, ms. */
-const spans = (frames) =>
-  frames.filter((passes) => passes.length > 0).map((passes) => Math.max(...passes.map((p) => p.end)) - passes[0].begin);
+const summary = (values) =>
+  values.length === 0
+    ? undefined
+    : {
+        median: rounded(percentile(values, 0.5)),
+        p95: rounded(percentile(values, 0.95)),
+        worst: rounded(Math.max(...values)),
+      };
+
+const shareOver = (values, most) => rounded(values.filter((value) => value > most).length / Math.max(1, values.length));
+
+/** Milliseconds from the begin of a frame's first pass to the end of its last. */
+const spanOf = (passes) => Math.max(...passes.map(({ end }) => end)) - passes[0].begin;
+
+/** Median milliseconds a frame of each kind of pass. */
+function stagesOf(frames) {
+  const labels = new Set(frames.flatMap((passes) => passes.map(({ label }) => label)));
+  const spent = (passes, label) =>
+    passes.filter((pass) => pass.label === label).reduce((sum, { begin, end }) => sum + end - begin, 0);
+  const median = (label) =>
+    rounded(
+      percentile(
+        frames.map((passes) => spent(passes, label)),
+        0.5,
+      ),
+    );
+  return Object.fromEntries([...labels].map((label) => [label, median(label)]));
+}
 
 /**
  * Lets the page's other tasks have a turn, as they do between the frames of a display: a loop that only ever waits for the GPU was seen to bring in two pages in two
  * seconds, with eight on their way all the time.
  */
-const turn = () => new Promise((resolve) => setTimeout(resolve));
+const turn = () => new Promise((resolve) => (pace === 'free' ? setTimeout(resolve) : requestAnimationFrame(resolve)));
 
 /** Waits until the GPU has drawn what was submitted. */
 const drawn = (device) => within(FETCH_SECONDS, 'the GPU to draw a frame', device.queue.onSubmittedWorkDone());
 
-async function fly({ device, renderer, scene, manifest, traffic, target }, rows) {
-  const timer = device.features.has('timestamp-query') ? new PassTimer(device) : undefined;
-  const start = performance.now();
-  for (let second = 0; second < seconds; second++) {
-    const [frames, gpu] = [[], []];
-    const end = start + 1000 * (second + 1);
-    progress.begin(`second ${second} of the flight`);
-    // One frame at least, however slow.
-    while (performance.now() < end || frames.length === 0) {
-      const before = performance.now();
-      const camera = cameraAt((before - start) / 1000 / seconds, manifest.bounds);
-      renderer.render({ gaussians: scene, camera, target, detail, splatBudget: splats, timer });
-      await drawn(device);
-      frames.push(performance.now() - before);
-      await turn();
-      if (timer && frames.length % 8 === 0) gpu.push(...spans(await timer.read()));
-    }
-    const { visible, overflow, pairOverflow, budgetError } = await renderer.readStatistics();
-    if (timer) gpu.push(...spans(await timer.read()));
-    rows.push({
-      second,
-      frames: frames.length,
-      wall: {
-        median: rounded(percentile(frames, 0.5)),
-        p95: rounded(percentile(frames, 0.95)),
-        worst: rounded(Math.max(...frames)),
+/** What the frames of one second took. Nothing that is read back is waited for before the second is over. */
+class Second {
+  #all;
+  #timer;
+  #begun = [];
+  #walls = [];
+  #encoding = [];
+  #passes = [];
+  #looks = [];
+  #before;
+
+  constructor(all, timer) {
+    this.#all = all;
+    this.#timer = timer;
+    this.#before = all.scene.traffic;
+  }
+
+  get frames() {
+    return this.#walls.length;
+  }
+
+  async draw(camera) {
+    const { device, renderer, scene, target } = this.#all;
+    const begun = performance.now();
+    renderer.render({ gaussians: scene, camera, target, detail, splatBudget: splats, timer: this.#timer });
+    this.#encoding.push(performance.now() - begun);
+    await drawn(device);
+    this.#walls.push(performance.now() - begun);
+    this.#begun.push(begun);
+    if (this.frames % LOOK === 0) this.#look();
+  }
+
+  /** A row of the report. */
+  async row(second) {
+    const now = { ...this.#all.scene.progress };
+    const [traffic, fetched] = [
+      this.#all.scene.traffic,
+      { ...this.#all.traffic, errors: this.#all.traffic.errors.length },
+    ];
+    this.#look();
+    const looks = await Promise.all(this.#looks);
+    const frames = (await Promise.all(this.#passes)).flat().filter((passes) => passes.length > 0);
+    const intervals = this.#begun.slice(1).map((begun, k) => begun - this.#begun[k]);
+    const { visible, overflow, pairOverflow, budgetError } = looks.at(-1);
+    return {
+      ...{ second, frames: this.frames },
+      ...{ wall: summary(this.#walls), overFrame: shareOver(this.#walls, FRAME_MS) },
+      ...{ interval: summary(intervals), late: shareOver(intervals, LATE_MS), encoding: summary(this.#encoding) },
+      ...{ gpu: summary(frames.map(spanOf)), stages: stagesOf(frames) },
+      ...{ visible, overflow, pairOverflow, budgetError: rounded(budgetError) },
+      lacking: { looks: looks.length, lacked: looks.filter((look) => look.overflow + look.pairOverflow > 0).length },
+      ...now,
+      uploaded: {
+        pages: traffic.pages - this.#before.pages,
+        megabytes: rounded((traffic.bytes - this.#before.bytes) / 1e6),
+        msPerFrame: rounded((traffic.milliseconds - this.#before.milliseconds) / Math.max(1, this.frames)),
+        abandoned: traffic.abandoned - this.#before.abandoned,
       },
-      gpu:
-        gpu.length > 0
-          ? {
-              median: rounded(percentile(gpu, 0.5)),
-              p95: rounded(percentile(gpu, 0.95)),
-              worst: rounded(Math.max(...gpu)),
-            }
-          : undefined,
-      ...{ visible, overflow, pairOverflow, budgetError: rounded(budgetError), ...scene.progress },
-      fetched: { ...traffic, errors: traffic.errors.length },
-    });
+      fetched,
+    };
+  }
+
+  /** Sends for what the GPU knows of the frames since the last look. */
+  #look() {
+    this.#looks.push(this.#all.renderer.readStatistics());
+    if (this.#timer) this.#passes.push(this.#timer.read());
+  }
+}
+
+/**
+ * Draws for so many seconds.
+ * @param rows gets a row for each second
+ * @param cameraOf gets the share, 0 to 1, of the seconds that have passed
+ */
+async function fly(all, rows, what, duration, cameraOf) {
+  const timer = all.device.features.has('timestamp-query') ? new PassTimer(all.device) : undefined;
+  const start = performance.now();
+  const pending = [];
+  for (let second = 0; second < duration; second++) {
+    const current = new Second(all, timer);
+    const end = start + 1000 * Math.min(second + 1, duration);
+    progress.begin(`second ${second} of the ${what}`);
+    // One frame at least, however slow.
+    while (performance.now() < end || current.frames === 0) {
+      await turn();
+      await current.draw(cameraOf(Math.min(1, (performance.now() - start) / 1000 / duration)));
+    }
+    pending.push(current.row(second).then((row) => rows.push(row)));
     if (progress.left === 0) throw new Error('the time was up');
   }
+  await within(FETCH_SECONDS, `what the GPU knows of the ${what}`, Promise.all(pending));
 }
 
 /**
@@ -140,7 +223,7 @@ async function fly({ device, renderer, scene, manifest, traffic, target }, rows)
 async function settle({ device, renderer, scene, target }, request) {
   const start = performance.now();
   const took = () => (performance.now() - start) / 1000;
-  for (let [calm, frames] = [0, 0]; calm < 20 && took() < Math.min(settleSeconds, progress.left); frames++) {
+  for (let calm = 0; calm < 20 && took() < Math.min(settleSeconds, progress.left);) {
     const { resident } = scene.progress;
     renderer.render({ ...request, gaussians: scene, target });
     await drawn(device);
@@ -150,7 +233,7 @@ async function settle({ device, renderer, scene, target }, request) {
   return { seconds: rounded(took()), coming: scene.progress.coming };
 }
 
-/** PSNR over the pixels that either picture covers. */
+/** PSNR over the pixels that either picture covers; `identical` for the same picture twice, `empty` where neither covers any. */
 function psnr(a, b) {
   let [sum, count] = [0, 0];
   for (let i = 0; i < a.length; i += 4) {
@@ -158,7 +241,8 @@ function psnr(a, b) {
     for (let k = 0; k < 4; k++) sum += (a[i + k] - b[i + k]) ** 2;
     count += 4;
   }
-  return -10 * Math.log10(sum / count);
+  if (count === 0) return 'empty';
+  return sum === 0 ? 'identical' : rounded(-10 * Math.log10(sum / count));
 }
 
 /** Views at rest: the picture within the budget against one of a quarter of the error and no budget. */
@@ -168,7 +252,7 @@ async function compare(all, views) {
     const camera = cameraAt(share, all.manifest.bounds);
     progress.begin(`the view at ${share} of the flight`);
     const settled = await settle(all, { camera, detail, splatBudget: splats });
-    const within = await readPixels(all.device, all.target);
+    const picture = await readPixels(all.device, all.target);
     const { visible, budgetError } = await all.renderer.readStatistics();
     progress.begin(`the view at ${share} of the flight, four times finer`);
     const finerSettled = await settle(all, { camera, detail: detail / 4, splatBudget: 4 * splats });
@@ -181,7 +265,7 @@ async function compare(all, views) {
         visible: more.visible,
         budgetError: rounded(more.budgetError),
         overflow: more.overflow,
-        decibels: rounded(psnr(within, finer)),
+        decibels: psnr(picture, finer),
       },
     });
   }
@@ -199,7 +283,9 @@ async function measure() {
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.STORAGE_BINDING;
   const target = device.createTexture({ size: [width, height], format: 'rgba8unorm', usage });
   const all = { device, renderer, scene, manifest, traffic, target };
-  await fly(all, report.flight);
+  const cameraOf = (share) => cameraAt(share, manifest.bounds);
+  await fly(all, report.warmUp, 'warm-up', warm, () => cameraOf(0));
+  await fly(all, report.flight, 'flight', seconds, cameraOf);
   report.bytes = { scene: scene.byteLength, renderer: renderer.byteLength, ledger: MemoryLedger.of(device).bytes };
   await compare(all, report.atRest);
 }

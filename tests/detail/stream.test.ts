@@ -147,6 +147,73 @@ for (const [name, source] of [
   });
 }
 
+/** A camera that comes nearer and goes on to the next copy. */
+const flightOver = (frame: number): Camera =>
+  viewFrom(2 + 10 * Math.abs(Math.sin(frame / 9)), frame / 20, [14 * ((frame >> 4) % 3), 0, 14 * ((frame >> 5) % 3)]);
+
+test('in a flight, with pages that come in any order and leave before they have arrived, every place is covered exactly once in every frame', async () => {
+  const random = randomSource(12);
+  const device = await nodeDevice();
+  const source = detailFolder(
+    pebbles(9_000),
+    [0, 1, 2, 3, 4, 5, 6, 7, 8].map((k) => [14 * (k % 3), 0, 14 * Math.floor(k / 3)] as const),
+  );
+  const list = listPages(source.manifest);
+  const late = async (file: string): Promise<ArrayBuffer> => {
+    await pause(15 * random());
+    return source.fetchPage(file);
+  };
+  const memoryBudget = Math.ceil(list.count / 3) * 4 * PAGE_CHUNKS * (8 + 12 + constants.CULL_GROUP * (8 + 4));
+  const scene = await StreamedGaussians.open(device, source.manifest, {
+    fetchPage: late,
+    memoryBudget,
+    arrivalMs: 150,
+  });
+  const renderer = new Renderer(device, options);
+  const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
+  let [arriving, exchanged] = [0, 0];
+  let before = new Set<number>();
+  for (let frame = 0; frame < 90; frame++) {
+    const camera = flightOver(frame);
+    renderer.render({ gaussians: scene, camera, target, detail: 0.2, splatBudget: 30_000 });
+    await device.queue.onSubmittedWorkDone();
+    // However fast the GPU is, pages have time to come.
+    await pause(8);
+    const rows = await readRows(scene);
+    for (const fade of [0, 0.5]) checkCovered(source, rows, { camera, allowed: 0.2, fade });
+    if ([...before].some((page) => !rows.has(page))) exchanged++;
+    if (scene.progress.coming > 0) arriving++;
+    before = new Set(rows.keys());
+  }
+  const seen = `${arriving} frames with pages on their way, ${exchanged} in which some left`;
+  console.log(seen);
+  assert.ok(arriving > 20 && exchanged > 2, seen);
+  [renderer, scene, target].forEach((owner) => owner.destroy());
+});
+
+test('a view that turns to the scene lacks nothing, though hardly anything was visible for long', async () => {
+  const device = await nodeDevice();
+  const places = Array.from({ length: 140 }, (_, k) => [9 * (k % 12), 0, 9 * Math.floor(k / 12)] as const);
+  // The pool has room for more splats than the scene has: 140 slots.
+  const scene = await openAll(detailFolder(pebbles(300), places));
+  // Whose room for pairs is watched, and that for splats with it.
+  const renderer = new Renderer(device, { ...options, rasterizer: 'tiles' });
+  const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
+  const look = async (at: Vector3): Promise<void> => {
+    const camera = cameraAt([-200, -5, 50], at, { width: 96, height: 64, fovXDegrees: 60, near: 0.01 });
+    renderer.render({ gaussians: scene, camera, target, detail: 4, splatBudget: 700_000 });
+    await device.queue.onSubmittedWorkDone();
+  };
+  for (let frame = 0; frame < 24; frame++) await look([-300, -5, 50]);
+  const away = await renderer.readStatistics();
+  await look([50, 0, 50]);
+  const towards = await renderer.readStatistics();
+  console.log(`${away.visible} splats visible, then ${towards.visible}; ${towards.overflow} left out`);
+  assert.ok(scene.count > 7e5 && away.visible === 0 && towards.visible > 100);
+  assert.equal(towards.overflow + towards.pairOverflow, 0);
+  [renderer, scene, target].forEach((owner) => owner.destroy());
+});
+
 test('whatever is wished for, comes or fails, what is above a page is there, and no page twice', () => {
   const random = randomSource(5);
   const list = listPages(folder.manifest);
@@ -156,7 +223,9 @@ test('whatever is wished for, comes or fails, what is above a page is there, and
   const coming: number[] = [];
   for (let step = 0; step < 3000; step++) {
     residency.note(Float32Array.from({ length: list.count }, () => (random() < 0.5 ? 0 : 10 * random())));
-    for (const page of residency.missing) if (coming.length < 3 && residency.begin(page)) coming.push(page);
+    for (let page = residency.nextMissing(); page !== NONE && coming.length < 3; page = residency.nextMissing()) {
+      if (residency.begin(page)) coming.push(page);
+    }
     const [page] = coming.splice(Math.floor(random() * coming.length), 1);
     if (page !== undefined && random() < 0.2) residency.giveUp(page);
     else if (page !== undefined) residency.settle(page);

@@ -9,9 +9,17 @@ export interface Capacity {
   readonly pairs: number;
 }
 
+/** Between which bounds the room stays; the lower one may change, and is asked for at every look. */
+export interface CapacityBounds {
+  readonly least: () => Capacity;
+  readonly most: Capacity;
+}
+
 /** Scenes up to this size get room for all their splats at once: 64 MB. */
 const SMALL_SCENE = 1_300_000;
 const LEAST_PAIRS = 1 << 16;
+/** What buffers that are nearly empty may shrink to. */
+export const LEAST_CAPACITY: Capacity = { visible: 1, pairs: LEAST_PAIRS };
 /** Room for pairs that small scenes get without asking, so that a first frame from near by has it: 48 MB. */
 const GENEROUS_PAIRS = 1 << 21;
 /** More room than was needed. */
@@ -41,7 +49,7 @@ export function initialCapacity(splats: number, most: Capacity): Capacity {
  */
 export class CapacityMonitor {
   readonly #staging: GPUBuffer;
-  readonly #most: Capacity;
+  readonly #bounds: CapacityBounds;
   readonly #onWish: (capacity: Capacity, overflowed: boolean) => void;
   #capacity: Capacity;
   #frame = 0;
@@ -54,11 +62,11 @@ export class CapacityMonitor {
   constructor(
     device: GPUDevice,
     capacity: Capacity,
-    most: Capacity,
+    bounds: CapacityBounds,
     onWish: (capacity: Capacity, overflowed: boolean) => void,
   ) {
     this.#capacity = capacity;
-    this.#most = most;
+    this.#bounds = bounds;
     this.#onWish = onWish;
     const { mapRead, copyDestination } = BUFFER_USAGE;
     this.#staging = device.createBuffer({ label: 'gs.capacity', size: 16, usage: mapRead | copyDestination });
@@ -70,7 +78,7 @@ export class CapacityMonitor {
    * @returns whether this frame is one to look at; then {@link record} must be called before the submit and {@link read} after it
    */
   isDue(hasPairs: boolean): boolean {
-    const hasRoom = this.#capacity.visible >= this.#most.visible && !hasPairs;
+    const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !hasPairs;
     this.#frame++;
     const isDue = this.#frame % INTERVAL === 0 || (this.#frame < INTERVAL && Number.isInteger(Math.log2(this.#frame)));
     return isDue && !hasRoom && !this.#isReading;
@@ -110,9 +118,10 @@ export class CapacityMonitor {
 
   /** Takes note of what a frame would have needed. */
   judge(used: Capacity, overflowed: boolean): void {
+    const least = this.#bounds.least();
     const grown = {
-      visible: grow(used.visible, this.#capacity.visible, this.#most.visible),
-      pairs: grow(used.pairs, this.#capacity.pairs, this.#most.pairs),
+      visible: Math.max(least.visible, grow(used.visible, this.#capacity.visible, this.#bounds.most.visible)),
+      pairs: Math.max(least.pairs, grow(used.pairs, this.#capacity.pairs, this.#bounds.most.pairs)),
     };
     if (grown.visible > this.#capacity.visible || grown.pairs > this.#capacity.pairs) {
       this.#wish(grown, overflowed);
@@ -124,8 +133,8 @@ export class CapacityMonitor {
     };
     if (++this.#idleLooks < PATIENCE) return;
     const shrunk = {
-      visible: shrink(this.#recent.visible, this.#capacity.visible, 1),
-      pairs: shrink(this.#recent.pairs, this.#capacity.pairs, LEAST_PAIRS),
+      visible: shrink(this.#recent.visible, this.#capacity.visible, least.visible),
+      pairs: shrink(this.#recent.pairs, this.#capacity.pairs, least.pairs),
     };
     if (bytesOf(this.#capacity) - bytesOf(shrunk) >= LEAST_SAVING) this.#wish(shrunk, false);
     this.#idleLooks = 0;

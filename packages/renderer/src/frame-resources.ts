@@ -1,6 +1,6 @@
 import type { Camera } from '@gaussian-splat/core';
 import { FrameBindings, type Stages } from './bindings.js';
-import { CapacityMonitor, initialCapacity, type Capacity } from './capacity.js';
+import { CapacityMonitor, initialCapacity, LEAST_CAPACITY, type Capacity } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { Occlusion } from './occlusion.js';
@@ -10,6 +10,9 @@ import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/tiles.js';
 import { maxVisible, Scratch } from './scratch.js';
 import type { SortName } from './stages/sort.js';
+
+/** Room for pairs that the pacer learns from what one costs. */
+const TELLING_ROOM = 1 << 18;
 
 /** What a set of scenes needs on the GPU between the stages. */
 export interface Resources {
@@ -26,6 +29,8 @@ export interface ResourceOptions {
   readonly sort: SortName;
   readonly rasterizer: Rasterizer;
   readonly occlusion: Occlusion;
+  /** Pairs of splat and bin that are painted in one submission. */
+  readonly pairsAtOnce: () => number;
   /** A frame lacked room, and the next one has it. */
   readonly onIncomplete: () => void;
 }
@@ -37,6 +42,7 @@ export class FrameResources {
   #current: Resources | undefined;
   #capacity: Capacity | undefined;
   #hasOtherPairs = false;
+  #hasQuickPairs = false;
   /** The largest budget of splats that a frame has been given. */
   #mostSplats: number | undefined;
 
@@ -103,6 +109,18 @@ export class FrameResources {
     return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
   }
 
+  /**
+   * A streamed scene within a budget keeps the room that it is given at first: flights turn from a near wall to everything within a frame. That for pairs, by which the painting
+   * is divided, it keeps as soon as one submission is known to paint them all.
+   */
+  #leastFor(table: PageTable): Capacity {
+    if (!table.isStreamed || !Number.isFinite(this.#mostSplats)) return LEAST_CAPACITY;
+    const { visible, pairs } = initialCapacity(table.splats, this.#mostFor(table));
+    // Never taken back: room that comes and goes would be allocated each time.
+    this.#hasQuickPairs ||= this.#options.pairsAtOnce() >= pairs;
+    return { visible, pairs: this.#hasQuickPairs ? pairs : Math.min(pairs, TELLING_ROOM) };
+  }
+
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
   #rebind(table: PageTable): Resources {
     const { stages, sort, occlusion } = this.#options;
@@ -138,7 +156,8 @@ export class FrameResources {
   }
 
   #watch(table: PageTable, capacity: Capacity): CapacityMonitor {
-    return new CapacityMonitor(this.#device, capacity, this.#mostFor(table), (wished, overflowed) => {
+    const bounds = { least: () => this.#leastFor(table), most: this.#mostFor(table) };
+    return new CapacityMonitor(this.#device, capacity, bounds, (wished, overflowed) => {
       this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
       this.#capacity = wished;
       if (overflowed) this.#options.onIncomplete();

@@ -86,14 +86,15 @@ export class Renderer {
     this.#compose = new ComposeStage(device);
     this.#rasterizer = makeRasterizer(device, this.levers);
     this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
+    this.#pacer = new SubmissionPacer(device);
     this.#resources = new FrameResources(device, {
       stages: this.#stages,
       sort: this.levers.sort,
       rasterizer: this.#rasterizer,
       occlusion: this.#occlusion,
+      pairsAtOnce: () => this.#pacer.pairsAtOnce,
       onIncomplete: this.#onIncomplete,
     });
-    this.#pacer = new SubmissionPacer(device);
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);

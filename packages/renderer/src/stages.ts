@@ -1,4 +1,5 @@
 /** The stages one by one, for tests and for those who build a pipeline of their own. */
+export { CapacityMonitor, LEAST_CAPACITY, type Capacity } from './capacity.js';
 export { givesKnownAnswer } from './choice/known-answer.js';
 export * from './generated/live-shaders.js';
 export * from './generated/shaders.js';
@@ -10,8 +11,11 @@ export { scaleRotationFactor } from './pack/factor.js';
 export { DETAIL_NUMBERS, DETAIL_PLACES } from './detail/chunk-detail.js';
 export { buildLevels } from './detail/build-levels.js';
 export { listPages, NONE, type PageList } from './detail/page-list.js';
+export { DetailTable } from './detail/detail-table.js';
 export { PAGE_CHUNKS } from './detail/manifest.js';
+export { MOST_FETCHES, MOST_UNDER_WAY, PageTraffic } from './detail/page-traffic.js';
 export { Residency } from './detail/residency.js';
+export { MOST_UPLOAD_BYTES, UploadPace } from './detail/upload-pace.js';
 export { halfBits } from './pack/half.js';
 export { mortonOrder } from './pack/morton.js';
 export { SH_PRECISION, shWords } from './pack/sh.js';

@@ -38,6 +38,11 @@ export class SubmissionPacer {
     return Math.min(MOST, Math.max(1, Math.ceil((pairs * this.#cost.perPair) / BUDGET_MS)));
   }
 
+  /** Pairs for which one submission is enough. */
+  get pairsAtOnce(): number {
+    return Math.floor(BUDGET_MS / this.#cost.perPair);
+  }
+
   /** True if a frame with room for so many pairs may tell what one costs. */
   wantsToKnow(pairs: number): boolean {
     return pairs * UNKNOWN_COST > BUDGET_MS;

@@ -1,25 +1,50 @@
-import type { GaussianSplatElement } from '@gaussian-splat/element';
-import '@gaussian-splat/element';
+import { GaussianSplatElement } from '@gaussian-splat/element';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
-import { assert, assertEqual, show, until } from './support/harness.js';
+import { assert, assertEqual, claimFault, show, until } from './support/harness.js';
 
 const folder = detailFolder(pebbles(40_000));
 
-/** Serves the folder below an address of its own; `lost` names files that are not there. */
-function serve(address: string, lost: RegExp = /$^/): { requests: string[]; stop: () => void } {
-  const original = window.fetch;
-  const requests: string[] = [];
-  window.fetch = async (input, init) => {
-    const { pathname } = new URL(input instanceof Request ? input.url : String(input), location.href);
-    if (!pathname.startsWith(address)) return original(input, init);
-    const name = pathname.slice(address.length);
-    requests.push(name);
-    if (lost.test(name)) return new Response('', { status: 404 });
-    if (name === 'detail.json') return new Response(JSON.stringify(folder.manifest));
-    return new Response(folder.files.get(name)!.slice(0));
+/**
+ * Serves the folder: the manifest at an address of its own, pages where the worker finds them as well; `lost` names those that are not there. Notes what the page asks its
+ * loader for, and what it fetches itself.
+ */
+function serve(
+  address: string,
+  lost: RegExp = /$^/,
+): { requests: string[]; own: string[]; bytes: () => number; stop: () => void } {
+  const [requests, own]: string[][] = [[], []];
+  let bytes = 0;
+  const nameOf = new Map<string, string>();
+  const locate = (name: string): string => {
+    const url = lost.test(name)
+      ? new URL(`/net/status/404?${name}`, location.href).href
+      : URL.createObjectURL(new Blob([folder.files.get(name)!]));
+    nameOf.set(url, name);
+    return url;
   };
-  return { requests, stop: () => (window.fetch = original) };
+  const trees = folder.manifest.trees.map(({ pages }) => ({
+    pages: pages.map((page) => ({ ...page, file: locate(page.file) })),
+  }));
+  const [fetchOriginal, loader] = [window.fetch, GaussianSplatElement.sceneLoader];
+  window.fetch = async (input, init) => {
+    const url = new URL(input instanceof Request ? input.url : String(input), location.href);
+    own.push(url.href);
+    if (url.pathname !== `${address}detail.json`) return fetchOriginal(input, init);
+    return new Response(JSON.stringify({ ...folder.manifest, trees }));
+  };
+  loader.fetchFile = async (request, signal) => {
+    requests.push(nameOf.get(request.url)!);
+    const file = await Object.getPrototypeOf(loader).fetchFile.call(loader, request, signal);
+    bytes += file.byteLength;
+    return file;
+  };
+  const stop = (): void => {
+    window.fetch = fetchOriginal;
+    Reflect.deleteProperty(loader, 'fetchFile');
+    for (const url of nameOf.keys()) URL.revokeObjectURL(url);
+  };
+  return { requests, own, bytes: () => bytes, stop };
 }
 
 /** An element that is removed keeps its scene for a moment, in case it is put elsewhere; one without a source lets go of it, and of its fetches. */
@@ -31,15 +56,22 @@ async function close(element: GaussianSplatElement): Promise<void> {
 
 describe('a streamed scene', () => {
   it('loads its coarsest page, shows it, and then fetches what the camera asks for, once each', async () => {
-    const { requests, stop } = serve('/streamed/');
+    const { requests, own, bytes, stop } = serve('/streamed/');
     const element = show({ src: '/streamed/detail.json', 'camera-orbit': '30deg 60deg 30m' });
     await element.ready;
     assert(element.loaded && element.error === null, `loaded: ${element.error?.message}`);
-    assertEqual(requests.slice(0, 2).join(' '), 'detail.json part-0');
+    assertEqual(requests[0], 'part-0');
     const few = requests.length;
     element.setAttribute('camera-orbit', '200deg 80deg 1m');
     await until(() => requests.length > few + 3, 'pages for another view');
     assertEqual(new Set(requests).size, requests.length, 'no page twice');
+    const all = (): number => requests.reduce((sum, name) => sum + folder.files.get(name)!.byteLength, 0);
+    await until(() => bytes() === all(), 'all of them');
+    assertEqual(
+      own.join(' '),
+      new URL('/streamed/detail.json', location.href).href,
+      'the page itself fetches the manifest alone',
+    );
     await close(element);
     stop();
   });
@@ -62,5 +94,20 @@ describe('a streamed scene', () => {
     assertEqual(broken.error?.reason, 'network/status');
     broken.remove();
     none.stop();
+  });
+
+  it("comes by way of the page's own thread where workers are refused", async () => {
+    const original = GaussianSplatElement.sceneLoader;
+    const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
+    GaussianSplatElement.sceneLoader = new Loader(() => new Worker('/net/status/404', { type: 'module' }));
+    const { requests, own, bytes, stop } = serve('/refused/');
+    const element = show({ src: '/refused/detail.json', 'camera-orbit': '200deg 80deg 1m' });
+    await element.ready;
+    await until(() => own.length > 3 && bytes() > 0, 'pages that the page itself fetches');
+    assert(requests.length >= own.length - 1, 'all of them asked of the loader');
+    await close(element);
+    stop();
+    GaussianSplatElement.sceneLoader = original;
+    claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
   });
 });

@@ -122,7 +122,7 @@ export function isStreamed({ url }: SceneRequest): boolean {
 }
 
 async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
-  const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
+  const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
   const opening = import('./open-streamed.js');
   const acquiring = options.device.acquire();
   opening.catch(ignore);
@@ -135,7 +135,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
     // How much of it fits is decided when its manifest is there.
     beforeUpload(memoryBudget ?? 0);
     const { gaussians, detail } = await openStreamed(request, lease.device, {
-      ...{ signal, onProgress, memoryBudget, onChange },
+      ...{ loader, signal, onProgress, memoryBudget, onChange },
     });
     scene = new GpuScene(lease, gaussians, gaussians.bounds, submissions, { detail });
     return scene;

@@ -3,9 +3,11 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchScene } from '@gaussian-splat/formats';
 import { checkManifest, StreamedGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
 import type { DetailLevers } from './gpu-scene.js';
 
 export interface StreamedOptions {
+  readonly loader: SceneLoader;
   readonly signal: AbortSignal;
   readonly onProgress: ProgressListener;
   /** Bytes of GPU memory that pages may take; undefined for what suits the device. */
@@ -34,17 +36,13 @@ const capsOf = (): Caps => (globalThis.matchMedia?.('(pointer: coarse)').matches
 export async function openStreamed(
   { url, credentials }: SceneRequest,
   device: GPUDevice,
-  { signal, onProgress, memoryBudget = Infinity, onChange }: StreamedOptions,
+  { loader, signal, onProgress, memoryBudget = Infinity, onChange }: StreamedOptions,
 ): Promise<{ gaussians: StreamedGaussians; detail: DetailLevers }> {
-  const get = async (address: string, aborted: AbortSignal, report?: ProgressListener): Promise<Uint8Array> =>
-    fetchScene(address, { mode: 'cors', credentials, signal: aborted, onProgress: report });
-  const manifest = checkManifest(parsed(await get(url, signal, onProgress), url), url);
+  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress });
+  const manifest = checkManifest(parsed(bytes, url), url);
   const caps = capsOf();
   const gaussians = await StreamedGaussians.open(device, manifest, {
-    fetchPage: async (file, aborted) => {
-      const bytes = await get(new URL(file, url).href, aborted);
-      return bytes.slice().buffer;
-    },
+    fetchPage: (file, aborted) => loader.fetchFile({ url: new URL(file, url).href, credentials }, aborted),
     memoryBudget: Math.min(memoryBudget, caps.bytes),
     onChange,
     // A page that is missing leaves what stands for it on show; the console tells whoever looks.

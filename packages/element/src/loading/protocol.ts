@@ -2,12 +2,16 @@
 import type { Bounds, ErrorData } from '@gaussian-splat/core';
 import type { PackedGaussians, PackedLevels, ShPrecision } from '@gaussian-splat/renderer';
 
-/** A scene to fetch. */
-export interface SceneRequest {
+/** A file to fetch. */
+export interface FileRequest {
   /** Absolute URL: a worker's own base URL is not the page's. */
   readonly url: string;
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
+}
+
+/** A scene to fetch. */
+export interface SceneRequest extends FileRequest {
   /** Precision of the spherical harmonics on the GPU. */
   readonly sh: ShPrecision | 'auto';
   /** Whether levels of detail are wanted that the file has, besides the finest. */
@@ -47,6 +51,7 @@ export type ProgressListener = (loaded: number, total: number | undefined, share
 export type PageMessage =
   | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest; readonly wantsPreviews: boolean }
   | { readonly type: 'levels'; readonly id: number; readonly packed: PackedGaussians }
+  | { readonly type: 'file'; readonly id: number; readonly request: FileRequest }
   | { readonly type: 'cancel'; readonly id: number };
 
 export type WorkerMessage =
@@ -56,4 +61,5 @@ export type WorkerMessage =
   | { readonly type: 'sequence'; readonly id: number; readonly sequence: LoadedSequence }
   | { readonly type: 'scene'; readonly id: number; readonly scene: LoadedScene }
   | { readonly type: 'levels'; readonly id: number; readonly levels: PackedLevels | undefined }
+  | { readonly type: 'file'; readonly id: number; readonly bytes: ArrayBuffer }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };

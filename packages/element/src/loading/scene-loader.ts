@@ -2,6 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { PackedGaussians, PackedLevels } from '@gaussian-splat/renderer';
 import { buffersOf } from './buffers-of.js';
 import type {
+  FileRequest,
   LoadedScene,
   LoadedSequence,
   PageMessage,
@@ -14,6 +15,8 @@ import { spawnSceneWorker } from './spawn-worker.js';
 
 /** An unused worker is kept this long: pages with several elements load one scene after another. */
 const IDLE_MS = 5_000;
+/** And one that has fetched for a streamed scene this long: its camera may move again at any time. */
+const STREAMING_IDLE_MS = 60_000;
 
 interface Listeners {
   readonly onProgress?: ProgressListener;
@@ -21,7 +24,7 @@ interface Listeners {
 }
 
 interface Pending extends Listeners {
-  /** Gets what the worker answered: a scene, a sequence or levels, as was asked for. */
+  /** Gets what the worker answered: a scene, a sequence, levels or a file, as was asked for. */
   readonly resolve: (answer: never) => void;
   readonly reject: (reason: unknown) => void;
 }
@@ -76,6 +79,16 @@ export class SceneLoader {
     return this.#ask<LoadedScene | LoadedSequence>(worker, message, signal, { onProgress, onPreview });
   }
 
+  /** The bytes of one file. Rejects with GaussianSplatError `network/*`, `out-of-memory/allocation`, or with the signal's reason as soon as that is aborted. */
+  async fetchFile(request: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
+    signal.throwIfAborted();
+    clearTimeout(this.#idleTimer);
+    const worker = await (this.#worker ??= this.#start());
+    signal.throwIfAborted();
+    if (worker === null) return (await import('./scene-worker.js')).fetchFile(request, signal);
+    return this.#ask<ArrayBuffer>(worker, { type: 'file', id: this.#nextId++, request }, signal, {});
+  }
+
   /**
    * Builds the levels of detail of a packed scene, whose arrays are the worker's afterwards; undefined for one that is too small to have any, and where the page
    * refuses workers: its own thread would stand still for seconds. Rejects with GaussianSplatError `out-of-memory/allocation` or the signal's reason.
@@ -112,7 +125,8 @@ export class SceneLoader {
     } finally {
       signal.removeEventListener('abort', cancel);
       this.#pending.delete(id);
-      if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#end(worker), IDLE_MS);
+      const idleMs = message.type === 'file' ? STREAMING_IDLE_MS : IDLE_MS;
+      if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#end(worker), idleMs);
     }
   }
 
@@ -156,6 +170,7 @@ export class SceneLoader {
     else if (message.type === 'scene') pending?.resolve(message.scene as never);
     else if (message.type === 'sequence') pending?.resolve(message.sequence as never);
     else if (message.type === 'levels') pending?.resolve(message.levels as never);
+    else if (message.type === 'file') pending?.resolve(message.bytes as never);
     else pending?.reject(GaussianSplatError.fromData(message.error));
   }
 

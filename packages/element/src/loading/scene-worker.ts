@@ -1,13 +1,14 @@
 /**
  * The module worker that loads scenes. Where a page refuses workers it imports this same module and calls
- * {@link loadScene} itself; then nothing here listens.
+ * {@link loadScene} or {@link fetchFile} itself; then nothing here listens.
  */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { buffersOf } from './buffers-of.js';
+import { fetchFile } from './fetch-file.js';
 import { loadScene } from './load-scene.js';
 import type { PageMessage, PreviewListener, ProgressListener, WorkerMessage } from './protocol.js';
 
-export { loadScene };
+export { fetchFile, loadScene };
 
 /** The part of a worker's global scope that is used here; TypeScript's page types do not know it. */
 interface WorkerScope {
@@ -39,6 +40,21 @@ function serve(scope: WorkerScope): void {
     }
   }
 
+  /** Of a streamed scene: the reading of a response costs its thread more than all else that a page of it does. */
+  async function bring({ id, request }: Extract<PageMessage, { type: 'file' }>): Promise<void> {
+    const abort = new AbortController();
+    running.set(id, abort);
+    try {
+      const bytes = await fetchFile(request, abort.signal);
+      scope.postMessage({ type: 'file', id, bytes }, [bytes]);
+    } catch (error) {
+      if (error instanceof GaussianSplatError) scope.postMessage({ type: 'error', id, error: error.toData() });
+      else if (!abort.signal.aborted) throw error;
+    } finally {
+      running.delete(id);
+    }
+  }
+
   async function buildLevels({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> {
     const abort = new AbortController();
     running.set(id, abort);
@@ -56,6 +72,7 @@ function serve(scope: WorkerScope): void {
   scope.addEventListener('message', ({ data }) => {
     if (data.type === 'load') void load(data);
     else if (data.type === 'levels') void buildLevels(data);
+    else if (data.type === 'file') void bring(data);
     else running.get(data.id)?.abort();
   });
   scope.postMessage({ type: 'ready' });

@@ -24,7 +24,8 @@ export class PagePool {
   readonly pages: readonly GaussianPage[];
   readonly #device: GPUDevice;
   readonly #manifest: DetailManifest;
-  readonly #slotsPerPage: number;
+  /** Slots that lie in one buffer. */
+  readonly slotsPerBuffer: number;
 
   constructor(device: GPUDevice, memory: GpuMemory, manifest: DetailManifest, slots: number) {
     this.#device = device;
@@ -32,11 +33,11 @@ export class PagePool {
     const stride = shWords(manifest.shDegree, manifest.shPrecision);
     const bytes = 4 * Math.max(GEOMETRY_WORDS, stride);
     const capacity = Math.min(pageCapacity(device, bytes), Math.floor(LARGEST_BUFFER / bytes));
-    this.#slotsPerPage = Math.max(1, Math.floor(capacity / SLOT_SPLATS));
+    this.slotsPerBuffer = Math.max(1, Math.floor(capacity / SLOT_SPLATS));
     const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
     const buffer = (name: string, words: number): GPUBuffer => memory.buffer(`gs.pool.${name}`, 4 * words, usage);
-    this.pages = Array.from({ length: Math.ceil(slots / this.#slotsPerPage) }, (_, p) => {
-      const own = Math.min(this.#slotsPerPage, slots - p * this.#slotsPerPage);
+    this.pages = Array.from({ length: Math.ceil(slots / this.slotsPerBuffer) }, (_, p) => {
+      const own = Math.min(this.slotsPerBuffer, slots - p * this.slotsPerBuffer);
       return {
         count: SLOT_SPLATS * own,
         geometry: buffer('geometry', GEOMETRY_WORDS * SLOT_SPLATS * own),
@@ -59,41 +60,36 @@ export class PagePool {
     queue.writeBuffer(page.sh, 4 * stride * SLOT_SPLATS * place, words, geometryAt + layout.geometry, layout.sh);
   }
 
-  /** Writes the detail rows of a slot: all {@link PAGE_CHUNKS} of them. */
-  writeDetails(slot: number, rows: Float32Array<ArrayBuffer>): void {
-    const { page, place } = this.#find(slot);
+  /** Writes detail rows, {@link PAGE_CHUNKS} for each slot from the given one on; all of them lie in one buffer. */
+  writeDetails(first: number, rows: Float32Array<ArrayBuffer>): void {
+    const { page, place } = this.#find(first);
     this.#device.queue.writeBuffer(page.details!, 4 * DETAIL_NUMBERS * PAGE_CHUNKS * place, rows);
   }
 
   #find(slot: number): { page: GaussianPage; place: number } {
-    return { page: this.pages[Math.floor(slot / this.#slotsPerPage)], place: slot % this.#slotsPerPage };
+    return { page: this.pages[Math.floor(slot / this.slotsPerBuffer)], place: slot % this.slotsPerBuffer };
   }
 }
 
 /** Moves everything in a page's file that is a position. */
-export function movePage(
-  words: Uint32Array<ArrayBuffer>,
-  [x, y, z]: Vector3,
-  manifest: DetailManifest,
-  chunks: number,
-): void {
-  if (x === 0 && y === 0 && z === 0) return;
+export function movePage(words: Uint32Array<ArrayBuffer>, by: Vector3, manifest: DetailManifest, chunks: number): void {
+  if (by.every((value) => value === 0)) return;
   const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
   const layout = pageLayout(manifest, chunks);
-  const move = (at: number): void => {
+  const [details, geometry] = [layout.chunks, layout.chunks + layout.details];
+  // The two corners of a box.
+  for (const corner of [0, 4]) movePoints(floats, corner, details, CHUNK_NUMBERS, by);
+  for (const sphere of [DETAIL_PLACES.sphere, DETAIL_PLACES.parentSphere]) {
+    movePoints(floats, details + sphere, geometry, DETAIL_NUMBERS, by);
+  }
+  movePoints(floats, geometry, geometry + layout.geometry, GEOMETRY_WORDS, by);
+}
+
+/** Moves the points that begin at every so many numbers. No closure, no array: of what a page costs the thread this is the largest part. */
+function movePoints(floats: Float32Array, first: number, end: number, stride: number, [x, y, z]: Vector3): void {
+  for (let at = first; at < end; at += stride) {
     floats[at] += x;
     floats[at + 1] += y;
     floats[at + 2] += z;
-  };
-  for (let at = 0; at < layout.chunks; at += CHUNK_NUMBERS) {
-    move(at);
-    move(at + 4);
   }
-  const details = layout.chunks;
-  for (let at = details; at < details + layout.details; at += DETAIL_NUMBERS) {
-    move(at + DETAIL_PLACES.sphere);
-    move(at + DETAIL_PLACES.parentSphere);
-  }
-  const geometry = details + layout.details;
-  for (let at = geometry; at < geometry + layout.geometry; at += GEOMETRY_WORDS) move(at);
 }

@@ -1,6 +1,6 @@
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
-import { PAGE_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
+import { pageLayout, type DetailManifest } from './manifest.js';
 import { NONE, type PageList } from './page-list.js';
 import { childrenOf } from './residency.js';
 
@@ -14,9 +14,15 @@ export const ARRIVED = ARRIVAL_STEPS;
  * below a page must never have arrived further than the page itself.
  */
 export class PageRows {
-  readonly numbers = new Float32Array(DETAIL_NUMBERS * PAGE_CHUNKS);
-  readonly #words = new Uint32Array(this.numbers.buffer);
+  readonly numbers: Float32Array<ArrayBuffer>;
+  readonly #words: Uint32Array<ArrayBuffer>;
   #children: Uint32Array = new Uint32Array(0);
+
+  /** @param numbers of the page's slot */
+  constructor(numbers: Float32Array<ArrayBuffer>) {
+    this.numbers = numbers;
+    this.#words = new Uint32Array(numbers.buffer, numbers.byteOffset, numbers.length);
+  }
 
   /** Takes a page over that nothing is below of yet. */
   load(list: PageList, manifest: DetailManifest, page: number, words: Uint32Array<ArrayBuffer>): void {

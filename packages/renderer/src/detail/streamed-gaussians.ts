@@ -5,14 +5,20 @@ import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
 import type { ShPrecision } from '../pack/sh.js';
 import { PAGE_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
-import { ARRIVED, PageRows } from './page-rows.js';
-import { Residency } from './residency.js';
+import { DetailTable } from './detail-table.js';
 import { listPages, NONE, type PageList } from './page-list.js';
 import { movePage, PagePool, slotBytes } from './page-pool.js';
+import { ARRIVED, PageRows } from './page-rows.js';
+import { PageTraffic, type FetchedPage } from './page-traffic.js';
+import { Residency } from './residency.js';
+import { UploadPace } from './upload-pace.js';
 import { WishReader } from './wish-reader.js';
 
 export interface StreamOptions {
-  /** Fetches a page's file, named relative to the manifest. Aborted when the scene is destroyed. */
+  /**
+   * Fetches a page's file, named relative to the manifest; 8 at a time at most. Aborted when no view wishes for it any more, and when the scene is destroyed. Best done in a
+   * worker: reading a response costs a thread more than all else that a page needs.
+   */
   readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>;
   /** Bytes of GPU memory that resident splats may take, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */
   readonly memoryBudget?: number;
@@ -28,19 +34,9 @@ export interface StreamOptions {
 
 /** Fits a phone. */
 const DEFAULT_BUDGET = 256e6;
-/** Pages on their way at a time, and uploaded before one frame. */
-const MOST_COMING = 8;
-const MOST_UPLOADS = 4;
-/** Milliseconds before a page that did not come is asked for again. */
-const RETRY_MS = 4_000;
 const ARRIVAL_MS = 400;
 /** Frames that a page takes to arrive at least, however slow they are. */
 const LEAST_STEPS = 16;
-
-interface Arrival {
-  readonly page: number;
-  readonly words: Uint32Array<ArrayBuffer>;
-}
 
 /**
  * A scene of any size from static hosting, of which only those pages are on the GPU that the view asks for. The coarsest page is always
@@ -66,17 +62,16 @@ export class StreamedGaussians implements GaussianScene {
   readonly #reservation: Reservation;
   readonly #pool: PagePool;
   readonly #residency: Residency;
+  readonly #traffic: PageTraffic;
+  readonly #pace = new UploadPace();
+  readonly #details: DetailTable;
   /** Of each slot. */
   readonly #rows: PageRows[];
   /** How much of their time has passed, 0 to 1, for the pages that arrive now. */
   readonly #arriving = new Map<number, number>();
   #steppedAt = 0;
-  /** Pages that the last look asks for, the most needed first. */
-  #wanted: number[] = [];
-  readonly #abort = new AbortController();
-  readonly #failedAt = new Map<number, number>();
-  #arrivals: Arrival[] = [];
-  #coming = 0;
+  #isDestroyed = false;
+  #uploaded = { pages: 0, bytes: 0, milliseconds: 0 };
   #version = 1;
 
   private constructor(device: GPUDevice, manifest: DetailManifest, options: StreamOptions) {
@@ -104,7 +99,13 @@ export class StreamedGaussians implements GaussianScene {
     }
     this.pages = this.#pool.pages;
     this.#residency = new Residency(this.#list, slots);
-    this.#rows = Array.from({ length: slots }, () => new PageRows());
+    this.#traffic = new PageTraffic(this.#residency, {
+      fetch: (page, signal) => this.#fetch(page, signal),
+      onArrival: () => this.#options.onChange?.(),
+      onError: (error) => this.#options.onError?.(error),
+    });
+    this.#details = new DetailTable(slots);
+    this.#rows = Array.from({ length: slots }, (_, slot) => new PageRows(this.#details.rowsOf(slot)));
   }
 
   /**
@@ -117,8 +118,8 @@ export class StreamedGaussians implements GaussianScene {
     const scene = await withMemoryCheck(device, what, () => new StreamedGaussians(device, manifest, options));
     try {
       scene.#residency.begin(0);
-      scene.#arrivals.push({ page: 0, words: await scene.#fetch(0) });
-      scene.update();
+      scene.#place({ page: 0, words: await scene.#fetch(0, new AbortController().signal) });
+      scene.#writeDetails();
       return scene;
     } catch (error) {
       scene.destroy();
@@ -141,7 +142,7 @@ export class StreamedGaussians implements GaussianScene {
     return {
       resident: this.#residency.residents,
       total: this.#list.count,
-      coming: this.#coming + this.#arrivals.length + this.#arriving.size,
+      coming: this.#traffic.underWay + this.#arriving.size,
     };
   }
 
@@ -150,26 +151,56 @@ export class StreamedGaussians implements GaussianScene {
     return Array.from(this.#residency.pageIn, (page) => (page === NONE ? undefined : page));
   }
 
+  /**
+   * What has been done since the scene was opened: pages and bytes uploaded, milliseconds of the page's thread that it took, and pages that were sent for in vain, because
+   * the view had moved on.
+   */
+  get traffic(): {
+    readonly pages: number;
+    readonly bytes: number;
+    readonly milliseconds: number;
+    readonly abandoned: number;
+  } {
+    return { ...this.#uploaded, abandoned: this.#traffic.abandoned };
+  }
+
   /** Uploads some of what has come, and lets what came before arrive further. The renderer calls it before each frame. */
   update(): void {
-    const arrivals = this.#arrivals.splice(0, MOST_UPLOADS);
-    this.#step();
-    for (const arrival of arrivals) this.#place(arrival);
-    if (this.#arrivals.length + this.#arriving.size > 0) queueMicrotask(() => this.#options.onChange?.());
+    const start = performance.now();
+    this.#step(start);
+    this.#upload(this.#pace.startFrame(start));
+    this.#writeDetails();
+    this.#uploaded.milliseconds += performance.now() - start;
+    this.#traffic.sendForMore();
+    if (this.#traffic.waiting + this.#arriving.size > 0) queueMicrotask(() => this.#options.onChange?.());
   }
 
   destroy(): void {
-    this.#abort.abort();
+    this.#isDestroyed = true;
+    this.#traffic?.close();
     this.wishes?.destroy();
-    this.#arrivals = [];
     this.#reservation.release();
     this.#memory.destroy();
   }
 
-  /** Puts a page into a slot; all that must be drawn otherwise for it changes with the same frame. */
-  #place({ page, words }: Arrival): void {
+  /** Places the most needed of what waits: one page, and as many more as so many bytes are enough for. */
+  #upload(most: number): void {
+    const start = performance.now();
+    let bytes = 0;
+    while (bytes === 0 || bytes + slotBytes(this.#manifest) <= most) {
+      const next = this.#traffic.next();
+      if (next === undefined) break;
+      if (!this.#place(next)) this.#traffic.refused();
+      // A page that finds no slot has cost its share of the thread as well.
+      bytes += next.words.byteLength;
+    }
+    if (bytes > 0) this.#pace.note(bytes, performance.now() - start);
+  }
+
+  /** Puts a page into a slot; all that must be drawn otherwise for it changes with the same frame. @returns false if there is no slot for it */
+  #place({ page, words }: FetchedPage): boolean {
     const place = this.#residency.settle(page);
-    if (place === undefined) return;
+    if (place === undefined) return false;
     const { slot, left } = place;
     const { upper, parent, parentChunk, chunks } = this.#list;
     movePage(words, this.#list.translate(page), this.#manifest, chunks[page]);
@@ -181,12 +212,14 @@ export class StreamedGaussians implements GaussianScene {
     const isAtOnce = parent[page] === NONE || this.#options.arrivalMs === 0;
     if (!isAtOnce) this.#arriving.set(page, 0);
     this.#setArrived(page, isAtOnce ? ARRIVED : 0);
+    this.#uploaded.pages++;
+    this.#uploaded.bytes += words.byteLength;
     this.#version++;
+    return true;
   }
 
   /** Lets arriving pages take the place of what stood for them by another step; none before the page above it. */
-  #step(): void {
-    const now = performance.now();
+  #step(now: number): void {
     const passed = (now - this.#steppedAt) / (this.#options.arrivalMs ?? ARRIVAL_MS);
     this.#steppedAt = now;
     if (this.#arriving.size === 0) return;
@@ -208,7 +241,7 @@ export class StreamedGaussians implements GaussianScene {
   /** How far a page has arrived: so far the chunk above gives way to it. */
   #setArrived(page: number, arrived: number): void {
     this.#rowsOf(page).setArrived(arrived);
-    this.#write(page);
+    this.#details.touch(this.#residency.slotOf[page]);
     this.#setBelow(page, arrived);
   }
 
@@ -222,55 +255,23 @@ export class StreamedGaussians implements GaussianScene {
     const parent = this.#list.parent[page];
     if (parent === NONE) return;
     this.#rowsOf(parent).setBelow(this.#list.parentChunk[page], arrived);
-    this.#write(parent);
+    this.#details.touch(this.#residency.slotOf[parent]);
   }
 
-  #write(page: number): void {
-    const slot = this.#residency.slotOf[page];
-    this.#pool.writeDetails(slot, this.#rows[slot].numbers);
+  #writeDetails(): void {
+    this.#details.flush(this.#pool.slotsPerBuffer, (first, rows) => this.#pool.writeDetails(first, rows));
   }
 
   #take(wishes: Float32Array): void {
-    if (this.#abort.signal.aborted) return;
+    if (this.#isDestroyed) return;
     this.#residency.note(wishes);
-    this.#wanted = this.#residency.missing;
-    this.#fetchWanted();
+    this.#traffic.follow();
   }
 
-  /** Sends for the pages that are needed most, as many as may be on their way. */
-  #fetchWanted(): void {
-    while (this.#coming < MOST_COMING && this.#wanted.length > 0) {
-      const page = this.#wanted.shift()!;
-      const hasFailed = performance.now() - (this.#failedAt.get(page) ?? -Infinity) < RETRY_MS;
-      // What was above it may have left since the look.
-      if (hasFailed || !this.#residency.lacks(page) || !this.#residency.isResident(this.#list.parent[page])) continue;
-      if (this.#residency.begin(page)) void this.#bring(page);
-      // What is needed less finds no room either.
-      else this.#wanted = [];
-    }
-  }
-
-  async #bring(page: number): Promise<void> {
-    this.#coming++;
-    try {
-      this.#arrivals.push({ page, words: await this.#fetch(page) });
-      this.#failedAt.delete(page);
-    } catch (error) {
-      this.#residency.giveUp(page);
-      this.#failedAt.set(page, performance.now());
-      if (!this.#abort.signal.aborted) this.#options.onError?.(error);
-    } finally {
-      this.#coming--;
-    }
-    if (this.#abort.signal.aborted) return;
-    this.#fetchWanted();
-    this.#options.onChange?.();
-  }
-
-  async #fetch(page: number): Promise<Uint32Array<ArrayBuffer>> {
+  async #fetch(page: number, signal: AbortSignal): Promise<Uint32Array<ArrayBuffer>> {
     const file = this.#list.file(page);
-    const bytes = await this.#options.fetchPage(file, this.#abort.signal);
-    this.#abort.signal.throwIfAborted();
+    const bytes = await this.#options.fetchPage(file, signal);
+    signal.throwIfAborted();
     const expected = 4 * pageLayout(this.#manifest, this.#list.chunks[page]).total;
     if (bytes.byteLength === expected) return new Uint32Array(bytes);
     throw new GaussianSplatError('decode/truncated', {

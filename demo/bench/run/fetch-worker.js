@@ -1,0 +1,22 @@
+/** Fetches files for a page that measures, as the element's worker does: reading a response costs its thread more than all else that a page of a streamed scene does. */
+const running = new Map();
+
+async function answer({ id, url }) {
+  const abort = new AbortController();
+  running.set(id, abort);
+  try {
+    const response = await fetch(url, { signal: abort.signal });
+    if (!response.ok) throw new Error(`${url}: HTTP ${response.status}`);
+    const bytes = await response.arrayBuffer();
+    postMessage({ id, bytes }, [bytes]);
+  } catch (error) {
+    if (!abort.signal.aborted) postMessage({ id, error: String(error) });
+  } finally {
+    running.delete(id);
+  }
+}
+
+addEventListener('message', ({ data }) => {
+  if (data.url === undefined) running.get(data.id)?.abort();
+  else void answer(data);
+});

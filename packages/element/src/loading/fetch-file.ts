@@ -1,0 +1,10 @@
+import { fetchScene } from '@gaussian-splat/formats';
+import type { FileRequest } from './protocol.js';
+
+/**
+ * The bytes of one file, in a buffer of their own. Throws GaussianSplatError (`network/*`), or the signal's reason once that is aborted.
+ */
+export async function fetchFile({ url, credentials }: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
+  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal });
+  return bytes.slice().buffer;
+}

@@ -1,0 +1,131 @@
+import { NONE } from './page-list.js';
+import type { Residency } from './residency.js';
+
+/** Pages being fetched at a time, and those together with what waits for its upload: at most 21 MB of the page's memory. */
+export const MOST_FETCHES = 8;
+export const MOST_UNDER_WAY = 32;
+/** Milliseconds before a page that did not come is asked for again. */
+const RETRY_MS = 4_000;
+
+/** A page that has come. */
+export interface FetchedPage {
+  readonly page: number;
+  readonly words: Uint32Array<ArrayBuffer>;
+}
+
+export interface TrafficOptions {
+  /** Rejects for a page that cannot be had. */
+  readonly fetch: (page: number, signal: AbortSignal) => Promise<Uint32Array<ArrayBuffer>>;
+  /** A page waits for its upload, or is known not to come. */
+  readonly onArrival: () => void;
+  readonly onError: (error: unknown) => void;
+}
+
+/**
+ * Pages on their way from the server to a slot: the most needed are sent for first and handed over first, a bounded number is under way, and what nobody wishes for any
+ * more is given up wherever it is.
+ */
+export class PageTraffic {
+  readonly #residency: Residency;
+  readonly #options: TrafficOptions;
+  readonly #fetching = new Map<number, AbortController>();
+  readonly #waiting = new Map<number, Uint32Array<ArrayBuffer>>();
+  readonly #failedAt = new Map<number, number>();
+  #abandoned = 0;
+  #isClosed = false;
+
+  constructor(residency: Residency, options: TrafficOptions) {
+    this.#residency = residency;
+    this.#options = options;
+  }
+
+  /** Pages being fetched or waiting. */
+  get underWay(): number {
+    return this.#fetching.size + this.#waiting.size;
+  }
+
+  /** Pages that wait for their upload. */
+  get waiting(): number {
+    return this.#waiting.size;
+  }
+
+  /** Pages sent for that were given up since, because nobody wished for them any more or nothing could leave for them. */
+  get abandoned(): number {
+    return this.#abandoned;
+  }
+
+  /** To be called after each look: gives up what the last looks do not wish for and sends for what they do. */
+  follow(): void {
+    for (const page of [...this.#fetching.keys(), ...this.#waiting.keys()]) {
+      if (this.#residency.isForgotten(page)) this.#abandon(page);
+    }
+    this.sendForMore();
+  }
+
+  /** Sends for the pages that are needed most, as many as may be under way. */
+  sendForMore(): void {
+    while (!this.#isClosed && this.#fetching.size < MOST_FETCHES && this.underWay < MOST_UNDER_WAY) {
+      const page = this.#residency.nextMissing();
+      if (page === NONE) return;
+      if (!this.#hasFailedLately(page) && this.#residency.begin(page)) void this.#bring(page);
+    }
+  }
+
+  /** Hands over the most needed of the pages that wait; undefined if the last look wishes for none of them. */
+  next(): FetchedPage | undefined {
+    let [most, need] = [NONE, 0];
+    for (const page of this.#waiting.keys()) {
+      if (this.#residency.need(page) > need) [most, need] = [page, this.#residency.need(page)];
+    }
+    if (most === NONE) return undefined;
+    const words = this.#waiting.get(most)!;
+    this.#waiting.delete(most);
+    return { page: most, words };
+  }
+
+  /** A page that was handed over has found no slot. */
+  refused(): void {
+    this.#abandoned++;
+  }
+
+  /** Ends everything; nothing is reported any more. */
+  close(): void {
+    this.#isClosed = true;
+    for (const controller of this.#fetching.values()) controller.abort();
+    this.#fetching.clear();
+    this.#waiting.clear();
+  }
+
+  #hasFailedLately(page: number): boolean {
+    return performance.now() - (this.#failedAt.get(page) ?? -Infinity) < RETRY_MS;
+  }
+
+  #abandon(page: number): void {
+    this.#fetching.get(page)?.abort();
+    this.#fetching.delete(page);
+    this.#waiting.delete(page);
+    this.#residency.giveUp(page);
+    this.#abandoned++;
+  }
+
+  async #bring(page: number): Promise<void> {
+    const controller = new AbortController();
+    this.#fetching.set(page, controller);
+    // A page that was given up may have been sent for again meanwhile: that is another fetch.
+    const isOver = (): boolean => this.#fetching.get(page) !== controller;
+    try {
+      const words = await this.#options.fetch(page, controller.signal);
+      if (isOver()) return;
+      this.#waiting.set(page, words);
+      this.#failedAt.delete(page);
+    } catch (error) {
+      if (isOver()) return;
+      this.#residency.giveUp(page);
+      this.#failedAt.set(page, performance.now());
+      this.#options.onError(error);
+    }
+    this.#fetching.delete(page);
+    this.sendForMore();
+    this.#options.onArrival();
+  }
+}

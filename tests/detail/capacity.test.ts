@@ -1,0 +1,42 @@
+/** How much room the buffers between the stages get as views change. The counts are made up; no GPU. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { CapacityMonitor, LEAST_CAPACITY, type Capacity } from '@gaussian-splat/renderer/stages';
+
+const MOST = { visible: 4e6, pairs: 50e6 };
+
+/** A monitor and the room that it has asked for last. */
+function watch(room: Capacity, least: () => Capacity): { monitor: CapacityMonitor; room: () => Capacity } {
+  const device = { createBuffer: () => ({ destroy: () => undefined }) } as unknown as GPUDevice;
+  let current = room;
+  const monitor = new CapacityMonitor(device, room, { least, most: MOST }, (wished) => (current = wished));
+  return { monitor, room: () => current };
+}
+
+/** As many looks as make buffers shrink. */
+function look(monitor: CapacityMonitor, used: Capacity): void {
+  for (let looks = 0; looks < 4; looks++) monitor.judge(used, false);
+}
+
+test('buffers that are nearly empty shrink, and grow before they are full', () => {
+  const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => LEAST_CAPACITY);
+  look(monitor, { visible: 1000, pairs: 5000 });
+  assert.deepEqual(room(), { visible: 1250, pairs: LEAST_CAPACITY.pairs });
+  monitor.judge({ visible: 1200, pairs: 5000 }, false);
+  assert.deepEqual(room(), { visible: 1500, pairs: LEAST_CAPACITY.pairs });
+  monitor.judge({ visible: 3.9e6, pairs: 60e6 }, true);
+  assert.deepEqual(room(), MOST);
+});
+
+test('room that must stay does, and comes back as soon as more of it may', () => {
+  let pairs = 1 << 18;
+  const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => ({ visible: 4e6, pairs }));
+  look(monitor, { visible: 1000, pairs: 5000 });
+  assert.deepEqual(room(), { visible: 4e6, pairs: 1 << 18 });
+  // A pair is known to cost less now: before anything overflows there is room for as many as one submission paints.
+  pairs = 6e6;
+  monitor.judge({ visible: 30_000, pairs: 80_000 }, false);
+  assert.deepEqual(room(), { visible: 4e6, pairs: 6e6 });
+  look(monitor, { visible: 30_000, pairs: 80_000 });
+  assert.deepEqual(room(), { visible: 4e6, pairs: 6e6 });
+});

@@ -1,0 +1,161 @@
+/** Who comes and who goes in a pool of pages, without a GPU: against plain sorting, at full size, and until nothing changes any more. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { NONE, Residency, type PageList } from '@gaussian-splat/renderer/stages';
+import { randomSource } from '../support/gpu.js';
+import { pageTree, wishesOf } from '../support/page-tree.js';
+
+const opened = (list: PageList, slots: number): Residency => {
+  const residency = new Residency(list, slots);
+  residency.begin(0);
+  residency.settle(0);
+  return residency;
+};
+
+/** Places everything that a look asks for, one page at a time. @returns pages placed */
+function placeAll(residency: Residency): number {
+  let placed = 0;
+  for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
+    if (residency.begin(page) && residency.settle(page)) placed++;
+  }
+  return placed;
+}
+
+/** Looks and places until a look asks for nothing more. @returns looks */
+function settle(list: PageList, residency: Residency, share: (page: number) => number): number {
+  for (let looks = 1; looks <= 200; looks++) {
+    residency.note(wishesOf(list, (page) => residency.isResident(page), share));
+    if (placeAll(residency) === 0) return looks;
+  }
+  throw new Error('200 looks at one view, and pages are still exchanged');
+}
+
+test('missing pages are named in the order of what doing without them costs', () => {
+  const random = randomSource(3);
+  const list = pageTree(600);
+  const residency = opened(list, 600);
+  for (let look = 0; look < 20; look++) {
+    const wishes = Float32Array.from({ length: list.count }, () => (random() < 0.3 ? 0 : 10 * random()));
+    residency.note(wishes);
+    const isMissing = (page: number): boolean =>
+      wishes[page] > 0 && !residency.isResident(page) && residency.isResident(list.parent[page]);
+    const expected = [...wishes.keys()].filter((page) => page > 0 && isMissing(page)).map((page) => wishes[page]);
+    const found: number[] = [];
+    const wished: number[] = [];
+    for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
+      found.push(wishes[page]);
+      wished.push(page);
+    }
+    assert.deepEqual(
+      found,
+      expected.sort((a, b) => b - a),
+    );
+    for (const page of wished.slice(0, 20)) assert.ok(residency.begin(page) && residency.settle(page));
+  }
+  assert.ok(residency.residents > 200);
+});
+
+test('with room for all, everything that a view wishes for is there in the end', () => {
+  const list = pageTree(3000);
+  const residency = opened(list, 3000);
+  const looks = settle(list, residency, (page) => (page % 7 === 0 ? 0 : 0.3));
+  const wished = wishesOf(
+    list,
+    () => true,
+    (page) => (page % 7 === 0 ? 0 : 0.3),
+  );
+  wished.forEach((wish, page) => assert.equal(residency.isResident(page), wish > 0, `page ${page}`));
+  assert.ok(looks <= 6, `${looks} looks for a tree of four levels`);
+});
+
+test('a pool that is too small comes to rest, and nothing that is worth much more than what is there is missing', () => {
+  const random = randomSource(8);
+  const list = pageTree(3000);
+  const residency = opened(list, 400);
+  for (let view = 0; view < 10; view++) {
+    const shares = Float32Array.from({ length: list.count }, () => (random() < 0.2 ? 0 : random()));
+    settle(list, residency, (page) => shares[page]);
+    const wishes = wishesOf(
+      list,
+      (page) => residency.isResident(page),
+      (page) => shares[page],
+    );
+    const isLeaf = (page: number): boolean =>
+      !Array.from(residency.pageIn).some((resident) => list.parent[resident] === page);
+    const spare = Math.min(
+      ...[...residency.pageIn].filter((page) => page !== 0 && isLeaf(page)).map((page) => wishes[page]),
+    );
+    const lacking = Math.max(...wishes.filter((_, page) => !residency.isResident(page)));
+    assert.ok(lacking <= 1.5 * spare, `view ${view}: ${lacking} is missing, ${spare} is there`);
+  }
+});
+
+test('pages on their way are never promised the same slot', () => {
+  const list = pageTree(200);
+  const residency = opened(list, 17);
+  settle(list, residency, (page) => (page <= 16 ? 0.1 : 0));
+  assert.equal(residency.residents, 17);
+  // All sixteen leaves may leave for others below one of them, which must stay: fifteen can come.
+  const wishes = new Float32Array(200);
+  [0, 1].forEach((page) => (wishes[page] = 1000));
+  for (let page = 17; page < 33; page++) wishes[page] = 500 - page;
+  residency.note(wishes);
+  const coming: number[] = [];
+  for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
+    if (residency.begin(page)) coming.push(page);
+  }
+  assert.deepEqual(
+    coming,
+    Array.from({ length: 15 }, (_, k) => 17 + k),
+  );
+  const left = coming.reverse().map((page) => residency.settle(page)?.left);
+  assert.equal(new Set(left).size, 15);
+  assert.ok(left.every((page) => page !== undefined && page >= 2 && page <= 16));
+});
+
+/** CPU milliseconds that work takes. */
+function cpuOf(work: () => void): number {
+  const before = process.cpuUsage();
+  work();
+  const { user, system } = process.cpuUsage(before);
+  return (user + system) / 1000;
+}
+
+/** CPU milliseconds of a look, the quickest of many, and of a page that takes the place of another, on average, in a full pool whose view changes with every look. */
+function costs(pages: number, slots: number): { look: number; page: number } {
+  const list = pageTree(pages);
+  const residency = opened(list, slots);
+  const view = (k: number): Float32Array =>
+    wishesOf(
+      list,
+      (page) => residency.isResident(page),
+      (page) => ((page + 31 * k) % 3 === 0 ? 0.02 : 0.5),
+    );
+  for (let k = 0; k < 12; k++) {
+    residency.note(view(k));
+    placeAll(residency);
+  }
+  assert.equal(residency.residents, slots);
+  let [look, placing, placed] = [Infinity, 0, 0];
+  for (let k = 12; k < 42; k++) {
+    const wishes = view(k);
+    look = Math.min(
+      look,
+      cpuOf(() => residency.note(wishes)),
+    );
+    placing += cpuOf(() => {
+      placed += placeAll(residency);
+    });
+  }
+  assert.ok(placed > slots, `only ${placed} pages were exchanged`);
+  return { look, page: placing / placed };
+}
+
+test('a look and a page cost what their numbers make of it, not their product', () => {
+  const [small, large] = [costs(3610, 1063), costs(14_440, 4251)];
+  const text = ({ look, page }: typeof small): string =>
+    `${look.toFixed(3)} ms a look, ${(1000 * page).toFixed(1)} µs a page`;
+  console.log(`3,610 pages and 1,063 slots: ${text(small)}; 14,440 and 4,251: ${text(large)}`);
+  assert.ok(large.look < 8 * small.look + 0.5, 'four times the pages, more than eight times the look');
+  assert.ok(large.page < 3 * small.page + 0.002, 'four times the slots, more than three times the page');
+});

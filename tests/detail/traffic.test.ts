@@ -1,0 +1,264 @@
+/** Pages on their way: how many, in which order, and what becomes of those that nobody wishes for any more. No GPU. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { setImmediate as turn } from 'node:timers/promises';
+import {
+  DETAIL_NUMBERS,
+  DetailTable,
+  MOST_FETCHES,
+  MOST_UNDER_WAY,
+  MOST_UPLOAD_BYTES,
+  NONE,
+  PAGE_CHUNKS,
+  PageTraffic,
+  Residency,
+  UploadPace,
+  type PageList,
+} from '@gaussian-splat/renderer/stages';
+import { randomSource } from '../support/gpu.js';
+import { pageTree, wishesOf } from '../support/page-tree.js';
+
+interface Fetch {
+  readonly page: number;
+  readonly signal: AbortSignal;
+  readonly arrive: () => void;
+  readonly fail: () => void;
+}
+
+/** A server that answers when told to. */
+class Server {
+  readonly open: Fetch[] = [];
+  /** Pages in the order in which they were sent for. */
+  readonly log: number[] = [];
+  most = 0;
+
+  readonly fetch = (page: number, signal: AbortSignal): Promise<Uint32Array<ArrayBuffer>> => {
+    this.log.push(page);
+    return new Promise((resolve, reject) => {
+      const arrive = (): void => resolve(Uint32Array.of(page));
+      this.open.push({ page, signal, arrive, fail: () => reject(new Error(`page ${page}: 404`)) });
+      this.most = Math.max(this.most, this.open.filter((fetch) => !fetch.signal.aborted).length);
+    });
+  };
+
+  /** Everything that is open arrives, the last first. */
+  async answer(): Promise<void> {
+    for (const { arrive } of this.open.splice(0).reverse()) arrive();
+    await turn();
+  }
+}
+
+interface Pool {
+  readonly list: PageList;
+  readonly residency: Residency;
+  readonly traffic: PageTraffic;
+  readonly server: Server;
+  readonly errors: unknown[];
+  /** Looks with the given shares of the parents' needs; returns the wishes. */
+  readonly look: (share: (page: number) => number) => Float32Array;
+}
+
+function pool(pages: number, slots: number): Pool {
+  const list = pageTree(pages);
+  const residency = new Residency(list, slots);
+  residency.begin(0);
+  residency.settle(0);
+  const [server, errors] = [new Server(), [] as unknown[]];
+  const traffic = new PageTraffic(residency, {
+    fetch: server.fetch,
+    onArrival: () => undefined,
+    onError: (error) => errors.push(error),
+  });
+  const look: Pool['look'] = (share) => {
+    const wishes = wishesOf(list, (page) => residency.isResident(page), share);
+    residency.note(wishes);
+    traffic.follow();
+    return wishes;
+  };
+  return { list, residency, traffic, server, errors, look };
+}
+
+/** Places up to so many pages of those that wait. @returns them, in order */
+function place({ residency, traffic }: Pool, most: number): number[] {
+  const placed: number[] = [];
+  for (let next = traffic.next(); next !== undefined; next = placed.length < most ? traffic.next() : undefined) {
+    assert.equal(next.words[0], next.page);
+    if (residency.settle(next.page)) placed.push(next.page);
+    else traffic.refused();
+  }
+  return placed;
+}
+
+test('a thousand pages that arrive as fast as they are sent for: few are under way, the most needed come first, all are there in the end', async () => {
+  const all = pool(1200, 1200);
+  const random = randomSource(2);
+  const shares = Float32Array.from({ length: 1200 }, () => 0.1 + 0.9 * random());
+  for (let frame = 0; all.residency.residents < 1200; frame++) {
+    assert.ok(frame < 1000, `${all.residency.residents} of 1200 pages after 1000 frames`);
+    if (frame % 6 === 0) all.look((page) => shares[page]);
+    for (let answers = 0; answers < 3; answers++) await all.server.answer();
+    assert.ok(all.traffic.underWay <= MOST_UNDER_WAY && all.server.most <= MOST_FETCHES);
+    const needs = place(all, 5).map((page) => all.residency.need(page));
+    assert.deepEqual(
+      needs,
+      [...needs].sort((a, b) => b - a),
+    );
+    all.traffic.sendForMore();
+  }
+  assert.equal(all.server.log.length, 1200 - 1, 'each page is sent for once');
+  assert.equal(all.traffic.abandoned, 0);
+  assert.equal(all.traffic.underWay, 0);
+});
+
+test('what is sent for is what is needed most of all that can come', () => {
+  const all = pool(300, 300);
+  const random = randomSource(4);
+  const wishes = all.look(() => random());
+  const expected = [...Array(17).keys()].slice(1).sort((a, b) => wishes[b] - wishes[a]);
+  assert.deepEqual(all.server.log, expected.slice(0, MOST_FETCHES));
+});
+
+test('pages that two looks do not wish for are given up where they are, and may be asked for again', async () => {
+  const all = pool(300, 300);
+  all.look(() => 0.5);
+  await all.server.answer();
+  const [waiting, fetching] = [all.traffic.waiting, all.server.open.length];
+  assert.equal(waiting, MOST_FETCHES);
+  assert.equal(fetching, MOST_FETCHES);
+  const stale = all.server.open.splice(0);
+  all.look(() => 0);
+  assert.equal(all.traffic.next(), undefined, 'nothing is placed that the last look does not wish for');
+  assert.equal(
+    all.traffic.underWay,
+    2 * MOST_FETCHES,
+    'one look alone gives nothing up: another view may look in turn',
+  );
+  all.look(() => 0);
+  assert.equal(all.traffic.underWay, 0);
+  assert.equal(all.traffic.abandoned, 2 * MOST_FETCHES);
+  assert.ok(stale.every(({ signal }) => signal.aborted));
+  all.look(() => 0.5);
+  assert.equal(all.server.open.length, MOST_FETCHES);
+  // What was given up comes late, or fails as aborted fetches do: neither counts.
+  stale.forEach(({ arrive, fail }, k) => (k % 2 ? arrive() : fail()));
+  await turn();
+  assert.equal(all.traffic.waiting, 0);
+  assert.deepEqual(all.errors, []);
+  for (let round = 0; round < 10; round++) {
+    await all.server.answer();
+    place(all, 16);
+    all.traffic.sendForMore();
+  }
+  assert.equal(all.residency.residents, 17, 'the root and what is below it');
+});
+
+test('pages that fail are told of once, make room for others, and nothing comes of a closed scene', async () => {
+  const all = pool(300, 300);
+  all.look(() => 0.5);
+  const failed = all.server.open.splice(0);
+  for (const { fail } of failed) fail();
+  await turn();
+  assert.equal(all.errors.length, MOST_FETCHES);
+  assert.equal(all.server.open.length, MOST_FETCHES, 'the next ones are sent for');
+  all.look(() => 0.5);
+  const again = all.server.log.slice(MOST_FETCHES).filter((page) => failed.some((fetch) => fetch.page === page));
+  assert.deepEqual(again, [], 'not for four seconds');
+  all.traffic.close();
+  const open = all.server.open.splice(0);
+  assert.ok(open.every(({ signal }) => signal.aborted));
+  open.forEach(({ fail }) => fail());
+  await turn();
+  assert.equal(all.errors.length, MOST_FETCHES);
+  assert.equal(all.server.open.length, 0);
+});
+
+test('in a small pool, whatever comes in whatever order, what is above a page is there, and views at rest come to rest', async () => {
+  const all = pool(2000, 120);
+  const random = randomSource(6);
+  for (let view = 0; view < 12; view++) {
+    const shares = Float32Array.from({ length: 2000 }, () => (random() < 0.3 ? 0 : random()));
+    let last = -1;
+    for (let frame = 0; frame < 600 && last !== all.server.log.length; frame++) {
+      // One view in three is left before it has what it wishes for.
+      if (view % 3 === 0 && frame > 20) break;
+      if (frame % 30 === 29) last = all.server.log.length;
+      if (frame % 3 === 0) all.look((page) => shares[page]);
+      const some = all.server.open.splice(0).filter((fetch) => (random() < 0.5 ? (fetch.arrive(), false) : true));
+      all.server.open.push(...some);
+      await turn();
+      place(all, Math.floor(3 * random()));
+      all.traffic.sendForMore();
+      const residents = [...all.residency.pageIn].filter((page) => page !== NONE);
+      assert.equal(new Set(residents).size, residents.length);
+      for (const page of residents.filter((page) => page !== 0)) {
+        assert.ok(all.residency.isResident(all.list.parent[page]), `page ${page} hangs in the air`);
+      }
+      assert.ok(all.traffic.underWay <= MOST_UNDER_WAY);
+      assert.ok(frame < 599, `view ${view} never comes to rest`);
+    }
+  }
+  assert.ok(all.traffic.abandoned > 0 && all.residency.residents === 120);
+});
+
+test('a frame uploads what an eighth of its time is enough for, 8 MB at most', () => {
+  const bytesAt = (frameMs: number, msPerMegabyte: number): number => {
+    const pace = new UploadPace();
+    let bytes = 0;
+    for (let frame = 0; frame < 60; frame++) {
+      bytes = pace.startFrame(frame * frameMs);
+      pace.note(bytes, (bytes / 1e6) * msPerMegabyte);
+    }
+    return bytes;
+  };
+  const close = (found: number, expected: number): void =>
+    assert.ok(Math.abs(found / expected - 1) < 0.02, `${found} bytes, expected ${expected}`);
+  close(bytesAt(1000 / 60, 1), (1000 / 60 / 8) * 1e6);
+  close(bytesAt(1000 / 30, 4), 1e6);
+  assert.equal(bytesAt(1000 / 60, 0.01), MOST_UPLOAD_BYTES);
+  // However slow the frames are: what makes them slow may be the uploads.
+  close(bytesAt(500, 4), 1e6);
+  close(bytesAt(1, 4), 0.25e6);
+});
+
+test('a clock that ticks once a millisecond gives the same share on average', () => {
+  const pace = new UploadPace();
+  let [now, sum] = [0, 0];
+  for (let frame = 0; frame < 600; frame++) {
+    const bytes = pace.startFrame((1000 / 60) * frame);
+    if (frame >= 100) sum += bytes;
+    const took = (bytes / 1e6) * 1.3;
+    pace.note(bytes, Math.floor(now + took) - Math.floor(now));
+    now += took + 7.77;
+  }
+  const [mean, exact] = [sum / 500, (1000 / 60 / 8 / 1.3) * 1e6];
+  assert.ok(Math.abs(mean / exact - 1) < 0.2, `${mean} bytes a frame, ${exact} by an exact clock`);
+});
+
+test('rows that changed are written once, in pieces that never reach over a buffer', () => {
+  const [slots, perBuffer] = [500, 64];
+  const random = randomSource(9);
+  const table = new DetailTable(slots);
+  const written = new Float32Array(DETAIL_NUMBERS * PAGE_CHUNKS * slots);
+  const stride = DETAIL_NUMBERS * PAGE_CHUNKS;
+  for (let frame = 0; frame < 50; frame++) {
+    const changed = Array.from({ length: Math.floor(40 * random()) }, () => Math.floor(slots * random() ** 2));
+    for (const slot of changed) {
+      table.rowsOf(slot).fill(random());
+      table.touch(slot);
+    }
+    let [pieces, rows] = [0, 0];
+    table.flush(perBuffer, (first, numbers) => {
+      const count = numbers.length / stride;
+      assert.equal(Math.floor(first / perBuffer), Math.floor((first + count - 1) / perBuffer));
+      written.set(numbers, stride * first);
+      pieces++;
+      rows += count;
+    });
+    const different = new Set(changed).size;
+    assert.ok(pieces <= different && rows <= 9 * different, `${pieces} pieces of ${rows} slots for ${different}`);
+    for (let slot = 0; slot < slots; slot++) {
+      assert.deepEqual(written.subarray(stride * slot, stride * (slot + 1)), table.rowsOf(slot), `slot ${slot}`);
+    }
+  }
+  table.flush(perBuffer, () => assert.fail('nothing has changed since'));
+});

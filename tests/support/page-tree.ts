@@ -1,0 +1,37 @@
+/** Pages without files: what a scene of any size would have, for tests of who comes and goes. */
+import { listPages, NONE, PAGE_CHUNKS, type PageList } from '@gaussian-splat/renderer/stages';
+
+/** Chunks of a page that have pages below them: all but the four upper ones. */
+const BELOW = PAGE_CHUNKS - 4;
+
+/** A full tree of so many pages, sixteen below each. */
+export function pageTree(count: number): PageList {
+  const pages = Array.from({ length: count }, (_, p) => ({
+    ...{ file: `page-${p}`, chunks: PAGE_CHUNKS, upper: p === 0 ? 1 : 4 },
+    parent: p === 0 ? undefined : ([Math.floor((p - 1) / BELOW), 4 + ((p - 1) % BELOW)] as const),
+  }));
+  return listPages({
+    ...{ format: 'gaussian-splat-detail', version: 1, splats: 0, shDegree: 0, shPrecision: 'int8' },
+    ...{ antialiased: false, origin: [0, 0, 0], trees: [{ pages }] },
+    bounds: { min: [0, 0, 0], max: [1, 1, 1], center: [0, 0, 0], radius: 1 },
+    instances: [{ tree: 0, translate: [0, 0, 0] }],
+  });
+}
+
+/**
+ * Wishes as a view notes them: only for pages whose parent is there, and each page less than its parent.
+ * @param share gets a page, returns the share, 0 to 1, of its parent's need that it has
+ */
+export function wishesOf(
+  list: PageList,
+  isResident: (page: number) => boolean,
+  share: (page: number) => number,
+): Float32Array {
+  const needs = new Float32Array(list.count).fill(1000);
+  return needs.map((_, page) => {
+    const above = list.parent[page];
+    if (above === NONE) return needs[page];
+    needs[page] = needs[above] * share(page);
+    return isResident(above) ? needs[page] : 0;
+  });
+}
