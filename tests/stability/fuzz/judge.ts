@@ -4,6 +4,7 @@ import type { RasterizerName } from '@gaussian-splat/renderer';
 import { renderOracle, type Mode, type OracleImage, type Rules } from '../../oracle/oracle.js';
 import { toCamera, worldPosition } from '../../oracle/projection.js';
 import { RULES } from '../../oracle/rules.js';
+import { isSwiftShader } from '../../support/limit.js';
 import { psnr } from '../../support/metrics.js';
 import { toRgba } from '../../oracle/oracle.js';
 import { compareImage, draw, notFinite } from '../support/pictures.js';
@@ -59,7 +60,8 @@ export interface JudgedView {
 /** The same for a scene and a camera that no recipe made. */
 export async function judgeView(view: JudgedView, { device, precise, rasterizer }: Subject): Promise<Verdict> {
   const { cloud, camera, mode, turning } = view;
-  const pixels = await draw(device, cloud, camera, { rasterizer, mode, turning, threads: 'serial' });
+  const threads = isSwiftShader(device) ? 'serial' : 'parallel';
+  const pixels = await draw(device, cloud, camera, { rasterizer, mode, turning, threads });
   const oracle = renderOracle(cloud, camera, { rules: 'gsplat', mode });
   const decibels = compareImage(pixels, oracle).psnr;
   const broken = notFinite(pixels);
@@ -74,7 +76,7 @@ export async function judgeView(view: JudgedView, { device, precise, rasterizer 
   const endless = renderOracle(cloud, camera, { rules: ENDLESS, mode });
   if (overPixels(pixels, endless, sure) >= FINE) return verdict('stop');
   if (precise === undefined) return verdict('none');
-  const options = { rasterizer, mode, turning, accumulation: 'rgba32float', threads: 'serial' } as const;
+  const options = { rasterizer, mode, turning, accumulation: 'rgba32float', threads } as const;
   const better = overPixels(await draw(precise, cloud, camera, options), endless, sure);
   return verdict(better >= FINE ? 'float16' : 'none');
 }
