@@ -3,6 +3,7 @@ export { CapacityMonitor, LEAST_CAPACITY, type Capacity } from './capacity.js';
 export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
 export * from './generated/live-shaders.js';
 export * from './generated/shaders.js';
+export * from './generated/streamed-shaders.js';
 export { dispatchGrid } from './gpu/kernel.js';
 export { GpuMemory } from './gpu/memory.js';
 export { writeStruct } from './gpu/struct.js';
