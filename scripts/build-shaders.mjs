@@ -2,7 +2,7 @@
  * Turns shaders/*.wgsl into packages/renderer/src/generated/: code with its `#import`s resolved, and every
  * binding number, struct layout, workgroup size and numeric constant reflected from the WGSL itself, so that nobody
  * counts padding or repeats a number by hand. `shaders.ts` has what every scene needs, `live-shaders.ts` what only generators and
- * picture models do: pages without them never load it.
+ * picture models do, `streamed-shaders.ts` what only streamed scenes do: pages without them never load these.
  */
 import { mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
@@ -12,8 +12,12 @@ const shaderFolder = fileURLToPath(new URL('../shaders/', import.meta.url));
 const outputFolder = fileURLToPath(new URL('../packages/renderer/src/generated/', import.meta.url));
 
 const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
-/** Stages of generators and picture models. */
-const LIVE = ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'];
+/** Stages that few pages need, by the file that has them. */
+const RARE = {
+  'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
+  'streamed-shaders': ['note_wishes'],
+};
+const fileOf = (stage) => Object.keys(RARE).find((file) => RARE[file].includes(stage)) ?? 'shaders';
 const IMPORT = /^#import (\S+)$/gm;
 
 /** A shader and all files that it imports, each once, before whoever asks for it. */
@@ -101,10 +105,11 @@ const constants = {};
 /** Each file once, however many stages import it: a page loads them all. */
 const parts = new Map();
 const partName = (path) => `${camelCase(path.replace('/', '_'))}Part`;
-const partsIn = { shaders: new Set(), live: new Set() };
-const sections = { shaders: [], live: [] };
+const stageFiles = ['shaders', ...Object.keys(RARE)];
+const partsIn = Object.fromEntries(stageFiles.map((file) => [file, new Set()]));
+const sections = Object.fromEntries(stageFiles.map((file) => [file, []]));
 for (const stage of stages) {
-  const home = LIVE.includes(stage) ? 'live' : 'shaders';
+  const home = fileOf(stage);
   const paths = partsOf(stage);
   for (const path of paths) parts.set(path, ownCode(path));
   for (const path of paths) partsIn[home].add(path);
@@ -125,7 +130,20 @@ for (const stage of stages) {
 const header = '/** Written by scripts/build-shaders.mjs from shaders/. Do not edit. */\n/* eslint-disable */\n';
 const define = ([name, value]) => `export const ${name} = ${literal(value)} as const;`;
 const part = (path) => `export const ${partName(path)} = ${JSON.stringify(parts.get(path))};`;
-const shared = [...partsIn.live].filter((path) => partsIn.shaders.has(path));
+/** What several files of stages need is in `shaders.ts`. */
+const usersOf = (path) => stageFiles.filter((file) => partsIn[file].has(path));
+const isShared = (path) => partsIn.shaders.has(path) || usersOf(path).length > 1;
+
+function rareFile(file) {
+  const paths = [...partsIn[file]];
+  const shared = paths.filter(isShared);
+  return [
+    ...(shared.length > 0 ? [`import { ${shared.map(partName).join(', ')} } from './shaders.js';`] : []),
+    ...paths.filter((path) => !isShared(path)).map(part),
+    ...sections[file],
+  ];
+}
+
 const files = {
   // Modules and not objects, so that bundlers leave out what nobody uses.
   layouts: [
@@ -136,14 +154,10 @@ const files = {
   shaders: [
     "export * as layouts from './layouts.js';",
     "export * as constants from './constants.js';",
-    ...[...partsIn.shaders].map(part),
+    ...[...parts.keys()].filter(isShared).map(part),
     ...sections.shaders,
   ],
-  'live-shaders': [
-    ...(shared.length > 0 ? [`import { ${shared.map(partName).join(', ')} } from './shaders.js';`] : []),
-    ...[...partsIn.live].filter((path) => !shared.includes(path)).map(part),
-    ...sections.live,
-  ],
+  ...Object.fromEntries(Object.keys(RARE).map((file) => [file, rareFile(file)])),
 };
 mkdirSync(outputFolder, { recursive: true });
 for (const [name, lines] of Object.entries(files))

@@ -47,6 +47,37 @@ test(
   },
 );
 
+/** What only some pages need, by words that nothing else says. */
+const ELSEWHERE: Readonly<Record<string, string>> = {
+  'manifests of streamed scenes': 'JSON that npm run detail wrote',
+  'pages of streamed scenes': 'gs.wishes.staging',
+  'the stage that notes their wishes': 'read_write> wishes',
+  sequences: 'a path with {0001} in it',
+  'headers of .ksplat': 'a .ksplat section header',
+  'what is said of files that are no scene': 'a git-LFS pointer, which only names the real file',
+  'the runtime of generators': 'onnxruntime-web',
+};
+
+test(
+  'what only some pages need is in the CDN build, and no page with a PLY scene fetches it',
+  { skip: isBuilt ? false : 'no CDN build: npm run build' },
+  async () => {
+    const { scriptsForPly } = (await import(`${root}packages/element/scripts/size.mjs`)) as SizeModule;
+    const cdn = `${root}packages/element/cdn/`;
+    const forPly = scriptsForPly();
+    const scripts = readdirSync(cdn, { recursive: true, encoding: 'utf8' }).filter((file) => file.endsWith('.js'));
+    for (const [what, words] of Object.entries(ELSEWHERE)) {
+      const holders = scripts.filter((file) => readFileSync(cdn + file, 'utf8').includes(words));
+      assert.ok(holders.length > 0, `${what}: nowhere`);
+      assert.deepEqual(
+        holders.filter((file) => forPly.includes(file)),
+        [],
+        what,
+      );
+    }
+  },
+);
+
 /** A process of its own: here tsx and the test runner have long touched the global scope. */
 function importInNode(specifier: string): { status: number | null; output: string } {
   const code = `const before = new Set(Reflect.ownKeys(globalThis));

@@ -9,7 +9,7 @@ import {
   Renderer,
   type Variants,
 } from '@gaussian-splat/renderer';
-import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
+import { givesKnownAnswer, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
 import { isSwiftShader } from '../support/limit.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
@@ -40,6 +40,17 @@ test('every variant gives the known answer, and a wrong rule does not', async ()
   assert.equal(await givesKnownAnswer(device, { alphaMin: 0.05 }), false, 'an alpha threshold of 0.05');
   assert.equal(await givesKnownAnswer(device, { shDegree: 0 }), false, 'no view-dependent colour');
   assert.equal(await givesKnownAnswer(device, { resolutionScale: 0.5 }), false, 'half the pixels');
+});
+
+test('the spheres that variants are judged by are packed as files are', () => {
+  for (const [count, size] of [
+    [64, 1],
+    [4_000, 0.46],
+  ]) {
+    const cloud = sphereCloud(count, size);
+    assert.deepEqual(packSpheres(cloud, 'float16'), packGaussians(cloud, { sh: 'float16' }));
+    assert.deepEqual(packSpheres(cloud, 'int8'), packGaussians(cloud));
+  }
 });
 
 test('the choice is made once, kept for the adapter, and made anew from a damaged store', async () => {

@@ -1,4 +1,4 @@
-import { isForeign } from './diagnose.js';
+import { foreignName } from './foreign-signatures.js';
 import { sceneFormats } from './formats.js';
 import type { SceneFormat, SceneFormatName } from './scene-format.js';
 import { looksLikeSplats } from './splat/plausible.js';
@@ -18,7 +18,7 @@ export function detectFormat(bytes: Uint8Array, name = '', contentType = ''): Sc
 /** The format's entry in the registry; see {@link detectFormat}. */
 export function findFormat(bytes: Uint8Array, name: string, contentType: string): SceneFormat | undefined {
   const signed = sceneFormats.find(({ hasSignature }) => hasSignature?.(bytes));
-  if (signed || bytes.length === 0 || isForeign(bytes)) return signed;
+  if (signed || bytes.length === 0 || foreignName(bytes)) return signed;
   const unsigned = sceneFormats.filter(({ hasSignature, isSignatureWeak }) => !hasSignature || isSignatureWeak);
   const extension = extensionOf(name);
   const mimeType = contentType.split(';')[0].trim().toLowerCase();

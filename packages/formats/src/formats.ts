@@ -1,5 +1,5 @@
 import { asciiOf, startsWith } from './bytes.js';
-import { looksLikeKsplat } from './ksplat/header.js';
+import { looksLikeKsplat } from './ksplat/signature.js';
 import type { SceneFormat } from './scene-format.js';
 
 /** Text that tells a compressed PLY from a plain one; it stands within the first lines of every such header. */

@@ -1,7 +1,6 @@
 import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from './bytes.js';
 import { extensionOf, findFormat } from './detect.js';
-import { diagnoseExtension, diagnoseSigned, diagnoseUnknown } from './diagnose.js';
 import { previewWanted, samplePreview } from './preview.js';
 import type { OpenPart, SceneSource } from './scene-format.js';
 
@@ -42,7 +41,9 @@ export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {
   if (bytes.length === 0) throw emptyFile(name);
   const format = findFormat(bytes, name, contentType);
   if (!format) {
-    throw diagnoseSigned(bytes, name) ?? diagnoseExtension(name, extensionOf(name)) ?? diagnoseUnknown(bytes, name);
+    const { diagnose } = await import('./diagnose.js');
+    signal?.throwIfAborted();
+    throw diagnose(bytes, name, extensionOf(name));
   }
   const read = await format.load();
   signal?.throwIfAborted();

@@ -1,6 +1,7 @@
 import { grouped } from './bytes.js';
 import { damaged } from './damaged.js';
-import { isObject, parseJson, show } from './sog/meta.js';
+import { MAX_MANIFEST_BYTES } from './is-sequence.js';
+import { parseJson, show } from './json.js';
 
 /** Scene files that follow one another in time. */
 export interface SceneSequence {
@@ -11,7 +12,6 @@ export interface SceneSequence {
   readonly durationSeconds: number;
 }
 
-const MAX_MANIFEST_BYTES = 1 << 24;
 const MAX_FRAMES = 1_000_000;
 /** `frame-{0001}.spz`: the digits say where numbering begins, and how many digits numbers have at least. */
 const PATTERN = /^([^{}]*)\{(\d+)\}([^{}]*)$/;
@@ -48,17 +48,6 @@ export function parseSequence(bytes: Uint8Array, name: string): SceneSequence {
     framesPerSecond: framesPerSecond as number,
     durationSeconds: paths.length / (framesPerSecond as number),
   };
-}
-
-/** True if a file is the manifest of a sequence. */
-export function isSequence(bytes: Uint8Array): boolean {
-  if (bytes.length > MAX_MANIFEST_BYTES || bytes[0] !== 0x7b) return false;
-  try {
-    const json: unknown = JSON.parse(new TextDecoder().decode(bytes));
-    return isObject(json) && 'gaussianSplatSequence' in json;
-  } catch {
-    return false;
-  }
 }
 
 /** The number of the frame that is shown at a time; times before the first and after the last frame give these, or wrap around. */

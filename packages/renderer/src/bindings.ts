@@ -7,7 +7,6 @@ import type { Scratch } from './scratch.js';
 import { CompactStage } from './stages/compact.js';
 import { CullChunksStage, CullStage } from './stages/cull.js';
 import { DetailBudgetStage } from './stages/detail-budget.js';
-import { NoteWishesStage } from './stages/note-wishes.js';
 import { PlanStage } from './stages/plan.js';
 import { ProjectStage } from './stages/project.js';
 import { ScanStage } from './stages/scan.js';
@@ -19,7 +18,6 @@ import { constants } from './generated/shaders.js';
 /** The stages before the rasterizer; each is a shader of the same name. */
 export interface Stages {
   readonly detailBudget: DetailBudgetStage;
-  readonly noteWishes: NoteWishesStage;
   readonly cullChunks: CullChunksStage;
   readonly cull: CullStage;
   readonly scan: ScanStage;
@@ -33,7 +31,6 @@ export interface Stages {
 export function makeStages(device: GPUDevice, { threads, sort }: Pick<Variants, 'threads' | 'sort'>): Stages {
   return {
     detailBudget: new DetailBudgetStage(device),
-    noteWishes: new NoteWishesStage(device),
     cullChunks: new CullChunksStage(device),
     cull: new CullStage(device, threads),
     scan: new ScanStage(device, threads),
@@ -199,10 +196,7 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
       detailCount: stages.detailBudget.bindCount({ view, chunks: page.chunks, details, detail_counts: detailCounts }),
       wishes: wishes && {
         of: wishes,
-        note: stages.noteWishes.bind({
-          ...{ view, chunks: page.chunks, details },
-          ...{ chunk_shares: chunkShares, wishes: wishes.buffer },
-        }),
+        note: wishes.bind({ view, chunks: page.chunks, details, chunk_shares: chunkShares }),
       },
       cullChunks: stages.cullChunks.bind({
         ...chunk,

@@ -131,7 +131,6 @@ export class FrameResources {
     this.#current?.bindings.destroy();
     this.#current?.monitor.destroy();
     if (table.hasDetail) stages.detailBudget.prepare();
-    if (table.isStreamed) stages.noteWishes.prepare();
     const pages = table.pages.length;
     const scratch = new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
     this.#bindRasterizer(scratch, capacity);

@@ -62,9 +62,9 @@ function wishesDue({ bindings }: Frame): Wishes[] {
   return [...all].filter((wishes) => wishes.isDue());
 }
 
-function noteWishes(pass: GPUComputePassEncoder, { stages, bindings }: Frame, due: readonly Wishes[]): void {
+function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly Wishes[]): void {
   for (const { wishes, splatCount } of bindings.pages) {
-    if (wishes && due.includes(wishes.of)) stages.noteWishes.record(pass, wishes.note, splatCount);
+    if (wishes && due.includes(wishes.of)) wishes.of.note(pass, wishes.note, splatCount);
   }
 }
 

@@ -1,4 +1,5 @@
 import type { ShDegree, Vector3 } from '@gaussian-splat/core';
+import type { Resource } from './gpu/kernel.js';
 import type { ShPrecision } from './pack/sh.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
@@ -14,13 +15,17 @@ export interface GaussianPage {
   readonly details?: GPUBuffer;
 }
 
-/** Carries the pages that a view asks for from a frame to whoever fetches them. */
+/** What {@link Wishes} are noted from: a view, and of a page of the pool what lies there. */
+export type NotedPage = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_shares', Resource>>;
+
+/** Carries the pages that a view asks for from a frame to whoever fetches them. Streamed scenes bring their own, so that no other page loads it. */
 export interface Wishes {
-  /** For each page the bits of the pixels that doing without it costs. */
-  readonly buffer: GPUBuffer;
-  /** True for a frame in which to note them; then the other three are called in turn, the last after the submit. */
+  /** Binds a page of the pool, for {@link Wishes.note}. */
+  bind(page: NotedPage): GPUBindGroup;
+  /** True for a frame in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
   isDue(): boolean;
   begin(encoder: GPUCommandEncoder): void;
+  note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void;
   copy(encoder: GPUCommandEncoder): void;
   read(): void;
 }

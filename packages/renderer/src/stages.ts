@@ -1,8 +1,9 @@
 /** The stages one by one, for tests and for those who build a pipeline of their own. */
 export { CapacityMonitor, LEAST_CAPACITY, type Capacity } from './capacity.js';
-export { givesKnownAnswer } from './choice/known-answer.js';
+export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
 export * from './generated/live-shaders.js';
 export * from './generated/shaders.js';
+export * from './generated/streamed-shaders.js';
 export { dispatchGrid } from './gpu/kernel.js';
 export { GpuMemory } from './gpu/memory.js';
 export { writeStruct } from './gpu/struct.js';

@@ -1,5 +1,5 @@
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, COMPASS, nextEvent, show } from './support/harness.js';
+import { assert, assertEqual, COMPASS, FIXTURES, nextEvent, show } from './support/harness.js';
 import { isRed, screenOf } from './support/screen.js';
 
 /** Scripts of all workers that the page has started. */
@@ -25,6 +25,32 @@ describe('the CDN build', () => {
       assert((await screenOf(element)).middleOf(isRed), 'the scene is seen');
     }
     assert(workers.length === 1 && workers[0].startsWith('blob:'), `one worker by way of a blob: ${workers.join(' ')}`);
+  });
+
+  it('fetches from there what streamed scenes, sequences and refused files need, and only for them', async () => {
+    const origin = await (await fetch('/net/other-origin')).text();
+    await import(`${origin}/cdn/gaussian-splat.min.js`);
+    const parts = (): string[] =>
+      performance
+        .getEntriesByType('resource')
+        .map(({ name }) => name)
+        .filter((name) => name.startsWith(`${origin}/cdn/generator-`));
+    const shown = async (src: string): Promise<GaussianSplatElement> => {
+      const element = show({ src });
+      await element.ready;
+      return element;
+    };
+    assert((await shown(COMPASS.replace('.splat', '.ply'))).loaded, 'a PLY file is shown');
+    assertEqual(parts(), [], 'parts fetched for a PLY file');
+    const refused = await shown(`${FIXTURES}lfs-pointer.ply`);
+    assertEqual(refused.error?.reason, 'decode/lfs-pointer', 'a file that is no scene');
+    assertEqual(parts(), [], 'parts that the page fetched for it');
+    // The manifest is fetched by the part of the element that reads it.
+    assertEqual((await shown('/nowhere/detail.json')).error?.reason, 'network/status', 'a streamed scene');
+    assertEqual(parts().length, 1, 'parts for a streamed scene');
+    const sequence = await shown('/net/sequence/movie.json');
+    assertEqual([sequence.error, sequence.duration], [null, 1.2], 'error and duration of a sequence');
+    assertEqual(parts().length, 2, 'parts for a sequence');
   });
 
   it('on a page that refuses workers and inline styles reads on the main thread, with one warning', async () => {

@@ -1,13 +1,6 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
 import { boundsOf, GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
-import {
-  fetchScene,
-  isSequence,
-  openPartAt,
-  parseSequence,
-  readScene,
-  type FetchSceneOptions,
-} from '@gaussian-splat/formats';
+import { fetchScene, isSequence, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
 import { PreviewSchedule } from './preview-schedule.js';
 import { ProgressSum } from './progress-sum.js';
@@ -37,7 +30,10 @@ export async function loadScene(
     });
     const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
     const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
-    if (isSequence(bytes)) return sequenceOf(bytes, name, url);
+    if (isSequence(bytes)) {
+      const { sequenceOf } = await import('./sequence-of.js');
+      return sequenceOf(bytes, name, url);
+    }
     const openPart = openPartAt(url, options);
     const level = request.levels ? 'all' : 0;
     const cloud = await readScene(bytes, { name, signal, openPart, level, onPreview: previews?.onPreview });
@@ -49,12 +45,6 @@ export async function loadScene(
     signal.throwIfAborted();
     throw named(error, fileName(request.url));
   }
-}
-
-/** Frames are where the manifest says, seen from the manifest. */
-function sequenceOf(bytes: Uint8Array, name: string, url: string): LoadedSequence {
-  const { frames, framesPerSecond, durationSeconds } = parseSequence(bytes, name);
-  return { frames: frames.map((path) => new URL(path, url).href), framesPerSecond, durationSeconds };
 }
 
 /**

@@ -1,6 +1,6 @@
 import { asciiOf, grouped, startsWith, viewOf } from '../bytes.js';
 import { damaged } from '../damaged.js';
-import { parseJson, show } from '../sog/meta.js';
+import { parseJson, show } from '../json.js';
 
 export type Json = Record<string, unknown>;
 

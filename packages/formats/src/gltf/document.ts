@@ -1,7 +1,7 @@
 import { grouped } from '../bytes.js';
 import { damaged } from '../damaged.js';
 import type { OpenPart } from '../scene-format.js';
-import { isObject, show } from '../sog/meta.js';
+import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';
 
 /** Reads components of the types that glTF has. */

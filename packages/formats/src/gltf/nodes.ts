@@ -1,6 +1,6 @@
 import type { Json } from './container.js';
 import type { GltfDocument } from './document.js';
-import { isObject } from '../sog/meta.js';
+import { isObject } from '../json.js';
 
 /** 3 x 4 affine map, row by row: [a b c tx, d e f ty, g h i tz]. */
 export type Affine = readonly number[];

@@ -2,7 +2,7 @@ import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian
 import { grouped } from '../bytes.js';
 import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
 import { damaged } from '../damaged.js';
-import { isObject, show } from '../sog/meta.js';
+import { isObject, show } from '../json.js';
 import { readSpz } from '../readers/spz.js';
 import { transformCloud } from '../transform/transform-cloud.js';
 import type { Json } from './container.js';

@@ -1,8 +1,8 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { grouped, viewOf } from '../bytes.js';
 import { damaged } from '../damaged.js';
+import { HEADER_BYTES } from './signature.js';
 
-export const HEADER_BYTES = 4096;
 const SECTION_HEADER_BYTES = 1024;
 
 /** How the numbers of each compression level are stored: bytes of one coordinate, scale or quaternion component, and of one coefficient. */
@@ -47,14 +47,6 @@ export interface KsplatHeader {
   /** What the bytes 0 and 255 of the coefficients of level 2 stand for. */
   readonly coefficientRange: readonly [number, number];
   readonly sections: readonly KsplatSection[];
-}
-
-/** True if the first bytes are those of mkkellogg's SplatBuffer: version 0.1, counts and level within their ranges. */
-export function looksLikeKsplat(bytes: Uint8Array): boolean {
-  if (bytes.length < HEADER_BYTES || bytes[0] !== 0 || bytes[1] !== 1) return false;
-  const view = viewOf(bytes);
-  const [maxSections, sections, maxSplats, splats] = [4, 8, 12, 16].map((at) => view.getUint32(at, true));
-  return sections >= 1 && sections <= maxSections && splats <= maxSplats && view.getUint16(20, true) <= 2;
 }
 
 /** Reads and checks all headers: every section lies within the file, or is shortened to what is there (`isPrefix`). */

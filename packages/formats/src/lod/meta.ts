@@ -1,6 +1,6 @@
 import { damaged } from '../damaged.js';
 import { grouped } from '../bytes.js';
-import { isObject, parseJson, show } from '../sog/meta.js';
+import { isObject, parseJson, show } from '../json.js';
 
 /** Splats `offset` to `offset + count` of one file. */
 export interface LodRun {

@@ -1,6 +1,7 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
-import { asciiOf, grouped, quote } from '../bytes.js';
+import { grouped } from '../bytes.js';
 import { damaged } from '../damaged.js';
+import { isObject, parseJson, show, type Json } from '../json.js';
 
 /** A value of each byte 0..255, for each channel of a plane. */
 export type ByteTable = readonly Float32Array[];
@@ -33,8 +34,6 @@ export interface SogMeta {
 const MAX_META_BYTES = 1 << 20;
 /** Labels have 16 bits. */
 const MAX_PALETTE = 65_536;
-
-type Json = Record<string, unknown>;
 
 /** Reads and checks the `meta.json` of a SOG scene of version 1 (which does not say so) or 2. */
 export function parseSogMeta(bytes: Uint8Array, name: string): SogMeta {
@@ -98,38 +97,6 @@ export function parseSogMeta(bytes: Uint8Array, name: string): SogMeta {
     }
     return { degree: bands, paletteSize: paletteSize as number, values: codebook('shN'), files: files('shN', 2) };
   }
-}
-
-/** Parses JSON of a scene. Throws `decode/corrupt` with the position that the parser names. */
-export function parseJson(bytes: Uint8Array, name: string, maxBytes: number): Json {
-  if (bytes.length > maxBytes) {
-    throw damaged(name, `a description of at most ${grouped(maxBytes)} bytes`, grouped(bytes.length));
-  }
-  let value: unknown;
-  try {
-    value = JSON.parse(new TextDecoder().decode(bytes));
-  } catch (cause) {
-    const isCut = !/\}\s*$/.test(asciiOf(bytes, Math.max(0, bytes.length - 64)));
-    const code = isCut ? 'decode/truncated' : 'decode/corrupt';
-    throw damaged(
-      `${name} (${grouped(bytes.length)} bytes)`,
-      'JSON',
-      (cause as Error).message.slice(0, 200),
-      code,
-      cause,
-    );
-  }
-  if (!isObject(value)) throw damaged(name, 'a JSON object', show(value));
-  return value;
-}
-
-export function isObject(value: unknown): value is Json {
-  return typeof value === 'object' && value !== null && !Array.isArray(value);
-}
-
-/** A JSON value for error messages. */
-export function show(value: unknown): string {
-  return value === undefined ? 'nothing' : quote(JSON.stringify(value) ?? String(value), 80);
 }
 
 /** Codebooks are padded to 256 entries with their last. */

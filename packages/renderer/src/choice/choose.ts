@@ -2,10 +2,9 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { FrameClock } from './frame-clock.js';
 import { perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
-import { packGaussians } from '../pack/pack.js';
 import { Renderer } from '../renderer.js';
 import { remember, SAFE, type Variants } from '../variants.js';
-import { givesKnownAnswer, probeCamera, sphereCloud } from './known-answer.js';
+import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud } from './known-answer.js';
 import { canSort, SORT_NAMES, type SortName } from '../stages/sort.js';
 import { sortsRight, timeSort } from './sort-probe.js';
 
@@ -181,7 +180,7 @@ async function timeFrames(
   clock: FrameClock,
 ): Promise<number> {
   const size = Math.cbrt(400 / splats);
-  const gaussians = await GaussianBuffers.upload(device, packGaussians(sphereCloud(splats, size)));
+  const gaussians = await GaussianBuffers.upload(device, packSpheres(sphereCloud(splats, size), 'int8'));
   const renderer = new Renderer(device, variants);
   const usage = TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.storageBinding;
   const target = device.createTexture({ label: 'gs.probe', size: [width, height], format: 'rgba8unorm', usage });

@@ -88,6 +88,7 @@ export class StreamedGaussians implements GaussianScene {
     try {
       this.#pool = new PagePool(device, this.#memory, manifest, slots);
       this.wishes = new WishReader(
+        device,
         this.#memory,
         this.#list.count,
         (wishes) => this.#take(wishes),

@@ -1,5 +1,7 @@
+import type { NotedPage, Wishes } from '../gaussian-scene.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
+import { NoteWishesStage } from '../stages/note-wishes.js';
 
 /** Frames between two looks at what is wished for. */
 const INTERVAL = 6;
@@ -7,9 +9,10 @@ const INTERVAL = 6;
 const STALE_MS = 120;
 
 /** Brings what views wish for back from the GPU, now and then, with nobody waiting for it. */
-export class WishReader {
-  /** For each page the bits of a float32, cleared before each look. */
-  readonly buffer: GPUBuffer;
+export class WishReader implements Wishes {
+  readonly #stage: NoteWishesStage;
+  /** For each page the bits of the pixels that doing without it costs, a float32; cleared before each look. */
+  readonly #wishes: GPUBuffer;
   readonly #staging: GPUBuffer;
   readonly #onWishes: (wishes: Float32Array) => void;
   readonly #onStale: () => void;
@@ -21,15 +24,22 @@ export class WishReader {
    * @param onWishes called with the pixels that doing without each page costs
    * @param onStale called when the last view has not been looked at for want of another frame
    */
-  constructor(memory: GpuMemory, pages: number, onWishes: (wishes: Float32Array) => void, onStale: () => void) {
+  constructor(
+    device: GPUDevice,
+    memory: GpuMemory,
+    pages: number,
+    onWishes: (wishes: Float32Array) => void,
+    onStale: () => void,
+  ) {
+    this.#stage = new NoteWishesStage(device);
     const { storage, copySource, copyDestination, mapRead } = BUFFER_USAGE;
-    this.buffer = memory.buffer('gs.wishes', 4 * pages, storage | copySource | copyDestination);
+    this.#wishes = memory.buffer('gs.wishes', 4 * pages, storage | copySource | copyDestination);
     this.#staging = memory.buffer('gs.wishes.staging', 4 * pages, mapRead | copyDestination);
     this.#onWishes = onWishes;
     this.#onStale = onStale;
   }
 
-  /** True for a frame that must note wishes; then {@link begin}, {@link copy} and, after the submit, {@link read} follow. */
+  /** True for a frame that must note wishes; then {@link begin}, {@link note}, {@link copy} and, after the submit, {@link read} follow. */
   isDue(): boolean {
     clearTimeout(this.#timer);
     const isDue = this.#frames >= INTERVAL && !this.#isReading;
@@ -48,11 +58,19 @@ export class WishReader {
   }
 
   begin(encoder: GPUCommandEncoder): void {
-    encoder.clearBuffer(this.buffer);
+    encoder.clearBuffer(this.#wishes);
+  }
+
+  bind(page: NotedPage): GPUBindGroup {
+    return this.#stage.bind({ ...page, wishes: this.#wishes });
+  }
+
+  note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
+    this.#stage.record(pass, bindings, splatCount);
   }
 
   copy(encoder: GPUCommandEncoder): void {
-    encoder.copyBufferToBuffer(this.buffer, 0, this.#staging, 0, this.buffer.size);
+    encoder.copyBufferToBuffer(this.#wishes, 0, this.#staging, 0, this.#wishes.size);
     this.#isReading = true;
   }
 

@@ -1,5 +1,6 @@
-import { constants, noteWishes } from '../generated/shaders.js';
-import { rareKernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
+import { constants } from '../generated/shaders.js';
+import { noteWishes } from '../generated/streamed-shaders.js';
+import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import { cullGroups } from './cull.js';
 
 /** Which pages of a streamed scene a view asks for. */
@@ -7,12 +8,7 @@ export class NoteWishesStage {
   readonly #kernel: ComputeKernel<typeof noteWishes>;
 
   constructor(device: GPUDevice) {
-    this.#kernel = rareKernelOf(device, noteWishes);
-  }
-
-  /** Of a streamed scene: makes the pipeline. */
-  prepare(): void {
-    this.#kernel.prepare();
+    this.#kernel = kernelOf(device, noteWishes);
   }
 
   bind(resources: Resources<typeof noteWishes>): GPUBindGroup {

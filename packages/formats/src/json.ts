@@ -1,0 +1,36 @@
+import { asciiOf, grouped, quote } from './bytes.js';
+import { damaged } from './damaged.js';
+
+export type Json = Record<string, unknown>;
+
+/** Parses JSON of a scene. Throws `decode/corrupt` with the position that the parser names. */
+export function parseJson(bytes: Uint8Array, name: string, maxBytes: number): Json {
+  if (bytes.length > maxBytes) {
+    throw damaged(name, `a description of at most ${grouped(maxBytes)} bytes`, grouped(bytes.length));
+  }
+  let value: unknown;
+  try {
+    value = JSON.parse(new TextDecoder().decode(bytes));
+  } catch (cause) {
+    const isCut = !/\}\s*$/.test(asciiOf(bytes, Math.max(0, bytes.length - 64)));
+    const code = isCut ? 'decode/truncated' : 'decode/corrupt';
+    throw damaged(
+      `${name} (${grouped(bytes.length)} bytes)`,
+      'JSON',
+      (cause as Error).message.slice(0, 200),
+      code,
+      cause,
+    );
+  }
+  if (!isObject(value)) throw damaged(name, 'a JSON object', show(value));
+  return value;
+}
+
+export function isObject(value: unknown): value is Json {
+  return typeof value === 'object' && value !== null && !Array.isArray(value);
+}
+
+/** A JSON value for error messages. */
+export function show(value: unknown): string {
+  return value === undefined ? 'nothing' : quote(JSON.stringify(value) ?? String(value), 80);
+}
