@@ -22,8 +22,15 @@ fn peers_of(digit: u32, is_key: bool) -> Votes {
   return peers;
 }
 
-// How many of them there are, how many before thread `own`, and the first.
-fn summary_of(peers: Votes, own: u32) -> vec3u {
+struct Peers {
+  count: u32,
+  // Those in threads before the own one.
+  before: u32,
+  // Thread of the first.
+  first: u32,
+}
+
+fn count_peers(peers: Votes, own: u32) -> Peers {
   var count = 0u;
   var before = 0u;
   var first = 0u;
@@ -35,7 +42,7 @@ fn summary_of(peers: Votes, own: u32) -> vec3u {
     let upto = select((1u << u32(threads_before % 32)) - 1u, 0xffffffffu, threads_before == 32);
     before += countOneBits(mask & upto);
   }
-  return vec3u(count, before, first);
+  return Peers(count, before, first);
 }
 
 @compute @workgroup_size(SORT_THREADS)
@@ -50,14 +57,14 @@ fn main(
   let own_first = block_id * SORT_BLOCK + subgroup * subgroup_size * ITEMS + own;
   var keys = items_at(own_first, subgroup_size);
   var places: Items;
-  // [subgroup][digit] keys of the rounds before.
+  // `exchange` holds the keys of the rounds before: [subgroup][digit].
   for (var r = 0u; r < ITEMS; r++) {
     let is_key = own_first + r * subgroup_size < plan.visible;
     let digit = digit_of(keys[r], digit_pass.shift);
-    let found = summary_of(peers_of(digit, is_key), own);
+    let peers = count_peers(peers_of(digit, is_key), own);
     var ranked = 0u;
-    if (is_key && own == found.z) { ranked = atomicAdd(&exchange[subgroup * DIGITS + digit], found.x); }
-    places[r] = subgroupShuffle(ranked, select(own, found.z, is_key)) + found.y;
+    if (is_key && own == peers.first) { ranked = atomicAdd(&exchange[subgroup * DIGITS + digit], peers.count); }
+    places[r] = subgroupShuffle(ranked, select(own, peers.first, is_key)) + peers.before;
   }
   workgroupBarrier();
 

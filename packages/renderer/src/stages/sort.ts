@@ -39,7 +39,7 @@ interface SortPass {
   readonly scatter: GPUBindGroup;
 }
 
-const { DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP, SORT_THREADS } = constants;
+const { DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP, SORT_BLOCK, SORT_THREADS } = constants;
 const MAX_KEY_BITS = 32;
 
 /**
@@ -55,9 +55,6 @@ const digitBits = (name: SortName): 4 | 8 => (name.endsWith('4') ? 4 : 8);
 /** Passes that keys of so many bits take. */
 const passCount = (name: SortName, keyBits: number): number => Math.max(1, Math.ceil(keyBits / digitBits(name)));
 
-/** Bytes of workgroup memory for the counts of all subgroups: with the rest, under WebGPU's default limit of 16 KB. */
-const MOST_COUNTS = 8192;
-
 /** Subgroups that a workgroup of the sort can have on a device. */
 function subgroupsOf(device: GPUDevice): number {
   const least = device.adapterInfo?.subgroupMinSize ?? 4;
@@ -69,10 +66,10 @@ function voteWordsOf(device: GPUDevice): number {
   return Math.ceil((device.adapterInfo?.subgroupMaxSize ?? 128) / 32);
 }
 
-/** True if the device has what the variant needs. */
+/** True if the device has what the variant needs: for votes, room for the counts of all subgroups where a block of keys lies later. */
 export function canSort(device: GPUDevice, name: SortName): boolean {
   if (!name.startsWith('subgroup')) return true;
-  return device.features.has('subgroups') && 4 * 2 ** digitBits(name) * subgroupsOf(device) <= MOST_COUNTS;
+  return device.features.has('subgroups') && 2 ** digitBits(name) * subgroupsOf(device) <= SORT_BLOCK;
 }
 
 /** What moves along with a key: its index, or two words of the caller's. */
