@@ -6,7 +6,7 @@
 @group(0) @binding(0) var<uniform> digit_pass: SortPass;
 @group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> keys: array<u32>;
-// [digit][block]
+// [block][digit]
 @group(0) @binding(3) var<storage, read_write> counts: array<u32>;
 
 var<workgroup> histogram: array<atomic<u32>, DIGITS>;
@@ -26,6 +26,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   }
   workgroupBarrier();
   if (lane < DIGITS && block_id < plan.sort_blocks) {
-    counts[lane * plan.sort_blocks + block_id] = atomicLoad(&histogram[lane]);
+    counts[block_id * DIGITS + lane] = atomicLoad(&histogram[lane]);
   }
 }

@@ -6,7 +6,7 @@
 @group(0) @binding(0) var<uniform> digit_pass: SortPass;
 @group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> keys: array<u32>;
-// [digit][block]
+// [block][digit]
 @group(0) @binding(3) var<storage, read_write> counts: array<u32>;
 
 @compute @workgroup_size(1)
@@ -18,5 +18,5 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u) {
   for (var i = block_id * SORT_BLOCK; i < end; i++) {
     histogram[digit_of(keys[i], digit_pass.shift)]++;
   }
-  for (var digit = 0u; digit < DIGITS; digit++) { counts[digit * plan.sort_blocks + block_id] = histogram[digit]; }
+  for (var digit = 0u; digit < DIGITS; digit++) { counts[block_id * DIGITS + digit] = histogram[digit]; }
 }

@@ -1,46 +1,56 @@
-// Second third: for each digit the exclusive prefix sums of its counts over the blocks, and the total. A workgroup
-// serves four digits, one in each row of 64 threads.
+// Second third: for each digit the exclusive prefix sums of its counts over the blocks, and the total. A workgroup serves four digits, which
+// lie side by side: one vector.
 #import shared/plan
 #import shared/sort
 #import shared/prefix
 
 @group(0) @binding(0) var<storage, read> plan: Plan;
-// [digit][block]
-@group(0) @binding(1) var<storage, read_write> counts: array<u32>;
-@group(0) @binding(2) var<storage, read_write> digit_totals: array<u32>;
+// [block][digit]
+@group(0) @binding(1) var<storage, read_write> counts: array<vec4u>;
+@group(0) @binding(2) var<storage, read_write> digit_totals: array<vec4u>;
 
-const ROW_THREADS = 64u;
-const DIGITS_PER_GROUP = PREFIX_THREADS / ROW_THREADS;
+const DIGITS_PER_GROUP = 4u;
 const BLOCKS_PER_THREAD = 8u;
 
-var<workgroup> row_totals: array<u32, DIGITS_PER_GROUP>;
+// Two halves, as in shared/prefix.
+var<workgroup> sums: array<vec4u, 2u * PREFIX_THREADS>;
+var<workgroup> step_total: vec4u;
+
+// Sum of `own` over all threads up to and including this one. Must be called by all threads.
+fn inclusive_sums(own: vec4u, lane: u32) -> vec4u {
+  var sum = own;
+  var side = 0u;
+  for (var reach = 1u; reach < PREFIX_THREADS; reach *= 2u) {
+    sums[side + lane] = sum;
+    workgroupBarrier();
+    if (lane >= reach) { sum += sums[side + lane - reach]; }
+    side = PREFIX_THREADS - side;
+  }
+  return sum;
+}
 
 @compute @workgroup_size(PREFIX_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let row = lane / ROW_THREADS;
-  let digit = workgroup_id.x * DIGITS_PER_GROUP + row;
   let blocks = plan.sort_blocks;
-  var carry = 0u;
-  for (var start = 0u; start < blocks; start += ROW_THREADS * BLOCKS_PER_THREAD) {
-    let first = start + (lane % ROW_THREADS) * BLOCKS_PER_THREAD;
-    var own: array<u32, BLOCKS_PER_THREAD>;
-    var sum = 0u;
+  var carry = vec4u(0u);
+  for (var start = 0u; start < blocks; start += PREFIX_THREADS * BLOCKS_PER_THREAD) {
+    let first = start + lane * BLOCKS_PER_THREAD;
+    var own: array<vec4u, BLOCKS_PER_THREAD>;
     for (var k = 0u; k < BLOCKS_PER_THREAD; k++) {
       // Written in every round: a compiler was seen to keep a variable of the loop body from one round to the next.
-      own[k] = 0u;
-      if (first + k < blocks) { own[k] = counts[digit * blocks + first + k]; }
-      sum += own[k];
+      own[k] = vec4u(0u);
+      if (first + k < blocks) { own[k] = counts[(first + k) * (DIGITS / DIGITS_PER_GROUP) + workgroup_id.x]; }
     }
-    let inclusive = inclusive_sum(sum, lane, ROW_THREADS);
-    if (lane % ROW_THREADS == ROW_THREADS - 1u) { row_totals[row] = inclusive; }
+    var sum = vec4u(0u);
+    for (var k = 0u; k < BLOCKS_PER_THREAD; k++) { sum += own[k]; }
+    let inclusive = inclusive_sums(sum, lane);
+    if (lane == PREFIX_THREADS - 1u) { step_total = inclusive; }
     var running = carry + inclusive - sum;
     for (var k = 0u; k < BLOCKS_PER_THREAD; k++) {
-      if (first + k < blocks) { counts[digit * blocks + first + k] = running; }
+      if (first + k < blocks) { counts[(first + k) * (DIGITS / DIGITS_PER_GROUP) + workgroup_id.x] = running; }
       running += own[k];
     }
-    workgroupBarrier();
-    carry += row_totals[row];
-    workgroupBarrier();
+    carry += workgroupUniformLoad(&step_total);
   }
-  if (lane % ROW_THREADS == 0u) { digit_totals[digit] = carry; }
+  if (lane == 0u) { digit_totals[workgroup_id.x] = carry; }
 }

@@ -9,7 +9,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u) {
   var next: array<u32, DIGITS>;
   var smaller = 0u;
   for (var digit = 0u; digit < DIGITS; digit++) {
-    next[digit] = smaller + block_offsets[digit * plan.sort_blocks + block_id];
+    next[digit] = smaller + block_offsets[block_id * DIGITS + digit];
     smaller += digit_totals[digit];
   }
   let end = min(block_id * SORT_BLOCK + SORT_BLOCK, plan.visible);

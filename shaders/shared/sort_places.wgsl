@@ -23,7 +23,7 @@ fn find_first_places(block_id: u32, lane: u32, count: u32) {
   if (is_digit) {
     first_in_block[lane] = before;
     // Keys with smaller digits, and keys with this digit in earlier blocks.
-    to_all[lane] = smaller + block_offsets[lane * plan.sort_blocks + block_id] - before;
+    to_all[lane] = smaller + block_offsets[block_id * DIGITS + lane] - before;
   }
   workgroupBarrier();
 }

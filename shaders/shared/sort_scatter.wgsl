@@ -7,7 +7,7 @@
 @group(0) @binding(1) var<storage, read> plan: Plan;
 @group(0) @binding(2) var<storage, read> keys_in: array<u32>;
 @group(0) @binding(3) var<storage, read> values_in: array<Value>;
-// Exclusive prefix sums over the blocks: [digit][block]
+// Exclusive prefix sums over the blocks: [block][digit]
 @group(0) @binding(4) var<storage, read> block_offsets: array<u32>;
 @group(0) @binding(5) var<storage, read> digit_totals: array<u32>;
 @group(0) @binding(6) var<storage, read_write> keys_out: array<u32>;

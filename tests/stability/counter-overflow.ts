@@ -12,7 +12,7 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import fc from 'fast-check';
 import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
-import { ScanStage } from '@gaussian-splat/renderer/stages';
+import { scanBytes, ScanStage } from '@gaussian-splat/renderer/stages';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { runCase } from '../support/gpu.js';
 import { nodeDevice } from '../support/node-device.js';
@@ -45,7 +45,9 @@ test('prefix sums of any counts stop at the largest number', async () => {
         async run(bench) {
           for (const threads of ['parallel', 'serial'] as const) {
             const stage = new ScanStage(device, threads);
-            const buffer = bench.buffer(Uint32Array.from([...values, 0]));
+            const words = new Uint32Array(scanBytes(values.length) / 4);
+            words.set(values);
+            const buffer = bench.buffer(words);
             const bindings = stage.bind({ values: buffer, scan: bench.uniform(values.length) });
             bench.compute((pass) => stage.record(pass, bindings));
             found.push(await bench.read(buffer, 4 * (values.length + 1)));

@@ -3,6 +3,7 @@
  * number: time goes on by 1/60 s a frame, whatever the frame rate.
  */
 import { lookAt } from '@gaussian-splat/core';
+import { LONE_RADIUS } from './placement.js';
 
 const SECONDS = 1 / 60;
 const UP = [0, -1, 0];
@@ -13,17 +14,23 @@ const FOCAL = 1200 / 1080;
 const ZOOM = 64;
 /** Frames that the snap stays on each side. */
 const SNAP_FRAMES = 10;
+/** Half a degree: what turns among the copies in a frame. */
+const AMONG_STEP = Math.PI / 360;
 
 const yawed = (eye, angle) => lookAt(eye, [eye[0] + Math.sin(angle), eye[1] + 0.2, eye[2] + Math.cos(angle)], UP);
 
+/** Around the origin at a distance r, a little above the ground. */
+const around = (angle, r) => lookAt([r * Math.sin(angle), -0.45 * r, -r * Math.cos(angle)], [0, 0, 0], UP);
+
 /**
- * World-to-camera matrix by frame, around a scene of radius r on the ground plane (y points down).
- * `progress` runs from 0 to 1 over the frames of a visit.
+ * World-to-camera matrix by frame, around a scene of radius r on the ground plane (y points down); `lone` is the radius that one copy
+ * would have. `progress` runs from 0 to 1 over the frames of a visit.
  */
 const PATHS = {
   /** Around the scene, 28.6 degrees a second. */
-  orbit: ({ seconds, r }) =>
-    lookAt([r * Math.sin(0.5 * seconds), -0.45 * r, -r * Math.cos(0.5 * seconds)], [0, 0, 0], UP),
+  orbit: ({ seconds, r }) => around(0.5 * seconds, r),
+  /** Around the copy in the middle as if it stood alone, so among the others, half a degree a frame. */
+  among: ({ frame, lone }) => around(AMONG_STEP * frame, lone),
   /** Into the scene. */
   dolly: ({ seconds, r }) => lookAt([0, -0.3 * r, -r + 0.4 * seconds], [0, 0, 0.4 * seconds], UP),
   /** In its middle, turning 60 degrees a second. */
@@ -41,8 +48,8 @@ const PATHS = {
 
 export const PATH_NAMES = Object.keys(PATHS);
 
-/** The cameras of `frames` frames along a path, in pixels and OpenCV axes. */
-export function camerasAlong({ path, width, height, frames, radius }) {
+/** The cameras of `frames` frames along a path, in pixels and OpenCV axes. `radius` is that of the scene times `distance`. */
+export function camerasAlong({ path, width, height, frames, radius, distance = 1 }) {
   if (!(path in PATHS)) throw new RangeError(`path: expected ${PATH_NAMES.join(', ')}, found "${path}"`);
   return Array.from({ length: frames }, (_, frame) => ({
     width,
@@ -58,6 +65,7 @@ export function camerasAlong({ path, width, height, frames, radius }) {
       seconds: frame * SECONDS,
       progress: frame / Math.max(1, frames - 1),
       r: radius,
+      lone: distance * LONE_RADIUS,
     }),
   }));
 }

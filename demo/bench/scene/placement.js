@@ -3,7 +3,7 @@
 /** World units between copies: the scene that ships has a radius of about 0.8. */
 const STEP = 2;
 /** Radius from which a camera overlooks one copy, and each further ring of them. */
-const LONE_RADIUS = 2.5;
+export const LONE_RADIUS = 2.5;
 const RADIUS_PER_SIDE = 0.6;
 
 /** Offsets on a square grid in the ground plane, nearest to its centre first, so that copy 0 of odd sides stays in place. */

@@ -20,7 +20,7 @@ export function viewOf(bytes: Uint8Array): DataView {
 
 /** The bytes at an address that is a multiple of 4, as typed-array views need: the same memory, or a copy. */
 export function alignedTo4(bytes: Uint8Array): Uint8Array {
-  return bytes.byteOffset % 4 === 0 ? bytes : bytes.slice();
+  return bytes.byteOffset % 4 === 0 ? bytes : new Uint8Array(bytes);
 }
 
 /** True where typed arrays read little-endian files directly: on every platform with a browser today. */

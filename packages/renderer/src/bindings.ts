@@ -9,7 +9,7 @@ import { CullChunksStage, CullStage } from './stages/cull.js';
 import { DetailBudgetStage } from './stages/detail-budget.js';
 import { PlanStage } from './stages/plan.js';
 import { ProjectStage } from './stages/project.js';
-import { ScanStage } from './stages/scan.js';
+import { scanBytes, ScanStage } from './stages/scan.js';
 import { SortStage } from './stages/sort.js';
 import { thinBlocks, ThinStage } from './stages/thin.js';
 import type { Variants } from './variants.js';
@@ -117,7 +117,7 @@ export class FrameBindings {
     const length = constants.CULL_GROUP * table.groups;
     const blocks = thinBlocks(length);
     this.#ordered = {
-      blockOffsets: memory.buffer('gs.thin.block_offsets', 4 * (blocks + 1), storage),
+      blockOffsets: memory.buffer('gs.thin.block_offsets', scanBytes(blocks), storage),
       thin: constant('thin.length', length),
       scan: constant('thin.blocks', blocks),
       limits: constant('thin.limits', count, scratch.capacity, blocks),

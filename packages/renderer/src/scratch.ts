@@ -1,6 +1,7 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import { scanBytes } from './stages/scan.js';
 
 /** How much the buffers between the stages must hold. */
 export interface ScratchSize {
@@ -48,7 +49,7 @@ export class Scratch {
   readonly keys: readonly [GPUBuffer, GPUBuffer];
   /** Slots in the order of their keys, likewise. Before the sort the first lists the survivors. */
   readonly order: readonly [GPUBuffer, GPUBuffer];
-  /** [digit][block] */
+  /** [block][digit] */
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
   readonly #memory: GpuMemory;
@@ -68,7 +69,7 @@ export class Scratch {
       this.chunkShares = buffer('cull_chunks.shares', 4 * (groups + 1));
       this.detailCounts = buffer('detail.counts', 4 * constants.DETAIL_COUNTS);
       this.visibleBits = buffer('cull.visible_bits', 4 * constants.WORDS_PER_GROUP * groups);
-      this.groupOffsets = buffer('scan.group_offsets', 4 * (groups + 1));
+      this.groupOffsets = buffer('scan.group_offsets', scanBytes(groups));
       this.gathered = buffer('cull.gathered', 4 * constants.GATHERED_WORDS);
       this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages), planUsage);
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);

@@ -4,7 +4,7 @@ export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answe
 export * from './generated/live-shaders.js';
 export * from './generated/shaders.js';
 export * from './generated/streamed-shaders.js';
-export { dispatchGrid } from './gpu/kernel.js';
+export { dispatchGrid, kernelOf } from './gpu/kernel.js';
 export { GpuMemory } from './gpu/memory.js';
 export { writeStruct } from './gpu/struct.js';
 export { occlusionView } from './occlusion.js';
@@ -31,7 +31,7 @@ export { OrderKeysStage } from './stages/order-keys.js';
 export { PlanStage } from './stages/plan.js';
 export { ProbeDepthStage } from './stages/probe-depth.js';
 export { ProjectStage } from './stages/project.js';
-export { ScanStage } from './stages/scan.js';
+export { scanBytes, ScanStage } from './stages/scan.js';
 export { canSort, SORT_NAMES, sortedIn, SortStage, type SortBuffers, type SortName } from './stages/sort.js';
 export { thinBlocks, ThinStage, type ThinBuffers } from './stages/thin.js';
 export { cameraValues } from './view.js';

@@ -5,6 +5,7 @@ import {
   cullGroups,
   layouts,
   OrderKeysStage,
+  scanBytes,
   thinBlocks,
   ThinStage,
   writeStruct,
@@ -39,7 +40,7 @@ async function checkThin(
   flags.forEach((flag, i) => (bits[i >> 5] |= flag ? 1 << (i & 31) : 0));
   const blocks = thinBlocks(length);
   const survivors = bench.buffer(new Uint32Array(capacity).fill(0xffffffff));
-  const blockOffsets = bench.buffer(4 * (blocks + 1));
+  const blockOffsets = bench.buffer(scanBytes(blocks));
   const stage = new ThinStage(bench.device, threads);
   const bindings = stage.bind({
     thin: bench.uniform(length, 0, 0, 0),

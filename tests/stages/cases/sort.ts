@@ -1,9 +1,11 @@
 import {
   canSort,
   constants,
+  kernelOf,
   layouts,
   SORT_NAMES,
   sortedIn,
+  sortScan,
   SortStage,
   type SortName,
 } from '@gaussian-splat/renderer/stages';
@@ -75,6 +77,26 @@ async function checkSort(bench: Bench, keys: Uint32Array, name?: SortName, keyBi
   );
 }
 
+/** The exclusive sums over the blocks, digit by digit, and the totals of the digits. */
+async function checkCountSums(bench: Bench, blocks: number): Promise<void> {
+  const { DIGITS, DIGITS_PER_GROUP, SORT_BLOCK } = constants;
+  const random = randomSource(blocks);
+  const counts = fill(DIGITS * blocks, () => Math.floor(random() * SORT_BLOCK));
+  const sums = new Uint32Array(counts.length);
+  const totals = new Uint32Array(DIGITS);
+  counts.forEach((count, i) => {
+    sums[i] = totals[i % DIGITS];
+    totals[i % DIGITS] += count;
+  });
+  const plan = bench.buffer(planFor(SORT_BLOCK * blocks));
+  const [found, digitTotals] = [bench.buffer(counts), bench.buffer(4 * DIGITS)];
+  const kernel = kernelOf(bench.device, sortScan);
+  const bindings = kernel.bind({ plan, counts: found, digit_totals: digitTotals });
+  bench.compute((pass) => kernel.dispatch(pass, bindings, DIGITS / DIGITS_PER_GROUP));
+  checkEqual(await bench.read(found), sums, 'sums of the counts');
+  checkEqual(await bench.read(digitTotals), totals, 'totals');
+}
+
 const fill = (count: number, value: (i: number) => number): Uint32Array =>
   Uint32Array.from({ length: count }, (_, i) => value(i));
 
@@ -93,16 +115,8 @@ export const sortCases: StageCase[] = [
     },
   })),
   {
-    name: 'sort: more blocks than the scan of a digit takes at once',
-    run: (bench) => {
-      const random = randomSource(3);
-      return checkSort(
-        bench,
-        fill(515 * block + 5, () => Math.floor(random() * 256)),
-        'shared8',
-        8,
-      );
-    },
+    name: 'sort: counts of more blocks than are summed up at once',
+    run: (bench) => checkCountSums(bench, 2 * constants.PREFIX_THREADS * constants.BLOCKS_PER_THREAD + 3),
   },
   ...SORT_NAMES.map((name) => ({
     name: `sort ${name}: keys of 4 to 32 bits, many of them equal, blocks not full`,

@@ -13,6 +13,7 @@ import { BUFFER_USAGE, TEXTURE_USAGE, ComputeKernel, kernelOf, perDevice, storin
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
+import { scanBytes } from '../stages/scan.js';
 import { sortedIn, SortStage, type SortBindings, type SortName } from '../stages/sort.js';
 import type {
   AccumulationFormat,
@@ -203,7 +204,7 @@ export class TilesRasterizer implements Rasterizer {
       buffer(`${name}_a`, bytes * pairs),
       buffer(`${name}_b`, bytes * pairs),
     ];
-    const groupPairs = buffer('group_pairs', 4 * (groups + 1));
+    const groupPairs = buffer('group_pairs', scanBytes(groups));
     this.#device.queue.writeBuffer(this.#scanLength, 0, Uint32Array.of(groupPairs.size / 4 - 1));
     return {
       rects: buffer('rects', 4 * capacity),

@@ -2,7 +2,12 @@ import { scan, scanSerial } from '../generated/shaders.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import type { Threads } from './threads.js';
 
-/** Exclusive prefix sums of an array in place; the total goes behind its last element. */
+const VECTOR_BYTES = 16;
+
+/** Bytes of a buffer for the prefix sums of `length` numbers and their total: whole vectors of four. */
+export const scanBytes = (length: number): number => VECTOR_BYTES * Math.ceil((4 * (length + 1)) / VECTOR_BYTES);
+
+/** Exclusive prefix sums of an array in place, in a buffer of {@link scanBytes}; the total goes behind its last element. */
 export class ScanStage {
   readonly #kernel: ComputeKernel<typeof scan> | ComputeKernel<typeof scanSerial>;
 

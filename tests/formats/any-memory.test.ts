@@ -1,0 +1,27 @@
+/** A file may lie anywhere in memory, in any kind of byte array: Node's Buffers lie at odd addresses, and their `slice` does not copy. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { readScene, type OpenPart } from '@gaussian-splat/formats';
+import { assertSameCloud } from './support/expect.js';
+import { fuzzScenes } from './support/fuzz.js';
+
+/** The bytes as a part of a larger Buffer. */
+function bufferAt(offset: number, bytes: Uint8Array): Uint8Array {
+  const memory = Buffer.from(new ArrayBuffer(bytes.length + 8));
+  memory.set(bytes, offset);
+  return memory.subarray(offset, offset + bytes.length);
+}
+
+for (const [format, scenes] of Object.entries(fuzzScenes())) {
+  test(`${format}: Buffers at any address give the same cloud`, async () => {
+    for (const { name, files } of scenes) {
+      const read = (place: (bytes: Uint8Array) => Uint8Array): ReturnType<typeof readScene> => {
+        const openPart: OpenPart = async (path) => place(files[path]);
+        return readScene(place(files[name]), { name, openPart });
+      };
+      const expected = await read((bytes) => new Uint8Array(bytes));
+      assert.ok(expected.count > 0);
+      for (const offset of [0, 1, 2, 3]) assertSameCloud(await read((bytes) => bufferAt(offset, bytes)), expected);
+    }
+  });
+}
