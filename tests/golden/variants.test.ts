@@ -86,6 +86,39 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
   }
 });
 
+test('a device that is lost while variants are tried leaves the choice for its adapter as it was', async () => {
+  const entries = new Map<string, string>();
+  const store = {
+    getItem: (key: string) => entries.get(key) ?? null,
+    setItem: (key: string, value: string) => void entries.set(key, value),
+  };
+  const chosen = await chooseVariants(await newDevice(), { store });
+  const [[key, kept]] = entries;
+  for (const [moment, isKnown, milliseconds] of [
+    ['before the first trial', true, 0],
+    ['while the kept choice is checked', true, 20],
+    ['while all are tried', false, 100],
+  ] as const) {
+    entries.clear();
+    if (isKnown) entries.set(key, kept);
+    const device = await newDevice();
+    // All ways to sort are tried where the adapter does not call itself a fallback.
+    Object.defineProperty(device, 'adapterInfo', { value: { ...chosenBy(device), isFallbackAdapter: false } });
+    const choosing = chooseVariants(device, { store });
+    if (milliseconds > 0) await new Promise((resolve) => setTimeout(resolve, milliseconds));
+    device.destroy();
+    await choosing;
+    assert.deepEqual([...entries.values()], isKnown ? [kept] : [], moment);
+  }
+  assert.deepEqual(await chooseVariants(await newDevice(), { store }), chosen);
+});
+
+/** What a choice is kept under. */
+function chosenBy({ adapterInfo }: GPUDevice): Partial<GPUAdapterInfo> {
+  const { vendor, architecture, device, description } = adapterInfo;
+  return { vendor, architecture, device, description };
+}
+
 const newDevice = async (): Promise<GPUDevice> => (await requestNodeAdapter()).requestDevice();
 
 /** On SwiftShader one choice is right. Elsewhere measuring decides, and may decide differently the next time, but never for what draws another picture. */

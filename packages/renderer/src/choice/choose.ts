@@ -1,7 +1,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { FrameClock } from './frame-clock.js';
-import { perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
+import { BUFFER_USAGE, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { Renderer } from '../renderer.js';
 import { remember, SAFE, type Variants } from '../variants.js';
 import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud } from './known-answer.js';
@@ -18,6 +18,9 @@ export interface ChoiceOptions {
   /** Default: the page's `localStorage` where there is one. null: nothing is kept. */
   readonly store?: ChoiceStore | null;
 }
+
+/** GPUMapMode.READ, which Node has only where Dawn was loaded. */
+const MAP_READ = 1;
 
 /** Changes whenever a variant does, so that old choices are made anew. */
 const VERSION = 3;
@@ -47,6 +50,8 @@ export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): 
     const store = options.store === undefined ? pageStore() : options.store;
     const kept = readChoice(store, device);
     const variants = kept !== undefined && (await isRight(device, kept)) ? kept : await probe(device);
+    // What a device answered while it was lost says nothing about the adapter, whose other devices would go by it.
+    if (!(await isAlive(device))) return SAFE;
     remember(device, variants);
     writeChoice(store, keyFor(device), variants);
     return variants;
@@ -66,8 +71,7 @@ async function probe(device: GPUDevice): Promise<Variants> {
 
 /** A wrong picture is worse than none. A lost device draws none, and says so itself. */
 async function giveUp(device: GPUDevice): Promise<Variants> {
-  const isLost = await Promise.race([device.lost.then(() => true), settled().then(() => false)]);
-  if (isLost) return SAFE;
+  if (!(await isAlive(device))) return SAFE;
   const { vendor = '', architecture = '', description = '' } = device.adapterInfo ?? {};
   throw new GaussianSplatError('unsupported/wrong-image', {
     where: `the graphics adapter ${[vendor, architecture, description].filter(Boolean).join(' ') || '(unnamed)'}`,
@@ -77,8 +81,18 @@ async function giveUp(device: GPUDevice): Promise<Variants> {
   });
 }
 
-/** Lets promises that are settled already have their turn. */
-const settled = (): Promise<void> => new Promise((resolve) => setTimeout(resolve, 0));
+/** Whether a device still answers, and so did before: one that is lost stays lost. */
+async function isAlive(device: GPUDevice): Promise<boolean> {
+  const buffer = device.createBuffer({ label: 'gs.probe.alive', size: 4, usage: BUFFER_USAGE.mapRead });
+  try {
+    await buffer.mapAsync(MAP_READ);
+    return true;
+  } catch {
+    return false;
+  } finally {
+    buffer.destroy();
+  }
+}
 
 /** A way to sort replaces one before it in the list only if it takes less than this share of its time: nobody gains by a choice that flickers. */
 const FASTER_SORT = 0.9;
