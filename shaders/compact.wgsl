@@ -5,18 +5,28 @@
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> chunk_list: array<u32>;
-@group(0) @binding(2) var<storage, read> visible_bits: array<u32>;
+// A bit for each splat, two vectors for a group.
+@group(0) @binding(2) var<storage, read> visible_bits: array<vec4u>;
 @group(0) @binding(3) var<storage, read> group_offsets: array<u32>;
 @group(0) @binding(4) var<storage, read_write> survivors: array<u32>;
+
+const VECTORS_PER_GROUP = WORDS_PER_GROUP / 4u;
+
+// Bits that are set in the words of a vector before its word number `end`.
+fn bits_before(words: vec4u, end: i32) -> u32 {
+  return dot(select(vec4u(0u), countOneBits(words), vec4i(0, 1, 2, 3) < vec4i(end)), vec4u(1u));
+}
 
 @compute @workgroup_size(CULL_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let group = view.first_group + chunk_list[view.first_group + workgroup_id.x];
+  let low = visible_bits[VECTORS_PER_GROUP * group];
+  let high = visible_bits[VECTORS_PER_GROUP * group + 1u];
   let word = lane / 32u;
-  let own = visible_bits[group * WORDS_PER_GROUP + word];
+  let own = select(low, high, word >= 4u)[word % 4u];
   let bit = 1u << (lane % 32u);
   if ((own & bit) == 0u) { return; }
-  var slot = group_offsets[group] + countOneBits(own & (bit - 1u));
-  for (var w = 0u; w < word; w++) { slot += countOneBits(visible_bits[group * WORDS_PER_GROUP + w]); }
+  let before = bits_before(low, i32(word)) + bits_before(high, i32(word) - 4);
+  let slot = group_offsets[group] + before + countOneBits(own & (bit - 1u));
   if (slot < arrayLength(&survivors)) { survivors[slot] = group * CULL_GROUP + lane; }
 }

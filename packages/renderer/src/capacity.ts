@@ -26,21 +26,45 @@ const GENEROUS_PAIRS = 1 << 21;
 const HEADROOM = 1.25;
 /** Share of the room that must be in use before there is more, or less. */
 const FULL = 0.92;
-const SLACK = 0.6;
+const SLACK = 0.7;
 /** Bytes that giving up room must free. */
 const LEAST_SAVING = 32 << 20;
 const BYTES_PER_VISIBLE = 52;
 const BYTES_PER_PAIR = 24;
 /** Frames between two looks once the first frames have been looked at. */
 const INTERVAL = 16;
-/** Looks at nearly empty buffers before they shrink. */
+/** Looks at buffers with room to spare before they shrink. */
 const PATIENCE = 4;
+/** So many times as many where they had to grow again: views that come and go, such as an orbit's, soon keep the room that the largest needs. */
+const PATIENCE_GROWTH = 4;
 
 /** Room to begin with. */
 export function initialCapacity(splats: number, most: Capacity): Capacity {
   const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
   const pairs = Math.max(LEAST_PAIRS, Math.min(4 * visible, GENEROUS_PAIRS), Math.ceil(1.5 * visible));
   return { visible, pairs: Math.min(most.pairs, pairs) };
+}
+
+/** How long room to spare is kept. */
+export class Patience {
+  #looks = PATIENCE;
+  #hasShrunk = false;
+
+  /** Looks at the buffers before they shrink. */
+  get looks(): number {
+    return this.#looks;
+  }
+
+  /** Room was given up. */
+  shrink(): void {
+    this.#hasShrunk = true;
+  }
+
+  /** There had to be more room. */
+  grow(): void {
+    if (this.#hasShrunk) this.#looks *= PATIENCE_GROWTH;
+    this.#hasShrunk = false;
+  }
 }
 
 /**
@@ -51,6 +75,7 @@ export class CapacityMonitor {
   readonly #staging: GPUBuffer;
   readonly #bounds: CapacityBounds;
   readonly #onWish: (capacity: Capacity, overflowed: boolean) => void;
+  readonly #patience: Patience;
   #capacity: Capacity;
   #frame = 0;
   #isReading = false;
@@ -58,13 +83,18 @@ export class CapacityMonitor {
   #idleLooks = 0;
   #recent: Capacity = { visible: 0, pairs: 0 };
 
-  /** @param onWish called with the room that the next frame should have */
+  /**
+   * @param patience what monitors before this one have learnt about the scene
+   * @param onWish called with the room that the next frame should have
+   */
   constructor(
     device: GPUDevice,
     capacity: Capacity,
     bounds: CapacityBounds,
+    patience: Patience,
     onWish: (capacity: Capacity, overflowed: boolean) => void,
   ) {
+    this.#patience = patience;
     this.#capacity = capacity;
     this.#bounds = bounds;
     this.#onWish = onWish;
@@ -124,6 +154,7 @@ export class CapacityMonitor {
       pairs: Math.max(least.pairs, grow(used.pairs, this.#capacity.pairs, this.#bounds.most.pairs)),
     };
     if (grown.visible > this.#capacity.visible || grown.pairs > this.#capacity.pairs) {
+      this.#patience.grow();
       this.#wish(grown, overflowed);
       return;
     }
@@ -131,12 +162,15 @@ export class CapacityMonitor {
       visible: Math.max(this.#recent.visible, used.visible),
       pairs: Math.max(this.#recent.pairs, used.pairs),
     };
-    if (++this.#idleLooks < PATIENCE) return;
+    if (++this.#idleLooks < this.#patience.looks) return;
     const shrunk = {
       visible: shrink(this.#recent.visible, this.#capacity.visible, least.visible),
       pairs: shrink(this.#recent.pairs, this.#capacity.pairs, least.pairs),
     };
-    if (bytesOf(this.#capacity) - bytesOf(shrunk) >= LEAST_SAVING) this.#wish(shrunk, false);
+    if (bytesOf(this.#capacity) - bytesOf(shrunk) >= LEAST_SAVING) {
+      this.#patience.shrink();
+      this.#wish(shrunk, false);
+    }
     this.#idleLooks = 0;
     this.#recent = { visible: 0, pairs: 0 };
   }

@@ -1,6 +1,6 @@
 import type { Camera } from '@gaussian-splat/core';
 import { FrameBindings, type Stages } from './bindings.js';
-import { CapacityMonitor, initialCapacity, LEAST_CAPACITY, type Capacity } from './capacity.js';
+import { CapacityMonitor, initialCapacity, LEAST_CAPACITY, Patience, type Capacity } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { Occlusion } from './occlusion.js';
@@ -41,6 +41,7 @@ export class FrameResources {
   readonly #options: ResourceOptions;
   #current: Resources | undefined;
   #capacity: Capacity | undefined;
+  #patience = new Patience();
   #hasOtherPairs = false;
   #hasQuickPairs = false;
   /** The largest budget of splats that a frame has been given. */
@@ -82,6 +83,7 @@ export class FrameResources {
     this.release();
     const table = new PageTable(this.#device, [...scenes]);
     this.#capacity = initialCapacity(table.splats, this.#mostFor(table));
+    this.#patience = new Patience();
     return this.#rebind(table);
   }
 
@@ -127,12 +129,13 @@ export class FrameResources {
     const capacity = this.#capacity!;
     const depthOrder = this.#current?.depthOrder ?? new DepthOrder(this.#device, table, sort);
     const orderPolicy = this.#current?.orderPolicy ?? new OrderPolicy(table, depthOrder);
-    this.#current?.scratch.destroy();
+    const kept = this.#current?.scratch.capacity === capacity.visible ? this.#current.scratch : undefined;
+    if (kept === undefined) this.#current?.scratch.destroy();
     this.#current?.bindings.destroy();
     this.#current?.monitor.destroy();
     if (table.hasDetail) stages.detailBudget.prepare();
     const pages = table.pages.length;
-    const scratch = new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
+    const scratch = kept ?? new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
     this.#bindRasterizer(scratch, capacity);
     this.#hasOtherPairs = false;
     const bindings = new FrameBindings(this.#device, stages, { table, scratch, occlusion: occlusion.depths });
@@ -156,7 +159,7 @@ export class FrameResources {
 
   #watch(table: PageTable, capacity: Capacity): CapacityMonitor {
     const bounds = { least: () => this.#leastFor(table), most: this.#mostFor(table) };
-    return new CapacityMonitor(this.#device, capacity, bounds, (wished, overflowed) => {
+    return new CapacityMonitor(this.#device, capacity, bounds, this.#patience, (wished, overflowed) => {
       this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
       this.#capacity = wished;
       if (overflowed) this.#options.onIncomplete();
