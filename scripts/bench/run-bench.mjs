@@ -9,7 +9,7 @@ const USAGE = `usage: npm run bench -- [options]
 
   --splats N        splats; the scene is repeated up to that number (default 100000)
   --size WxH        image size (default 960x540)
-  --path NAME       orbit (default), dolly, yaw, snap, zoom or strafe
+  --path NAME       orbit (default), among, dolly, yaw, snap, zoom or strafe
   --frames N        frames of each visit (default 5)
   --rounds N        visits to each configuration, in alternating order (default 3)
   --scene FILE      a scene of yours instead of the one that ships

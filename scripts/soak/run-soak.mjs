@@ -3,7 +3,7 @@ import { writeFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { chromium } from 'playwright-core';
 import { PNG } from 'pngjs';
-import { findChromium, SWIFTSHADER_FLAGS } from '../lib/chromium.mjs';
+import { findChromium, gpuFlags } from '../lib/chromium.mjs';
 import { root } from '../lib/run.mjs';
 import { serve } from '../lib/server.mjs';
 import { residentBytes } from './processes.mjs';
@@ -55,7 +55,7 @@ const server = await serve({
   '/fixtures/': `${root}tests/element/browser/fixtures`,
   '/generators/': `${root}tests/fixtures/generators`,
 });
-const browser = await chromium.launch({ executablePath: findChromium(), args: SWIFTSHADER_FLAGS });
+const browser = await chromium.launch({ executablePath: findChromium(), args: gpuFlags() });
 const failures = [];
 /** What the page complained of since the last epoch, and did not have to expect. */
 const faults = [];

@@ -46,4 +46,25 @@ for (const { name, cloud, camera } of views) {
   });
 }
 
+test('fewer pixels are in no quality: what they cost depends on the scene', async () => {
+  const device = await serialDevice();
+  const [lowest, scales] = [Math.min(...Object.values(LIMITS)), [0.9, 0.75, 0.5]];
+  const figures = new Map(scales.map((scale) => [scale, [] as number[]]));
+  for (const { name, cloud, camera } of views) {
+    const oracle = renderOracle(cloud, camera, { rules: 'gsplat', mode: cloud.antialiased ? 'antialiased' : 'classic' });
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+    for (const resolutionScale of scales) {
+      const renderer = new Renderer(device, { rasterizer: 'quads', resolutionScale });
+      const close = closeness(await capture(device, renderer, { gaussians, camera }), oracle);
+      console.log(describeCloseness(`${name}, scale ${resolutionScale}`, close));
+      figures.get(resolutionScale)!.push(close.psnr);
+      renderer.destroy();
+    }
+    gaussians.destroy();
+  }
+  for (const [scale, found] of figures) {
+    assert.ok(Math.min(...found) < lowest, `scale ${scale} keeps ${lowest} dB in all views: qualities could have it`);
+  }
+});
+
 after(endNodeDevice);

@@ -1,4 +1,5 @@
 /** Small helpers on byte arrays that several readers share. */
+import { GaussianSplatError } from '@gaussian-splat/core';
 
 const latin1 = new TextDecoder('latin1');
 
@@ -16,6 +17,28 @@ export function startsWith(bytes: Uint8Array, signature: readonly number[] | str
 /** A view of the same bytes for reading numbers of any type and byte order. */
 export function viewOf(bytes: Uint8Array): DataView {
   return new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+}
+
+/** A file as its bytes: what `Response.arrayBuffer()` gives, or any view of memory. */
+export type FileBytes = ArrayBuffer | ArrayBufferView<ArrayBufferLike>;
+
+/** The same memory as plain bytes. Node's Buffers, too: some of their methods share memory where those of a Uint8Array copy it. */
+export function plainBytes(file: FileBytes, name: string): Uint8Array {
+  if (ArrayBuffer.isView(file)) return new Uint8Array(file.buffer, file.byteOffset, file.byteLength);
+  // By its tag, because that of another window or realm is no instance of this one's class.
+  if (Object.prototype.toString.call(file) === '[object ArrayBuffer]') return new Uint8Array(file);
+  throw new GaussianSplatError('argument/value', {
+    where: name,
+    expected: 'the bytes of a scene file: a Uint8Array or an ArrayBuffer',
+    found: kindOf(file),
+    remedy: 'fetch the file and pass what response.arrayBuffer() resolves to, or call fetchScene(url)',
+  });
+}
+
+/** What a value is, for error messages. */
+function kindOf(value: unknown): string {
+  if (value === null || typeof value !== 'object') return value === null ? 'null' : typeof value;
+  return value.constructor?.name || 'an object';
 }
 
 /** The bytes at an address that is a multiple of 4, as typed-array views need: the same memory, or a copy. */

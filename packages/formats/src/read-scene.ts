@@ -1,5 +1,5 @@
 import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-splat/core';
-import { grouped } from './bytes.js';
+import { grouped, plainBytes, type FileBytes } from './bytes.js';
 import { extensionOf, findFormat } from './detect.js';
 import { previewWanted, samplePreview } from './preview.js';
 import type { OpenPart, SceneSource } from './scene-format.js';
@@ -29,15 +29,16 @@ export interface ReadSceneOptions {
  * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4, SOG version 1 and 2, streamed SOG, glTF with
  * `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is told from the content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
  *
- * @param bytes the whole file. It is not changed, and the cloud does not refer to it.
+ * @param file the whole file. It is not changed, and the cloud does not refer to it.
  * @returns the splats in the shape and frame that `GaussianCloud` documents. Splats with values that cannot be drawn
  * are left out and counted in `droppedCount`.
- * @throws GaussianSplatError with a `decode/...` code that says what was expected and found, where and what to do, or
- * `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
+ * @throws GaussianSplatError with a `decode/...` code that says what was expected and found, where and what to do,
+ * `argument/value` for what are no bytes, or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
  */
-export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
+export async function readScene(file: FileBytes, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
   const { name = 'scene', contentType = '', signal, openPart, level, onPreview } = options;
   signal?.throwIfAborted();
+  const bytes = plainBytes(file, name);
   if (bytes.length === 0) throw emptyFile(name);
   const format = findFormat(bytes, name, contentType);
   if (!format) {
@@ -69,16 +70,17 @@ export async function readScene(bytes: Uint8Array, options: ReadSceneOptions = {
  * Reads what can be seen of a file that is still arriving: the splats that are whole (PLY, compressed PLY, .splat, .ksplat), or all splats
  * without their view-dependent colours once these are all that is missing (SPZ, compressed PLY).
  *
- * @param bytes the first bytes of the file.
+ * @param beginning the first bytes of the file.
  * @returns the splats in the order of the file, or undefined if there are none yet or the format cannot be read in part. Never throws for
  * what the bytes are: `readScene` says what is wrong once the file is whole.
  */
 export async function readPrefix(
-  bytes: Uint8Array,
+  beginning: FileBytes,
   options: ReadSceneOptions = {},
 ): Promise<GaussianCloud | undefined> {
   const { name = 'scene', contentType = '', signal } = options;
   signal?.throwIfAborted();
+  const bytes = plainBytes(beginning, name);
   const format = bytes.length === 0 ? undefined : findFormat(bytes, name, contentType);
   if (!format?.readsPrefix) return undefined;
   const read = await format.load();
