@@ -1,6 +1,8 @@
 // Paints tiles, and notes what each splat contributed and how deep each pixel is.
 #import shared/paint_tiles
 
+const NOTES_SPLATS = true;
+
 // Numbers of the splats by slot.
 @group(0) @binding(8) var<storage, read> survivors: array<u32>;
 // By number: bits of the largest weight, alpha times transmittance, that the splat has had in any pixel of any frame.

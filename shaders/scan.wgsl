@@ -1,19 +1,19 @@
-// Exclusive prefix sum of an array in place, by one workgroup that walks over it: no workgroup waits for another. Four values are read and
-// written at a time, so that a thread's values lie in few memory transactions.
+// Exclusive prefix sum of an array in place, by one workgroup that walks over it: no workgroup waits for another. Threads side by side read
+// and write vectors side by side, four for each thread in a step.
 // values[length] receives the total; what follows it up to a whole vector is lost.
-#import shared/prefix
+#import shared/prefix_vectors
 
 @group(0) @binding(0) var<storage, read_write> values: array<vec4u>;
 @group(0) @binding(1) var<uniform> scan: Scan;
 
 struct Scan { length: u32 }
 
-const PER_THREAD = 32u;
-const VECTORS = PER_THREAD / 4u;
+// Vectors of one thread, as many as one of them has numbers: each is a column of the sums over the threads.
+const VECTORS = 4u;
+const PER_THREAD = 4u * VECTORS;
 
-var<workgroup> step_total: u32;
-// Sum up to and including each thread.
-var<workgroup> ends: array<u32, PREFIX_THREADS>;
+// Sums up to and including each thread, column by column.
+var<workgroup> ends: array<vec4u, PREFIX_THREADS>;
 
 // The values of vector v, of which those behind the end count as 0.
 fn values_of(v: u32) -> vec4u {
@@ -29,29 +29,37 @@ fn sums_before(before: u32, own: vec4u) -> vec4u {
   return vec4u(before, y, z, add_saturating(z, own.z));
 }
 
+fn sum_of(own: vec4u) -> u32 {
+  return add_saturating(sums_before(0u, own).w, own.w);
+}
+
 @compute @workgroup_size(PREFIX_THREADS)
 fn main(@builtin(local_invocation_index) lane: u32) {
   var carry = 0u;
   for (var start = 0u; start < scan.length; start += PREFIX_THREADS * PER_THREAD) {
-    let first = start / 4u + lane * VECTORS;
-    var own: array<vec4u, VECTORS>;
+    let first = start / 4u + lane;
     // All are on their way before the first is added.
-    for (var k = 0u; k < VECTORS; k++) { own[k] = values_of(first + k); }
-    var sum = 0u;
-    for (var k = 0u; k < VECTORS; k++) { sum = add_saturating(sums_before(sum, own[k]).w, own[k].w); }
-    let inclusive = inclusive_sum(sum, lane, PREFIX_THREADS);
-    if (lane == PREFIX_THREADS - 1u) { step_total = inclusive; }
-    ends[lane] = inclusive;
+    let a = values_of(first);
+    let b = values_of(first + PREFIX_THREADS);
+    let c = values_of(first + 2u * PREFIX_THREADS);
+    let d = values_of(first + 3u * PREFIX_THREADS);
+    ends[lane] = inclusive_sums(vec4u(sum_of(a), sum_of(b), sum_of(c), sum_of(d)), lane);
     workgroupBarrier();
     // Not the difference of two sums: both may have stopped.
-    var running = add_saturating(carry, select(ends[max(lane, 1u) - 1u], 0u, lane == 0u));
-    for (var k = 0u; k < VECTORS; k++) {
-      let sums = sums_before(running, own[k]);
-      if (4u * (first + k) < scan.length) { values[first + k] = sums; }
-      running = add_saturating(sums.w, own[k].w);
-    }
-    carry = add_saturating(carry, workgroupUniformLoad(&step_total));
+    let before = select(ends[max(lane, 1u) - 1u], vec4u(0u), lane == 0u);
+    let columns = ends[PREFIX_THREADS - 1u];
+    let begins = add_vectors_saturating(before, sums_before(carry, columns));
+    write_sums(first, begins.x, a);
+    write_sums(first + PREFIX_THREADS, begins.y, b);
+    write_sums(first + 2u * PREFIX_THREADS, begins.z, c);
+    write_sums(first + 3u * PREFIX_THREADS, begins.w, d);
+    carry = add_saturating(carry, sum_of(columns));
+    workgroupBarrier();
   }
   storageBarrier();
   if (lane == 0u) { values[scan.length / 4u][scan.length % 4u] = carry; }
+}
+
+fn write_sums(v: u32, before: u32, own: vec4u) {
+  if (4u * v < scan.length) { values[v] = sums_before(before, own); }
 }

@@ -2,7 +2,7 @@
 // lie side by side: one vector.
 #import shared/plan
 #import shared/sort
-#import shared/prefix
+#import shared/prefix_vectors
 
 @group(0) @binding(0) var<storage, read> plan: Plan;
 // [block][digit]
@@ -12,22 +12,7 @@
 const DIGITS_PER_GROUP = 4u;
 const BLOCKS_PER_THREAD = 8u;
 
-// Two halves, as in shared/prefix.
-var<workgroup> sums: array<vec4u, 2u * PREFIX_THREADS>;
 var<workgroup> step_total: vec4u;
-
-// Sum of `own` over all threads up to and including this one. Must be called by all threads.
-fn inclusive_sums(own: vec4u, lane: u32) -> vec4u {
-  var sum = own;
-  var side = 0u;
-  for (var reach = 1u; reach < PREFIX_THREADS; reach *= 2u) {
-    sums[side + lane] = sum;
-    workgroupBarrier();
-    if (lane >= reach) { sum += sums[side + lane - reach]; }
-    side = PREFIX_THREADS - side;
-  }
-  return sum;
-}
 
 @compute @workgroup_size(PREFIX_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {

@@ -2,6 +2,7 @@
 // part of the block by itself. Threads of a subgroup must be neighbours in the workgroup and run in step; where they do not, the known answer
 // of the probe rules this variant out.
 #import shared/sort_places
+#import shared/bits
 
 // Subgroups of a workgroup at most, and words with a bit for each thread of a subgroup: replaced by what the device has.
 const SUBGROUPS = 8u;
@@ -36,7 +37,7 @@ fn count_peers(peers: Votes, own: u32) -> Peers {
   var first = 0u;
   for (var w = 0u; w < VOTE_WORDS; w++) {
     let mask = peers[w];
-    if (count == 0u && mask != 0u) { first = 32u * w + countTrailingZeros(mask); }
+    if (count == 0u && mask != 0u) { first = 32u * w + zeros_below(mask); }
     count += countOneBits(mask);
     let threads_before = clamp(i32(own) - i32(32u * w), 0, 32);
     let upto = select((1u << u32(threads_before % 32)) - 1u, 0xffffffffu, threads_before == 32);

@@ -2,6 +2,9 @@
 #import shared/splat
 #import shared/falloff
 
+// Beyond it, px², a splat covers every image; infinity has no square root that helps.
+const VARIANCE_MAX = 1e36;
+
 // The ellipse u² + v² <= radius², prepared for questions about horizontal bands.
 struct Coverage {
   center: vec2f,
@@ -11,6 +14,10 @@ struct Coverage {
   lean: f32,
   // Half length of the longest chord, the one through the centre.
   half_chord: f32,
+  // Height above the centre of the rightmost point.
+  rightmost_y: f32,
+  // 1 / extent.y
+  inverse_height: f32,
 }
 
 fn coverage_of(s: ProjectedSplat, alpha_min: f32) -> Coverage {
@@ -19,12 +26,18 @@ fn coverage_of(s: ProjectedSplat, alpha_min: f32) -> Coverage {
   let sigma_v = 1.0 / bitcast<f32>(s.paint.x);
   let radius = cutoff_radius(bitcast<f32>(s.paint.w), alpha_min);
   let sheared = slope * sigma_x;
-  let sigma_y = sqrt(sheared * sheared + sigma_v * sigma_v);
+  // Divisions are what this costs: one here, for all bands.
+  let variance_y = min(sheared * sheared + sigma_v * sigma_v, VARIANCE_MAX);
+  let inverse_sigma_y = inverseSqrt(variance_y);
+  let sigma_y = variance_y * inverse_sigma_y;
+  let extent = radius * vec2f(sigma_x, sigma_y);
   return Coverage(
     s.shape.xy,
-    radius * vec2f(sigma_x, sigma_y),
-    sheared * sigma_x / (sigma_y * sigma_y),
-    radius * sigma_x * sigma_v / sigma_y,
+    extent,
+    sheared * sigma_x * inverse_sigma_y * inverse_sigma_y,
+    extent.x * sigma_v * inverse_sigma_y,
+    radius * sheared,
+    inverse_sigma_y / max(radius, 1e-20),
   );
 }
 
@@ -34,14 +47,13 @@ fn band_range(c: Coverage, top: f32, bottom: f32) -> vec2f {
   let to_y = min(bottom - c.center.y, c.extent.y);
   if (from_y > to_y) { return vec2f(1.0, -1.0); }
   // The outermost points of the whole ellipse lie at these heights; a band without them is widest at its nearest edge.
-  let rightmost_y = c.lean * c.extent.y * c.extent.y / max(c.extent.x, 1e-20);
-  let right = chord_end(c, clamp(rightmost_y, from_y, to_y), 1.0);
-  let left = chord_end(c, clamp(-rightmost_y, from_y, to_y), -1.0);
+  let right = chord_end(c, clamp(c.rightmost_y, from_y, to_y), 1.0);
+  let left = chord_end(c, clamp(-c.rightmost_y, from_y, to_y), -1.0);
   return c.center.x + vec2f(left, right);
 }
 
 // Right (side 1) or left (side -1) end of the chord at height y, relative to the centre.
 fn chord_end(c: Coverage, y: f32, side: f32) -> f32 {
-  let t = y / max(c.extent.y, 1e-20);
+  let t = y * c.inverse_height;
   return c.lean * y + side * c.half_chord * sqrt(max(0.0, 1.0 - t * t));
 }

@@ -2,6 +2,7 @@
 // when nothing behind can be seen. Whoever imports this says what is noted on the way: `clear_notes`, `note_blend`,
 // `keep_notes` and `note_pixel`.
 #import shared/bins
+#import shared/bits
 #import shared/coverage
 #import shared/prefix
 
@@ -40,16 +41,30 @@ const NO_POWER = -1e30;
 // sqrt(log2(e) / 2): in axes stretched by it a Gaussian is 2^-(u² + v²).
 const BASE_2_AXIS = 0.8493218002880191;
 
+// A splat as the pixels of one tile see it: at x, y from the tile's corner its alpha is 2^(power - u² - v²) with u = u_x · x + u_0 and
+// v = v_x · x + v_y · y + v_0. Without differences from its centre a pixel has two operations less for each splat.
+struct Brush {
+  u_x: f32,
+  u_0: f32,
+  v_x: f32,
+  v_y: f32,
+  v_0: f32,
+  // log2 of the opacity
+  power: f32,
+  // float16
+  red_green: u32,
+  // float32; where depths are noted blue and depth, float16
+  blue: u32,
+}
+
 // The window on the bin's pairs: a bit for each that touches the tile, and how many of these there are up to the end of each word.
 var<workgroup> window: array<u32, TILE_THREADS>;
 var<workgroup> found_upto: array<u32, TILE_THREADS>;
 var<workgroup> found: u32;
-// Slots of the splats at hand, a batch, front to back, and behind the last place of the batch one that reaches no pixel;
+// Slots of the splats at hand, a batch, front to back;
 var<workgroup> slots: array<u32, TILE_THREADS>;
-// centre, 1 / sigma_x in those axes, slope;
-var<workgroup> shapes: array<vec4f, TILE_THREADS + 1u>;
-// 1 / sigma_v in those axes, red and green, blue and depth, log2 of the opacity;
-var<workgroup> paints: array<vec4u, TILE_THREADS + 1u>;
+// how they paint, and behind the last place of the batch one that reaches no pixel;
+var<workgroup> brushes: array<Brush, TILE_THREADS + 1u>;
 // for each block of the tile a bit for each splat that touches it.
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
@@ -82,8 +97,10 @@ fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
     // Column k holds the pixel centres k·width + 0.5 ... (k + 1)·width - 0.5.
     let first = max(ceil((range.x + 0.5) / size.x) - 1.0, 0.0);
     let last = min(floor((range.y - 0.5) / size.x), f32(BLOCK_COLUMNS) - 1.0);
-    for (var column = first; column <= last; column += 1.0) {
-      atomicOr(&block_hits[(row * BLOCK_COLUMNS + u32(column)) * BATCH_WORDS + word], bit);
+    if (first > last) { continue; }
+    let end = u32(last) + 1u;
+    for (var column = u32(first); column < end; column++) {
+      atomicOr(&block_hits[(row * BLOCK_COLUMNS + column) * BATCH_WORDS + word], bit);
     }
   }
 }
@@ -129,10 +146,13 @@ fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
   let s = splats[slot];
   slots[k] = slot;
   hit_blocks(k, s, tile_corner);
-  shapes[k] = s.shape * vec4f(1.0, 1.0, BASE_2_AXIS, 1.0);
-  let inverse_sigma_v = bitcast<f32>(s.paint.x) * BASE_2_AXIS;
+  let center = s.shape.xy - tile_corner;
+  let u_x = s.shape.z * BASE_2_AXIS;
+  let v_y = bitcast<f32>(s.paint.x) * BASE_2_AXIS;
+  let v_x = -s.shape.w * v_y;
   let power = log2(bitcast<f32>(s.paint.w));
-  paints[k] = vec4u(bitcast<u32>(inverse_sigma_v), s.paint.yz, bitcast<u32>(power));
+  let blue = select(bitcast<u32>(splat_color(s).b), s.paint.z, keeps_depth());
+  brushes[k] = Brush(u_x, -u_x * center.x, v_x, v_y, -v_x * center.x - v_y * center.y, power, s.paint.y, blue);
 }
 
 struct Pixel {
@@ -151,20 +171,29 @@ fn is_finished(pixel: Pixel) -> bool {
   return pixel.least >= FINISHED;
 }
 
+// Whether the depths of splats are needed here.
+fn keeps_depth() -> bool {
+  return notes_depth || NOTES_SPLATS;
+}
+
+fn blue_of(brush: Brush) -> f32 {
+  if (keeps_depth()) { return unpack2x16float(brush.blue).x; }
+  return bitcast<f32>(brush.blue);
+}
+
 // Blends splat k of the batch. Without a branch, which takes a third more time: where the splat does not reach, and where the pixel is finished, nothing
 // is added.
-fn blend(pixel: ptr<function, Pixel>, k: u32, shape: vec4f, paint: vec4u, center: vec2f, least_power: f32) {
-  let offset = center - shape.xy;
-  let u = offset.x * shape.z;
-  let v = (offset.y - shape.w * offset.x) * bitcast<f32>(paint.x);
-  let power = bitcast<f32>(paint.w) - u * u - v * v;
+fn blend(pixel: ptr<function, Pixel>, k: u32, brush: Brush, place: vec2f, least_power: f32) {
+  let u = brush.u_x * place.x + brush.u_0;
+  let v = brush.v_x * place.x + (brush.v_y * place.y + brush.v_0);
+  let power = brush.power - u * u - v * v;
   let reaches = power >= least_power;
   let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), reaches);
   let before = (*pixel).transmittance;
   // The last one to be blended while the pixel is transparent is the one that ends it.
   if (notes_depth) {
     let is_seen = reaches && before > view.occluded_below && !is_finished(*pixel);
-    (*pixel).last_seen = select((*pixel).last_seen, paint.z, is_seen);
+    (*pixel).last_seen = select((*pixel).last_seen, brush.blue, is_seen);
   }
   let full_weight = before * alpha;
   let remaining = before - full_weight;
@@ -172,8 +201,8 @@ fn blend(pixel: ptr<function, Pixel>, k: u32, shape: vec4f, paint: vec4u, center
   (*pixel).least = select((*pixel).least, FINISHED, ends);
   let after = select(remaining, before, ends);
   let weight = select(full_weight, 0.0, ends);
-  note_blend(k, weight, before, after, paint.z);
-  (*pixel).color += weight * vec3f(unpack2x16float(paint.y), unpack2x16float(paint.z).x);
+  note_blend(k, weight, before, after, brush.blue);
+  (*pixel).color += weight * vec3f(unpack2x16float(brush.red_green), blue_of(brush));
   (*pixel).transmittance = after;
 }
 
@@ -210,8 +239,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let tile = view.first_tile + workgroup_id.xy;
   let corner = tile * TILE;
   let position = corner + pixel_in_tile(lane);
-  let center = vec2f(position) + 0.5;
-  let is_outside = any(center > view.viewport);
+  let place = vec2f(pixel_in_tile(lane)) + 0.5;
+  let is_outside = any(vec2f(position) + 0.5 > view.viewport);
   let own_block = lane / BLOCK_THREADS;
   let bin = tile / vec2u(BIN_COLUMNS, BIN_ROWS);
   let in_bin = tile % vec2u(BIN_COLUMNS, BIN_ROWS);
@@ -220,7 +249,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
 
   var pixel = Pixel(vec3f(0.0), 1.0, select(view.transmittance_min, FINISHED, is_outside), 0u);
   let least_power = log2(view.alpha_min);
-  if (lane == 0u) { paints[NO_SPLAT] = vec4u(0u, 0u, 0u, bitcast<u32>(NO_POWER)); }
+  if (lane == 0u) { brushes[NO_SPLAT].power = NO_POWER; }
   // First word of the window and the one behind it, and how many of the pairs found in it have been painted.
   var first_word = range.x / 32u;
   var next_word = first_word;
@@ -258,16 +287,14 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
       // Of these 32 splats those that touch the block, two at once: the second is read while the first is blended.
       var ahead = atomicLoad(&block_hits[own_block * BATCH_WORDS + word]);
       while (ahead > 0u) {
-        let k = word * 32u + firstTrailingBit(ahead);
+        let k = word * 32u + zeros_below(ahead);
         ahead &= ahead - 1u;
-        let next = select(NO_SPLAT, word * 32u + firstTrailingBit(ahead), ahead != 0u);
+        let next = select(NO_SPLAT, word * 32u + zeros_below(ahead), ahead != 0u);
         ahead &= ahead - 1u;
-        let shape = shapes[k];
-        let paint = paints[k];
-        let next_shape = shapes[next];
-        let next_paint = paints[next];
-        blend(&pixel, k, shape, paint, center, least_power);
-        blend(&pixel, next, next_shape, next_paint, center, least_power);
+        let brush = brushes[k];
+        let next_brush = brushes[next];
+        blend(&pixel, k, brush, place, least_power);
+        blend(&pixel, next, next_brush, place, least_power);
       }
     }
     if (!is_finished(pixel)) { atomicStore(&unfinished, 1u); }
