@@ -34,14 +34,17 @@ fn owner_of(p: u32) -> u32 {
 fn touched_tiles(c: Coverage, bin: vec2u) -> u32 {
   let corner = vec2f(f32(bin.x * BIN_WIDTH), f32(bin.y * BIN_HEIGHT));
   let tile = f32(TILE);
+  // Row k holds the pixel centres k·16 + 0.5 ... k·16 + 15.5. Only the rows at hand: threads side by side have others.
+  let low = c.center.y - c.extent.y - corner.y - RIM;
+  let high = c.center.y + c.extent.y - corner.y + RIM;
+  let first_row = clamp(ceil((low - (tile - 0.5)) / tile), 0.0, f32(BIN_ROWS));
+  let end_row = clamp(floor((high - 0.5) / tile) + 1.0, 0.0, f32(BIN_ROWS));
   var mask = 0u;
-  for (var row = 0u; row < BIN_ROWS; row++) {
-    // From the first to the last row of pixel centres of the tiles.
+  for (var row = u32(first_row); row < u32(end_row); row++) {
     let top = corner.y + f32(row) * tile + 0.5;
-    // 0.01 px more than exact: rounding must not lose a pixel on the rim.
-    let range = band_range(c, top - 0.01, top + tile - 1.0 + 0.01) + vec2f(-0.01, 0.01);
+    let range = band_range(c, top - RIM, top + tile - 1.0 + RIM) + vec2f(-RIM, RIM);
     if (range.x > range.y) { continue; }
-    // Column k holds the pixel centres k·16 + 0.5 ... k·16 + 15.5.
+    // Columns likewise.
     let first = max(ceil((range.x - corner.x - (tile - 0.5)) / tile), 0.0);
     let last = min(floor((range.y - corner.x - 0.5) / tile), f32(BIN_COLUMNS) - 1.0);
     if (first > last) { continue; }

@@ -2,6 +2,8 @@
 #import shared/splat
 #import shared/falloff
 
+// Pixels by which whoever asks makes a band larger than exact: rounding must not lose a pixel on the rim.
+const RIM = 0.01;
 // Beyond it, px², a splat covers every image; infinity has no square root that helps.
 const VARIANCE_MAX = 1e36;
 

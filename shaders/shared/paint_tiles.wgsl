@@ -89,12 +89,16 @@ fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
   let word = k / 32u;
   let bit = 1u << (k % 32u);
   let size = vec2f(f32(BLOCK_WIDTH), f32(BLOCK_HEIGHT));
-  for (var row = 0u; row < BLOCK_ROWS; row++) {
-    // From the first to the last row of pixel centres, and 0.01 px more: rounding must not lose a pixel on the rim.
+  // Row k holds the pixel centres k·height + 0.5 ... (k + 1)·height - 0.5. Only the rows at hand: threads side by side have others.
+  let low = c.center.y - c.extent.y - tile_corner.y - RIM;
+  let high = c.center.y + c.extent.y - tile_corner.y + RIM;
+  let first_row = clamp(ceil((low + 0.5) / size.y) - 1.0, 0.0, f32(BLOCK_ROWS));
+  let end_row = clamp(floor((high - 0.5) / size.y) + 1.0, 0.0, f32(BLOCK_ROWS));
+  for (var row = u32(first_row); row < u32(end_row); row++) {
     let top = tile_corner.y + f32(row) * size.y + 0.5;
-    let range = band_range(c, top - 0.01, top + size.y - 0.99) + vec2f(-0.01, 0.01) - tile_corner.x;
+    let range = band_range(c, top - RIM, top + size.y - 1.0 + RIM) + vec2f(-RIM, RIM) - tile_corner.x;
     if (range.x > range.y) { continue; }
-    // Column k holds the pixel centres k·width + 0.5 ... (k + 1)·width - 0.5.
+    // Columns likewise.
     let first = max(ceil((range.x + 0.5) / size.x) - 1.0, 0.0);
     let last = min(floor((range.y - 0.5) / size.x), f32(BLOCK_COLUMNS) - 1.0);
     if (first > last) { continue; }
