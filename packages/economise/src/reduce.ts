@@ -22,35 +22,47 @@ export interface ReducedCloud {
 /** Applies a cut. The source is left as it is. */
 export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedCloud {
   const kept = coarseToFine(cloud, scores, cut);
-  const stride = 3 * shCoefficientCount(cloud.shDegree);
   const degrees = Uint8Array.from(kept, (i) => degreeOf(cloud.shDegree, scores, i, cut.colourPrice ?? 0));
   const highest = degrees.reduce((most, degree) => Math.max(most, degree), 0) as ShDegree;
+  const reduced = {
+    ...cloud,
+    count: kept.length,
+    positions: rowsOf(cloud.positions, 3, kept),
+    scales: rowsOf(cloud.scales, 3, kept),
+    rotations: rowsOf(cloud.rotations, 4, kept),
+    opacities: rowsOf(cloud.opacities, 1, kept),
+    sh: coloursOf(cloud, scores, kept, degrees, highest),
+    shDegree: highest,
+  };
+  return { cloud: reduced, degrees };
+}
+
+/** Rows of so many numbers, in a new order. */
+function rowsOf(values: Float32Array, width: number, kept: Uint32Array): Float32Array {
+  const taken = new Float32Array(width * kept.length);
+  for (let k = 0; k < kept.length; k++) {
+    for (let column = 0; column < width; column++) taken[width * k + column] = values[width * kept[k] + column];
+  }
+  return taken;
+}
+
+/** The coefficients of the splats that stay, each at its degree, in rows as long as the highest needs. */
+function coloursOf(
+  { sh, shDegree }: GaussianCloud,
+  { lowered }: Scores,
+  kept: Uint32Array,
+  degrees: Uint8Array,
+  highest: ShDegree,
+): Float32Array {
+  const stride = 3 * shCoefficientCount(shDegree);
   const length = 3 * shCoefficientCount(highest);
-  const sh = new Float32Array(length * kept.length);
-  kept.forEach((i, k) => {
-    const numbers = 3 * (degrees[k] + 1) ** 2;
-    const lowered = scores.lowered[degrees[k]];
-    const own = lowered ? lowered.sh.subarray(numbers * i) : cloud.sh.subarray(stride * i);
-    sh.set(own.subarray(0, numbers), length * k);
-  });
-  const take = (values: Float32Array, size: number): Float32Array => {
-    const taken = new Float32Array(size * kept.length);
-    kept.forEach((i, k) => taken.set(values.subarray(size * i, size * i + size), size * k));
-    return taken;
-  };
-  return {
-    cloud: {
-      ...cloud,
-      count: kept.length,
-      positions: take(cloud.positions, 3),
-      scales: take(cloud.scales, 3),
-      rotations: take(cloud.rotations, 4),
-      opacities: take(cloud.opacities, 1),
-      sh,
-      shDegree: highest,
-    },
-    degrees,
-  };
+  const colours = new Float32Array(length * kept.length);
+  for (let k = 0; k < kept.length; k++) {
+    const i = kept[k];
+    const own = degrees[k] < shDegree ? lowered[degrees[k]].of(i) : sh.subarray(stride * i, stride * i + stride);
+    colours.set(own, length * k);
+  }
+  return colours;
 }
 
 /** Numbers of the splats that stay, the most seen first: by contribution times the area of the splat. */
@@ -79,6 +91,13 @@ function degreeOf(full: ShDegree, { lowered }: Scores, i: number, price: number)
     [best, least] = [degree as ShDegree, cost];
   }
   return price > 0 ? best : full;
+}
+
+/** [4] splats of each degree. */
+export function degreesOf(degrees: Uint8Array): number[] {
+  const counts = [0, 0, 0, 0];
+  for (const degree of degrees) counts[degree]++;
+  return counts;
 }
 
 /** Coefficients above the constant one that a reduced cloud keeps, all splats and channels together. */

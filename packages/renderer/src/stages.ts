@@ -4,9 +4,10 @@ export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answe
 export * from './generated/live-shaders.js';
 export * from './generated/shaders.js';
 export * from './generated/streamed-shaders.js';
-export { dispatchGrid } from './gpu/kernel.js';
-export { GpuMemory } from './gpu/memory.js';
+export { BUFFER_USAGE, dispatchGrid, rareKernelOf, TEXTURE_USAGE, type ComputeKernel } from './gpu/kernel.js';
+export { GpuMemory, withMemoryCheck } from './gpu/memory.js';
 export { writeStruct } from './gpu/struct.js';
+export { pageCapacity } from './gaussian-buffers.js';
 export { occlusionView } from './occlusion.js';
 export { scaleRotationFactor } from './pack/factor.js';
 export { DETAIL_NUMBERS, DETAIL_PLACES } from './detail/chunk-detail.js';
