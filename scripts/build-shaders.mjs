@@ -20,7 +20,14 @@ const RARE = {
 };
 /** Those of another package, which takes shared parts from the renderer. */
 const ECONOMISE = 'economise';
-RARE[ECONOMISE] = ['economise_cut', 'economise_lower', 'economise_score', 'picture_error', 'picture_error_sum'];
+RARE[ECONOMISE] = [
+  'economise_cut',
+  'economise_lower',
+  'economise_mask',
+  'economise_score',
+  'picture_error',
+  'picture_error_sum',
+];
 const fileOf = (stage) => Object.keys(RARE).find((file) => RARE[file].includes(stage)) ?? 'shaders';
 const IMPORT = /^#import (\S+)$/gm;
 

@@ -1,6 +1,6 @@
 // Applies a cut to a part of a scene: what goes becomes transparent, and splats of which fewer bands are kept take those that were set anew. The same choice
 // as `reduce` of `economise`.
-#import shared/gaussian
+#import shared/transparent
 #import shared/sh
 #import shared/group
 #import shared/score
@@ -73,11 +73,6 @@ fn write_colour(i: u32, degree: u32) {
     let pair = vec2f(lowered_number(source, 2u * k, numbers), lowered_number(source, 2u * k + 1u, numbers));
     cut_sh[first + k] = pack2x16float(pair);
   }
-}
-
-// A Gaussian with opacity 0, which is culled: the bits that shape_words of shared/gaussian takes for the opacity are cleared.
-fn transparent(g: PackedGaussian) -> PackedGaussian {
-  return PackedGaussian(g.head, g.tail & vec4u(0xffffffffu, ~0xffu, ~0x3ffu, ~0x3ffu));
 }
 
 fn apply(i: u32) {

@@ -1,5 +1,5 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import type { Scores } from './score.js';
+import type { Ranking, Scores } from './score.js';
 
 /** What is taken from a scene. */
 export interface Cut {
@@ -59,26 +59,39 @@ function coloursOf(
   const colours = new Float32Array(length * kept.length);
   for (let k = 0; k < kept.length; k++) {
     const i = kept[k];
-    const own = degrees[k] < shDegree ? lowered[degrees[k]].of(i) : sh.subarray(stride * i, stride * i + stride);
-    colours.set(own, length * k);
+    if (degrees[k] < shDegree) colours.set(lowered[degrees[k]].of(i), length * k);
+    else for (let number = 0; number < stride; number++) colours[length * k + number] = sh[stride * i + number];
   }
   return colours;
 }
 
+/**
+ * Positive floats are in the order of their bits. Together with the splat's number they fit the 53 bits of a float64, if need be without their last ones, and numbers sort
+ * many times faster than a comparison does.
+ */
+const [IMPORTANCE_BITS, KEY_BITS] = [31, 53];
+
 /** Numbers of the splats that stay, the most seen first: by contribution times the area of the splat. */
-function coarseToFine({ count, scales }: GaussianCloud, scores: Scores, cut: Cut): Uint32Array {
-  const { contribution, removalError } = scores;
+function coarseToFine(
+  { count, scales }: GaussianCloud,
+  { contribution, removalError }: Ranking,
+  cut: Cut,
+): Uint32Array {
   const { minContribution = 0, removalPrice = 0 } = cut;
-  const importance = new Float32Array(count);
-  const kept = new Uint32Array(count);
+  const importance = new Float32Array(1);
+  const bits = new Uint32Array(importance.buffer);
+  const keys = new Float64Array(count);
+  const placeBits = Math.max(1, Math.ceil(Math.log2(count)));
+  const [places, unit] = [2 ** placeBits, 2 ** Math.max(0, placeBits + IMPORTANCE_BITS - KEY_BITS)];
   let length = 0;
   for (let i = 0; i < count; i++) {
     if (contribution[i] < minContribution || removalError[i] < removalPrice) continue;
     const [a, b, c] = [scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]];
-    importance[i] = contribution[i] * Math.max(a * b, b * c, c * a);
-    kept[length++] = i;
+    importance[0] = contribution[i] * Math.max(a * b, b * c, c * a);
+    keys[length++] = Math.floor((2 ** IMPORTANCE_BITS - bits[0]) / unit) * places + i;
   }
-  return kept.slice(0, length).sort((a, b) => importance[b] - importance[a] || a - b);
+  const sorted = keys.subarray(0, length).sort();
+  return Uint32Array.from(sorted, (key) => key % places);
 }
 
 /** The degree at which error and the price of what is kept add up to least. */

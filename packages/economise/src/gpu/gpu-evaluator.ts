@@ -165,22 +165,27 @@ export class GpuEvaluator implements Evaluator {
   #loweredOf(parts: readonly Float32Array[]): LoweredColours[] {
     const { count, shDegree } = this.#cloud;
     const stride = loweredNumbers(shDegree);
-    // Of each splat its record, or none if the renderer refuses it.
-    const records = new Uint32Array(count).fill(NO_RECORD);
-    this.#scene.order.forEach((i, slot) => (records[i] = slot));
     const partSplats = parts[0].length / stride;
-    const recordOf = (i: number, first: number, end: number): Float32Array => {
-      const slot = records[i];
-      if (slot === NO_RECORD) return new Float32Array(end - first);
-      const at = stride * (slot % partSplats);
-      return parts[Math.floor(slot / partSplats)].subarray(at + first, at + end);
-    };
-    return Array.from({ length: shDegree }, (_, degree) => {
+    const partOf = (slot: number): Float32Array => parts[Math.floor(slot / partSplats)];
+    // Of each splat its record, or none if the renderer refuses it.
+    const slots = new Uint32Array(count).fill(NO_SLOT);
+    const errors = Array.from({ length: shDegree }, () => new Float32Array(count));
+    this.#scene.order.forEach((i, slot) => {
+      slots[i] = slot;
+      const [record, at] = [partOf(slot), stride * (slot % partSplats)];
+      for (let degree = 0; degree < shDegree; degree++) errors[degree][i] = record[at + degree];
+    });
+    return errors.map((error, degree) => {
       const [first, end] = [loweredNumbers(shDegree, degree), loweredNumbers(shDegree, degree + 1)];
-      const error = Float32Array.from({ length: count }, (_, i) => recordOf(i, degree, degree + 1)[0]);
-      return { error, of: (i) => recordOf(i, first, end) };
+      const of = (i: number): Float32Array => {
+        const slot = slots[i];
+        if (slot === NO_SLOT) return new Float32Array(end - first);
+        const at = stride * (slot % partSplats);
+        return partOf(slot).subarray(at + first, at + end);
+      };
+      return { error, of };
     });
   }
 }
 
-const NO_RECORD = 0xffffffff;
+const NO_SLOT = 0xffffffff;

@@ -13,6 +13,9 @@ const COUNTS_BYTES = 16;
 /** Bindings begin at multiples of 256 bytes. */
 const ALIGNED_TILES = 256 / SUM_BYTES;
 
+/** What is waited for between two pictures. */
+export type Pause = () => Promise<void>;
+
 /** A view, and the picture that others are held against. */
 interface Exhibit {
   readonly camera: Camera;
@@ -59,16 +62,20 @@ export class PictureErrors {
     this.#exhibits = views.map((camera, k) => this.#exhibit(camera, { buffer: tiles, offset: size * k, size }));
   }
 
-  /** Draws the pictures that others will be held against. @param renderer one with the rasterizer `tiles` */
+  /**
+   * Draws the pictures that others will be held against.
+   * @param pause waited for between two pictures: the turn of others
+   */
   static async of(
     device: GPUDevice,
     renderer: Renderer,
     gaussians: GaussianScene,
     views: readonly Camera[],
+    pause?: Pause,
   ): Promise<PictureErrors> {
     const made = new PictureErrors(device, renderer, views);
     try {
-      await made.#draw(gaussians, ({ reference }) => reference);
+      await made.#draw(gaussians, ({ reference }) => reference, pause);
       return made;
     } catch (error) {
       made.destroy();
@@ -77,8 +84,8 @@ export class PictureErrors {
   }
 
   /** [views] mean squared error of the colours, peak 1, over the pixels that the reference covers; 0 where it covers none. */
-  async measure(gaussians: GaussianScene): Promise<number[]> {
-    const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.#targetOf(camera)));
+  async measure(gaussians: GaussianScene, pause?: Pause): Promise<number[]> {
+    const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.#targetOf(camera), pause));
     return this.#exhibits.map((_, k) => (sums[2 * k + 1] === 0 ? 0 : sums[2 * k] / (3 * sums[2 * k + 1])));
   }
 
@@ -117,12 +124,17 @@ export class PictureErrors {
   }
 
   /** Draws all views, again where there was no room for all of them. @returns the sums to the references */
-  async #draw(gaussians: GaussianScene, targetOf: (exhibit: Exhibit) => GPUTexture): Promise<ArrayBuffer> {
+  async #draw(
+    gaussians: GaussianScene,
+    targetOf: (exhibit: Exhibit) => GPUTexture,
+    pause: Pause | undefined,
+  ): Promise<ArrayBuffer> {
     for (let tries = 1; ; tries++) {
-      this.#exhibits.forEach((exhibit, k) => {
+      for (const [k, exhibit] of this.#exhibits.entries()) {
         this.#renderer.render({ gaussians, camera: exhibit.camera, target: targetOf(exhibit) });
         this.#compare(exhibit, k);
-      });
+        await pause?.();
+      }
       this.#addUp();
       const [sums, counts] = await readBack(this.#device, [{ buffer: this.#errors }, { buffer: this.#counts }]);
       const hadRoom = this.#exhibits.map((_, k) =>
