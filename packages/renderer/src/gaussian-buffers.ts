@@ -12,8 +12,6 @@ import { shWords, type ShPrecision } from './pack/sh.js';
 export interface UploadOptions {
   /** Bytes of GPU memory that the scene may take; default no limit but the device's. */
   readonly memoryBudget?: number;
-  /** Most splats in a page, for those who bind more than the renderer does for each; rounded down to whole chunks of 256. Default: what the device's limits allow. */
-  readonly pageSplats?: number;
 }
 
 /** Gaussians on the GPU, ready for any {@link Renderer} of the same device. */
@@ -35,7 +33,7 @@ export class GaussianBuffers implements GaussianScene {
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
 
-  private constructor(device: GPUDevice, packed: PackedGaussians, { memoryBudget, pageSplats }: UploadOptions) {
+  private constructor(device: GPUDevice, packed: PackedGaussians, memoryBudget?: number) {
     ({
       count: this.count,
       shDegree: this.shDegree,
@@ -50,7 +48,7 @@ export class GaussianBuffers implements GaussianScene {
     this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), bytes, memoryBudget);
     this.#memory = new GpuMemory(device);
     try {
-      this.pages = uploadPages(device, packed, this.#memory, pageSplats);
+      this.pages = uploadPages(device, packed, this.#memory);
     } catch (error) {
       this.destroy();
       throw error;
@@ -65,9 +63,9 @@ export class GaussianBuffers implements GaussianScene {
   static async upload(
     device: GPUDevice,
     packed: PackedGaussians,
-    options: UploadOptions = {},
+    { memoryBudget }: UploadOptions = {},
   ): Promise<GaussianBuffers> {
-    return withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, options));
+    return withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, memoryBudget));
   }
 
   /** Bytes of GPU memory held. */
@@ -83,17 +81,10 @@ export class GaussianBuffers implements GaussianScene {
 
 const whatOf = ({ count }: PackedGaussians): string => `scene of ${count} splats`;
 
-function uploadPages(
-  device: GPUDevice,
-  packed: PackedGaussians,
-  memory: GpuMemory,
-  pageSplats = Infinity,
-): GaussianPage[] {
+function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemory): GaussianPage[] {
   const shStride = shWords(packed.shDegree, packed.shPrecision);
   const chunks = new Uint32Array(packed.chunks.buffer, packed.chunks.byteOffset, packed.chunks.length);
-  const { CULL_GROUP } = constants;
-  const most = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
-  const capacity = Math.min(most, Math.max(1, Math.floor(pageSplats / CULL_GROUP)) * CULL_GROUP);
+  const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
   const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
   const details =
     packed.details && new Uint32Array(packed.details.buffer, packed.details.byteOffset, packed.details.length);
@@ -102,7 +93,7 @@ function uploadPages(
     const end = Math.min(first + capacity, packed.count);
     const part = (label: string, words: Uint32Array, stride: number, from = first, to = end): GPUBuffer =>
       memory.buffer(label, 4 * stride * (to - from), usage, words.subarray(stride * from, stride * to));
-    const [firstChunk, endChunk] = [first / CULL_GROUP, Math.ceil(end / CULL_GROUP)];
+    const [firstChunk, endChunk] = [first / constants.CULL_GROUP, Math.ceil(end / constants.CULL_GROUP)];
     pages.push({
       count: end - first,
       geometry: part('gs.gaussians.geometry', packed.geometry, GEOMETRY_WORDS),

@@ -20,6 +20,7 @@ export { Residency } from './detail/residency.js';
 export { MOST_UPLOAD_BYTES, UploadPace } from './detail/upload-pace.js';
 export { halfBits } from './pack/half.js';
 export { mortonOrder } from './pack/morton.js';
+export { recentred } from './pack/recentre.js';
 export { SH_PRECISION, shWords } from './pack/sh.js';
 export { planOffsets, Scratch } from './scratch.js';
 export { CompactStage } from './stages/compact.js';

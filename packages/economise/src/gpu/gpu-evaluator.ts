@@ -1,11 +1,12 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { Renderer } from '@gaussian-splat/renderer';
 import type { LoweredColours } from '../colour-moments.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import { UNJUDGED } from '../generated/shaders.js';
 import type { Cut } from '../reduce.js';
 import type { Ranking, Scores } from '../score.js';
 import type { DealtViews } from '../views.js';
+import { CloudBuffers } from './cloud-buffers.js';
 import { CutScene } from './cut-scene.js';
 import { layouts } from './layouts.js';
 import { PictureErrors } from './picture-errors.js';
@@ -19,7 +20,7 @@ export interface GpuEvaluatorOptions {
 }
 
 /**
- * Scores and compares on the GPU. The scene is packed and uploaded once; a cut is applied to a copy there, and of its pictures only their errors come back. It takes 296 bytes of GPU memory a splat of
+ * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and of its pictures only their errors come back. It takes 296 bytes of GPU memory a splat of
  * degree 3 for the scene and its copy, 196 for scores and colours, 4 for each scored view, and 16 a pixel of all other views.
  */
 export class GpuEvaluator implements Evaluator {
@@ -93,7 +94,8 @@ export class GpuEvaluator implements Evaluator {
     const found = new Float32Array(this.#cloud.count);
     let slot = 0;
     for (const bytes of await readBack(this.#device, parts)) {
-      for (const energy of new Float32Array(bytes)) found[this.#scene.order[slot++]] = energy;
+      found.set(new Float32Array(bytes), slot);
+      slot += bytes.byteLength / 4;
     }
     return found;
   }
@@ -121,7 +123,7 @@ export class GpuEvaluator implements Evaluator {
   async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
     const errors = await this.#errorsIn(views);
     signal?.throwIfAborted();
-    const gaussians = await GaussianBuffers.upload(this.#device, packGaussians(cloud, { sh: 'float16' }));
+    const gaussians = await CloudBuffers.upload(this.#device, cloud);
     try {
       return await errors.measure(gaussians);
     } finally {
@@ -144,19 +146,18 @@ export class GpuEvaluator implements Evaluator {
     return made;
   }
 
-  /** Scores by splat. Those that the renderer refuses contribute nothing. */
+  /** Scores by splat. */
   #rankingOf(parts: readonly ArrayBuffer[]): Ranking {
-    const { order } = this.#scene;
     const stride = layouts.Score.size / 4;
     const { contribution: at, removal } = layouts.Score.fields;
     const contribution = new Float32Array(this.#cloud.count);
     const removalError = new Float32Array(this.#cloud.count);
-    let slot = 0;
+    let i = 0;
     for (const scores of parts.map((bytes) => new Float32Array(bytes))) {
-      for (let k = 0; k < scores.length; k += stride, slot++) {
+      for (let k = 0; k < scores.length; k += stride, i++) {
         const error = scores[k + removal.offset / 4];
-        contribution[order[slot]] = scores[k + at.offset / 4];
-        removalError[order[slot]] = error >= UNJUDGED ? Infinity : error;
+        contribution[i] = scores[k + at.offset / 4];
+        removalError[i] = error >= UNJUDGED ? Infinity : error;
       }
     }
     return { contribution, removalError };
@@ -166,26 +167,16 @@ export class GpuEvaluator implements Evaluator {
     const { count, shDegree } = this.#cloud;
     const stride = loweredNumbers(shDegree);
     const partSplats = parts[0].length / stride;
-    const partOf = (slot: number): Float32Array => parts[Math.floor(slot / partSplats)];
-    // Of each splat its record, or none if the renderer refuses it.
-    const slots = new Uint32Array(count).fill(NO_SLOT);
-    const errors = Array.from({ length: shDegree }, () => new Float32Array(count));
-    this.#scene.order.forEach((i, slot) => {
-      slots[i] = slot;
-      const [record, at] = [partOf(slot), stride * (slot % partSplats)];
-      for (let degree = 0; degree < shDegree; degree++) errors[degree][i] = record[at + degree];
-    });
-    return errors.map((error, degree) => {
+    const partOf = (i: number): Float32Array => parts[Math.floor(i / partSplats)];
+    return Array.from({ length: shDegree }, (_, degree) => {
       const [first, end] = [loweredNumbers(shDegree, degree), loweredNumbers(shDegree, degree + 1)];
+      const error = new Float32Array(count);
+      for (let i = 0; i < count; i++) error[i] = partOf(i)[stride * (i % partSplats) + degree];
       const of = (i: number): Float32Array => {
-        const slot = slots[i];
-        if (slot === NO_SLOT) return new Float32Array(end - first);
-        const at = stride * (slot % partSplats);
-        return partOf(slot).subarray(at + first, at + end);
+        const at = stride * (i % partSplats);
+        return partOf(i).subarray(at + first, at + end);
       };
       return { error, of };
     });
   }
 }
-
-const NO_SLOT = 0xffffffff;

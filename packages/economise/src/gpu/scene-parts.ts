@@ -1,6 +1,7 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { GaussianBuffers, packedOrder, packGaussians, type GaussianPage } from '@gaussian-splat/renderer';
+import type { GaussianPage } from '@gaussian-splat/renderer';
 import { BUFFER_USAGE, GpuMemory, pageCapacity, withMemoryCheck } from '@gaussian-splat/renderer/stages';
+import { CloudBuffers } from './cloud-buffers.js';
 import { layouts } from './layouts.js';
 
 const CHUNK = 256;
@@ -33,18 +34,15 @@ export function loweredNumbers(degree: ShDegree, lower: number = degree): number
 
 /** A cloud on the GPU, in parts that a binding holds with all that is found out about them. */
 export class SceneParts {
-  readonly gaussians: GaussianBuffers;
-  /** [slots] the splat of the cloud in each slot of the GPU. */
-  readonly order: Uint32Array;
+  readonly gaussians: CloudBuffers;
   readonly parts: readonly ScenePart[];
   /** Splats of the scene, of every part whole chunks. */
   readonly slots: number;
   readonly #memory: GpuMemory;
 
-  private constructor(memory: GpuMemory, gaussians: GaussianBuffers, order: Uint32Array, views: number) {
+  private constructor(memory: GpuMemory, gaussians: CloudBuffers, views: number) {
     this.#memory = memory;
     this.gaussians = gaussians;
-    this.order = order;
     let first = 0;
     this.parts = gaussians.pages.map((page) => {
       const part = partOf(memory, page, first, views, gaussians.shDegree);
@@ -65,17 +63,15 @@ export class SceneParts {
     views: number,
     mostSplats = Infinity,
   ): Promise<SceneParts> {
-    const order = packedOrder(cloud);
-    const packed = packGaussians(cloud, { sh: 'float16', order });
     const largest = Math.max(layouts.Score.size, FLOAT_BYTES * Math.max(views, loweredNumbers(cloud.shDegree)));
     const pageSplats = Math.min(mostSplats, pageCapacity(device, largest));
-    const gaussians = await GaussianBuffers.upload(device, packed, { pageSplats });
+    const gaussians = await CloudBuffers.upload(device, cloud, pageSplats);
     const memory = new GpuMemory(device);
     try {
       const destroy = (): void => memory.destroy();
       const where = `scores of ${cloud.count} splats`;
       const { made } = await withMemoryCheck(device, where, () => ({
-        made: new SceneParts(memory, gaussians, order, views),
+        made: new SceneParts(memory, gaussians, views),
         destroy,
       }));
       return made;

@@ -14,8 +14,6 @@ export interface PackOptions {
    * 62 dB below white a splat, 75 dB and more in images. docs/decisions/0007 has the figures.
    */
   readonly sh?: ShPrecision | 'auto';
-  /** Numbers of the splats to pack, in that order; default {@link packedOrder}. For those who need to know which splat lies where. */
-  readonly order?: Uint32Array;
 }
 
 /**
@@ -61,7 +59,7 @@ export function packGaussians(given: GaussianCloud, options: PackOptions = {}): 
   validateCloud(given);
   const cloud = recentred(given);
   const { shDegree, antialiased, origin } = cloud;
-  const kept = options.order ?? packedOrder(cloud);
+  const kept = packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
