@@ -22,7 +22,7 @@ import { readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 
-const SIZE = { width: 96, height: 64 };
+const SIZE = { width: 64, height: 48 };
 const COUNT = 900;
 
 /** A ball of splats of degree 3, some dim, some inside, and colours that depend on the view. */
@@ -43,8 +43,8 @@ function ball(): GaussianCloud {
 const scene = ball();
 const dealt = dealtViewsAround(boundsOf(scene), SIZE);
 const views = {
-  scored: dealt.scored.slice(0, 20),
-  searched: dealt.searched.slice(0, 2),
+  scored: dealt.scored.slice(0, 16),
+  searched: dealt.searched.slice(0, 1),
   heldOut: dealt.heldOut.slice(0, 2),
 };
 
@@ -164,13 +164,7 @@ for (const [name, cutOf] of [
 test('a cut can be taken back', async () => {
   await evaluator.cut({ minContribution: 0.5 }, 'searched');
   const { errors, degrees } = await evaluator.cut({}, 'searched');
-  assert.deepEqual(
-    [errors, degrees],
-    [
-      [0, 0],
-      [0, 0, 0, COUNT],
-    ],
-  );
+  assert.deepEqual([errors, degrees], [[0], [0, 0, 0, COUNT]]);
 });
 
 test('the asked figure is met by the written file', async () => {
