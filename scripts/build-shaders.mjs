@@ -24,6 +24,7 @@ RARE[ECONOMISE] = [
   'economise_cut',
   'economise_lower',
   'economise_mask',
+  'economise_moments',
   'economise_score',
   'picture_error',
   'picture_error_sum',

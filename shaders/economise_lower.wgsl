@@ -1,12 +1,11 @@
 // For each splat the coefficients of lower degrees that come nearest to the colours that the views saw, by least squares, and the error that is left:
 // see ColourMoments of `economise`, which does the same on the CPU. Also what its scores are once all views have been looked at.
-#import shared/gaussian
-#import shared/sh
+#import shared/moments
 #import shared/group
 #import shared/score
 
 struct Lowering {
-  // Splats of the part, and from one row of `energies` to the next.
+  // Splats of the part, and from one row of `moments` to the next.
   splat_count: u32,
   row: u32,
   views: u32,
@@ -20,33 +19,21 @@ struct Lowering {
 }
 
 @group(0) @binding(0) var<uniform> lowering: Lowering;
-// Where the views look from, page-local.
-@group(0) @binding(1) var<storage, read> eyes: array<vec4f>;
-@group(0) @binding(2) var<storage, read> gaussians: array<PackedGaussian>;
 // float16, two a word.
-@group(0) @binding(3) var<storage, read> sh: array<u32>;
-// A row for each view.
-@group(0) @binding(4) var<storage, read> energies: array<f32>;
-@group(0) @binding(5) var<storage, read_write> scores: array<Score>;
+@group(0) @binding(1) var<storage, read> sh: array<u32>;
+@group(0) @binding(2) var<storage, read> moments: array<f32>;
+@group(0) @binding(3) var<storage, read_write> scores: array<Score>;
 // For each splat the errors of degrees 0 to sh_degree - 1, then the coefficients of degree 0, of degree 1 and of degree 2.
-@group(0) @binding(6) var<storage, read_write> lowered: array<f32>;
+@group(0) @binding(4) var<storage, read_write> lowered: array<f32>;
 
 const PI = 3.14159265358979;
 // What stands for no bound: WGSL has no infinity.
 const UNJUDGED = 3e38;
 // A direction that no view knows is left alone: its pivot is less than this part of the diagonal.
 const LEAST_PIVOT = 1e-6;
-const MAX_COEFFICIENTS = 16u;
 
-// The moments of the basis functions, then their Cholesky factor: lower triangle, rows outermost.
-var<private> matrix: array<f32, 136>;
-var<private> basis: array<f32, MAX_COEFFICIENTS>;
 var<private> own: array<vec3f, MAX_COEFFICIENTS>;
 var<private> shift: array<vec3f, MAX_COEFFICIENTS>;
-
-fn at(row: u32, column: u32) -> u32 {
-  return row * (row + 1u) / 2u + column;
-}
 
 fn half_at(number: u32) -> f32 {
   let pair = unpack2x16float(sh[number / 2u]);
@@ -61,32 +48,7 @@ fn load_coefficients(i: u32, size: u32) {
   }
 }
 
-fn load_basis(d: vec3f, size: u32) {
-  for (var q = 0u; 4u * q < size; q++) {
-    let values = sh_basis(q, d);
-    for (var k = 0u; k < 4u; k++) { basis[4u * q + k] = values[k]; }
-  }
-}
-
-// Sums of the products of basis functions over the views, weighted by energy.
-fn gather_moments(i: u32, size: u32, position: vec3f) {
-  for (var k = 0u; k < at(size, 0u); k++) { matrix[k] = 0.0; }
-  for (var v = 0u; v < lowering.views; v++) {
-    let energy = energies[v * lowering.row + i];
-    if (energy == 0.0) { continue; }
-    load_basis(normalize(position - eyes[v].xyz), size);
-    var k = 0u;
-    for (var row = 0u; row < size; row++) {
-      let weight = energy * basis[row];
-      for (var column = 0u; column <= row; column++) {
-        matrix[k] += weight * basis[column];
-        k++;
-      }
-    }
-  }
-}
-
-// Cholesky's method in place. One factor serves all degrees: that of the first coefficients is its beginning.
+// Cholesky's method in place, on the moments. One factor serves all degrees: that of the first coefficients is its beginning.
 fn factorise(size: u32) {
   for (var row = 0u; row < size; row++) {
     for (var column = 0u; column <= row; column++) {
@@ -163,7 +125,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   if (lowering.sh_degree == 0u) { return; }
   let size = (lowering.sh_degree + 1u) * (lowering.sh_degree + 1u);
   load_coefficients(i, size);
-  gather_moments(i, size, unpack_gaussian(gaussians[i]).position);
+  for (var k = 0u; k < at(size, 0u); k++) { matrix[k] = moments[k * lowering.row + i]; }
   let prior = lowering.prior_views * s.energy / f32(max(1u, s.looks)) / (4.0 * PI);
   for (var k = 0u; k < size; k++) { matrix[at(k, k)] += prior; }
   factorise(size);

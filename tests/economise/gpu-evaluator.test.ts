@@ -64,8 +64,7 @@ before(async () => {
 function apart(found: ArrayLike<number>, expected: ArrayLike<number>): number {
   let [most, largest] = [0, 0];
   for (let i = 0; i < expected.length; i++) {
-    if (found[i] === expected[i]) continue;
-    most = Math.max(most, Math.abs(found[i] - expected[i]));
+    if (found[i] !== expected[i]) most = Math.max(most, Math.abs(found[i] - expected[i]));
     if (Number.isFinite(expected[i])) largest = Math.max(largest, Math.abs(expected[i]));
   }
   return most / largest;
@@ -123,6 +122,17 @@ test('a scene in parts is scored as one in a single part', async () => {
   for (const [degree, { error, of }] of whole.lowered.entries()) {
     assert.deepEqual(error, scores.lowered[degree].error);
     for (let i = 0; i < COUNT; i += 7) assert.deepEqual(of(i), scores.lowered[degree].of(i));
+  }
+});
+
+test('views that are looked at a few at once add up to the same', async () => {
+  const few = await GpuEvaluator.create(device, scene, views, { viewsAtOnce: 5 });
+  assert.deepEqual(await few.rank(), ranking);
+  const found = await few.scores();
+  few.destroy();
+  for (const [degree, { error, of }] of found.lowered.entries()) {
+    assert.ok(apart(error, scores.lowered[degree].error) < 1e-4);
+    for (let i = 0; i < COUNT; i += 7) assert.ok(apart(of(i), scores.lowered[degree].of(i)) < 1e-4, `splat ${i}`);
   }
 });
 

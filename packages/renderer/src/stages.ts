@@ -6,7 +6,7 @@ export * from './generated/shaders.js';
 export * from './generated/streamed-shaders.js';
 export { BUFFER_USAGE, dispatchGrid, rareKernelOf, TEXTURE_USAGE, type ComputeKernel } from './gpu/kernel.js';
 export { GpuMemory, withMemoryCheck } from './gpu/memory.js';
-export { writeStruct } from './gpu/struct.js';
+export { writeStruct, type StructLayout, type StructValues } from './gpu/struct.js';
 export { pageCapacity } from './gaussian-buffers.js';
 export { occlusionView } from './occlusion.js';
 export { scaleRotationFactor } from './pack/factor.js';

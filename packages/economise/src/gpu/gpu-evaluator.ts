@@ -17,11 +17,16 @@ import { SceneScorer } from './scene-scorer.js';
 export interface GpuEvaluatorOptions {
   /** Most splats that are bound at once, for tests; default what the device's limits allow. */
   readonly partSplats?: number;
+  /** Views whose energies are kept until they are added to the moments of colour, default 32. */
+  readonly viewsAtOnce?: number;
 }
 
+/** Bytes of them are a fourth of what the moments take. */
+const VIEWS_AT_ONCE = 32;
+
 /**
- * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and of its pictures only their errors come back. It takes 296 bytes of GPU memory a splat of
- * degree 3 for the scene and its copy, 196 for scores and colours, 4 for each scored view, and 16 a pixel of all other views.
+ * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and of its pictures only their errors come back. It takes 256 bytes of GPU memory a splat of
+ * degree 3 for the scene and its copy, 872 for scores and colours, and 16 for each pixel of the views that errors are measured in.
  */
 export class GpuEvaluator implements Evaluator {
   readonly #device: GPUDevice;
@@ -58,9 +63,10 @@ export class GpuEvaluator implements Evaluator {
     device: GPUDevice,
     cloud: GaussianCloud,
     views: DealtViews,
-    { partSplats }: GpuEvaluatorOptions = {},
+    { partSplats, viewsAtOnce = VIEWS_AT_ONCE }: GpuEvaluatorOptions = {},
   ): Promise<GpuEvaluator> {
-    const scene = await SceneParts.upload(device, cloud, views.scored.length, partSplats);
+    const energies = Math.min(views.scored.length, viewsAtOnce);
+    const scene = await SceneParts.upload(device, cloud, energies, partSplats);
     try {
       return new GpuEvaluator(device, cloud, views, scene, await CutScene.of(device, scene));
     } catch (error) {
@@ -84,11 +90,14 @@ export class GpuEvaluator implements Evaluator {
     }
   }
 
-  /** [N] what the splats had of a scored view: the sum of the squares of their weights over the pixels of its picture, as far as peak and size tell. */
+  /**
+   * [N] what the splats had of a scored view, one of the last that were looked at together: the sum of the squares of their weights over the pixels of its picture, as far as
+   * peak and size tell.
+   */
   async energiesIn(view: number): Promise<Float32Array> {
     const parts = this.#scene.parts.map(({ energies, row, page }) => ({
       buffer: energies,
-      byteOffset: 4 * row * view,
+      byteOffset: 4 * row * (view % this.#scene.views),
       byteLength: 4 * page.count,
     }));
     const found = new Float32Array(this.#cloud.count);

@@ -16,8 +16,10 @@ export interface ScenePart {
   readonly row: number;
   /** array<Score> */
   readonly scores: GPUBuffer;
-  /** array<f32>: a row for each view. */
+  /** array<f32>: a row for each of the views at hand. */
   readonly energies: GPUBuffer;
+  /** array<f32>: a row for each number of the moments of colour: see shaders/shared/moments.wgsl. */
+  readonly moments: GPUBuffer;
   /** array<f32>: {@link loweredNumbers} for each splat. */
   readonly lowered: GPUBuffer;
 }
@@ -32,17 +34,26 @@ export function loweredNumbers(degree: ShDegree, lower: number = degree): number
   return numbers;
 }
 
+/** Numbers of a triangle of basis functions against one another; none where there is no lower degree. */
+function momentNumbers(degree: ShDegree): number {
+  const size = shCoefficientCount(degree);
+  return degree === 0 ? 0 : (size * (size + 1)) / 2;
+}
+
 /** A cloud on the GPU, in parts that a binding holds with all that is found out about them. */
 export class SceneParts {
   readonly gaussians: CloudBuffers;
   readonly parts: readonly ScenePart[];
   /** Splats of the scene, of every part whole chunks. */
   readonly slots: number;
+  /** Views that `energies` has room for. */
+  readonly views: number;
   readonly #memory: GpuMemory;
 
   private constructor(memory: GpuMemory, gaussians: CloudBuffers, views: number) {
     this.#memory = memory;
     this.gaussians = gaussians;
+    this.views = views;
     let first = 0;
     this.parts = gaussians.pages.map((page) => {
       const part = partOf(memory, page, first, views, gaussians.shDegree);
@@ -53,7 +64,7 @@ export class SceneParts {
   }
 
   /**
-   * @param views how many the scene is scored in
+   * @param views how many the scene is scored in at once
    * @param mostSplats of a part; default what the device's limits allow
    * @throws GaussianSplatError `out-of-memory/*`
    */
@@ -63,7 +74,10 @@ export class SceneParts {
     views: number,
     mostSplats = Infinity,
   ): Promise<SceneParts> {
-    const largest = Math.max(layouts.Score.size, FLOAT_BYTES * Math.max(views, loweredNumbers(cloud.shDegree)));
+    const largest = Math.max(
+      layouts.Score.size,
+      FLOAT_BYTES * Math.max(views, momentNumbers(cloud.shDegree), loweredNumbers(cloud.shDegree)),
+    );
     const pageSplats = Math.min(mostSplats, pageCapacity(device, largest));
     const gaussians = await CloudBuffers.upload(device, cloud, pageSplats);
     const memory = new GpuMemory(device);
@@ -97,6 +111,7 @@ function partOf(memory: GpuMemory, page: GaussianPage, first: number, views: num
     ...{ page, first, row },
     scores: buffer('scores', layouts.Score.size),
     energies: buffer('energies', FLOAT_BYTES * views),
+    moments: buffer('moments', FLOAT_BYTES * momentNumbers(degree)),
     lowered: buffer('lowered', FLOAT_BYTES * loweredNumbers(degree)),
   };
 }

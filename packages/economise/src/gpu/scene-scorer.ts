@@ -1,5 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
-import { eyeOf } from '@gaussian-splat/core';
+import { eyeOf, type Camera } from '@gaussian-splat/core';
 import type { Renderer } from '@gaussian-splat/renderer';
 import {
   BUFFER_USAGE,
@@ -9,13 +8,15 @@ import {
   rareKernelOf,
   TEXTURE_USAGE,
   writeStruct,
+  type StructLayout,
+  type StructValues,
 } from '@gaussian-splat/renderer/stages';
 import { PRIOR_VIEWS } from '../colour-moments.js';
-import { economiseLower, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
+import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
 import { MIN_LOOKS, UNSEEN_CONTRAST } from '../score.js';
 import { layouts } from './layouts.js';
 import { readBack } from './read-back.js';
-import { type ScenePart, type SceneParts } from './scene-parts.js';
+import type { SceneParts } from './scene-parts.js';
 
 /**
  * Squared difference of a splat's colour to what lies behind it, a channel: an assumption, on the low side of the means of captured scenes (0.05 to 0.16). It shifts
@@ -41,6 +42,8 @@ export class SceneScorer {
   /** By slot: the largest weights in the view at hand. */
   readonly #peaks: GPUBuffer;
   readonly #counts: GPUBuffer;
+  /** Where the views look from, page-local. */
+  readonly #eyes: GPUBuffer;
   readonly #targets = new Map<string, GPUTexture>();
 
   /** @param renderer one with the rasterizer `tiles` */
@@ -57,6 +60,7 @@ export class SceneScorer {
       COUNTS_BYTES * views.length,
       copySource | copyDestination,
     );
+    this.#eyes = this.#memory.buffer('gs.economise.eyes', 16 * views.length, storage, eyesOf(views, scene));
   }
 
   /** Scores all splats, and finds their colours at lower degrees. */
@@ -77,7 +81,10 @@ export class SceneScorer {
     const uniforms = this.#writeViews();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.clear' });
     encoder.clearBuffer(this.#peaks);
-    for (const { scores } of this.#scene.parts) encoder.clearBuffer(scores);
+    for (const { scores, moments } of this.#scene.parts) {
+      encoder.clearBuffer(scores);
+      encoder.clearBuffer(moments);
+    }
     this.#device.queue.submit([encoder.finish()]);
     this.#views.forEach((camera, k) => {
       signal?.throwIfAborted();
@@ -85,6 +92,8 @@ export class SceneScorer {
       const target = this.#targetOf(camera);
       this.#renderer.render({ gaussians: this.#scene.gaussians, camera, target, notes });
       this.#note(uniforms, k);
+      const isLast = k === this.#views.length - 1;
+      if (isLast || (k + 1) % this.#scene.views === 0) this.#gather(k - (k % this.#scene.views), k + 1);
     });
     const [counts] = await readBack(this.#device, [{ buffer: this.#counts }]);
     this.#memory.free(uniforms);
@@ -123,7 +132,7 @@ export class SceneScorer {
         view: { buffer: uniforms, offset, size: rendererLayouts.View.size },
         gaussians: page.geometry,
         peaks: { buffer: this.#peaks, offset: FLOAT_BYTES * first, size },
-        energies: { buffer: energies, offset: size * k, size },
+        energies: { buffer: energies, offset: size * (k % this.#scene.views), size },
         scores,
       });
       kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
@@ -132,45 +141,44 @@ export class SceneScorer {
     this.#device.queue.submit([encoder.finish()]);
   }
 
+  /** Adds the views from `first` to `end`, whose energies are at hand, to the moments of colour. */
+  #gather(first: number, end: number): void {
+    const { shDegree } = this.#scene.gaussians;
+    if (shDegree === 0) return;
+    const kernel = rareKernelOf(this.#device, economiseMoments);
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.moments' });
+    const pass = encoder.beginComputePass({ label: 'gs.economise.moments' });
+    this.#scene.parts.forEach(({ page, row, energies, moments }) => {
+      const counts = { splat_count: page.count, row, views: end - first, first_view: first, sh_degree: shDegree };
+      const seen = this.#uniform(layouts.MomentViews, counts);
+      const bindings = kernel.bind({ seen, eyes: this.#eyes, gaussians: page.geometry, energies, moments });
+      kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
+    });
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
   /** Turns sums into scores and colours, a submission for each part. */
   #lower(): void {
-    const { gaussians, parts } = this.#scene;
-    const { origin, shDegree } = gaussians;
-    const { uniform, storage, copyDestination } = BUFFER_USAGE;
-    const places = this.#views.flatMap(({ worldToCamera }) => [
-      ...eyeOf(worldToCamera).map((value, axis) => value - origin[axis]),
-      1,
-    ]);
-    const eyes = this.#memory.buffer('gs.economise.eyes', 4 * places.length, storage | copyDestination);
-    this.#device.queue.writeBuffer(eyes, 0, Float32Array.from(places));
-    for (const part of parts) {
-      const bytes = new ArrayBuffer(layouts.Lowering.size);
-      writeStruct(
-        layouts.Lowering,
-        {
-          ...{ splat_count: part.page.count, row: part.row, views: this.#views.length, sh_degree: shDegree },
-          ...{ contrast: USUAL_CONTRAST + UNSEEN_CONTRAST, prior_views: PRIOR_VIEWS, least_looks: MIN_LOOKS },
-        },
-        bytes,
-      );
-      const lowering = this.#memory.buffer('gs.economise.lowering', bytes.byteLength, uniform | copyDestination);
-      this.#device.queue.writeBuffer(lowering, 0, bytes);
-      this.#lowerPart(part, lowering, eyes);
+    const kernel = rareKernelOf(this.#device, economiseLower);
+    for (const { page, row, scores, moments, lowered } of this.#scene.parts) {
+      const lowering = this.#uniform(layouts.Lowering, {
+        ...{ splat_count: page.count, row, views: this.#views.length, sh_degree: this.#scene.gaussians.shDegree },
+        ...{ contrast: USUAL_CONTRAST + UNSEEN_CONTRAST, prior_views: PRIOR_VIEWS, least_looks: MIN_LOOKS },
+      });
+      const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.lower' });
+      const pass = encoder.beginComputePass({ label: 'gs.economise.lower' });
+      const bindings = kernel.bind({ lowering, sh: page.sh, moments, scores, lowered });
+      kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
+      pass.end();
+      this.#device.queue.submit([encoder.finish()]);
     }
   }
 
-  #lowerPart({ page, energies, scores, lowered }: ScenePart, lowering: GPUBuffer, eyes: GPUBuffer): void {
-    const kernel = rareKernelOf(this.#device, economiseLower);
-    const bindings = kernel.bind({
-      ...{ lowering, eyes, energies, scores, lowered },
-      gaussians: page.geometry,
-      sh: page.sh,
-    });
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.lower' });
-    const pass = encoder.beginComputePass({ label: 'gs.economise.lower' });
-    kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
-    pass.end();
-    this.#device.queue.submit([encoder.finish()]);
+  #uniform<L extends StructLayout>(layout: L, values: StructValues<L>): GPUBuffer {
+    const bytes = new ArrayBuffer(layout.size);
+    writeStruct(layout, values, bytes);
+    return this.#memory.buffer('gs.economise.uniform', layout.size, BUFFER_USAGE.uniform, new Uint32Array(bytes));
   }
 
   #targetOf({ width, height }: Camera): GPUTexture {
@@ -188,6 +196,15 @@ export class SceneScorer {
     this.#targets.set(key, made);
     return made;
   }
+}
+
+/** [views, 4] where views look from, relative to the scene's origin; the fourth number fills up. */
+function eyesOf(views: readonly Camera[], { gaussians }: SceneParts): Uint32Array {
+  const places = views.flatMap(({ worldToCamera }) => [
+    ...eyeOf(worldToCamera).map((value, axis) => value - gaussians.origin[axis]),
+    1,
+  ]);
+  return new Uint32Array(Float32Array.from(places).buffer);
 }
 
 /** What the score shader does not ask of a `View`. */
