@@ -21,7 +21,8 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
   --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
-                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 86 views around the subject, 6 of them held out
+                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 230 views around the subject, 6 of them held out
+  --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
   --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
                   auto (default): gpu where there is one
   --report FILE   the figures as JSON, with the seconds that each kind of work took
@@ -45,6 +46,7 @@ function parseOptions(args) {
         views: text,
         report: text,
         scorer: { ...text, default: 'auto' },
+        scored: { ...text, default: '216' },
         help: { type: 'boolean' },
       },
     });
@@ -62,11 +64,14 @@ function parseOptions(args) {
   const { views, report, scorer } = values;
   if (!['auto', 'gpu', 'cpu'].includes(scorer))
     throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
-  return { scene, out, minDecibels, views, report, scorer };
+  const scored = Number(values.scored);
+  if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
+    throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
+  return { scene, out, minDecibels, views, report, scorer, scored };
 }
 
-function readViews(path, bounds) {
-  if (path === undefined) return dealtViewsAround(bounds);
+function readViews(path, bounds, scored) {
+  if (path === undefined) return dealtViewsAround(bounds, { scored });
   const { views } = JSON.parse(readFileSync(resolve(from, path), 'utf8'));
   const dealt = dealViews(views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`)));
   if (dealt.heldOut.length > 0) return { ...dealt, scored: [...dealt.scored, ...viewsBetween(dealt.scored)] };
@@ -86,13 +91,13 @@ async function evaluatorFor(cloud, views, scorer) {
   return new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report, scorer }) {
+async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
   const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
   const cloud = await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart });
   const read = seconds();
-  const views = readViews(viewsFile, boundsOf(cloud));
+  const views = readViews(viewsFile, boundsOf(cloud), scored);
   const evaluator = await evaluatorFor(cloud, views, scorer);
   const prepare = seconds() - read;
   const result = await economise(cloud, {

@@ -44,7 +44,7 @@ function ball(): GaussianCloud {
 const scene = ball();
 const views = dealtViewsAround(boundsOf(scene), SIZE);
 const fewer = {
-  scored: views.scored.slice(0, 24),
+  scored: viewsAround(boundsOf(scene), 24, SIZE),
   searched: views.searched.slice(0, 3),
   heldOut: views.heldOut.slice(0, 3),
 };

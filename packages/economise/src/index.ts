@@ -17,5 +17,13 @@ export { PaintedEvaluator, type PaintedEvaluatorOptions } from './painted-evalua
 export { degreesOf, reduce, type Cut, type ReducedCloud } from './reduce.js';
 export { scoreSplats, type Ranking, type Scores } from './score.js';
 export type { ContributionScorer } from './scorer.js';
-export { dealtViewsAround, dealViews, viewsAround, viewsBetween, type DealtViews, type ViewOptions } from './views.js';
+export {
+  dealtViewsAround,
+  dealViews,
+  viewsAround,
+  viewsBetween,
+  type DealtViewOptions,
+  type DealtViews,
+  type ViewOptions,
+} from './views.js';
 export { encodingsFor, type Encoding } from './write/index.js';
