@@ -2,14 +2,15 @@
  * Turns shaders/*.wgsl into packages/renderer/src/generated/: code with its `#import`s resolved, and every
  * binding number, struct layout, workgroup size and numeric constant reflected from the WGSL itself, so that nobody
  * counts padding or repeats a number by hand. `shaders.ts` has what every scene needs, `live-shaders.ts` what only generators and
- * picture models do, `streamed-shaders.ts` what only streamed scenes do: pages without them never load these.
+ * picture models do, `streamed-shaders.ts` what only streamed scenes do: pages without them never load these. The stages of economise are in its own
+ * package, with the structs and constants that only they have.
  */
 import { mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { ResourceType, WgslReflect } from 'wgsl_reflect/wgsl_reflect.module.js';
 
 const shaderFolder = fileURLToPath(new URL('../shaders/', import.meta.url));
-const outputFolder = fileURLToPath(new URL('../packages/renderer/src/generated/', import.meta.url));
+const generatedOf = (name) => fileURLToPath(new URL(`../packages/${name}/src/generated/`, import.meta.url));
 
 const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
 /** Stages that few pages need, by the file that has them. */
@@ -17,6 +18,17 @@ const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'streamed-shaders': ['note_wishes'],
 };
+/** Those of another package, which takes shared parts from the renderer. */
+const ECONOMISE = 'economise';
+RARE[ECONOMISE] = [
+  'economise_cut',
+  'economise_lower',
+  'economise_mask',
+  'economise_moments',
+  'economise_score',
+  'picture_error',
+  'picture_error_sum',
+];
 const fileOf = (stage) => Object.keys(RARE).find((file) => RARE[file].includes(stage)) ?? 'shaders';
 const IMPORT = /^#import (\S+)$/gm;
 
@@ -93,6 +105,11 @@ function reflectStruct(struct) {
   return { size: struct.size, fields: Object.fromEntries(fields) };
 }
 
+function note(named, name, value, file) {
+  const homes = named.get(name)?.homes ?? new Set();
+  named.set(name, { value, homes: homes.add(file) });
+}
+
 const camelCase = (name) => name.replace(/_(\w)/g, (_, letter) => letter.toUpperCase());
 const literal = (value) => JSON.stringify(value, null, 2);
 
@@ -100,8 +117,9 @@ const stages = readdirSync(shaderFolder)
   .filter((file) => file.endsWith('.wgsl'))
   .map((file) => file.slice(0, -5))
   .sort();
+/** By name: the layout or the number, and the files whose stages say it. */
 const structs = new Map();
-const constants = {};
+const constants = new Map();
 /** Each file once, however many stages import it: a page loads them all. */
 const parts = new Map();
 const partName = (path) => `${camelCase(path.replace('/', '_'))}Part`;
@@ -115,10 +133,11 @@ for (const stage of stages) {
   for (const path of paths) partsIn[home].add(path);
   const code = paths.map((path) => parts.get(path)).join('\n');
   const reflection = reflect(stage, code);
-  for (const struct of reflection.structs) structs.set(struct.name, reflectStruct(struct));
+  for (const struct of reflection.structs) note(structs, struct.name, reflectStruct(struct), home);
   for (const [name, value] of Object.entries(reflectConstants(code))) {
-    if (constants[name] !== undefined && constants[name] !== value) throw new Error(`${stage}: ${name} has two values`);
-    constants[name] = value;
+    const known = constants.get(name)?.value ?? value;
+    if (known !== value) throw new Error(`${stage}: ${name} has two values`);
+    note(constants, name, value, home);
   }
   const joined = paths.map(partName).join(" + '\\n' + ");
   const bindings = literal(reflectBindings(reflection));
@@ -134,11 +153,19 @@ const part = (path) => `export const ${partName(path)} = ${JSON.stringify(parts.
 const usersOf = (path) => stageFiles.filter((file) => partsIn[file].has(path));
 const isShared = (path) => partsIn.shaders.has(path) || usersOf(path).length > 1;
 
-function rareFile(file) {
+/** What stages of the given kind say, by name. */
+function saidBy(named, isMeant) {
+  return [...named].filter(([, { homes }]) => isMeant(homes)).map(([name, { value }]) => [name, value]);
+}
+
+const isOfRenderer = (homes) => [...homes].some((file) => file !== ECONOMISE);
+const byName = ([a], [b]) => (a < b ? -1 : 1);
+
+function rareFile(file, from = './shaders.js') {
   const paths = [...partsIn[file]];
   const shared = paths.filter(isShared);
   return [
-    ...(shared.length > 0 ? [`import { ${shared.map(partName).join(', ')} } from './shaders.js';`] : []),
+    ...(shared.length > 0 ? [`import { ${shared.map(partName).join(', ')} } from '${from}';`] : []),
     ...paths.filter((path) => !isShared(path)).map(part),
     ...sections[file],
   ];
@@ -148,18 +175,35 @@ const files = {
   // Modules and not objects, so that bundlers leave out what nobody uses.
   layouts: [
     '/** Byte sizes and offsets of the WGSL structs. */',
-    ...[...structs].sort(([a], [b]) => (a < b ? -1 : 1)).map(define),
+    ...saidBy(structs, isOfRenderer).sort(byName).map(define),
   ],
-  constants: ['/** Numeric constants of the WGSL, by their names there. */', ...Object.entries(constants).map(define)],
+  constants: [
+    '/** Numeric constants of the WGSL, by their names there. */',
+    ...saidBy(constants, isOfRenderer).map(define),
+  ],
   shaders: [
     "export * as layouts from './layouts.js';",
     "export * as constants from './constants.js';",
     ...[...parts.keys()].filter(isShared).map(part),
     ...sections.shaders,
   ],
-  ...Object.fromEntries(Object.keys(RARE).map((file) => [file, rareFile(file)])),
+  ...Object.fromEntries(
+    Object.keys(RARE)
+      .filter((file) => file !== ECONOMISE)
+      .map((file) => [file, rareFile(file)]),
+  ),
 };
-mkdirSync(outputFolder, { recursive: true });
-for (const [name, lines] of Object.entries(files))
-  writeFileSync(`${outputFolder}${name}.ts`, `${header}${lines.join('\n')}\n`);
+const isOwn = (homes) => !isOfRenderer(homes);
+const ownFile = [
+  ...rareFile(ECONOMISE, '@gaussian-splat/renderer/stages'),
+  ...[structs, constants].flatMap((named) => saidBy(named, isOwn).sort(byName).map(define)),
+];
+
+function write(folder, name, lines) {
+  mkdirSync(folder, { recursive: true });
+  writeFileSync(`${folder}${name}.ts`, `${header}${lines.join('\n')}\n`);
+}
+
+for (const [name, lines] of Object.entries(files)) write(generatedOf('renderer'), name, lines);
+write(generatedOf('economise'), 'shaders', ownFile);
 console.log(`shaders: ${stages.length} stages, ${structs.size} structs`);

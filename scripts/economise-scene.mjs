@@ -3,7 +3,15 @@ import { readFileSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
-import { dealtViewsAround, dealViews, economise, GpuScorer, Studio, viewsBetween } from '@gaussian-splat/economise';
+import {
+  dealtViewsAround,
+  dealViews,
+  economise,
+  GpuEvaluator,
+  PaintedEvaluator,
+  Studio,
+  viewsBetween,
+} from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
@@ -13,10 +21,11 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
   --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
-                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 86 views around the subject, 6 of them held out
-  --scorer NAME   what measures contributions: gpu (the compute rasterizer), cpu, or auto (default): gpu where there is one. The images of the
-                  search are drawn by the GPU where there is one, else by plain code
-  --report FILE   the figures as JSON
+                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 230 views around the subject, 6 of them held out
+  --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
+  --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
+                  auto (default): gpu where there is one
+  --report FILE   the figures as JSON, with the seconds that each kind of work took
 `;
 
 class UsageError extends Error {}
@@ -37,6 +46,7 @@ function parseOptions(args) {
         views: text,
         report: text,
         scorer: { ...text, default: 'auto' },
+        scored: { ...text, default: '216' },
         help: { type: 'boolean' },
       },
     });
@@ -54,45 +64,60 @@ function parseOptions(args) {
   const { views, report, scorer } = values;
   if (!['auto', 'gpu', 'cpu'].includes(scorer))
     throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
-  return { scene, out, minDecibels, views, report, scorer };
+  const scored = Number(values.scored);
+  if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
+    throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
+  return { scene, out, minDecibels, views, report, scorer, scored };
 }
 
-function readViews(path, bounds) {
-  if (path === undefined) return dealtViewsAround(bounds);
+function readViews(path, bounds, scored) {
+  if (path === undefined) return dealtViewsAround(bounds, { scored });
   const { views } = JSON.parse(readFileSync(resolve(from, path), 'utf8'));
   const dealt = dealViews(views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`)));
   if (dealt.heldOut.length > 0) return { ...dealt, scored: [...dealt.scored, ...viewsBetween(dealt.scored)] };
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report, scorer }) {
-  const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
-  const cloud = await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart });
+/** What looks at the cloud. SwiftShader is a processor in disguise, slower than plain code on the same. */
+async function evaluatorFor(cloud, views, scorer) {
   const adapter = await requestNodeAdapter();
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
-  const views = readViews(viewsFile, boundsOf(cloud));
-  // SwiftShader is a processor in disguise, slower than plain code on the same.
-  const isHardware = !/swiftshader/i.test(adapter.info.description);
-  const scoresOnGpu = scorer === 'auto' ? isHardware : scorer === 'gpu';
-  const gpu = scoresOnGpu ? await GpuScorer.create(device, cloud) : undefined;
-  const studio = new Studio(device, 'default');
-  const start = performance.now();
+  const { vendor, architecture, device: model, description } = adapter.info;
+  const isGpu = scorer === 'gpu' || (scorer === 'auto' && !/swiftshader/i.test(description));
+  console.log(
+    `adapter      ${[vendor, architecture, model, description].filter(Boolean).join(' ')}${isGpu ? '' : '; scores and cuts on the CPU'}`,
+  );
+  if (isGpu) return GpuEvaluator.create(device, cloud, views);
+  return new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
+}
+
+async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored }) {
+  const begun = performance.now();
+  const seconds = () => (performance.now() - begun) / 1000;
+  const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
+  const cloud = await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart });
+  const read = seconds();
+  const views = readViews(viewsFile, boundsOf(cloud), scored);
+  const evaluator = await evaluatorFor(cloud, views, scorer);
+  const prepare = seconds() - read;
   const result = await economise(cloud, {
-    ...{ minDecibels, name: out, views, studio, scorer: gpu?.score },
-    sketcher: isHardware ? studio : undefined,
-    onStep: (step) => console.log(`${((performance.now() - start) / 1000).toFixed(0).padStart(5)} s  ${step}`),
+    ...{ minDecibels, name: out, evaluator },
+    onStep: (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`),
   });
   writeFileSync(out, result.bytes);
   const { splats, coefficients } = result;
+  const spent = { read, prepare, ...result.seconds, total: seconds() };
   const share = ({ before, after }) => `${((100 * after) / Math.max(1, before)).toFixed(1)} %`;
   const [oldBytes, newBytes] = [statSync(scene).size, result.bytes.length];
+  const times = Object.entries(spent).map(([work, time]) => `${work} ${time.toFixed(2)}`);
   console.log(`
 asked        ${minDecibels.toFixed(2)} dB
 found        ${result.decibels.toFixed(2)} dB in ${views.heldOut.length} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
 splats       ${splats.after} of ${splats.before} (${share(splats)})
 SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficients)}); splats by degree ${result.degrees.join(', ')}
-bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}`);
-  const figures = { ...result, bytes: newBytes, minDecibels };
+bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}
+seconds      ${times.join(', ')}`);
+  const figures = { ...result, bytes: newBytes, minDecibels, seconds: spent };
   if (report) writeFileSync(resolve(from, report), JSON.stringify(figures, null, 2));
 }
 

@@ -2,14 +2,14 @@ import { eyeOf, shCoefficientCount, type Camera, type GaussianCloud } from '@gau
 import { shBasis } from './colour.js';
 
 /** A few views know little of a colour that depends on the view: so many more are imagined, from everywhere. */
-const PRIOR_VIEWS = 4;
+export const PRIOR_VIEWS = 4;
 
 /** The colours of all splats with fewer bands. */
 export interface LoweredColours {
   /** [N] the mean squared error of the views' images if this splat alone has them. */
   readonly error: Float32Array;
-  /** [N, (degree + 1)², 3] coefficients: those that come nearest to the colours that the views saw. */
-  readonly sh: Float32Array;
+  /** [(degree + 1)², 3] coefficients of splat i: those that come nearest to the colours that the views saw. */
+  of(i: number): Float32Array;
 }
 
 /**
@@ -75,15 +75,17 @@ export class ColourMoments {
   #atDegree(degree: number): LoweredColours {
     const { count, sh } = this.#cloud;
     const kept = 3 * (degree + 1) ** 2;
-    const lowered = { error: new Float32Array(count), sh: new Float32Array(kept * count) };
+    const all = new Float32Array(kept * count);
+    const of = (i: number): Float32Array => all.subarray(kept * i, kept * i + kept);
+    const lowered = { error: new Float32Array(count), of };
     const scale = 1 / (3 * Math.max(1, this.#views));
     for (let i = 0; i < count; i++) {
       const from = 3 * this.#size * i;
-      lowered.sh.set(sh.subarray(from, from + kept), kept * i);
+      all.set(sh.subarray(from, from + kept), kept * i);
       if (this.#energy[i] === 0) continue;
       const { shift, squares } = this.#lower(i, kept / 3);
       lowered.error[i] = scale * squares;
-      for (let k = 0; k < kept; k++) lowered.sh[kept * i + k] += shift[k];
+      for (let k = 0; k < kept; k++) all[kept * i + k] += shift[k];
     }
     return lowered;
   }

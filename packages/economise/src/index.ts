@@ -1,6 +1,8 @@
+export type { LoweredColours } from './colour-moments.js';
 export { cpuPainter, cpuScorer } from './cpu-raster.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
-export { GpuScorer } from './gpu-scorer.js';
+export type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
+export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
 export { LiveMask, heaviest, type LiveMaskOptions, type MaskedScene, type ViewSize } from './live-mask.js';
 export {
   contributionOfShare,
@@ -11,8 +13,17 @@ export {
   type EconomyShare,
 } from './mask.js';
 export { decibels, meanSquare, Studio, type Image, type Painter } from './measure.js';
-export { reduce, type Cut, type ReducedCloud } from './reduce.js';
-export { scoreSplats, type Scores } from './score.js';
+export { PaintedEvaluator, type PaintedEvaluatorOptions } from './painted-evaluator.js';
+export { degreesOf, reduce, type Cut, type ReducedCloud } from './reduce.js';
+export { scoreSplats, type Ranking, type Scores } from './score.js';
 export type { ContributionScorer } from './scorer.js';
-export { dealtViewsAround, dealViews, viewsAround, viewsBetween, type DealtViews, type ViewOptions } from './views.js';
+export {
+  dealtViewsAround,
+  dealViews,
+  viewsAround,
+  viewsBetween,
+  type DealtViewOptions,
+  type DealtViews,
+  type ViewOptions,
+} from './views.js';
 export { encodingsFor, type Encoding } from './write/index.js';

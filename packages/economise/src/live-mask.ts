@@ -1,6 +1,5 @@
 import { eyeOf, type Bounds, type Camera } from '@gaussian-splat/core';
 import {
-  capture,
   GaussianBuffers,
   readPacked,
   Renderer,
@@ -8,8 +7,10 @@ import {
   type GaussianScene,
   type PackedGaussians,
 } from '@gaussian-splat/renderer';
+import { MaskScene } from './gpu/mask-scene.js';
+import { PictureErrors } from './gpu/picture-errors.js';
 import type { EconomyGoal } from './mask.js';
-import { decibels, mean, meanSquare, type Image } from './measure.js';
+import { decibels, mean } from './measure.js';
 import { viewsAround } from './views.js';
 
 /** Values of GPUBufferUsage and GPUTextureUsage, which Node has only where Dawn was loaded. */
@@ -118,32 +119,32 @@ export class LiveMask {
   }
 
   async #take(share: number): Promise<PackedGaussians> {
-    const count = Math.max(1, Math.round(share * this.whole.count));
-    return selectPacked(this.whole, heaviest(this.#weights, count), turns());
+    return selectPacked(this.whole, heaviest(this.#weights, this.#countOf(share)), turns());
+  }
+
+  #countOf(share: number): number {
+    return Math.max(1, Math.round(share * this.whole.count));
   }
 
   /** The least share that keeps to a figure in some views, raised until it does in others. */
   async #search(asked: number, signal: AbortSignal | undefined): Promise<MaskedScene> {
-    const gauge = new Gauge(this.#device, signal);
+    const gauge = await Gauge.of(this.#device, this.whole, signal);
     const around = (count: number, seed: number): readonly Camera[] =>
       viewsAround(this.#bounds, count, { ...this.#viewSize, seed });
-    const [searched, heldOut] = [around(SEARCHED, 1), around(HELD_OUT, 2)];
+    const slotsOf = (share: number): Uint32Array => heaviest(this.#weights, this.#countOf(share));
     try {
-      const expected = {
-        searched: await gauge.draw(this.whole, searched),
-        heldOut: await gauge.draw(this.whole, heldOut),
-      };
+      const searched = await gauge.lookFrom(around(SEARCHED, 1));
       let [low, high] = [LEAST_SHARE, 1];
       for (let k = 0; k < HALVINGS; k++) {
         const middle = (low + high) / 2;
-        const found = await gauge.compare(await this.#take(middle), searched, expected.searched);
-        if (found >= asked) high = middle;
+        if ((await searched(slotsOf(middle))) >= asked) high = middle;
         else low = middle;
       }
+      const heldOut = await gauge.lookFrom(around(HELD_OUT, 2));
       for (let k = 0; k < RAISES; k++) {
-        const packed = await this.#take(Math.min(1, high + k * RAISE));
-        const found = await gauge.compare(packed, heldOut, expected.heldOut);
-        if (found >= asked) return { packed, decibels: found };
+        const share = Math.min(1, high + k * RAISE);
+        const found = await heldOut(slotsOf(share));
+        if (found >= asked) return { packed: await this.#take(share), decibels: found };
       }
       return { packed: this.whole, decibels: Infinity };
     } finally {
@@ -152,42 +153,57 @@ export class LiveMask {
   }
 }
 
-/** Draws packed scenes and tells how far they are from others. */
+/** Tells how far pictures of some splats of a scene are from those of all. */
 class Gauge {
   readonly #device: GPUDevice;
   readonly #renderer: Renderer;
+  readonly #whole: GaussianBuffers;
+  readonly #shown: MaskScene;
+  readonly #errors: PictureErrors[] = [];
   readonly #signal: AbortSignal | undefined;
 
-  constructor(device: GPUDevice, signal: AbortSignal | undefined) {
+  private constructor(device: GPUDevice, whole: GaussianBuffers, shown: MaskScene, signal: AbortSignal | undefined) {
     this.#device = device;
     this.#signal = signal;
+    this.#whole = whole;
+    this.#shown = shown;
     this.#renderer = new Renderer(device);
   }
 
-  async draw(packed: PackedGaussians, views: readonly Camera[]): Promise<Image[]> {
-    this.#signal?.throwIfAborted();
-    const gaussians = await GaussianBuffers.upload(this.#device, packed);
+  static async of(device: GPUDevice, packed: PackedGaussians, signal: AbortSignal | undefined): Promise<Gauge> {
+    signal?.throwIfAborted();
+    const whole = await GaussianBuffers.upload(device, packed);
     try {
-      const images: Image[] = [];
-      for (const camera of views) {
-        images.push(await capture(this.#device, this.#renderer, { gaussians, camera }));
-        this.#signal?.throwIfAborted();
-      }
-      return images;
-    } finally {
-      gaussians.destroy();
+      return new Gauge(device, whole, await MaskScene.of(device, whole), signal);
+    } catch (error) {
+      whole.destroy();
+      throw error;
     }
   }
 
-  /** dB over all views together. */
-  async compare(packed: PackedGaussians, views: readonly Camera[], expected: readonly Image[]): Promise<number> {
-    const images = await this.draw(packed, views);
-    return decibels(mean(images.map((image, k) => meanSquare(image, expected[k]))));
+  /** Draws all of the scene in some views. @returns what tells the dB of some splats, all views together */
+  async lookFrom(views: readonly Camera[]): Promise<(slots: Uint32Array) => Promise<number>> {
+    const errors = await PictureErrors.of(this.#device, this.#renderer, this.#whole, views, this.#pause);
+    this.#errors.push(errors);
+    return async (slots) => {
+      this.#signal?.throwIfAborted();
+      this.#shown.show(slots);
+      return decibels(mean(await errors.measure(this.#shown, this.#pause)));
+    };
   }
 
   destroy(): void {
+    for (const errors of this.#errors) errors.destroy();
+    this.#shown.destroy();
+    this.#whole.destroy();
     this.#renderer.destroy();
   }
+
+  /** The page's own frames come between. */
+  readonly #pause = async (): Promise<void> => {
+    await this.#device.queue.onSubmittedWorkDone();
+    this.#signal?.throwIfAborted();
+  };
 }
 
 /** The largest weight that each slot has in any pixel of any view, and how many views that are. */

@@ -3,23 +3,27 @@ import { ColourMoments, type LoweredColours } from './colour-moments.js';
 import type { ContributionScorer } from './scorer.js';
 
 /** What the splats of a cloud were seen to contribute. */
-export interface Scores {
+export interface Ranking {
   /** [N] largest weight in any pixel of any view, 0..1; 1 for splats that too few views looked at to judge them. */
   readonly contribution: Float32Array;
   /** [N] the largest mean squared error of any view's image if this splat alone goes, peak 1; Infinity for splats that too few views looked at. */
   readonly removalError: Float32Array;
+}
+
+/** A ranking, and what splats look like with fewer bands of colour. */
+export interface Scores extends Ranking {
   /** The colours at each degree below the cloud's. */
   readonly lowered: readonly LoweredColours[];
 }
 
 /** A splat that fewer views looked at is kept: another view may show it in full. */
-const MIN_LOOKS = 3;
+export const MIN_LOOKS = 3;
 
 /**
  * What lies behind a splat differs from it by the root of this, in other views, besides what it does in those that were looked at: much of what goes
  * goes together with what lay behind it, and then something else is seen.
  */
-const UNSEEN_CONTRAST = 0.1;
+export const UNSEEN_CONTRAST = 0.1;
 
 /** Looks at a cloud from all views. */
 export async function scoreSplats(

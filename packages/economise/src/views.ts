@@ -95,8 +95,16 @@ export function dealViews(views: readonly Camera[]): DealtViews {
   return { scored: of(0, 1, 3, 4, 5, 6, 8), searched: of(2), heldOut: of(7, 9) };
 }
 
-/** Views around a subject, for scenes without cameras: 72 to score in, 8 to search in, 6 held out. */
-export function dealtViewsAround(bounds: Bounds, options: Omit<ViewOptions, 'seed'> = {}): DealtViews {
+export interface DealtViewOptions extends Omit<ViewOptions, 'seed'> {
+  /** Views to score in; default 216. Colours of fewer bands come nearer to what others see the more views there are. */
+  readonly scored?: number;
+}
+
+/** Seeds of the three kinds: so far apart that no number of views to score in reaches those of the others. */
+const [SEARCHED_SEED, HELD_OUT_SEED, SCORED_SEED] = [1, 2, 10];
+
+/** Views around a subject, for scenes without cameras: 216 to score in, 8 to search in, 6 held out. */
+export function dealtViewsAround(bounds: Bounds, { scored = 216, ...options }: DealtViewOptions = {}): DealtViews {
   const around = (count: number, seed: number): Camera[] => viewsAround(bounds, count, { ...options, seed });
-  return { scored: around(72, 0), searched: around(8, 1), heldOut: around(6, 2) };
+  return { scored: around(scored, SCORED_SEED), searched: around(8, SEARCHED_SEED), heldOut: around(6, HELD_OUT_SEED) };
 }

@@ -1,5 +1,5 @@
-import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
+import { copyCounts } from './statistics.js';
 
 /** For how much the buffers between the stages have room. */
 export interface Capacity {
@@ -116,10 +116,7 @@ export class CapacityMonitor {
 
   /** Records the copy of the counts. */
   record(encoder: GPUCommandEncoder, plan: GPUBuffer, pairPlan: GPUBuffer | undefined): void {
-    const { visible, overflow } = layouts.Plan.fields;
-    if (overflow.offset !== visible.offset + 4) throw new Error('Plan: overflow must follow visible');
-    encoder.copyBufferToBuffer(plan, visible.offset, this.#staging, 0, 8);
-    if (pairPlan) encoder.copyBufferToBuffer(pairPlan, visible.offset, this.#staging, 8, 8);
+    copyCounts(encoder, plan, pairPlan, this.#staging, 0);
     this.#isReading = true;
   }
 

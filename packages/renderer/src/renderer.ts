@@ -19,7 +19,7 @@ import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { sortedOrder } from './stages/sort.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
-import { readStatistics, type FrameStatistics } from './statistics.js';
+import { copyCounts, readStatistics, type FrameStatistics } from './statistics.js';
 import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
 import { scaled } from './view.js';
@@ -206,7 +206,21 @@ export class Renderer {
     if (this.#resources.current === undefined) return true;
     const mayLack = this.#occlusion.mayLack;
     const { visible, overflow, pairs, pairOverflow } = await this.readStatistics();
-    if (overflow + pairOverflow === 0) return !mayLack;
+    return this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow)) && !mayLack;
+  }
+
+  /**
+   * Copies the counts that {@link hadRoom} judges into 16 bytes of a buffer, for those who draw many images before they read anything back.
+   * @param offset bytes, a multiple of 4
+   */
+  copyCounts(encoder: GPUCommandEncoder, buffer: GPUBuffer, offset: number): void {
+    const { scratch } = this.#resources.current ?? {};
+    if (scratch) copyCounts(encoder, scratch.plan, this.#rasterizer.pairPlan, buffer, offset);
+  }
+
+  /** Whether the frame that these four counts are from had room for all that it should show; if not, those that follow will. */
+  hadRoom([visible, overflow, pairs, pairOverflow]: Uint32Array): boolean {
+    if (overflow + pairOverflow === 0) return true;
     this.#resources.current?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
     return false;
   }

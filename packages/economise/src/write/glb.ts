@@ -67,35 +67,28 @@ export function writeGlb({ cloud, degrees }: ReducedCloud): Uint8Array<ArrayBuff
 }
 
 function primitiveOf(cloud: GaussianCloud, members: readonly number[], degree: number, assembly: Assembly): object {
-  const { positions, origin, rotations, opacities, scales, sh, shDegree } = cloud;
-  const collect = (width: number, value: (i: number, k: number) => number): Float32Array<ArrayBuffer> => {
+  const { opacities, scales, sh, shDegree } = cloud;
+  /** Some numbers of the members' rows, each times a sign. */
+  const columns = (values: Float32Array, stride: number, first: number, signs: readonly number[]): Numbers => {
+    const width = signs.length;
     const out = new Float32Array(width * members.length);
-    members.forEach((i, n) => {
-      for (let k = 0; k < width; k++) out[width * n + k] = value(i, k);
-    });
+    for (let n = 0; n < members.length; n++) {
+      for (let k = 0; k < width; k++) out[width * n + k] = signs[k] * values[stride * members[n] + first + k];
+    }
     return out;
   };
-  const places = collect(3, (i, k) => (k < 2 ? -1 : 1) * (positions[3 * i + k] + origin[k]));
-  // The product of (0, 0, 0, 1) and (w, x, y, z), in glTF's order (x, y, z, w).
-  const turned = (i: number, k: number): number =>
-    [-rotations[4 * i + 2], rotations[4 * i + 1], rotations[4 * i], -rotations[4 * i + 3]][k];
-  const stride = 3 * shCoefficientCount(shDegree);
   const own = (name: string): string => `${EXTENSION}:${name}`;
+  const places = placesOf(cloud, members);
   const attributes: Record<string, number> = {
     POSITION: assembly.add(places, 3, boundsOf(places)),
-    [own('ROTATION')]: assembly.add(Int16Array.from(collect(4, (i, k) => Math.round(32_767 * turned(i, k)))), 4),
-    [own('SCALE')]: assembly.add(
-      collect(3, (i, k) => scales[3 * i + k]),
-      3,
-    ),
-    [own('OPACITY')]: assembly.add(
-      collect(1, (i) => opacities[i]),
-      1,
-    ),
+    [own('ROTATION')]: assembly.add(rotationsOf(cloud, members), 4),
+    [own('SCALE')]: assembly.add(columns(scales, 3, 0, [1, 1, 1]), 3),
+    [own('OPACITY')]: assembly.add(columns(opacities, 1, 0, [1]), 1),
   };
+  const stride = 3 * shCoefficientCount(shDegree);
   for (let band = 0; band <= degree; band++) {
     for (let k = band * band; k < (band + 1) ** 2; k++) {
-      const values = collect(3, (i, channel) => HALF_TURN[k] * sh[stride * i + 3 * k + channel]);
+      const values = columns(sh, stride, 3 * k, [HALF_TURN[k], HALF_TURN[k], HALF_TURN[k]]);
       attributes[own(`SH_DEGREE_${band}_COEF_${k - band * band}`)] = assembly.add(values, 3);
     }
   }
@@ -108,13 +101,38 @@ function primitiveOf(cloud: GaussianCloud, members: readonly number[], degree: n
   return { mode: 0, attributes, extensions: { [EXTENSION]: splats } };
 }
 
+/** Positions in the world and in glTF's axes. */
+function placesOf({ positions, origin }: GaussianCloud, members: readonly number[]): Float32Array<ArrayBuffer> {
+  const out = new Float32Array(3 * members.length);
+  members.forEach((i, n) => {
+    out[3 * n] = -(positions[3 * i] + origin[0]);
+    out[3 * n + 1] = -(positions[3 * i + 1] + origin[1]);
+    out[3 * n + 2] = positions[3 * i + 2] + origin[2];
+  });
+  return out;
+}
+
+/** The product of (0, 0, 0, 1) and (w, x, y, z), in glTF's order (x, y, z, w). */
+function rotationsOf({ rotations }: GaussianCloud, members: readonly number[]): Int16Array<ArrayBuffer> {
+  const out = new Int16Array(4 * members.length);
+  members.forEach((i, n) => {
+    out[4 * n] = Math.round(-32_767 * rotations[4 * i + 2]);
+    out[4 * n + 1] = Math.round(32_767 * rotations[4 * i + 1]);
+    out[4 * n + 2] = Math.round(32_767 * rotations[4 * i]);
+    out[4 * n + 3] = Math.round(-32_767 * rotations[4 * i + 3]);
+  });
+  return out;
+}
+
 /** glTF asks for the bounds of positions. */
 function boundsOf(positions: Float32Array): object {
   const [min, max] = [new Array<number>(3).fill(Infinity), new Array<number>(3).fill(-Infinity)];
-  positions.forEach((value, k) => {
-    min[k % 3] = Math.min(min[k % 3], value);
-    max[k % 3] = Math.max(max[k % 3], value);
-  });
+  for (let at = 0; at < positions.length; at += 3) {
+    for (let axis = 0; axis < 3; axis++) {
+      min[axis] = Math.min(min[axis], positions[at + axis]);
+      max[axis] = Math.max(max[axis], positions[at + axis]);
+    }
+  }
   return { min, max };
 }
 

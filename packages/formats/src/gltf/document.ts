@@ -14,6 +14,8 @@ const COMPONENTS: ReadonlyMap<unknown, { bytes: number; max: number; get: (view:
     [5125, { bytes: 4, max: 4_294_967_295, get: (view: DataView, at: number) => view.getUint32(at, true) }],
     [5126, { bytes: 4, max: 1, get: (view: DataView, at: number) => view.getFloat32(at, true) }],
   ]);
+const FLOAT = 5126;
+const isLittleEndian = new Uint8Array(Uint16Array.of(1).buffer)[0] === 1;
 const WIDTHS: ReadonlyMap<unknown, number> = new Map([
   ['SCALAR', 1],
   ['VEC2', 2],
@@ -89,6 +91,10 @@ export class GltfDocument {
     const end = count === 0 ? 0 : byteOffset + (count - 1) * byteStride + width * component.bytes;
     if (end > bytes.length) {
       throw damaged(`${this.name}, ${path}`, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/corrupt');
+    }
+    if (accessor.componentType === FLOAT && byteStride === 4 * width && isLittleEndian) {
+      // Numbers that lie as they are wanted are copied at once. A view's beginning need not be a multiple of 4.
+      return { count, width, values: new Float32Array(bytes.slice(byteOffset, byteOffset + 4 * count * width).buffer) };
     }
     const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
     const values = new Float32Array(count * width);

@@ -101,7 +101,7 @@ function degreeOf(own: (name: string) => unknown): ShDegree {
 function toWFirst(source: Float32Array, out: Float32Array): void {
   for (let i = 0; i < out.length; i += 4) {
     out[i] = source[i + 3];
-    out.set(source.subarray(i, i + 3), i + 1);
+    for (let k = 0; k < 3; k++) out[i + 1 + k] = source[i + k];
   }
 }
 
@@ -112,15 +112,15 @@ async function readColours(
   read: (name: string, index: unknown, width: number) => Promise<Float32Array>,
 ): Promise<void> {
   const stride = 3 * shCoefficientCount(cloud.shDegree);
-  const put = (values: Float32Array, coefficient: number, width: number, map = (x: number): number => x): void => {
+  const put = (values: Float32Array, coefficient: number, width: number, shift = 0, scale = 1): void => {
     for (let i = 0; i < cloud.count; i++) {
-      for (let k = 0; k < 3; k++) cloud.sh[i * stride + 3 * coefficient + k] = map(values[i * width + k]);
+      for (let k = 0; k < 3; k++) cloud.sh[i * stride + 3 * coefficient + k] = (values[i * width + k] + shift) * scale;
     }
   };
   const constant = own('SH_DEGREE_0_COEF_0');
   if (constant !== undefined || attributes.COLOR_0 === undefined)
     put(await read('SH_DEGREE_0_COEF_0', constant, 3), 0, 3);
-  else put(await read('COLOR_0', attributes.COLOR_0, 4), 0, 4, (colour) => (colour - 0.5) / SH_C0);
+  else put(await read('COLOR_0', attributes.COLOR_0, 4), 0, 4, -0.5, 1 / SH_C0);
   for (let degree = 1; degree <= cloud.shDegree; degree++) {
     for (let k = 0; k < 2 * degree + 1; k++) {
       const name = `SH_DEGREE_${degree}_COEF_${k}`;

@@ -14,6 +14,9 @@ import { shRotation } from './sh-rotation.js';
 /** Relative difference from a rotation with one scale up to which a matrix counts as one. */
 const SIMILARITY = 1e-6;
 
+/** Entry of a rotation of harmonics that float32 would not show. */
+const NEGLIGIBLE = 1e-12;
+
 /**
  * Moves a cloud by an affine map, in place: centres, covariances, and the directions of the spherical harmonics, which turn with the
  * map's rotation. Maps that flatten everything leave splats without extent, which readers drop.
@@ -50,7 +53,7 @@ function turnShapes({ count, scales, rotations }: GaussianCloud, turn: Matrix3, 
   const sign = Math.sign(determinant(turn));
   const [w, x, y, z] = quaternionOfMatrix(turn.map((value) => sign * value));
   for (let i = 0; i < count; i++) {
-    const [a, b, c, d] = rotations.subarray(4 * i, 4 * i + 4);
+    const [a, b, c, d] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
     rotations[4 * i] = w * a - x * b - y * c - z * d;
     rotations[4 * i + 1] = w * b + x * a + y * d - z * c;
     rotations[4 * i + 2] = w * c - x * d + y * a + z * b;
@@ -80,13 +83,19 @@ function turnHarmonics({ count, sh, shDegree }: GaussianCloud, turn: Matrix3): v
   for (let band = 1; band <= shDegree; band++) {
     const matrix = shRotation(band as 1 | 2 | 3, turn);
     const size = 2 * band + 1;
+    // Between files' axes it is half turns and quarter turns, which leave a number a row.
+    const terms = Array.from({ length: size }, (_, row) =>
+      Array.from({ length: size }, (_, k) => ({ k, factor: matrix[row * size + k] })).filter(
+        ({ factor }) => Math.abs(factor) > NEGLIGIBLE,
+      ),
+    );
     for (let i = 0; i < count; i++) {
       const at = i * stride + 3 * band * band;
       for (let k = 0; k < 3 * size; k++) old[k] = sh[at + k];
       for (let row = 0; row < size; row++) {
         for (let channel = 0; channel < 3; channel++) {
           let sum = 0;
-          for (let k = 0; k < size; k++) sum += matrix[row * size + k] * old[3 * k + channel];
+          for (const { k, factor } of terms[row]) sum += factor * old[3 * k + channel];
           sh[at + 3 * row + channel] = sum;
         }
       }

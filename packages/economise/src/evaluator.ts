@@ -1,0 +1,31 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import type { Cut } from './reduce.js';
+import type { Ranking, Scores } from './score.js';
+
+/** Views that errors are measured in: those of the search, or those that nothing but the result is measured in. */
+export type JudgedViews = 'searched' | 'heldOut';
+
+/** What a cut leaves of a scene, and what that costs. */
+export interface CutFigures {
+  /** [views] mean squared error of the colours of each picture, peak 1, over the pixels that the whole scene covers. */
+  readonly errors: readonly number[];
+  /** [4] splats that stay, by the degree of spherical harmonics that they keep. */
+  readonly degrees: readonly number[];
+}
+
+/**
+ * Looks at a scene: says what its splats contribute, and how far pictures of what is left of it are from those of the whole. {@link PaintedEvaluator} does it in plain
+ * code, with whatever draws pictures; {@link GpuEvaluator} on the GPU.
+ */
+export interface Evaluator {
+  /** Looks at the scene in the scored views. To be called once, before all else. */
+  rank(signal?: AbortSignal): Promise<Ranking>;
+  /** The ranking, with the colours of lower degrees. */
+  scores(): Promise<Scores>;
+  /** Figures of a cut, in pictures of the scene. */
+  cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures>;
+  /** [views] errors of another cloud in place of the scene. */
+  compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
+  /** Frees what the evaluator holds. */
+  destroy(): void;
+}

@@ -1,0 +1,123 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import type { Evaluator } from './evaluator.js';
+import { mean } from './measure.js';
+import type { Cut } from './reduce.js';
+import type { Ranking } from './score.js';
+import { bestTrades, measureTrades, type TradeCurve } from './search.js';
+
+/** Shares of the splats whose absence is measured, the least missed first. */
+const DROPPED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5];
+/** The share at which two scores are held against one another. */
+const TRIAL_SHARE = 0.06;
+/** Prices of a coefficient that are measured. */
+const PRICES = Array.from({ length: 14 }, (_, k) => 10 ** (-14.5 + 0.5 * k));
+/** Numbers that a splat has besides its harmonics. */
+const OTHER_NUMBERS = 11;
+/** Cuts that are tried in the held-out views, and how near to the figure one must come. */
+const FIT_TRIES = 6;
+const NEAR_ENOUGH = 0.99;
+
+/** What can be traded for error. */
+export interface Trades {
+  /** The cut that saves most numbers of the file, by what was measured, within a mean squared error. */
+  readonly cutAt: (error: number) => Cut;
+}
+
+/** How a search is watched and ended. */
+export interface FitOptions {
+  readonly signal?: AbortSignal;
+  readonly onStep?: (step: string) => void;
+}
+
+/** What a score stands for. */
+interface Dropping {
+  readonly thresholds: readonly number[];
+  readonly cutAt: (threshold: number) => Cut;
+}
+
+/** Measures, in the searched views, what dropping alone costs, and what fewer bands of colour alone. */
+export async function findTrades(
+  cloud: GaussianCloud,
+  ranking: Ranking,
+  evaluator: Evaluator,
+  budget: number,
+  { signal, onStep = () => undefined }: FitOptions,
+): Promise<Trades> {
+  const all = cloud.count * (OTHER_NUMBERS + 3 * (cloud.shDegree + 1) ** 2);
+  const along = (thresholds: readonly number[], cutAt: (threshold: number) => Cut): Promise<TradeCurve> =>
+    measureTrades(
+      thresholds,
+      async (threshold) => {
+        const { errors, degrees } = await evaluator.cut(cutAt(threshold), 'searched', signal);
+        return { threshold, error: mean(errors), saved: all - numbersOf(degrees) };
+      },
+      budget,
+    );
+  onStep('measuring what dropped splats cost');
+  const dropping = await chooseDropping(ranking, evaluator, signal);
+  const drop = await along(dropping.thresholds, dropping.cutAt);
+  onStep('measuring what fewer bands of colour cost');
+  const colour = await along(cloud.shDegree > 0 ? PRICES : [], (colourPrice) => ({ colourPrice }));
+  return {
+    cutAt: (error) => {
+      const [dropped, coloured] = bestTrades(drop, colour, error);
+      // The GPU compares in float32.
+      const [threshold, colourPrice] = [Math.fround(dropped.threshold), Math.fround(coloured.threshold)];
+      return { ...dropping.cutAt(threshold), colourPrice };
+    },
+  };
+}
+
+/** Numbers of a file with so many splats of each degree. */
+function numbersOf(degrees: readonly number[]): number {
+  return degrees.reduce((sum, splats, degree) => sum + splats * (OTHER_NUMBERS + 3 * (degree + 1) ** 2), 0);
+}
+
+/**
+ * Thresholds for dropping, in the score that does better at the trial share: what single views would lack, or the largest weight in a pixel. The former
+ * knows what lies behind a splat and how large it is, the latter is the more careful with what goes together; which counts for more depends on the scene.
+ */
+async function chooseDropping(
+  { removalError, contribution }: Ranking,
+  evaluator: Evaluator,
+  signal: AbortSignal | undefined,
+): Promise<Dropping> {
+  const candidates = [
+    { values: removalError, cutAt: (removalPrice: number): Cut => ({ removalPrice }) },
+    { values: contribution, cutAt: (minContribution: number): Cut => ({ minContribution }) },
+  ].map(({ values, cutAt }) => {
+    const sorted = values.slice().sort();
+    const at = (share: number): number => sorted[Math.floor(share * (sorted.length - 1))];
+    return { at, cutAt };
+  });
+  const trials: number[] = [];
+  for (const { at, cutAt } of candidates)
+    trials.push(mean((await evaluator.cut(cutAt(at(TRIAL_SHARE)), 'searched', signal)).errors));
+  const { at, cutAt } = candidates[trials[0] <= trials[1] ? 0 : 1];
+  const thresholds = [...new Set(DROPPED_SHARES.map(at))].filter((price) => price > 0 && Number.isFinite(price));
+  return { thresholds, cutAt };
+}
+
+/**
+ * How much of what the search allows can be taken so that the held-out views, too, stay within the error: they may ask for less, never allow more.
+ * @returns a share in 0..1; 0 if nothing can be
+ */
+export async function scaleToFit(
+  { cutAt }: Trades,
+  evaluator: Evaluator,
+  budget: number,
+  { signal, onStep = () => undefined }: FitOptions,
+): Promise<number> {
+  onStep('finding what the held-out views allow');
+  let [fits, fails, next] = [0, Infinity, 1];
+  for (let tries = 0; tries < FIT_TRIES; tries++) {
+    const error = mean((await evaluator.cut(cutAt(next * budget), 'heldOut', signal)).errors);
+    if (error <= budget) fits = next;
+    else fails = next;
+    if (fits === 1 || (error <= budget && error > NEAR_ENOUGH * budget)) break;
+    // Errors grow nearly as what is allowed does.
+    const guess = (next * 0.995 * budget) / error;
+    next = guess > fits && guess < fails ? guess : (fits + Math.min(1, fails)) / 2;
+  }
+  return fits;
+}

@@ -1,0 +1,128 @@
+import { shCoefficientCount, validateCloud, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import type { GaussianPage, GaussianScene } from '@gaussian-splat/renderer';
+import {
+  BUFFER_USAGE,
+  constants,
+  cullGroups,
+  GpuMemory,
+  IngestStage,
+  layouts,
+  pageCapacity,
+  recentred,
+  shWords,
+  withMemoryCheck,
+  writeStruct,
+} from '@gaussian-splat/renderer/stages';
+
+const { CULL_GROUP, SHAPE_SCALE, COLOR_COEFFICIENT_MAJOR } = constants;
+
+/** Numbers that each attribute of a cloud has for a splat. */
+function widthsOf(degree: ShDegree) {
+  return { positions: 3, scales: 3, rotations: 4, sh: 3 * shCoefficientCount(degree), opacities: 1 } as const;
+}
+
+/**
+ * A cloud on the GPU, packed there by the stage that packs what generators write: a tenth of the time that the CPU takes for it. Splats stay in the cloud's order, so that a
+ * slot is a splat's number; harmonics are float16. What the renderer cannot use is not drawn.
+ */
+export class CloudBuffers implements GaussianScene {
+  readonly count: number;
+  readonly shDegree: ShDegree;
+  readonly shPrecision = 'float16';
+  readonly antialiased: boolean;
+  readonly origin: GaussianScene['origin'];
+  readonly version = 0;
+  readonly pages: readonly GaussianPage[];
+  readonly #memory: GpuMemory;
+
+  private constructor(device: GPUDevice, cloud: GaussianCloud, memory: GpuMemory, pageSplats: number) {
+    ({ count: this.count, shDegree: this.shDegree, antialiased: this.antialiased, origin: this.origin } = cloud);
+    this.#memory = memory;
+    const most = pageCapacity(device, 4 * Math.max(...Object.values(widthsOf(cloud.shDegree))));
+    const capacity = Math.min(most, CULL_GROUP * Math.max(1, Math.floor(pageSplats / CULL_GROUP)));
+    const pages: GaussianPage[] = [];
+    for (let first = 0; first < cloud.count; first += capacity) {
+      const page = pageOf(memory, cloud.shDegree, Math.min(capacity, cloud.count - first));
+      pack(device, cloud, first, page);
+      pages.push(page);
+    }
+    this.pages = pages;
+  }
+
+  /**
+   * Uploads and packs a cloud.
+   * @param pageSplats most splats of a page; default what the device's limits allow
+   * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`; `out-of-memory/*`
+   */
+  static async upload(device: GPUDevice, cloud: GaussianCloud, pageSplats = Infinity): Promise<CloudBuffers> {
+    validateCloud(cloud);
+    const memory = new GpuMemory(device);
+    try {
+      const make = (): CloudBuffers => new CloudBuffers(device, recentred(cloud), memory, pageSplats);
+      return await withMemoryCheck(device, `scene of ${cloud.count} splats`, make);
+    } catch (error) {
+      memory.destroy();
+      throw error;
+    }
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+  }
+}
+
+function pageOf(memory: GpuMemory, degree: ShDegree, count: number): GaussianPage {
+  const { storage, copySource } = BUFFER_USAGE;
+  const buffer = (name: string, bytes: number): GPUBuffer =>
+    memory.buffer(`gs.economise.${name}`, bytes, storage | copySource);
+  return {
+    count,
+    geometry: buffer('geometry', layouts.PackedGaussian.size * count),
+    sh: buffer('sh', 4 * shWords(degree, 'float16') * count),
+    chunks: buffer('chunks', layouts.Chunk.size * cullGroups(count)),
+  };
+}
+
+/** Packs the splats of a page, from `first` on. What the cloud's arrays take is free again when that is done. */
+function pack(device: GPUDevice, cloud: GaussianCloud, first: number, page: GaussianPage): void {
+  const passing = new GpuMemory(device);
+  try {
+    const widths = widthsOf(cloud.shDegree);
+    const part = (name: keyof typeof widths): GPUBuffer => {
+      const numbers = cloud[name].subarray(widths[name] * first, widths[name] * (first + page.count));
+      const words = new Uint32Array(numbers.buffer, numbers.byteOffset, numbers.length);
+      return passing.buffer(`gs.economise.${name}`, words.byteLength, BUFFER_USAGE.storage, words);
+    };
+    const stage = new IngestStage(device);
+    const bindings = stage.bind({
+      ingest: uniformOf(passing, cloud.shDegree, page.count),
+      ...{ positions: part('positions'), shapes: part('scales'), rotations: part('rotations') },
+      ...{ colors: part('sh'), opacities: part('opacities') },
+      ...{ gaussians: page.geometry, sh: page.sh, chunks: page.chunks },
+    });
+    const encoder = device.createCommandEncoder({ label: 'gs.economise.pack' });
+    const pass = encoder.beginComputePass({ label: 'gs.economise.pack' });
+    stage.record(pass, bindings, page.count);
+    pass.end();
+    device.queue.submit([encoder.finish()]);
+  } finally {
+    passing.destroy();
+  }
+}
+
+/** `Ingest` of rows that all live. */
+function uniformOf(memory: GpuMemory, degree: ShDegree, count: number): GPUBuffer {
+  const bytes = new ArrayBuffer(layouts.Ingest.size);
+  const { positions, scales, rotations, sh, opacities } = widthsOf(degree);
+  writeStruct(
+    layouts.Ingest,
+    {
+      ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 0 },
+      ...{ shape_kind: SHAPE_SCALE, color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: degree },
+      ...{ positions: [0, positions], shapes: [0, scales], rotations: [0, rotations] },
+      ...{ colors: [0, sh], opacities: [0, opacities] },
+    },
+    bytes,
+  );
+  return memory.buffer('gs.economise.ingest', bytes.byteLength, BUFFER_USAGE.uniform, new Uint32Array(bytes));
+}

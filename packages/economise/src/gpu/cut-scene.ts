@@ -1,0 +1,112 @@
+import type { GaussianPage, GaussianScene } from '@gaussian-splat/renderer';
+import { BUFFER_USAGE, GpuMemory, rareKernelOf, withMemoryCheck, writeStruct } from '@gaussian-splat/renderer/stages';
+import { economiseCut, SCORE_GROUP, UNJUDGED } from '../generated/shaders.js';
+import type { Cut } from '../reduce.js';
+import { layouts } from './layouts.js';
+import { readBack } from './read-back.js';
+import type { ScenePart, SceneParts } from './scene-parts.js';
+
+const DEGREES = 4;
+
+/** A copy of a scene that cuts are applied to, on the GPU: what goes becomes transparent, and colours take fewer bands. Chunks keep their bounds. */
+export class CutScene implements GaussianScene {
+  readonly pages: readonly GaussianPage[];
+  readonly #device: GPUDevice;
+  readonly #scene: SceneParts;
+  readonly #memory: GpuMemory;
+  readonly #uniforms: readonly GPUBuffer[];
+  readonly #kept: GPUBuffer;
+  readonly #bindings: readonly GPUBindGroup[];
+  #version = 0;
+
+  private constructor(device: GPUDevice, scene: SceneParts, memory: GpuMemory) {
+    this.#device = device;
+    this.#scene = scene;
+    this.#memory = memory;
+    const { uniform, storage, copySource, copyDestination } = BUFFER_USAGE;
+    const copyOf = (name: string, buffer: GPUBuffer): GPUBuffer =>
+      memory.buffer(`gs.economise.cut_${name}`, buffer.size, storage | copySource);
+    this.pages = scene.parts.map(({ page }) => ({
+      ...page,
+      geometry: copyOf('geometry', page.geometry),
+      sh: copyOf('sh', page.sh),
+    }));
+    this.#kept = memory.buffer('gs.economise.kept', 4 * DEGREES, storage | copySource | copyDestination);
+    this.#uniforms = scene.parts.map(() =>
+      memory.buffer('gs.economise.cut', layouts.Cut.size, uniform | copyDestination),
+    );
+    this.#bindings = scene.parts.map((part, p) => this.#bind(part, p));
+  }
+
+  /** @throws GaussianSplatError `out-of-memory/*` */
+  static async of(device: GPUDevice, scene: SceneParts): Promise<CutScene> {
+    const memory = new GpuMemory(device);
+    try {
+      const where = `copy of a scene of ${scene.gaussians.count} splats`;
+      return await withMemoryCheck(device, where, () => new CutScene(device, scene, memory));
+    } catch (error) {
+      memory.destroy();
+      throw error;
+    }
+  }
+
+  get count(): number {
+    return this.#scene.gaussians.count;
+  }
+  get shDegree(): GaussianScene['shDegree'] {
+    return this.#scene.gaussians.shDegree;
+  }
+  get shPrecision(): GaussianScene['shPrecision'] {
+    return this.#scene.gaussians.shPrecision;
+  }
+  get antialiased(): boolean {
+    return this.#scene.gaussians.antialiased;
+  }
+  get origin(): GaussianScene['origin'] {
+    return this.#scene.gaussians.origin;
+  }
+  get version(): number {
+    return this.#version;
+  }
+
+  /** Makes this scene what a cut leaves. Splats must have been scored. */
+  apply({ minContribution = 0, removalPrice = 0, colourPrice = 0 }: Cut): void {
+    const kernel = rareKernelOf(this.#device, economiseCut);
+    const bytes = new ArrayBuffer(layouts.Cut.size);
+    const prices = {
+      min_contribution: minContribution,
+      // WGSL has no infinity.
+      removal_price: Math.min(removalPrice, UNJUDGED),
+      colour_price: colourPrice,
+    };
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.cut' });
+    encoder.clearBuffer(this.#kept);
+    const pass = encoder.beginComputePass({ label: 'gs.economise.cut' });
+    this.#scene.parts.forEach(({ page }, p) => {
+      writeStruct(layouts.Cut, { ...prices, splat_count: page.count, sh_degree: this.shDegree }, bytes);
+      this.#device.queue.writeBuffer(this.#uniforms[p], 0, bytes);
+      kernel.dispatch(pass, this.#bindings[p], Math.ceil(page.count / SCORE_GROUP));
+    });
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+    this.#version++;
+  }
+
+  /** [4] splats that the last cut leaves, by the degree that they keep. */
+  async degrees(): Promise<number[]> {
+    const [counts] = await readBack(this.#device, [{ buffer: this.#kept, byteLength: 4 * DEGREES }]);
+    return [...new Uint32Array(counts)];
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+  }
+
+  #bind({ page, scores, lowered }: ScenePart, p: number): GPUBindGroup {
+    const { geometry, sh } = this.pages[p];
+    return rareKernelOf(this.#device, economiseCut).bind({
+      ...{ cut: this.#uniforms[p], gaussians: page.geometry, sh: page.sh, scores, lowered },
+      ...{ cut_gaussians: geometry, cut_sh: sh, kept: this.#kept },
+    });
+  }
+}

@@ -1,0 +1,191 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { Renderer } from '@gaussian-splat/renderer';
+import type { LoweredColours } from '../colour-moments.js';
+import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
+import { UNJUDGED } from '../generated/shaders.js';
+import type { Cut } from '../reduce.js';
+import type { Ranking, Scores } from '../score.js';
+import type { DealtViews } from '../views.js';
+import { CloudBuffers } from './cloud-buffers.js';
+import { CutScene } from './cut-scene.js';
+import { layouts } from './layouts.js';
+import { PictureErrors } from './picture-errors.js';
+import { readBack } from './read-back.js';
+import { SceneParts, loweredNumbers } from './scene-parts.js';
+import { SceneScorer } from './scene-scorer.js';
+
+export interface GpuEvaluatorOptions {
+  /** Most splats that are bound at once, for tests; default what the device's limits allow. */
+  readonly partSplats?: number;
+  /** Views whose energies are kept until they are added to the moments of colour, default 32. */
+  readonly viewsAtOnce?: number;
+}
+
+/** Bytes of them are a fourth of what the moments take. */
+const VIEWS_AT_ONCE = 32;
+
+/**
+ * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and of its pictures only their errors come back. It takes 256 bytes of GPU memory a splat of
+ * degree 3 for the scene and its copy, 872 for scores and colours, and 16 for each pixel of the views that errors are measured in.
+ */
+export class GpuEvaluator implements Evaluator {
+  readonly #device: GPUDevice;
+  readonly #cloud: GaussianCloud;
+  readonly #views: DealtViews;
+  readonly #scene: SceneParts;
+  readonly #renderer: Renderer;
+  readonly #cutScene: CutScene;
+  readonly #errors = new Map<JudgedViews, PictureErrors>();
+  #ranking: Ranking | undefined;
+
+  private constructor(
+    device: GPUDevice,
+    cloud: GaussianCloud,
+    views: DealtViews,
+    scene: SceneParts,
+    cutScene: CutScene,
+  ) {
+    this.#device = device;
+    this.#cloud = cloud;
+    this.#views = views;
+    this.#scene = scene;
+    this.#cutScene = cutScene;
+    // Exact, so that no rounding is taken for an effect of the cut.
+    this.#renderer = new Renderer(device, { quality: 'reference' });
+  }
+
+  /**
+   * Uploads a cloud.
+   * @param views of three kinds, none of which may share one: what was not seen in the first would seem unneeded in the second.
+   * @throws GaussianSplatError `out-of-memory/*`
+   */
+  static async create(
+    device: GPUDevice,
+    cloud: GaussianCloud,
+    views: DealtViews,
+    { partSplats, viewsAtOnce = VIEWS_AT_ONCE }: GpuEvaluatorOptions = {},
+  ): Promise<GpuEvaluator> {
+    const energies = Math.min(views.scored.length, viewsAtOnce);
+    const scene = await SceneParts.upload(device, cloud, energies, partSplats);
+    try {
+      return new GpuEvaluator(device, cloud, views, scene, await CutScene.of(device, scene));
+    } catch (error) {
+      scene.destroy();
+      throw error;
+    }
+  }
+
+  async rank(signal?: AbortSignal): Promise<Ranking> {
+    const scorer = new SceneScorer(this.#device, this.#renderer, this.#scene, this.#views.scored);
+    try {
+      await scorer.run(signal);
+      const parts = this.#scene.parts.map(({ scores, page }) => ({
+        buffer: scores,
+        byteLength: layouts.Score.size * page.count,
+      }));
+      this.#ranking = this.#rankingOf(await readBack(this.#device, parts));
+      return this.#ranking;
+    } finally {
+      scorer.destroy();
+    }
+  }
+
+  /**
+   * [N] what the splats had of a scored view, one of the last that were looked at together: the sum of the squares of their weights over the pixels of its picture, as far as
+   * peak and size tell.
+   */
+  async energiesIn(view: number): Promise<Float32Array> {
+    const parts = this.#scene.parts.map(({ energies, row, page }) => ({
+      buffer: energies,
+      byteOffset: 4 * row * (view % this.#scene.views),
+      byteLength: 4 * page.count,
+    }));
+    const found = new Float32Array(this.#cloud.count);
+    let slot = 0;
+    for (const bytes of await readBack(this.#device, parts)) {
+      found.set(new Float32Array(bytes), slot);
+      slot += bytes.byteLength / 4;
+    }
+    return found;
+  }
+
+  async scores(): Promise<Scores> {
+    if (this.#ranking === undefined) throw new Error('GpuEvaluator: rank() comes before scores()');
+    const stride = loweredNumbers(this.#cloud.shDegree);
+    if (stride === 0) return { ...this.#ranking, lowered: [] };
+    const parts = this.#scene.parts.map(({ lowered, page }) => ({
+      buffer: lowered,
+      byteLength: 4 * stride * page.count,
+    }));
+    const records = await readBack(this.#device, parts);
+    return { ...this.#ranking, lowered: this.#loweredOf(records.map((bytes) => new Float32Array(bytes))) };
+  }
+
+  async cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
+    const errors = await this.#errorsIn(views);
+    signal?.throwIfAborted();
+    this.#cutScene.apply(cut);
+    const [found, degrees] = await Promise.all([errors.measure(this.#cutScene), this.#cutScene.degrees()]);
+    return { errors: found, degrees };
+  }
+
+  async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+    const errors = await this.#errorsIn(views);
+    signal?.throwIfAborted();
+    const gaussians = await CloudBuffers.upload(this.#device, cloud);
+    try {
+      return await errors.measure(gaussians);
+    } finally {
+      gaussians.destroy();
+    }
+  }
+
+  destroy(): void {
+    for (const errors of this.#errors.values()) errors.destroy();
+    this.#renderer.destroy();
+    this.#cutScene.destroy();
+    this.#scene.destroy();
+  }
+
+  async #errorsIn(views: JudgedViews): Promise<PictureErrors> {
+    const known = this.#errors.get(views);
+    if (known) return known;
+    const made = await PictureErrors.of(this.#device, this.#renderer, this.#scene.gaussians, this.#views[views]);
+    this.#errors.set(views, made);
+    return made;
+  }
+
+  /** Scores by splat. */
+  #rankingOf(parts: readonly ArrayBuffer[]): Ranking {
+    const stride = layouts.Score.size / 4;
+    const { contribution: at, removal } = layouts.Score.fields;
+    const contribution = new Float32Array(this.#cloud.count);
+    const removalError = new Float32Array(this.#cloud.count);
+    let i = 0;
+    for (const scores of parts.map((bytes) => new Float32Array(bytes))) {
+      for (let k = 0; k < scores.length; k += stride, i++) {
+        const error = scores[k + removal.offset / 4];
+        contribution[i] = scores[k + at.offset / 4];
+        removalError[i] = error >= UNJUDGED ? Infinity : error;
+      }
+    }
+    return { contribution, removalError };
+  }
+
+  #loweredOf(parts: readonly Float32Array[]): LoweredColours[] {
+    const { count, shDegree } = this.#cloud;
+    const stride = loweredNumbers(shDegree);
+    const partSplats = parts[0].length / stride;
+    const partOf = (i: number): Float32Array => parts[Math.floor(i / partSplats)];
+    return Array.from({ length: shDegree }, (_, degree) => {
+      const [first, end] = [loweredNumbers(shDegree, degree), loweredNumbers(shDegree, degree + 1)];
+      const error = new Float32Array(count);
+      for (let i = 0; i < count; i++) error[i] = partOf(i)[stride * (i % partSplats) + degree];
+      const of = (i: number): Float32Array => {
+        const at = stride * (i % partSplats);
+        return partOf(i).subarray(at + first, at + end);
+      };
+      return { error, of };
+    });
+  }
+}

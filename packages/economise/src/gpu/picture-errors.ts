@@ -1,0 +1,163 @@
+import type { Camera } from '@gaussian-splat/core';
+import type { GaussianScene, Renderer } from '@gaussian-splat/renderer';
+import { BUFFER_USAGE, GpuMemory, rareKernelOf, TEXTURE_USAGE, writeStruct } from '@gaussian-splat/renderer/stages';
+import * as generated from '../generated/shaders.js';
+import { readBack } from './read-back.js';
+
+const { ERROR_TILE, pictureError, pictureErrorSum, PictureErrors: layout } = generated;
+/** Pictures drawn until all had room: room grows by a quarter more than was asked for. */
+const MOST_TRIES = 4;
+/** A sum of squares and a count of pixels. */
+const SUM_BYTES = 8;
+const COUNTS_BYTES = 16;
+/** Bindings begin at multiples of 256 bytes. */
+const ALIGNED_TILES = 256 / SUM_BYTES;
+
+/** What is waited for between two pictures. */
+export type Pause = () => Promise<void>;
+
+/** A view, and the picture that others are held against. */
+interface Exhibit {
+  readonly camera: Camera;
+  readonly reference: GPUTexture;
+  readonly columns: number;
+  readonly rows: number;
+  readonly compare: GPUBindGroup;
+}
+
+/**
+ * How far pictures of a scene are from those of another one in the same views. Pictures never leave the GPU: of each, a sum of squares and a number of pixels
+ * come back, all in one read.
+ */
+export class PictureErrors {
+  readonly #device: GPUDevice;
+  readonly #renderer: Renderer;
+  readonly #memory: GpuMemory;
+  /** Pictures at hand, by their size. */
+  readonly #targets = new Map<string, GPUTexture>();
+  readonly #exhibits: readonly Exhibit[];
+  readonly #errors: GPUBuffer;
+  readonly #counts: GPUBuffer;
+  readonly #sum: GPUBindGroup;
+
+  private constructor(device: GPUDevice, renderer: Renderer, views: readonly Camera[]) {
+    this.#device = device;
+    this.#renderer = renderer;
+    this.#memory = new GpuMemory(device);
+    const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
+    const buffer = (name: string, bytes: number, usage: number): GPUBuffer =>
+      this.#memory.buffer(`gs.economise.${name}`, bytes, usage);
+    const tilesOf = ({ width, height }: Camera): number =>
+      Math.ceil(width / ERROR_TILE) * Math.ceil(height / ERROR_TILE);
+    const room = ALIGNED_TILES * Math.ceil(Math.max(...views.map(tilesOf)) / ALIGNED_TILES);
+    const tiles = buffer('tile_errors', SUM_BYTES * room * views.length, storage);
+    this.#errors = buffer('errors', SUM_BYTES * views.length, storage | copySource);
+    this.#counts = buffer('counts', COUNTS_BYTES * views.length, copySource | copyDestination);
+    const pictures = buffer('pictures', layout.size, uniform | copyDestination);
+    const bytes = new ArrayBuffer(layout.size);
+    writeStruct(layout, { tiles: room }, bytes);
+    device.queue.writeBuffer(pictures, 0, bytes);
+    this.#sum = rareKernelOf(device, pictureErrorSum).bind({ pictures, tiles, errors: this.#errors });
+    const size = SUM_BYTES * room;
+    this.#exhibits = views.map((camera, k) => this.#exhibit(camera, { buffer: tiles, offset: size * k, size }));
+  }
+
+  /**
+   * Draws the pictures that others will be held against.
+   * @param pause waited for between two pictures: the turn of others
+   */
+  static async of(
+    device: GPUDevice,
+    renderer: Renderer,
+    gaussians: GaussianScene,
+    views: readonly Camera[],
+    pause?: Pause,
+  ): Promise<PictureErrors> {
+    const made = new PictureErrors(device, renderer, views);
+    try {
+      await made.#draw(gaussians, ({ reference }) => reference, pause);
+      return made;
+    } catch (error) {
+      made.destroy();
+      throw error;
+    }
+  }
+
+  /** [views] mean squared error of the colours, peak 1, over the pixels that the reference covers; 0 where it covers none. */
+  async measure(gaussians: GaussianScene, pause?: Pause): Promise<number[]> {
+    const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.#targetOf(camera), pause));
+    return this.#exhibits.map((_, k) => (sums[2 * k + 1] === 0 ? 0 : sums[2 * k] / (3 * sums[2 * k + 1])));
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+    for (const { reference } of this.#exhibits) reference.destroy();
+    for (const target of this.#targets.values()) target.destroy();
+  }
+
+  #exhibit(camera: Camera, tiles: GPUBufferBinding): Exhibit {
+    const reference = this.#texture(camera, 'gs.economise.reference');
+    const image = this.#targetOf(camera).createView();
+    return {
+      ...{ camera, reference },
+      columns: Math.ceil(camera.width / ERROR_TILE),
+      rows: Math.ceil(camera.height / ERROR_TILE),
+      compare: rareKernelOf(this.#device, pictureError).bind({ image, reference: reference.createView(), tiles }),
+    };
+  }
+
+  #targetOf(camera: Camera): GPUTexture {
+    const key = `${camera.width} x ${camera.height}`;
+    const target = this.#targets.get(key) ?? this.#texture(camera, 'gs.economise.picture');
+    this.#targets.set(key, target);
+    return target;
+  }
+
+  #texture({ width, height }: Camera, label: string): GPUTexture {
+    const { storageBinding, textureBinding, renderAttachment } = TEXTURE_USAGE;
+    return this.#device.createTexture({
+      label,
+      size: [width, height],
+      format: 'rgba32float',
+      usage: storageBinding | textureBinding | renderAttachment,
+    });
+  }
+
+  /** Draws all views, again where there was no room for all of them. @returns the sums to the references */
+  async #draw(
+    gaussians: GaussianScene,
+    targetOf: (exhibit: Exhibit) => GPUTexture,
+    pause: Pause | undefined,
+  ): Promise<ArrayBuffer> {
+    for (let tries = 1; ; tries++) {
+      for (const [k, exhibit] of this.#exhibits.entries()) {
+        this.#renderer.render({ gaussians, camera: exhibit.camera, target: targetOf(exhibit) });
+        this.#compare(exhibit, k);
+        await pause?.();
+      }
+      this.#addUp();
+      const [sums, counts] = await readBack(this.#device, [{ buffer: this.#errors }, { buffer: this.#counts }]);
+      const hadRoom = this.#exhibits.map((_, k) =>
+        this.#renderer.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)),
+      );
+      if (!hadRoom.includes(false) || tries === MOST_TRIES) return sums;
+    }
+  }
+
+  #compare({ columns, rows, compare }: Exhibit, k: number): void {
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.compare' });
+    this.#renderer.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
+    const pass = encoder.beginComputePass({ label: 'gs.economise.compare' });
+    rareKernelOf(this.#device, pictureError).dispatchGrid(pass, compare, columns, rows);
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  #addUp(): void {
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.add_up' });
+    const pass = encoder.beginComputePass({ label: 'gs.economise.add_up' });
+    rareKernelOf(this.#device, pictureErrorSum).dispatchGrid(pass, this.#sum, this.#exhibits.length, 1);
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+  }
+}

@@ -1,0 +1,35 @@
+import { BUFFER_USAGE } from '@gaussian-splat/renderer/stages';
+
+/** A part of a buffer to read. */
+export interface ReadPart {
+  readonly buffer: GPUBuffer;
+  /** Bytes from the beginning of the buffer, default 0, and how many, default all. */
+  readonly byteOffset?: number;
+  readonly byteLength?: number;
+}
+
+/** Reads buffers back, in one submission. Rejects if the device is lost meanwhile. */
+export async function readBack(device: GPUDevice, parts: readonly ReadPart[]): Promise<ArrayBuffer[]> {
+  const { mapRead, copyDestination } = BUFFER_USAGE;
+  const encoder = device.createCommandEncoder({ label: 'gs.economise.read' });
+  const staged = parts.map(({ buffer, byteOffset = 0, byteLength = buffer.size }) => {
+    const staging = device.createBuffer({
+      label: 'gs.economise.read',
+      size: byteLength,
+      usage: mapRead | copyDestination,
+    });
+    encoder.copyBufferToBuffer(buffer, byteOffset, staging, 0, byteLength);
+    return staging;
+  });
+  device.queue.submit([encoder.finish()]);
+  try {
+    return await Promise.all(
+      staged.map(async (staging) => {
+        await staging.mapAsync(0x1);
+        return staging.getMappedRange().slice(0);
+      }),
+    );
+  } finally {
+    for (const staging of staged) staging.destroy();
+  }
+}

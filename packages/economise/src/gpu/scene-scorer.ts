@@ -1,0 +1,215 @@
+import { eyeOf, type Camera } from '@gaussian-splat/core';
+import type { Renderer } from '@gaussian-splat/renderer';
+import {
+  BUFFER_USAGE,
+  cameraValues,
+  GpuMemory,
+  layouts as rendererLayouts,
+  rareKernelOf,
+  TEXTURE_USAGE,
+  writeStruct,
+  type StructLayout,
+  type StructValues,
+} from '@gaussian-splat/renderer/stages';
+import { PRIOR_VIEWS } from '../colour-moments.js';
+import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
+import { MIN_LOOKS, UNSEEN_CONTRAST } from '../score.js';
+import { layouts } from './layouts.js';
+import { readBack } from './read-back.js';
+import type { SceneParts } from './scene-parts.js';
+
+/**
+ * Squared difference of a splat's colour to what lies behind it, a channel: an assumption, on the low side of the means of captured scenes (0.05 to 0.16). It shifts
+ * only what is tried first; what a cut costs is measured on pictures.
+ */
+const USUAL_CONTRAST = 0.02;
+/** Looks at the scene until all views had room. */
+const MOST_TRIES = 4;
+const COUNTS_BYTES = 16;
+const FLOAT_BYTES = 4;
+const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
+
+/**
+ * Looks at a scene from all views and keeps on the GPU what they tell of each splat: the compute rasterizer notes the largest weight of each, and sums grow in buffers. Nothing
+ * is read back but whether there was room, at the end.
+ */
+export class SceneScorer {
+  readonly #device: GPUDevice;
+  readonly #renderer: Renderer;
+  readonly #scene: SceneParts;
+  readonly #views: readonly Camera[];
+  readonly #memory: GpuMemory;
+  /** By slot: the largest weights in the view at hand. */
+  readonly #peaks: GPUBuffer;
+  readonly #counts: GPUBuffer;
+  /** Where the views look from, page-local. */
+  readonly #eyes: GPUBuffer;
+  readonly #targets = new Map<string, GPUTexture>();
+
+  /** @param renderer one with the rasterizer `tiles` */
+  constructor(device: GPUDevice, renderer: Renderer, scene: SceneParts, views: readonly Camera[]) {
+    this.#device = device;
+    this.#renderer = renderer;
+    this.#scene = scene;
+    this.#views = views;
+    this.#memory = new GpuMemory(device);
+    const { storage, copySource, copyDestination } = BUFFER_USAGE;
+    this.#peaks = this.#memory.buffer('gs.economise.peaks', FLOAT_BYTES * scene.slots, storage | copyDestination);
+    this.#counts = this.#memory.buffer(
+      'gs.economise.counts',
+      COUNTS_BYTES * views.length,
+      copySource | copyDestination,
+    );
+    this.#eyes = this.#memory.buffer('gs.economise.eyes', 16 * views.length, storage, eyesOf(views, scene));
+  }
+
+  /** Scores all splats, and finds their colours at lower degrees. */
+  async run(signal?: AbortSignal): Promise<void> {
+    for (let tries = 0; tries < MOST_TRIES; tries++) {
+      if (await this.#look(signal)) break;
+    }
+    this.#lower();
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+    for (const target of this.#targets.values()) target.destroy();
+  }
+
+  /** @returns whether there was room for all that each view should show; if not, there will be */
+  async #look(signal: AbortSignal | undefined): Promise<boolean> {
+    const uniforms = this.#writeViews();
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.clear' });
+    encoder.clearBuffer(this.#peaks);
+    for (const { scores, moments } of this.#scene.parts) {
+      encoder.clearBuffer(scores);
+      encoder.clearBuffer(moments);
+    }
+    this.#device.queue.submit([encoder.finish()]);
+    this.#views.forEach((camera, k) => {
+      signal?.throwIfAborted();
+      const notes = { contributions: this.#peaks };
+      const target = this.#targetOf(camera);
+      this.#renderer.render({ gaussians: this.#scene.gaussians, camera, target, notes });
+      this.#note(uniforms, k);
+      const isLast = k === this.#views.length - 1;
+      if (isLast || (k + 1) % this.#scene.views === 0) this.#gather(k - (k % this.#scene.views), k + 1);
+    });
+    const [counts] = await readBack(this.#device, [{ buffer: this.#counts }]);
+    this.#memory.free(uniforms);
+    signal?.throwIfAborted();
+    const hadRoom = this.#views.map((_, k) => this.#renderer.hadRoom(new Uint32Array(counts, COUNTS_BYTES * k, 4)));
+    return !hadRoom.includes(false);
+  }
+
+  /** `View` of each view and part. */
+  #writeViews(): GPUBuffer {
+    const { parts, gaussians } = this.#scene;
+    const bytes = new ArrayBuffer(VIEW_STRIDE * parts.length * this.#views.length);
+    this.#views.forEach((camera, k) => {
+      const values = { ...NO_VIEW, ...cameraValues(camera, gaussians.origin), antialiased: +gaussians.antialiased };
+      parts.forEach(({ page }, p) => {
+        const at = VIEW_STRIDE * (parts.length * k + p);
+        writeStruct(rendererLayouts.View, { ...values, splat_count: page.count }, bytes, at);
+      });
+    });
+    const { uniform, copyDestination } = BUFFER_USAGE;
+    const buffer = this.#memory.buffer('gs.economise.views', bytes.byteLength, uniform | copyDestination);
+    this.#device.queue.writeBuffer(buffer, 0, bytes);
+    return buffer;
+  }
+
+  /** Adds what the view that was drawn last has told. */
+  #note(uniforms: GPUBuffer, k: number): void {
+    const kernel = rareKernelOf(this.#device, economiseScore);
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.score' });
+    this.#renderer.copyCounts(encoder, this.#counts, COUNTS_BYTES * k);
+    const pass = encoder.beginComputePass({ label: 'gs.economise.score' });
+    this.#scene.parts.forEach(({ page, first, row, scores, energies }, p) => {
+      const offset = VIEW_STRIDE * (this.#scene.parts.length * k + p);
+      const size = FLOAT_BYTES * row;
+      const bindings = kernel.bind({
+        view: { buffer: uniforms, offset, size: rendererLayouts.View.size },
+        gaussians: page.geometry,
+        peaks: { buffer: this.#peaks, offset: FLOAT_BYTES * first, size },
+        energies: { buffer: energies, offset: size * (k % this.#scene.views), size },
+        scores,
+      });
+      kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
+    });
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  /** Adds the views from `first` to `end`, whose energies are at hand, to the moments of colour. */
+  #gather(first: number, end: number): void {
+    const { shDegree } = this.#scene.gaussians;
+    if (shDegree === 0) return;
+    const kernel = rareKernelOf(this.#device, economiseMoments);
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.moments' });
+    const pass = encoder.beginComputePass({ label: 'gs.economise.moments' });
+    this.#scene.parts.forEach(({ page, row, energies, moments }) => {
+      const counts = { splat_count: page.count, row, views: end - first, first_view: first, sh_degree: shDegree };
+      const seen = this.#uniform(layouts.MomentViews, counts);
+      const bindings = kernel.bind({ seen, eyes: this.#eyes, gaussians: page.geometry, energies, moments });
+      kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
+    });
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  /** Turns sums into scores and colours, a submission for each part. */
+  #lower(): void {
+    const kernel = rareKernelOf(this.#device, economiseLower);
+    for (const { page, row, scores, moments, lowered } of this.#scene.parts) {
+      const lowering = this.#uniform(layouts.Lowering, {
+        ...{ splat_count: page.count, row, views: this.#views.length, sh_degree: this.#scene.gaussians.shDegree },
+        ...{ contrast: USUAL_CONTRAST + UNSEEN_CONTRAST, prior_views: PRIOR_VIEWS, least_looks: MIN_LOOKS },
+      });
+      const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.lower' });
+      const pass = encoder.beginComputePass({ label: 'gs.economise.lower' });
+      const bindings = kernel.bind({ lowering, sh: page.sh, moments, scores, lowered });
+      kernel.dispatch(pass, bindings, Math.ceil(page.count / SCORE_GROUP));
+      pass.end();
+      this.#device.queue.submit([encoder.finish()]);
+    }
+  }
+
+  #uniform<L extends StructLayout>(layout: L, values: StructValues<L>): GPUBuffer {
+    const bytes = new ArrayBuffer(layout.size);
+    writeStruct(layout, values, bytes);
+    return this.#memory.buffer('gs.economise.uniform', layout.size, BUFFER_USAGE.uniform, new Uint32Array(bytes));
+  }
+
+  #targetOf({ width, height }: Camera): GPUTexture {
+    const key = `${width} x ${height}`;
+    const known = this.#targets.get(key);
+    if (known) return known;
+    const { storageBinding, renderAttachment } = TEXTURE_USAGE;
+    const usage = storageBinding | renderAttachment;
+    const made = this.#device.createTexture({
+      label: 'gs.economise.view',
+      size: [width, height],
+      format: 'rgba16float',
+      usage,
+    });
+    this.#targets.set(key, made);
+    return made;
+  }
+}
+
+/** [views, 4] where views look from, relative to the scene's origin; the fourth number fills up. */
+function eyesOf(views: readonly Camera[], { gaussians }: SceneParts): Uint32Array {
+  const places = views.flatMap(({ worldToCamera }) => [
+    ...eyeOf(worldToCamera).map((value, axis) => value - gaussians.origin[axis]),
+    1,
+  ]);
+  return new Uint32Array(Float32Array.from(places).buffer);
+}
+
+/** What the score shader does not ask of a `View`. */
+const NO_VIEW = {
+  ...{ page: 0, first_group: 0, sh_degree: 0, sh_cap: 0, sh_encoding: 0, key_bits: 0, is_ordered: 0 },
+  ...{ occlusion_tiles: [0, 0], has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },
+  ...{ alpha_min: 0, min_contribution: 0 },
+};

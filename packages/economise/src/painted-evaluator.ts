@@ -1,0 +1,79 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { cpuPainter, cpuScorer } from './cpu-raster.js';
+import type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
+import { meanSquare, type Image, type Painter } from './measure.js';
+import { degreesOf, reduce, type Cut } from './reduce.js';
+import { scoreSplats, type Ranking, type Scores } from './score.js';
+import type { ContributionScorer } from './scorer.js';
+import type { DealtViews } from './views.js';
+
+export interface PaintedEvaluatorOptions {
+  /** The views of three kinds, none of which may share one: what was not seen in the first would seem unneeded in the second. */
+  readonly views: DealtViews;
+  /** Draws the held-out views of clouds to compare: what the result is judged by. Default {@link cpuPainter}; {@link Studio} is the project's renderer. */
+  readonly studio?: Painter;
+  /** Draws all other pictures; default {@link cpuPainter}. */
+  readonly sketcher?: Painter;
+  /** Default: {@link cpuScorer} of the cloud. */
+  readonly scorer?: ContributionScorer;
+}
+
+/** Scores in plain code, and draws each reduced cloud anew: where there is no GPU, and what others are held against. */
+export class PaintedEvaluator implements Evaluator {
+  readonly #cloud: GaussianCloud;
+  readonly #options: PaintedEvaluatorOptions;
+  /** Pictures of the whole scene, by who drew them and of which views. */
+  readonly #whole = new Map<Painter, Map<JudgedViews, Promise<Image[]>>>();
+  #scores: Scores | undefined;
+
+  constructor(cloud: GaussianCloud, options: PaintedEvaluatorOptions) {
+    this.#cloud = cloud;
+    this.#options = options;
+  }
+
+  async rank(signal?: AbortSignal): Promise<Ranking> {
+    const { views, scorer = cpuScorer(this.#cloud) } = this.#options;
+    this.#scores = await scoreSplats(this.#cloud, views.scored, scorer, signal);
+    return this.#scores;
+  }
+
+  async scores(): Promise<Scores> {
+    return this.#scores ?? Promise.reject(new Error('PaintedEvaluator: rank() comes before scores()'));
+  }
+
+  async cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
+    const { cloud, degrees } = reduce(this.#cloud, await this.scores(), cut);
+    const { sketcher = cpuPainter } = this.#options;
+    return { errors: await this.#errors(cloud, views, sketcher, signal), degrees: degreesOf(degrees) };
+  }
+
+  async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+    const { studio = cpuPainter, sketcher = cpuPainter } = this.#options;
+    return this.#errors(cloud, views, views === 'heldOut' ? studio : sketcher, signal);
+  }
+
+  destroy(): void {
+    this.#whole.clear();
+  }
+
+  async #errors(
+    cloud: GaussianCloud,
+    views: JudgedViews,
+    painter: Painter,
+    signal: AbortSignal | undefined,
+  ): Promise<readonly number[]> {
+    signal?.throwIfAborted();
+    const expected = await this.#wholeBy(painter, views);
+    signal?.throwIfAborted();
+    const images = await painter.draw(cloud, this.#options.views[views]);
+    return images.map((image, k) => meanSquare(image, expected[k]));
+  }
+
+  #wholeBy(painter: Painter, views: JudgedViews): Promise<Image[]> {
+    const drawn = this.#whole.get(painter) ?? new Map<JudgedViews, Promise<Image[]>>();
+    this.#whole.set(painter, drawn);
+    const known = drawn.get(views) ?? painter.draw(this.#cloud, this.#options.views[views]);
+    drawn.set(views, known);
+    return known;
+  }
+}

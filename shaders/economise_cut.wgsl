@@ -1,0 +1,100 @@
+// Applies a cut to a part of a scene: what goes becomes transparent, and splats of which fewer bands are kept take those that were set anew. The same choice
+// as `reduce` of `economise`.
+#import shared/transparent
+#import shared/sh
+#import shared/group
+#import shared/score
+
+struct Cut {
+  splat_count: u32,
+  sh_degree: u32,
+  // Splats below one of these go.
+  min_contribution: f32,
+  removal_price: f32,
+  // Mean squared error that a coefficient is worth.
+  colour_price: f32,
+}
+
+@group(0) @binding(0) var<uniform> cut: Cut;
+@group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
+// float16, two a word.
+@group(0) @binding(2) var<storage, read> sh: array<u32>;
+@group(0) @binding(3) var<storage, read> scores: array<Score>;
+// See economise_lower.
+@group(0) @binding(4) var<storage, read> lowered: array<f32>;
+@group(0) @binding(5) var<storage, read_write> cut_gaussians: array<PackedGaussian>;
+@group(0) @binding(6) var<storage, read_write> cut_sh: array<u32>;
+// Splats that stay, by the degree that they keep.
+@group(0) @binding(7) var<storage, read_write> kept: array<atomic<u32>, 4>;
+
+var<workgroup> kept_here: array<atomic<u32>, 4>;
+
+fn coefficients(degree: u32) -> u32 {
+  return (degree + 1u) * (degree + 1u);
+}
+
+// The degree at which error and the price of what is kept add up to least.
+fn degree_of(i: u32) -> u32 {
+  var best = cut.sh_degree;
+  if (cut.colour_price <= 0.0) { return best; }
+  let record = i * lowered_numbers(cut.sh_degree, cut.sh_degree);
+  var least = cut.colour_price * f32(coefficients(best));
+  for (var degree = 0u; degree < cut.sh_degree; degree++) {
+    let cost = lowered[record + degree] + cut.colour_price * f32(coefficients(degree));
+    if (cost > least) { continue; }
+    best = degree;
+    least = cost;
+  }
+  return best;
+}
+
+// The nearest number that float16 holds, in its normal range: packing may cut off what it has no room for.
+fn nearest_half(value: f32) -> f32 {
+  let value_bits = bitcast<u32>(value);
+  return bitcast<f32>((value_bits + 0xfffu + ((value_bits >> 13u) & 1u)) & 0xffffe000u);
+}
+
+// Number `n` of the coefficients of a lower degree, which begin at `first` and are so many.
+fn lowered_number(first: u32, n: u32, numbers: u32) -> f32 {
+  if (n >= numbers) { return 0.0; }
+  return nearest_half(lowered[first + n]);
+}
+
+fn write_colour(i: u32, degree: u32) {
+  let words = 2u * sh_stride(cut.sh_degree, SH_FLOAT16);
+  let first = words * i;
+  if (degree == cut.sh_degree) {
+    for (var k = 0u; k < words; k++) { cut_sh[first + k] = sh[first + k]; }
+    return;
+  }
+  let numbers = 3u * coefficients(degree);
+  let source = i * lowered_numbers(cut.sh_degree, cut.sh_degree) + lowered_numbers(cut.sh_degree, degree);
+  for (var k = 0u; k < words; k++) {
+    let pair = vec2f(lowered_number(source, 2u * k, numbers), lowered_number(source, 2u * k + 1u, numbers));
+    cut_sh[first + k] = pack2x16float(pair);
+  }
+}
+
+fn apply(i: u32) {
+  let s = scores[i];
+  let g = gaussians[i];
+  let goes = s.contribution < cut.min_contribution || s.removal < cut.removal_price;
+  if (goes) {
+    cut_gaussians[i] = transparent(g);
+    return;
+  }
+  cut_gaussians[i] = g;
+  let degree = degree_of(i);
+  write_colour(i, degree);
+  atomicAdd(&kept_here[degree], 1u);
+}
+
+@compute @workgroup_size(SCORE_GROUP)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  if (lane < 4u) { atomicStore(&kept_here[lane], 0u); }
+  workgroupBarrier();
+  let i = group_index(workgroup_id) * SCORE_GROUP + lane;
+  if (i < cut.splat_count) { apply(i); }
+  workgroupBarrier();
+  if (lane < 4u) { atomicAdd(&kept[lane], atomicLoad(&kept_here[lane])); }
+}

@@ -1,0 +1,40 @@
+// Adds what a view told of the splats of a part, after the tiles have noted their largest weights in it: the energy of each, which is the sum of the
+// squares of its weights over the pixels of the picture, taken for those of an ellipse of that peak and of its size on the screen.
+#import shared/projection
+#import shared/group
+#import shared/score
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
+// Largest weights in this view; zero again afterwards, for the next one.
+@group(0) @binding(2) var<storage, read_write> peaks: array<f32>;
+// The view's row.
+@group(0) @binding(3) var<storage, read_write> energies: array<f32>;
+@group(0) @binding(4) var<storage, read_write> scores: array<Score>;
+
+const PI = 3.14159265358979;
+
+@compute @workgroup_size(SCORE_GROUP)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let i = group_index(workgroup_id) * SCORE_GROUP + lane;
+  if (i >= view.splat_count) { return; }
+  let peak = peaks[i];
+  peaks[i] = 0.0;
+  let g = unpack_gaussian(gaussians[i]);
+  let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
+  let e = project_ellipse(view, g);
+  var energy = 0.0;
+  if (peak > 0.0) {
+    // The integral of exp(-(u² + v²)).
+    let area = PI * e.sigma_x * e.sigma_v;
+    energy = peak * peak * min(1.0, area / (view.viewport.x * view.viewport.y));
+  }
+  energies[i] = energy;
+  var s = scores[i];
+  let is_in_frame = depth >= view.near && all(e.center >= vec2f(0.0)) && all(e.center < view.viewport);
+  s.contribution = max(s.contribution, peak);
+  s.removal = max(s.removal, energy);
+  s.energy += energy;
+  s.looks += select(0u, 1u, is_in_frame);
+  scores[i] = s;
+}

@@ -1,0 +1,20 @@
+// Adds up what `picture_error` found in the tiles of several pictures, one workgroup a picture.
+#import shared/picture_sums
+
+struct PictureErrors {
+  // Tiles for which there is room in each picture; those that a picture lacks are zero.
+  tiles: u32,
+}
+
+@group(0) @binding(0) var<uniform> pictures: PictureErrors;
+@group(0) @binding(1) var<storage, read> tiles: array<vec2f>;
+// A sum and the number of covered pixels for each picture.
+@group(0) @binding(2) var<storage, read_write> errors: array<vec2f>;
+
+@compute @workgroup_size(SUM_THREADS)
+fn main(@builtin(workgroup_id) picture: vec3u, @builtin(local_invocation_index) lane: u32) {
+  var own = vec2f(0.0);
+  for (var k = lane; k < pictures.tiles; k += SUM_THREADS) { own += tiles[picture.x * pictures.tiles + k]; }
+  let sum = sum_of_all(own, lane);
+  if (lane == 0u) { errors[picture.x] = sum; }
+}
