@@ -9,7 +9,13 @@ const MOST = { visible: 4e6, pairs: 50e6 };
 function watch(room: Capacity, least: () => Capacity): { monitor: CapacityMonitor; room: () => Capacity } {
   const device = { createBuffer: () => ({ destroy: () => undefined }) } as unknown as GPUDevice;
   let current = room;
-  const monitor = new CapacityMonitor(device, room, { least, most: MOST }, new Patience(), (wished) => (current = wished));
+  const monitor = new CapacityMonitor(
+    device,
+    room,
+    { least, most: MOST },
+    new Patience(),
+    (wished) => (current = wished),
+  );
   return { monitor, room: () => current };
 }
 

@@ -51,7 +51,10 @@ test('fewer pixels are in no quality: what they cost depends on the scene', asyn
   const [lowest, scales] = [Math.min(...Object.values(LIMITS)), [0.9, 0.75, 0.5]];
   const figures = new Map(scales.map((scale) => [scale, [] as number[]]));
   for (const { name, cloud, camera } of views) {
-    const oracle = renderOracle(cloud, camera, { rules: 'gsplat', mode: cloud.antialiased ? 'antialiased' : 'classic' });
+    const oracle = renderOracle(cloud, camera, {
+      rules: 'gsplat',
+      mode: cloud.antialiased ? 'antialiased' : 'classic',
+    });
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     for (const resolutionScale of scales) {
       const renderer = new Renderer(device, { rasterizer: 'quads', resolutionScale });
