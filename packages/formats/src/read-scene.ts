@@ -55,7 +55,8 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
     if (drawable.count > 0) await onPreview?.(drawable);
     signal?.throwIfAborted();
   };
-  const source: SceneSource = { bytes, name, signal, openPart, level, onPreview: onPreview && preview };
+  const openPlain = openPart && (async (path: string): Promise<Uint8Array> => plainBytes(await openPart(path), path));
+  const source: SceneSource = { bytes, name, signal, openPart: openPlain, level, onPreview: onPreview && preview };
   const whole = await read(source);
   signal?.throwIfAborted();
   // Checking and packing all splats takes longer than reading them, so that a preview is worth its while even now.

@@ -1,4 +1,4 @@
-import { grouped } from '../bytes.js';
+import { grouped, hostIsLittleEndian } from '../bytes.js';
 import { damaged } from '../damaged.js';
 import type { OpenPart } from '../scene-format.js';
 import { isObject, show } from '../json.js';
@@ -15,7 +15,6 @@ const COMPONENTS: ReadonlyMap<unknown, { bytes: number; max: number; get: (view:
     [5126, { bytes: 4, max: 1, get: (view: DataView, at: number) => view.getFloat32(at, true) }],
   ]);
 const FLOAT = 5126;
-const isLittleEndian = new Uint8Array(Uint16Array.of(1).buffer)[0] === 1;
 const WIDTHS: ReadonlyMap<unknown, number> = new Map([
   ['SCALAR', 1],
   ['VEC2', 2],
@@ -92,9 +91,11 @@ export class GltfDocument {
     if (end > bytes.length) {
       throw damaged(`${this.name}, ${path}`, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/corrupt');
     }
-    if (accessor.componentType === FLOAT && byteStride === 4 * width && isLittleEndian) {
+    if (accessor.componentType === FLOAT && byteStride === 4 * width && hostIsLittleEndian) {
       // Numbers that lie as they are wanted are copied at once. A view's beginning need not be a multiple of 4.
-      return { count, width, values: new Float32Array(bytes.slice(byteOffset, byteOffset + 4 * count * width).buffer) };
+      const values = new Float32Array(count * width);
+      new Uint8Array(values.buffer).set(bytes.subarray(byteOffset, byteOffset + values.byteLength));
+      return { count, width, values };
     }
     const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
     const values = new Float32Array(count * width);
