@@ -147,7 +147,7 @@ for (const name of ['a.glb', 'a.ply', 'a.spz']) {
   });
 }
 
-test('the asked figure is met in views that had no say, with less than there was', async () => {
+test('the asked figure is met in held-out views, with less than there was', async () => {
   const evaluator = new PaintedEvaluator(scene, { views: fewer });
   const result = await economise(scene, { minDecibels: 50, name: 'a.glb', evaluator });
   assert.ok(result.decibels >= 50, `${result.decibels} dB`);

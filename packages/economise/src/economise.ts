@@ -45,7 +45,8 @@ const MAX_TRIES = 8;
 /**
  * Makes a scene smaller without going below a figure: scores all splats by what the views would lack without them, drops the least missed,
  * takes view-dependent colour from splats where it does not show, orders the rest from coarse to fine, and writes it. How much of the error goes to
- * which of the two is what saves most. The figure is measured on the written file, read again, in views that had no say in the choice.
+ * which of the two is what saves most. The figure is measured on the written file, read again, in held-out
+ * views: they scored and chose nothing, and could only ask for a smaller cut.
  *
  * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, or the file's name is of no known format.
  */

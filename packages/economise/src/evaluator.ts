@@ -2,7 +2,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import type { Cut } from './reduce.js';
 import type { Ranking, Scores } from './score.js';
 
-/** Views that errors are measured in: those of the search, or those that nothing but the result is measured in. */
+/** Views that errors are measured in: those of the search, or those that are held out: the result is measured in them, and that its cut is not too large. */
 export type JudgedViews = 'searched' | 'heldOut';
 
 /** What a cut leaves of a scene, and what that costs. */
