@@ -26,6 +26,7 @@ RARE[ECONOMISE] = [
   'economise_mask',
   'economise_moments',
   'economise_score',
+  'note_sides',
   'picture_error',
   'picture_error_sum',
 ];

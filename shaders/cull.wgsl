@@ -22,7 +22,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let chunk = chunk_list[view.first_group + workgroup_id.x];
   let i = chunk * CULL_GROUP + lane;
   let share = chunk_shares[view.first_group + chunk];
-  if (i < view.splat_count) {
+  if (i < view.splat_count && !is_turned_away(view, i)) {
     let packed = gaussians[i];
     if (!is_usable(packed)) {
       atomicAdd(&gathered[UNUSABLE], 1u);

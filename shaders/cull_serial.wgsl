@@ -22,6 +22,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var nearest = 0xffffffffu;
   var farthest = 0u;
   for (var k = 0u; k < 32u && first + k < view.splat_count; k++) {
+    if (is_turned_away(view, first + k)) { continue; }
     let packed = gaussians[first + k];
     if (!is_usable(packed)) {
       atomicAdd(&gathered[UNUSABLE], 1u);

@@ -188,8 +188,9 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
     const view = table.view(i);
     const gaussians = page.geometry;
     const wishes = table.wishesOf(i);
-    // Something must be bound where there are no levels of detail; it is not looked at.
+    // Something must be bound where there are no levels of detail and no visible sets; it is not looked at.
     const details = page.details ?? page.chunks;
+    const seenFrom = page.seenFrom ?? page.chunks;
     const chunk = { view, chunk_list: chunkList, visible_bits: visibleBits };
     return {
       splatCount: page.count,
@@ -213,6 +214,7 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
         gathered,
         occlusion,
         chunk_shares: chunkShares,
+        seen_from: seenFrom,
       }),
       compact: stages.compact.bind({ ...chunk, group_offsets: groupOffsets, survivors }),
       project: stages.project.bind({

@@ -1,6 +1,7 @@
 import type { ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { Resource } from './gpu/kernel.js';
 import type { ShPrecision } from './pack/sh.js';
+import type { Surroundings } from './sides.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
 export interface GaussianPage {
@@ -13,6 +14,8 @@ export interface GaussianPage {
   readonly chunks: GPUBuffer;
   /** array<ChunkDetail>, if there are levels of detail. */
   readonly details?: GPUBuffer;
+  /** array<u32>: the sides that each splat shows from (shaders/shared/sides.wgsl), where the scene has visible sets. */
+  readonly seenFrom?: GPUBuffer;
 }
 
 /** What {@link Wishes} are noted from: a view, and of a page of the pool what lies there. */
@@ -44,6 +47,8 @@ export interface GaussianScene {
   /** World position, in float64, that the positions on the GPU are relative to. */
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
+  /** Of a scene with visible sets: what it was looked at from. */
+  readonly around?: Surroundings;
   /** Of a scene that is streamed: where views say which pages they wish for. */
   readonly wishes?: Wishes;
   /** Called before each frame: a streamed scene uploads what has come. */

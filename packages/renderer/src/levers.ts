@@ -44,6 +44,10 @@ export interface Levers {
   readonly alphaMin: number;
   /** Least opacity times area, in px², of a splat that is drawn. */
   readonly minContribution: number;
+  /**
+   * Scenes with visible sets (`SidedGaussians`): leaves out splats that show from none of the sides near the camera's. False, the default, draws all.
+   */
+  readonly visibleSets: boolean;
   /** Spherical harmonics above this degree are ignored. */
   readonly shDegree: 0 | 1 | 2 | 3;
   /**
@@ -74,6 +78,7 @@ const EXACT: Levers = {
   transmittanceMin: 1e-4,
   alphaMin: 1 / 255,
   minContribution: 0,
+  visibleSets: false,
   shDegree: 3,
   detail: 0,
   detailFade: 0.5,
@@ -97,8 +102,22 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
     sortAngle: 0,
   },
   default: EXACT,
-  balanced: { ...EXACT, occludedBelow: 0.03, transmittanceMin: 1 / 255, alphaMin: 1.1 / 255, depthKeyBits: 16 },
-  fast: { ...EXACT, occludedBelow: 0.1, transmittanceMin: 1 / 100, alphaMin: 1.25 / 255, depthKeyBits: 16 },
+  balanced: {
+    ...EXACT,
+    occludedBelow: 0.03,
+    transmittanceMin: 1 / 255,
+    alphaMin: 1.1 / 255,
+    visibleSets: true,
+    depthKeyBits: 16,
+  },
+  fast: {
+    ...EXACT,
+    occludedBelow: 0.1,
+    transmittanceMin: 1 / 100,
+    alphaMin: 1.25 / 255,
+    visibleSets: true,
+    depthKeyBits: 16,
+  },
 };
 
 /**
@@ -113,6 +132,7 @@ const FRAME_LEVERS = [
   'transmittanceMin',
   'alphaMin',
   'minContribution',
+  'visibleSets',
   'shDegree',
   'detail',
   'resolutionScale',

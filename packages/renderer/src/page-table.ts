@@ -1,16 +1,20 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
-import { layouts } from './generated/shaders.js';
+import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import type { Levers } from './levers.js';
 import { SH_PRECISION } from './pack/sh.js';
+import { sidesNear } from './sides.js';
 import { cullGroups } from './stages/cull.js';
 import { cameraValues } from './view.js';
 
 /** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;
+
+/** Draws splats whatever they show from. */
+const ALL_SIDES = new Uint32Array(constants.SIDE_WORDS);
 
 /** The pages that are drawn together, with a `View` uniform for each. */
 export class PageTable {
@@ -86,7 +90,7 @@ export class PageTable {
   /** Points every page at a camera, for the commands that are submitted next. */
   look(
     camera: Camera,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget, alphaMin, minContribution }: Levers,
+    { shDegree, depthKeyBits, detail, detailFade, splatBudget, alphaMin, minContribution, visibleSets }: Levers,
     isOrdered: boolean,
     occlusionTiles: readonly [number, number],
   ): void {
@@ -109,9 +113,12 @@ export class PageTable {
         sh_encoding: SH_PRECISION[scene.shPrecision],
         antialiased: scene.antialiased ? 1 : 0,
       };
-      for (const { count, details } of scene.pages) {
+      const near = visibleSets && scene.around ? sidesNear(camera, scene.around) : ALL_SIDES;
+      for (const { count, details, seenFrom } of scene.pages) {
+        const sides = seenFrom ? near : ALL_SIDES;
         const place = { has_detail: details ? 1 : 0, splat_count: count, page, first_group: this.firstGroups[page] };
-        writeStruct(layouts.View, { ...values, ...shared, ...own, ...place }, this.#uniformBytes, VIEW_STRIDE * page);
+        const all = { ...values, ...shared, ...own, ...place, sides };
+        writeStruct(layouts.View, all, this.#uniformBytes, VIEW_STRIDE * page);
         page++;
       }
     }

@@ -29,6 +29,7 @@ export type CameraValues = Omit<
   | 'splat_budget'
   | 'alpha_min'
   | 'min_contribution'
+  | 'sides'
 >;
 
 /**

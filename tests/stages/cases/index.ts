@@ -8,6 +8,7 @@ import { probeCases } from './probe.js';
 import { projectionCases } from './projection.js';
 import { roundedApartCases } from './rounded-apart.js';
 import { scanCases } from './scan.js';
+import { sidesCases } from './sides.js';
 import { sortCases } from './sort.js';
 
 export const stageCases: readonly StageCase[] = [
@@ -19,6 +20,7 @@ export const stageCases: readonly StageCase[] = [
   ...orderCases,
   ...occlusionCases,
   ...probeCases,
+  ...sidesCases,
   ...sortCases,
   ...ingestCases,
 ];

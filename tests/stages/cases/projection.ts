@@ -1,5 +1,5 @@
 import { normalize, subtract, eyeOf, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { packGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
+import { packGaussians, type PackedGaussians, type Threads } from '@gaussian-splat/renderer';
 import {
   cameraValues,
   constants,
@@ -30,12 +30,25 @@ import { WITHOUT_LEVERS } from './view.js';
 
 const { CULL_GROUP, WORDS_PER_GROUP, PROJECT_GROUP } = constants;
 
+/** What `cull` leaves out although it is in view. */
+export interface LeftOut {
+  /** Depths beyond which nothing shows, of tiles across and down. */
+  readonly tiles: readonly [number, number];
+  readonly depths: Uint32Array;
+  /** Visible sets: the sides of the view, and those of each splat. */
+  readonly sides?: readonly number[];
+  readonly seenFrom?: Uint32Array;
+  readonly threads?: Threads;
+}
+
+const NOTHING: LeftOut = { tiles: [0, 0], depths: new Uint32Array(1) };
+
 /** Everything that `cull` and `project` read, on the GPU. */
 function uploadScene(
   bench: Bench,
   packed: PackedGaussians,
   camera: Camera,
-  occlusionTiles: readonly [number, number] = [0, 0],
+  { tiles, sides = WITHOUT_LEVERS.sides }: LeftOut = NOTHING,
 ): { view: GPUBuffer; gaussians: GPUBuffer; sh: GPUBuffer; chunks: GPUBuffer } {
   const bytes = new ArrayBuffer(layouts.View.size);
   const page = { splat_count: packed.count, page: 0, first_group: 0 };
@@ -43,8 +56,9 @@ function uploadScene(
     antialiased: packed.antialiased ? 1 : 0,
     key_bits: 32,
     is_ordered: 0,
-    occlusion_tiles: occlusionTiles,
+    occlusion_tiles: tiles,
     ...WITHOUT_LEVERS,
+    sides,
   };
   const sh = { sh_degree: packed.shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[packed.shPrecision] };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...sh, ...flags }, bytes);
@@ -56,16 +70,14 @@ function uploadScene(
   };
 }
 
-const NO_OCCLUSION = { tiles: [0, 0], depths: new Uint32Array(1) } as const;
-
 /** Visibility flags of all splats, how many were refused as unusable, and how many chunks were looked into. */
 export async function cullOnGpu(
   bench: Bench,
   packed: PackedGaussians,
   camera: Camera,
-  occlusion: { readonly tiles: readonly [number, number]; readonly depths: Uint32Array } = NO_OCCLUSION,
+  leftOut = NOTHING,
 ): Promise<{ visible: boolean[]; unusable: number; chunksSeen: number }> {
-  const { view, gaussians, chunks } = uploadScene(bench, packed, camera, occlusion.tiles);
+  const { view, gaussians, chunks } = uploadScene(bench, packed, camera, leftOut);
   const groups = cullGroups(packed.count);
   // What `cull` does not write must come from `cull_chunks`: garbage would show.
   const bits = bench.buffer(new Uint32Array(WORDS_PER_GROUP * groups).fill(0xffffffff));
@@ -74,7 +86,7 @@ export async function cullOnGpu(
   const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
   const shared = { view, chunk_list: bench.buffer(4 * groups), visible_bits: bits, group_counts: counts };
   const shares = bench.buffer(4 * (groups + 1));
-  const [chunkStage, stage] = [new CullChunksStage(bench.device), new CullStage(bench.device)];
+  const [chunkStage, stage] = [new CullChunksStage(bench.device), new CullStage(bench.device, leftOut.threads)];
   const chunkBindings = chunkStage.bind({
     ...shared,
     chunks,
@@ -83,8 +95,9 @@ export async function cullOnGpu(
     chunk_args: chunkArgs,
   });
   const bindings = stage.bind({
-    ...{ ...shared, gaussians, gathered, occlusion: bench.buffer(occlusion.depths) },
+    ...{ ...shared, gaussians, gathered, occlusion: bench.buffer(leftOut.depths) },
     chunk_shares: shares,
+    seen_from: leftOut.seenFrom ? bench.buffer(leftOut.seenFrom) : gaussians,
   });
   bench.compute((pass) => {
     chunkStage.record(pass, chunkBindings, packed.count);

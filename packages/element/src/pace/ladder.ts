@@ -20,8 +20,14 @@ const BALANCED_COST = 0.73;
 const FAST_COST = 0.72;
 
 /** The levers of a quality that a frame can have without other memory. */
-function frameLeversOf({ depthKeyBits, occludedBelow, transmittanceMin, alphaMin }: Levers): Partial<FrameLevers> {
-  return { depthKeyBits, occludedBelow, transmittanceMin, alphaMin };
+function frameLeversOf({
+  depthKeyBits,
+  occludedBelow,
+  transmittanceMin,
+  alphaMin,
+  visibleSets,
+}: Levers): Partial<FrameLevers> {
+  return { depthKeyBits, occludedBelow, transmittanceMin, alphaMin, visibleSets };
 }
 
 /**

@@ -19,6 +19,8 @@ export class DetailedGaussians implements GaussianScene {
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
   readonly origin: Vector3;
+  /** Its visible sets are of its own splats; coarser ones are drawn from all sides. */
+  readonly around: GaussianScene['around'];
   readonly pages: readonly GaussianPage[];
   readonly #leaves: GaussianScene;
   readonly #coarser: GaussianBuffers;
@@ -33,6 +35,7 @@ export class DetailedGaussians implements GaussianScene {
       shPrecision: this.shPrecision,
       antialiased: this.antialiased,
       origin: this.origin,
+      around: this.around,
     } = leaves);
     this.count = leaves.count + coarser.count;
     try {
