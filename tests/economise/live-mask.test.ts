@@ -37,6 +37,7 @@ test('the attribute: shares, figures, and what is neither', () => {
     ['42.5 dB', { decibels: 42.5 }],
     ['0db', null],
     ['100%', null],
+    ['views', 'views'],
     ['few', null],
     ['', null],
     [null, null],

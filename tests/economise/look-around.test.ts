@@ -14,6 +14,7 @@ import {
   SIDES,
   sidesNear,
   type GaussianScene,
+  type HeldScene,
 } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
@@ -51,13 +52,14 @@ const halves = [cloudOf(splats.slice(0, 400)), cloudOf(splats.slice(400))];
 const { center, radius } = boundsOf(cloud);
 const around = { center, radius };
 
-async function upload(device: GPUDevice): Promise<GaussianScene & { destroy(): void }> {
+async function upload(device: GPUDevice): Promise<HeldScene> {
   const parts: GaussianBuffers[] = [];
   for (const half of halves) parts.push(await GaussianBuffers.upload(device, packGaussians(half)));
   const [{ shDegree, shPrecision, antialiased, origin }] = parts;
   const pages = parts.flatMap((part) => part.pages);
   const destroy = (): void => parts.forEach((part) => part.destroy());
-  return { count: cloud.count, shDegree, shPrecision, antialiased, origin, version: 0, pages, destroy };
+  const byteLength = parts.reduce((sum, part) => sum + part.byteLength, 0);
+  return { count: cloud.count, shDegree, shPrecision, antialiased, origin, version: 0, pages, byteLength, destroy };
 }
 
 let looked: Promise<SidedGaussians> | undefined;

@@ -12,6 +12,7 @@ export {
   parseEconomyGoal,
   type EconomyGoal,
   type EconomyShare,
+  type MaskGoal,
 } from './mask.js';
 export { decibels, meanSquare, Studio, type Image, type Painter } from './measure.js';
 export { PaintedEvaluator, type PaintedEvaluatorOptions } from './painted-evaluator.js';

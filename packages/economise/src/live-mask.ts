@@ -9,7 +9,7 @@ import {
 } from '@gaussian-splat/renderer';
 import { MaskScene } from './gpu/mask-scene.js';
 import { PictureErrors } from './gpu/picture-errors.js';
-import type { EconomyGoal } from './mask.js';
+import type { MaskGoal } from './mask.js';
 import { decibels, mean } from './measure.js';
 import { viewsAround } from './views.js';
 
@@ -113,7 +113,7 @@ export class LiveMask {
   }
 
   /** The splats that a goal leaves. Rejects likewise. */
-  async masked(goal: EconomyGoal, signal?: AbortSignal): Promise<MaskedScene> {
+  async masked(goal: MaskGoal, signal?: AbortSignal): Promise<MaskedScene> {
     if ('share' in goal) return { packed: await this.#take(goal.share), decibels: null };
     return this.#search(goal.decibels, signal);
   }

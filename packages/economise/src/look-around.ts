@@ -1,5 +1,5 @@
 import { add, DEFAULT_FAR, lookAt, scale, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { Renderer, SIDES, SidedGaussians, type GaussianScene, type Surroundings } from '@gaussian-splat/renderer';
+import { Renderer, SIDES, SidedGaussians, type HeldScene, type Surroundings } from '@gaussian-splat/renderer';
 import { BUFFER_USAGE, GpuMemory, rareKernelOf, TEXTURE_USAGE, writeStruct } from '@gaussian-splat/renderer/stages';
 import { noteSides, SIDE_GROUP, Side as layout } from './generated/shaders.js';
 import { readBack } from './gpu/read-back.js';
@@ -38,7 +38,7 @@ export interface LookAroundOptions {
  * @returns the scene with its sets, which holds the scene and frees it
  * @throws GaussianSplatError `out-of-memory/*`; the signal's reason; or rejects if the device is lost
  */
-export async function lookAround<S extends GaussianScene & { destroy(): void }>(
+export async function lookAround<S extends HeldScene>(
   device: GPUDevice,
   scene: S,
   around: Surroundings,

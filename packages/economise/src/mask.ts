@@ -16,11 +16,15 @@ export function parseEconomy(text: string | null): EconomyShare {
   return share > 0 && share < 1 ? share : null;
 }
 
-/** What the attribute `economy` may ask for: a share of the splats, or a figure that the picture keeps to. */
-export type EconomyGoal = { readonly share: number } | { readonly decibels: number };
+/** How much of a scene a mask leaves: a share of the splats, or as few as keep the picture to a figure. */
+export type MaskGoal = { readonly share: number } | { readonly decibels: number };
 
-/** Reads the `economy` attribute: a share as {@link parseEconomy} has it, or dB such as `57db`; null for anything else, which is all. */
+/** What the attribute `economy` may ask for: a mask for all views alike, or that each view leaves out what does not show from its side. */
+export type EconomyGoal = MaskGoal | 'views';
+
+/** Reads the `economy` attribute: a share as {@link parseEconomy} has it, dB such as `57db`, or `views`; null for anything else, which is all. */
 export function parseEconomyGoal(text: string | null): EconomyGoal | null {
+  if (text?.trim() === 'views') return 'views';
   const figure = /^\s*(\d*\.?\d+)\s*db\s*$/i.exec(text ?? '');
   if (figure) return Number(figure[1]) > 0 ? { decibels: Number(figure[1]) } : null;
   const share = parseEconomy(text);

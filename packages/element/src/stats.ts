@@ -11,7 +11,7 @@ export interface SceneStats {
   readonly isPreview: boolean;
   /** Of these, left out because a value was not usable. */
   readonly dropped: number;
-  /** Of these, left out because the attribute `economy` asks for it. */
+  /** Of these, left out of all pictures because the attribute `economy` asks for it. */
   readonly spared: number;
   /** dB to the whole scene in views around it that had no say; null unless `economy` asks for a figure. */
   readonly decibels: number | null;
@@ -74,6 +74,7 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPre
       ...whyPreview(isPreview),
       ...whyDropped(dropped),
       ...whySpared(economy),
+      ...whyByView(economy),
       ...whyDetail(detail),
       ...whyPace(quality, pace),
     ],
@@ -92,6 +93,12 @@ function whySpared({ spared, decibels }: EconomyReport): string[] {
   if (spared === 0) return [];
   const figure = decibels === null ? '' : `: ${decibels.toFixed(1)} dB to the whole scene`;
   return [`${spared} splats that contribute least to views around the scene are left out${figure}.`];
+}
+
+function whyByView({ byView }: EconomyReport): string[] {
+  return byView
+    ? ['Pictures that are drawn with less than the whole leave out splats that do not show from their side.']
+    : [];
 }
 
 function whyDetail({ splats, pixels }: SceneStats['detail']): string[] {

@@ -45,6 +45,33 @@ describe('economy', () => {
     );
   }).timeout(120_000);
 
+  it('of views: pictures at rest are whole, moving ones leave out what does not show from their side; without the attribute the sets are freed', async () => {
+    const element = show({ src: `${BALL}&size=0.2`, economy: 'views' });
+    await element.ready;
+    const whole = await bytesOf(element);
+    const before = element.stats!.bytes.scene;
+    await until(
+      () => element.stats!.why.some((sentence) => /do not show from their side/.test(sentence)),
+      'sets',
+      100_000,
+    );
+    const { spared, modelled, inMemory, bytes } = element.stats!;
+    assertEqual([spared, modelled, inMemory], [0, 600, 600], 'spared, modelled, in memory');
+    assert(bytes.scene >= before + 16 * 600, `sets take ${bytes.scene - before} bytes`);
+    assertEqual(await bytesOf(element), whole, 'the whole picture');
+    const all = (await element.updateStats())!.drawn!;
+    element.quality = 'balanced';
+    await frames(10);
+    const some = (await element.updateStats())!.drawn!;
+    assert(some > 0 && some < 0.9 * all, `${some} of ${all} splats drawn`);
+    element.quality = 'auto';
+    element.economy = '60%';
+    await until(() => element.stats!.spared === 240, 'a share in place of them', 100_000);
+    element.economy = null;
+    await until(() => element.stats!.bytes.scene === before, 'neither');
+    assertEqual(await bytesOf(element), whole, 'the picture of all');
+  }).timeout(240_000);
+
   it('what is no economy is said once, and the scene stays whole', async () => {
     const element = await showLoaded({ economy: 'little' });
     const { splats } = element.statistics!;
@@ -53,7 +80,7 @@ describe('economy', () => {
     element.requestUpdate();
     await frames(10);
     assertEqual(element.statistics?.splats, splats, 'splats');
-    claimFault(/economy expects a share such as 60% or dB such as 57db, found "little"/);
+    claimFault(/economy expects a share such as 60%, dB such as 57db, or views, found "little"/);
   });
 
   it('a scene that is taken away while it is looked at leaves nothing behind', async () => {

@@ -17,9 +17,11 @@ export interface EconomyReport {
   readonly spared: number;
   /** dB to the whole scene, where a figure was asked for. */
   readonly decibels: number | null;
+  /** Whether it is known what shows from where. */
+  readonly byView: boolean;
 }
 
-const NOTHING: EconomyReport = { spared: 0, decibels: null };
+const NOTHING: EconomyReport = { spared: 0, decibels: null, byView: false };
 
 /** Leaves out of a scene what no view needs, as far as the page asks for it, after the whole scene is on show; and puts it back. */
 export class EconomyController {
@@ -27,7 +29,7 @@ export class EconomyController {
   #scene: GpuScene | null = null;
   #wish: string | null = null;
   #running = new AbortController();
-  #economy: Promise<Economy> | undefined;
+  #economy: Economy | undefined;
   #report = NOTHING;
 
   constructor(options: EconomyOptions) {
@@ -66,19 +68,18 @@ export class EconomyController {
       const goal: EconomyGoal | null = goalOf(wish);
       if (wish !== null && goal === null)
         this.#options.warn(
-          `<gaussian-splat>: economy expects a share such as 60% or dB such as 57db, found ${JSON.stringify(wish)}.`,
+          `<gaussian-splat>: economy expects a share such as 60%, dB such as 57db, or views, found ${JSON.stringify(wish)}.`,
         );
       if (signal.aborted || (goal === null && this.#economy === undefined)) return;
-      this.#economy ??= SceneEconomy.of(scene);
-      const economy = await this.#economy;
+      this.#economy ??= new SceneEconomy(scene);
+      const report = await this.#economy.apply(goal, this.#options.memoryBudget(), signal);
       if (signal.aborted) return;
-      this.#report = await economy.apply(goal, this.#options.memoryBudget(), signal);
+      this.#report = report;
       this.#options.onChange();
     } catch (error) {
       if (signal.aborted || scene.isLost || scene.isDestroyed) return;
-      this.#economy = undefined;
       const reason = error instanceof Error ? error.message : String(error);
-      this.#options.warn(`<gaussian-splat>: the scene stays whole, since economy failed: ${reason}`);
+      this.#options.warn(`<gaussian-splat>: the scene stays as it is, since economy failed: ${reason}`);
     }
   }
 }

@@ -1,47 +1,99 @@
 /** Loaded only where a page asks for economy. */
-import { LiveMask, parseEconomyGoal, type EconomyGoal } from '@gaussian-splat/economise';
-import { GaussianBuffers } from '@gaussian-splat/renderer';
+import { LiveMask, lookAround, parseEconomyGoal, type EconomyGoal, type MaskGoal } from '@gaussian-splat/economise';
+import { GaussianBuffers, type SidedGaussians } from '@gaussian-splat/renderer';
 import type { EconomyReport } from '../controllers/economy-controller.js';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
 
 /** What the element's core knows of this module. */
 export type Economy = SceneEconomy;
 
 export const goalOf = parseEconomyGoal;
 
-/** A scene on show, and all of its splats in the page's memory: those that are left out take none on the GPU. */
+/** A scene on show, of which what no view needs can be left out, and taken back. */
 export class SceneEconomy {
   readonly #scene: GpuScene;
-  readonly #mask: LiveMask;
+  readonly #gone = new AbortController();
+  /** Once a mask was asked for: all splats in the page's memory. Those that it leaves out take none on the GPU. */
+  #mask: Promise<LiveMask> | undefined;
+  #isMasked = false;
+  /** What is on show, while each view leaves out what does not show from its side. */
+  #sided: SidedGaussians<OwnedGaussians> | undefined;
 
-  private constructor(scene: GpuScene, mask: LiveMask) {
+  constructor(scene: GpuScene) {
     this.#scene = scene;
-    this.#mask = mask;
-  }
-
-  /** Scores a scene that is on show. Takes seconds for large ones, beside the frames. */
-  static async of(scene: GpuScene): Promise<SceneEconomy> {
-    const abort = new AbortController();
     // A scene that is taken away meanwhile has no buffers any more.
-    scene.onDestroy = () => abort.abort();
-    return new SceneEconomy(
-      scene,
-      await LiveMask.of(scene.device, scene.gaussians, scene.bounds, { signal: abort.signal }),
-    );
+    scene.onDestroy = () => this.#gone.abort();
   }
 
-  /** Shows what the goal leaves of the scene, null for all of it. Rejects with the signal's reason, or GaussianSplatError `out-of-memory/*`. */
+  /**
+   * Shows what the goal leaves of the scene, null for all of it. Looking at a large scene takes seconds, beside the frames. Rejects with the signal's reason, or
+   * GaussianSplatError `out-of-memory/*`.
+   */
   async apply(goal: EconomyGoal | null, memoryBudget: number | undefined, signal: AbortSignal): Promise<EconomyReport> {
-    const { whole } = this.#mask;
-    const { packed, decibels } =
-      goal === null ? { packed: whole, decibels: null } : await this.#mask.masked(goal, signal);
-    const gaussians = await GaussianBuffers.upload(this.#scene.device, packed, { memoryBudget });
-    if (signal.aborted || this.#scene.isDestroyed) {
-      gaussians.destroy();
-      signal.throwIfAborted();
-    } else {
-      this.#scene.replaceGaussians(gaussians);
+    const either = AbortSignal.any([signal, this.#gone.signal]);
+    if (goal === 'views') return this.#showByView(memoryBudget, either);
+    this.#forgetSides();
+    if (goal === null) await this.#showWhole(memoryBudget, either);
+    return goal === null ? WHOLE : this.#showMasked(goal, memoryBudget, either);
+  }
+
+  async #showByView(memoryBudget: number | undefined, signal: AbortSignal): Promise<EconomyReport> {
+    const { device, bounds } = this.#scene;
+    await this.#showWhole(memoryBudget, signal);
+    if (this.#sided) return BY_VIEW;
+    const { gaussians } = this.#scene;
+    const left = memoryBudget === undefined ? undefined : memoryBudget - gaussians.byteLength;
+    const sided = await lookAround(device, gaussians, bounds, { signal, memoryBudget: left });
+    if (signal.aborted) sided.release();
+    signal.throwIfAborted();
+    this.#scene.replaceGaussians(sided, 'kept');
+    this.#sided = sided;
+    return BY_VIEW;
+  }
+
+  #forgetSides(): void {
+    if (this.#sided === undefined || this.#scene.isDestroyed) return;
+    this.#scene.replaceGaussians(this.#sided.whole, 'kept');
+    this.#sided.release();
+    this.#sided = undefined;
+  }
+
+  async #showWhole(memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
+    if (!this.#isMasked) return;
+    const { whole } = await this.#mask!;
+    this.#show(await GaussianBuffers.upload(this.#scene.device, whole, { memoryBudget }), signal);
+    this.#isMasked = false;
+  }
+
+  async #showMasked(goal: MaskGoal, memoryBudget: number | undefined, signal: AbortSignal): Promise<EconomyReport> {
+    this.#mask ??= this.#look();
+    const mask = await this.#mask;
+    signal.throwIfAborted();
+    const { packed, decibels } = await mask.masked(goal, signal);
+    const { whole } = mask;
+    this.#show(await GaussianBuffers.upload(this.#scene.device, packed, { memoryBudget }), signal);
+    this.#isMasked = true;
+    return { spared: whole.count - packed.count, decibels, byView: false };
+  }
+
+  /** Looks at the scene once, for whatever is asked of it later; again only where that failed. */
+  async #look(): Promise<LiveMask> {
+    const { device, gaussians, bounds } = this.#scene;
+    try {
+      return await LiveMask.of(device, gaussians, bounds, { signal: this.#gone.signal });
+    } catch (error) {
+      this.#mask = undefined;
+      throw error;
     }
-    return { spared: whole.count - packed.count, decibels };
+  }
+
+  /** Other splats in place of those on show, unless they come too late. */
+  #show(gaussians: GaussianBuffers, signal: AbortSignal): void {
+    if (signal.aborted) gaussians.destroy();
+    signal.throwIfAborted();
+    this.#scene.replaceGaussians(gaussians);
   }
 }
+
+const WHOLE: EconomyReport = { spared: 0, decibels: null, byView: false };
+const BY_VIEW: EconomyReport = { spared: 0, decibels: null, byView: true };

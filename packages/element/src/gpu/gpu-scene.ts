@@ -125,10 +125,13 @@ export class GpuScene {
     return this.gaussians.pages.some(({ details }) => details !== undefined);
   }
 
-  /** Draws other splats from now on; those before are freed, and levels that were built of them. */
-  replaceGaussians(gaussians: OwnedGaussians): void {
+  /**
+   * Draws other splats from now on; levels that were built of those before are freed, and so are these.
+   * @param before `kept` where the ones hold the others
+   */
+  replaceGaussians(gaussians: OwnedGaussians, before: 'freed' | 'kept' = 'freed'): void {
     this.setLevels(undefined);
-    this.#gaussians.destroy();
+    if (before === 'freed') this.#gaussians.destroy();
     this.#gaussians = gaussians;
     this.#filter?.invalidate();
   }

@@ -50,9 +50,10 @@ const ANSWERS = {
     );
   },
 
-  /** A red ball of `n` splats, 4,000 unless said, in twelve pieces over `ms` milliseconds. */
+  /** A red ball of `n` splats, 4,000 unless said, of a `size` that hardly covers it unless said, in twelve pieces over `ms` milliseconds. */
   ball(context) {
-    const bytes = ball(Number(context.query.n ?? 4_000), COLOURS[0]);
+    const { n = 4_000, size } = context.query;
+    const bytes = ball(Number(n), COLOURS[0], size && Number(size));
     const pause = Number(context.query.ms ?? 0) / 12;
     context.set('Content-Length', String(bytes.length));
     context.body = Readable.from(
@@ -285,7 +286,7 @@ const COLOURS = [
 ];
 
 /** A .splat file: splats in no order on a ball of radius 1. */
-function ball(count, colour) {
+function ball(count, colour, size = Math.max(0.05, 2 / Math.sqrt(count))) {
   const bytes = Buffer.alloc(32 * count);
   for (let i = 0; i < count; i++) {
     const height = 1 - (2 * (i + 0.5)) / count;
@@ -293,7 +294,6 @@ function ball(count, colour) {
     const ring = Math.sqrt(1 - height * height);
     // Steps of a number without common factor: any part of the file is spread over the ball.
     const at = 32 * ((i * 1_301) % count);
-    const size = Math.max(0.05, 2 / Math.sqrt(count));
     [ring * Math.cos(angle), height, ring * Math.sin(angle), size, size, size].forEach((value, k) =>
       bytes.writeFloatLE(value, at + 4 * k),
     );
