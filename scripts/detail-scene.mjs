@@ -2,13 +2,14 @@
 import { existsSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { buildDetailTree, cutPages, manifestOf, packPage, treeOfCopies } from '@gaussian-splat/renderer';
 
 const USAGE = `usage: npm run detail -- SCENE --out FOLDER [options]
 
   --out FOLDER    an empty folder, or one that does not exist yet: detail.json and pages/, docs/detail-pages.md describes them
+  --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
   --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
   --spacing LEN   world units between copies; default: 2.5 times the radius of the scene
 `;
@@ -25,7 +26,7 @@ function parseOptions(args) {
     parsed = parseArgs({
       args,
       allowPositionals: true,
-      options: { out: text, tile: text, spacing: text, help: { type: 'boolean' } },
+      options: { out: text, degree: text, tile: text, spacing: text, help: { type: 'boolean' } },
     });
   } catch (error) {
     throw new UsageError(error.message);
@@ -41,7 +42,26 @@ function parseOptions(args) {
   const spacing = values.spacing === undefined ? undefined : Number(values.spacing);
   if (spacing !== undefined && !(spacing > 0))
     throw new UsageError(`--spacing: expected a length, found "${values.spacing}"`);
-  return { scene: resolve(from, positionals[0]), out, columns: Number(tile[1]), rows: Number(tile[2]), spacing };
+  if (!/^[0-3]$/.test(values.degree ?? '3'))
+    throw new UsageError(`--degree: expected 0 to 3, found "${values.degree}"`);
+  const degree = Number(values.degree ?? 3);
+  return {
+    scene: resolve(from, positionals[0]),
+    out,
+    degree,
+    columns: Number(tile[1]),
+    rows: Number(tile[2]),
+    spacing,
+  };
+}
+
+/** A cloud without the harmonics above a degree. */
+function upTo(degree, cloud) {
+  if (cloud.shDegree <= degree) return cloud;
+  const [all, kept] = [3 * shCoefficientCount(cloud.shDegree), 3 * shCoefficientCount(degree)];
+  const sh = new Float32Array(kept * cloud.count);
+  for (let i = 0; i < cloud.count; i++) sh.set(cloud.sh.subarray(all * i, all * i + kept), kept * i);
+  return { ...cloud, shDegree: degree, sh };
 }
 
 /** Where the copies stand, along a Z-order curve so that neighbours have one parent. */
@@ -93,9 +113,9 @@ function writeCopies(out, tree, places) {
   };
 }
 
-async function main({ scene, out, columns, rows, spacing }) {
+async function main({ scene, out, degree, columns, rows, spacing }) {
   const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
-  const cloud = await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart });
+  const cloud = upTo(degree, await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart }));
   const start = performance.now();
   const tree = buildDetailTree(cloud);
   const built = performance.now();

@@ -284,7 +284,7 @@ async function measure() {
   report.gpuErrors = environment.errors;
   const { manifest, scene, traffic } = await open(device);
   Object.assign(report, { splats: manifest.splats, pages: scene.progress.total });
-  const renderer = new Renderer(device);
+  const renderer = new Renderer(device, { detailFade: number('fade', 0.5) });
   report.levers = renderer.levers;
   const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC | GPUTextureUsage.STORAGE_BINDING;
   const target = device.createTexture({ size: [width, height], format: 'rgba8unorm', usage });

@@ -1,4 +1,6 @@
 /** Copies of a scene, as one cloud or straight to the GPU. */
+import { boundsOf } from '@gaussian-splat/core';
+import { lookAround } from '@gaussian-splat/economise';
 import { GaussianBuffers, packGaussians, packWithDetail } from '@gaussian-splat/renderer';
 
 /** Splats in one upload: their harmonics stay well under the largest array that browsers allocate. */
@@ -42,7 +44,9 @@ export function tileCloud(cloud, copies) {
  * Uploads the copies, a few million splats at a time, without ever holding them all in memory.
  * @returns {Promise<GaussianBuffers[]>} to be drawn together.
  */
-export async function uploadTiled(device, cloud, copies, { detail = false, ...packOptions } = {}) {
+export async function uploadTiled(device, cloud, copies, { detail = false, sides = false, ...packOptions } = {}) {
+  if (sides)
+    return withSides(device, cloud, copies, await uploadTiled(device, cloud, copies, { detail, ...packOptions }));
   // Levels of detail are built over all copies together.
   if (detail) return [await GaussianBuffers.upload(device, packWithDetail(tileCloud(cloud, copies), packOptions))];
   const packed = packGaussians(cloud, packOptions);
@@ -56,6 +60,19 @@ export async function uploadTiled(device, cloud, copies, { detail = false, ...pa
     first = end;
   }
   return uploads;
+}
+
+/** The same with visible sets; where copies fill several uploads, each shows what it hides of itself alone. */
+async function withSides(device, cloud, copies, uploads) {
+  const { center, radius } = boundsOf(cloud);
+  const middle = [0, 1, 2].map((axis) => copies.reduce((sum, { offset }) => sum + offset[axis], 0) / copies.length);
+  const reach = Math.max(
+    ...copies.map(({ offset }) => Math.hypot(...offset.map((value, axis) => value - middle[axis]))),
+  );
+  const around = { center: center.map((value, axis) => value + middle[axis]), radius: radius + reach };
+  const sided = [];
+  for (const upload of uploads) sided.push(await lookAround(device, upload, around));
+  return sided;
 }
 
 /** Splats whose bounds the packed scene keeps together. */
