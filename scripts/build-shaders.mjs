@@ -26,6 +26,7 @@ RARE[ECONOMISE] = [
   'economise_mask',
   'economise_moments',
   'economise_score',
+  'economise_take',
   'picture_error',
   'picture_error_sum',
 ];

@@ -1,5 +1,6 @@
 /** The work behind `npm run economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
 import { readFileSync, statSync, writeFileSync } from 'node:fs';
+import { readFile } from 'node:fs/promises';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
@@ -78,27 +79,33 @@ function readViews(path, bounds, scored) {
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
 }
 
-/** What looks at the cloud. SwiftShader is a processor in disguise, slower than plain code on the same. */
-async function evaluatorFor(cloud, views, scorer) {
-  const adapter = await requestNodeAdapter();
+/** SwiftShader is a processor in disguise, slower than plain code on the same. */
+async function openDevice(scorer) {
+  const adapter = await requestNodeAdapter({ isTrusted: true });
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   const { vendor, architecture, device: model, description } = adapter.info;
   const isGpu = scorer === 'gpu' || (scorer === 'auto' && !/swiftshader/i.test(description));
   console.log(
     `adapter      ${[vendor, architecture, model, description].filter(Boolean).join(' ')}${isGpu ? '' : '; scores and cuts on the CPU'}`,
   );
-  if (isGpu) return GpuEvaluator.create(device, cloud, views);
-  return new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
+  return { device, isGpu };
 }
 
 async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
   const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
-  const cloud = await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart });
-  const read = seconds();
+  // The disk and the driver take their time at the same time.
+  const file = readFile(scene);
+  file.catch(() => undefined);
+  const { device, isGpu } = await openDevice(scorer);
+  const opened = seconds();
+  const cloud = await readScene(await file, { name: scene, openPart });
+  const read = seconds() - opened;
   const views = readViews(viewsFile, boundsOf(cloud), scored);
-  const evaluator = await evaluatorFor(cloud, views, scorer);
+  const evaluator = isGpu
+    ? await GpuEvaluator.create(device, cloud, views)
+    : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
   const prepare = seconds() - read;
   const result = await economise(cloud, {
     ...{ minDecibels, name: out, evaluator },

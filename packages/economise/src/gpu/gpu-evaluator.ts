@@ -1,9 +1,9 @@
-import type { GaussianCloud } from '@gaussian-splat/core';
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { Renderer } from '@gaussian-splat/renderer';
 import type { LoweredColours } from '../colour-moments.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import { UNJUDGED } from '../generated/shaders.js';
-import type { Cut } from '../reduce.js';
+import { coarseToFine, reduceTo, type Cut, type ReducedCloud } from '../reduce.js';
 import type { Ranking, Scores } from '../score.js';
 import type { DealtViews } from '../views.js';
 import { CloudBuffers } from './cloud-buffers.js';
@@ -13,6 +13,7 @@ import { PictureErrors } from './picture-errors.js';
 import { readBack } from './read-back.js';
 import { SceneParts, loweredNumbers } from './scene-parts.js';
 import { SceneScorer } from './scene-scorer.js';
+import { takeLowered } from './take-lowered.js';
 
 export interface GpuEvaluatorOptions {
   /** Most splats that are bound at once, for tests; default what the device's limits allow. */
@@ -84,6 +85,8 @@ export class GpuEvaluator implements Evaluator {
         byteLength: layouts.Score.size * page.count,
       }));
       this.#ranking = this.#rankingOf(await readBack(this.#device, parts));
+      // Now, while the renderer still has room for this scene: for each other one it finds it anew.
+      for (const views of ['searched', 'heldOut'] as const) await this.#errorsIn(views);
       return this.#ranking;
     } finally {
       scorer.destroy();
@@ -129,6 +132,17 @@ export class GpuEvaluator implements Evaluator {
     return { errors: found, degrees };
   }
 
+  async reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
+    if (this.#ranking === undefined) throw new Error('GpuEvaluator: rank() comes before reduce()');
+    signal?.throwIfAborted();
+    this.#cutScene.apply(cut);
+    const { staying, degrees } = await this.#cutScene.choice();
+    const kept = coarseToFine(this.#cloud, this.#ranking.contribution, staying);
+    const reduced = reduceTo(this.#cloud, { kept, degrees: Uint8Array.from(kept, (i) => degrees[i]) });
+    await this.#lower(reduced, kept);
+    return reduced;
+  }
+
   async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
     const errors = await this.#errorsIn(views);
     signal?.throwIfAborted();
@@ -145,6 +159,28 @@ export class GpuEvaluator implements Evaluator {
     this.#renderer.destroy();
     this.#cutScene.destroy();
     this.#scene.destroy();
+  }
+
+  /** Puts the coefficients of the splats that keep a lower degree in their places. @param kept their numbers in the scene */
+  async #lower({ cloud, degrees }: ReducedCloud, kept: Uint32Array): Promise<void> {
+    const lists = this.#scene.parts.flatMap((part) =>
+      lowerDegreesOf(this.#cloud.shDegree).map((degree) => {
+        const isOwn = (k: number): boolean =>
+          degrees[k] === degree && kept[k] >= part.first && kept[k] < part.first + part.page.count;
+        const places = placesWhere(kept.length, isOwn);
+        return { part, degree, places, splats: places.map((k) => kept[k] - part.first) };
+      }),
+    );
+    const found = lists.filter(({ places }) => places.length > 0);
+    const colours = await takeLowered(this.#device, this.#cloud.shDegree, found);
+    const length = 3 * shCoefficientCount(cloud.shDegree);
+    found.forEach(({ degree, places }, k) => {
+      const width = 3 * shCoefficientCount(degree);
+      for (let n = 0; n < places.length; n++) {
+        for (let number = 0; number < width; number++)
+          cloud.sh[length * places[n] + number] = colours[k][width * n + number];
+      }
+    });
   }
 
   async #errorsIn(views: JudgedViews): Promise<PictureErrors> {
@@ -188,4 +224,14 @@ export class GpuEvaluator implements Evaluator {
       return { error, of };
     });
   }
+}
+
+const lowerDegreesOf = (degree: ShDegree): ShDegree[] => ([0, 1, 2] as const).filter((lower) => lower < degree);
+
+/** The numbers below `count` that a condition holds for. */
+function placesWhere(count: number, holds: (k: number) => boolean): Uint32Array {
+  const places = new Uint32Array(count);
+  let length = 0;
+  for (let k = 0; k < count; k++) if (holds(k)) places[length++] = k;
+  return places.slice(0, length);
 }

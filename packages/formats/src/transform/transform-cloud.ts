@@ -77,27 +77,49 @@ function deformShapes({ count, scales, rotations }: GaussianCloud, m: Matrix3): 
   }
 }
 
-function turnHarmonics({ count, sh, shDegree }: GaussianCloud, turn: Matrix3): void {
+function turnHarmonics(cloud: GaussianCloud, turn: Matrix3): void {
+  const bands = ([1, 2, 3] as const).filter((band) => band <= cloud.shDegree);
+  const rotations = bands.map((band) => shRotation(band, turn));
+  const signs = rotations.map((matrix, k) => signsOf(matrix, 2 * bands[k] + 1));
+  if (signs.every((band) => band !== undefined)) return flipHarmonics(cloud, [1, ...signs.flat()]);
+  bands.forEach((band, k) => turnBand(cloud, band, rotations[k]));
+}
+
+/** The diagonal of a rotation of harmonics that does no more than change signs, as half turns do. */
+function signsOf(matrix: Float64Array, size: number): number[] | undefined {
+  const diagonal = Array.from({ length: size }, (_, k) => Math.sign(matrix[k * size + k]));
+  const isDiagonal = matrix.every((value, at) => {
+    const [row, column] = [Math.floor(at / size), at % size];
+    return Math.abs(value - (row === column ? diagonal[row] : 0)) <= NEGLIGIBLE;
+  });
+  return isDiagonal ? diagonal : undefined;
+}
+
+function flipHarmonics({ count, sh }: GaussianCloud, signs: readonly number[]): void {
+  const factors = Float32Array.from({ length: 3 * signs.length }, (_, k) => signs[Math.floor(k / 3)]);
+  for (let i = 0, at = 0; i < count; i++) {
+    for (let k = 0; k < factors.length; k++, at++) sh[at] *= factors[k];
+  }
+}
+
+function turnBand({ count, sh, shDegree }: GaussianCloud, band: number, matrix: Float64Array): void {
   const stride = 3 * shCoefficientCount(shDegree);
   const old = new Float64Array(21);
-  for (let band = 1; band <= shDegree; band++) {
-    const matrix = shRotation(band as 1 | 2 | 3, turn);
-    const size = 2 * band + 1;
-    // Between files' axes it is half turns and quarter turns, which leave a number a row.
-    const terms = Array.from({ length: size }, (_, row) =>
-      Array.from({ length: size }, (_, k) => ({ k, factor: matrix[row * size + k] })).filter(
-        ({ factor }) => Math.abs(factor) > NEGLIGIBLE,
-      ),
-    );
-    for (let i = 0; i < count; i++) {
-      const at = i * stride + 3 * band * band;
-      for (let k = 0; k < 3 * size; k++) old[k] = sh[at + k];
-      for (let row = 0; row < size; row++) {
-        for (let channel = 0; channel < 3; channel++) {
-          let sum = 0;
-          for (const { k, factor } of terms[row]) sum += factor * old[3 * k + channel];
-          sh[at + 3 * row + channel] = sum;
-        }
+  const size = 2 * band + 1;
+  // Quarter turns between files' axes leave a number or two a row.
+  const terms = Array.from({ length: size }, (_, row) =>
+    Array.from({ length: size }, (_, k) => ({ k, factor: matrix[row * size + k] })).filter(
+      ({ factor }) => Math.abs(factor) > NEGLIGIBLE,
+    ),
+  );
+  for (let i = 0; i < count; i++) {
+    const at = i * stride + 3 * band * band;
+    for (let k = 0; k < 3 * size; k++) old[k] = sh[at + k];
+    for (let row = 0; row < size; row++) {
+      for (let channel = 0; channel < 3; channel++) {
+        let sum = 0;
+        for (const { k, factor } of terms[row]) sum += factor * old[3 * k + channel];
+        sh[at + 3 * row + channel] = sum;
       }
     }
   }
