@@ -1,7 +1,6 @@
 /** The work behind `npm run economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
 import { readFileSync, statSync, writeFileSync } from 'node:fs';
-import { readFile } from 'node:fs/promises';
-import { dirname, join, resolve } from 'node:path';
+import { resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
 import {
@@ -13,9 +12,9 @@ import {
   Studio,
   viewsBetween,
 } from '@gaussian-splat/economise';
-import { readScene } from '@gaussian-splat/formats';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
+import { readInThread } from './lib/scene-thread.mjs';
 
 const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options]
 
@@ -26,7 +25,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
   --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
                   auto (default): gpu where there is one
-  --report FILE   the figures as JSON, with the seconds that each kind of work took
+  --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
 `;
 
 class UsageError extends Error {}
@@ -94,13 +93,14 @@ async function openDevice(scorer) {
 async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
-  const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
-  // The disk and the driver take their time at the same time.
-  const file = readFile(scene);
-  file.catch(() => undefined);
+  // The file and the driver take their time at the same time.
+  const reading = readInThread(scene);
+  reading.catch(() => undefined);
   const { device, isGpu } = await openDevice(scorer);
+  if (isGpu) GpuEvaluator.prepare(device);
   const opened = seconds();
-  const cloud = await readScene(await file, { name: scene, openPart });
+  const cloud = await reading;
+  // What is left of it when the device is there.
   const read = seconds() - opened;
   const views = readViews(viewsFile, boundsOf(cloud), scored);
   const evaluator = isGpu

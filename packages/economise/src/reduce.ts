@@ -94,11 +94,14 @@ export function coarseToFine({ scales }: GaussianCloud, contribution: Float32Arr
   const importance = new Float32Array(splats.length);
   for (let k = 0; k < splats.length; k++) {
     const i = splats[k];
-    const [a, b, c] = [scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]];
+    const a = scales[3 * i];
+    const b = scales[3 * i + 1];
+    const c = scales[3 * i + 2];
     importance[k] = contribution[i] * Math.max(a * b, b * c, c * a);
   }
   const order = ascendingOrder(importance).reverse();
-  return order.map((k) => splats[k]);
+  for (let k = 0; k < order.length; k++) order[k] = splats[order[k]];
+  return order;
 }
 
 /** The degree at which error and the price of what is kept add up to least. */

@@ -1,8 +1,9 @@
-import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import type { GaussianCloud } from '@gaussian-splat/core';
 import { Renderer } from '@gaussian-splat/renderer';
+import { rareKernelOf } from '@gaussian-splat/renderer/stages';
 import type { LoweredColours } from '../colour-moments.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
-import { UNJUDGED } from '../generated/shaders.js';
+import * as shaders from '../generated/shaders.js';
 import { coarseToFine, reduceTo, type Cut, type ReducedCloud } from '../reduce.js';
 import type { Ranking, Scores } from '../score.js';
 import type { DealtViews } from '../views.js';
@@ -10,10 +11,10 @@ import { CloudBuffers } from './cloud-buffers.js';
 import { CutScene } from './cut-scene.js';
 import { layouts } from './layouts.js';
 import { PictureErrors } from './picture-errors.js';
+import { putLowered } from './put-lowered.js';
 import { readBack } from './read-back.js';
 import { SceneParts, loweredNumbers } from './scene-parts.js';
 import { SceneScorer } from './scene-scorer.js';
-import { takeLowered } from './take-lowered.js';
 
 export interface GpuEvaluatorOptions {
   /** Most splats that are bound at once, for tests; default what the device's limits allow. */
@@ -21,6 +22,14 @@ export interface GpuEvaluatorOptions {
   /** Views whose energies are kept until they are added to the moments of colour, default 32. */
   readonly viewsAtOnce?: number;
 }
+
+/** Exact, so that no rounding is taken for an effect of the cut. */
+const QUALITY = { quality: 'reference' } as const;
+/** Shaders whose pipelines are made once for a device. */
+const STAGES = [
+  ...[shaders.economiseScore, shaders.economiseMoments, shaders.economiseLower, shaders.economiseCut],
+  ...[shaders.economiseTake, shaders.pictureError, shaders.pictureErrorSum],
+];
 
 /** Bytes of them are a fourth of what the moments take. */
 const VIEWS_AT_ONCE = 32;
@@ -51,8 +60,13 @@ export class GpuEvaluator implements Evaluator {
     this.#views = views;
     this.#scene = scene;
     this.#cutScene = cutScene;
-    // Exact, so that no rounding is taken for an effect of the cut.
-    this.#renderer = new Renderer(device, { quality: 'reference' });
+    this.#renderer = new Renderer(device, QUALITY);
+  }
+
+  /** Makes pipelines that {@link create} and what follows would make, for those who wait for a cloud meanwhile. */
+  static prepare(device: GPUDevice): void {
+    for (const stage of STAGES) rareKernelOf(device, stage).prepare();
+    new Renderer(device, QUALITY).destroy();
   }
 
   /**
@@ -136,10 +150,12 @@ export class GpuEvaluator implements Evaluator {
     if (this.#ranking === undefined) throw new Error('GpuEvaluator: rank() comes before reduce()');
     signal?.throwIfAborted();
     this.#cutScene.apply(cut);
-    const { staying, degrees } = await this.#cutScene.choice();
+    const { staying, degrees: all } = await this.#cutScene.choice();
     const kept = coarseToFine(this.#cloud, this.#ranking.contribution, staying);
-    const reduced = reduceTo(this.#cloud, { kept, degrees: Uint8Array.from(kept, (i) => degrees[i]) });
-    await this.#lower(reduced, kept);
+    const degrees = new Uint8Array(kept.length);
+    for (let k = 0; k < kept.length; k++) degrees[k] = all[kept[k]];
+    const reduced = reduceTo(this.#cloud, { kept, degrees });
+    await putLowered(this.#device, this.#scene, reduced, kept);
     return reduced;
   }
 
@@ -161,28 +177,6 @@ export class GpuEvaluator implements Evaluator {
     this.#scene.destroy();
   }
 
-  /** Puts the coefficients of the splats that keep a lower degree in their places. @param kept their numbers in the scene */
-  async #lower({ cloud, degrees }: ReducedCloud, kept: Uint32Array): Promise<void> {
-    const lists = this.#scene.parts.flatMap((part) =>
-      lowerDegreesOf(this.#cloud.shDegree).map((degree) => {
-        const isOwn = (k: number): boolean =>
-          degrees[k] === degree && kept[k] >= part.first && kept[k] < part.first + part.page.count;
-        const places = placesWhere(kept.length, isOwn);
-        return { part, degree, places, splats: places.map((k) => kept[k] - part.first) };
-      }),
-    );
-    const found = lists.filter(({ places }) => places.length > 0);
-    const colours = await takeLowered(this.#device, this.#cloud.shDegree, found);
-    const length = 3 * shCoefficientCount(cloud.shDegree);
-    found.forEach(({ degree, places }, k) => {
-      const width = 3 * shCoefficientCount(degree);
-      for (let n = 0; n < places.length; n++) {
-        for (let number = 0; number < width; number++)
-          cloud.sh[length * places[n] + number] = colours[k][width * n + number];
-      }
-    });
-  }
-
   async #errorsIn(views: JudgedViews): Promise<PictureErrors> {
     const known = this.#errors.get(views);
     if (known) return known;
@@ -202,7 +196,7 @@ export class GpuEvaluator implements Evaluator {
       for (let k = 0; k < scores.length; k += stride, i++) {
         const error = scores[k + removal.offset / 4];
         contribution[i] = scores[k + at.offset / 4];
-        removalError[i] = error >= UNJUDGED ? Infinity : error;
+        removalError[i] = error >= shaders.UNJUDGED ? Infinity : error;
       }
     }
     return { contribution, removalError };
@@ -224,14 +218,4 @@ export class GpuEvaluator implements Evaluator {
       return { error, of };
     });
   }
-}
-
-const lowerDegreesOf = (degree: ShDegree): ShDegree[] => ([0, 1, 2] as const).filter((lower) => lower < degree);
-
-/** The numbers below `count` that a condition holds for. */
-function placesWhere(count: number, holds: (k: number) => boolean): Uint32Array {
-  const places = new Uint32Array(count);
-  let length = 0;
-  for (let k = 0; k < count; k++) if (holds(k)) places[length++] = k;
-  return places.slice(0, length);
 }

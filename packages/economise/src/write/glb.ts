@@ -125,7 +125,8 @@ function primitiveOf(cloud: GaussianCloud, members: Uint32Array, degree: number)
     width,
     put: (out: Numbers, first: number, end: number): void => {
       for (let n = first; n < end; n++) {
-        const [to, from] = [width * (n - first), stride * members[n] + at];
+        const to = width * (n - first);
+        const from = stride * members[n] + at;
         for (let k = 0; k < width; k++) out[to + k] = sign * values[from + k];
       }
     },
@@ -167,7 +168,8 @@ function placesOf({ positions, origin }: GaussianCloud, members: Uint32Array): A
 function rotationsOf({ rotations }: GaussianCloud, members: Uint32Array): Attribute {
   const put = (out: Numbers, first: number, end: number): void => {
     for (let n = first; n < end; n++) {
-      const [to, from] = [4 * (n - first), 4 * members[n]];
+      const to = 4 * (n - first);
+      const from = 4 * members[n];
       out[to] = Math.round(-32_767 * rotations[from + 2]);
       out[to + 1] = Math.round(32_767 * rotations[from + 1]);
       out[to + 2] = Math.round(32_767 * rotations[from]);

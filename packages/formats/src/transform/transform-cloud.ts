@@ -41,7 +41,9 @@ export function transformCloud(cloud: GaussianCloud, map: readonly number[]): vo
 
 function movePositions(positions: Float32Array, m: Matrix3, [tx, ty, tz]: readonly number[]): void {
   for (let i = 0; i < positions.length; i += 3) {
-    const [x, y, z] = [positions[i], positions[i + 1], positions[i + 2]];
+    const x = positions[i];
+    const y = positions[i + 1];
+    const z = positions[i + 2];
     positions[i] = m[0] * x + m[1] * y + m[2] * z + tx;
     positions[i + 1] = m[3] * x + m[4] * y + m[5] * z + ty;
     positions[i + 2] = m[6] * x + m[7] * y + m[8] * z + tz;
@@ -53,13 +55,16 @@ function turnShapes({ count, scales, rotations }: GaussianCloud, turn: Matrix3, 
   const sign = Math.sign(determinant(turn));
   const [w, x, y, z] = quaternionOfMatrix(turn.map((value) => sign * value));
   for (let i = 0; i < count; i++) {
-    const [a, b, c, d] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
+    const a = rotations[4 * i];
+    const b = rotations[4 * i + 1];
+    const c = rotations[4 * i + 2];
+    const d = rotations[4 * i + 3];
     rotations[4 * i] = w * a - x * b - y * c - z * d;
     rotations[4 * i + 1] = w * b + x * a + y * d - z * c;
     rotations[4 * i + 2] = w * c - x * d + y * a + z * b;
     rotations[4 * i + 3] = w * d + x * c - y * b + z * a;
   }
-  for (let k = 0; k < scales.length; k++) scales[k] *= scale;
+  if (scale !== 1) for (let k = 0; k < scales.length; k++) scales[k] *= scale;
 }
 
 /** Covariances M·Σ·Mᵀ, taken apart into rotation and scales again. */
