@@ -26,6 +26,7 @@ RARE[ECONOMISE] = [
   'economise_mask',
   'economise_moments',
   'economise_score',
+  'economise_take',
   'note_sides',
   'picture_error',
   'picture_error_sum',

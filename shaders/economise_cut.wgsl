@@ -27,6 +27,11 @@ struct Cut {
 // Splats that stay, by the degree that they keep.
 @group(0) @binding(7) var<storage, read_write> kept: array<atomic<u32>, 4>;
 
+// For each splat the degree that it keeps, or GONE.
+@group(0) @binding(8) var<storage, read_write> choices: array<u32>;
+
+const GONE = 4u;
+
 var<workgroup> kept_here: array<atomic<u32>, 4>;
 
 fn coefficients(degree: u32) -> u32 {
@@ -80,11 +85,13 @@ fn apply(i: u32) {
   let g = gaussians[i];
   let goes = s.contribution < cut.min_contribution || s.removal < cut.removal_price;
   if (goes) {
+    choices[i] = GONE;
     cut_gaussians[i] = transparent(g);
     return;
   }
   cut_gaussians[i] = g;
   let degree = degree_of(i);
+  choices[i] = degree;
   write_colour(i, degree);
   atomicAdd(&kept_here[degree], 1u);
 }

@@ -204,6 +204,20 @@ test('between cameras there are views that are no camera, each halfway to its ne
   assert.deepEqual(viewsBetween(cameras.slice(0, 1)), []);
 });
 
+test('splats come in the order of what they contribute over their area, equal ones in that of the file', async () => {
+  const { lowered, removalError } = await scored;
+  // All scales are equal. From the tiniest numbers to the largest, and every one of them three times.
+  const contribution = Float32Array.from({ length: scene.count }, (_, i) =>
+    (i * 7) % 300 === 0 ? 0 : 1.1 ** -((i * 7) % 300),
+  );
+  const { cloud } = reduce(scene, { contribution, removalError, lowered }, {});
+  const numbers = [...contribution.keys()].sort((a, b) => contribution[b] - contribution[a] || a - b);
+  assert.deepEqual(
+    cloud.positions,
+    Float32Array.from(numbers.flatMap((i) => [...scene.positions.subarray(3 * i, 3 * i + 3)])),
+  );
+});
+
 test('a file in this order is a coarse picture while it arrives', async () => {
   const reduced = reduce(scene, await scored, {});
   const bytes = await encodingsFor('a.ply')[0].write(reduced);

@@ -163,6 +163,9 @@ for (const [name, cutOf] of [
     const { cloud, degrees } = reduce(scene, scores, cut);
     const found = await evaluator.cut(cut, 'heldOut');
     assert.deepEqual(found.degrees, degreesOf(degrees));
+    const taken = await evaluator.reduce(cut);
+    assert.deepEqual(taken.degrees, degrees);
+    assert.deepEqual(taken.cloud, cloud);
     const expected = await evaluator.compare(cloud, 'heldOut');
     found.errors.forEach((error, k) => {
       assert.ok(error > 1e-9, 'something is lost');

@@ -93,15 +93,22 @@ export function validateCloud(cloud: GaussianCloud): void {
 export function isUsable(cloud: GaussianCloud, i: number): boolean {
   const { positions, scales, rotations, opacities, sh, shDegree } = cloud;
   const shLength = 3 * shCoefficientCount(shDegree);
-  // A sum is finite only if every term is; sh is the longest array, so this is the inner loop of loading.
-  let sum = opacities[i];
-  for (let k = 0; k < 3; k++) sum += Math.abs(positions[3 * i + k]);
-  for (let k = 0; k < shLength; k++) sum += Math.abs(sh[shLength * i + k]);
-  if (!Number.isFinite(sum)) return false;
-  const [w, x, y, z] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
-  const norm = w * w + x * x + y * y + z * z;
+  // A sum is finite only if every term is: infinities of both signs add up to NaN. sh is the longest array, so this is the inner loop of loading, and one
+  // sum alone would wait for each of its additions.
+  let red = positions[3 * i];
+  let green = positions[3 * i + 1];
+  let blue = positions[3 * i + 2];
+  for (let k = shLength * i; k < shLength * (i + 1); k += 3) {
+    red += sh[k];
+    green += sh[k + 1];
+    blue += sh[k + 2];
+  }
+  if (!Number.isFinite(opacities[i] + red + green + blue)) return false;
+  const norm = squaredNorm(rotations, 4 * i);
   if (!(norm > 0 && Number.isFinite(norm))) return false;
-  const [a, b, c] = [scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]];
+  const a = scales[3 * i];
+  const b = scales[3 * i + 1];
+  const c = scales[3 * i + 2];
   if (!(a >= 0 && b >= 0 && c >= 0)) return false;
   const longest = Math.max(a, b, c);
   return longest >= MIN_LONGEST_SCALE && longest <= MAX_SCALE;
@@ -148,10 +155,15 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
 }
 
 function normaliseQuaternion(rotations: Float32Array, at: number): void {
-  const [w, x, y, z] = [rotations[at], rotations[at + 1], rotations[at + 2], rotations[at + 3]];
-  const scale = 1 / Math.hypot(w, x, y, z);
-  rotations[at] = w * scale;
-  rotations[at + 1] = x * scale;
-  rotations[at + 2] = y * scale;
-  rotations[at + 3] = z * scale;
+  const scale = 1 / Math.sqrt(squaredNorm(rotations, at));
+  for (let k = at; k < at + 4; k++) rotations[k] *= scale;
+}
+
+/** Squares of float32 numbers neither overflow nor vanish in float64. */
+function squaredNorm(rotations: Float32Array, at: number): number {
+  const w = rotations[at];
+  const x = rotations[at + 1];
+  const y = rotations[at + 2];
+  const z = rotations[at + 3];
+  return w * w + x * x + y * y + z * z;
 }

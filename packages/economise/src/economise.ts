@@ -3,7 +3,7 @@ import { readScene } from '@gaussian-splat/formats';
 import type { Evaluator } from './evaluator.js';
 import { findTrades, scaleToFit } from './fit.js';
 import { decibels, mean, meanSquareOf } from './measure.js';
-import { degreesOf, keptCoefficients, reduce, type Cut, type ReducedCloud } from './reduce.js';
+import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
 import { Stopwatch } from './stopwatch.js';
 import { encodingsFor, type Encoding } from './write/index.js';
 
@@ -64,11 +64,10 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   const trades = await findTrades(cloud, ranking, evaluator, budget, options);
   watch.lap('search');
   let filling = await scaleToFit(trades, evaluator, budget, options);
-  const scores = await evaluator.scores();
   watch.lap('fit');
   for (let tries = 0; tries < MAX_TRIES; tries++) {
     const cut = trades.cutAt(filling * budget);
-    const reduced = reduce(cloud, scores, cut);
+    const reduced = await evaluator.reduce(cut, signal);
     const bytes = await encoding.write(reduced);
     const written = await readScene(bytes, { name: options.name, signal });
     watch.lap('write');

@@ -1,6 +1,6 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import type { Cut } from './reduce.js';
-import type { Ranking, Scores } from './score.js';
+import type { Cut, ReducedCloud } from './reduce.js';
+import type { Ranking } from './score.js';
 
 /** Views that errors are measured in: those of the search, or those that are held out: the result is measured in them, and that its cut is not too large. */
 export type JudgedViews = 'searched' | 'heldOut';
@@ -20,10 +20,10 @@ export interface CutFigures {
 export interface Evaluator {
   /** Looks at the scene in the scored views. To be called once, before all else. */
   rank(signal?: AbortSignal): Promise<Ranking>;
-  /** The ranking, with the colours of lower degrees. */
-  scores(): Promise<Scores>;
   /** Figures of a cut, in pictures of the scene. */
   cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures>;
+  /** What a cut leaves, to be written. */
+  reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud>;
   /** [views] errors of another cloud in place of the scene. */
   compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
   /** Frees what the evaluator holds. */

@@ -1,6 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { Evaluator } from './evaluator.js';
 import { mean } from './measure.js';
+import { ascendingOrder } from './order.js';
 import type { Cut } from './reduce.js';
 import type { Ranking } from './score.js';
 import { bestTrades, measureTrades, type TradeCurve } from './search.js';
@@ -86,8 +87,8 @@ async function chooseDropping(
     { values: removalError, cutAt: (removalPrice: number): Cut => ({ removalPrice }) },
     { values: contribution, cutAt: (minContribution: number): Cut => ({ minContribution }) },
   ].map(({ values, cutAt }) => {
-    const sorted = values.slice().sort();
-    const at = (share: number): number => sorted[Math.floor(share * (sorted.length - 1))];
+    const order = ascendingOrder(values);
+    const at = (share: number): number => values[order[Math.floor(share * (order.length - 1))]];
     return { at, cutAt };
   });
   const trials: number[] = [];

@@ -2,7 +2,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 import { cpuPainter, cpuScorer } from './cpu-raster.js';
 import type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
 import { meanSquare, type Image, type Painter } from './measure.js';
-import { degreesOf, reduce, type Cut } from './reduce.js';
+import { degreesOf, reduce, type Cut, type ReducedCloud } from './reduce.js';
 import { scoreSplats, type Ranking, type Scores } from './score.js';
 import type { ContributionScorer } from './scorer.js';
 import type { DealtViews } from './views.js';
@@ -45,6 +45,11 @@ export class PaintedEvaluator implements Evaluator {
     const { cloud, degrees } = reduce(this.#cloud, await this.scores(), cut);
     const { sketcher = cpuPainter } = this.#options;
     return { errors: await this.#errors(cloud, views, sketcher, signal), degrees: degreesOf(degrees) };
+  }
+
+  async reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
+    signal?.throwIfAborted();
+    return reduce(this.#cloud, await this.scores(), cut);
   }
 
   async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {

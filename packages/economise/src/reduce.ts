@@ -1,5 +1,6 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import type { Ranking, Scores } from './score.js';
+import { ascendingOrder } from './order.js';
+import type { Scores } from './score.js';
 
 /** What is taken from a scene. */
 export interface Cut {
@@ -19,10 +20,36 @@ export interface ReducedCloud {
   readonly degrees: Uint8Array;
 }
 
+/** Which splats stay, and how much of their colours. */
+export interface Choice {
+  /** Numbers of the splats that stay, the most seen first. */
+  readonly kept: Uint32Array;
+  /** [N] degree that each of them keeps. */
+  readonly degrees: Uint8Array;
+}
+
 /** Applies a cut. The source is left as it is. */
 export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedCloud {
-  const kept = coarseToFine(cloud, scores, cut);
-  const degrees = Uint8Array.from(kept, (i) => degreeOf(cloud.shDegree, scores, i, cut.colourPrice ?? 0));
+  const { contribution, removalError, lowered } = scores;
+  const { minContribution = 0, removalPrice = 0, colourPrice = 0 } = cut;
+  const staying = new Uint32Array(cloud.count);
+  let count = 0;
+  for (let i = 0; i < cloud.count; i++) {
+    if (contribution[i] < minContribution || removalError[i] < removalPrice) continue;
+    staying[count++] = i;
+  }
+  const kept = coarseToFine(cloud, contribution, staying.subarray(0, count));
+  const degrees = Uint8Array.from(kept, (i) => degreeOf(cloud.shDegree, scores, i, colourPrice));
+  const reduced = reduceTo(cloud, { kept, degrees });
+  const length = 3 * shCoefficientCount(reduced.cloud.shDegree);
+  for (let k = 0; k < kept.length; k++) {
+    if (degrees[k] < cloud.shDegree) reduced.cloud.sh.set(lowered[degrees[k]].of(kept[k]), length * k);
+  }
+  return reduced;
+}
+
+/** The splats that stay, in their order. Coefficients of those that keep a lower degree than the cloud's are 0: to be put in by whoever knows them. */
+export function reduceTo(cloud: GaussianCloud, { kept, degrees }: Choice): ReducedCloud {
   const highest = degrees.reduce((most, degree) => Math.max(most, degree), 0) as ShDegree;
   const reduced = {
     ...cloud,
@@ -31,7 +58,7 @@ export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedC
     scales: rowsOf(cloud.scales, 3, kept),
     rotations: rowsOf(cloud.rotations, 4, kept),
     opacities: rowsOf(cloud.opacities, 1, kept),
-    sh: coloursOf(cloud, scores, kept, degrees, highest),
+    sh: wholeColoursOf(cloud, kept, degrees, highest),
     shDegree: highest,
   };
   return { cloud: reduced, degrees };
@@ -46,52 +73,35 @@ function rowsOf(values: Float32Array, width: number, kept: Uint32Array): Float32
   return taken;
 }
 
-/** The coefficients of the splats that stay, each at its degree, in rows as long as the highest needs. */
-function coloursOf(
+/** The coefficients of the splats that keep all of theirs, in rows as long as the highest degree needs. */
+function wholeColoursOf(
   { sh, shDegree }: GaussianCloud,
-  { lowered }: Scores,
   kept: Uint32Array,
   degrees: Uint8Array,
   highest: ShDegree,
 ): Float32Array {
-  const stride = 3 * shCoefficientCount(shDegree);
   const length = 3 * shCoefficientCount(highest);
   const colours = new Float32Array(length * kept.length);
   for (let k = 0; k < kept.length; k++) {
-    const i = kept[k];
-    if (degrees[k] < shDegree) colours.set(lowered[degrees[k]].of(i), length * k);
-    else for (let number = 0; number < stride; number++) colours[length * k + number] = sh[stride * i + number];
+    if (degrees[k] < shDegree) continue;
+    for (let number = 0; number < length; number++) colours[length * k + number] = sh[length * kept[k] + number];
   }
   return colours;
 }
 
-/**
- * Positive floats are in the order of their bits. Together with the splat's number they fit the 53 bits of a float64, if need be without their last ones, and numbers sort
- * many times faster than a comparison does.
- */
-const [IMPORTANCE_BITS, KEY_BITS] = [31, 53];
-
-/** Numbers of the splats that stay, the most seen first: by contribution times the area of the splat. */
-function coarseToFine(
-  { count, scales }: GaussianCloud,
-  { contribution, removalError }: Ranking,
-  cut: Cut,
-): Uint32Array {
-  const { minContribution = 0, removalPrice = 0 } = cut;
-  const importance = new Float32Array(1);
-  const bits = new Uint32Array(importance.buffer);
-  const keys = new Float64Array(count);
-  const placeBits = Math.max(1, Math.ceil(Math.log2(count)));
-  const [places, unit] = [2 ** placeBits, 2 ** Math.max(0, placeBits + IMPORTANCE_BITS - KEY_BITS)];
-  let length = 0;
-  for (let i = 0; i < count; i++) {
-    if (contribution[i] < minContribution || removalError[i] < removalPrice) continue;
-    const [a, b, c] = [scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]];
-    importance[0] = contribution[i] * Math.max(a * b, b * c, c * a);
-    keys[length++] = Math.floor((2 ** IMPORTANCE_BITS - bits[0]) / unit) * places + i;
+/** The same splats, the most seen first: by contribution times the area of the splat. */
+export function coarseToFine({ scales }: GaussianCloud, contribution: Float32Array, splats: Uint32Array): Uint32Array {
+  const importance = new Float32Array(splats.length);
+  for (let k = 0; k < splats.length; k++) {
+    const i = splats[k];
+    const a = scales[3 * i];
+    const b = scales[3 * i + 1];
+    const c = scales[3 * i + 2];
+    importance[k] = contribution[i] * Math.max(a * b, b * c, c * a);
   }
-  const sorted = keys.subarray(0, length).sort();
-  return Uint32Array.from(sorted, (key) => key % places);
+  const order = ascendingOrder(importance).reverse();
+  for (let k = 0; k < order.length; k++) order[k] = splats[order[k]];
+  return order;
 }
 
 /** The degree at which error and the price of what is kept add up to least. */

@@ -38,7 +38,7 @@ function copyPart({ cloud, first, count }: CloudPart, to: DraftCloud, at: number
     to.sh.set(cloud.sh.subarray(from * first, from * end), stride * at);
   } else {
     for (let i = 0; i < count; i++) {
-      to.sh.set(cloud.sh.subarray(from * (first + i), from * (first + i + 1)), stride * (at + i));
+      for (let k = 0; k < from; k++) to.sh[stride * (at + i) + k] = cloud.sh[from * (first + i) + k];
     }
   }
 }

@@ -1,6 +1,6 @@
 import type { GaussianPage, GaussianScene } from '@gaussian-splat/renderer';
 import { BUFFER_USAGE, GpuMemory, rareKernelOf, withMemoryCheck, writeStruct } from '@gaussian-splat/renderer/stages';
-import { economiseCut, SCORE_GROUP, UNJUDGED } from '../generated/shaders.js';
+import { economiseCut, GONE, SCORE_GROUP, UNJUDGED } from '../generated/shaders.js';
 import type { Cut } from '../reduce.js';
 import { layouts } from './layouts.js';
 import { readBack } from './read-back.js';
@@ -16,6 +16,8 @@ export class CutScene implements GaussianScene {
   readonly #memory: GpuMemory;
   readonly #uniforms: readonly GPUBuffer[];
   readonly #kept: GPUBuffer;
+  /** Of each part: for each splat the degree that it keeps, or GONE. */
+  readonly #choices: readonly GPUBuffer[];
   readonly #bindings: readonly GPUBindGroup[];
   #version = 0;
 
@@ -32,6 +34,9 @@ export class CutScene implements GaussianScene {
       sh: copyOf('sh', page.sh),
     }));
     this.#kept = memory.buffer('gs.economise.kept', 4 * DEGREES, storage | copySource | copyDestination);
+    this.#choices = scene.parts.map(({ page }) =>
+      memory.buffer('gs.economise.choices', 4 * page.count, storage | copySource),
+    );
     this.#uniforms = scene.parts.map(() =>
       memory.buffer('gs.economise.cut', layouts.Cut.size, uniform | copyDestination),
     );
@@ -98,6 +103,22 @@ export class CutScene implements GaussianScene {
     return [...new Uint32Array(counts)];
   }
 
+  /** What the last cut leaves: splats by their numbers, and the degree of each of the scene's splats. */
+  async choice(): Promise<{ staying: Uint32Array; degrees: Uint8Array }> {
+    const parts = this.#scene.parts.map(({ page }, p) => ({ buffer: this.#choices[p], byteLength: 4 * page.count }));
+    const staying = new Uint32Array(this.count);
+    const degrees = new Uint8Array(this.count);
+    let [length, i] = [0, 0];
+    for (const choices of (await readBack(this.#device, parts)).map((bytes) => new Uint32Array(bytes))) {
+      for (let k = 0; k < choices.length; k++, i++) {
+        if (choices[k] === GONE) continue;
+        staying[length++] = i;
+        degrees[i] = choices[k];
+      }
+    }
+    return { staying: staying.subarray(0, length), degrees };
+  }
+
   destroy(): void {
     this.#memory.destroy();
   }
@@ -106,7 +127,7 @@ export class CutScene implements GaussianScene {
     const { geometry, sh } = this.pages[p];
     return rareKernelOf(this.#device, economiseCut).bind({
       ...{ cut: this.#uniforms[p], gaussians: page.geometry, sh: page.sh, scores, lowered },
-      ...{ cut_gaussians: geometry, cut_sh: sh, kept: this.#kept },
+      ...{ cut_gaussians: geometry, cut_sh: sh, kept: this.#kept, choices: this.#choices[p] },
     });
   }
 }

@@ -1,15 +1,17 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { Renderer } from '@gaussian-splat/renderer';
+import { rareKernelOf } from '@gaussian-splat/renderer/stages';
 import type { LoweredColours } from '../colour-moments.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
-import { UNJUDGED } from '../generated/shaders.js';
-import type { Cut } from '../reduce.js';
+import * as shaders from '../generated/shaders.js';
+import { coarseToFine, reduceTo, type Cut, type ReducedCloud } from '../reduce.js';
 import type { Ranking, Scores } from '../score.js';
 import type { DealtViews } from '../views.js';
 import { CloudBuffers } from './cloud-buffers.js';
 import { CutScene } from './cut-scene.js';
 import { layouts } from './layouts.js';
 import { PictureErrors } from './picture-errors.js';
+import { putLowered } from './put-lowered.js';
 import { readBack } from './read-back.js';
 import { SceneParts, loweredNumbers } from './scene-parts.js';
 import { SceneScorer } from './scene-scorer.js';
@@ -20,6 +22,14 @@ export interface GpuEvaluatorOptions {
   /** Views whose energies are kept until they are added to the moments of colour, default 32. */
   readonly viewsAtOnce?: number;
 }
+
+/** Exact, so that no rounding is taken for an effect of the cut. */
+const QUALITY = { quality: 'reference' } as const;
+/** Shaders whose pipelines are made once for a device. */
+const STAGES = [
+  ...[shaders.economiseScore, shaders.economiseMoments, shaders.economiseLower, shaders.economiseCut],
+  ...[shaders.economiseTake, shaders.pictureError, shaders.pictureErrorSum],
+];
 
 /** Bytes of them are a fourth of what the moments take. */
 const VIEWS_AT_ONCE = 32;
@@ -50,8 +60,13 @@ export class GpuEvaluator implements Evaluator {
     this.#views = views;
     this.#scene = scene;
     this.#cutScene = cutScene;
-    // Exact, so that no rounding is taken for an effect of the cut.
-    this.#renderer = new Renderer(device, { quality: 'reference' });
+    this.#renderer = new Renderer(device, QUALITY);
+  }
+
+  /** Makes pipelines that {@link create} and what follows would make, for those who wait for a cloud meanwhile. */
+  static prepare(device: GPUDevice): void {
+    for (const stage of STAGES) rareKernelOf(device, stage).prepare();
+    new Renderer(device, QUALITY).destroy();
   }
 
   /**
@@ -84,6 +99,8 @@ export class GpuEvaluator implements Evaluator {
         byteLength: layouts.Score.size * page.count,
       }));
       this.#ranking = this.#rankingOf(await readBack(this.#device, parts));
+      // Now, while the renderer still has room for this scene: for each other one it finds it anew.
+      for (const views of ['searched', 'heldOut'] as const) await this.#errorsIn(views);
       return this.#ranking;
     } finally {
       scorer.destroy();
@@ -129,6 +146,19 @@ export class GpuEvaluator implements Evaluator {
     return { errors: found, degrees };
   }
 
+  async reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
+    if (this.#ranking === undefined) throw new Error('GpuEvaluator: rank() comes before reduce()');
+    signal?.throwIfAborted();
+    this.#cutScene.apply(cut);
+    const { staying, degrees: all } = await this.#cutScene.choice();
+    const kept = coarseToFine(this.#cloud, this.#ranking.contribution, staying);
+    const degrees = new Uint8Array(kept.length);
+    for (let k = 0; k < kept.length; k++) degrees[k] = all[kept[k]];
+    const reduced = reduceTo(this.#cloud, { kept, degrees });
+    await putLowered(this.#device, this.#scene, reduced, kept);
+    return reduced;
+  }
+
   async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
     const errors = await this.#errorsIn(views);
     signal?.throwIfAborted();
@@ -166,7 +196,7 @@ export class GpuEvaluator implements Evaluator {
       for (let k = 0; k < scores.length; k += stride, i++) {
         const error = scores[k + removal.offset / 4];
         contribution[i] = scores[k + at.offset / 4];
-        removalError[i] = error >= UNJUDGED ? Infinity : error;
+        removalError[i] = error >= shaders.UNJUDGED ? Infinity : error;
       }
     }
     return { contribution, removalError };

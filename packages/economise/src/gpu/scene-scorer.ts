@@ -23,8 +23,10 @@ import type { SceneParts } from './scene-parts.js';
  * only what is tried first; what a cut costs is measured on pictures.
  */
 const USUAL_CONTRAST = 0.02;
-/** Looks at the scene until all views had room. */
+/** Looks at the scene, or at a view of the rehearsal, until all had room. */
 const MOST_TRIES = 4;
+/** Views that are drawn before any counts, spread over all: what a pair costs is learnt at the first, second, fourth and eighth frame. */
+const REHEARSED = 8;
 const COUNTS_BYTES = 16;
 const FLOAT_BYTES = 4;
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
@@ -65,6 +67,7 @@ export class SceneScorer {
 
   /** Scores all splats, and finds their colours at lower degrees. */
   async run(signal?: AbortSignal): Promise<void> {
+    await this.#rehearse(signal);
     for (let tries = 0; tries < MOST_TRIES; tries++) {
       if (await this.#look(signal)) break;
     }
@@ -74,6 +77,32 @@ export class SceneScorer {
   destroy(): void {
     this.#memory.destroy();
     for (const target of this.#targets.values()) target.destroy();
+  }
+
+  /**
+   * Draws a few views, waiting for each. The renderer finds the room that the others will need, and that their painting need not be divided into many submissions, which takes the CPU longer than it takes the
+   * GPU to draw.
+   */
+  async #rehearse(signal: AbortSignal | undefined): Promise<void> {
+    const step = Math.max(1, Math.floor(this.#views.length / REHEARSED));
+    for (const camera of this.#views.filter((_, k) => k % step === 0).slice(0, REHEARSED)) {
+      for (let tries = 0; tries < MOST_TRIES; tries++) {
+        signal?.throwIfAborted();
+        this.#paint(camera);
+        const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.rehearse' });
+        this.#renderer.copyCounts(encoder, this.#counts, 0);
+        this.#device.queue.submit([encoder.finish()]);
+        const [counts] = await readBack(this.#device, [{ buffer: this.#counts, byteLength: COUNTS_BYTES }]);
+        if (this.#renderer.hadRoom(new Uint32Array(counts))) break;
+      }
+    }
+  }
+
+  /** Draws a view and notes the largest weights in it. */
+  #paint(camera: Camera): void {
+    const target = this.#targetOf(camera);
+    const notes = { contributions: this.#peaks };
+    this.#renderer.render({ gaussians: this.#scene.gaussians, camera, target, notes });
   }
 
   /** @returns whether there was room for all that each view should show; if not, there will be */
@@ -86,15 +115,16 @@ export class SceneScorer {
       encoder.clearBuffer(moments);
     }
     this.#device.queue.submit([encoder.finish()]);
-    this.#views.forEach((camera, k) => {
+    for (const [k, camera] of this.#views.entries()) {
       signal?.throwIfAborted();
-      const notes = { contributions: this.#peaks };
-      const target = this.#targetOf(camera);
-      this.#renderer.render({ gaussians: this.#scene.gaussians, camera, target, notes });
+      this.#paint(camera);
       this.#note(uniforms, k);
       const isLast = k === this.#views.length - 1;
-      if (isLast || (k + 1) % this.#scene.views === 0) this.#gather(k - (k % this.#scene.views), k + 1);
-    });
+      if (!isLast && (k + 1) % this.#scene.views !== 0) continue;
+      this.#gather(k - (k % this.#scene.views), k + 1);
+      // The renderer's own looks at what a frame took come back meanwhile.
+      await this.#device.queue.onSubmittedWorkDone();
+    }
     const [counts] = await readBack(this.#device, [{ buffer: this.#counts }]);
     this.#memory.free(uniforms);
     signal?.throwIfAborted();

@@ -10,33 +10,36 @@ const [FLOAT, SHORT] = [5126, 5122];
  */
 const HALF_TURN = [1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1];
 
+/** The same turn of places. */
+const PLACE_SIGNS = [-1, -1, 1];
+
+/** What the extension says of every primitive. */
+const SPLATS = {
+  kernel: 'ellipse',
+  colorSpace: 'srgb_rec709_display',
+  sortingMethod: 'cameraDistance',
+  projection: 'perspective',
+};
+
+/** Splats are visited in blocks of this many, so that their rows stay in the cache while column after column of them is written. */
+const BLOCK = 256;
+
 type Numbers = Float32Array<ArrayBuffer> | Int16Array<ArrayBuffer>;
 
-/** Collects what a glTF file is made of. */
-class Assembly {
-  readonly chunks: Uint8Array[] = [];
-  readonly bufferViews: object[] = [];
-  readonly accessors: object[] = [];
-  byteLength = 0;
+/** What a primitive says of each of its splats. Of every attribute a splat takes whole words. */
+interface Attribute {
+  readonly name: string;
+  readonly width: number;
+  readonly isShort?: boolean;
+  readonly bounds?: object;
+  /** Writes the numbers of splats `first` to `end` of the primitive, from the beginning of `out` on. */
+  readonly put: (out: Numbers, first: number, end: number) => void;
+}
 
-  /** Adds numbers as an accessor; returns its index. */
-  add(values: Numbers, width: number, bounds?: object): number {
-    const bytes = new Uint8Array(values.buffer, values.byteOffset, values.byteLength);
-    const padding = -bytes.length & 3;
-    this.bufferViews.push({ buffer: 0, byteOffset: this.byteLength, byteLength: bytes.length });
-    this.chunks.push(bytes, new Uint8Array(padding));
-    this.byteLength += bytes.length + padding;
-    const isFloat = values instanceof Float32Array;
-    this.accessors.push({
-      bufferView: this.bufferViews.length - 1,
-      componentType: isFloat ? FLOAT : SHORT,
-      ...(isFloat ? {} : { normalized: true }),
-      count: values.length / width,
-      type: width === 1 ? 'SCALAR' : `VEC${width}`,
-      ...bounds,
-    });
-    return this.accessors.length - 1;
-  }
+/** The splats that keep one degree. */
+interface Primitive {
+  readonly count: number;
+  readonly attributes: readonly Attribute[];
 }
 
 /**
@@ -44,99 +47,140 @@ class Assembly {
  * bytes. Rotations are 16-bit normalised integers, which the extension allows; all else is float32.
  */
 export function writeGlb({ cloud, degrees }: ReducedCloud): Uint8Array<ArrayBuffer> {
-  const assembly = new Assembly();
   const primitives = [0, 1, 2, 3].flatMap((degree) => {
-    const members: number[] = [];
-    degrees.forEach((own, i) => {
-      if (own === degree) members.push(i);
-    });
-    return members.length === 0 ? [] : [primitiveOf(cloud, members, degree, assembly)];
+    const members = membersOf(degrees, degree);
+    return members.length === 0 ? [] : [primitiveOf(cloud, members, degree)];
   });
+  const { json, byteLength } = describe(primitives);
+  const { bytes, start } = containerOf(json, byteLength);
+  let at = start;
+  for (const { count, attributes } of primitives) {
+    const arrays = attributes.map(({ width, isShort }) => {
+      const array = isShort
+        ? new Int16Array(bytes.buffer, at, width * count)
+        : new Float32Array(bytes.buffer, at, width * count);
+      at += array.byteLength;
+      return array;
+    });
+    for (let first = 0; first < count; first += BLOCK) {
+      const end = Math.min(count, first + BLOCK);
+      attributes.forEach(({ width, put }, k) => put(arrays[k].subarray(width * first, width * end), first, end));
+    }
+  }
+  return bytes;
+}
+
+/** Numbers of the splats that keep a degree. */
+function membersOf(degrees: Uint8Array, degree: number): Uint32Array {
+  const members = new Uint32Array(degrees.length);
+  let count = 0;
+  for (let i = 0; i < degrees.length; i++) if (degrees[i] === degree) members[count++] = i;
+  return members.subarray(0, count);
+}
+
+/** The file but for its numbers, and how many bytes these take. */
+function describe(primitives: readonly Primitive[]): { json: object; byteLength: number } {
+  const bufferViews: object[] = [];
+  const accessors: object[] = [];
+  let byteLength = 0;
+  const add = ({ width, isShort, bounds }: Attribute, count: number): number => {
+    const length = (isShort ? 2 : 4) * width * count;
+    bufferViews.push({ buffer: 0, byteOffset: byteLength, byteLength: length });
+    byteLength += length;
+    return (
+      accessors.push({
+        bufferView: bufferViews.length - 1,
+        componentType: isShort ? SHORT : FLOAT,
+        ...(isShort && { normalized: true }),
+        count,
+        type: width === 1 ? 'SCALAR' : `VEC${width}`,
+        ...bounds,
+      }) - 1
+    );
+  };
+  const meshPrimitives = primitives.map(({ count, attributes }) => ({
+    mode: 0,
+    attributes: Object.fromEntries(attributes.map((attribute) => [attribute.name, add(attribute, count)])),
+    extensions: { [EXTENSION]: SPLATS },
+  }));
   const json = {
     asset: { version: '2.0', generator: 'gaussian-splat economise' },
     extensionsUsed: [EXTENSION],
     scene: 0,
     scenes: [{ nodes: [0] }],
     nodes: [{ mesh: 0 }],
-    meshes: [{ primitives }],
-    accessors: assembly.accessors,
-    bufferViews: assembly.bufferViews,
-    buffers: [{ byteLength: assembly.byteLength }],
+    meshes: [{ primitives: meshPrimitives }],
+    accessors,
+    bufferViews,
+    buffers: [{ byteLength }],
   };
-  return containerOf(json, assembly);
+  return { json, byteLength };
 }
 
-function primitiveOf(cloud: GaussianCloud, members: readonly number[], degree: number, assembly: Assembly): object {
+function primitiveOf(cloud: GaussianCloud, members: Uint32Array, degree: number): Primitive {
   const { opacities, scales, sh, shDegree } = cloud;
   /** Some numbers of the members' rows, each times a sign. */
-  const columns = (values: Float32Array, stride: number, first: number, signs: readonly number[]): Numbers => {
-    const width = signs.length;
-    const out = new Float32Array(width * members.length);
-    for (let n = 0; n < members.length; n++) {
-      for (let k = 0; k < width; k++) out[width * n + k] = signs[k] * values[stride * members[n] + first + k];
-    }
-    return out;
-  };
-  const own = (name: string): string => `${EXTENSION}:${name}`;
-  const places = placesOf(cloud, members);
-  const attributes: Record<string, number> = {
-    POSITION: assembly.add(places, 3, boundsOf(places)),
-    [own('ROTATION')]: assembly.add(rotationsOf(cloud, members), 4),
-    [own('SCALE')]: assembly.add(columns(scales, 3, 0, [1, 1, 1]), 3),
-    [own('OPACITY')]: assembly.add(columns(opacities, 1, 0, [1]), 1),
-  };
+  const columns = (name: string, values: Float32Array, stride: number, at: number, width: number, sign = 1) => ({
+    name: `${EXTENSION}:${name}`,
+    width,
+    put: (out: Numbers, first: number, end: number): void => {
+      for (let n = first; n < end; n++) {
+        const to = width * (n - first);
+        const from = stride * members[n] + at;
+        for (let k = 0; k < width; k++) out[to + k] = sign * values[from + k];
+      }
+    },
+  });
   const stride = 3 * shCoefficientCount(shDegree);
-  for (let band = 0; band <= degree; band++) {
-    for (let k = band * band; k < (band + 1) ** 2; k++) {
-      const values = columns(sh, stride, 3 * k, [HALF_TURN[k], HALF_TURN[k], HALF_TURN[k]]);
-      attributes[own(`SH_DEGREE_${band}_COEF_${k - band * band}`)] = assembly.add(values, 3);
-    }
-  }
-  const splats = {
-    kernel: 'ellipse',
-    colorSpace: 'srgb_rec709_display',
-    sortingMethod: 'cameraDistance',
-    projection: 'perspective',
-  };
-  return { mode: 0, attributes, extensions: { [EXTENSION]: splats } };
+  const colours = [0, 1, 2, 3].slice(0, degree + 1).flatMap((band) =>
+    Array.from({ length: 2 * band + 1 }, (_, k) => {
+      const n = band * band + k;
+      return columns(`SH_DEGREE_${band}_COEF_${k}`, sh, stride, 3 * n, 3, HALF_TURN[n]);
+    }),
+  );
+  const attributes = [
+    placesOf(cloud, members),
+    rotationsOf(cloud, members),
+    columns('SCALE', scales, 3, 0, 3),
+    columns('OPACITY', opacities, 1, 0, 1),
+    ...colours,
+  ];
+  return { count: members.length, attributes };
 }
 
-/** Positions in the world and in glTF's axes. */
-function placesOf({ positions, origin }: GaussianCloud, members: readonly number[]): Float32Array<ArrayBuffer> {
-  const out = new Float32Array(3 * members.length);
-  members.forEach((i, n) => {
-    out[3 * n] = -(positions[3 * i] + origin[0]);
-    out[3 * n + 1] = -(positions[3 * i + 1] + origin[1]);
-    out[3 * n + 2] = positions[3 * i + 2] + origin[2];
-  });
-  return out;
+/** Positions in the world and in glTF's axes, with the bounds that glTF asks for. */
+function placesOf({ positions, origin }: GaussianCloud, members: Uint32Array): Attribute {
+  const places = new Float32Array(3 * members.length);
+  const [min, max] = [new Array<number>(3).fill(Infinity), new Array<number>(3).fill(-Infinity)];
+  for (let n = 0; n < members.length; n++) {
+    for (let axis = 0; axis < 3; axis++) {
+      const place = Math.fround(PLACE_SIGNS[axis] * (positions[3 * members[n] + axis] + origin[axis]));
+      places[3 * n + axis] = place;
+      if (place < min[axis]) min[axis] = place;
+      if (place > max[axis]) max[axis] = place;
+    }
+  }
+  const put = (out: Numbers, first: number, end: number): void => out.set(places.subarray(3 * first, 3 * end));
+  return { name: 'POSITION', width: 3, bounds: { min, max }, put };
 }
 
 /** The product of (0, 0, 0, 1) and (w, x, y, z), in glTF's order (x, y, z, w). */
-function rotationsOf({ rotations }: GaussianCloud, members: readonly number[]): Int16Array<ArrayBuffer> {
-  const out = new Int16Array(4 * members.length);
-  members.forEach((i, n) => {
-    out[4 * n] = Math.round(-32_767 * rotations[4 * i + 2]);
-    out[4 * n + 1] = Math.round(32_767 * rotations[4 * i + 1]);
-    out[4 * n + 2] = Math.round(32_767 * rotations[4 * i]);
-    out[4 * n + 3] = Math.round(-32_767 * rotations[4 * i + 3]);
-  });
-  return out;
-}
-
-/** glTF asks for the bounds of positions. */
-function boundsOf(positions: Float32Array): object {
-  const [min, max] = [new Array<number>(3).fill(Infinity), new Array<number>(3).fill(-Infinity)];
-  for (let at = 0; at < positions.length; at += 3) {
-    for (let axis = 0; axis < 3; axis++) {
-      min[axis] = Math.min(min[axis], positions[at + axis]);
-      max[axis] = Math.max(max[axis], positions[at + axis]);
+function rotationsOf({ rotations }: GaussianCloud, members: Uint32Array): Attribute {
+  const put = (out: Numbers, first: number, end: number): void => {
+    for (let n = first; n < end; n++) {
+      const to = 4 * (n - first);
+      const from = 4 * members[n];
+      out[to] = Math.round(-32_767 * rotations[from + 2]);
+      out[to + 1] = Math.round(32_767 * rotations[from + 1]);
+      out[to + 2] = Math.round(32_767 * rotations[from]);
+      out[to + 3] = Math.round(-32_767 * rotations[from + 3]);
     }
-  }
-  return { min, max };
+  };
+  return { name: `${EXTENSION}:ROTATION`, width: 4, isShort: true, put };
 }
 
-function containerOf(json: object, { chunks, byteLength }: Assembly): Uint8Array<ArrayBuffer> {
+/** A GLB whose binary chunk is still empty, and the byte where that begins. */
+function containerOf(json: object, byteLength: number): { bytes: Uint8Array<ArrayBuffer>; start: number } {
   const text = new TextEncoder().encode(JSON.stringify(json));
   const textLength = text.length + (-text.length & 3);
   const bytes = new Uint8Array(28 + textLength + byteLength);
@@ -149,10 +193,5 @@ function containerOf(json: object, { chunks, byteLength }: Assembly): Uint8Array
   bytes.set(text, 20);
   // "BIN" and a zero.
   words(20 + textLength, byteLength, 0x004e4942);
-  let at = 28 + textLength;
-  for (const chunk of chunks) {
-    bytes.set(chunk, at);
-    at += chunk.length;
-  }
-  return bytes;
+  return { bytes, start: 28 + textLength };
 }

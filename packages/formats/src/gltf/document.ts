@@ -1,4 +1,4 @@
-import { grouped, hostIsLittleEndian } from '../bytes.js';
+import { alignedTo4, grouped, hostIsLittleEndian } from '../bytes.js';
 import { damaged } from '../damaged.js';
 import type { OpenPart } from '../scene-format.js';
 import { isObject, show } from '../json.js';
@@ -27,7 +27,7 @@ export interface AccessorData {
   readonly count: number;
   /** Numbers of one element. */
   readonly width: number;
-  /** [count, width], normalised where the accessor says so. */
+  /** [count, width], normalised where the accessor says so. Not to be changed: it may be the file's own memory. */
   readonly values: Float32Array;
 }
 
@@ -92,10 +92,9 @@ export class GltfDocument {
       throw damaged(`${this.name}, ${path}`, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/corrupt');
     }
     if (accessor.componentType === FLOAT && byteStride === 4 * width && hostIsLittleEndian) {
-      // Numbers that lie as they are wanted are copied at once. A view's beginning need not be a multiple of 4.
-      const values = new Float32Array(count * width);
-      new Uint8Array(values.buffer).set(bytes.subarray(byteOffset, byteOffset + values.byteLength));
-      return { count, width, values };
+      // Numbers that lie as they are wanted are the file's own. A view's beginning need not be a multiple of 4.
+      const own = alignedTo4(bytes.subarray(byteOffset, byteOffset + 4 * count * width));
+      return { count, width, values: new Float32Array(own.buffer, own.byteOffset, count * width) };
     }
     const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
     const values = new Float32Array(count * width);
@@ -104,7 +103,7 @@ export class GltfDocument {
       for (let k = 0; k < width; k++) values[i * width + k] = component.get(data, at + k * component.bytes);
     }
     // The lowest signed integer stands for -1 as well as the one above it.
-    if (accessor.normalized === true) values.forEach((value, i) => (values[i] = Math.max(-1, value / component.max)));
+    if (accessor.normalized === true) normalise(values, component.max);
     return { count, width, values };
   }
 
@@ -150,6 +149,10 @@ export class GltfDocument {
     }
     return this.fail(`buffers[${index}].uri`, 'base64', uri.slice(0, 40));
   }
+}
+
+function normalise(values: Float32Array, max: number): void {
+  for (let i = 0; i < values.length; i++) values[i] = Math.max(-1, values[i] / max);
 }
 
 function decodeSafely(uri: string): string {

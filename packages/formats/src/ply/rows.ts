@@ -1,5 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { alignedTo4, grouped, hostIsLittleEndian, viewOf } from '../bytes.js';
+import { grouped, hostIsLittleEndian, viewOf } from '../bytes.js';
 import type { SceneSource } from '../scene-format.js';
 import { AsciiCursor, BinaryCursor, scalarGetter, type ValueCursor } from './cursors.js';
 import { sizeOf, type PlyElement, type PlyHeader } from './header.js';
@@ -186,16 +186,50 @@ function canViewAsFloats(data: ElementData, targets: readonly ColumnTarget[]): b
 function readFloats(data: ElementData, targets: readonly ColumnTarget[]): void {
   const { source, element, start } = data;
   const rowBytes = data.rowBytes ?? 0;
-  const body = alignedTo4(source.bytes.subarray(start, start + element.count * rowBytes));
-  const floats = new Float32Array(body.buffer, body.byteOffset, body.length / 4);
-  const rowFloats = rowBytes / 4;
-  const columns = locateColumns(data, targets);
+  const parts = columnsByArray(data, targets);
+  // Rows of a file need not begin at multiples of 4.
+  const block = new Uint8Array(BLOCK_ROWS * rowBytes);
+  const floats = new Float32Array(block.buffer);
   for (let first = 0; first < element.count; first += BLOCK_ROWS) {
-    const last = Math.min(first + BLOCK_ROWS, element.count);
-    for (const { target, at } of columns) {
-      const { array, stride, offset } = target;
-      const from = at / 4;
-      for (let row = first; row < last; row++) array[row * stride + offset] = floats[row * rowFloats + from];
-    }
+    const rows = Math.min(BLOCK_ROWS, element.count - first);
+    const from = start + first * rowBytes;
+    block.set(source.bytes.subarray(from, from + rows * rowBytes));
+    for (const part of parts) copyColumns(floats, rowBytes / 4, rows, part, first);
+  }
+}
+
+/** Columns of rows of floats, and where they go in the rows of an array. */
+interface ArrayColumns {
+  readonly array: ColumnTarget['array'];
+  readonly stride: number;
+  readonly from: Int32Array;
+  readonly to: Int32Array;
+}
+
+/** Columns that go to the same array, together: row by row its numbers lie near one another. */
+function columnsByArray(data: ElementData, targets: readonly ColumnTarget[]): ArrayColumns[] {
+  const columns = locateColumns(data, targets).sort((a, b) => a.target.offset - b.target.offset);
+  return [...new Set(columns.map(({ target }) => target.array))].map((array) => {
+    const own = columns.filter(({ target }) => target.array === array);
+    return {
+      array,
+      stride: own[0].target.stride,
+      from: Int32Array.from(own, ({ at }) => at / 4),
+      to: Int32Array.from(own, ({ target }) => target.offset),
+    };
+  });
+}
+
+function copyColumns(
+  floats: Float32Array,
+  rowFloats: number,
+  rows: number,
+  { array, stride, from, to }: ArrayColumns,
+  first: number,
+): void {
+  for (let row = 0; row < rows; row++) {
+    const source = row * rowFloats;
+    const target = (first + row) * stride;
+    for (let k = 0; k < from.length; k++) array[target + to[k]] = floats[source + from[k]];
   }
 }

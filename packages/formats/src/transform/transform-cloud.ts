@@ -41,7 +41,9 @@ export function transformCloud(cloud: GaussianCloud, map: readonly number[]): vo
 
 function movePositions(positions: Float32Array, m: Matrix3, [tx, ty, tz]: readonly number[]): void {
   for (let i = 0; i < positions.length; i += 3) {
-    const [x, y, z] = [positions[i], positions[i + 1], positions[i + 2]];
+    const x = positions[i];
+    const y = positions[i + 1];
+    const z = positions[i + 2];
     positions[i] = m[0] * x + m[1] * y + m[2] * z + tx;
     positions[i + 1] = m[3] * x + m[4] * y + m[5] * z + ty;
     positions[i + 2] = m[6] * x + m[7] * y + m[8] * z + tz;
@@ -53,13 +55,16 @@ function turnShapes({ count, scales, rotations }: GaussianCloud, turn: Matrix3, 
   const sign = Math.sign(determinant(turn));
   const [w, x, y, z] = quaternionOfMatrix(turn.map((value) => sign * value));
   for (let i = 0; i < count; i++) {
-    const [a, b, c, d] = [rotations[4 * i], rotations[4 * i + 1], rotations[4 * i + 2], rotations[4 * i + 3]];
+    const a = rotations[4 * i];
+    const b = rotations[4 * i + 1];
+    const c = rotations[4 * i + 2];
+    const d = rotations[4 * i + 3];
     rotations[4 * i] = w * a - x * b - y * c - z * d;
     rotations[4 * i + 1] = w * b + x * a + y * d - z * c;
     rotations[4 * i + 2] = w * c - x * d + y * a + z * b;
     rotations[4 * i + 3] = w * d + x * c - y * b + z * a;
   }
-  for (let k = 0; k < scales.length; k++) scales[k] *= scale;
+  if (scale !== 1) for (let k = 0; k < scales.length; k++) scales[k] *= scale;
 }
 
 /** Covariances M·Σ·Mᵀ, taken apart into rotation and scales again. */
@@ -77,27 +82,49 @@ function deformShapes({ count, scales, rotations }: GaussianCloud, m: Matrix3): 
   }
 }
 
-function turnHarmonics({ count, sh, shDegree }: GaussianCloud, turn: Matrix3): void {
+function turnHarmonics(cloud: GaussianCloud, turn: Matrix3): void {
+  const bands = ([1, 2, 3] as const).filter((band) => band <= cloud.shDegree);
+  const rotations = bands.map((band) => shRotation(band, turn));
+  const signs = rotations.map((matrix, k) => signsOf(matrix, 2 * bands[k] + 1));
+  if (signs.every((band) => band !== undefined)) return flipHarmonics(cloud, [1, ...signs.flat()]);
+  bands.forEach((band, k) => turnBand(cloud, band, rotations[k]));
+}
+
+/** The diagonal of a rotation of harmonics that does no more than change signs, as half turns do. */
+function signsOf(matrix: Float64Array, size: number): number[] | undefined {
+  const diagonal = Array.from({ length: size }, (_, k) => Math.sign(matrix[k * size + k]));
+  const isDiagonal = matrix.every((value, at) => {
+    const [row, column] = [Math.floor(at / size), at % size];
+    return Math.abs(value - (row === column ? diagonal[row] : 0)) <= NEGLIGIBLE;
+  });
+  return isDiagonal ? diagonal : undefined;
+}
+
+function flipHarmonics({ count, sh }: GaussianCloud, signs: readonly number[]): void {
+  const factors = Float32Array.from({ length: 3 * signs.length }, (_, k) => signs[Math.floor(k / 3)]);
+  for (let i = 0, at = 0; i < count; i++) {
+    for (let k = 0; k < factors.length; k++, at++) sh[at] *= factors[k];
+  }
+}
+
+function turnBand({ count, sh, shDegree }: GaussianCloud, band: number, matrix: Float64Array): void {
   const stride = 3 * shCoefficientCount(shDegree);
   const old = new Float64Array(21);
-  for (let band = 1; band <= shDegree; band++) {
-    const matrix = shRotation(band as 1 | 2 | 3, turn);
-    const size = 2 * band + 1;
-    // Between files' axes it is half turns and quarter turns, which leave a number a row.
-    const terms = Array.from({ length: size }, (_, row) =>
-      Array.from({ length: size }, (_, k) => ({ k, factor: matrix[row * size + k] })).filter(
-        ({ factor }) => Math.abs(factor) > NEGLIGIBLE,
-      ),
-    );
-    for (let i = 0; i < count; i++) {
-      const at = i * stride + 3 * band * band;
-      for (let k = 0; k < 3 * size; k++) old[k] = sh[at + k];
-      for (let row = 0; row < size; row++) {
-        for (let channel = 0; channel < 3; channel++) {
-          let sum = 0;
-          for (const { k, factor } of terms[row]) sum += factor * old[3 * k + channel];
-          sh[at + 3 * row + channel] = sum;
-        }
+  const size = 2 * band + 1;
+  // Quarter turns between files' axes leave a number or two a row.
+  const terms = Array.from({ length: size }, (_, row) =>
+    Array.from({ length: size }, (_, k) => ({ k, factor: matrix[row * size + k] })).filter(
+      ({ factor }) => Math.abs(factor) > NEGLIGIBLE,
+    ),
+  );
+  for (let i = 0; i < count; i++) {
+    const at = i * stride + 3 * band * band;
+    for (let k = 0; k < 3 * size; k++) old[k] = sh[at + k];
+    for (let row = 0; row < size; row++) {
+      for (let channel = 0; channel < 3; channel++) {
+        let sum = 0;
+        for (const { k, factor } of terms[row]) sum += factor * old[3 * k + channel];
+        sh[at + 3 * row + channel] = sum;
       }
     }
   }

@@ -1,0 +1,89 @@
+import { shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
+import { BUFFER_USAGE, GpuMemory, rareKernelOf, writeStruct } from '@gaussian-splat/renderer/stages';
+import { economiseTake, SCORE_GROUP } from '../generated/shaders.js';
+import type { ReducedCloud } from '../reduce.js';
+import { layouts } from './layouts.js';
+import { readBack, type ReadPart } from './read-back.js';
+import type { ScenePart, SceneParts } from './scene-parts.js';
+
+/** Splats of a part that keep the same degree, which is below the scene's. */
+interface LoweredSplats {
+  readonly part: ScenePart;
+  readonly degree: ShDegree;
+  /** Their places in the reduced cloud. */
+  readonly places: Uint32Array;
+}
+
+/**
+ * Puts the coefficients of the splats that keep a lower degree in their places. No more comes back from the GPU than these.
+ * @param kept numbers in the scene of the reduced cloud's splats
+ */
+export async function putLowered(
+  device: GPUDevice,
+  { gaussians: { shDegree }, parts }: SceneParts,
+  { cloud, degrees }: ReducedCloud,
+  kept: Uint32Array,
+): Promise<void> {
+  const lists = parts.flatMap((part) => loweredSplatsOf(part, shDegree, kept, degrees));
+  const memory = new GpuMemory(device);
+  try {
+    const taken = lists.map((list) => take(device, memory, shDegree, list, kept));
+    const rows = await readBack(device, taken);
+    lists.forEach(({ degree, places }, k) => {
+      const width = 3 * shCoefficientCount(degree);
+      putRows(new Float32Array(rows[k]), width, places, cloud.sh, 3 * shCoefficientCount(cloud.shDegree));
+    });
+  } finally {
+    memory.destroy();
+  }
+}
+
+/** The splats of a part, by degree; degrees that none of them keeps are left out. */
+function loweredSplatsOf(part: ScenePart, shDegree: ShDegree, kept: Uint32Array, degrees: Uint8Array): LoweredSplats[] {
+  const end = part.first + part.page.count;
+  const places = Array.from({ length: shDegree }, () => new Uint32Array(kept.length));
+  const counts = new Uint32Array(shDegree);
+  for (let k = 0; k < kept.length; k++) {
+    const degree = degrees[k];
+    if (degree < shDegree && kept[k] >= part.first && kept[k] < end) places[degree][counts[degree]++] = k;
+  }
+  return places
+    .map((own, degree) => ({ part, degree: degree as ShDegree, places: own.subarray(0, counts[degree]) }))
+    .filter((list) => list.places.length > 0);
+}
+
+/** Has the coefficients of some splats put one after another. */
+function take(
+  device: GPUDevice,
+  memory: GpuMemory,
+  sh_degree: ShDegree,
+  { part, degree, places }: LoweredSplats,
+  kept: Uint32Array,
+): ReadPart {
+  const { uniform, storage, copySource } = BUFFER_USAGE;
+  const splats = places.map((k) => kept[k] - part.first);
+  const width = 3 * shCoefficientCount(degree);
+  const count = width * splats.length;
+  const counts = new ArrayBuffer(layouts.Take.size);
+  writeStruct(layouts.Take, { count, width, sh_degree, degree }, counts);
+  const taken = memory.buffer('gs.economise.taken', 4 * count, storage | copySource);
+  const kernel = rareKernelOf(device, economiseTake);
+  const bindings = kernel.bind({
+    take: memory.buffer('gs.economise.take', counts.byteLength, uniform, new Uint32Array(counts)),
+    splats: memory.buffer('gs.economise.splats', splats.byteLength, storage, splats),
+    ...{ lowered: part.lowered, taken },
+  });
+  const encoder = device.createCommandEncoder({ label: 'gs.economise.take' });
+  const pass = encoder.beginComputePass({ label: 'gs.economise.take' });
+  kernel.dispatch(pass, bindings, Math.ceil(count / SCORE_GROUP));
+  pass.end();
+  device.queue.submit([encoder.finish()]);
+  return { buffer: taken, byteLength: 4 * count };
+}
+
+/** Copies rows of `width` numbers to the beginnings of longer ones, at their places. */
+function putRows(rows: Float32Array, width: number, places: Uint32Array, out: Float32Array, length: number): void {
+  for (let n = 0; n < places.length; n++) {
+    for (let k = 0; k < width; k++) out[length * places[n] + k] = rows[width * n + k];
+  }
+}

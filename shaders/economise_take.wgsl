@@ -1,0 +1,26 @@
+// Takes the coefficients of a lower degree of some splats of a part, one after another: those that were found for all degrees take as much as the scene does.
+#import shared/group
+#import shared/score
+
+struct Take {
+  // Numbers that are taken, all splats together, and of each splat.
+  count: u32,
+  width: u32,
+  sh_degree: u32,
+  degree: u32,
+}
+
+@group(0) @binding(0) var<uniform> take: Take;
+// Numbers of the splats within the part.
+@group(0) @binding(1) var<storage, read> splats: array<u32>;
+// See economise_lower.
+@group(0) @binding(2) var<storage, read> lowered: array<f32>;
+@group(0) @binding(3) var<storage, read_write> taken: array<f32>;
+
+@compute @workgroup_size(SCORE_GROUP)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let n = group_index(workgroup_id) * SCORE_GROUP + lane;
+  if (n >= take.count) { return; }
+  let record = splats[n / take.width] * lowered_numbers(take.sh_degree, take.sh_degree);
+  taken[n] = lowered[record + lowered_numbers(take.sh_degree, take.degree) + n % take.width];
+}
