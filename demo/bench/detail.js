@@ -253,7 +253,7 @@ function psnr(a, b) {
 
 /** Views at rest: the picture within the budget against one of a quarter of the error and no budget. */
 async function compare(all, views) {
-  for (const share of [0.1, 0.3, 0.5]) {
+  for (const share of [0.1, 0.3, 0.5, 0.9]) {
     if (progress.left === 0) throw new Error('the time was up');
     const camera = cameraAt(share, all.manifest.bounds);
     progress.begin(`the view at ${share} of the flight`);

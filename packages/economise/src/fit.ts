@@ -7,7 +7,7 @@ import type { Ranking } from './score.js';
 import { bestTrades, measureTrades, type TradeCurve } from './search.js';
 
 /** Shares of the splats whose absence is measured, the least missed first. */
-const DROPPED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5];
+const DROPPED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /** The share at which two scores are held against one another. */
 const TRIAL_SHARE = 0.06;
 /** Prices of a coefficient that are measured. */

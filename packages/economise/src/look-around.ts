@@ -1,8 +1,19 @@
-import { add, DEFAULT_FAR, lookAt, scale, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { add, DEFAULT_FAR, GaussianSplatError, lookAt, scale, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { Renderer, SIDES, SidedGaussians, type HeldScene, type Surroundings } from '@gaussian-splat/renderer';
-import { BUFFER_USAGE, GpuMemory, rareKernelOf, TEXTURE_USAGE, writeStruct } from '@gaussian-splat/renderer/stages';
+import {
+  BUFFER_USAGE,
+  cameraValues,
+  GpuMemory,
+  layouts as rendererLayouts,
+  rareKernelOf,
+  TEXTURE_USAGE,
+  writeStruct,
+} from '@gaussian-splat/renderer/stages';
 import { noteSides, SIDE_GROUP, Side as layout } from './generated/shaders.js';
+import { NO_VIEW } from './gpu/no-view.js';
 import { readBack } from './gpu/read-back.js';
+
+const { View: viewLayout } = rendererLayouts;
 
 /** Distances from the middle that a side is looked at from, in radii of the scene, and the tangent of half the angle that the square picture shows. */
 const LOOKS = [
@@ -14,7 +25,7 @@ const FARTHEST = LOOKS[LOOKS.length - 1];
 const LEAST_WEIGHT = 0.5 / 255;
 /** Smaller scenes have larger splats, which are seen as well in smaller pictures: pixels for each splat, and sides of a picture. */
 const PIXELS_OF_SPLAT = 4;
-const [LEAST_SIZE, LARGEST_SIZE] = [96, 640];
+const [LEAST_SIZE, LARGEST_SIZE] = [96, 1024];
 /** Rounds in which sides are looked at again whose pictures had no room for all that they should show. */
 const MOST_ROUNDS = 4;
 /** Pictures between two turns of others. */
@@ -25,7 +36,7 @@ const FLOAT_BYTES = 4;
 
 export interface LookAroundOptions {
   readonly signal?: AbortSignal;
-  /** Pixels of each side of the square pictures; default 96 to 640, by the number of splats. */
+  /** Pixels of each side of the square pictures; default 96 to 1,024, by the number of splats. */
   readonly size?: number;
   /** Bytes of GPU memory that the sets may take; default no limit but the device's. */
   readonly memoryBudget?: number;
@@ -74,7 +85,12 @@ class Onlooker {
   /** Of each picture: what tells whether it had room for all. */
   readonly #counts: GPUBuffer;
   /** Bind groups of each page, and what is written before they are used. */
-  readonly #pages: readonly { readonly count: number; readonly side: GPUBuffer; readonly bindings: GPUBindGroup }[];
+  readonly #pages: readonly {
+    readonly count: number;
+    readonly view: GPUBuffer;
+    readonly side: GPUBuffer;
+    readonly bindings: GPUBindGroup;
+  }[];
 
   constructor(device: GPUDevice, sided: SidedGaussians, size: number) {
     this.#device = device;
@@ -89,11 +105,12 @@ class Onlooker {
     this.#counts = this.#memory.buffer('gs.economise.counts', counts, copySource | copyDestination);
     let offset = 0;
     this.#pages = sided.pages.map(({ count, geometry, seenFrom }) => {
+      const view = this.#memory.buffer('gs.economise.view', viewLayout.size, uniform | copyDestination);
       const side = this.#memory.buffer('gs.economise.side', layout.size, uniform | copyDestination);
       const weights = { buffer: this.#weights, offset, size: weightBytes(count) };
       offset += weightBytes(count);
-      const resources = { side, gaussians: geometry, weights, seen_from: seenFrom };
-      return { count, side, bindings: rareKernelOf(device, noteSides).bind(resources) };
+      const resources = { view, side, gaussians: geometry, weights, seen_from: seenFrom };
+      return { count, view, side, bindings: rareKernelOf(device, noteSides).bind(resources) };
     });
     const usage = TEXTURE_USAGE.renderAttachment;
     this.#target = device.createTexture({ size: [size, size], format: 'rgba16float', usage });
@@ -109,10 +126,9 @@ class Onlooker {
       }
       due = await this.#lacking(due);
     }
-    // What was not painted for want of room may show from there.
-    for (const side of due) this.#note(side, 0);
     await this.#device.queue.onSubmittedWorkDone();
     signal?.throwIfAborted();
+    if (due.length > 0) throw lacking(due.length);
   }
 
   destroy(): void {
@@ -126,25 +142,24 @@ class Onlooker {
       const camera = cameraOf(SIDES[side], look, this.#sided.around, this.#size);
       const notes = { contributions: this.#weights };
       this.#renderer.render({ gaussians: this.#sided, camera, target: this.#target, notes });
+      this.#note(side, camera, look === FARTHEST);
       const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.counts' });
       this.#renderer.copyCounts(encoder, this.#counts, COUNTS_BYTES * (LOOKS.length * side + k));
       this.#device.queue.submit([encoder.finish()]);
     });
-    this.#note(side, LEAST_WEIGHT);
   }
 
-  /** Adds the side to the sets of what had enough weight. */
-  #note(side: number, leastWeight: number): void {
-    const { center, radius } = this.#sided.around;
-    const eye = subtract(add(center, scale(SIDES[side], FARTHEST.distance * radius)), this.#sided.origin);
-    const values = {
-      ...{ eye, forward: scale(SIDES[side], -1), tangent: FARTHEST.tangent },
-      ...{ bit: (1 << (side & 31)) >>> 0, word: side >>> 5, least_weight: leastWeight },
-    };
-    const bytes = new ArrayBuffer(layout.size);
-    for (const { count, side: uniform } of this.#pages) {
-      writeStruct(layout, { ...values, splat_count: count }, bytes);
-      this.#device.queue.writeBuffer(uniform, 0, bytes);
+  /** Adds the side to the sets of what the picture that was drawn last shows. */
+  #note(side: number, camera: Camera, isWidest: boolean): void {
+    const { origin, antialiased } = this.#sided;
+    const view = { ...NO_VIEW, ...cameraValues(camera, origin), antialiased: +antialiased };
+    const own = { bit: (1 << (side & 31)) >>> 0, word: side >>> 5, least_weight: LEAST_WEIGHT, is_widest: +isWidest };
+    const bytes = new ArrayBuffer(Math.max(viewLayout.size, layout.size));
+    for (const { count, view: viewBuffer, side: sideBuffer } of this.#pages) {
+      writeStruct(viewLayout, { ...view, splat_count: count }, bytes);
+      this.#device.queue.writeBuffer(viewBuffer, 0, bytes, 0, viewLayout.size);
+      writeStruct(layout, own, bytes);
+      this.#device.queue.writeBuffer(sideBuffer, 0, bytes, 0, layout.size);
     }
     const kernel = rareKernelOf(this.#device, noteSides);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.economise.sides' });
@@ -164,6 +179,15 @@ class Onlooker {
       }).includes(false);
     return sides.filter((side) => !hadRoom(side));
   }
+}
+
+function lacking(sides: number): GaussianSplatError {
+  return new GaussianSplatError('out-of-memory/buffer-limit', {
+    where: 'visible sets',
+    expected: 'room for all that each picture of the scene shows',
+    found: `${sides} of ${SIDES.length} sides whose pictures lacked some of it, after ${MOST_ROUNDS} rounds`,
+    remedy: 'make visible sets of a smaller scene',
+  });
 }
 
 /** Weights of whole chunks, as the renderer counts slots. */

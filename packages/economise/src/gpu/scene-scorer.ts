@@ -15,6 +15,7 @@ import { PRIOR_VIEWS } from '../colour-moments.js';
 import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
 import { MIN_LOOKS, UNSEEN_CONTRAST } from '../score.js';
 import { layouts } from './layouts.js';
+import { NO_VIEW } from './no-view.js';
 import { readBack } from './read-back.js';
 import type { SceneParts } from './scene-parts.js';
 
@@ -236,10 +237,3 @@ function eyesOf(views: readonly Camera[], { gaussians }: SceneParts): Uint32Arra
   ]);
   return new Uint32Array(Float32Array.from(places).buffer);
 }
-
-/** What the score shader does not ask of a `View`. */
-const NO_VIEW = {
-  ...{ page: 0, first_group: 0, sh_degree: 0, sh_cap: 0, sh_encoding: 0, key_bits: 0, is_ordered: 0 },
-  ...{ occlusion_tiles: [0, 0], has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },
-  ...{ alpha_min: 0, min_contribution: 0, sides: [0, 0, 0, 0] },
-};
