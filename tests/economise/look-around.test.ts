@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { boundsOf, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { cpuScorer, decibels, lookAround, meanSquare } from '@gaussian-splat/economise';
+import { cpuScorer, decibels, lookAround, meanSquare, visibleSetsDecibels } from '@gaussian-splat/economise';
 import {
   capture,
   GaussianBuffers,
@@ -170,6 +170,9 @@ test('frames from the sets leave out what is hidden, and keep 55 dB; without the
     assert.ok(found > 55, `${found} dB`);
     assert.ok(visible >= showing && visible < 0.7 * all, `${visible} of ${all} for ${showing}`);
   }
+  const figure = await visibleSetsDecibels(device, sided, boundsOf(cloud), { viewSize: { width: 96, height: 54 } });
+  console.log(`${figure.toFixed(1)} dB in views of its own`);
+  assert.ok(figure > 55, `${figure} dB`);
   // From within all are drawn.
   const inside = cameraAt([0.2, 0, 0], [0, 0, 5], { width: 96, height: 64 });
   const expected = await capture(device, exact, { gaussians: both, camera: inside });

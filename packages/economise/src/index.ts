@@ -3,7 +3,7 @@ export { cpuPainter, cpuScorer } from './cpu-raster.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
 export type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
 export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
-export { lookAround, type LookAroundOptions } from './look-around.js';
+export { lookAround, visibleSetsDecibels, type LookAroundOptions } from './look-around.js';
 export { LiveMask, heaviest, type LiveMaskOptions, type MaskedScene, type ViewSize } from './live-mask.js';
 export {
   contributionOfShare,

@@ -36,7 +36,7 @@ const PIXELS_OF_SPLAT = 16;
 const LEAST_SCALE = 0.25;
 
 /** Pixels of the views that so many splats are looked at in. */
-function viewSizeOf(count: number): ViewSize {
+export function viewSizeOf(count: number): ViewSize {
   const { width, height } = LARGEST_VIEW;
   const scale = Math.min(1, Math.max(LEAST_SCALE, Math.sqrt((PIXELS_OF_SPLAT * count) / (width * height))));
   return { width: Math.round(scale * width), height: Math.round(scale * height) };

@@ -1,4 +1,13 @@
-import { add, DEFAULT_FAR, GaussianSplatError, lookAt, scale, type Camera, type Vector3 } from '@gaussian-splat/core';
+import {
+  add,
+  DEFAULT_FAR,
+  GaussianSplatError,
+  lookAt,
+  scale,
+  type Bounds,
+  type Camera,
+  type Vector3,
+} from '@gaussian-splat/core';
 import { Renderer, SIDES, SidedGaussians, type HeldScene, type Surroundings } from '@gaussian-splat/renderer';
 import {
   BUFFER_USAGE,
@@ -11,7 +20,11 @@ import {
 } from '@gaussian-splat/renderer/stages';
 import { noteSides, SIDE_GROUP, Side as layout } from './generated/shaders.js';
 import { NO_VIEW } from './gpu/no-view.js';
+import { PictureErrors } from './gpu/picture-errors.js';
 import { readBack } from './gpu/read-back.js';
+import { decibels, mean } from './measure.js';
+import { viewsAround } from './views.js';
+import { viewSizeOf, type ViewSize } from './live-mask.js';
 
 const { View: viewLayout } = rendererLayouts;
 
@@ -65,6 +78,38 @@ export async function lookAround<S extends HeldScene>(
     throw error;
   } finally {
     onlooker.destroy();
+  }
+}
+
+/** Views that a figure is measured in: not those that a scene was looked at from. */
+const HELD_OUT = 6;
+const HELD_OUT_SEED = 3;
+
+/**
+ * How far pictures from the visible sets are from those of the whole scene, dB over the pixels that the whole covers, in views around it. Scenes of many subjects far apart
+ * hide one thing behind another otherwise from nearby than from farther away: there the figure is low.
+ */
+export async function visibleSetsDecibels(
+  device: GPUDevice,
+  sided: SidedGaussians,
+  bounds: Bounds,
+  { signal, viewSize = viewSizeOf(sided.count) }: { readonly signal?: AbortSignal; readonly viewSize?: ViewSize } = {},
+): Promise<number> {
+  const pause = async (): Promise<void> => {
+    await device.queue.onSubmittedWorkDone();
+    signal?.throwIfAborted();
+  };
+  const renderer = new Renderer(device, { visibleSets: true });
+  const views = viewsAround(bounds, HELD_OUT, { ...viewSize, seed: HELD_OUT_SEED });
+  try {
+    const errors = await PictureErrors.of(device, renderer, sided.whole, views, pause);
+    try {
+      return decibels(mean(await errors.measure(sided, pause)));
+    } finally {
+      errors.destroy();
+    }
+  } finally {
+    renderer.destroy();
   }
 }
 

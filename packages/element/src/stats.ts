@@ -13,7 +13,7 @@ export interface SceneStats {
   readonly dropped: number;
   /** Of these, left out of all pictures because the attribute `economy` asks for it. */
   readonly spared: number;
-  /** dB to the whole scene in views around it that had no say; null unless `economy` asks for a figure. */
+  /** dB to the whole scene in views around it that had no say; null unless `economy` asks for a figure or for `views`. */
   readonly decibels: number | null;
   /** Splats on the GPU, those of levels of detail included. */
   readonly inMemory: number;
@@ -95,10 +95,12 @@ function whySpared({ spared, decibels }: EconomyReport): string[] {
   return [`${spared} splats that contribute least to views around the scene are left out${figure}.`];
 }
 
-function whyByView({ byView }: EconomyReport): string[] {
-  return byView
-    ? ['Pictures that are drawn with less than the whole leave out splats that do not show from their side.']
-    : [];
+function whyByView({ byView, decibels }: EconomyReport): string[] {
+  if (!byView) return [];
+  const figure = decibels === null ? '' : `: ${decibels.toFixed(1)} dB to the whole scene`;
+  return [
+    `Pictures that are drawn with less than the whole leave out splats that do not show from their side${figure}.`,
+  ];
 }
 
 function whyDetail({ splats, pixels }: SceneStats['detail']): string[] {

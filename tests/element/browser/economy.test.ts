@@ -55,8 +55,9 @@ describe('economy', () => {
       'sets',
       100_000,
     );
-    const { spared, modelled, inMemory, bytes } = element.stats!;
+    const { spared, modelled, inMemory, bytes, decibels } = element.stats!;
     assertEqual([spared, modelled, inMemory], [0, 600, 600], 'spared, modelled, in memory');
+    assert(decibels !== null && decibels > 55, `${decibels} dB`);
     assert(bytes.scene >= before + 16 * 600, `sets take ${bytes.scene - before} bytes`);
     assertEqual(await bytesOf(element), whole, 'the whole picture');
     const all = (await element.updateStats())!.drawn!;

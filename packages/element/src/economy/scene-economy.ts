@@ -1,5 +1,12 @@
 /** Loaded only where a page asks for economy. */
-import { LiveMask, lookAround, parseEconomyGoal, type EconomyGoal, type MaskGoal } from '@gaussian-splat/economise';
+import {
+  LiveMask,
+  lookAround,
+  parseEconomyGoal,
+  visibleSetsDecibels,
+  type EconomyGoal,
+  type MaskGoal,
+} from '@gaussian-splat/economise';
 import { GaussianBuffers, type SidedGaussians } from '@gaussian-splat/renderer';
 import type { EconomyReport } from '../controllers/economy-controller.js';
 import type { GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
@@ -18,6 +25,7 @@ export class SceneEconomy {
   #isMasked = false;
   /** What is on show, while each view leaves out what does not show from its side. */
   #sided: SidedGaussians<OwnedGaussians> | undefined;
+  #byView = WHOLE;
 
   constructor(scene: GpuScene) {
     this.#scene = scene;
@@ -40,15 +48,22 @@ export class SceneEconomy {
   async #showByView(memoryBudget: number | undefined, signal: AbortSignal): Promise<EconomyReport> {
     const { device, bounds } = this.#scene;
     await this.#showWhole(memoryBudget, signal);
-    if (this.#sided) return BY_VIEW;
+    if (this.#sided) return this.#byView;
     const { gaussians } = this.#scene;
     const left = memoryBudget === undefined ? undefined : memoryBudget - gaussians.byteLength;
     const sided = await lookAround(device, gaussians, bounds, { signal, memoryBudget: left });
-    if (signal.aborted) sided.release();
-    signal.throwIfAborted();
-    this.#scene.replaceGaussians(sided, 'kept');
-    this.#sided = sided;
-    return BY_VIEW;
+    try {
+      const decibels = await visibleSetsDecibels(device, sided, bounds, { signal });
+      if (decibels < LEAST_DECIBELS) throw new Error(tooFar(decibels));
+      signal.throwIfAborted();
+      this.#scene.replaceGaussians(sided, 'kept');
+      this.#sided = sided;
+      this.#byView = { spared: 0, decibels, byView: true };
+    } catch (error) {
+      sided.release();
+      throw error;
+    }
+    return this.#byView;
   }
 
   #forgetSides(): void {
@@ -96,4 +111,8 @@ export class SceneEconomy {
 }
 
 const WHOLE: EconomyReport = { spared: 0, decibels: null, byView: false };
-const BY_VIEW: EconomyReport = { spared: 0, decibels: null, byView: true };
+/** What `balanced`, the best quality that leaves out what does not show, is held to. */
+const LEAST_DECIBELS = 42;
+
+const tooFar = (decibels: number): string =>
+  `views around the scene hide so much of it from one another that leaving it out would keep ${decibels.toFixed(1)} dB, fewer than ${LEAST_DECIBELS}`;
