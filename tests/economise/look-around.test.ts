@@ -224,6 +224,9 @@ test('sets are reserved before they are allocated, given back, and given up with
   assert.equal(ledger.bytes - before, sided.setBytes);
   // 16 bytes a splat, in whole chunks.
   assert.equal(sided.setBytes, 16 * 256 * Math.ceil(cloud.count / 256));
+  // Nobody has looked yet: nothing shows from anywhere, and the figure says so.
+  const figure = await visibleSetsDecibels(device, sided, boundsOf(cloud), { viewSize: { width: 48, height: 32 } });
+  assert.ok(figure < 20, `${figure} dB of a scene without any splat`);
   sided.release();
   assert.equal(ledger.bytes, before);
   await assert.rejects(

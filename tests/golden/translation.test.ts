@@ -52,32 +52,38 @@ for (const make of [room, offCentre]) {
   }
 }
 
-/** Labels of the sorting passes of frames with the given turns, in radians. */
-async function sortingPasses(options: RendererOptions, angles: readonly number[]): Promise<string[]> {
+/** Labels of the sorting passes of frames with the given turns, in radians, and bytes that the renderer holds after each. */
+async function sortingPasses(
+  options: RendererOptions,
+  angles: readonly number[],
+): Promise<{ labels: string[]; bytes: number[] }> {
   const device = await nodeDevice();
   const { cloud, cameras } = offCentre();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const renderer = new Renderer(device, options);
   const labels: string[] = [];
+  const bytes: number[] = [];
   for (const angle of angles) {
     const passes = notePasses(device);
     await capture(device, renderer, { gaussians, camera: moved(cameras[0], [0, 0, 0], angle) });
     passes.stop();
     labels.push(passes.labels.find((label) => label === 'gs.sort' || label === 'gs.order') ?? '');
+    bytes.push(renderer.byteLength);
   }
   renderer.destroy();
   gaussians.destroy();
-  return labels;
+  return { labels, bytes };
 }
 
 test('a turning camera sorts what is visible; the first frame at rest orders everything once', async () => {
-  const labels = await sortingPasses({}, [0, 0.1, 0.2, 0.2, 0.2]);
+  const { labels } = await sortingPasses({}, [0, 0.1, 0.2, 0.2, 0.2]);
   assert.deepEqual(labels, ['gs.order', 'gs.sort', 'gs.sort', 'gs.order', '']);
 });
 
-test('sortAngle lets a camera turn that far before it sorts again', async () => {
-  const labels = await sortingPasses({ sortAngle: 0.05 }, [0, 0.02, 0.04, 0.06, 0.08, 0.12]);
+test('sortAngle lets a camera turn that far before it sorts again, and takes the memory for it once', async () => {
+  const { labels, bytes } = await sortingPasses({ sortAngle: 0.05 }, [0, 0.02, 0.04, 0.06, 0.08, 0.12]);
   assert.deepEqual(labels, ['gs.order', '', '', 'gs.order', '', 'gs.order']);
+  assert.deepEqual(new Set(bytes).size, 1, `${bytes.join()} bytes`);
 });
 
 test('several scenes keep their common order while the camera moves', async () => {

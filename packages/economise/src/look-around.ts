@@ -22,9 +22,9 @@ import { noteSides, SIDE_GROUP, Side as layout } from './generated/shaders.js';
 import { NO_VIEW } from './gpu/no-view.js';
 import { PictureErrors } from './gpu/picture-errors.js';
 import { readBack } from './gpu/read-back.js';
+import { viewSizeOf, type ViewSize } from './live-mask.js';
 import { decibels, mean } from './measure.js';
 import { viewsAround } from './views.js';
-import { viewSizeOf, type ViewSize } from './live-mask.js';
 
 const { View: viewLayout } = rendererLayouts;
 
@@ -34,7 +34,7 @@ const LOOKS = [
   { distance: 2.6, tangent: 0.7 },
 ] as const;
 const FARTHEST = LOOKS[LOOKS.length - 1];
-/** Alpha times transmittance, in some pixel, from which on a splat shows: measured, see the README. */
+/** Alpha times transmittance, in some pixel, from which on a splat shows: measured, see docs/decisions/0017. */
 const LEAST_WEIGHT = 0.5 / 255;
 /** Smaller scenes have larger splats, which are seen as well in smaller pictures: pixels for each splat, and sides of a picture. */
 const PIXELS_OF_SPLAT = 4;
@@ -43,6 +43,9 @@ const [LEAST_SIZE, LARGEST_SIZE] = [96, 1024];
 const MOST_ROUNDS = 4;
 /** Pictures between two turns of others. */
 const PICTURES_AT_ONCE = 4;
+/** Views that a figure is measured in: not those that a scene was looked at from. */
+const HELD_OUT = 6;
+const HELD_OUT_SEED = 3;
 const COUNTS_BYTES = 16;
 const CHUNK = 256;
 const FLOAT_BYTES = 4;
@@ -80,10 +83,6 @@ export async function lookAround<S extends HeldScene>(
     onlooker.destroy();
   }
 }
-
-/** Views that a figure is measured in: not those that a scene was looked at from. */
-const HELD_OUT = 6;
-const HELD_OUT_SEED = 3;
 
 /**
  * How far pictures from the visible sets are from those of the whole scene, dB over the pixels that the whole covers, in views around it. Scenes of many subjects far apart

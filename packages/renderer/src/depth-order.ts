@@ -10,6 +10,15 @@ import { SortStage, type SortName } from './stages/sort.js';
 const KEY_BITS = 32;
 const { SORT_BLOCK, DIGITS, CULL_GROUP } = constants;
 
+/** What a sort needs besides the order that it makes. */
+interface Working {
+  readonly memory: GpuMemory;
+  readonly plan: GPUBuffer;
+  /** Of each page. */
+  readonly keys: readonly GPUBindGroup[];
+  readonly sort: ReturnType<SortStage['bind']>;
+}
+
 /**
  * All splats of a page table from near to far. Depth along the camera's axis changes by the same amount for all splats when the
  * camera moves without turning, so the order stays right: such frames only thin it to the visible splats.
@@ -29,7 +38,7 @@ export class DepthOrder {
   /** Of the content that was ordered. */
   #version = 0;
   /** Needed while sorting only. */
-  #working: GpuMemory | undefined;
+  #working: Working | undefined;
 
   constructor(device: GPUDevice, table: PageTable, sort: SortName) {
     this.#device = device;
@@ -52,7 +61,7 @@ export class DepthOrder {
   }
 
   get byteLength(): number {
-    return this.#memory.byteLength + (this.#working?.byteLength ?? 0);
+    return this.#memory.byteLength + (this.#working?.memory.byteLength ?? 0);
   }
 
   /** True if the order serves the content at hand and a camera, whose axis may have turned by an angle in radians. */
@@ -61,33 +70,14 @@ export class DepthOrder {
     return this.#axis !== undefined && angleBetween(this.#axis, axisOf(camera)) <= angle;
   }
 
-  /** Records the sorting of all splats for the camera that the table looks through. Call {@link settle} after submitting. */
+  /** Records the sorting of all splats for the camera that the table looks through. Call {@link settle} after submitting, unless there will be more to sort. */
   record(encoder: GPUCommandEncoder, camera: Camera, timer?: FrameTimer): void {
-    const { storage, copyDestination, indirect } = BUFFER_USAGE;
-    const memory = (this.#working ??= new GpuMemory(this.#device));
-    const buffer = (name: string, bytes: number): GPUBuffer =>
-      memory.buffer(`gs.order.${name}`, bytes, storage | copyDestination | indirect);
-    this.#order ??= this.#memory.buffer('gs.order', 4 * this.length, storage);
-    const blocks = Math.ceil(this.length / SORT_BLOCK);
-    const keys = [buffer('keys_a', 4 * this.length), buffer('keys_b', 4 * this.length)] as const;
-    const plan = buffer('plan', layouts.Plan.size + layouts.PagePlan.size);
-    this.#writePlan(plan, blocks);
-    const bindings = this.#sort.bind(
-      {
-        plan,
-        keys,
-        values: [this.#order, buffer('values_b', 4 * this.length)],
-        digitCounts: buffer('digit_counts', 4 * DIGITS * blocks),
-        digitTotals: buffer('digit_totals', 4 * DIGITS),
-      },
-      KEY_BITS,
-    );
+    this.#order ??= this.#memory.buffer('gs.order', 4 * this.length, BUFFER_USAGE.storage);
+    const { plan, keys, sort } = (this.#working ??= this.#makeWorking(this.#order));
+    this.#writePlan(plan);
     const pass = encoder.beginComputePass({ label: 'gs.order', timestampWrites: timer?.timestampWrites('order') });
-    this.#table.pages.forEach(({ geometry, count }, page) => {
-      const view = this.#table.view(page);
-      this.#keys.record(pass, this.#keys.bind({ view, gaussians: geometry, keys: keys[0] }), count);
-    });
-    this.#sort.record(pass, bindings, plan);
+    this.#table.pages.forEach(({ count }, page) => this.#keys.record(pass, keys[page], count));
+    this.#sort.record(pass, sort, plan);
     pass.end();
     this.#axis = axisOf(camera);
     this.#version = this.#table.version;
@@ -95,7 +85,7 @@ export class DepthOrder {
 
   /** Frees what only the sorting needed. */
   settle(): void {
-    this.#working?.destroy();
+    this.#working?.memory.destroy();
     this.#working = undefined;
   }
 
@@ -107,7 +97,34 @@ export class DepthOrder {
     this.#axis = undefined;
   }
 
-  #writePlan(plan: GPUBuffer, blocks: number): void {
+  /** Buffers to sort in, and what the stages are bound to. */
+  #makeWorking(order: GPUBuffer): Working {
+    const { storage, copyDestination, indirect } = BUFFER_USAGE;
+    const memory = new GpuMemory(this.#device);
+    const buffer = (name: string, bytes: number): GPUBuffer =>
+      memory.buffer(`gs.order.${name}`, bytes, storage | copyDestination | indirect);
+    const blocks = this.#blocks;
+    const keys = [buffer('keys_a', 4 * this.length), buffer('keys_b', 4 * this.length)] as const;
+    const plan = buffer('plan', layouts.Plan.size + layouts.PagePlan.size);
+    const buffers = {
+      ...{ plan, keys, values: [order, buffer('values_b', 4 * this.length)] as const },
+      digitCounts: buffer('digit_counts', 4 * DIGITS * blocks),
+      digitTotals: buffer('digit_totals', 4 * DIGITS),
+    };
+    return {
+      ...{ memory, plan, sort: this.#sort.bind(buffers, KEY_BITS) },
+      keys: this.#table.pages.map(({ geometry }, page) =>
+        this.#keys.bind({ view: this.#table.view(page), gaussians: geometry, keys: keys[0] }),
+      ),
+    };
+  }
+
+  get #blocks(): number {
+    return Math.ceil(this.length / SORT_BLOCK);
+  }
+
+  #writePlan(plan: GPUBuffer): void {
+    const blocks = this.#blocks;
     const words = new Uint32Array(layouts.Plan.size / 4);
     const { visible, sort_blocks, sort_x, sort_y, sort_z } = layouts.Plan.fields;
     const [columns, rows] = dispatchGrid(blocks);

@@ -59,8 +59,8 @@ export class OrderPolicy {
     return false;
   }
 
-  /** Frees what only the sorting needed. A lever that reuses orders sorts all splats again and again: it keeps the buffers. */
-  settle(sortAngle: number): void {
-    if (sortAngle <= STILL) this.#depthOrder.settle();
+  /** Frees what only the sorting needed. Where all splats are sorted again and again, by a lever that reuses orders or because each frame asks for it, the buffers are kept. */
+  settle({ sortAngle, isAskedFor }: Omit<OrderOccasion, 'timer'>): void {
+    if (sortAngle <= STILL && !isAskedFor) this.#depthOrder.settle();
   }
 }

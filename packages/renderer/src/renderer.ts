@@ -153,7 +153,8 @@ export class Renderer {
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const { sortAngle } = this.levers;
-    const isOrdered = orderPolicy.prepare(encoder, drawn, { sortAngle, timer, isAskedFor: notes !== undefined });
+    const occasion = { sortAngle, isAskedFor: notes !== undefined };
+    const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
     table.look(drawn, { ...levers, ...detail }, isOrdered, this.#occlusion.tiles);
     const wishes = recordProjection(encoder, {
@@ -186,7 +187,7 @@ export class Renderer {
     }
     for (const wish of wishes) wish.read();
     if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
-    orderPolicy.settle(sortAngle);
+    orderPolicy.settle(occasion);
   }
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
