@@ -1,6 +1,6 @@
 /**
  * `npm run sides:chart`: splats that a frame takes for each that shows, with and without visible sets, and how far its picture is from the whole one: views from all around
- * a scene, at growing distances, none of them one that it was looked at from. Prints a table for docs/decisions/0017.
+ * a scene, at growing distances, none of them one that it was looked at from; with `--step DEGREES` views that follow one another on a circle. Prints a table for docs/decisions/0017.
  */
 import { readFileSync } from 'node:fs';
 import { basename } from 'node:path';
@@ -19,6 +19,7 @@ const { values, positionals } = parseArgs({
     distances: { type: 'string', default: '0.3,0.5,1,2,4' },
     views: { type: 'string', default: '8' },
     look: { type: 'string' },
+    step: { type: 'string' },
   },
 });
 const [width, height] = values.size.split('x').map(Number);
@@ -29,6 +30,12 @@ const { architecture = '' } = device.adapterInfo ?? {};
 const variants = architecture.includes('swiftshader') ? { threads: 'serial', sort: 'serial' } : {};
 const exact = new Renderer(device, { rasterizer: 'tiles', ...variants });
 const some = new Renderer(device, { rasterizer: 'tiles', ...variants, visibleSets: true });
+
+/** Azimuth and elevation of a view, radians. */
+function directionOf(view, distance) {
+  if (values.step !== undefined) return [0.4 + (Number(values.step) * view * Math.PI) / 180, 0.46];
+  return [0.4 + (2 * Math.PI * view) / Number(values.views) + 0.1 * distance, 0.35 + 0.45 * Math.sin(1.7 * view)];
+}
 
 const median = (list) => [...list].sort((a, b) => a - b)[Math.floor(list.length / 2)];
 
@@ -48,8 +55,7 @@ for (const scene of scenes) {
   for (const distance of numbers(values.distances)) {
     const found = { all: [], sets: [], errors: [] };
     for (let view = 0; view < Number(values.views); view++) {
-      const elevation = 0.35 + 0.45 * Math.sin(1.7 * view);
-      const azimuth = 0.4 + (2 * Math.PI * view) / Number(values.views) + 0.1 * distance;
+      const [azimuth, elevation] = directionOf(view, distance);
       const camera = cameraAt(bounds, { width, height }, distance, azimuth, elevation);
       const whole = await draw(device, exact, gaussians, camera);
       const { pixels, visible } = await draw(device, some, sided, camera);
