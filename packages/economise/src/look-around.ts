@@ -38,7 +38,7 @@ const FARTHEST = LOOKS[LOOKS.length - 1];
 const LEAST_WEIGHT = 0.5 / 255;
 /** Smaller scenes have larger splats, which are seen as well in smaller pictures: pixels for each splat, and sides of a picture. */
 const PIXELS_OF_SPLAT = 4;
-const [LEAST_SIZE, LARGEST_SIZE] = [96, 1024];
+const [LEAST_SIZE, LARGEST_SIZE] = [64, 1024];
 /** Rounds in which sides are looked at again whose pictures had no room for all that they should show. */
 const MOST_ROUNDS = 4;
 /** Pictures between two turns of others. */
@@ -52,7 +52,7 @@ const FLOAT_BYTES = 4;
 
 export interface LookAroundOptions {
   readonly signal?: AbortSignal;
-  /** Pixels of each side of the square pictures; default 96 to 1,024, by the number of splats. */
+  /** Pixels of each side of the square pictures; default 64 to 1,024, by the number of splats. */
   readonly size?: number;
   /** Bytes of GPU memory that the sets may take; default no limit but the device's. */
   readonly memoryBudget?: number;
