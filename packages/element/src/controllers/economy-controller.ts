@@ -30,14 +30,13 @@ export class EconomyController {
   #wish: string | null = null;
   #running = new AbortController();
   #economy: Economy | undefined;
-  #report = NOTHING;
 
   constructor(options: EconomyOptions) {
     this.#options = options;
   }
 
   get report(): EconomyReport {
-    return this.#report;
+    return this.#economy?.report ?? NOTHING;
   }
 
   /** Looks at the scene that is on show whole, or null for none, and at the attribute. Safe to call as often as one likes. */
@@ -59,7 +58,6 @@ export class EconomyController {
   #forget(): void {
     this.#running.abort();
     this.#economy = undefined;
-    this.#report = NOTHING;
   }
 
   async #apply(scene: GpuScene, wish: string | null, signal: AbortSignal): Promise<void> {
@@ -72,13 +70,13 @@ export class EconomyController {
         );
       if (signal.aborted || (goal === null && this.#economy === undefined)) return;
       this.#economy ??= new SceneEconomy(scene);
-      const report = await this.#economy.apply(goal, this.#options.memoryBudget(), signal);
-      if (signal.aborted) return;
-      this.#report = report;
-      this.#options.onChange();
+      await this.#economy.apply(goal, this.#options.memoryBudget(), signal);
+      if (!signal.aborted) this.#options.onChange();
     } catch (error) {
       if (signal.aborted || scene.isLost || scene.isDestroyed) return;
       const reason = error instanceof Error ? error.message : String(error);
+      // Something else may be on show all the same: the whole, in place of what was asked for before.
+      this.#options.onChange();
       this.#options.warn(`<gaussian-splat>: the scene stays as it is, since economy failed: ${reason}`);
     }
   }

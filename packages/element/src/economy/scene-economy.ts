@@ -25,7 +25,7 @@ export class SceneEconomy {
   #isMasked = false;
   /** What is on show, while each view leaves out what does not show from its side. */
   #sided: SidedGaussians<OwnedGaussians> | undefined;
-  #byView = WHOLE;
+  #report = WHOLE;
 
   constructor(scene: GpuScene) {
     this.#scene = scene;
@@ -33,22 +33,26 @@ export class SceneEconomy {
     scene.onDestroy = () => this.#gone.abort();
   }
 
+  /** What is left out of what is on show, whatever was asked for last. */
+  get report(): EconomyReport {
+    return this.#report;
+  }
+
   /**
    * Shows what the goal leaves of the scene, null for all of it. Looking at a large scene takes seconds, beside the frames. Rejects with the signal's reason, or
    * GaussianSplatError `out-of-memory/*`.
    */
-  async apply(goal: EconomyGoal | null, memoryBudget: number | undefined, signal: AbortSignal): Promise<EconomyReport> {
+  async apply(goal: EconomyGoal | null, memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
     const either = AbortSignal.any([signal, this.#gone.signal]);
     if (goal === 'views') return this.#showByView(memoryBudget, either);
     this.#forgetSides();
-    if (goal === null) await this.#showWhole(memoryBudget, either);
-    return goal === null ? WHOLE : this.#showMasked(goal, memoryBudget, either);
+    return goal === null ? this.#showWhole(memoryBudget, either) : this.#showMasked(goal, memoryBudget, either);
   }
 
-  async #showByView(memoryBudget: number | undefined, signal: AbortSignal): Promise<EconomyReport> {
+  async #showByView(memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
     const { device, bounds } = this.#scene;
     await this.#showWhole(memoryBudget, signal);
-    if (this.#sided) return this.#byView;
+    if (this.#sided) return;
     const { gaussians } = this.#scene;
     const left = memoryBudget === undefined ? undefined : memoryBudget - gaussians.byteLength;
     const sided = await lookAround(device, gaussians, bounds, { signal, memoryBudget: left });
@@ -58,12 +62,11 @@ export class SceneEconomy {
       signal.throwIfAborted();
       this.#scene.replaceGaussians(sided, 'kept');
       this.#sided = sided;
-      this.#byView = { spared: 0, decibels, byView: true };
+      this.#report = { spared: 0, decibels, byView: true };
     } catch (error) {
       sided.release();
       throw error;
     }
-    return this.#byView;
   }
 
   #forgetSides(): void {
@@ -71,6 +74,7 @@ export class SceneEconomy {
     this.#scene.replaceGaussians(this.#sided.whole, 'kept');
     this.#sided.release();
     this.#sided = undefined;
+    this.#report = WHOLE;
   }
 
   async #showWhole(memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
@@ -78,9 +82,10 @@ export class SceneEconomy {
     const { whole } = await this.#mask!;
     this.#show(await GaussianBuffers.upload(this.#scene.device, whole, { memoryBudget }), signal);
     this.#isMasked = false;
+    this.#report = WHOLE;
   }
 
-  async #showMasked(goal: MaskGoal, memoryBudget: number | undefined, signal: AbortSignal): Promise<EconomyReport> {
+  async #showMasked(goal: MaskGoal, memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
     this.#mask ??= this.#look();
     const mask = await this.#mask;
     signal.throwIfAborted();
@@ -88,7 +93,7 @@ export class SceneEconomy {
     const { whole } = mask;
     this.#show(await GaussianBuffers.upload(this.#scene.device, packed, { memoryBudget }), signal);
     this.#isMasked = true;
-    return { spared: whole.count - packed.count, decibels, byView: false };
+    this.#report = { spared: whole.count - packed.count, decibels, byView: false };
   }
 
   /** Looks at the scene once, for whatever is asked of it later; again only where that failed. */
