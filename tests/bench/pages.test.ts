@@ -11,7 +11,10 @@ const SMALL = { frames: '2', rounds: '2', warmup: '1' };
 test('the benchmark page measures a list in one report', { timeout: 180_000 }, async () => {
   const list = JSON.stringify([
     { name: 'ours' },
-    { name: 'half', resolutionScale: 0.5, options: { rasterizer: 'tiles', depthKeyBits: 16, warp: 9 } },
+    {
+      ...{ name: 'half', resolutionScale: 0.5, pack: { sh: 'int8', gloss: 1 } },
+      options: { rasterizer: 'tiles', depthKeyBits: 16, warp: 9 },
+    },
     { name: 'PlayCanvas', peer: 'playcanvas' },
   ]);
   const report = await runPage('bench/index.html', { ...SMALL, list, n: '2000', w: '96', h: '64' });
@@ -25,7 +28,7 @@ test('the benchmark page measures a list in one report', { timeout: 180_000 }, a
   }
   assert.ok(ours.statistics.visible > 100 && ours.statistics.visible <= 2000);
   assert.ok(ours.bytes.perSplat > 100);
-  assert.deepEqual(half.ignoredOptions, ['warp']);
+  assert.deepEqual(half.ignoredOptions, ['warp', 'gloss']);
   assert.equal(half.rasterizer, 'tiles');
   if (report.environment.timestamps) {
     assert.ok(ours.span.p50 > 0 && playcanvas.span.p50 > 0);

@@ -1,6 +1,6 @@
 /** Copies of a scene, as one cloud or straight to the GPU. */
 import { boundsOf } from '@gaussian-splat/core';
-import { lookAround } from '@gaussian-splat/economise';
+import { LiveMask, lookAround } from '@gaussian-splat/economise';
 import { GaussianBuffers, packGaussians, packWithDetail } from '@gaussian-splat/renderer';
 
 /** Splats in one upload: their harmonics stay well under the largest array that browsers allocate. */
@@ -42,14 +42,20 @@ export function tileCloud(cloud, copies) {
 
 /**
  * Uploads the copies, a few million splats at a time, without ever holding them all in memory.
+ * @param pack options of packGaussians, and `detail`, `sides`, `economy`: levels of detail, visible sets, what no view needs at so many dB left out
  * @returns {Promise<GaussianBuffers[]>} to be drawn together.
  */
-export async function uploadTiled(device, cloud, copies, { detail = false, sides = false, ...packOptions } = {}) {
-  if (sides)
-    return withSides(device, cloud, copies, await uploadTiled(device, cloud, copies, { detail, ...packOptions }));
+export async function uploadTiled(device, cloud, copies, pack = {}) {
+  const whole = await uploadWhole(device, cloud, copies, pack);
+  if (pack.economy > 0) return withoutUnseen(device, boundsAround(cloud, copies), whole, pack.economy);
+  return pack.sides ? withSides(device, boundsAround(cloud, copies), whole) : whole;
+}
+
+/** `pack` is handed on as it is: whoever asks for unread options watches that very object. */
+async function uploadWhole(device, cloud, copies, pack) {
   // Levels of detail are built over all copies together.
-  if (detail) return [await GaussianBuffers.upload(device, packWithDetail(tileCloud(cloud, copies), packOptions))];
-  const packed = packGaussians(cloud, packOptions);
+  if (pack.detail) return [await GaussianBuffers.upload(device, packWithDetail(tileCloud(cloud, copies), pack))];
+  const packed = packGaussians(cloud, pack);
   if (copies.length === 1) return [await GaussianBuffers.upload(device, shifted(packed, copies[0].offset))];
   const uploads = [];
   for (let first = 0; first < copies.length;) {
@@ -63,16 +69,31 @@ export async function uploadTiled(device, cloud, copies, { detail = false, sides
 }
 
 /** The same with visible sets; where copies fill several uploads, each shows what it hides of itself alone. */
-async function withSides(device, cloud, copies, uploads) {
+async function withSides(device, around, uploads) {
+  const sided = [];
+  for (const upload of uploads) sided.push(await lookAround(device, upload, around));
+  return sided;
+}
+
+/** What the element's `economy` leaves of it, at so many dB. */
+async function withoutUnseen(device, around, [whole, ...more], decibels) {
+  try {
+    if (more.length > 0) throw new RangeError('economy: expected splats that fit one upload');
+    const { packed } = await (await LiveMask.of(device, whole, around)).masked({ decibels });
+    return [await GaussianBuffers.upload(device, packed)];
+  } finally {
+    for (const upload of [whole, ...more]) upload.destroy();
+  }
+}
+
+/** A ball around all copies. */
+function boundsAround(cloud, copies) {
   const { center, radius } = boundsOf(cloud);
   const middle = [0, 1, 2].map((axis) => copies.reduce((sum, { offset }) => sum + offset[axis], 0) / copies.length);
   const reach = Math.max(
     ...copies.map(({ offset }) => Math.hypot(...offset.map((value, axis) => value - middle[axis]))),
   );
-  const around = { center: center.map((value, axis) => value + middle[axis]), radius: radius + reach };
-  const sided = [];
-  for (const upload of uploads) sided.push(await lookAround(device, upload, around));
-  return sided;
+  return { center: center.map((value, axis) => value + middle[axis]), radius: radius + reach };
 }
 
 /** Splats whose bounds the packed scene keeps together. */
