@@ -8,7 +8,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, renderCloud } from '../support/compare.js';
 import { psnr } from '../support/metrics.js';
 import { onlyInFull } from '../support/extent.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { randomSource } from '../support/gpu.js';
 import { cameraAt, equalDepthPlane, movedBy, offCentre, resized, room, withHostileSplats } from '../support/scenes.js';
 
@@ -42,7 +42,7 @@ for (const { make, frames } of [
   { make: room, frames: 8 },
 ]) {
   test(`${frames} frames of one view of ${make.name} are the same bytes`, async () => {
-    const device = await nodeDevice();
+    const device = await anyDevice();
     const { cloud, cameras } = make();
     const camera = resized(cameras[0], 120);
     const renderer = new Renderer(device);
@@ -59,7 +59,7 @@ for (const { make, frames } of [
 }
 
 test('hostile values in every attribute change nothing and are counted', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const { cloud, cameras } = room();
   const hostile = withHostileSplats(cloud);
   const packed = packGaussians(hostile.cloud);
@@ -71,7 +71,7 @@ test('hostile values in every attribute change nothing and are counted', async (
 });
 
 test('an image of no splats is the background', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const renderer = new Renderer(device);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloudOf([])));
   const camera = cameraAt([0, 0, -3], [0, 0, 0], { width: 7, height: 5 });
@@ -82,7 +82,7 @@ test('an image of no splats is the background', async () => {
 });
 
 test('background shines through by transmittance, premultiplied', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const { cloud, cameras } = offCentre();
   const renderer = new Renderer(device);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
@@ -96,7 +96,7 @@ test('background shines through by transmittance, premultiplied', async () => {
 });
 
 test('a scene in several buffers is the same image as in one', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const { cloud, cameras } = room();
   const cuts = [0, 1000, 1257, 20_000, cloud.count];
   const camera = resized(cameras[0], 240);
@@ -113,7 +113,7 @@ test('a scene in several buffers is the same image as in one', async () => {
 });
 
 test('a moving camera allocates nothing, compiles nothing and reads nothing back', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const { cloud, cameras } = offCentre();
   const renderer = new Renderer(device);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
@@ -161,7 +161,7 @@ function spyOnAllocations(device: GPUDevice): { names: string[]; submits: number
 }
 
 test('a scene a million units from the origin looks as at the origin', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const { cloud, cameras } = offCentre();
   const here = await renderCloud(device, cloud, cameras[0], 'classic');
   // Powers of two, so that the camera's own float64 position loses nothing.
@@ -171,7 +171,7 @@ test('a scene a million units from the origin looks as at the origin', async () 
 });
 
 test('more splats with SH3 than a buffer holds at default limits span pages', { skip: onlyInFull }, async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const visible = 3000;
   const random = randomSource(3);
   const near = cloudOf(

@@ -9,7 +9,7 @@ import { compareWithOracle, describeCloseness } from '../support/compare.js';
 import { hasSharedData, needsSharedData, sharedFile } from '../support/data.js';
 import { isFull } from '../support/extent.js';
 import { limitOn, type Limit } from '../support/limit.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { proceduralScenes } from '../support/scenes.js';
 
 const MODES: readonly Mode[] = ['classic', 'antialiased'];
@@ -30,7 +30,7 @@ async function assertClose(
   mode: Mode,
   p999 = LIMIT_P999,
 ): Promise<void> {
-  const closeness = await compareWithOracle(await nodeDevice(), scene, camera, mode);
+  const closeness = await compareWithOracle(await anyDevice(), scene, camera, mode);
   console.log(describeCloseness(name, closeness));
   assert.ok(closeness.psnr >= LIMIT_DB, `${name}: ${closeness.psnr} dB`);
   assert.ok(closeness.p999 <= p999, `${name}: 99.9th percentile ${255 * closeness.p999}/255`);
@@ -55,7 +55,7 @@ for (const makeScene of proceduralScenes) {
   for (const mode of MODES) {
     test(`${makeScene.name}, ${mode}`, async () => {
       const { name, cloud, cameras } = makeScene();
-      const p999 = name === 'brightColors' ? limitOn(await nodeDevice(), LIMIT_P999_BRIGHT) : LIMIT_P999;
+      const p999 = name === 'brightColors' ? limitOn(await anyDevice(), LIMIT_P999_BRIGHT) : LIMIT_P999;
       for (const [i, camera] of cameras.entries()) {
         await assertClose(`${name} ${i} ${mode}`, cloud, camera, mode, p999);
       }

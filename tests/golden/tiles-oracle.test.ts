@@ -6,7 +6,7 @@ import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-spl
 import { cloudOf, repeat } from '../support/clouds.js';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, compareWithOracle, describeCloseness, renderCloud } from '../support/compare.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { faultyDevice } from '../stability/support/devices.js';
 import {
   brightColors,
@@ -32,7 +32,7 @@ for (const make of [needles, hugeSplats, opacityLadder, brightColors, edgeOnDisc
   test(`tiles: ${make.name}`, async () => {
     const { name, cloud, cameras } = make();
     for (const [i, camera] of cameras.entries()) {
-      const close = await compareWithOracle(await nodeDevice(), cloud, camera, 'classic', { rasterizer: 'tiles' });
+      const close = await compareWithOracle(await anyDevice(), cloud, camera, 'classic', { rasterizer: 'tiles' });
       console.log(describeCloseness(`tiles ${name} ${i}`, close));
       assert.ok(close.psnr >= LIMITS.psnr, `${name}: ${close.psnr} dB`);
       assert.ok(close.p999 <= LIMITS.p999, `${name}: 99.9th percentile ${255 * close.p999}/255`);
@@ -59,7 +59,7 @@ test('tiles: an adapter that cuts off what float16 has no room for stores the sa
   const camera = resized(cameras[0], 100);
   const { device, befallen } = await cutsOff('bitcast<vec4f>(bitcast<vec4u>(result) & vec4u(0xffffe000u))');
   const [exact, cut] = await Promise.all(
-    [await nodeDevice(), device].map((each) => renderCloud(each, cloud, camera, 'classic', SERIAL)),
+    [await anyDevice(), device].map((each) => renderCloud(each, cloud, camera, 'classic', SERIAL)),
   );
   assert.ok(befallen.length > 0, 'the shader was changed');
   assert.deepEqual(cut, exact);
@@ -70,11 +70,11 @@ test('tiles: bytes are the nearest, on an adapter that cuts off, too', async () 
   const { cloud, cameras } = offCentre();
   const camera = resized(cameras[0], 100);
   const { device, befallen } = await cutsOff('floor(saturate(result) * 255.0) / 255.0');
-  const [exact, cut] = [await bytesOf(await nodeDevice(), cloud, camera), await bytesOf(device, cloud, camera)];
+  const [exact, cut] = [await bytesOf(await anyDevice(), cloud, camera), await bytesOf(device, cloud, camera)];
   assert.ok(befallen.length > 0, 'the shader was changed');
   assert.deepEqual(cut, exact);
   device.destroy();
-  const floats = await renderCloud(await nodeDevice(), cloud, camera, 'classic', SERIAL);
+  const floats = await renderCloud(await anyDevice(), cloud, camera, 'classic', SERIAL);
   // Half a step, and what float16 rounds.
   const worst = floats.reduce((most, x, i) => Math.max(most, Math.abs(255 * Math.min(1, x) - exact[i])), 0);
   assert.ok(worst <= 0.5 + 255 * 2 ** -12, `${worst} steps`);
@@ -118,7 +118,7 @@ const crowd = cloudOf(
 const crowdCamera = cameraAt([0, 0, -3], [0, 0, 0], { width: 640, height: 360 });
 
 test('tiles: over capacity the farthest pairs are left out, the frame says so, and the next one has room', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(crowd));
   let told: () => void = () => undefined;
   const incomplete = new Promise<void>((resolve) => (told = resolve));

@@ -5,7 +5,7 @@ import type { Camera } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer, type RendererOptions } from '@gaussian-splat/renderer';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, describeCloseness } from '../support/compare.js';
-import { endNodeDevice, nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { notePasses } from '../support/passes.js';
 import { offCentre, resized, room } from '../support/scenes.js';
 
@@ -30,7 +30,7 @@ const steps = [
 for (const make of [room, offCentre]) {
   for (const rasterizer of ['quads', 'tiles'] as const) {
     test(`${make.name}, ${rasterizer}: no sort while the camera only moves, and the image is that of the oracle`, async () => {
-      const device = await nodeDevice();
+      const device = await anyDevice();
       const { cloud, cameras } = make();
       const start = resized(cameras[0], 240);
       const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
@@ -57,7 +57,7 @@ async function sortingPasses(
   options: RendererOptions,
   angles: readonly number[],
 ): Promise<{ labels: string[]; bytes: number[] }> {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const { cloud, cameras } = offCentre();
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const renderer = new Renderer(device, options);
@@ -87,7 +87,7 @@ test('sortAngle lets a camera turn that far before it sorts again, and takes the
 });
 
 test('several scenes keep their common order while the camera moves', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const { cloud, cameras } = room();
   const start = resized(cameras[0], 240);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));

@@ -1,6 +1,7 @@
 /** A device of Dawn in Node. Tests that use it run under `gpuEnvironment()` of scripts/lib. */
 import { chooseVariants } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { isFull } from './extent.js';
 
 const devices = new Map<string, Promise<GPUDevice>>();
 
@@ -25,6 +26,11 @@ export function serialDevice(): Promise<GPUDevice> {
     await chooseVariants(device, { store: { getItem: () => choice, setItem: () => undefined } });
     return device;
   });
+}
+
+/** For what must hold however stages share their work: {@link nodeDevice} in `npm test -- --full`, else {@link serialDevice}, since `variants.test.ts` finds the pictures of both to be the same. */
+export function anyDevice(): Promise<GPUDevice> {
+  return isFull ? nodeDevice() : serialDevice();
 }
 
 async function requestDevice(): Promise<GPUDevice> {
