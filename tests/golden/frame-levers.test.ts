@@ -13,7 +13,7 @@ import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
-import { serialDevice } from '../support/node-device.js';
+import { asOnSwiftShader, serialDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { countWork } from '../support/work-counters.js';
@@ -70,7 +70,9 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
   test(`${rasterizer}: once prepared and seen, steps allocate and compile nothing`, async () => {
     // Tiles take seconds to compile here: those of the test before are good enough for them.
     const isFresh = rasterizer === 'quads';
-    const device = isFresh ? await (await requestNodeAdapter()).requestDevice() : await serialDevice();
+    const device = isFresh
+      ? await asOnSwiftShader(await (await requestNodeAdapter()).requestDevice())
+      : await serialDevice();
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const renderer = new Renderer(device, { rasterizer });
     const format = 'rgba8unorm';
@@ -130,7 +132,7 @@ test('a lever out of range is refused', async () => {
 test('the span of every frame comes back, beside the frames', async (t) => {
   const adapter = await requestNodeAdapter();
   if (!adapter.features.has('timestamp-query')) return t.skip('no timestamps here');
-  const device = await adapter.requestDevice({ requiredFeatures: ['timestamp-query'] });
+  const device = await asOnSwiftShader(await adapter.requestDevice({ requiredFeatures: ['timestamp-query'] }));
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const renderer = new Renderer(device);
   const target = device.createTexture({ size: [size.width, size.height], format: 'rgba8unorm', usage: 0x10 });

@@ -15,17 +15,19 @@ export function nodeDevice(): Promise<GPUDevice> {
  * a tenth of the time. Pictures are the same.
  */
 export function serialDevice(): Promise<GPUDevice> {
-  return once('serial', async () => {
-    const device = await requestDevice();
-    const choice = JSON.stringify({
-      rasterizer: 'quads',
-      accumulation: 'rgba16float',
-      threads: 'serial',
-      sort: 'serial',
-    });
-    await chooseVariants(device, { store: { getItem: () => choice, setItem: () => undefined } });
-    return device;
+  return once('serial', async () => asOnSwiftShader(await requestDevice()));
+}
+
+/** A device whose renderers have from now on what {@link serialDevice} says. */
+export async function asOnSwiftShader(device: GPUDevice): Promise<GPUDevice> {
+  const choice = JSON.stringify({
+    rasterizer: 'quads',
+    accumulation: 'rgba16float',
+    threads: 'serial',
+    sort: 'serial',
   });
+  await chooseVariants(device, { store: { getItem: () => choice, setItem: () => undefined } });
+  return device;
 }
 
 /** For what must hold however stages share their work: {@link nodeDevice} in `npm test -- --full`, else {@link serialDevice}, since `variants.test.ts` finds the pictures of both to be the same. */
