@@ -7,6 +7,7 @@ import {
   resolveContract,
   type Camera,
 } from '@gaussian-splat/core';
+import { chooseVariants } from '@gaussian-splat/renderer';
 import { bindInputs, setRuntimeLocation, type GaussianSink, type GeneratorState } from '@gaussian-splat/generator';
 import type * as OnnxRuntime from 'onnxruntime-web/wasm';
 
@@ -34,7 +35,11 @@ export async function makeDevice(optional: readonly GPUFeatureName[] = []): Prom
   if (adapter === null) throw new Error('no WebGPU adapter in this browser');
   const { maxStorageBuffersPerShaderStage } = adapter.limits;
   const requiredFeatures = optional.filter((feature) => adapter.features.has(feature));
-  return adapter.requestDevice({ requiredFeatures, requiredLimits: { maxStorageBuffersPerShaderStage } });
+  const device = await adapter.requestDevice({ requiredFeatures, requiredLimits: { maxStorageBuffersPerShaderStage } });
+  // What the element finds on SwiftShader, which takes seconds to compile the rest.
+  const choice = JSON.stringify({ rasterizer: 'quads', accumulation: 'rgba16float', threads: 'serial', sort: 'serial' });
+  await chooseVariants(device, { store: { getItem: () => choice, setItem: () => undefined } });
+  return device;
 }
 
 /** Keeps what runs write. */
