@@ -40,3 +40,41 @@ function moveByDigit({ keys, places }: Items, { keys: keysOut, places: placesOut
     placesOut[to] = places[k];
   }
 }
+
+/** Numbers of half a word. */
+const HALVES = 1 << 16;
+
+/**
+ * The numbers that would stand at some places if all were in ascending order, which takes a tenth of the time of putting them there. Numbers must not be negative. They are counted by the upper
+ * halves of their bits, and those whose upper halves matter by the lower ones.
+ */
+export function valuesAtPlaces(values: Float32Array, places: readonly number[]): number[] {
+  const bits = new Uint32Array(values.buffer, values.byteOffset, values.length);
+  const uppers = new Uint32Array(HALVES);
+  for (let k = 0; k < bits.length; k++) uppers[bits[k] >>> 16]++;
+  const found = places.map((place) => countedAt(uppers, place));
+  const rows = new Int32Array(HALVES).fill(-1);
+  let length = 0;
+  for (const { half } of found) {
+    if (rows[half] >= 0) continue;
+    rows[half] = length;
+    length += HALVES;
+  }
+  const lowers = new Uint32Array(length);
+  for (let k = 0; k < bits.length; k++) {
+    const row = rows[bits[k] >>> 16];
+    if (row >= 0) lowers[row + (bits[k] & (HALVES - 1))]++;
+  }
+  const words = Uint32Array.from(found, ({ half, rest }) => {
+    const row = rows[half];
+    return half * HALVES + countedAt(lowers.subarray(row, row + HALVES), rest).half;
+  });
+  return [...new Float32Array(words.buffer)];
+}
+
+/** Which of the counted ones stands at a place, and at which place among those like it. */
+function countedAt(counts: Uint32Array, place: number): { half: number; rest: number } {
+  let [half, rest] = [0, place];
+  while (rest >= counts[half]) rest -= counts[half++];
+  return { half, rest };
+}
