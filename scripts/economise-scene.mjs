@@ -14,7 +14,8 @@ import {
 } from '@gaussian-splat/economise';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
-import { readInThread } from './lib/scene-thread.mjs';
+import { readInThreads } from './lib/scene-in-parts.mjs';
+import { ThreadPool } from './lib/thread-pool.mjs';
 
 const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options]
 
@@ -94,7 +95,8 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
   // The file and the driver take their time at the same time.
-  const reading = readInThread(scene);
+  const pool = new ThreadPool();
+  const reading = readInThreads(scene, pool);
   reading.catch(() => undefined);
   const { device, isGpu } = await openDevice(scorer);
   if (isGpu) GpuEvaluator.prepare(device);
@@ -104,11 +106,11 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const read = seconds() - opened;
   const views = readViews(viewsFile, boundsOf(cloud), scored);
   const evaluator = isGpu
-    ? await GpuEvaluator.create(device, cloud, views)
+    ? await GpuEvaluator.create(device, cloud, views, { pool })
     : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
   const prepare = seconds() - read;
   const result = await economise(cloud, {
-    ...{ minDecibels, name: out, evaluator },
+    ...{ minDecibels, name: out, evaluator, pool },
     onStep: (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`),
   });
   writeFileSync(out, result.bytes);

@@ -4,7 +4,8 @@ import { rareKernelOf } from '@gaussian-splat/renderer/stages';
 import type { LoweredColours } from '../colour-moments.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
-import { coarseToFine, reduceTo, type Cut, type ReducedCloud } from '../reduce.js';
+import { inline, type TaskPool } from '../parts/task-pool.js';
+import { coarseToFine, reduceInParts, type Cut, type ReducedCloud } from '../reduce.js';
 import type { Ranking, Scores } from '../score.js';
 import type { DealtViews } from '../views.js';
 import { CloudBuffers } from './cloud-buffers.js';
@@ -21,6 +22,8 @@ export interface GpuEvaluatorOptions {
   readonly partSplats?: number;
   /** Views whose energies are kept until they are added to the moments of colour, default 32. */
   readonly viewsAtOnce?: number;
+  /** Takes what stays out of the cloud, in parts; default {@link inline}. */
+  readonly pool?: TaskPool;
 }
 
 /** Exact, so that no rounding is taken for an effect of the cut. */
@@ -45,6 +48,7 @@ export class GpuEvaluator implements Evaluator {
   readonly #scene: SceneParts;
   readonly #renderer: Renderer;
   readonly #cutScene: CutScene;
+  readonly #pool: TaskPool;
   readonly #errors = new Map<JudgedViews, PictureErrors>();
   #ranking: Ranking | undefined;
 
@@ -54,12 +58,14 @@ export class GpuEvaluator implements Evaluator {
     views: DealtViews,
     scene: SceneParts,
     cutScene: CutScene,
+    pool: TaskPool,
   ) {
     this.#device = device;
     this.#cloud = cloud;
     this.#views = views;
     this.#scene = scene;
     this.#cutScene = cutScene;
+    this.#pool = pool;
     this.#renderer = new Renderer(device, QUALITY);
   }
 
@@ -78,12 +84,12 @@ export class GpuEvaluator implements Evaluator {
     device: GPUDevice,
     cloud: GaussianCloud,
     views: DealtViews,
-    { partSplats, viewsAtOnce = VIEWS_AT_ONCE }: GpuEvaluatorOptions = {},
+    { partSplats, viewsAtOnce = VIEWS_AT_ONCE, pool = inline }: GpuEvaluatorOptions = {},
   ): Promise<GpuEvaluator> {
     const energies = Math.min(views.scored.length, viewsAtOnce);
     const scene = await SceneParts.upload(device, cloud, energies, partSplats);
     try {
-      return new GpuEvaluator(device, cloud, views, scene, await CutScene.of(device, scene));
+      return new GpuEvaluator(device, cloud, views, scene, await CutScene.of(device, scene), pool);
     } catch (error) {
       scene.destroy();
       throw error;
@@ -154,7 +160,7 @@ export class GpuEvaluator implements Evaluator {
     const kept = coarseToFine(this.#cloud, this.#ranking.contribution, staying);
     const degrees = new Uint8Array(kept.length);
     for (let k = 0; k < kept.length; k++) degrees[k] = all[kept[k]];
-    const reduced = reduceTo(this.#cloud, { kept, degrees });
+    const reduced = await reduceInParts(this.#cloud, { kept, degrees }, this.#pool);
     await putLowered(this.#device, this.#scene, reduced, kept);
     return reduced;
   }
