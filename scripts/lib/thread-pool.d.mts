@@ -1,8 +1,9 @@
 import type { TaskPool } from '@gaussian-splat/economise';
 
 export class ThreadPool implements TaskPool {
-  constructor(size?: number);
+  constructor(size?: number, leastSplats?: number);
   readonly size: number;
+  readonly leastSplats: number;
   allocate: TaskPool['allocate'];
   shares: TaskPool['shares'];
   run: TaskPool['run'];

@@ -1,19 +1,25 @@
 /** Threads that do the tasks of `@gaussian-splat/economise`, in memory that they share: a `TaskPool`, see packages/economise/src/parts/task-pool.ts. */
 import { availableParallelism } from 'node:os';
 import { Worker } from 'node:worker_threads';
-import { inline, tasks } from '@gaussian-splat/economise/parts';
 import { unpackError } from './thread-errors.mjs';
 
 /** More threads have little to gain: most of the work is moving memory. */
 const MOST_THREADS = 16;
 
+/** Fewer splats are done before threads are started, which takes each a tenth of a second of a processor; measured on two cores. */
+const LEAST_SPLATS = 1 << 18;
+
 export class ThreadPool {
   /** Each with the tasks that it has not answered yet, in their order. */
   #threads = [];
 
-  /** @param size threads; they are started by the first tasks, or by `start` */
-  constructor(size = Math.min(MOST_THREADS, availableParallelism())) {
+  /**
+   * @param size threads; they are started by the first tasks, or by `start`
+   * @param leastSplats that they are given work on
+   */
+  constructor(size = Math.min(MOST_THREADS, availableParallelism()), leastSplats = LEAST_SPLATS) {
     this.size = size;
+    this.leastSplats = leastSplats;
   }
 
   allocate(byteLength) {
@@ -31,7 +37,6 @@ export class ThreadPool {
 
   /** All tasks are handed out at once, so that they are done also while this thread is kept busy. */
   async run(name, inputs) {
-    if (inputs.length <= 1 && name in tasks) return inline.run(name, inputs);
     this.start();
     const answers = inputs.map((input, k) => this.#threads[k % this.size].ask(name, input));
     await Promise.allSettled(answers);

@@ -1,7 +1,13 @@
 /** Numbers in their order, against comparison. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { ascendingOrder, valuesAtPlaces } from '../../packages/economise/src/order.js';
+import {
+  ascendingOrder,
+  coarseToFine,
+  orderAll,
+  stayingInOrder,
+  valuesAtPlaces,
+} from '../../packages/economise/src/order.js';
 import { seededRandom } from '../support/random.js';
 
 const random = seededRandom(5);
@@ -29,4 +35,13 @@ test('numbers at some places are those of all in order', () => {
   );
   assert.deepEqual(valuesAtPlaces(values, [4000, 2, 2]), [sorted[4000], sorted[2], sorted[2]]);
   assert.deepEqual(valuesAtPlaces(Float32Array.of(3), [0]), [3]);
+});
+
+test('splats that stay come in the same order whether they are put into it before or after', () => {
+  const contribution = values.map((value) => Math.min(value, 1));
+  const scales = Float32Array.from({ length: 3 * contribution.length }, (_, k) => 1 + (k % 4));
+  const staying = Uint32Array.from([...contribution.keys()].filter((i) => i % 3 !== 1));
+  const expected = coarseToFine({ scales }, contribution, staying);
+  assert.deepEqual(stayingInOrder(orderAll({ scales, contribution }), staying), expected);
+  assert.ok(expected.some((i, k) => i !== staying[k]));
 });

@@ -1,5 +1,5 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { ascendingOrder } from './order.js';
+import { coarseToFine } from './order.js';
 import { allocateColumns, arraysOf, columnsOf } from './parts/cloud-memory.js';
 import { inline, partsOf, poolFor, type TaskPool } from './parts/task-pool.js';
 import type { Scores } from './score.js';
@@ -75,21 +75,6 @@ function roomFor(cloud: GaussianCloud, { kept, degrees }: Choice, pool: TaskPool
   const highest = degreesOf(degrees).findLastIndex((count) => count > 0);
   const columns = allocateColumns(kept.length, Math.max(0, highest) as ShDegree, pool);
   return { cloud: { ...cloud, ...columns, count: kept.length }, degrees };
-}
-
-/** The same splats, the most seen first: by contribution times the area of the splat. */
-export function coarseToFine({ scales }: GaussianCloud, contribution: Float32Array, splats: Uint32Array): Uint32Array {
-  const importance = new Float32Array(splats.length);
-  for (let k = 0; k < splats.length; k++) {
-    const i = splats[k];
-    const a = scales[3 * i];
-    const b = scales[3 * i + 1];
-    const c = scales[3 * i + 2];
-    importance[k] = contribution[i] * Math.max(a * b, b * c, c * a);
-  }
-  const order = ascendingOrder(importance).reverse();
-  for (let k = 0; k < order.length; k++) order[k] = splats[order[k]];
-  return order;
 }
 
 /** The degree at which error and the price of what is kept add up to least. */

@@ -10,6 +10,8 @@ export type TaskResult<Name extends TaskName> = Awaited<ReturnType<Tasks[Name]>>
 export interface TaskPool {
   /** How many parts are done at the same time. */
   readonly size: number;
+  /** Work on fewer splats is done sooner by whoever has it than here. */
+  readonly leastSplats: number;
   /** Memory that tasks share with whoever asks for them. */
   allocate(byteLength: number): ArrayBufferLike;
   /** True if tasks see this memory as it is, and write to it. */
@@ -21,6 +23,7 @@ export interface TaskPool {
 /** Does one part after another, in this thread. */
 export const inline: TaskPool = {
   size: 1,
+  leastSplats: 0,
   allocate: (byteLength) => new ArrayBuffer(byteLength),
   shares: () => true,
   async run<Name extends TaskName>(name: Name, inputs: readonly TaskInput<Name>[]): Promise<TaskResult<Name>[]> {
@@ -31,10 +34,8 @@ export const inline: TaskPool = {
   },
 };
 
-/** Fewer splats than this are done sooner here than threads are started: a tenth of a second of a processor each, measured on two cores. */
-const WORTH_THREADS = 1 << 18;
-/** Fewer splats than this are no part of their own: handing them to a thread would take longer than they do. */
-const LEAST_SPLATS = 1 << 15;
+/** Parts of {@link TaskPool.leastSplats} that are a part of their own at least. */
+const LEAST_SHARE = 1 / 8;
 
 /** Splats `first` to `end`, the latter not included. */
 export interface Part {
@@ -43,8 +44,8 @@ export interface Part {
 }
 
 /** So many splats in parts of one size, but for the last. None if there are no splats. */
-export function partsOf(count: number, { size }: TaskPool): Part[] {
-  const wanted = Math.min(size, Math.floor(count / LEAST_SPLATS));
+export function partsOf(count: number, { size, leastSplats }: TaskPool): Part[] {
+  const wanted = Math.min(size, Math.floor(count / Math.max(1, LEAST_SHARE * leastSplats)));
   const step = Math.ceil(count / Math.max(1, wanted));
   const parts: Part[] = [];
   for (let first = 0; first < count; first += step) parts.push({ first, end: Math.min(count, first + step) });
@@ -53,5 +54,5 @@ export function partsOf(count: number, { size }: TaskPool): Part[] {
 
 /** The pool, or none for work that is too small for it, or where its tasks would get copies of what arrays hold. */
 export function poolFor(pool: TaskPool, count: number, arrays: readonly ArrayBufferView[] = []): TaskPool {
-  return count >= WORTH_THREADS && arrays.every(({ buffer }) => pool.shares(buffer)) ? pool : inline;
+  return count >= pool.leastSplats && arrays.every(({ buffer }) => pool.shares(buffer)) ? pool : inline;
 }
