@@ -1,4 +1,4 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import type { ThreadPool } from './thread-pool.mjs';
+import type { TaskPool } from '@gaussian-splat/economise';
 
-export function readInThreads(path: string, pool: ThreadPool): Promise<GaussianCloud>;
+export function readInThreads(path: string, pool: TaskPool): Promise<GaussianCloud>;

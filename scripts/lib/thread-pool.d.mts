@@ -1,5 +1,7 @@
 import type { TaskPool } from '@gaussian-splat/economise';
 
+export function usualThreads(): number;
+
 export class ThreadPool implements TaskPool {
   constructor(size?: number, leastSplats?: number);
   readonly size: number;

@@ -5,6 +5,8 @@ import { unpackError } from './thread-errors.mjs';
 
 /** More threads have little to gain: most of the work is moving memory. */
 const MOST_THREADS = 16;
+/** One for each processor, up to so many. */
+export const usualThreads = () => Math.min(MOST_THREADS, availableParallelism());
 
 /** Fewer splats are done before threads are started, which takes each a tenth of a second of a processor; measured on two cores. */
 const LEAST_SPLATS = 1 << 18;
@@ -17,7 +19,7 @@ export class ThreadPool {
    * @param size threads; they are started by the first tasks, or by `start`
    * @param leastSplats that they are given work on
    */
-  constructor(size = Math.min(MOST_THREADS, availableParallelism()), leastSplats = LEAST_SPLATS) {
+  constructor(size = usualThreads(), leastSplats = LEAST_SPLATS) {
     this.size = size;
     this.leastSplats = leastSplats;
   }
