@@ -12,9 +12,11 @@ import {
   Studio,
   viewsBetween,
 } from '@gaussian-splat/economise';
+import { inline } from '@gaussian-splat/economise/parts';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
-import { readInThread } from './lib/scene-thread.mjs';
+import { readInThreads } from './lib/scene-in-parts.mjs';
+import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 
 const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options]
 
@@ -25,6 +27,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
   --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
                   auto (default): gpu where there is one
+  --threads N     that share what comes in parts: reading a large PLY, writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
   --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
 `;
 
@@ -47,6 +50,7 @@ function parseOptions(args) {
         report: text,
         scorer: { ...text, default: 'auto' },
         scored: { ...text, default: '216' },
+        threads: { ...text, default: String(usualThreads()) },
         help: { type: 'boolean' },
       },
     });
@@ -67,7 +71,10 @@ function parseOptions(args) {
   const scored = Number(values.scored);
   if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
     throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
-  return { scene, out, minDecibels, views, report, scorer, scored };
+  const threads = Number(values.threads);
+  if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
+    throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
+  return { scene, out, minDecibels, views, report, scorer, scored, threads };
 }
 
 function readViews(path, bounds, scored) {
@@ -90,11 +97,12 @@ async function openDevice(scorer) {
   return { device, isGpu };
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored }) {
+async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored, threads }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
   // The file and the driver take their time at the same time.
-  const reading = readInThread(scene);
+  const pool = threads > 1 ? new ThreadPool(threads) : inline;
+  const reading = readInThreads(scene, pool);
   reading.catch(() => undefined);
   const { device, isGpu } = await openDevice(scorer);
   if (isGpu) GpuEvaluator.prepare(device);
@@ -104,11 +112,11 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const read = seconds() - opened;
   const views = readViews(viewsFile, boundsOf(cloud), scored);
   const evaluator = isGpu
-    ? await GpuEvaluator.create(device, cloud, views)
+    ? await GpuEvaluator.create(device, cloud, views, { pool })
     : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
   const prepare = seconds() - read;
   const result = await economise(cloud, {
-    ...{ minDecibels, name: out, evaluator },
+    ...{ minDecibels, name: out, evaluator, pool },
     onStep: (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`),
   });
   writeFileSync(out, result.bytes);

@@ -2,18 +2,18 @@
 import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { isMainThread, parentPort, Worker, workerData } from 'node:worker_threads';
-import { GaussianSplatError } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { readWhole } from './read-whole.mjs';
+import { packError, unpackError } from './thread-errors.mjs';
 
-/** A scene file as a cloud, read while the caller does something else. Rejects as `readScene` does, or with the error of the file system. */
+/** A scene file as a cloud in shared memory, read while the caller does something else. Rejects as `readScene` does, or with the error of the file system. */
 export function readInThread(path) {
   return new Promise((resolve, reject) => {
     const thread = new Worker(new URL(import.meta.url), { workerData: path });
     thread.once('error', reject);
-    thread.once('message', ({ cloud, data, message, code }) => {
+    thread.once('message', ({ cloud, error }) => {
       if (cloud) resolve(cloud);
-      else reject(data ? GaussianSplatError.fromData(data) : Object.assign(new Error(message), { code }));
+      else reject(unpackError(error));
     });
   });
 }
@@ -22,12 +22,21 @@ async function answer(path) {
   const openPart = async (part) => new Uint8Array(readFileSync(join(dirname(path), part)));
   try {
     const cloud = await readScene(await readWhole(path), { name: path, openPart });
-    const arrays = Object.values(cloud).filter((value) => ArrayBuffer.isView(value));
-    parentPort.postMessage({ cloud }, [...new Set(arrays.map(({ buffer }) => buffer))]);
+    parentPort.postMessage({ cloud: shared(cloud) });
   } catch (error) {
-    const { message, code } = error;
-    parentPort.postMessage(error instanceof GaussianSplatError ? { data: error.toData() } : { message, code });
+    parentPort.postMessage({ error: packError(error) });
   }
+}
+
+/** The same cloud in memory that threads share. */
+function shared(cloud) {
+  const entries = Object.entries(cloud).map(([name, value]) => {
+    if (!(value instanceof Float32Array)) return [name, value];
+    const numbers = new Float32Array(new SharedArrayBuffer(value.byteLength));
+    numbers.set(value);
+    return [name, numbers];
+  });
+  return Object.fromEntries(entries);
 }
 
 if (!isMainThread) await answer(workerData);

@@ -30,6 +30,16 @@ for (const encoding of ENCODINGS) {
   }
 }
 
+test('a header may be long, and end anywhere', async () => {
+  const splats = rawSplats(3, 0);
+  const file = (length: number): Uint8Array =>
+    writePly([{ name: 'vertex', columns: inriaColumns(splats) }], { headerLines: [`comment ${'c'.repeat(length)}`] });
+  const rest = Buffer.from(file(0)).indexOf('end_header') + 'end_header\n'.length;
+  // From one whose last line ends some bytes before the first 16,384 to one that is longer by as many; and a very long one.
+  const lengths = Array.from({ length: 40 }, (_, k) => 16_384 - rest - 20 + k);
+  for (const length of [...lengths, 200_000]) assertHolds(await readScene(file(length)), splats);
+});
+
 test('any order of properties, extra ones, other elements and types give the same cloud', async () => {
   const wide: readonly PlyType[] = ['float', 'double'];
   await fc.assert(

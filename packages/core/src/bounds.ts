@@ -21,10 +21,15 @@ export function boundsOf(cloud: Pick<GaussianCloud, 'count' | 'positions' | 'opa
   if (count === 0) return { min: origin, max: origin, center: origin, radius: 1 };
   const min = [Infinity, Infinity, Infinity];
   const max = [-Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < 3 * count; i++) {
-    const axis = i % 3;
-    if (positions[i] < min[axis]) min[axis] = positions[i];
-    if (positions[i] > max[axis]) max[axis] = positions[i];
+  for (let axis = 0; axis < 3; axis++) {
+    let least = Infinity;
+    let most = -Infinity;
+    for (let i = axis; i < 3 * count; i += 3) {
+      const place = positions[i];
+      if (place < least) least = place;
+      if (place > most) most = place;
+    }
+    [min[axis], max[axis]] = [least, most];
   }
   const indices = sampleOpaque(opacities, count);
   const center = [0, 1, 2].map((axis) =>

@@ -3,6 +3,8 @@ import { readScene } from '@gaussian-splat/formats';
 import type { Evaluator } from './evaluator.js';
 import { findTrades, scaleToFit } from './fit.js';
 import { decibels, mean, meanSquareOf } from './measure.js';
+import { readInParts } from './parts/read-in-parts.js';
+import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
 import { Stopwatch } from './stopwatch.js';
 import { encodingsFor, type Encoding } from './write/index.js';
@@ -14,6 +16,8 @@ export interface EconomiseOptions {
   readonly name: string;
   /** Looks at the cloud: `GpuEvaluator` where there is a GPU, else `PaintedEvaluator`. */
   readonly evaluator: Evaluator;
+  /** Does what comes in parts, of writing and reading the file again; default {@link inline}. */
+  readonly pool?: TaskPool;
   readonly signal?: AbortSignal;
   /** Called with what is being done. */
   readonly onStep?: (step: string) => void;
@@ -51,7 +55,7 @@ const MAX_TRIES = 8;
  * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, or the file's name is of no known format.
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
-  const { minDecibels, evaluator, signal, onStep = () => undefined } = options;
+  const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
   const encodings = encodingsFor(options.name);
   const watch = new Stopwatch();
   onStep(`scoring ${cloud.count} splats`);
@@ -68,14 +72,19 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   for (let tries = 0; tries < MAX_TRIES; tries++) {
     const cut = trades.cutAt(filling * budget);
     const reduced = await evaluator.reduce(cut, signal);
-    const bytes = await encoding.write(reduced);
-    const written = await readScene(bytes, { name: options.name, signal });
+    const bytes = await encoding.write(reduced, pool);
+    const written = await readInParts(bytes, { name: options.name, signal }, pool);
     watch.lap('write');
     const found = await evaluator.compare(written, 'heldOut', signal);
     watch.lap('judge');
     onStep(`held-out views: ${decibels(mean(found)).toFixed(2)} dB`);
     if (mean(found) <= target)
-      return { ...summary(cloud, reduced, cut, found), bytes, encoding: encoding.title, seconds: watch.seconds };
+      return {
+        ...summary(cloud, reduced, cut, found),
+        bytes: unshared(bytes),
+        encoding: encoding.title,
+        seconds: watch.seconds,
+      };
     filling *= SHRINK;
   }
   throw unreachable(options, 'less, whatever was kept');
@@ -100,6 +109,11 @@ async function chooseEncoding(
     if (rounding <= ROUNDING_SHARE * target || (isLast && rounding < 0.95 * target)) return { encoding, rounding };
   }
   throw unreachable(options, `at most ${decibels(best).toFixed(1)} dB, with every splat kept`);
+}
+
+/** The same bytes in memory that is nobody else's: much that takes bytes refuses shared ones. */
+function unshared(bytes: Uint8Array): Uint8Array<ArrayBuffer> {
+  return bytes.buffer instanceof ArrayBuffer ? (bytes as Uint8Array<ArrayBuffer>) : new Uint8Array(bytes);
 }
 
 function summary(

@@ -1,7 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { Evaluator } from './evaluator.js';
 import { mean } from './measure.js';
-import { ascendingOrder } from './order.js';
+import { valuesAtPlaces } from './order.js';
 import type { Cut } from './reduce.js';
 import type { Ranking } from './score.js';
 import { bestTrades, measureTrades, type TradeCurve } from './search.js';
@@ -87,15 +87,15 @@ async function chooseDropping(
     { values: removalError, cutAt: (removalPrice: number): Cut => ({ removalPrice }) },
     { values: contribution, cutAt: (minContribution: number): Cut => ({ minContribution }) },
   ].map(({ values, cutAt }) => {
-    const order = ascendingOrder(values);
-    const at = (share: number): number => values[order[Math.floor(share * (order.length - 1))]];
-    return { at, cutAt };
+    const places = [TRIAL_SHARE, ...DROPPED_SHARES].map((share) => Math.floor(share * (values.length - 1)));
+    const [trial, ...dropped] = valuesAtPlaces(values, places);
+    return { trial, dropped, cutAt };
   });
   const trials: number[] = [];
-  for (const { at, cutAt } of candidates)
-    trials.push(mean((await evaluator.cut(cutAt(at(TRIAL_SHARE)), 'searched', signal)).errors));
-  const { at, cutAt } = candidates[trials[0] <= trials[1] ? 0 : 1];
-  const thresholds = [...new Set(DROPPED_SHARES.map(at))].filter((price) => price > 0 && Number.isFinite(price));
+  for (const { trial, cutAt } of candidates)
+    trials.push(mean((await evaluator.cut(cutAt(trial), 'searched', signal)).errors));
+  const { dropped, cutAt } = candidates[trials[0] <= trials[1] ? 0 : 1];
+  const thresholds = [...new Set(dropped)].filter((price) => price > 0 && Number.isFinite(price));
   return { thresholds, cutAt };
 }
 

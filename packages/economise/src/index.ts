@@ -16,6 +16,7 @@ export {
 } from './mask.js';
 export { decibels, meanSquare, Studio, type Image, type Painter } from './measure.js';
 export { PaintedEvaluator, type PaintedEvaluatorOptions } from './painted-evaluator.js';
+export type { TaskPool } from './parts/task-pool.js';
 export { degreesOf, reduce, type Cut, type ReducedCloud } from './reduce.js';
 export { scoreSplats, type Ranking, type Scores } from './score.js';
 export type { ContributionScorer } from './scorer.js';

@@ -1,6 +1,9 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { ascendingOrder } from './order.js';
+import { coarseToFine } from './order.js';
+import { allocateColumns, arraysOf, columnsOf } from './parts/cloud-memory.js';
+import { inline, partsOf, poolFor, type TaskPool } from './parts/task-pool.js';
 import type { Scores } from './score.js';
+import { takeSplats } from './take-splats.js';
 
 /** What is taken from a scene. */
 export interface Cut {
@@ -49,59 +52,29 @@ export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedC
 }
 
 /** The splats that stay, in their order. Coefficients of those that keep a lower degree than the cloud's are 0: to be put in by whoever knows them. */
-export function reduceTo(cloud: GaussianCloud, { kept, degrees }: Choice): ReducedCloud {
-  const highest = degrees.reduce((most, degree) => Math.max(most, degree), 0) as ShDegree;
-  const reduced = {
-    ...cloud,
-    count: kept.length,
-    positions: rowsOf(cloud.positions, 3, kept),
-    scales: rowsOf(cloud.scales, 3, kept),
-    rotations: rowsOf(cloud.rotations, 4, kept),
-    opacities: rowsOf(cloud.opacities, 1, kept),
-    sh: wholeColoursOf(cloud, kept, degrees, highest),
-    shDegree: highest,
-  };
-  return { cloud: reduced, degrees };
+export function reduceTo(cloud: GaussianCloud, choice: Choice): ReducedCloud {
+  const reduced = roomFor(cloud, choice, inline);
+  takeSplats({ from: cloud, to: reduced.cloud, ...choice, at: 0 });
+  return reduced;
 }
 
-/** Rows of so many numbers, in a new order. */
-function rowsOf(values: Float32Array, width: number, kept: Uint32Array): Float32Array {
-  const taken = new Float32Array(width * kept.length);
-  for (let k = 0; k < kept.length; k++) {
-    for (let column = 0; column < width; column++) taken[width * k + column] = values[width * kept[k] + column];
-  }
-  return taken;
+/** The same, in parts. What is left lies in memory that the pool's tasks share. */
+export async function reduceInParts(cloud: GaussianCloud, choice: Choice, pool: TaskPool): Promise<ReducedCloud> {
+  const reduced = roomFor(cloud, choice, pool);
+  const [from, to] = [columnsOf(cloud), columnsOf(reduced.cloud)];
+  const workers = poolFor(pool, choice.kept.length, [...arraysOf(from), ...arraysOf(to)]);
+  const inputs = partsOf(choice.kept.length, workers).map(({ first, end }) => ({
+    ...{ from, to, at: first, kept: choice.kept.slice(first, end), degrees: choice.degrees.slice(first, end) },
+  }));
+  await workers.run('takeSplats', inputs);
+  return reduced;
 }
 
-/** The coefficients of the splats that keep all of theirs, in rows as long as the highest degree needs. */
-function wholeColoursOf(
-  { sh, shDegree }: GaussianCloud,
-  kept: Uint32Array,
-  degrees: Uint8Array,
-  highest: ShDegree,
-): Float32Array {
-  const length = 3 * shCoefficientCount(highest);
-  const colours = new Float32Array(length * kept.length);
-  for (let k = 0; k < kept.length; k++) {
-    if (degrees[k] < shDegree) continue;
-    for (let number = 0; number < length; number++) colours[length * k + number] = sh[length * kept[k] + number];
-  }
-  return colours;
-}
-
-/** The same splats, the most seen first: by contribution times the area of the splat. */
-export function coarseToFine({ scales }: GaussianCloud, contribution: Float32Array, splats: Uint32Array): Uint32Array {
-  const importance = new Float32Array(splats.length);
-  for (let k = 0; k < splats.length; k++) {
-    const i = splats[k];
-    const a = scales[3 * i];
-    const b = scales[3 * i + 1];
-    const c = scales[3 * i + 2];
-    importance[k] = contribution[i] * Math.max(a * b, b * c, c * a);
-  }
-  const order = ascendingOrder(importance).reverse();
-  for (let k = 0; k < order.length; k++) order[k] = splats[order[k]];
-  return order;
+/** A reduced cloud whose numbers are all 0. */
+function roomFor(cloud: GaussianCloud, { kept, degrees }: Choice, pool: TaskPool): ReducedCloud {
+  const highest = degreesOf(degrees).findLastIndex((count) => count > 0);
+  const columns = allocateColumns(kept.length, Math.max(0, highest) as ShDegree, pool);
+  return { cloud: { ...cloud, ...columns, count: kept.length }, degrees };
 }
 
 /** The degree at which error and the price of what is kept add up to least. */
@@ -125,5 +98,5 @@ export function degreesOf(degrees: Uint8Array): number[] {
 
 /** Coefficients above the constant one that a reduced cloud keeps, all splats and channels together. */
 export function keptCoefficients(degrees: Uint8Array): number {
-  return degrees.reduce((sum, degree) => sum + 3 * ((degree + 1) ** 2 - 1), 0);
+  return degreesOf(degrees).reduce((sum, count, degree) => sum + 3 * count * ((degree + 1) ** 2 - 1), 0);
 }

@@ -6,4 +6,5 @@ export { readPrefix, readScene, type ReadSceneOptions } from './read-scene.js';
 export { isSequence } from './is-sequence.js';
 export type { FileBytes } from './bytes.js';
 export { frameAt, parseSequence, type SceneSequence } from './sequence.js';
-export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource } from './scene-format.js';
+export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
+export { HEADER_BYTES, readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';

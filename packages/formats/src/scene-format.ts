@@ -1,5 +1,11 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 
+/** Splats `first` to `end`, the latter not included, in the order of the file. */
+export interface SplatRange {
+  readonly first: number;
+  readonly end: number;
+}
+
 /** One scene file in memory, as readers get it. */
 export interface SceneSource {
   /** The whole file, as the server or disk gave it. */
@@ -10,6 +16,8 @@ export interface SceneSource {
   readonly signal?: AbortSignal;
   /** True if `bytes` are only the first of the file: the splats that are whole are read, attributes that are missing left out. */
   readonly isPrefix?: boolean;
+  /** Only these splats are wanted; readers that cannot leave the others out do not know it. See `splatRanges`. */
+  readonly range?: SplatRange;
   /** Opens the files that a scene of several files names; absent where there is only the one. */
   readonly openPart?: OpenPart;
   /** Which level of a scene with levels of detail is read: 0 is the finest. `all`: all of them, in the runs that `GaussianCloud.levelRuns` tells. */

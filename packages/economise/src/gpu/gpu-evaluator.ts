@@ -4,7 +4,9 @@ import { rareKernelOf } from '@gaussian-splat/renderer/stages';
 import type { LoweredColours } from '../colour-moments.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
-import { coarseToFine, reduceTo, type Cut, type ReducedCloud } from '../reduce.js';
+import { coarseToFine, stayingInOrder } from '../order.js';
+import { inline, poolFor, type TaskPool } from '../parts/task-pool.js';
+import { reduceInParts, type Cut, type ReducedCloud } from '../reduce.js';
 import type { Ranking, Scores } from '../score.js';
 import type { DealtViews } from '../views.js';
 import { CloudBuffers } from './cloud-buffers.js';
@@ -21,6 +23,8 @@ export interface GpuEvaluatorOptions {
   readonly partSplats?: number;
   /** Views whose energies are kept until they are added to the moments of colour, default 32. */
   readonly viewsAtOnce?: number;
+  /** Takes what stays out of the cloud, in parts; default {@link inline}. */
+  readonly pool?: TaskPool;
 }
 
 /** Exact, so that no rounding is taken for an effect of the cut. */
@@ -45,8 +49,11 @@ export class GpuEvaluator implements Evaluator {
   readonly #scene: SceneParts;
   readonly #renderer: Renderer;
   readonly #cutScene: CutScene;
+  readonly #pool: TaskPool;
   readonly #errors = new Map<JudgedViews, PictureErrors>();
   #ranking: Ranking | undefined;
+  /** All splats, the most seen first: a thread finds it meanwhile. Undefined where there is none. */
+  #order: Promise<Uint32Array> | undefined;
 
   private constructor(
     device: GPUDevice,
@@ -54,12 +61,14 @@ export class GpuEvaluator implements Evaluator {
     views: DealtViews,
     scene: SceneParts,
     cutScene: CutScene,
+    pool: TaskPool,
   ) {
     this.#device = device;
     this.#cloud = cloud;
     this.#views = views;
     this.#scene = scene;
     this.#cutScene = cutScene;
+    this.#pool = pool;
     this.#renderer = new Renderer(device, QUALITY);
   }
 
@@ -78,12 +87,12 @@ export class GpuEvaluator implements Evaluator {
     device: GPUDevice,
     cloud: GaussianCloud,
     views: DealtViews,
-    { partSplats, viewsAtOnce = VIEWS_AT_ONCE }: GpuEvaluatorOptions = {},
+    { partSplats, viewsAtOnce = VIEWS_AT_ONCE, pool = inline }: GpuEvaluatorOptions = {},
   ): Promise<GpuEvaluator> {
     const energies = Math.min(views.scored.length, viewsAtOnce);
     const scene = await SceneParts.upload(device, cloud, energies, partSplats);
     try {
-      return new GpuEvaluator(device, cloud, views, scene, await CutScene.of(device, scene));
+      return new GpuEvaluator(device, cloud, views, scene, await CutScene.of(device, scene), pool);
     } catch (error) {
       scene.destroy();
       throw error;
@@ -99,6 +108,7 @@ export class GpuEvaluator implements Evaluator {
         byteLength: layouts.Score.size * page.count,
       }));
       this.#ranking = this.#rankingOf(await readBack(this.#device, parts));
+      this.#order = this.#orderAhead(this.#ranking);
       // Now, while the renderer still has room for this scene: for each other one it finds it anew.
       for (const views of ['searched', 'heldOut'] as const) await this.#errorsIn(views);
       return this.#ranking;
@@ -151,11 +161,14 @@ export class GpuEvaluator implements Evaluator {
     signal?.throwIfAborted();
     this.#cutScene.apply(cut);
     const { staying, degrees: all } = await this.#cutScene.choice();
-    const kept = coarseToFine(this.#cloud, this.#ranking.contribution, staying);
+    const order = await this.#order;
+    const kept = order
+      ? stayingInOrder(order, staying)
+      : coarseToFine(this.#cloud, this.#ranking.contribution, staying);
     const degrees = new Uint8Array(kept.length);
     for (let k = 0; k < kept.length; k++) degrees[k] = all[kept[k]];
-    const reduced = reduceTo(this.#cloud, { kept, degrees });
-    await putLowered(this.#device, this.#scene, reduced, kept);
+    const reduced = await reduceInParts(this.#cloud, { kept, degrees }, this.#pool);
+    await putLowered(this.#device, this.#scene, reduced, kept, this.#pool);
     return reduced;
   }
 
@@ -183,6 +196,16 @@ export class GpuEvaluator implements Evaluator {
     const made = await PictureErrors.of(this.#device, this.#renderer, this.#scene.gaussians, this.#views[views]);
     this.#errors.set(views, made);
     return made;
+  }
+
+  #orderAhead({ contribution }: Ranking): Promise<Uint32Array> | undefined {
+    const { count, scales } = this.#cloud;
+    const pool = poolFor(this.#pool, count, [scales]);
+    if (pool === inline) return undefined;
+    const order = pool.run('orderAll', [{ scales, contribution }]).then(([all]) => all);
+    // Whoever needs it hears of its error.
+    order.catch(() => undefined);
+    return order;
   }
 
   /** Scores by splat. */

@@ -1,9 +1,10 @@
 import { shCoefficientCount, type ShDegree } from '@gaussian-splat/core';
 import { BUFFER_USAGE, GpuMemory, rareKernelOf, writeStruct } from '@gaussian-splat/renderer/stages';
 import { economiseTake, SCORE_GROUP } from '../generated/shaders.js';
+import { partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
 import type { ReducedCloud } from '../reduce.js';
 import { layouts } from './layouts.js';
-import { readBack, type ReadPart } from './read-back.js';
+import { readBackWith, type ReadPart } from './read-back.js';
 import type { ScenePart, SceneParts } from './scene-parts.js';
 
 /** Splats of a part that keep the same degree, which is below the scene's. */
@@ -23,16 +24,23 @@ export async function putLowered(
   { gaussians: { shDegree }, parts }: SceneParts,
   { cloud, degrees }: ReducedCloud,
   kept: Uint32Array,
+  pool: TaskPool,
 ): Promise<void> {
+  const workers = poolFor(pool, cloud.count, [cloud.sh]);
   const lists = parts.flatMap((part) => loweredSplatsOf(part, shDegree, kept, degrees));
   const memory = new GpuMemory(device);
   try {
     const taken = lists.map((list) => take(device, memory, shDegree, list, kept));
-    const rows = await readBack(device, taken);
-    lists.forEach(({ degree, places }, k) => {
+    const rows = await readBackWith(device, taken, (mapped) => numbersIn(mapped, workers));
+    const length = 3 * shCoefficientCount(cloud.shDegree);
+    const inputs = lists.flatMap(({ degree, places }, k) => {
       const width = 3 * shCoefficientCount(degree);
-      putRows(new Float32Array(rows[k]), width, places, cloud.sh, 3 * shCoefficientCount(cloud.shDegree));
+      return partsOf(places.length, workers).map(({ first, end }) => ({
+        ...{ width, length, to: cloud.sh, places: places.slice(first, end) },
+        rows: rows[k].subarray(width * first, width * end),
+      }));
     });
+    await workers.run('putRows', inputs);
   } finally {
     memory.destroy();
   }
@@ -81,9 +89,9 @@ function take(
   return { buffer: taken, byteLength: 4 * count };
 }
 
-/** Copies rows of `width` numbers to the beginnings of longer ones, at their places. */
-function putRows(rows: Float32Array, width: number, places: Uint32Array, out: Float32Array, length: number): void {
-  for (let n = 0; n < places.length; n++) {
-    for (let k = 0; k < width; k++) out[length * places[n] + k] = rows[width * n + k];
-  }
+/** The same numbers in memory that tasks share. */
+function numbersIn(bytes: ArrayBuffer, pool: TaskPool): Float32Array {
+  const numbers = new Float32Array(pool.allocate(bytes.byteLength));
+  numbers.set(new Float32Array(bytes));
+  return numbers;
 }

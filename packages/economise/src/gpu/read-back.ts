@@ -10,6 +10,18 @@ export interface ReadPart {
 
 /** Reads buffers back, in one submission. Rejects if the device is lost meanwhile. */
 export async function readBack(device: GPUDevice, parts: readonly ReadPart[]): Promise<ArrayBuffer[]> {
+  return readBackWith(device, parts, (mapped) => mapped.slice(0));
+}
+
+/**
+ * The same, for those who put the bytes elsewhere.
+ * @param take is given the bytes of each part, which are gone when it has returned
+ */
+export async function readBackWith<Taken>(
+  device: GPUDevice,
+  parts: readonly ReadPart[],
+  take: (mapped: ArrayBuffer) => Taken,
+): Promise<Taken[]> {
   const { mapRead, copyDestination } = BUFFER_USAGE;
   const encoder = device.createCommandEncoder({ label: 'gs.economise.read' });
   const staged = parts.map(({ buffer, byteOffset = 0, byteLength = buffer.size }) => {
@@ -26,7 +38,7 @@ export async function readBack(device: GPUDevice, parts: readonly ReadPart[]): P
     return await Promise.all(
       staged.map(async (staging) => {
         await staging.mapAsync(0x1);
-        return staging.getMappedRange().slice(0);
+        return take(staging.getMappedRange());
       }),
     );
   } finally {

@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { ReducedCloud } from '../reduce.js';
+import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
 import { writePly } from './ply.js';
 import { writeSpz } from './spz.js';
@@ -8,7 +9,8 @@ import { writeSpz } from './spz.js';
 export interface Encoding {
   /** For people. */
   readonly title: string;
-  readonly write: (reduced: ReducedCloud) => Uint8Array<ArrayBuffer> | Promise<Uint8Array<ArrayBuffer>>;
+  /** @param pool does what can be done in parts; the file then lies in its memory */
+  readonly write: (reduced: ReducedCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
 }
 
 const spz = (shBits: number): Encoding => ({

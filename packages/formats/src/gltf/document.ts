@@ -1,6 +1,6 @@
 import { alignedTo4, grouped, hostIsLittleEndian } from '../bytes.js';
 import { damaged } from '../damaged.js';
-import type { OpenPart } from '../scene-format.js';
+import type { OpenPart, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';
 
@@ -24,10 +24,11 @@ const WIDTHS: ReadonlyMap<unknown, number> = new Map([
 
 /** Numbers of an accessor. */
 export interface AccessorData {
+  /** Elements of the accessor, those too that were not asked for. */
   readonly count: number;
   /** Numbers of one element. */
   readonly width: number;
-  /** [count, width], normalised where the accessor says so. Not to be changed: it may be the file's own memory. */
+  /** [elements asked for, width], normalised where the accessor says so. Not to be changed: it may be the file's own memory. */
   readonly values: Float32Array;
 }
 
@@ -68,7 +69,8 @@ export class GltfDocument {
     return this.isIndex(count) ? count : this.fail(`accessors[${String(index)}].count`, 'a whole number', count);
   }
 
-  async readAccessor(index: unknown): Promise<AccessorData> {
+  /** @param range elements that are read; default all */
+  async readAccessor(index: unknown, range?: SplatRange): Promise<AccessorData> {
     const accessor = this.item('accessors', index);
     const path = `accessors[${String(index)}]`;
     const component =
@@ -91,15 +93,18 @@ export class GltfDocument {
     if (end > bytes.length) {
       throw damaged(`${this.name}, ${path}`, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/corrupt');
     }
+    const { first, end: last } = range ?? { first: 0, end: count };
+    const elements = Math.max(0, Math.min(count, last) - first);
+    const start = byteOffset + first * byteStride;
     if (accessor.componentType === FLOAT && byteStride === 4 * width && hostIsLittleEndian) {
       // Numbers that lie as they are wanted are the file's own. A view's beginning need not be a multiple of 4.
-      const own = alignedTo4(bytes.subarray(byteOffset, byteOffset + 4 * count * width));
-      return { count, width, values: new Float32Array(own.buffer, own.byteOffset, count * width) };
+      const own = alignedTo4(bytes.subarray(start, start + 4 * elements * width));
+      return { count, width, values: new Float32Array(own.buffer, own.byteOffset, elements * width) };
     }
     const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-    const values = new Float32Array(count * width);
-    for (let i = 0; i < count; i++) {
-      const at = byteOffset + i * byteStride;
+    const values = new Float32Array(elements * width);
+    for (let i = 0; i < elements; i++) {
+      const at = start + i * byteStride;
       for (let k = 0; k < width; k++) values[i * width + k] = component.get(data, at + k * component.bytes);
     }
     // The lowest signed integer stands for -1 as well as the one above it.

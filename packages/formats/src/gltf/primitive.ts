@@ -6,6 +6,7 @@ import { isObject, show } from '../json.js';
 import { readSpz } from '../readers/spz.js';
 import { transformCloud } from '../transform/transform-cloud.js';
 import type { Json } from './container.js';
+import type { SplatRange } from '../scene-format.js';
 import type { GltfDocument } from './document.js';
 
 const EXTENSION = 'KHR_gaussian_splatting';
@@ -20,14 +21,32 @@ export function isSplats(primitive: unknown): primitive is Json {
   return isObject(primitive) && isObject(primitive.extensions) && isObject(primitive.extensions[EXTENSION]);
 }
 
-/** Reads a primitive with `KHR_gaussian_splatting` into a cloud in the frame of its node. */
+/** True if the numbers of a primitive of splats lie open. */
+export function isUncompressed(primitive: Json): boolean {
+  const { extensions } = splatsOf(primitive);
+  return !isObject(extensions) || Object.keys(extensions).length === 0;
+}
+
+const splatsOf = ({ extensions }: Json): Json => (extensions as Json)[EXTENSION] as Json;
+
+/** Splats of a primitive whose numbers lie open, and the degree of their spherical harmonics. */
+export function splatsIn(document: GltfDocument, { attributes }: Json): { count: number; shDegree: ShDegree } {
+  const own = isObject(attributes) ? attributes : {};
+  return { count: document.accessorCount(own.POSITION), shDegree: degreeOf((name) => own[`${EXTENSION}:${name}`]) };
+}
+
+/**
+ * Reads a primitive with `KHR_gaussian_splatting` into a cloud in the frame of its node.
+ * @param range splats of an uncompressed primitive that are read; default all
+ */
 export async function readPrimitive(
   document: GltfDocument,
   primitive: Json,
   path: string,
   signal: AbortSignal | undefined,
+  range?: SplatRange,
 ): Promise<GaussianCloud> {
-  const splats = (primitive.extensions as Json)[EXTENSION] as Json;
+  const splats = splatsOf(primitive);
   requireKnown(document, splats, path);
   const compression = isObject(splats.extensions) ? splats.extensions : {};
   const spz = SPZ_EXTENSIONS.map((name) => compression[name]).find(isObject);
@@ -40,7 +59,7 @@ export async function readPrimitive(
       Object.keys(compression)[0],
     );
   }
-  return readAttributes(document, primitive, path);
+  return readAttributes(document, primitive, path, range);
 }
 
 function requireKnown(document: GltfDocument, splats: Json, path: string): void {
@@ -67,17 +86,23 @@ async function readCompressed(
   return cloud;
 }
 
-async function readAttributes(document: GltfDocument, primitive: Json, path: string): Promise<GaussianCloud> {
+async function readAttributes(
+  document: GltfDocument,
+  primitive: Json,
+  path: string,
+  range: SplatRange | undefined,
+): Promise<GaussianCloud> {
   const attributes = isObject(primitive.attributes) ? primitive.attributes : {};
   const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`];
-  const count = document.accessorCount(attributes.POSITION);
+  const all = document.accessorCount(attributes.POSITION);
+  const count = range ? range.end - range.first : all;
   const read = async (name: string, index: unknown, width: number): Promise<Float32Array> => {
     if (index === undefined)
       return document.fail(`${path}, attributes`, `an attribute ${name}`, Object.keys(attributes));
-    const data = await document.readAccessor(index);
-    if (data.count !== count || data.width !== width) {
+    const data = await document.readAccessor(index, range);
+    if (data.count !== all || data.width !== width) {
       const found = `${grouped(data.count)} of ${data.width} numbers`;
-      return document.fail(`${path}, ${name}`, `${grouped(count)} of ${width} numbers`, found);
+      return document.fail(`${path}, ${name}`, `${grouped(all)} of ${width} numbers`, found);
     }
     return data.values;
   };

@@ -51,6 +51,8 @@ const ENCODINGS: ReadonlyMap<string, PlyHeader['encoding']> = new Map([
 
 /** Headers of splat files have 1 to 5 KB; a longer one than this is not searched for its end. */
 const MAX_HEADER_BYTES = 262_144;
+/** So many are looked at first: a quarter of a megabyte of numbers as text takes longer than reading some thousand splats. */
+const USUAL_HEADER_BYTES = 16_384;
 
 /** Size in bytes of one binary value. */
 export function sizeOf(type: ScalarType): number {
@@ -107,13 +109,15 @@ function parseProperty(words: readonly string[], properties: readonly PlyPropert
 }
 
 /** Lines up to, not including, `end_header`, and the byte after that line. */
-function splitHeader(source: SceneSource): { lines: string[]; dataStart: number } {
+function splitHeader(source: SceneSource, length = USUAL_HEADER_BYTES): { lines: string[]; dataStart: number } {
   const { bytes, name } = source;
-  const text = asciiOf(bytes, 0, MAX_HEADER_BYTES);
+  const text = asciiOf(bytes, 0, length);
   // With lone CRs a first data byte of 10 belongs to the data; otherwise LF ends every line and a CR before it is part
   // of the line end.
   const usesLoneCr = /^ply[ \t]*\r(?!\n)/.test(text);
   const end = (usesLoneCr ? /\rend_header[ \t]*(\r|$)/ : /\nend_header[ \t]*\r?(\n|$)/).exec(text);
+  const isWithin = end !== null && end.index + end[0].length < length;
+  if (!isWithin && length < Math.min(bytes.length, MAX_HEADER_BYTES)) return splitHeader(source, MAX_HEADER_BYTES);
   if (end) {
     const lines = text.slice(0, end.index).split(usesLoneCr ? '\r' : /\r?\n/);
     return { lines, dataStart: end.index + end[0].length };

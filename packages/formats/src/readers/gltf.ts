@@ -1,11 +1,11 @@
-import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { GaussianSplatError, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { openContainer, type Json } from '../gltf/container.js';
 import { GltfDocument } from '../gltf/document.js';
 import { multiply, placedMeshes, type Affine } from '../gltf/nodes.js';
-import { isSplats, readPrimitive } from '../gltf/primitive.js';
+import { isSplats, isUncompressed, readPrimitive, splatsIn } from '../gltf/primitive.js';
 import { mergeClouds } from '../merge-clouds.js';
-import type { SceneSource } from '../scene-format.js';
+import type { SceneSource, SplatRange } from '../scene-format.js';
 import { transformCloud } from '../transform/transform-cloud.js';
 import { noParts } from './sog.js';
 
@@ -21,34 +21,72 @@ const MAX_GROWTH = 4_096;
  * cameras, lights and animations are left out.
  */
 export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
-  const { bytes, name, signal } = source;
-  const document = new GltfDocument(openContainer(bytes, name), name, source.openPart ?? noParts(name));
+  const { bytes, name, signal, range } = source;
+  const { document, placed, others } = open(source);
+  if (placed.length === 0) throw noSplats(document.json, name, others);
   const clouds: GaussianCloud[] = [];
   let splats = 0;
-  let others = 0;
-  for (const { mesh, toScene } of placedMeshes(document)) {
-    const { primitives } = document.item('meshes', mesh);
-    if (!Array.isArray(primitives)) document.fail(`meshes[${mesh}].primitives`, 'a list', primitives);
-    for (const [k, primitive] of (primitives as unknown[]).entries()) {
-      signal?.throwIfAborted();
-      if (!isSplats(primitive)) {
-        others++;
-        continue;
-      }
-      const cloud = await readPrimitive(document, primitive, `meshes[${mesh}].primitives[${k}]`, signal);
-      splats += cloud.count;
-      if (splats > MAX_GROWTH * bytes.length)
-        document.fail('nodes', 'a mesh in some places', `${grouped(splats)} splats`);
-      transformCloud(cloud, multiply(TO_CLOUD, toScene));
-      clouds.push(cloud);
+  for (const { primitive, path, toScene } of placed) {
+    signal?.throwIfAborted();
+    const own = range && within(range, splats, splatsIn(document, primitive).count);
+    if (own && own.end <= own.first) {
+      splats += own.count;
+      continue;
     }
+    const cloud = await readPrimitive(document, primitive, path, signal, own);
+    splats += own?.count ?? cloud.count;
+    if (splats > MAX_GROWTH * bytes.length)
+      document.fail('nodes', 'a mesh in some places', `${grouped(splats)} splats`);
+    transformCloud(cloud, multiply(TO_CLOUD, toScene));
+    clouds.push(cloud);
   }
-  if (clouds.length === 0) throw noSplats(document.json, name, others);
   if (clouds.length === 1) return clouds[0];
   return mergeClouds(
     clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
     name,
   );
+}
+
+/** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time, because they are compressed. */
+export function gltfSplats(source: SceneSource): { count: number; shDegree: ShDegree } | undefined {
+  const { document, placed } = open(source);
+  if (!placed.every(({ primitive }) => isUncompressed(primitive))) return undefined;
+  const found = placed.map(({ primitive }) => splatsIn(document, primitive));
+  const count = found.reduce((sum, own) => sum + own.count, 0);
+  const shDegree = found.reduce<ShDegree>((most, own) => (own.shDegree > most ? own.shDegree : most), 0);
+  return { count, shDegree };
+}
+
+/** Splats at their place in the scene, and where in the file they stand. */
+interface PlacedSplats {
+  readonly primitive: Json;
+  readonly path: string;
+  readonly toScene: Affine;
+}
+
+/** The primitives of splats of the default scene in their order, and how many others there are. */
+function open({ bytes, name, openPart }: SceneSource): {
+  document: GltfDocument;
+  placed: PlacedSplats[];
+  others: number;
+} {
+  const document = new GltfDocument(openContainer(bytes, name), name, openPart ?? noParts(name));
+  const placed: PlacedSplats[] = [];
+  let others = 0;
+  for (const { mesh, toScene } of placedMeshes(document)) {
+    const { primitives } = document.item('meshes', mesh);
+    if (!Array.isArray(primitives)) document.fail(`meshes[${mesh}].primitives`, 'a list', primitives);
+    for (const [k, primitive] of (primitives as unknown[]).entries()) {
+      if (isSplats(primitive)) placed.push({ primitive, path: `meshes[${mesh}].primitives[${k}]`, toScene });
+      else others++;
+    }
+  }
+  return { document, placed, others };
+}
+
+/** The part of a range that lies in `count` splats from number `at` on, counted from there. */
+function within({ first, end }: SplatRange, at: number, count: number): SplatRange & { count: number } {
+  return { first: Math.max(0, first - at), end: Math.min(count, end - at), count };
 }
 
 function noSplats({ meshes }: Json, name: string, others: number): GaussianSplatError {

@@ -1,0 +1,49 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { readScene, splatRanges, type SplatRanges } from '@gaussian-splat/formats';
+import { allocateColumns, closeGaps, type Columns } from './cloud-memory.js';
+import type { PartRead } from './read-part.js';
+import { partsOf, poolFor, type Part, type TaskPool } from './task-pool.js';
+
+/** Reads a scene in memory as `readScene` does, in parts where its format and the pool allow. */
+export async function readInParts(
+  bytes: Uint8Array,
+  options: { readonly name: string; readonly signal?: AbortSignal },
+  pool: TaskPool,
+): Promise<GaussianCloud> {
+  const { name, signal } = options;
+  if (pool.size > 1 && pool.shares(bytes.buffer)) {
+    const ranges = await splatRanges(bytes, name);
+    const readAll = (parts: readonly Part[], to: Columns): Promise<PartRead[]> =>
+      pool.run(
+        'readPart',
+        parts.map((part) => ({ bytes, name, part, to })),
+      );
+    const cloud = ranges && (await gatherParts(ranges, pool, readAll));
+    signal?.throwIfAborted();
+    if (cloud) return cloud;
+  }
+  return readScene(bytes, options);
+}
+
+/**
+ * Has the splats of a file read part by part into memory that tasks share.
+ * @param readAll reads parts into columns, as `readBlocks` does
+ * @returns undefined if the scene is too small for parts, or no splat can be drawn
+ */
+export async function gatherParts(
+  { count, shDegree }: SplatRanges,
+  pool: TaskPool,
+  readAll: (parts: readonly Part[], to: Columns) => Promise<readonly PartRead[]>,
+): Promise<GaussianCloud | undefined> {
+  const parts = partsOf(count, poolFor(pool, count));
+  if (parts.length <= 1) return undefined;
+  const columns = allocateColumns(count, shDegree, pool);
+  const read = await readAll(parts, columns);
+  const kept = closeGaps(
+    columns,
+    read.map((part, k) => ({ first: parts[k].first, count: part.count })),
+  );
+  if (kept.count === 0) return undefined;
+  const antialiased = read.some((part) => part.antialiased);
+  return { ...kept, origin: [0, 0, 0], antialiased, droppedCount: count - kept.count };
+}

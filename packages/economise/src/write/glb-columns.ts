@@ -1,0 +1,128 @@
+import { shCoefficientCount } from '@gaussian-splat/core';
+import type { Vector3 } from '@gaussian-splat/core';
+import type { Columns } from '../parts/cloud-memory.js';
+
+export const EXTENSION = 'KHR_gaussian_splatting';
+
+/**
+ * Signs of the coefficients of degrees 0 to 3 under the half turn about z that leads from a cloud's axes (right, down, forward) to
+ * glTF's (left, up, forward).
+ */
+const HALF_TURN = [1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1];
+
+/** The same turn of places. */
+const PLACE_SIGNS = [-1, -1, 1];
+
+/** Splats are visited in blocks of this many, so that their rows stay in the cache while column after column of them is written. */
+const BLOCK = 256;
+
+type Numbers = Float32Array | Int16Array;
+
+/** What a primitive says of each of its splats: an attribute of glTF. A splat takes whole words of each. */
+export interface GlbColumn {
+  readonly name: string;
+  readonly width: number;
+  readonly isShort?: boolean;
+  /** Writes the numbers of some splats from the beginning of `out` on. */
+  readonly put: (out: Numbers, splats: Uint32Array) => void;
+}
+
+/** A cloud, and where it is. */
+export interface Placed {
+  readonly columns: Columns;
+  readonly origin: Vector3;
+}
+
+/** The attributes of splats that keep one degree. */
+export function glbColumns({ columns, origin }: Placed, degree: number): GlbColumn[] {
+  const { positions, rotations, opacities, scales, sh, shDegree } = columns;
+  /** Some numbers of the splats' rows, each times a sign. */
+  const plain = (name: string, values: Float32Array, stride: number, at: number, width: number, sign = 1) => ({
+    name: `${EXTENSION}:${name}`,
+    width,
+    put: (out: Numbers, splats: Uint32Array): void => {
+      for (let n = 0; n < splats.length; n++) {
+        const from = stride * splats[n] + at;
+        for (let k = 0; k < width; k++) out[width * n + k] = sign * values[from + k];
+      }
+    },
+  });
+  const stride = 3 * shCoefficientCount(shDegree);
+  const colours = [0, 1, 2, 3].slice(0, degree + 1).flatMap((band) =>
+    Array.from({ length: 2 * band + 1 }, (_, k) => {
+      const n = band * band + k;
+      return plain(`SH_DEGREE_${band}_COEF_${k}`, sh, stride, 3 * n, 3, HALF_TURN[n]);
+    }),
+  );
+  return [
+    { name: 'POSITION', width: 3, put: (out, splats) => putPlaces(positions, origin, out, splats) },
+    {
+      ...{ name: `${EXTENSION}:ROTATION`, width: 4, isShort: true },
+      put: (out, splats) => putRotations(rotations, out, splats),
+    },
+    plain('SCALE', scales, 3, 0, 3),
+    plain('OPACITY', opacities, 1, 0, 1),
+    ...colours,
+  ];
+}
+
+/** Positions in the world and in glTF's axes. */
+function putPlaces(positions: Float32Array, origin: Vector3, out: Numbers, splats: Uint32Array): void {
+  for (let n = 0; n < splats.length; n++) {
+    for (let axis = 0; axis < 3; axis++) {
+      out[3 * n + axis] = PLACE_SIGNS[axis] * (positions[3 * splats[n] + axis] + origin[axis]);
+    }
+  }
+}
+
+/** The bounds of positions that glTF asks for: of what {@link glbColumns} writes. */
+export function placeBounds({ columns: { positions }, origin }: Placed, splats: Uint32Array): object {
+  const [min, max] = [new Array<number>(3), new Array<number>(3)];
+  for (let axis = 0; axis < 3; axis++) {
+    const [sign, shift] = [PLACE_SIGNS[axis], origin[axis]];
+    let [least, most] = [Infinity, -Infinity];
+    for (let n = 0; n < splats.length; n++) {
+      const place = Math.fround(sign * (positions[3 * splats[n] + axis] + shift));
+      if (place < least) least = place;
+      if (place > most) most = place;
+    }
+    [min[axis], max[axis]] = [least, most];
+  }
+  return { min, max };
+}
+
+/** The product of (0, 0, 0, 1) and (w, x, y, z), in glTF's order (x, y, z, w). */
+function putRotations(rotations: Float32Array, out: Numbers, splats: Uint32Array): void {
+  for (let n = 0; n < splats.length; n++) {
+    const from = 4 * splats[n];
+    out[4 * n] = Math.round(-32_767 * rotations[from + 2]);
+    out[4 * n + 1] = Math.round(32_767 * rotations[from + 1]);
+    out[4 * n + 2] = Math.round(32_767 * rotations[from]);
+    out[4 * n + 3] = Math.round(-32_767 * rotations[from + 3]);
+  }
+}
+
+/** Some splats of a primitive, and where in the file they go. */
+export interface ColumnsToPut extends Placed {
+  readonly degree: number;
+  readonly splats: Uint32Array;
+  /** Place of the first of them in the primitive. */
+  readonly at: number;
+  readonly bytes: Uint8Array;
+  /** Byte of the file where each attribute of the primitive begins. */
+  readonly starts: readonly number[];
+}
+
+/** Writes all attributes of some splats of a primitive. */
+export function putColumns({ degree, splats, at, bytes, starts, ...placed }: ColumnsToPut): void {
+  const outputs = glbColumns(placed, degree).map(({ width, isShort, put }, k) => {
+    const start = bytes.byteOffset + starts[k] + (isShort ? 2 : 4) * width * at;
+    const length = width * splats.length;
+    const out = isShort ? new Int16Array(bytes.buffer, start, length) : new Float32Array(bytes.buffer, start, length);
+    return { width, put, out };
+  });
+  for (let first = 0; first < splats.length; first += BLOCK) {
+    const block = splats.subarray(first, first + BLOCK);
+    for (const { width, put, out } of outputs) put(out.subarray(width * first, width * (first + block.length)), block);
+  }
+}

@@ -1,0 +1,32 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { keptDegree } from '../cloud.js';
+import { readPly } from '../readers/ply.js';
+import type { SceneSource, SplatRange } from '../scene-format.js';
+import { HEADER_BYTES, type SplatRanges } from '../splat-ranges.js';
+import { findGaussians } from './gaussian-layout.js';
+import { parsePlyHeader } from './header.js';
+import { openElement } from './rows.js';
+
+/** Coordinates of these types have an origin that all splats together decide. */
+const COARSE_TYPES = ['float64', 'int32', 'uint32'];
+
+/** Where the splats of a PLY lie, or undefined if its rows differ in size or depend on one another. */
+export function plyRanges(source: SceneSource): SplatRanges | undefined {
+  const header = parsePlyHeader(source);
+  const { vertex, degree } = findGaussians(source, header);
+  const { start, rowBytes } = openElement({ ...source, isPrefix: true }, header, 'vertex');
+  const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && COARSE_TYPES.includes(type));
+  if (rowBytes === undefined || rowBytes === 0 || isCoarse || start > HEADER_BYTES) return undefined;
+  return { count: vertex.count, shDegree: keptDegree(degree), rows: { start, byteLength: rowBytes } };
+}
+
+/** Reads some rows of a PLY: of a file that has its header, and then these rows alone. */
+export function readPlyRange(source: SceneSource & { readonly range: SplatRange }): GaussianCloud {
+  const { bytes, range } = source;
+  const { start, rowBytes = 0 } = openElement(source, parsePlyHeader(source), 'vertex');
+  const rows = bytes.subarray(start + rowBytes * range.first, start + rowBytes * range.end);
+  const part = new Uint8Array(start + rows.length);
+  part.set(bytes.subarray(0, start));
+  part.set(rows, start);
+  return readPly({ ...source, bytes: part, isPrefix: true });
+}

@@ -1,0 +1,34 @@
+/** The task of reading a part of a PLY file: see scene-in-parts.mjs. */
+import { closeSync, openSync, readSync } from 'node:fs';
+import { readBlocks } from '@gaussian-splat/economise/parts';
+import { readPrefix } from '@gaussian-splat/formats';
+
+/**
+ * Reads some rows of a file into columns. What is read at once is a file of its own: the header, and then some rows.
+ * @param head the file up to its first row
+ */
+export async function readFilePart({ path, head, rowBytes, part, to }) {
+  const file = openSync(path);
+  let room = new Uint8Array(0);
+  try {
+    return await readBlocks(part, to, ({ first, end }) => {
+      const byteLength = head.length + rowBytes * (end - first);
+      if (room.length < byteLength) {
+        room = new Uint8Array(byteLength);
+        room.set(head);
+      }
+      fill(file, room.subarray(head.length, byteLength), head.length + rowBytes * first);
+      return readPrefix(room.subarray(0, byteLength), { name: path });
+    });
+  } finally {
+    closeSync(file);
+  }
+}
+
+function fill(file, bytes, from) {
+  for (let at = 0; at < bytes.length;) {
+    const length = readSync(file, bytes, at, bytes.length - at, from + at);
+    if (length === 0) throw new Error(`the file ended at byte ${from + at}: it has changed while it was read`);
+    at += length;
+  }
+}

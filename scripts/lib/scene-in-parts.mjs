@@ -1,0 +1,40 @@
+import { openSync, closeSync, fstatSync, readSync } from 'node:fs';
+import { gatherParts } from '@gaussian-splat/economise/parts';
+import { HEADER_BYTES, splatRanges } from '@gaussian-splat/formats';
+import { readInThread } from './scene-thread.mjs';
+
+/**
+ * A scene file as a cloud in shared memory, read by other threads while the caller does something else: by all of the pool where its splats can be read apart, as a large PLY's can.
+ * Rejects as `readScene` does, or with the error of the file system.
+ */
+export async function readInThreads(path, pool) {
+  const found = pool.size > 1 ? await rangesOf(path) : undefined;
+  const cloud = found && (await gatherParts(found.ranges, pool, (parts, to) => readRows(path, found, parts, to, pool)));
+  return cloud ?? readInThread(path);
+}
+
+function readRows(path, { head, ranges }, parts, to, pool) {
+  const rowBytes = ranges.rows.byteLength;
+  const inputs = parts.map((part) => ({ path, head, rowBytes, part, to }));
+  return pool.run('readFilePart', inputs);
+}
+
+/** Where the rows of a file lie that are all there, and what comes before them. Whatever is wrong with a file is said by those who read it whole. */
+async function rangesOf(path) {
+  const { beginning, size } = readBeginning(path);
+  const ranges = await splatRanges(beginning, path).catch(() => undefined);
+  if (ranges?.rows === undefined) return undefined;
+  const { start, byteLength } = ranges.rows;
+  return start + byteLength * ranges.count <= size ? { head: beginning.slice(0, start), ranges } : undefined;
+}
+
+function readBeginning(path) {
+  const file = openSync(path);
+  try {
+    const { size } = fstatSync(file);
+    const bytes = new Uint8Array(Math.min(size, HEADER_BYTES));
+    return { beginning: bytes.subarray(0, readSync(file, bytes, 0, bytes.length, 0)), size };
+  } finally {
+    closeSync(file);
+  }
+}

@@ -1,0 +1,14 @@
+import type { TaskPool } from '@gaussian-splat/economise';
+
+export function usualThreads(): number;
+
+export class ThreadPool implements TaskPool {
+  constructor(size?: number, leastSplats?: number);
+  readonly size: number;
+  readonly leastSplats: number;
+  allocate: TaskPool['allocate'];
+  shares: TaskPool['shares'];
+  run: TaskPool['run'];
+  start(): void;
+  close(): Promise<void>;
+}
