@@ -1,8 +1,9 @@
-import type { GaussianCloud, LevelRun } from '@gaussian-splat/core';
+import type { GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { damaged } from '../damaged.js';
 import { parseLodMeta, runsAtAllLevels, runsAtLevel, type NodeRun } from '../lod/meta.js';
-import { mergeClouds, type CloudPart } from '../merge-clouds.js';
+import { levelRunsOf, type NodePart } from '../lod/node-parts.js';
+import { mergeClouds } from '../merge-clouds.js';
 import type { OpenPart, SceneSource } from '../scene-format.js';
 import { parseSogMeta } from '../sog/meta.js';
 import { readSogImages } from '../sog/read-sog.js';
@@ -38,19 +39,6 @@ export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   }
   const merged = mergeClouds(parts, name);
   return level === 'all' ? { ...merged, levelRuns: levelRunsOf(parts) } : merged;
-}
-
-/** Part of a cloud, and what it shows. */
-type NodePart = CloudPart & Pick<NodeRun, 'node' | 'level'>;
-
-/** Where the parts lie once they are merged. */
-function levelRunsOf(parts: readonly NodePart[]): LevelRun[] {
-  let first = 0;
-  return parts.map(({ count, node, level }) => {
-    const run = { first, count, node, level };
-    first += count;
-    return run;
-  });
 }
 
 /** One SOG of the scene; the paths in its description are relative to it. */
