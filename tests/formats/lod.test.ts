@@ -203,3 +203,24 @@ test('a run beyond its file, a file that is missing and a run without anything t
   );
   assert.equal((await refusal(broken)).code, 'network/status');
 });
+
+test('the coarsest level of a large scene is on show before any other is fetched, also where the whole scene is read', async () => {
+  const large = lodFolder(smallCloud(60_000, 0), { levels: 2, boxes: 2, environment: sky });
+  const log: string[] = [];
+  let [previewed, fetched] = [0, 0];
+  const found = await readScene(large.index, {
+    name: 'lod-meta.json',
+    openPart: (path) => {
+      log.push(path);
+      return Promise.resolve(large.files.get(path)!);
+    },
+    onPreview: ({ count }) => {
+      assert.equal(previewed, 0, 'one preview');
+      [previewed, fetched] = [count, log.length];
+    },
+  });
+  assert.equal(previewed, 15_000 + 7);
+  assert.ok(log.slice(0, fetched).every((path) => /^(1_0|env)\//.test(path)));
+  assert.equal(found.count, 60_000 + 7);
+  assert.equal(log.filter((path) => path.endsWith('meta.json')).length, 3, 'the environment once');
+});
