@@ -108,7 +108,7 @@ test('pages on their way are never promised the same slot', () => {
     coming,
     Array.from({ length: 15 }, (_, k) => 17 + k),
   );
-  const left = coming.reverse().map((page) => residency.settle(page)?.left);
+  const left = coming.reverse().map((page) => residency.settle(page)?.left.map((leaver) => leaver.page)[0]);
   assert.equal(new Set(left).size, 15);
   assert.ok(left.every((page) => page !== undefined && page >= 2 && page <= 16));
 });

@@ -4,13 +4,14 @@ import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
 import type { Camera, Vector3 } from '@gaussian-splat/core';
 import { checkManifest, GaussianBuffers, packWithDetail, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
-import { constants, DETAIL_NUMBERS, listPages, NONE, PAGE_CHUNKS, Residency } from '@gaussian-splat/renderer/stages';
+import { constants, listPages, NONE, PAGE_CHUNKS, Residency } from '@gaussian-splat/renderer/stages';
 import { detailFolder, type DetailFolder } from '../support/detail-folder.js';
 import { shareDrawn, type DetailView } from '../support/detail-twin.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
+import { readRows } from '../support/read-rows.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 
@@ -67,20 +68,8 @@ test('a scene that has room for all its pages becomes the picture of the scene t
 });
 
 /** Detail rows by page, as they are on the GPU. */
-async function readRows(scene: StreamedGaussians): Promise<Map<number, Float32Array>> {
-  const device = await nodeDevice();
-  const rows: Float32Array[] = [];
-  for (const { details } of scene.pages) {
-    const staging = device.createBuffer({ size: details!.size, usage: 0x1 | 0x8 });
-    const encoder = device.createCommandEncoder();
-    encoder.copyBufferToBuffer(details!, 0, staging, 0, details!.size);
-    device.queue.submit([encoder.finish()]);
-    await staging.mapAsync(0x1);
-    const all = new Float32Array(staging.getMappedRange().slice(0));
-    staging.destroy();
-    const stride = DETAIL_NUMBERS * PAGE_CHUNKS;
-    for (let at = 0; at + stride <= all.length; at += stride) rows.push(all.subarray(at, at + stride));
-  }
+async function rowsOfPages(scene: StreamedGaussians): Promise<Map<number, Float32Array>> {
+  const rows = await readRows(scene);
   return new Map(scene.pagesInSlots.flatMap((page, slot) => (page === undefined ? [] : [[page, rows[slot]] as const])));
 }
 
@@ -137,7 +126,7 @@ for (const [name, source] of [
     for (const [k, distance] of [30, 3, 2, 60, 1.5, 2.5].entries()) {
       const camera = viewFrom(distance, k, [2 * k - 5, 0, 3 - k]);
       await drawUntilCalm(scene, renderer, camera, 0.2);
-      const rows = await readRows(scene);
+      const rows = await rowsOfPages(scene);
       for (const page of rows.keys()) seen.add(page);
       for (const fade of [0, 0.5]) assert.ok(checkCovered(source, rows, { camera, allowed: 0.2, fade }) > 3);
     }
@@ -179,7 +168,7 @@ test('in a flight, with pages that come in any order and leave before they have 
     await device.queue.onSubmittedWorkDone();
     // However fast the GPU is, pages have time to come.
     await pause(8);
-    const rows = await readRows(scene);
+    const rows = await rowsOfPages(scene);
     for (const fade of [0, 0.5]) checkCovered(source, rows, { camera, allowed: 0.2, fade });
     if ([...before].some((page) => !rows.has(page))) exchanged++;
     if (scene.progress.coming > 0) arriving++;

@@ -1,5 +1,5 @@
 /** Pages without files: what a scene of any size would have, for tests of who comes and goes. */
-import { listPages, NONE, PAGE_CHUNKS, type PageList } from '@gaussian-splat/renderer/stages';
+import { emptyList, listPages, NONE, PAGE_CHUNKS, putBelow, type PageList } from '@gaussian-splat/renderer/stages';
 
 /** Chunks of a page that have pages below them: all but the four upper ones. */
 const BELOW = PAGE_CHUNKS - 4;
@@ -34,4 +34,26 @@ export function wishesOf(
     needs[page] = needs[above] * share(page);
     return isResident(above) ? needs[page] : 0;
   });
+}
+
+/**
+ * Boxes with runs at several levels, as pages: all coarsest runs in the first, each finer one below that of its box.
+ * @param boxes of each box the chunks of its runs, the coarsest first
+ */
+export function boxList(boxes: readonly (readonly number[])[]): PageList {
+  const coarsest = boxes.reduce((sum, [chunks]) => sum + chunks, 0);
+  const chunks = [coarsest, ...boxes.flatMap((runs) => runs.slice(1))];
+  const list = emptyList(Uint32Array.from(chunks, (count) => Math.ceil(count / PAGE_CHUNKS)));
+  list.chunks.set(chunks);
+  list.upper.set(chunks);
+  let [page, first] = [1, 0];
+  for (const runs of boxes) {
+    runs.slice(1).forEach((_, k) => {
+      if (k === 0) putBelow(list, page, 0, first, runs[0]);
+      else putBelow(list, page, page - 1, 0, runs[k]);
+      page++;
+    });
+    first += runs[0];
+  }
+  return list;
 }

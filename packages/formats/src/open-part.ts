@@ -9,9 +9,11 @@ import type { OpenPart } from './scene-format.js';
  * @param optionsOf options for each part, by its path.
  */
 export function openPartAt(url: string | URL, optionsOf: (path: string) => FetchSceneOptions): OpenPart {
-  return (path) => {
-    // Every part is encoded, so that a path can be no address of another server.
-    const encoded = path.split('/').map((part) => (part === '..' || part === '.' ? part : encodeURIComponent(part)));
-    return fetchScene(new URL(encoded.join('/'), url), optionsOf(path));
-  };
+  return (path) => fetchScene(partAddress(url, path), optionsOf(path));
+}
+
+/** Address of another file of the scene at an address. Every part of the path is encoded, so that it can be no address of another server. */
+export function partAddress(url: string | URL, path: string): URL {
+  const encoded = path.split('/').map((part) => (part === '..' || part === '.' ? part : encodeURIComponent(part)));
+  return new URL(encoded.join('/'), url);
 }

@@ -1,6 +1,7 @@
 import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-splat/core';
-import { grouped, plainBytes, type FileBytes } from './bytes.js';
+import { plainBytes, type FileBytes } from './bytes.js';
 import { extensionOf, findFormat } from './detect.js';
+import { noSplats } from './no-splats.js';
 import { previewWanted, samplePreview } from './preview.js';
 import type { OpenPart, SceneSource } from './scene-format.js';
 
@@ -101,17 +102,5 @@ function emptyFile(name: string): GaussianSplatError {
     expected: 'a scene file',
     found: '0 bytes',
     remedy: 'check the address of the scene and the upload; the file is empty',
-  });
-}
-
-function noSplats(name: string, droppedCount: number): GaussianSplatError {
-  return new GaussianSplatError('decode/empty', {
-    where: name,
-    expected: '1 splat or more that can be drawn',
-    found:
-      droppedCount === 0
-        ? '0 splats'
-        : `${grouped(droppedCount)} splats, all with values that cannot be drawn (not finite, no rotation or no extent)`,
-    remedy: 'export the scene again; this file has nothing to show',
   });
 }

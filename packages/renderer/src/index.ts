@@ -21,7 +21,10 @@ export {
   type DetailTree,
 } from './detail/build-pages.js';
 export { treeOfCopies } from './detail/tile-tree.js';
-export { StreamedGaussians, type StreamOptions } from './detail/streamed-gaussians.js';
+export { StreamedGaussians, type PoolOptions, type StreamOptions } from './detail/streamed-gaussians.js';
+export type { PageSource, StreamedScene } from './detail/page-source.js';
+export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './detail/level-pages.js';
+export { levelSource, packLevelPage } from './detail/level-source.js';
 export { checkManifest, type DetailManifest } from './detail/manifest.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export { readPacked, selectPacked } from './pack/packed-scene.js';

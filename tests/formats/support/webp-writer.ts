@@ -64,10 +64,12 @@ export function writeWebp(rgba: Uint8Array, width: number, height: number): Uint
     for (const channel of [1, 0, 2, 3]) bits.write(reversed(rgba[i + channel]), 8);
   }
   const stream = bits.finish();
-  const padded = Buffer.alloc(stream.length + (stream.length & 1));
-  padded.set(stream);
-  const head = Buffer.from('RIFF\0\0\0\0WEBPVP8L\0\0\0\0', 'latin1');
-  head.writeUInt32LE(12 + padded.length, 4);
-  head.writeUInt32LE(stream.length, 16);
-  return new Uint8Array(Buffer.concat([head, padded]));
+  const length = stream.length + (stream.length & 1);
+  const file = new Uint8Array(20 + length);
+  file.set(new TextEncoder().encode('RIFF\0\0\0\0WEBPVP8L'));
+  const view = new DataView(file.buffer);
+  view.setUint32(4, 12 + length, true);
+  view.setUint32(16, stream.length, true);
+  file.set(stream, 20);
+  return file;
 }

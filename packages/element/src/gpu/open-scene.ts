@@ -116,9 +116,13 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
   }
 }
 
-/** A folder that `npm run detail` wrote is known by the name of its manifest. */
-export function isStreamed({ url }: SceneRequest): boolean {
-  return URL.canParse(url) && /(^|\/)detail\.json$/.test(new URL(url).pathname);
+/**
+ * A folder that `npm run detail` wrote is known by the name of its manifest, and so is streamed SOG, of which levels may be wanted or not.
+ */
+export function isStreamed({ url, levels }: SceneRequest): boolean {
+  return (
+    URL.canParse(url) && (levels ? /(^|\/)(detail|lod-meta)\.json$/ : /(^|\/)detail\.json$/).test(new URL(url).pathname)
+  );
 }
 
 async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {

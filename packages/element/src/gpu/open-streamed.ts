@@ -1,7 +1,7 @@
-/** Scenes that are streamed page by page: see docs/detail-pages.md. */
+/** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchScene } from '@gaussian-splat/formats';
-import { checkManifest, StreamedGaussians } from '@gaussian-splat/renderer';
+import { checkManifest, levelSource, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { DetailLevers } from './gpu-scene.js';
@@ -30,28 +30,54 @@ const DETAIL = 1;
 const capsOf = (): Caps => (globalThis.matchMedia?.('(pointer: coarse)').matches ? PHONE : DESKTOP);
 
 /**
- * Opens a folder by its manifest: fetches that and the coarsest page.
+ * Opens a folder by its manifest: fetches that and what is coarsest.
  * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason
  */
 export async function openStreamed(
-  { url, credentials }: SceneRequest,
+  request: SceneRequest,
   device: GPUDevice,
-  { loader, signal, onProgress, memoryBudget = Infinity, onChange }: StreamedOptions,
+  options: StreamedOptions,
 ): Promise<{ gaussians: StreamedGaussians; detail: DetailLevers }> {
-  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress });
-  const manifest = checkManifest(parsed(bytes, url), url);
+  const { signal, memoryBudget = Infinity, onChange } = options;
   const caps = capsOf();
-  const gaussians = await StreamedGaussians.open(device, manifest, {
-    fetchPage: (file, aborted) => loader.fetchFile({ url: new URL(file, url).href, credentials }, aborted),
+  const pool: PoolOptions = {
     memoryBudget: Math.min(memoryBudget, caps.bytes),
     onChange,
     // A page that is missing leaves what stands for it on show; the console tells whoever looks.
     onError: (error) => console.warn(error instanceof Error ? error.message : error),
-  });
+  };
+  const isSog = new URL(request.url).pathname.endsWith('lod-meta.json');
+  const gaussians = await (isSog ? openBoxes : openPages)(request, device, options, pool);
   if (!signal.aborted) return { gaussians, detail: { detail: DETAIL, splatBudget: caps.splats } };
   gaussians.destroy();
   throw signal.reason;
 }
+
+type Open = (
+  request: SceneRequest,
+  device: GPUDevice,
+  options: StreamedOptions,
+  pool: PoolOptions,
+) => Promise<StreamedGaussians>;
+
+const openPages: Open = async ({ url, credentials }, device, { loader, signal, onProgress }, pool) => {
+  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress });
+  const manifest = checkManifest(parsed(bytes, url), url);
+  return StreamedGaussians.open(device, manifest, {
+    ...pool,
+    fetchPage: (file, aborted) => loader.fetchFile({ url: new URL(file, url).href, credentials }, aborted),
+  });
+};
+
+const openBoxes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
+  const { levels, runs } = await loader.openBoxes(request, signal, onProgress);
+  const { credentials } = request;
+  const source = levelSource(levels, async (page, aborted) => {
+    const run = runs[page.box][page.level];
+    return new Uint32Array(await loader.readBox({ run, page, scene: levels.scene, credentials }, aborted));
+  });
+  return StreamedGaussians.openSource(device, source, pool);
+};
 
 function parsed(bytes: Uint8Array, where: string): unknown {
   try {

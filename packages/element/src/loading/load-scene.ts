@@ -51,7 +51,7 @@ export async function loadScene(
  * Last part of the URL's path: what people call the file, and whose extension tells formats without a signature. A `blob:`
  * URL has no name of its own; there the fragment is taken, so that a page can say `${objectUrl}#plant.splat`.
  */
-function fileName(url: string): string {
+export function fileName(url: string): string {
   if (!URL.canParse(url) || url.startsWith('data:')) return url.slice(0, 80);
   const { protocol, pathname, hash } = new URL(url);
   const name = protocol === 'blob:' && hash !== '' ? hash.slice(1) : (pathname.split('/').pop() ?? '');
@@ -72,7 +72,7 @@ function decodeURIComponentSafely(text: string): string {
 }
 
 /** Lets the first and the last report through and few of those between. */
-function throttled(onProgress: ProgressListener): ProgressListener {
+export function throttled(onProgress: ProgressListener): ProgressListener {
   let last = -Infinity;
   return (loaded, total) => {
     const now = performance.now();
@@ -83,7 +83,7 @@ function throttled(onProgress: ProgressListener): ProgressListener {
 }
 
 /** Errors that no reader named: memory that was not to be had, or a fault of ours that the file brought to light. */
-function named(error: unknown, where: string): GaussianSplatError {
+export function named(error: unknown, where: string): GaussianSplatError {
   if (error instanceof GaussianSplatError) return error;
   if (error instanceof RangeError) {
     return new GaussianSplatError('out-of-memory/allocation', {

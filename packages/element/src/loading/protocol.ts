@@ -1,6 +1,14 @@
 /** What the page and the scene worker say to each other. */
 import type { Bounds, ErrorData } from '@gaussian-splat/core';
-import type { PackedGaussians, PackedLevels, ShPrecision } from '@gaussian-splat/renderer';
+import type { SogRun } from '@gaussian-splat/formats';
+import type {
+  LevelPage,
+  LevelScene,
+  PackedGaussians,
+  PackedLevels,
+  ShPrecision,
+  StreamedScene,
+} from '@gaussian-splat/renderer';
 
 /** A file to fetch. */
 export interface FileRequest {
@@ -36,6 +44,21 @@ export interface LoadedSequence {
   readonly durationSeconds: number;
 }
 
+/** A streamed SOG scene of which the coarsest levels are there. */
+export interface LoadedBoxes {
+  readonly levels: LevelScene;
+  /** Where the levels of each box lie, the coarsest first. */
+  readonly runs: readonly (readonly SogRun[])[];
+}
+
+/** A level of a box of such a scene: all that the worker must know, for it may have been ended meanwhile. */
+export interface BoxRequest {
+  readonly run: SogRun;
+  readonly page: LevelPage;
+  readonly scene: StreamedScene;
+  readonly credentials: RequestCredentials;
+}
+
 /**
  * Called with a part of a scene that is still loading, ready for upload: fewer splats, or splats without their view-dependent colours.
  * Each preview replaces the one before.
@@ -52,6 +75,8 @@ export type PageMessage =
   | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest; readonly wantsPreviews: boolean }
   | { readonly type: 'levels'; readonly id: number; readonly packed: PackedGaussians }
   | { readonly type: 'file'; readonly id: number; readonly request: FileRequest }
+  | { readonly type: 'boxes'; readonly id: number; readonly request: SceneRequest }
+  | { readonly type: 'box'; readonly id: number; readonly request: BoxRequest }
   | { readonly type: 'cancel'; readonly id: number };
 
 export type WorkerMessage =
@@ -62,4 +87,5 @@ export type WorkerMessage =
   | { readonly type: 'scene'; readonly id: number; readonly scene: LoadedScene }
   | { readonly type: 'levels'; readonly id: number; readonly levels: PackedLevels | undefined }
   | { readonly type: 'file'; readonly id: number; readonly bytes: ArrayBuffer }
+  | { readonly type: 'boxes'; readonly id: number; readonly boxes: LoadedBoxes }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };

@@ -2,7 +2,9 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { PackedGaussians, PackedLevels } from '@gaussian-splat/renderer';
 import { buffersOf } from './buffers-of.js';
 import type {
+  BoxRequest,
   FileRequest,
+  LoadedBoxes,
   LoadedScene,
   LoadedSequence,
   PageMessage,
@@ -11,6 +13,7 @@ import type {
   SceneRequest,
   WorkerMessage,
 } from './protocol.js';
+import type * as workerModule from './scene-worker.js';
 import { spawnSceneWorker } from './spawn-worker.js';
 
 /** An unused worker is kept this long: pages with several elements load one scene after another. */
@@ -22,6 +25,15 @@ interface Listeners {
   readonly onProgress?: ProgressListener;
   readonly onPreview?: PreviewListener | undefined;
 }
+
+/** The worker's code. */
+type Here = typeof workerModule;
+
+/** What streamed scenes ask for. */
+type Request =
+  | { readonly type: 'file'; readonly request: FileRequest }
+  | { readonly type: 'boxes'; readonly request: SceneRequest }
+  | { readonly type: 'box'; readonly request: BoxRequest };
 
 interface Pending extends Listeners {
   /** Gets what the worker answered: a scene, a sequence, levels or a file, as was asked for. */
@@ -80,13 +92,19 @@ export class SceneLoader {
   }
 
   /** The bytes of one file. Rejects with GaussianSplatError `network/*`, `out-of-memory/allocation`, or with the signal's reason as soon as that is aborted. */
-  async fetchFile(request: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
-    signal.throwIfAborted();
-    clearTimeout(this.#idleTimer);
-    const worker = await (this.#worker ??= this.#start());
-    signal.throwIfAborted();
-    if (worker === null) return (await import('./scene-worker.js')).fetchFile(request, signal);
-    return this.#ask<ArrayBuffer>(worker, { type: 'file', id: this.#nextId++, request }, signal, {});
+  fetchFile(request: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
+    return this.#do({ type: 'file', request }, signal, (here) => here.fetchFile(request, signal));
+  }
+
+  /** The coarsest levels of a streamed SOG scene. Rejects as {@link load} does. */
+  openBoxes(request: SceneRequest, signal: AbortSignal, onProgress: ProgressListener): Promise<LoadedBoxes> {
+    const here = (worker: Here): Promise<LoadedBoxes> => worker.openBoxes(request, signal, onProgress);
+    return this.#do({ type: 'boxes', request }, signal, here, { onProgress });
+  }
+
+  /** The words of a level of a box of it. Rejects as {@link load} does. */
+  readBox(request: BoxRequest, signal: AbortSignal): Promise<ArrayBuffer> {
+    return this.#do({ type: 'box', request }, signal, (here) => here.readBox(request, signal));
   }
 
   /**
@@ -100,6 +118,21 @@ export class SceneLoader {
     if (worker === null) return undefined;
     const message: PageMessage = { type: 'levels', id: this.#nextId++, packed };
     return this.#ask<PackedLevels | undefined>(worker, message, signal, {}, buffersOf(packed));
+  }
+
+  /** Has a request answered by the worker, or by its code on the page's own thread. */
+  async #do<T>(
+    request: Request,
+    signal: AbortSignal,
+    here: (worker: Here) => Promise<T>,
+    listeners: Listeners = {},
+  ): Promise<T> {
+    signal.throwIfAborted();
+    clearTimeout(this.#idleTimer);
+    const worker = await (this.#worker ??= this.#start());
+    signal.throwIfAborted();
+    if (worker === null) return here(await import('./scene-worker.js'));
+    return this.#ask<T>(worker, { ...request, id: this.#nextId++ }, signal, listeners);
   }
 
   /** Sends a request to the worker, and waits for its answer. */
@@ -125,7 +158,7 @@ export class SceneLoader {
     } finally {
       signal.removeEventListener('abort', cancel);
       this.#pending.delete(id);
-      const idleMs = message.type === 'file' ? STREAMING_IDLE_MS : IDLE_MS;
+      const idleMs = /^(file|box)/.test(message.type) ? STREAMING_IDLE_MS : IDLE_MS;
       if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#end(worker), idleMs);
     }
   }
@@ -171,6 +204,7 @@ export class SceneLoader {
     else if (message.type === 'sequence') pending?.resolve(message.sequence as never);
     else if (message.type === 'levels') pending?.resolve(message.levels as never);
     else if (message.type === 'file') pending?.resolve(message.bytes as never);
+    else if (message.type === 'boxes') pending?.resolve(message.boxes as never);
     else pending?.reject(GaussianSplatError.fromData(message.error));
   }
 

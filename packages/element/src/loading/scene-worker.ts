@@ -1,14 +1,31 @@
 /**
  * The module worker that loads scenes. Where a page refuses workers it imports this same module and calls
- * {@link loadScene} or {@link fetchFile} itself; then nothing here listens.
+ * {@link loadScene} and the others itself; then nothing here listens.
  */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { buffersOf } from './buffers-of.js';
 import { fetchFile } from './fetch-file.js';
 import { loadScene } from './load-scene.js';
-import type { PageMessage, PreviewListener, ProgressListener, WorkerMessage } from './protocol.js';
+import type {
+  BoxRequest,
+  LoadedBoxes,
+  PageMessage,
+  PreviewListener,
+  ProgressListener,
+  SceneRequest,
+  WorkerMessage,
+} from './protocol.js';
 
 export { fetchFile, loadScene };
+
+export const openBoxes = async (
+  request: SceneRequest,
+  signal: AbortSignal,
+  onProgress: ProgressListener,
+): Promise<LoadedBoxes> => (await import('./lod-boxes.js')).openBoxes(request, signal, onProgress);
+
+export const readBox = async (request: BoxRequest, signal: AbortSignal): Promise<ArrayBuffer> =>
+  (await import('./lod-boxes.js')).readBox(request, signal);
 
 /** The part of a worker's global scope that is used here; TypeScript's page types do not know it. */
 interface WorkerScope {
@@ -19,20 +36,13 @@ interface WorkerScope {
 function serve(scope: WorkerScope): void {
   const running = new Map<number, AbortController>();
 
-  async function load({ id, request, wantsPreviews }: Extract<PageMessage, { type: 'load' }>): Promise<void> {
+  /** Does what a message asks for, and answers. What is called throws errors with names, or the reason of an abort, which nobody waits for. */
+  async function answer(id: number, work: (signal: AbortSignal) => Promise<void>): Promise<void> {
     const abort = new AbortController();
     running.set(id, abort);
     try {
-      const onProgress: ProgressListener = (loaded, total) =>
-        scope.postMessage({ type: 'progress', id, loaded, total });
-      const onPreview: PreviewListener = (preview) =>
-        scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview.packed));
-      const scene = await loadScene(request, abort.signal, onProgress, wantsPreviews ? onPreview : undefined);
-      if (abort.signal.aborted) return;
-      if ('frames' in scene) scope.postMessage({ type: 'sequence', id, sequence: scene });
-      else scope.postMessage({ type: 'scene', id, scene }, buffersOf(scene.packed));
+      await work(abort.signal);
     } catch (error) {
-      // loadScene throws its own errors, or the reason of an abort, which nobody waits for.
       if (error instanceof GaussianSplatError) scope.postMessage({ type: 'error', id, error: error.toData() });
       else if (!abort.signal.aborted) throw error;
     } finally {
@@ -40,20 +50,33 @@ function serve(scope: WorkerScope): void {
     }
   }
 
+  const progressOf =
+    (id: number): ProgressListener =>
+    (loaded, total) =>
+      scope.postMessage({ type: 'progress', id, loaded, total });
+
+  const load = ({ id, request, wantsPreviews }: Extract<PageMessage, { type: 'load' }>): Promise<void> =>
+    answer(id, async (signal) => {
+      const onPreview: PreviewListener = (preview) =>
+        scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview.packed));
+      const scene = await loadScene(request, signal, progressOf(id), wantsPreviews ? onPreview : undefined);
+      if (signal.aborted) return;
+      if ('frames' in scene) scope.postMessage({ type: 'sequence', id, sequence: scene });
+      else scope.postMessage({ type: 'scene', id, scene }, buffersOf(scene.packed));
+    });
+
   /** Of a streamed scene: the reading of a response costs its thread more than all else that a page of it does. */
-  async function bring({ id, request }: Extract<PageMessage, { type: 'file' }>): Promise<void> {
-    const abort = new AbortController();
-    running.set(id, abort);
-    try {
-      const bytes = await fetchFile(request, abort.signal);
+  const bring = (id: number, bytesOf: (signal: AbortSignal) => Promise<ArrayBuffer>): Promise<void> =>
+    answer(id, async (signal) => {
+      const bytes = await bytesOf(signal);
       scope.postMessage({ type: 'file', id, bytes }, [bytes]);
-    } catch (error) {
-      if (error instanceof GaussianSplatError) scope.postMessage({ type: 'error', id, error: error.toData() });
-      else if (!abort.signal.aborted) throw error;
-    } finally {
-      running.delete(id);
-    }
-  }
+    });
+
+  const open = ({ id, request }: Extract<PageMessage, { type: 'boxes' }>): Promise<void> =>
+    answer(id, async (signal) => {
+      const boxes = await openBoxes(request, signal, progressOf(id));
+      scope.postMessage({ type: 'boxes', id, boxes }, buffersOf(boxes.levels));
+    });
 
   async function buildLevels({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> {
     const abort = new AbortController();
@@ -72,7 +95,9 @@ function serve(scope: WorkerScope): void {
   scope.addEventListener('message', ({ data }) => {
     if (data.type === 'load') void load(data);
     else if (data.type === 'levels') void buildLevels(data);
-    else if (data.type === 'file') void bring(data);
+    else if (data.type === 'file') void bring(data.id, (signal) => fetchFile(data.request, signal));
+    else if (data.type === 'box') void bring(data.id, (signal) => readBox(data.request, signal));
+    else if (data.type === 'boxes') void open(data);
     else running.get(data.id)?.abort();
   });
   scope.postMessage({ type: 'ready' });

@@ -1,8 +1,10 @@
-import type { GaussianCloud, LevelRun } from '@gaussian-splat/core';
+import type { GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { damaged } from '../damaged.js';
-import { parseLodMeta, runsAtAllLevels, runsAtLevel, type NodeRun } from '../lod/meta.js';
-import { mergeClouds, type CloudPart } from '../merge-clouds.js';
+import { parseLodMeta, runsAtAllLevels, runsAtLevel, type LodMeta, type NodeRun } from '../lod/meta.js';
+import { levelRunsOf, type NodePart } from '../lod/node-parts.js';
+import { mergeClouds } from '../merge-clouds.js';
+import { previewWanted } from '../preview.js';
 import type { OpenPart, SceneSource } from '../scene-format.js';
 import { parseSogMeta } from '../sog/meta.js';
 import { readSogImages } from '../sog/read-sog.js';
@@ -10,47 +12,51 @@ import { noParts } from './sog.js';
 
 /**
  * Reads a streamed SOG scene from its `lod-meta.json` as a whole at one level of detail (`source.level`, 0 the finest; levels
- * beyond the last give the coarsest) or at all of them (`all`), with its environment.
+ * beyond the last give the coarsest) or at all of them (`all`), with its environment. The coarsest level is its preview.
  */
 export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   const { name, level = 0 } = source;
   const meta = parseLodMeta(source.bytes, name);
   const open = source.openPart ?? noParts(name);
+  const coarsest = runsAtLevel(meta, meta.levels - 1);
   const runs = level === 'all' ? runsAtAllLevels(meta) : runsAtLevel(meta, Math.min(level, meta.levels - 1));
-  const files = [...new Set(runs.map(({ file }) => file))];
-  const parts: NodePart[] = [];
-  for (const file of files) {
-    source.signal?.throwIfAborted();
-    const cloud = await readPart(meta.files[file], open, source);
-    parts.push(
-      ...partsOf(
-        cloud,
-        runs.filter((run) => run.file === file),
-        meta.files[file],
-        name,
-      ),
-    );
+  const around = await readEnvironment(meta, open, source);
+  const countOf = (some: readonly NodeRun[]): number => some.reduce((sum, { count }) => sum + count, 0);
+  if (previewWanted(source, countOf(runs)) && countOf(coarsest) < countOf(runs) / 2) {
+    const parts = [...(await readRuns(coarsest, meta, open, source)), ...around];
+    if (parts.length > 0) await source.onPreview?.(mergeClouds(parts, name));
   }
-  if (meta.environment !== undefined) {
-    const cloud = await readPart(meta.environment, open, source);
-    // Another node than all others, at a level of its own: it is always drawn.
-    parts.push({ cloud, first: 0, count: cloud.count, node: meta.leaves.length, level: 0 });
-  }
+  const parts = [...(await readRuns(runs, meta, open, source)), ...around];
   const merged = mergeClouds(parts, name);
   return level === 'all' ? { ...merged, levelRuns: levelRunsOf(parts) } : merged;
 }
 
-/** Part of a cloud, and what it shows. */
-type NodePart = CloudPart & Pick<NodeRun, 'node' | 'level'>;
+/** Some runs, file by file. */
+async function readRuns(
+  runs: readonly NodeRun[],
+  { files }: LodMeta,
+  open: OpenPart,
+  source: SceneSource,
+): Promise<NodePart[]> {
+  const parts: NodePart[] = [];
+  for (const file of new Set(runs.map((run) => run.file))) {
+    source.signal?.throwIfAborted();
+    const cloud = await readPart(files[file], open, source);
+    const own = runs.filter((run) => run.file === file);
+    parts.push(...partsOf(cloud, own, files[file], source.name));
+  }
+  return parts;
+}
 
-/** Where the parts lie once they are merged. */
-function levelRunsOf(parts: readonly NodePart[]): LevelRun[] {
-  let first = 0;
-  return parts.map(({ count, node, level }) => {
-    const run = { first, count, node, level };
-    first += count;
-    return run;
-  });
+/** Another node than all others, at a level of its own: it is always drawn. */
+async function readEnvironment(
+  { environment, leaves }: LodMeta,
+  open: OpenPart,
+  source: SceneSource,
+): Promise<NodePart[]> {
+  if (environment === undefined) return [];
+  const cloud = await readPart(environment, open, source);
+  return [{ cloud, first: 0, count: cloud.count, node: leaves.length, level: 0 }];
 }
 
 /** One SOG of the scene; the paths in its description are relative to it. */

@@ -51,9 +51,12 @@ export interface DetailManifest {
   readonly instances: readonly TreeInstance[];
 }
 
+/** What the size of a page depends on. */
+export type PageFormat = Pick<DetailManifest, 'shDegree' | 'shPrecision'>;
+
 /** Words of each part of a page's file, one after the other. */
 export function pageLayout(
-  { shDegree, shPrecision }: Pick<DetailManifest, 'shDegree' | 'shPrecision'>,
+  { shDegree, shPrecision }: PageFormat,
   chunks: number,
 ): { chunks: number; details: number; geometry: number; sh: number; total: number } {
   const splats = constants.CULL_GROUP * chunks;

@@ -7,6 +7,7 @@ import { mortonOrder } from '../pack/morton.js';
 import { choosePrecision, shWords, type ShPrecision } from '../pack/sh.js';
 import { detailRows, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
 import { packFiller } from './pack-level.js';
+import { errorsOfSpacings, spacingOf } from './run-errors.js';
 import { chunksOf } from './splat-level.js';
 
 const { CULL_GROUP } = constants;
@@ -82,69 +83,21 @@ function keptRuns({ positions, levelRuns = [] }: GaussianCloud, usable: Uint32Ar
 
 const finestOf = (runs: readonly PackedRun[]): PackedRun[] => runs.filter(({ node }, r) => runs[r - 1]?.node !== node);
 
-/** Splats whose nearest neighbour is looked for, and among how many before and behind them in the order. */
-const SAMPLE = 128;
-const REACH = 512;
-
-/** Width of the cells that the splats of a surface have each to itself: scattered at random, twice the distance of nearest neighbours. Their median. */
-function spacingOf(positions: Float32Array, kept: Uint32Array): number {
-  const count = Math.min(SAMPLE, kept.length);
-  const distances = Float64Array.from({ length: count }, (_, s) => {
-    const k = Math.floor((s * kept.length) / count);
-    let nearest = Infinity;
-    for (let j = Math.max(0, k - REACH); j < Math.min(kept.length, k + REACH); j++) {
-      if (j !== k) nearest = Math.min(nearest, squaredDistance(positions, 3 * kept[k], 3 * kept[j]));
-    }
-    return Math.sqrt(nearest);
-  }).sort();
-  const median = 2 * distances[count >> 1];
-  return Number.isFinite(median) ? median : 0;
-}
-
-function squaredDistance(positions: Float32Array, p: number, q: number): number {
-  const x = positions[p] - positions[q];
-  const y = positions[p + 1] - positions[q + 1];
-  const z = positions[p + 2] - positions[q + 2];
-  return x * x + y * y + z * z;
-}
-
-/**
- * Twice the root mean square of how far points of a surface are from the nearest of splats scattered over it, 2 √(1/π) for cells 1 wide, and as much again (in squares)
- * for the shape of a splat that is as wide as its cell.
- */
-const CELL_ERROR = 1.6;
-
-/**
- * How far a level displaces what it shows, world units: the file does not say, so it is taken from how far apart its splats are, and those of the finest
- * level of its node. Grows from level to level.
- */
-function errorsOf(runs: readonly PackedRun[]): number[] {
-  const errors: number[] = [];
-  let finest = 0;
-  runs.forEach(({ node, spacing }, r) => {
-    const isFinest = r === 0 || runs[r - 1].node !== node;
-    if (isFinest) finest = spacing;
-    const displaced = CELL_ERROR * Math.sqrt(Math.max(0, spacing ** 2 - finest ** 2));
-    errors.push(isFinest ? 0 : Math.max(displaced, 1.001 * errors[r - 1], Number.EPSILON * spacing));
-  });
-  return errors;
-}
-
 /** All levels of a node have one sphere, so that only their errors decide. */
 function writeDetails(
   { chunks, details = new Float32Array(0) }: Pick<PackedGaussians, 'chunks' | 'details'>,
   runs: readonly PackedRun[],
   firstChunks: readonly number[],
 ): void {
-  const errors = errorsOf(runs);
   for (let from = 0; from < runs.length;) {
     let end = from + 1;
     while (end < runs.length && runs[end].node === runs[from].node) end++;
+    const errors = errorsOfSpacings(runs.slice(from, end).map(({ spacing }) => spacing));
     const lastChunk = firstChunks[end - 1] + chunksOf(runs[end - 1].kept.length);
     const sphere = sphereAround(chunks, firstChunks[from], lastChunk);
     const one = (error: number): ChunkErrors => ({ count: 1, spheres: sphere, errors: Float32Array.of(error) });
     for (let r = from; r < end; r++) {
-      const row = detailRows(one(errors[r]), r + 1 < end ? one(errors[r + 1]) : undefined);
+      const row = detailRows(one(errors[r - from]), r + 1 < end ? one(errors[r + 1 - from]) : undefined);
       for (let c = 0; c < chunksOf(runs[r].kept.length); c++) details.set(row, DETAIL_NUMBERS * (firstChunks[r] + c));
     }
     from = end;

@@ -8,29 +8,29 @@ import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { shWords } from '../pack/sh.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
-import { PAGE_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
+import { PAGE_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 
 const SLOT_SPLATS = PAGE_CHUNKS * constants.CULL_GROUP;
 /** Largest buffer of a pool, in bytes: several of this size are found where one large one is not (iOS). */
 const LARGEST_BUFFER = 1 << 27;
 
 /** Bytes of GPU memory that one slot takes. */
-export function slotBytes({ shDegree, shPrecision }: Pick<DetailManifest, 'shDegree' | 'shPrecision'>): number {
-  return 4 * pageLayout({ shDegree, shPrecision }, PAGE_CHUNKS).total;
+export function slotBytes(format: PageFormat): number {
+  return 4 * pageLayout(format, PAGE_CHUNKS).total;
 }
 
-/** Slots on the GPU, allocated once, each with room for one page of a streamed scene. What is in a slot without page is never drawn. */
+/** Slots on the GPU, allocated once, each with room for one page of a streamed scene or a part of it. What is in a slot without page is never drawn. */
 export class PagePool {
   readonly pages: readonly GaussianPage[];
   readonly #device: GPUDevice;
-  readonly #manifest: DetailManifest;
+  readonly #format: PageFormat;
   /** Slots that lie in one buffer. */
   readonly slotsPerBuffer: number;
 
-  constructor(device: GPUDevice, memory: GpuMemory, manifest: DetailManifest, slots: number) {
+  constructor(device: GPUDevice, memory: GpuMemory, format: PageFormat, slots: number) {
     this.#device = device;
-    this.#manifest = manifest;
-    const stride = shWords(manifest.shDegree, manifest.shPrecision);
+    this.#format = format;
+    const stride = shWords(format.shDegree, format.shPrecision);
     const bytes = 4 * Math.max(GEOMETRY_WORDS, stride);
     const capacity = Math.min(pageCapacity(device, bytes), Math.floor(LARGEST_BUFFER / bytes));
     this.slotsPerBuffer = Math.max(1, Math.floor(capacity / SLOT_SPLATS));
@@ -48,12 +48,12 @@ export class PagePool {
     });
   }
 
-  /** Puts the content of a page's file into a slot; its details are written by {@link writeDetails}. */
+  /** Puts so many chunks, laid out as in a page's file, into a slot; its details are written by {@link writeDetails}. */
   write(slot: number, words: Uint32Array<ArrayBuffer>, chunks: number): void {
     const { page, place } = this.#find(slot);
     const { queue } = this.#device;
-    const layout = pageLayout(this.#manifest, chunks);
-    const stride = shWords(this.#manifest.shDegree, this.#manifest.shPrecision);
+    const layout = pageLayout(this.#format, chunks);
+    const stride = shWords(this.#format.shDegree, this.#format.shPrecision);
     const geometryAt = layout.chunks + layout.details;
     queue.writeBuffer(page.chunks, 4 * CHUNK_NUMBERS * PAGE_CHUNKS * place, words, 0, layout.chunks);
     queue.writeBuffer(page.geometry, 4 * GEOMETRY_WORDS * SLOT_SPLATS * place, words, geometryAt, layout.geometry);
@@ -72,10 +72,10 @@ export class PagePool {
 }
 
 /** Moves everything in a page's file that is a position. */
-export function movePage(words: Uint32Array<ArrayBuffer>, by: Vector3, manifest: DetailManifest, chunks: number): void {
+export function movePage(words: Uint32Array<ArrayBuffer>, by: Vector3, format: PageFormat, chunks: number): void {
   if (by.every((value) => value === 0)) return;
   const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
-  const layout = pageLayout(manifest, chunks);
+  const layout = pageLayout(format, chunks);
   const [details, geometry] = [layout.chunks, layout.chunks + layout.details];
   // The two corners of a box.
   for (const corner of [0, 4]) movePoints(floats, corner, details, CHUNK_NUMBERS, by);

@@ -1,8 +1,6 @@
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
-import { pageLayout, type DetailManifest } from './manifest.js';
-import { NONE, type PageList } from './page-list.js';
-import { childrenOf } from './residency.js';
+import { NONE } from './page-list.js';
 
 const { ARRIVAL_STEPS, CHILD_PAGE_BITS, CHILD_PAGE_MASK } = constants;
 
@@ -10,7 +8,7 @@ const { ARRIVAL_STEPS, CHILD_PAGE_BITS, CHILD_PAGE_MASK } = constants;
 export const ARRIVED = ARRIVAL_STEPS;
 
 /**
- * The detail rows of a page in its slot, as on the GPU: what the page's file says of its chunks, and how far the page and those below it have arrived. What is
+ * The detail rows of a slot, as on the GPU: what is said of the chunks in it, and how far the page that they are part of and those below it have arrived. What is
  * below a page must never have arrived further than the page itself.
  */
 export class PageRows {
@@ -24,13 +22,22 @@ export class PageRows {
     this.#words = new Uint32Array(numbers.buffer, numbers.byteOffset, numbers.length);
   }
 
-  /** Takes a page over that nothing is below of yet. */
-  load(list: PageList, manifest: DetailManifest, page: number, words: Uint32Array<ArrayBuffer>): void {
-    const layout = pageLayout(manifest, list.chunks[page]);
-    this.numbers.fill(0);
-    this.numbers.set(new Float32Array(words.buffer, words.byteOffset + 4 * layout.chunks, layout.details));
-    this.#children = childrenOf(list, page);
+  /**
+   * Takes chunks over that nothing is below of yet.
+   * @param details as in a page's file
+   * @param children numbers of the pages below each chunk, or {@link NONE}
+   */
+  load(details: Float32Array, children: Uint32Array): void {
+    this.clear();
+    this.numbers.set(details);
+    this.#children = children;
     this.#children.forEach((child, chunk) => child !== NONE && this.setBelow(chunk, 0));
+  }
+
+  /** Nothing is in the slot that might be drawn. */
+  clear(): void {
+    this.numbers.fill(0);
+    this.#children = new Uint32Array(0);
   }
 
   /** Sphere and error of a chunk, for what has it above itself. */

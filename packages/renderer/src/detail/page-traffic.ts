@@ -1,8 +1,9 @@
 import { NONE } from './page-list.js';
 import type { Residency } from './residency.js';
 
-/** Pages being fetched at a time, and those together with what waits for its upload: at most 21 MB of the page's memory. */
+/** Pages being fetched at a time. */
 export const MOST_FETCHES = 8;
+/** Slots of pages being fetched or waiting for their upload, from which on no other is sent for: at most 21 MB of the page's memory, and one page of any size. */
 export const MOST_UNDER_WAY = 32;
 /** Milliseconds before a page that did not come is asked for again. */
 const RETRY_MS = 4_000;
@@ -31,6 +32,7 @@ export class PageTraffic {
   readonly #fetching = new Map<number, AbortController>();
   readonly #waiting = new Map<number, Uint32Array<ArrayBuffer>>();
   readonly #failedAt = new Map<number, number>();
+  #slotsUnderWay = 0;
   #abandoned = 0;
   #isClosed = false;
 
@@ -64,7 +66,7 @@ export class PageTraffic {
 
   /** Sends for the pages that are needed most, as many as may be under way. */
   sendForMore(): void {
-    while (!this.#isClosed && this.#fetching.size < MOST_FETCHES && this.underWay < MOST_UNDER_WAY) {
+    while (!this.#isClosed && this.#fetching.size < MOST_FETCHES && this.#slotsUnderWay < MOST_UNDER_WAY) {
       const page = this.#residency.nextMissing();
       if (page === NONE) return;
       if (!this.#hasFailedLately(page) && this.#residency.begin(page)) void this.#bring(page);
@@ -80,6 +82,7 @@ export class PageTraffic {
     if (most === NONE) return undefined;
     const words = this.#waiting.get(most)!;
     this.#waiting.delete(most);
+    this.#slotsUnderWay -= this.#residency.slotsFor(most);
     return { page: most, words };
   }
 
@@ -104,6 +107,7 @@ export class PageTraffic {
     this.#fetching.get(page)?.abort();
     this.#fetching.delete(page);
     this.#waiting.delete(page);
+    this.#slotsUnderWay -= this.#residency.slotsFor(page);
     this.#residency.giveUp(page);
     this.#abandoned++;
   }
@@ -111,6 +115,7 @@ export class PageTraffic {
   async #bring(page: number): Promise<void> {
     const controller = new AbortController();
     this.#fetching.set(page, controller);
+    this.#slotsUnderWay += this.#residency.slotsFor(page);
     // A page that was given up may have been sent for again meanwhile: that is another fetch.
     const isOver = (): boolean => this.#fetching.get(page) !== controller;
     try {
@@ -120,6 +125,7 @@ export class PageTraffic {
       this.#failedAt.delete(page);
     } catch (error) {
       if (isOver()) return;
+      this.#slotsUnderWay -= this.#residency.slotsFor(page);
       this.#residency.giveUp(page);
       this.#failedAt.set(page, performance.now());
       this.#options.onError(error);

@@ -1,6 +1,6 @@
-import { PAGE_CHUNKS } from './manifest.js';
 import { PageHeap } from './page-heap.js';
-import { NONE, type PageList } from './page-list.js';
+import { largerThan, NONE, type PageList } from './page-list.js';
+import { PageSlots, type Settled } from './page-slots.js';
 
 /** How much more pixels a page must save than one that has to leave for it, both being wished for. */
 const WORTH = 1.5;
@@ -8,22 +8,22 @@ const WORTH = 1.5;
 const PATIENCE = 2;
 
 /**
- * Which pages are in which slots, and which should come and go. The chunk above a page is there as long as the page is: pages come from the coarse to the fine
- * and leave from the fine to the coarse, so that what is there always covers the scene.
+ * Which pages are in which slots, and which should come and go. The chunks above a page are there as long as the page is: pages come from the coarse to the fine
+ * and leave from the fine to the coarse, so that what is there always covers the scene. A page is there in all of its slots or not at all; one that has no room beside
+ * all that is above it never comes.
  *
  * A look costs time linear in the pages, a page that comes or goes the logarithm of it.
  */
 export class Residency {
-  /** [S] page in each slot, or {@link NONE}. Slots are filled in turn and never become empty. */
-  readonly pageIn: Uint32Array;
-  /** [P] slot of each page, or {@link NONE}. */
-  readonly slotOf: Uint32Array;
+  readonly #slots: PageSlots;
   readonly #list: PageList;
   /** [P] pixels that doing without a page would cost, when last looked, and at which look it was last wished for. */
   readonly #wish: Float32Array;
   readonly #wishedAt: Uint32Array;
   /** [P] pages below a page that are there or on their way. */
-  readonly #below: Uint16Array;
+  readonly #below: Uint32Array;
+  /** [P] 1 for those that have no room beside all that is above them. */
+  readonly #isTooLarge: Uint8Array;
   readonly #coming = new Set<number>();
   readonly #missing: PageHeap;
   /** Pages that may leave, those that can best be spared first. */
@@ -32,28 +32,52 @@ export class Residency {
   readonly #isListed: Uint8Array;
   /** Pages that will leave for those on their way that find no empty slot, in the order in which they will; drawn until then. */
   #setAside: number[] = [];
+  /** Slots of those, and of pages on their way. */
+  #slotsAside = 0;
+  #slotsComing = 0;
+  /** The last look has found no room for pages of so many slots. */
+  #noRoomFor = Infinity;
   #look = 0;
-  #residents = 0;
 
   constructor(list: PageList, slots: number) {
     this.#list = list;
-    this.pageIn = new Uint32Array(slots).fill(NONE);
-    this.slotOf = new Uint32Array(list.count).fill(NONE);
+    this.#slots = new PageSlots(list.count, slots);
     this.#wish = new Float32Array(list.count);
     this.#wishedAt = new Uint32Array(list.count);
-    this.#below = new Uint16Array(list.count);
+    this.#below = new Uint32Array(list.count);
+    this.#isTooLarge = largerThan(slots, list);
     this.#isListed = new Uint8Array(list.count);
     this.#missing = new PageHeap(list.count);
     this.#leavers = new PageHeap(slots);
+  }
+
+  /** [S] page in each slot, or {@link NONE}. */
+  get pageIn(): Uint32Array {
+    return this.#slots.pageIn;
+  }
+
+  /** [P] first slot of each page, or {@link NONE}. */
+  get slotOf(): Uint32Array {
+    return this.#slots.slotOf;
   }
 
   isResident(page: number): boolean {
     return this.slotOf[page] !== NONE;
   }
 
+  /** Slots of a page that is there, in the order of its chunks; none of another. */
+  slotsOf(page: number): readonly number[] {
+    return this.#slots.of(page);
+  }
+
+  /** Slots that a page takes. */
+  slotsFor(page: number): number {
+    return this.#list.slots[page];
+  }
+
   /** Pages that are there. */
   get residents(): number {
-    return this.#residents;
+    return this.#slots.count;
   }
 
   /** Pixels that doing without a page would cost, as of the last look; 0 if that does not wish for it. */
@@ -69,6 +93,7 @@ export class Residency {
   /** Takes note of a look: for each page the pixels that doing without it would cost, 0 for those that nobody wishes for. */
   note(wishes: Float32Array): void {
     this.#look++;
+    this.#noRoomFor = Infinity;
     for (let page = 0; page < this.#list.count; page++) {
       this.#wish[page] = wishes[page];
       if (wishes[page] > 0) this.#wishedAt[page] = this.#look;
@@ -83,61 +108,67 @@ export class Residency {
    */
   nextMissing(): number {
     for (let page = this.#missing.pop(); page !== NONE; page = this.#missing.pop()) {
-      if (this.#isMissing(page)) return page;
+      if (this.#list.slots[page] < this.#noRoomFor && this.#isMissing(page)) return page;
     }
     return NONE;
   }
 
-  /** Starts bringing a page if there is room for it, or something to leave that is needed less; if not, nothing is missing until the next look. */
+  /** Starts bringing a page if there is room for it, or something to leave that is needed less; if not, nothing as large is missing until the next look. */
   begin(page: number): boolean {
     const parent = this.#list.parent[page];
     if (parent !== NONE) this.#hold(parent);
     if (!this.#makeRoom(page)) {
       if (parent !== NONE) this.#release(parent);
-      // What is needed less finds no room either.
-      this.#missing.clear();
+      // What is needed less and takes as many slots finds no room either.
+      this.#noRoomFor = this.#list.slots[page];
+      if (this.#noRoomFor === 1) this.#missing.clear();
       return false;
     }
     this.#coming.add(page);
+    this.#slotsComing += this.#list.slots[page];
     return true;
   }
 
   /** A page that was on its way does not come. */
   giveUp(page: number): void {
     if (!this.#coming.delete(page)) return;
+    this.#slotsComing -= this.#list.slots[page];
     const parent = this.#list.parent[page];
     if (parent !== NONE) this.#release(parent);
-    if (this.#setAside.length > this.#lackingSlots) this.#return(this.#setAside.pop()!);
+    while (this.#setAside.length > 0) {
+      const last = this.#setAside.at(-1)!;
+      if (this.#slotsAside - this.#list.slots[last] < this.#lackingSlots) return;
+      this.#putBack();
+    }
   }
 
-  /** A page has come. @returns its slot and the page that left it, {@link NONE} for none; undefined if there is no room any more. */
-  settle(page: number): { slot: number; left: number } | undefined {
-    const isFull = this.#residents === this.pageIn.length;
-    const left = isFull ? this.#leaverFor(page) : NONE;
-    if (isFull && left === NONE) {
+  /** A page has come. @returns its slots and the pages that left for it; undefined if there is no room any more. */
+  settle(page: number): Settled | undefined {
+    const leavers = this.#leaversFor(page);
+    if (leavers === undefined) {
       this.giveUp(page);
       return undefined;
     }
-    const slot = isFull ? this.slotOf[left] : this.#residents++;
+    const left = leavers.map((leaver) => ({ page: leaver, slots: this.#slots.clear(leaver) }));
     this.#coming.delete(page);
-    this.pageIn[slot] = page;
-    this.slotOf[page] = slot;
-    if (left !== NONE) {
-      this.slotOf[left] = NONE;
-      this.#release(this.#list.parent[left]);
+    this.#slotsComing -= this.#list.slots[page];
+    const slots = this.#slots.fill(page, this.#list.slots[page]);
+    for (const leaver of leavers) {
+      this.#isListed[leaver] = 0;
+      this.#release(this.#list.parent[leaver]);
     }
     this.#offer(page);
-    return { slot, left };
+    return { slots, left };
   }
 
-  /** Pages on their way that will find no empty slot. */
+  /** Slots that pages on their way will need and not find empty. */
   get #lackingSlots(): number {
-    return Math.max(0, this.#coming.size + this.#residents - this.pageIn.length);
+    return Math.max(0, this.#slotsComing - this.#slots.empty);
   }
 
   #isMissing(page: number): boolean {
     const above = this.#list.parent[page];
-    const isNew = !this.isResident(page) && !this.#coming.has(page);
+    const isNew = !this.isResident(page) && !this.#coming.has(page) && this.#isTooLarge[page] === 0;
     return this.#wish[page] > 0 && isNew && (above === NONE || this.isResident(above));
   }
 
@@ -152,16 +183,18 @@ export class Residency {
   #listLeavers(): void {
     this.#leavers.clear();
     this.#isListed.fill(0);
-    for (const page of this.pageIn.subarray(0, this.#residents)) {
+    for (const page of this.#slots.pages()) {
       if (!this.#mayLeave(page)) continue;
       this.#isListed[page] = 1;
       this.#leavers.add(page, this.#spareRank(page));
     }
     this.#leavers.order();
     this.#setAside = [];
-    for (let lacking = this.#lackingSlots; lacking > 0; lacking--) {
+    this.#slotsAside = 0;
+    while (this.#slotsAside < this.#lackingSlots) {
       const page = this.#nextLeaver();
-      if (page !== NONE) this.#setAside.push(page);
+      if (page === NONE) return;
+      this.#putAside(page);
     }
   }
 
@@ -197,36 +230,54 @@ export class Residency {
     return NONE;
   }
 
+  #putAside(page: number): void {
+    this.#setAside.push(page);
+    this.#slotsAside += this.#list.slots[page];
+  }
+
+  /** Returns what was set aside last. */
+  #putBack(): void {
+    const page = this.#setAside.pop()!;
+    this.#slotsAside -= this.#list.slots[page];
+    this.#return(page);
+  }
+
   #isWorth(page: number, leaver: number): boolean {
     return this.#wishedAt[leaver] !== this.#look || WORTH * this.#wish[leaver] < this.#wish[page];
   }
 
-  /** Sees to a slot for one page more than are on their way. */
+  /** Sees to slots for one page more than are on their way. */
   #makeRoom(page: number): boolean {
-    const lacking = this.#coming.size + 1 + this.#residents - this.pageIn.length;
-    while (this.#setAside.length < lacking) {
+    const lacking = this.#slotsComing + this.#list.slots[page] - this.#slots.empty;
+    const before = this.#setAside.length;
+    while (this.#slotsAside < lacking) {
       const leaver = this.#nextLeaver();
-      if (leaver === NONE) return false;
-      if (!this.#isWorth(page, leaver)) {
-        this.#return(leaver);
-        return false;
+      if (leaver !== NONE && this.#isWorth(page, leaver)) {
+        this.#putAside(leaver);
+        continue;
       }
-      this.#setAside.push(leaver);
+      if (leaver !== NONE) this.#return(leaver);
+      while (this.#setAside.length > before) this.#putBack();
+      return false;
     }
     return true;
   }
 
-  /** The page that leaves for one that has come; {@link NONE} if none is needed so much less. */
-  #leaverFor(page: number): number {
-    let leaver = this.#setAside.shift() ?? NONE;
-    if (leaver === NONE || !this.#mayLeave(leaver)) leaver = this.#nextLeaver();
-    if (leaver === NONE) return NONE;
-    if (!this.#isWorth(page, leaver)) {
-      this.#return(leaver);
-      return NONE;
+  /** The pages that leave for one that has come; undefined if too few are needed so much less. */
+  #leaversFor(page: number): number[] | undefined {
+    const leavers: number[] = [];
+    for (let room = this.#slots.empty; room < this.#list.slots[page];) {
+      const aside = this.#setAside.shift();
+      if (aside !== undefined) this.#slotsAside -= this.#list.slots[aside];
+      const leaver = aside !== undefined && this.#mayLeave(aside) ? aside : this.#nextLeaver();
+      if (leaver !== NONE) leavers.push(leaver);
+      if (leaver === NONE || !this.#isWorth(page, leaver)) {
+        leavers.forEach((spared) => this.#return(spared));
+        return undefined;
+      }
+      room += this.#list.slots[leaver];
     }
-    this.#isListed[leaver] = 0;
-    return leaver;
+    return leavers;
   }
 
   /** Something below a page is on its way: it must stay. */
@@ -235,6 +286,7 @@ export class Residency {
     const at = this.#setAside.indexOf(page);
     if (at < 0) return;
     this.#setAside.splice(at, 1);
+    this.#slotsAside -= this.#list.slots[page];
     this.#isListed[page] = 0;
   }
 
@@ -244,7 +296,3 @@ export class Residency {
     this.#offer(page);
   }
 }
-
-/** Numbers of the pages below the chunks of a page, {@link NONE} where there is none. */
-export const childrenOf = (list: PageList, page: number): Uint32Array =>
-  list.children.subarray(PAGE_CHUNKS * page, PAGE_CHUNKS * page + list.chunks[page]);

@@ -4,26 +4,22 @@ import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
 import type { ShPrecision } from '../pack/sh.js';
+import { ARRIVAL_MS, Arrivals } from './arrivals.js';
 import { PAGE_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
-import { DetailTable } from './detail-table.js';
-import { listPages, NONE, type PageList } from './page-list.js';
-import { movePage, PagePool, slotBytes } from './page-pool.js';
-import { ARRIVED, PageRows } from './page-rows.js';
-import { PageTraffic, type FetchedPage } from './page-traffic.js';
+import { NONE } from './page-list.js';
+import { PagePool, slotBytes } from './page-pool.js';
+import { folderSource, type PageSource } from './page-source.js';
+import { PageTraffic } from './page-traffic.js';
+import { PlacedRows } from './placed-rows.js';
 import { Residency } from './residency.js';
 import { UploadPace } from './upload-pace.js';
 import { WishReader } from './wish-reader.js';
 
-export interface StreamOptions {
-  /**
-   * Fetches a page's file, named relative to the manifest; 8 at a time at most. Aborted when no view wishes for it any more, and when the scene is destroyed. Best done in a
-   * worker: reading a response costs a thread more than all else that a page needs.
-   */
-  readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>;
+export interface PoolOptions {
   /** Bytes of GPU memory that resident splats may take, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */
   readonly memoryBudget?: number;
   /**
-   * Milliseconds in which a page that has come takes the place of what stood for it, in {@link LEAST_STEPS} frames at least; 0 for at once. Default 400.
+   * Milliseconds in which a page that has come takes the place of what stood for it, in 16 frames at least; 0 for at once. Default 400.
    */
   readonly arrivalMs?: number;
   /** Called when another frame is asked for: a page has come, or what the last view lacks is not known yet. */
@@ -32,11 +28,25 @@ export interface StreamOptions {
   readonly onError?: (error: unknown) => void;
 }
 
+export interface StreamOptions extends PoolOptions {
+  /**
+   * Fetches a page's file, named relative to the manifest; 8 at a time at most. Aborted when no view wishes for it any more, and when the scene is destroyed. Best done in a
+   * worker: reading a response costs a thread more than all else that a page needs.
+   */
+  readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>;
+}
+
 /** Fits a phone. */
 const DEFAULT_BUDGET = 256e6;
-const ARRIVAL_MS = 400;
-/** Frames that a page takes to arrive at least, however slow they are. */
-const LEAST_STEPS = 16;
+
+/** A page that has slots, and which of its parts are in them already. */
+interface Upload {
+  readonly page: number;
+  readonly slots: readonly number[];
+  /** Words of each slot that holds chunks. */
+  readonly parts: readonly Uint32Array<ArrayBuffer>[];
+  written: number;
+}
 
 /**
  * A scene of any size from static hosting, of which only those pages are on the GPU that the view asks for. The coarsest page is always
@@ -55,42 +65,38 @@ export class StreamedGaussians implements GaussianScene {
   readonly pages: readonly GaussianPage[];
   /** Wishes of the views: for the renderer. */
   readonly wishes: WishReader;
-  readonly #list: PageList;
-  readonly #manifest: DetailManifest;
-  readonly #options: StreamOptions;
+  readonly #source: PageSource;
+  readonly #options: PoolOptions;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
   readonly #pool: PagePool;
   readonly #residency: Residency;
   readonly #traffic: PageTraffic;
   readonly #pace = new UploadPace();
-  readonly #details: DetailTable;
-  /** Of each slot. */
-  readonly #rows: PageRows[];
-  /** How much of their time has passed, 0 to 1, for the pages that arrive now. */
-  readonly #arriving = new Map<number, number>();
-  #steppedAt = 0;
+  readonly #rows: PlacedRows;
+  readonly #arrivals: Arrivals;
+  #upload: Upload | undefined;
   #isDestroyed = false;
   #uploaded = { pages: 0, bytes: 0, milliseconds: 0 };
   #version = 1;
 
-  private constructor(device: GPUDevice, manifest: DetailManifest, options: StreamOptions) {
-    const { shDegree, shPrecision, antialiased, origin, bounds } = manifest;
+  private constructor(device: GPUDevice, source: PageSource, options: PoolOptions) {
+    const { scene, list } = source;
+    const { shDegree, shPrecision, antialiased, origin, bounds } = scene;
     [this.shDegree, this.shPrecision, this.antialiased, this.origin] = [shDegree, shPrecision, antialiased, origin];
     this.bounds = bounds;
-    this.#manifest = manifest;
+    this.#source = source;
     this.#options = options;
-    this.#list = listPages(manifest);
-    const slots = slotsFor(manifest, this.#list.count, options.memoryBudget ?? DEFAULT_BUDGET);
+    const slots = slotsFor(source, options.memoryBudget ?? DEFAULT_BUDGET);
     this.count = slots * PAGE_CHUNKS * constants.CULL_GROUP;
-    this.#reservation = MemoryLedger.of(device).reserve('pages of a streamed scene', slots * slotBytes(manifest));
+    this.#reservation = MemoryLedger.of(device).reserve('pages of a streamed scene', slots * slotBytes(scene));
     this.#memory = new GpuMemory(device);
     try {
-      this.#pool = new PagePool(device, this.#memory, manifest, slots);
+      this.#pool = new PagePool(device, this.#memory, scene, slots);
       this.wishes = new WishReader(
         device,
         this.#memory,
-        this.#list.count,
+        list.count,
         (wishes) => this.#take(wishes),
         () => this.#options.onChange?.(),
       );
@@ -99,14 +105,20 @@ export class StreamedGaussians implements GaussianScene {
       throw error;
     }
     this.pages = this.#pool.pages;
-    this.#residency = new Residency(this.#list, slots);
+    this.#residency = new Residency(list, slots);
     this.#traffic = new PageTraffic(this.#residency, {
-      fetch: (page, signal) => this.#fetch(page, signal),
+      fetch: async (page, signal) => {
+        const words = await source.fetch(page, signal);
+        signal.throwIfAborted();
+        return words;
+      },
       onArrival: () => this.#options.onChange?.(),
       onError: (error) => this.#options.onError?.(error),
     });
-    this.#details = new DetailTable(slots);
-    this.#rows = Array.from({ length: slots }, (_, slot) => new PageRows(this.#details.rowsOf(slot)));
+    this.#rows = new PlacedRows(list, this.#residency);
+    this.#arrivals = new Arrivals(list, options.arrivalMs ?? ARRIVAL_MS, (page, arrived) =>
+      this.#rows.setArrived(page, arrived),
+    );
   }
 
   /**
@@ -114,12 +126,21 @@ export class StreamedGaussians implements GaussianScene {
    * @param manifest see `checkManifest`
    * @throws GaussianSplatError `out-of-memory/*` if there is no room; what `fetchPage` throws, `decode/truncated` for a page of the wrong length.
    */
-  static async open(device: GPUDevice, manifest: DetailManifest, options: StreamOptions): Promise<StreamedGaussians> {
-    const what = `streamed scene of ${manifest.splats} splats`;
-    const scene = await withMemoryCheck(device, what, () => new StreamedGaussians(device, manifest, options));
+  static open(device: GPUDevice, manifest: DetailManifest, options: StreamOptions): Promise<StreamedGaussians> {
+    return this.openSource(device, folderSource(manifest, options.fetchPage), options);
+  }
+
+  /**
+   * The same for pages from anywhere.
+   * @throws GaussianSplatError `out-of-memory/*` if there is no room; what the source throws for the first page.
+   */
+  static async openSource(device: GPUDevice, source: PageSource, options: PoolOptions): Promise<StreamedGaussians> {
+    const what = `streamed scene of ${source.scene.splats} splats`;
+    const scene = await withMemoryCheck(device, what, () => new StreamedGaussians(device, source, options));
     try {
       scene.#residency.begin(0);
-      scene.#place({ page: 0, words: await scene.#fetch(0, new AbortController().signal) });
+      const words = await source.fetch(0, new AbortController().signal);
+      if (scene.#begin(0, words)) while (scene.#upload) scene.#writeSlot(scene.#upload);
       scene.#writeDetails();
       return scene;
     } catch (error) {
@@ -142,8 +163,8 @@ export class StreamedGaussians implements GaussianScene {
   get progress(): { readonly resident: number; readonly total: number; readonly coming: number } {
     return {
       resident: this.#residency.residents,
-      total: this.#list.count,
-      coming: this.#traffic.underWay + this.#arriving.size,
+      total: this.#source.list.count,
+      coming: this.#traffic.underWay + this.#placing,
     };
   }
 
@@ -168,12 +189,12 @@ export class StreamedGaussians implements GaussianScene {
   /** Uploads some of what has come, and lets what came before arrive further. The renderer calls it before each frame. */
   update(): void {
     const start = performance.now();
-    this.#step(start);
-    this.#upload(this.#pace.startFrame(start));
+    if (this.#arrivals.step(start)) this.#version++;
+    this.#uploadSome(this.#pace.startFrame(start));
     this.#writeDetails();
     this.#uploaded.milliseconds += performance.now() - start;
     this.#traffic.sendForMore();
-    if (this.#traffic.waiting + this.#arriving.size > 0) queueMicrotask(() => this.#options.onChange?.());
+    if (this.#traffic.waiting + this.#placing > 0) queueMicrotask(() => this.#options.onChange?.());
   }
 
   destroy(): void {
@@ -184,83 +205,63 @@ export class StreamedGaussians implements GaussianScene {
     this.#memory.destroy();
   }
 
-  /** Places the most needed of what waits: one page, and as many more as so many bytes are enough for. */
-  #upload(most: number): void {
+  /** Pages that have slots, but do not cover what they should yet. */
+  get #placing(): number {
+    return (this.#upload ? 1 : 0) + this.#arrivals.count;
+  }
+
+  /** Places the most needed of what waits: one slot, and as many more as so many bytes are enough for. */
+  #uploadSome(most: number): void {
     const start = performance.now();
     let bytes = 0;
-    while (bytes === 0 || bytes + slotBytes(this.#manifest) <= most) {
-      const next = this.#traffic.next();
-      if (next === undefined) break;
-      if (!this.#place(next)) this.#traffic.refused();
-      // A page that finds no slot has cost its share of the thread as well.
-      bytes += next.words.byteLength;
+    while (bytes === 0 || bytes + slotBytes(this.#source.scene) <= most) {
+      if (this.#upload === undefined) {
+        const next = this.#traffic.next();
+        if (next === undefined) break;
+        if (!this.#begin(next.page, next.words)) {
+          this.#traffic.refused();
+          // A page that finds no slot has cost its share of the thread as well.
+          bytes += next.words.byteLength;
+          continue;
+        }
+      }
+      bytes += this.#writeSlot(this.#upload!);
     }
     if (bytes > 0) this.#pace.note(bytes, performance.now() - start);
   }
 
-  /** Puts a page into a slot; all that must be drawn otherwise for it changes with the same frame. @returns false if there is no slot for it */
-  #place({ page, words }: FetchedPage): boolean {
+  /** Finds slots for a page; what leaves them gives way to what is above it with this frame. @returns false if there are none */
+  #begin(page: number, words: Uint32Array<ArrayBuffer>): boolean {
     const place = this.#residency.settle(page);
     if (place === undefined) return false;
-    const { slot, left } = place;
-    const { upper, parent, parentChunk, chunks } = this.#list;
-    movePage(words, this.#list.translate(page), this.#manifest, chunks[page]);
-    this.#pool.write(slot, words, chunks[page]);
-    if (left !== NONE) this.#leave(left);
-    const rows = this.#rows[slot];
-    rows.load(this.#list, this.#manifest, page, words);
-    if (parent[page] !== NONE) rows.setAbove(upper[page], this.#rowsOf(parent[page]).above(parentChunk[page]));
-    const isAtOnce = parent[page] === NONE || this.#options.arrivalMs === 0;
-    if (!isAtOnce) this.#arriving.set(page, 0);
-    this.#setArrived(page, isAtOnce ? ARRIVED : 0);
-    this.#uploaded.pages++;
-    this.#uploaded.bytes += words.byteLength;
-    this.#version++;
+    for (const { page: leaver, slots } of place.left) {
+      this.#arrivals.forget(leaver);
+      this.#rows.leave(leaver, slots);
+      this.#version++;
+    }
+    this.#source.prepare?.(page, words);
+    this.#upload = { page, slots: place.slots, parts: partsOf(words, this.#source.scene), written: 0 };
     return true;
   }
 
-  /** Lets arriving pages take the place of what stood for them by another step; none before the page above it. */
-  #step(now: number): void {
-    const passed = (now - this.#steppedAt) / (this.#options.arrivalMs ?? ARRIVAL_MS);
-    this.#steppedAt = now;
-    if (this.#arriving.size === 0) return;
-    const step = Math.min(1 / LEAST_STEPS, passed);
-    for (const [page, before] of this.#arriving) {
-      const most = this.#arriving.get(this.#list.parent[page]) ?? 1;
-      const passedNow = Math.min(most, before + step);
-      if (passedNow === 1) this.#arriving.delete(page);
-      else this.#arriving.set(page, passedNow);
-      this.#setArrived(page, Math.round(ARRIVED * eased(passedNow)));
+  /** Uploads what belongs in one slot of a page. With the last of them the page takes part in the picture. @returns bytes */
+  #writeSlot(upload: Upload): number {
+    const { page, slots, parts } = upload;
+    const words = parts[upload.written];
+    this.#pool.write(slots[upload.written++], words, chunksIn(words, this.#source.scene));
+    this.#uploaded.bytes += words.byteLength;
+    if (upload.written === parts.length) {
+      this.#upload = undefined;
+      this.#rows.load(page, parts, this.#source.scene);
+      this.#arrivals.begin(page);
+      this.#uploaded.pages++;
+      this.#version++;
     }
-    this.#version++;
-  }
-
-  #rowsOf(page: number): PageRows {
-    return this.#rows[this.#residency.slotOf[page]];
-  }
-
-  /** How far a page has arrived: so far the chunk above gives way to it. */
-  #setArrived(page: number, arrived: number): void {
-    this.#rowsOf(page).setArrived(arrived);
-    this.#details.touch(this.#residency.slotOf[page]);
-    this.#setBelow(page, arrived);
-  }
-
-  /** A page that is about to be overwritten: the chunk above is drawn again. */
-  #leave(page: number): void {
-    this.#arriving.delete(page);
-    this.#setBelow(page, 0);
-  }
-
-  #setBelow(page: number, arrived: number): void {
-    const parent = this.#list.parent[page];
-    if (parent === NONE) return;
-    this.#rowsOf(parent).setBelow(this.#list.parentChunk[page], arrived);
-    this.#details.touch(this.#residency.slotOf[parent]);
+    return words.byteLength;
   }
 
   #writeDetails(): void {
-    this.#details.flush(this.#pool.slotsPerBuffer, (first, rows) => this.#pool.writeDetails(first, rows));
+    this.#rows.flush(this.#pool.slotsPerBuffer, (first, rows) => this.#pool.writeDetails(first, rows));
   }
 
   #take(wishes: Float32Array): void {
@@ -268,31 +269,26 @@ export class StreamedGaussians implements GaussianScene {
     this.#residency.note(wishes);
     this.#traffic.follow();
   }
-
-  async #fetch(page: number, signal: AbortSignal): Promise<Uint32Array<ArrayBuffer>> {
-    const file = this.#list.file(page);
-    const bytes = await this.#options.fetchPage(file, signal);
-    signal.throwIfAborted();
-    const expected = 4 * pageLayout(this.#manifest, this.#list.chunks[page]).total;
-    if (bytes.byteLength === expected) return new Uint32Array(bytes);
-    throw new GaussianSplatError('decode/truncated', {
-      where: file,
-      expected: `${expected} bytes`,
-      found: `${bytes.byteLength} bytes`,
-      remedy: 'upload the folder again, all files of it from one run of npm run detail',
-    });
-  }
 }
 
-/** Slow at both ends: an opaque splat in the share w has the opacity 1 − (1 − a)^w, which is a third at the first of sixteen even steps. */
-const eased = (t: number): number => t * t * (3 - 2 * t);
+/** Chunks that are laid out as in a page's file. */
+const chunksIn = ({ length }: Uint32Array, scene: PageSource['scene']): number => length / pageLayout(scene, 1).total;
 
-function slotsFor(manifest: DetailManifest, pages: number, budget: number): number {
-  const slots = Math.min(pages, Math.floor(budget / slotBytes(manifest)));
-  if (slots >= 1) return slots;
+/** The words of each slot. */
+function partsOf(words: Uint32Array<ArrayBuffer>, scene: PageSource['scene']): Uint32Array<ArrayBuffer>[] {
+  const stride = pageLayout(scene, PAGE_CHUNKS).total;
+  return Array.from({ length: Math.ceil(words.length / stride) }, (_, k) =>
+    words.subarray(stride * k, stride * (k + 1)),
+  );
+}
+
+function slotsFor({ scene, list }: PageSource, budget: number): number {
+  const all = list.slots.reduce((sum, slots) => sum + slots, 0);
+  const slots = Math.min(all, Math.floor(budget / slotBytes(scene)));
+  if (slots >= list.slots[0]) return slots;
   throw new GaussianSplatError('out-of-memory/budget', {
     where: 'streamed scene',
-    expected: `at least ${slotBytes(manifest)} bytes of GPU memory for one page`,
+    expected: `at least ${list.slots[0] * slotBytes(scene)} bytes of GPU memory for one page`,
     found: `${Math.floor(budget)} bytes (memoryBudget)`,
     remedy: 'raise the budget',
   });

@@ -23,6 +23,9 @@ export function hostileServer(otherOrigin) {
   };
 }
 
+/** By folder: what tests have put there, and what was asked for. */
+const kept = new Map();
+
 const ANSWERS = {
   status(context, code) {
     context.status = Number(code);
@@ -157,6 +160,28 @@ const ANSWERS = {
     const path = join(sharedData, normalize(`/${name}`));
     context.status = existsSync(path) && statSync(path).isFile() ? 200 : 404;
     context.body = context.status === 200 ? createReadStream(path) : 'absent';
+  },
+
+  /** Files that a test has put there with PUT; DELETE takes one away. `log` tells the paths that were asked for, in order. */
+  async kept(context, path) {
+    const [folder, ...rest] = path.split('/');
+    const { files, log } = kept.get(folder) ?? kept.set(folder, { files: new Map(), log: [] }).get(folder);
+    const name = rest.join('/');
+    if (context.method === 'PUT') {
+      const pieces = [];
+      for await (const piece of context.req) pieces.push(piece);
+      files.set(name, Buffer.concat(pieces));
+      context.status = 204;
+    } else if (context.method === 'DELETE') {
+      files.delete(name);
+      context.status = 204;
+    } else if (name === 'log') {
+      context.body = JSON.stringify(log);
+    } else {
+      log.push(name);
+      context.status = files.has(name) ? 200 : 404;
+      context.body = files.get(name) ?? 'absent';
+    }
   },
 
   'soak-cycles'(context) {

@@ -1,0 +1,54 @@
+import { partAddress } from '../open-part.js';
+import { parseLodMeta } from './meta.js';
+
+/** Splats `first` to `first + count` of one SOG file of a streamed scene. */
+export interface SogRun extends SogAddress {
+  readonly first: number;
+  readonly count: number;
+}
+
+/** A SOG file of a streamed scene. */
+export interface SogAddress {
+  /** Absolute address of its `meta.json`. */
+  readonly url: string;
+  /** What error messages call it. */
+  readonly name: string;
+}
+
+/** A part of a streamed scene, and how it looks at each level of detail that it has. */
+export interface LodBox {
+  /** Corners, world units. */
+  readonly min: readonly number[];
+  readonly max: readonly number[];
+  /** One or more, the coarsest first; each with a splat or more. */
+  readonly runs: readonly SogRun[];
+}
+
+/** A streamed SOG scene, of which no splat has been read. */
+export interface LodScene {
+  readonly boxes: readonly LodBox[];
+  /** Splats that are always shown, if there are any. */
+  readonly environment: SogAddress | undefined;
+}
+
+/**
+ * Reads the index of a streamed SOG scene, `lod-meta.json`, for those who fetch it box by box.
+ * @param name what error messages call it
+ * @param url absolute address of the index, which all others are relative to
+ * @throws GaussianSplatError `decode/header`, `decode/unsupported` for another version.
+ */
+export function readLodScene(bytes: Uint8Array, name: string, url: string): LodScene {
+  const { files, leaves, environment } = parseLodMeta(bytes, name);
+  const addressOf = (path: string): SogAddress => ({ url: partAddress(url, path).href, name: `${name}, ${path}` });
+  const addresses = files.map(addressOf);
+  const boxes = leaves.map(({ min, max, levels }) => ({
+    ...{ min, max },
+    runs: levels
+      .flatMap((run) => (run && run.count > 0 ? { ...addresses[run.file], first: run.offset, count: run.count } : []))
+      .reverse(),
+  }));
+  return {
+    boxes: boxes.filter(({ runs }) => runs.length > 0),
+    environment: environment === undefined ? undefined : addressOf(environment),
+  };
+}

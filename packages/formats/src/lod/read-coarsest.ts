@@ -1,0 +1,50 @@
+import { keepUsable, type GaussianCloud } from '@gaussian-splat/core';
+import { levelRunsOf, type NodePart } from './node-parts.js';
+import { noSplats } from '../no-splats.js';
+import { mergeClouds } from '../merge-clouds.js';
+import type { LodScene, SogRun } from './boxes.js';
+import { cut, type FetchBytes, type SogFiles } from './sog-files.js';
+
+/**
+ * The coarsest run of each box of a streamed scene, with its environment: the nodes of `levelRuns` are the numbers of the boxes, and behind them the environment. Splats
+ * that cannot be drawn are left out; of a box none may be left.
+ * @throws GaussianSplatError as `SogFiles.read`
+ */
+export async function readCoarsest(
+  { boxes, environment }: LodScene,
+  files: SogFiles,
+  fetch: FetchBytes,
+  name: string,
+  signal?: AbortSignal,
+): Promise<GaussianCloud> {
+  const parts: NodePart[] = new Array(boxes.length);
+  const byFile = new Map<string, [node: number, run: SogRun][]>();
+  boxes.forEach(({ runs: [run] }, node) => {
+    const others = byFile.get(run.url);
+    if (others) others.push([node, run]);
+    else byFile.set(run.url, [[node, run]]);
+  });
+  // Where one file is missing the others are not waited for.
+  const failed = new AbortController();
+  const either = AbortSignal.any([failed.signal, ...(signal ? [signal] : [])]);
+  const readFile = async (runs: readonly [number, SogRun][]): Promise<void> => {
+    const cloud = await files.open(runs[0][1], fetch, either);
+    for (const [node, run] of runs) {
+      parts[node] = { cloud: cut(cloud, run), first: 0, count: run.count, node, level: 0 };
+    }
+  };
+  const readAround = async (): Promise<void> => {
+    if (environment === undefined) return;
+    const cloud = await files.open(environment, fetch, either);
+    parts[boxes.length] = { cloud, first: 0, count: cloud.count, node: boxes.length, level: 0 };
+  };
+  try {
+    await Promise.all([...[...byFile.values()].map(readFile), readAround()]);
+  } catch (error) {
+    failed.abort(error);
+    throw error;
+  }
+  const cloud = keepUsable({ ...mergeClouds(parts, name), levelRuns: levelRunsOf(parts) });
+  if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
+  return cloud;
+}

@@ -1,0 +1,153 @@
+import { GaussianSplatError, keepUsable, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { grouped } from '../bytes.js';
+import { damaged } from '../damaged.js';
+import { partAddress } from '../open-part.js';
+import { parseSogMeta } from '../sog/meta.js';
+import { readSogImages } from '../sog/read-sog.js';
+import type { SogAddress, SogRun } from './boxes.js';
+import { Gate } from './gate.js';
+
+/** Brings a file, or rejects; aborted when nobody waits for it any more. */
+export type FetchBytes = (url: string, signal: AbortSignal) => Promise<Uint8Array>;
+
+/** Bytes of decoded splats that are kept; the last file is, however large. */
+const KEPT_BYTES = 128e6;
+/** Files that are fetched and decoded at a time: one is on its way while the other is decoded. */
+const FILES_AT_A_TIME = 2;
+
+/** A file that is being fetched and decoded. */
+interface Reading {
+  readonly cloud: Promise<GaussianCloud>;
+  readonly controller: AbortController;
+  readers: number;
+}
+
+/**
+ * Runs of splats out of the SOG files of streamed scenes. A file holds many runs: those that are asked for while it is read share one reading, and the files read last
+ * are kept, in so many bytes.
+ */
+export class SogFiles {
+  readonly #keptBytes: number;
+  /** The one used last is the last. */
+  readonly #kept = new Map<string, GaussianCloud>();
+  readonly #reading = new Map<string, Reading>();
+  readonly #gate = new Gate(FILES_AT_A_TIME);
+
+  /** @param keptBytes decoded splats that are kept, default 128 MB; the last file is, however large */
+  constructor(keptBytes = KEPT_BYTES) {
+    this.#keptBytes = keptBytes;
+  }
+
+  /**
+   * Reads the splats of a run, those left out that cannot be drawn.
+   * @param fetch brings the files that are not here
+   * @throws GaussianSplatError `decode/*`, `decode/corrupt` for a run that reaches beyond its file, `decode/empty` for one without a splat that can be drawn; what `fetch` throws; the
+   * reason of `signal` as soon as that is aborted.
+   */
+  async read(run: SogRun, fetch: FetchBytes, signal?: AbortSignal): Promise<GaussianCloud> {
+    const cloud = keepUsable(cut(await this.open(run, fetch, signal), run));
+    if (cloud.count > 0) return cloud;
+    throw new GaussianSplatError('decode/empty', {
+      where: whereOf(run),
+      expected: '1 splat or more that can be drawn',
+      found: `${grouped(run.count)} with values that cannot be drawn`,
+      remedy: 'export the scene again; until then a coarser level is shown here',
+    });
+  }
+
+  /** All splats of a file, in its order; not to be changed. Throws as {@link read} does. */
+  async open(file: SogAddress, fetch: FetchBytes, signal?: AbortSignal): Promise<GaussianCloud> {
+    signal?.throwIfAborted();
+    const kept = this.#kept.get(file.url);
+    if (kept) {
+      this.#keep(file.url, kept);
+      return kept;
+    }
+    let reading = this.#reading.get(file.url);
+    if (reading === undefined) {
+      const controller = new AbortController();
+      reading = { cloud: this.#read(file, fetch, controller.signal), controller, readers: 0 };
+      this.#reading.set(file.url, reading);
+    }
+    return this.#wait(file.url, reading, signal);
+  }
+
+  /** Waits with others for a file; the last that gives up ends its reading. */
+  async #wait(url: string, reading: Reading, signal: AbortSignal | undefined): Promise<GaussianCloud> {
+    reading.readers++;
+    let giveUp: (() => void) | undefined;
+    const givenUp = new Promise<never>((_, reject) => {
+      giveUp = () => reject(signal?.reason);
+      signal?.addEventListener('abort', giveUp, { once: true });
+    });
+    try {
+      return await Promise.race([reading.cloud, givenUp]);
+    } finally {
+      signal?.removeEventListener('abort', giveUp!);
+      reading.readers--;
+      if (reading.readers === 0 && this.#reading.get(url) === reading) {
+        this.#reading.delete(url);
+        reading.controller.abort();
+        reading.cloud.catch(() => undefined);
+      }
+    }
+  }
+
+  async #read({ url, name }: SogAddress, fetch: FetchBytes, signal: AbortSignal): Promise<GaussianCloud> {
+    const leave = await this.#gate.enter();
+    try {
+      signal.throwIfAborted();
+      const bytes = await fetch(url, signal);
+      const open = (path: string): Promise<Uint8Array> => fetch(partAddress(url, path).href, signal);
+      const cloud = await readSogImages(parseSogMeta(bytes, name), open, { bytes, name, signal });
+      this.#keep(url, cloud);
+      return cloud;
+    } finally {
+      leave();
+    }
+  }
+
+  /** Keeps a file, and lets go of those that have not been used for the longest. */
+  #keep(url: string, cloud: GaussianCloud): void {
+    this.#kept.delete(url);
+    this.#kept.set(url, cloud);
+    let bytes = [...this.#kept.values()].reduce((sum, kept) => sum + byteLengthOf(kept), 0);
+    for (const [oldest, kept] of this.#kept) {
+      if (bytes <= this.#keptBytes || oldest === url) return;
+      this.#kept.delete(oldest);
+      bytes -= byteLengthOf(kept);
+    }
+  }
+}
+
+const whereOf = ({ name, first, count }: SogRun): string =>
+  `${name}, splats ${grouped(first)} to ${grouped(first + count)}`;
+
+const byteLengthOf = ({ positions, scales, rotations, opacities, sh }: GaussianCloud): number =>
+  [positions, scales, rotations, opacities, sh].reduce((sum, { byteLength }) => sum + byteLength, 0);
+
+/**
+ * Some splats of a cloud, with arrays of their own.
+ * @throws GaussianSplatError `decode/corrupt` if the cloud has not as many
+ */
+export function cut(cloud: GaussianCloud, run: SogRun): GaussianCloud {
+  const { first, count } = run;
+  if (first + count > cloud.count) {
+    throw damaged(
+      whereOf(run),
+      `runs within the ${grouped(cloud.count)} splats of the file`,
+      'one that reaches beyond',
+    );
+  }
+  const part = (values: Float32Array, stride: number): Float32Array =>
+    values.slice(stride * first, stride * (first + count));
+  return {
+    ...cloud,
+    count,
+    positions: part(cloud.positions, 3),
+    scales: part(cloud.scales, 3),
+    rotations: part(cloud.rotations, 4),
+    opacities: part(cloud.opacities, 1),
+    sh: part(cloud.sh, 3 * shCoefficientCount(cloud.shDegree)),
+  };
+}

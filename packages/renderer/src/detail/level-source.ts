@@ -1,0 +1,93 @@
+import { GaussianSplatError, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { mortonOrder } from '../pack/morton.js';
+import { usableIndices } from '../pack/pack.js';
+import type { LevelPage, LevelScene } from './level-pages.js';
+import { PAGE_CHUNKS, pageLayout } from './manifest.js';
+import { joinSlots, packRun } from './pack-run.js';
+import { emptyList, putBelow, type PageList } from './page-list.js';
+import type { PageSource, StreamedScene } from './page-source.js';
+import { chunksOf } from './splat-level.js';
+
+/**
+ * The words of a page.
+ * @param cloud its splats
+ * @throws GaussianSplatError `argument/cloud` for a cloud without a splat that can be drawn, or with more than the page has.
+ */
+export function packLevelPage(
+  cloud: GaussianCloud,
+  { count, sphere, error }: LevelPage,
+  scene: StreamedScene,
+): Uint32Array<ArrayBuffer> {
+  const placed = placedIn(cloud, scene);
+  const usable = usableIndices(placed);
+  if (usable.length === 0 || usable.length > count) {
+    throw new GaussianSplatError('argument/cloud', {
+      where: 'page of a scene with levels of its own',
+      expected: `1 to ${count} splats that can be drawn`,
+      found: String(usable.length),
+      remedy: 'pass the splats of the run that the index names',
+    });
+  }
+  const run = packRun(placed, mortonOrder(placed.positions, usable), scene.shPrecision);
+  return joinSlots([{ ...run, sphere, error }], scene);
+}
+
+/** The cloud relative to the origin of the scene, and with harmonics of its degree. */
+function placedIn(cloud: GaussianCloud, { origin, shDegree }: StreamedScene): GaussianCloud {
+  const shift = cloud.origin.map((x, axis) => x - origin[axis]);
+  const positions = shift.every((x) => x === 0) ? cloud.positions : cloud.positions.map((x, i) => x + shift[i % 3]);
+  return { ...cloud, origin, positions, sh: shOfDegree(cloud, shDegree), shDegree };
+}
+
+/** Harmonics cut off above a degree, or filled up with zeros. */
+function shOfDegree(cloud: GaussianCloud, degree: ShDegree): Float32Array {
+  if (cloud.shDegree === degree) return cloud.sh;
+  const [from, to] = [cloud.shDegree, degree].map((one) => 3 * shCoefficientCount(one));
+  const sh = new Float32Array(to * cloud.count);
+  for (let i = 0; i < cloud.count; i++) {
+    sh.set(cloud.sh.subarray(from * i, from * i + Math.min(from, to)), to * i);
+  }
+  return sh;
+}
+
+function listLevels({ first, firstChunks, pages, scene }: LevelScene): PageList {
+  const total = first.length / pageLayout(scene, 1).total;
+  const chunks = [total, ...pages.map(({ count }) => chunksOf(count))];
+  const list = emptyList(Uint32Array.from(chunks, (count) => Math.ceil(count / PAGE_CHUNKS)));
+  list.chunks.set(chunks);
+  list.upper.set(chunks);
+  let [boxBefore, start] = [0, 0];
+  pages.forEach(({ box, level }, p) => {
+    while (boxBefore < box) start += firstChunks[boxBefore++];
+    if (level === 1) putBelow(list, p + 1, 0, start, firstChunks[box]);
+    else putBelow(list, p + 1, p, 0, list.chunks[p]);
+  });
+  return list;
+}
+
+/**
+ * The pages of a scene whose file has levels of its own.
+ * @param levels whose first page is the source's afterwards
+ * @param fetchLevel brings a page: see {@link packLevelPage}. Best done in a worker.
+ */
+export function levelSource(
+  levels: LevelScene,
+  fetchLevel: (page: LevelPage, signal: AbortSignal) => Promise<Uint32Array<ArrayBuffer>>,
+): PageSource {
+  const { scene, pages } = levels;
+  const list = listLevels(levels);
+  const chunk = pageLayout(scene, 1).total;
+  const fetch = async (page: number, signal: AbortSignal): Promise<Uint32Array<ArrayBuffer>> => {
+    if (page === 0) return levels.first;
+    const words = await fetchLevel(pages[page - 1], signal);
+    const chunks = words.length / chunk;
+    if (Number.isInteger(chunks) && chunks >= 1 && chunks <= list.chunks[page]) return words;
+    throw new GaussianSplatError('decode/truncated', {
+      where: `level ${pages[page - 1].level} of box ${pages[page - 1].box}`,
+      expected: `1 to ${list.chunks[page]} chunks of ${4 * chunk} bytes`,
+      found: `${words.byteLength} bytes`,
+      remedy: 'bring what packLevelPage makes of the run',
+    });
+  };
+  return { scene, list, fetch };
+}

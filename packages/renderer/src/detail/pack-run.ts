@@ -1,0 +1,77 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+import { constants } from '../generated/shaders.js';
+import { CHUNK_NUMBERS } from '../pack/chunks.js';
+import { GEOMETRY_WORDS, packKept } from '../pack/pack.js';
+import { shWords, type ShPrecision } from '../pack/sh.js';
+import { detailRows, DETAIL_NUMBERS } from './chunk-detail.js';
+import { PAGE_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
+import { packFiller } from './pack-level.js';
+import { chunksOf } from './splat-level.js';
+
+const { CULL_GROUP } = constants;
+
+/** Splats in whole chunks, the last filled up. */
+export interface RunWords {
+  readonly geometry: Uint32Array;
+  readonly sh: Uint32Array;
+  readonly chunks: Float32Array;
+}
+
+/** All chunks of a run have one sphere and one error. */
+export interface PackedRun extends RunWords {
+  /** Centre and radius. */
+  readonly sphere: readonly number[];
+  /** World units. */
+  readonly error: number;
+}
+
+/**
+ * Packs some splats of a cloud, in that order.
+ * @param place where a run stands that has nothing to draw: one chunk of nothing, which what is finer can take the place of
+ */
+export function packRun(
+  cloud: GaussianCloud,
+  kept: Uint32Array,
+  shPrecision: ShPrecision,
+  place?: { readonly min: readonly number[]; readonly max: readonly number[] },
+): RunWords {
+  const count = Math.max(place ? 1 : 0, chunksOf(kept.length));
+  const part = packKept(cloud, kept, shPrecision);
+  const words: RunWords = {
+    geometry: new Uint32Array(GEOMETRY_WORDS * CULL_GROUP * count),
+    sh: new Uint32Array(shWords(cloud.shDegree, shPrecision) * CULL_GROUP * count),
+    chunks: new Float32Array(CHUNK_NUMBERS * count),
+  };
+  words.geometry.set(part.geometry);
+  words.sh.set(part.sh);
+  words.chunks.set(part.chunks);
+  if (place && kept.length === 0) words.chunks.set([...place.min, 0, ...place.max, 0]);
+  packFiller(words.geometry, kept.length, CULL_GROUP * count);
+  return words;
+}
+
+/** Puts runs one behind the other into slots: of each what docs/detail-pages.md describes, all but the last full. Nothing is above any of them. */
+export function joinSlots(runs: readonly PackedRun[], format: PageFormat): Uint32Array<ArrayBuffer> {
+  const total = runs.reduce((sum, { chunks }) => sum + chunks.length / CHUNK_NUMBERS, 0);
+  const words = new Uint32Array(pageLayout(format, 1).total * total);
+  const floats = new Float32Array(words.buffer);
+  const one = pageLayout(format, 1);
+  let at = 0;
+  for (const { geometry, sh, chunks, sphere, error } of runs) {
+    const errors = { count: 1, spheres: Float32Array.from(sphere), errors: Float32Array.of(error) };
+    const row = detailRows(errors, undefined);
+    for (let c = 0; c < chunks.length / CHUNK_NUMBERS; c++, at++) {
+      const slot = at - (at % PAGE_CHUNKS);
+      const layout = pageLayout(format, Math.min(PAGE_CHUNKS, total - slot));
+      const [start, k] = [one.total * slot, at - slot];
+      const part = <T>(values: { subarray(from: number, end: number): T }, size: number): T =>
+        values.subarray(size * c, size * (c + 1));
+      floats.set(part(chunks, one.chunks), start + one.chunks * k);
+      floats.set(row, start + layout.chunks + DETAIL_NUMBERS * k);
+      const geometryAt = start + layout.chunks + layout.details;
+      words.set(part(geometry, one.geometry), geometryAt + one.geometry * k);
+      words.set(part(sh, one.sh), geometryAt + layout.geometry + one.sh * k);
+    }
+  }
+  return words;
+}

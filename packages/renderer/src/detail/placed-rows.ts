@@ -1,0 +1,84 @@
+import { DetailTable } from './detail-table.js';
+import { PAGE_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
+import { childrenIn, NONE, type PageList } from './page-list.js';
+import { PageRows } from './page-rows.js';
+import type { Residency } from './residency.js';
+
+/** The detail rows of all slots, page by page: which chunks are drawn, and in which share, while pages come and go. */
+export class PlacedRows {
+  readonly #list: PageList;
+  readonly #residency: Residency;
+  readonly #table: DetailTable;
+  /** Of each slot. */
+  readonly #rows: readonly PageRows[];
+
+  constructor(list: PageList, residency: Residency) {
+    this.#list = list;
+    this.#residency = residency;
+    const slots = residency.pageIn.length;
+    this.#table = new DetailTable(slots);
+    this.#rows = Array.from({ length: slots }, (_, slot) => new PageRows(this.#table.rowsOf(slot)));
+  }
+
+  /**
+   * Takes over what a page says of its chunks. Nothing below it is there, and it has not arrived at all.
+   * @param parts words of each slot that holds chunks, as in a page's file
+   */
+  load(page: number, parts: readonly Uint32Array<ArrayBuffer>[], format: PageFormat): void {
+    const { upper, parent, parentChunk } = this.#list;
+    const above =
+      parent[page] === NONE
+        ? undefined
+        : this.#rowsOf(parent[page], parentChunk[page]).above(parentChunk[page] % PAGE_CHUNKS);
+    const slots = this.#residency.slotsOf(page);
+    parts.forEach((words, k) => {
+      const chunks = words.length / pageLayout(format, 1).total;
+      const { chunks: from, details } = pageLayout(format, chunks);
+      const rows = this.#rows[slots[k]];
+      const numbers = new Float32Array(words.buffer, words.byteOffset + 4 * from, details);
+      rows.load(numbers, childrenIn(this.#list, page, k).subarray(0, chunks));
+      if (above) rows.setAbove(Math.min(chunks, Math.max(0, upper[page] - PAGE_CHUNKS * k)), above);
+      this.#table.touch(slots[k]);
+    });
+  }
+
+  /** How far, 0 to `ARRIVED`, a page has arrived: so far the chunks above give way to it. */
+  setArrived(page: number, arrived: number): void {
+    for (const slot of this.#residency.slotsOf(page)) {
+      this.#rows[slot].setArrived(arrived);
+      this.#table.touch(slot);
+    }
+    this.#setBelow(page, arrived);
+  }
+
+  /** A page has left: the chunks above are drawn again, and nothing is that its slots held. */
+  leave(page: number, slots: readonly number[]): void {
+    for (const slot of slots) {
+      this.#rows[slot].clear();
+      this.#table.touch(slot);
+    }
+    this.#setBelow(page, 0);
+  }
+
+  /** Hands over what has changed: see `DetailTable.flush`. */
+  flush(slotsPerBuffer: number, write: (slot: number, rows: Float32Array<ArrayBuffer>) => void): void {
+    this.#table.flush(slotsPerBuffer, write);
+  }
+
+  #rowsOf(page: number, chunk: number): PageRows {
+    return this.#rows[this.#residency.slotsOf(page)[Math.floor(chunk / PAGE_CHUNKS)]];
+  }
+
+  #setBelow(page: number, arrived: number): void {
+    const parent = this.#list.parent[page];
+    if (parent === NONE) return;
+    const slots = this.#residency.slotsOf(parent);
+    const first = this.#list.parentChunk[page];
+    const end = first + this.#list.parentChunks[page];
+    for (let chunk = first; chunk < end; chunk++) {
+      const slot = slots[Math.floor(chunk / PAGE_CHUNKS)];
+      this.#rows[slot].setBelow(chunk % PAGE_CHUNKS, arrived);
+      this.#table.touch(slot);
+    }
+  }
+}

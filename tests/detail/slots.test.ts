@@ -1,0 +1,204 @@
+/** Pages of several slots, as runs of a file's own levels are: who comes and who goes, without a GPU. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { setImmediate as turn } from 'node:timers/promises';
+import {
+  MOST_UNDER_WAY,
+  NONE,
+  PAGE_CHUNKS,
+  PageTraffic,
+  Residency,
+  type PageList,
+} from '@gaussian-splat/renderer/stages';
+import { randomSource } from '../support/gpu.js';
+import { boxList, wishesOf } from '../support/page-tree.js';
+
+/** Boxes of one to four levels, the finest of up to 400 chunks. */
+function randomBoxes(count: number, random: () => number): PageList {
+  return boxList(
+    Array.from({ length: count }, () => {
+      const coarsest = 1 + Math.floor(4 * random());
+      return Array.from({ length: 1 + Math.floor(4 * random()) }, (_, k) =>
+        Math.floor(coarsest * (2 + 2.5 * random()) ** k),
+      );
+    }),
+  );
+}
+
+function opened(list: PageList, slots: number): Residency {
+  const residency = new Residency(list, slots);
+  assert.ok(residency.begin(0));
+  assert.equal(residency.settle(0)?.slots.length, list.slots[0]);
+  return residency;
+}
+
+/** Each page is in as many slots as it takes, each slot holds one page, and what is above a page is there. @returns slots in use */
+function check(list: PageList, residency: Residency): number {
+  const residents = [...new Set(residency.pageIn)].filter((page) => page !== NONE);
+  assert.equal(residency.residents, residents.length);
+  for (const page of residents) {
+    const slots = residency.slotsOf(page);
+    assert.equal(slots.length, list.slots[page], `page ${page}`);
+    assert.equal(new Set(slots).size, slots.length);
+    assert.ok(slots.every((slot) => residency.pageIn[slot] === page));
+    assert.equal(residency.slotOf[page], slots[0]);
+    if (page !== 0) assert.ok(residency.isResident(list.parent[page]), `page ${page} hangs in the air`);
+  }
+  for (let page = 0; page < list.count; page++) {
+    if (!residents.includes(page)) assert.equal(residency.slotOf[page], NONE);
+  }
+  return residents.reduce((sum, page) => sum + list.slots[page], 0);
+}
+
+test('whatever is wished for, comes or fails, pages are there whole or not at all, and what is above them is', () => {
+  const random = randomSource(21);
+  const list = randomBoxes(60, random);
+  const slots = list.slots[0] + 30;
+  const residency = opened(list, slots);
+  const coming: number[] = [];
+  let [placed, refused, several, most] = [0, 0, 0, 0];
+  for (let step = 0; step < 4000; step++) {
+    residency.note(Float32Array.from({ length: list.count }, () => (random() < 0.5 ? 0 : 10 * random())));
+    for (let page = residency.nextMissing(); page !== NONE && coming.length < 5; page = residency.nextMissing()) {
+      if (residency.begin(page)) coming.push(page);
+    }
+    const [page] = coming.splice(Math.floor(random() * coming.length), 1);
+    if (page === undefined) continue;
+    if (random() < 0.2) {
+      residency.giveUp(page);
+      continue;
+    }
+    const before = new Set(residency.pageIn);
+    const settled = residency.settle(page);
+    if (settled === undefined) {
+      refused++;
+      assert.deepEqual(new Set(residency.pageIn), before, 'a page that finds no room drives nothing out');
+      continue;
+    }
+    placed++;
+    if (settled.left.length > 1) several++;
+    for (const { page: leaver } of settled.left) assert.ok(before.has(leaver) && !residency.isResident(leaver));
+    most = Math.max(most, check(list, residency));
+  }
+  console.log(`${placed} placed, ${several} of them for several others, ${refused} refused; ${most} of ${slots} slots`);
+  assert.ok(placed > 500 && several > 50 && most > slots - 3);
+});
+
+test('a page that does not fit beside what is above it is never sent for, and keeps nothing else away', () => {
+  // The finest run of the first box takes 10 slots; there are 12, of which the runs above it take 3.
+  const list = boxList([
+    [20, 40, 200],
+    [20, 60],
+    [20, 20],
+  ]);
+  const residency = opened(list, 3 + 2 + 7);
+  for (let look = 0; look < 4; look++) {
+    residency.note(
+      wishesOf(
+        list,
+        (page) => residency.isResident(page),
+        () => 0.9,
+      ),
+    );
+    for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
+      assert.notEqual(page, 2, 'the page of 10 slots');
+      assert.ok(residency.begin(page) && residency.settle(page));
+    }
+  }
+  assert.deepEqual(
+    [0, 1, 2, 3, 4].map((page) => residency.isResident(page)),
+    [true, true, false, true, true],
+  );
+});
+
+test('a large page for which too little can leave keeps no small one from coming that has room', () => {
+  const list = boxList([
+    [20, 200],
+    [20, 100],
+    [20, 20],
+  ]);
+  const residency = opened(list, 3 + 5 + 6);
+  const look = (...wishes: number[]): void => residency.note(Float32Array.of(0, ...wishes));
+  look(0, 50, 0);
+  assert.ok(residency.nextMissing() === 2 && residency.begin(2) && residency.settle(2));
+  // Ten slots: six are empty, and what is in the others is needed nearly as much.
+  look(60, 50, 1);
+  assert.equal(residency.nextMissing(), 1);
+  assert.equal(residency.begin(1), false);
+  assert.equal(residency.nextMissing(), 3);
+  assert.ok(residency.begin(3) && residency.settle(3));
+  // Where it is needed far more, both leave for it.
+  look(90, 50, 1);
+  assert.equal(residency.nextMissing(), 1);
+  assert.ok(residency.begin(1));
+  const settled = residency.settle(1);
+  assert.deepEqual(settled?.left.map(({ page }) => page).sort(), [2, 3]);
+  assert.equal(check(list, residency), 3 + 10);
+});
+
+test('views at rest come to rest in a pool that is too small, and nothing that has room and is needed is missing', () => {
+  const random = randomSource(5);
+  const list = randomBoxes(80, random);
+  const residency = opened(list, list.slots[0] + 40);
+  for (let view = 0; view < 30; view++) {
+    const shares = Float32Array.from({ length: list.count }, () => (random() < 0.2 ? 0 : random()));
+    const wishes = (): Float32Array =>
+      wishesOf(
+        list,
+        (page) => residency.isResident(page),
+        (page) => shares[page],
+      );
+    let placed = -1;
+    for (let looks = 0; placed !== 0; looks++) {
+      assert.ok(looks < 100, `view ${view} never comes to rest`);
+      residency.note(wishes());
+      placed = 0;
+      for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
+        if (residency.begin(page) && residency.settle(page)) placed++;
+      }
+    }
+    const left = residency.pageIn.length - check(list, residency);
+    wishes().forEach((wish, page) => {
+      if (wish > 0 && !residency.isResident(page)) assert.ok(list.slots[page] > left, `page ${page} has room`);
+    });
+  }
+});
+
+test('what is under way is bounded in slots, not in pages', async () => {
+  const list = boxList(Array.from({ length: 200 }, (_, k) => [1, k % 3 === 0 ? 300 : 40]));
+  const residency = opened(list, 2000);
+  const open: (() => void)[] = [];
+  const sent: number[] = [];
+  const traffic = new PageTraffic(residency, {
+    fetch: (page) => {
+      sent.push(page);
+      const words = new Uint32Array(1);
+      return new Promise((resolve) => open.push(() => resolve(words)));
+    },
+    onArrival: () => undefined,
+    onError: (error) => assert.fail(String(error)),
+  });
+  const largest = Math.max(...list.slots.subarray(1));
+  const waiting = new Set<number>();
+  for (let round = 0; round < 600 && residency.residents < list.count; round++) {
+    residency.note(
+      wishesOf(
+        list,
+        (page) => residency.isResident(page),
+        () => 0.5,
+      ),
+    );
+    traffic.follow();
+    for (const page of sent.splice(0)) waiting.add(page);
+    const slots = [...waiting].reduce((sum, page) => sum + list.slots[page], 0);
+    assert.ok(slots < MOST_UNDER_WAY + largest, `${slots} slots under way`);
+    for (const arrive of open.splice(0)) arrive();
+    await turn();
+    const next = traffic.next();
+    if (next !== undefined && residency.settle(next.page)) waiting.delete(next.page);
+  }
+  assert.equal(residency.residents, list.count);
+  assert.equal(traffic.underWay, 0);
+  assert.equal(list.chunks[1], 300);
+  assert.equal(list.slots[1], 300 / PAGE_CHUNKS);
+});

@@ -1,0 +1,131 @@
+/** Streamed SOG (`lod-meta.json`) box by box: what is fetched when, and what is on show meanwhile. */
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import { lodFolder, type LodFolder } from '../../support/lod-folder.js';
+import { pebbles } from '../../support/scenes/pebbles.js';
+import { assert, assertEqual, claimFault, show, until } from './support/harness.js';
+
+const folder = lodFolder(pebbles(14_000), { levels: 3, boxes: 2 });
+
+/** Puts a folder on the server, but for files that are lost. */
+async function serve(name: string, { index, files }: LodFolder = folder, lost = /$^/): Promise<Served> {
+  const address = `/net/kept/${name}/`;
+  const put = (path: string, bytes: Uint8Array): Promise<unknown> =>
+    fetch(address + path, { method: 'PUT', body: bytes.slice() });
+  const there = [...files].filter(([path]) => !lost.test(path));
+  await Promise.all([put('lod-meta.json', index), ...there.map(([path, bytes]) => put(path, bytes))]);
+  return {
+    src: `${address}lod-meta.json`,
+    put,
+    log: async () =>
+      ((await (await fetch(`${address}log`)).json()) as string[]).filter((path) => path.endsWith('meta.json')),
+  };
+}
+
+interface Served {
+  readonly src: string;
+  readonly put: (path: string, bytes: Uint8Array) => Promise<unknown>;
+  /** Descriptions that were asked for, in order. */
+  readonly log: () => Promise<readonly string[]>;
+}
+
+/** Waits until the server was asked for a file. */
+async function asked({ log }: Served, path: string): Promise<readonly string[]> {
+  for (let waited = 0; waited < 400; waited++) {
+    const paths = await log();
+    if (paths.includes(path)) return paths;
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+  throw new Error(`nobody asks for ${path}: ${(await log()).join(' ')}`);
+}
+
+/** Colours of the picture as it is now. */
+async function pixelsOf(element: GaussianSplatElement): Promise<Uint8ClampedArray> {
+  const bitmap = await createImageBitmap(await element.toBlob());
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d')!;
+  context.drawImage(bitmap, 0, 0);
+  return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+}
+
+/** Root mean square difference, in steps of 255. */
+const difference = (a: Uint8ClampedArray, b: Uint8ClampedArray): number =>
+  Math.sqrt(a.reduce((sum, value, i) => sum + (value - b[i]) ** 2, 0) / a.length);
+
+const NEAR = '30deg 60deg 9m';
+
+async function close(element: GaussianSplatElement): Promise<void> {
+  element.removeAttribute('src');
+  await until(() => !element.loaded, 'the scene is let go');
+  element.remove();
+}
+
+describe('a streamed SOG scene', () => {
+  it('shows its coarsest level, then fetches what the camera asks for, and ends as the finest', async () => {
+    const served = await serve('fine');
+    const element = show({ src: served.src, detail: '0.02px', 'camera-orbit': NEAR, 'camera-target': '0m 0m 0m' });
+    let atLoad: Promise<readonly string[]> | undefined;
+    element.addEventListener('load', () => (atLoad = served.log()));
+    await element.ready;
+    assert(element.loaded && element.error === null, `loaded: ${element.error?.message}`);
+    const early = await atLoad!;
+    assert(early.includes('2_0/meta.json') && !early.includes('0_0/meta.json'), `asked for: ${early.join(' ')}`);
+    const all = await asked(served, '0_0/meta.json');
+    assertEqual(all.join(' '), 'lod-meta.json 2_0/meta.json 1_0/meta.json 0_0/meta.json', 'each file once');
+    const reference = show({ src: (await serve('whole')).src, 'camera-orbit': NEAR, 'camera-target': '0m 0m 0m' });
+    await reference.ready;
+    const truth = await pixelsOf(reference);
+    let last = Infinity;
+    for (let tries = 0; tries < 200 && last >= 1.5; tries++) {
+      await new Promise((resolve) => setTimeout(resolve, 100));
+      last = difference(await pixelsOf(element), truth);
+    }
+    assert(last < 1.5, `${last} steps from the finest level`);
+    await close(element);
+    await close(reference);
+  });
+
+  it('without the attribute loads its finest level whole', async () => {
+    const served = await serve('plain');
+    const element = show({ src: served.src, 'camera-orbit': NEAR });
+    await element.ready;
+    assertEqual(element.stats?.modelled, 14_000, 'splats');
+    assertEqual((await served.log()).join(' '), 'lod-meta.json 0_0/meta.json');
+    await close(element);
+  });
+
+  it('stays on show where a file is missing, fetches it once it is there, and fails with a name where the coarsest is', async () => {
+    const warned: string[] = [];
+    const original = console.warn;
+    console.warn = (message: unknown) => void warned.push(String(message));
+    const served = await serve('gaps', folder, /^1_0/);
+    const element = show({ src: served.src, detail: '0.1px', 'camera-orbit': NEAR });
+    await element.ready;
+    await until(() => warned.some((message) => message.includes('404')), 'a word on the missing file');
+    assert(element.loaded && element.error === null, 'still on show');
+    for (const [path, bytes] of folder.files) if (path.startsWith('1_0')) await served.put(path, bytes);
+    // Any picture is a look at what is missing; it is asked for again after four seconds.
+    const turning = setInterval(() => (element.cameraOrbit = `${30 + (performance.now() % 7)}deg 60deg 9m`), 200);
+    await asked(served, '0_0/meta.json');
+    clearInterval(turning);
+    await close(element);
+    console.warn = original;
+    const none = await serve('none', folder, /^2_0/);
+    const broken = show({ src: none.src, detail: '1px' });
+    await broken.ready;
+    assertEqual(broken.error?.reason, 'network/status');
+    broken.remove();
+  });
+
+  it("comes by way of the page's own thread where workers are refused", async () => {
+    const original = GaussianSplatElement.sceneLoader;
+    const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
+    GaussianSplatElement.sceneLoader = new Loader(() => new Worker('/net/status/404', { type: 'module' }));
+    const served = await serve('refused');
+    const element = show({ src: served.src, detail: '0.02px', 'camera-orbit': NEAR });
+    await element.ready;
+    assert(element.loaded, `loaded: ${element.error?.message}`);
+    await asked(served, '0_0/meta.json');
+    await close(element);
+    GaussianSplatElement.sceneLoader = original;
+    claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
+  });
+});
