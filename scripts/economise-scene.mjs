@@ -8,6 +8,7 @@ import {
   dealViews,
   economise,
   GpuEvaluator,
+  MergingEvaluator,
   PaintedEvaluator,
   Studio,
   viewsBetween,
@@ -25,6 +26,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
   --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
                   auto (default): gpu where there is one
+  --merge         merges splats that look like one, too: more go at the same figure, for several times the seconds
   --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
 `;
 
@@ -47,6 +49,7 @@ function parseOptions(args) {
         report: text,
         scorer: { ...text, default: 'auto' },
         scored: { ...text, default: '216' },
+        merge: { type: 'boolean', default: false },
         help: { type: 'boolean' },
       },
     });
@@ -61,13 +64,13 @@ function parseOptions(args) {
   if (values.out === undefined) throw new UsageError('--out is missing');
   const [scene, out] = [resolve(from, positionals[0]), resolve(from, values.out)];
   if (scene === out) throw new UsageError('--out: expected another file than SCENE, which is never changed');
-  const { views, report, scorer } = values;
+  const { views, report, scorer, merge } = values;
   if (!['auto', 'gpu', 'cpu'].includes(scorer))
     throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
   const scored = Number(values.scored);
   if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
     throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
-  return { scene, out, minDecibels, views, report, scorer, scored };
+  return { scene, out, minDecibels, views, report, scorer, scored, merge };
 }
 
 function readViews(path, bounds, scored) {
@@ -90,7 +93,7 @@ async function openDevice(scorer) {
   return { device, isGpu };
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored }) {
+async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored, merge }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
   // The file and the driver take their time at the same time.
@@ -103,9 +106,11 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   // What is left of it when the device is there.
   const read = seconds() - opened;
   const views = readViews(viewsFile, boundsOf(cloud), scored);
-  const evaluator = isGpu
+  const measuring = isGpu
     ? await GpuEvaluator.create(device, cloud, views)
     : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
+  const merging = { views: views.scored, mostError: 10 ** (-minDecibels / 10) };
+  const evaluator = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
   const prepare = seconds() - read;
   const result = await economise(cloud, {
     ...{ minDecibels, name: out, evaluator },

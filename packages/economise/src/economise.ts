@@ -89,7 +89,8 @@ async function chooseEncoding(
   options: EconomiseOptions,
 ): Promise<{ encoding: Encoding; rounding: number }> {
   if (encodings.length === 1) return { encoding: encodings[0], rounding: 0 };
-  const whole: ReducedCloud = { cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) };
+  const degrees = new Uint8Array(cloud.count).fill(cloud.shDegree);
+  const whole: ReducedCloud = { cloud, degrees, kept: Uint32Array.from(degrees.keys()) };
   let best = Infinity;
   for (const encoding of encodings) {
     options.onStep?.(`rounding of ${encoding.title}`);

@@ -10,6 +10,8 @@ export interface Cut {
   readonly removalPrice?: number;
   /** Mean squared error that a splat's coefficient is worth: those that save less go; 0, the default, keeps all. */
   readonly colourPrice?: number;
+  /** Pairs of splats that look like one at a mean squared error up to this become one, by evaluators that merge ({@link MergingEvaluator}); 0, the default, merges none. */
+  readonly mergePrice?: number;
 }
 
 /** A cloud with its least needed parts gone. */
@@ -18,6 +20,8 @@ export interface ReducedCloud {
   readonly cloud: GaussianCloud;
   /** [N] degree that each splat keeps. */
   readonly degrees: Uint8Array;
+  /** [N] its number in the source; of a merged splat that of one that it was made of. */
+  readonly kept: Uint32Array;
 }
 
 /** Which splats stay, and how much of their colours. */
@@ -61,7 +65,12 @@ export function reduceTo(cloud: GaussianCloud, { kept, degrees }: Choice): Reduc
     sh: wholeColoursOf(cloud, kept, degrees, highest),
     shDegree: highest,
   };
-  return { cloud: reduced, degrees };
+  return { cloud: reduced, degrees, kept };
+}
+
+/** Some splats of a cloud, in an order. */
+export function takeSplats(cloud: GaussianCloud, numbers: Uint32Array): GaussianCloud {
+  return reduceTo(cloud, { kept: numbers, degrees: new Uint8Array(numbers.length).fill(cloud.shDegree) }).cloud;
 }
 
 /** Rows of so many numbers, in a new order. */

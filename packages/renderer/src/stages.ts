@@ -12,6 +12,7 @@ export { occlusionView } from './occlusion.js';
 export { scaleRotationFactor } from './pack/factor.js';
 export { DETAIL_NUMBERS, DETAIL_PLACES } from './detail/chunk-detail.js';
 export { buildLevels } from './detail/build-levels.js';
+export * as splatRows from './detail/splat-rows.js';
 export { listPages, NONE, type PageList } from './detail/page-list.js';
 export { DetailTable } from './detail/detail-table.js';
 export { PAGE_CHUNKS } from './detail/manifest.js';
