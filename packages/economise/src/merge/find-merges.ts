@@ -53,8 +53,8 @@ export function findMerges(
   let slots = Uint32Array.from(removalError.keys()).filter((i) => Number.isFinite(removalError[i]));
   let spent = 0;
   for (let round = 0; round < MOST_ROUNDS && spent < mostError; round++) {
-    const { first, second, costs: found } = pairsOf(costs, slots);
-    const gone = new Set<number>();
+    const { first, second, costs: found } = pairsOf(costs, slots, cloud.count);
+    const isGone = new Uint8Array(cloud.count);
     const most = Math.ceil(PART * first.length);
     for (let k = 0; k < most && spent < mostError; k++) {
       const [i, j] = [first[k], second[k]];
@@ -67,10 +67,10 @@ export function findMerges(
       merges.shares.push(costs.share);
       merges.opacities.push(costs.opacity);
       merges.prices.push(prices[i]);
-      gone.add(j);
+      isGone[j] = 1;
     }
-    if (gone.size === 0) break;
-    slots = slots.filter((i) => !gone.has(i));
+    if (first.length === 0) break;
+    slots = slots.filter((i) => !isGone[i]);
   }
   return {
     into: Uint32Array.from(merges.into),
@@ -88,14 +88,14 @@ function evenly(views: readonly Camera[], most: number): Camera[] {
 }
 
 /** Pairs of which no two share a splat: the cheapest of all, the cheapest of the rest, and so on. */
-function pairsOf(costs: PairCosts, slots: Uint32Array): Pairs {
+function pairsOf(costs: PairCosts, slots: Uint32Array, count: number): Pairs {
   const candidates = candidatesOf(costs, slots);
-  const taken = new Set<number>();
+  const isTaken = new Uint8Array(count);
   const pairs: [number, number, number][] = [];
   for (const k of ascendingOrder(candidates.costs)) {
     const [i, j] = [candidates.first[k], candidates.second[k]];
-    if (taken.has(i) || taken.has(j)) continue;
-    taken.add(i).add(j);
+    if (isTaken[i] || isTaken[j]) continue;
+    isTaken[i] = isTaken[j] = 1;
     pairs.push([i, j, candidates.costs[k]]);
   }
   return {
