@@ -8,6 +8,7 @@ import {
   dealViews,
   economise,
   GpuEvaluator,
+  MergingEvaluator,
   PaintedEvaluator,
   Studio,
   viewsBetween,
@@ -28,6 +29,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
                   auto (default): gpu where there is one
   --threads N     that share what comes in parts: reading a large PLY, writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
+  --merge         merges splats that look like one, too: more go at the same figure, for several times the seconds
   --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
 `;
 
@@ -51,6 +53,7 @@ function parseOptions(args) {
         scorer: { ...text, default: 'auto' },
         scored: { ...text, default: '216' },
         threads: { ...text, default: String(usualThreads()) },
+        merge: { type: 'boolean', default: false },
         help: { type: 'boolean' },
       },
     });
@@ -65,7 +68,7 @@ function parseOptions(args) {
   if (values.out === undefined) throw new UsageError('--out is missing');
   const [scene, out] = [resolve(from, positionals[0]), resolve(from, values.out)];
   if (scene === out) throw new UsageError('--out: expected another file than SCENE, which is never changed');
-  const { views, report, scorer } = values;
+  const { views, report, scorer, merge } = values;
   if (!['auto', 'gpu', 'cpu'].includes(scorer))
     throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
   const scored = Number(values.scored);
@@ -74,7 +77,7 @@ function parseOptions(args) {
   const threads = Number(values.threads);
   if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
     throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
-  return { scene, out, minDecibels, views, report, scorer, scored, threads };
+  return { scene, out, minDecibels, views, report, scorer, scored, threads, merge };
 }
 
 function readViews(path, bounds, scored) {
@@ -97,7 +100,7 @@ async function openDevice(scorer) {
   return { device, isGpu };
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored, threads }) {
+async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored, threads, merge }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
   // The file and the driver take their time at the same time.
@@ -111,9 +114,11 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   // What is left of it when the device is there.
   const read = seconds() - opened;
   const views = readViews(viewsFile, boundsOf(cloud), scored);
-  const evaluator = isGpu
+  const measuring = isGpu
     ? await GpuEvaluator.create(device, cloud, views, { pool })
     : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
+  const merging = { views: views.scored, mostError: 10 ** (-minDecibels / 10) };
+  const evaluator = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
   const prepare = seconds() - read;
   const result = await economise(cloud, {
     ...{ minDecibels, name: out, evaluator, pool },

@@ -162,7 +162,7 @@ class Second {
 
   /** A row of the report. */
   async row(second) {
-    const now = { ...this.#all.scene.progress };
+    const { error, ...now } = this.#all.scene.progress;
     const [traffic, fetched] = [
       this.#all.scene.traffic,
       { ...this.#all.traffic, errors: this.#all.traffic.errors.length },
@@ -181,6 +181,7 @@ class Second {
       ...{ visible, overflow, pairOverflow, budgetError: rounded(budgetError) },
       lacking: { looks: looks.length, lacked: looks.filter((look) => look.overflow + look.pairOverflow > 0).length },
       ...now,
+      poolError: rounded(error),
       uploaded: {
         pages: traffic.pages - this.#before.pages,
         megabytes: rounded((traffic.bytes - this.#before.bytes) / 1e6),
@@ -260,12 +261,14 @@ async function compare(all, views) {
     const settled = await settle(all, { camera, detail, splatBudget: splats });
     const picture = await readPixels(all.device, all.target);
     const { visible, budgetError } = await all.renderer.readStatistics();
+    const { resident, error } = all.scene.progress;
+    const rest = { resident, poolError: rounded(error) };
     progress.begin(`the view at ${share} of the flight, four times finer`);
     const finerSettled = await settle(all, { camera, detail: detail / 4, splatBudget: 4 * splats });
     const finer = await readPixels(all.device, all.target);
     const more = await all.renderer.readStatistics();
     views.push({
-      ...{ share, settled, visible, budgetError: rounded(budgetError), resident: all.scene.progress.resident },
+      ...{ share, settled, visible, budgetError: rounded(budgetError), ...rest },
       against: {
         settled: finerSettled,
         visible: more.visible,

@@ -20,7 +20,7 @@ import { randomSource } from '../support/gpu.js';
 import { heaps } from '../support/scenes/heaps.js';
 import { lodFolder, openLod, pick, type FetchPart } from '../support/lod-folder.js';
 import { psnr } from '../support/metrics.js';
-import { nodeDevice } from '../support/node-device.js';
+import { anyDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
@@ -61,7 +61,7 @@ test('pages of levels: slots by what the index says, errors that grow, one spher
 });
 
 test('in a flight over a small pool, with levels that come late, in any order, or not at all, every box is covered exactly once in every frame', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const random = randomSource(12);
   const { levels, clouds } = heaps(5);
   let failures = 0;
@@ -114,7 +114,7 @@ async function drawUntilCalm(
   camera: Camera,
   detail: number,
 ): Promise<void> {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
   for (let [calm, frames] = [0, 0]; calm < 10 && frames < 3000; frames++) {
     const { resident } = scene.progress;
@@ -127,7 +127,7 @@ async function drawUntilCalm(
 }
 
 test('a scene that has room for all is, without an error, the picture of the scene that was loaded whole', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const folder = lodFolder(pebbles(12_000), {
     levels: 4,
     boxes: 3,
@@ -160,7 +160,7 @@ test('a scene that has room for all is, without an error, the picture of the sce
 });
 
 test('a file that is missing, and a run beyond its file, are told by name, and what stands for them stays', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const folder = lodFolder(pebbles(8_000), { levels: 3, boxes: 2 });
   const text = new TextDecoder().decode(folder.index);
   const index = JSON.parse(text) as { tree: { children: { lods: Record<string, { count: number }> }[] } };
@@ -190,7 +190,7 @@ test('a file that is missing, and a run beyond its file, are told by name, and w
 });
 
 test('a pool without room for the coarsest levels is refused, and so are pages of another size', async () => {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const { levels, clouds } = heaps(2);
   const source = levelSource(levels, () => Promise.resolve(new Uint32Array(5)));
   await assert.rejects(StreamedGaussians.openSource(device, source, { memoryBudget: 1000 }), {
@@ -206,7 +206,7 @@ test(
   { skip: needsSharedData },
   async () => {
     const folder = 'scenes/playbot-streamed/';
-    const device = await nodeDevice();
+    const device = await anyDevice();
     const fetch: FetchPart = async (path) => sharedFile(folder + path);
     // The three finest are left out, which only take time here.
     let bytes = 0;

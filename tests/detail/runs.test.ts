@@ -8,7 +8,7 @@ import { constants, DETAIL_NUMBERS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { shareDrawn } from '../support/detail-twin.js';
 import { psnr } from '../support/metrics.js';
-import { nodeDevice } from '../support/node-device.js';
+import { anyDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
@@ -90,7 +90,7 @@ test(
     const bytes = new TextEncoder().encode(index.replace(/"[012]":\{"file":\d+,"offset":\d+,"count":\d+\},?/g, ''));
     const read = (level: number | 'all'): Promise<GaussianCloud> =>
       readScene(bytes, { name: 'lod-meta.json', openPart, level });
-    const device = await nodeDevice();
+    const device = await anyDevice();
     const upload = async (level: number | 'all'): Promise<GaussianBuffers> =>
       GaussianBuffers.upload(
         device,

@@ -10,6 +10,8 @@ import {
   economise,
   GpuEvaluator,
   meanSquare,
+  MergingEvaluator,
+  PaintedEvaluator,
   reduce,
   scoreSplats,
   Studio,
@@ -189,6 +191,28 @@ test('the asked figure is met by the written file', async () => {
   assert.equal(written.count, result.splats.after);
   assert.ok(result.splats.after < COUNT && result.coefficients.after < result.coefficients.before);
   assert.ok(result.seconds.score > 0 && result.seconds.search > 0);
+});
+
+test('pairs are merged by its scores, and what that costs is measured on its pictures', async () => {
+  const merging = new MergingEvaluator(evaluator, scene, { views: views.scored, mostError: 1e-3 });
+  assert.deepEqual(await merging.rank(), ranking);
+  const [mergePrice] = merging.mergePrices.slice(-1);
+  const cut: Cut = { mergePrice, minContribution: median(ranking.contribution, 0.1) };
+  const { cloud } = await merging.reduce(cut);
+  const { cloud: dropped } = await evaluator.reduce(cut);
+  assert.ok(cloud.count < 0.95 * dropped.count, `${cloud.count} of ${dropped.count}`);
+  const { errors, degrees } = await merging.cut(cut, 'heldOut');
+  assert.deepEqual(degrees, [0, 0, 0, cloud.count]);
+  assert.deepEqual(errors, await evaluator.compare(cloud, 'heldOut'));
+  // As the CPU's scores would have it, within what float16 and peaks leave open.
+  const cpu = new MergingEvaluator(new PaintedEvaluator(scene, { views }), scene, {
+    views: views.scored,
+    mostError: 1e-3,
+  });
+  await cpu.rank();
+  const theirs = await cpu.reduce({ mergePrice });
+  const ours = await merging.reduce({ mergePrice });
+  assert.ok(Math.abs(ours.cloud.count - theirs.cloud.count) < 0.1 * (COUNT - theirs.cloud.count) + 2);
 });
 
 test('an end is an end', async () => {

@@ -1,10 +1,10 @@
 import type { StreamedGaussians } from '@gaussian-splat/renderer';
 import { DETAIL_NUMBERS, PAGE_CHUNKS } from '@gaussian-splat/renderer/stages';
-import { nodeDevice } from './node-device.js';
+import { anyDevice } from './node-device.js';
 
 /** Detail rows of each slot of a streamed scene, as they are on the GPU. */
 export async function readRows(scene: StreamedGaussians): Promise<Float32Array[]> {
-  const device = await nodeDevice();
+  const device = await anyDevice();
   const rows: Float32Array[] = [];
   for (const { details } of scene.pages) {
     const staging = device.createBuffer({ size: details!.size, usage: 0x1 | 0x8 });

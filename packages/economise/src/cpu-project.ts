@@ -2,7 +2,7 @@ import { eyeOf, shCoefficientCount, type Camera, type GaussianCloud } from '@gau
 import { shBasis } from './colour.js';
 
 /** Screen-space dilation of 3D Gaussian Splatting, px². */
-const DILATION = 0.3;
+export const DILATION = 0.3;
 /** Less than this no renderer paints. */
 export const ALPHA_MIN = 1 / 255;
 const JACOBIAN_MARGIN = 0.3;

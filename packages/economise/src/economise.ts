@@ -56,7 +56,7 @@ const MAX_TRIES = 8;
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
   const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
-  const encodings = encodingsFor(options.name);
+  const encodings = encodingsFor(options.name, cloud);
   const watch = new Stopwatch();
   onStep(`scoring ${cloud.count} splats`);
   const ranking = await evaluator.rank(signal);
@@ -98,7 +98,8 @@ async function chooseEncoding(
   options: EconomiseOptions,
 ): Promise<{ encoding: Encoding; rounding: number }> {
   if (encodings.length === 1) return { encoding: encodings[0], rounding: 0 };
-  const whole: ReducedCloud = { cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) };
+  const degrees = new Uint8Array(cloud.count).fill(cloud.shDegree);
+  const whole = { cloud, degrees };
   let best = Infinity;
   for (const encoding of encodings) {
     options.onStep?.(`rounding of ${encoding.title}`);

@@ -26,6 +26,10 @@ export interface Evaluator {
   reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud>;
   /** [views] errors of another cloud in place of the scene. */
   compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
+  /** [views] the same, as quickly as {@link cut} finds errors: near enough for a search. */
+  sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
   /** Frees what the evaluator holds. */
   destroy(): void;
+  /** Prices at which merges are measured, the lowest first; undefined for an evaluator that merges nothing. */
+  readonly mergePrices?: readonly number[];
 }

@@ -1,5 +1,6 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import type { Evaluator } from './evaluator.js';
+import type { CutFigures, Evaluator } from './evaluator.js';
+import { tradeMerges } from './merge/trade-merges.js';
 import { mean } from './measure.js';
 import { valuesAtPlaces } from './order.js';
 import type { Cut } from './reduce.js';
@@ -59,7 +60,7 @@ export async function findTrades(
   const drop = await along(dropping.thresholds, dropping.cutAt);
   onStep('measuring what fewer bands of colour cost');
   const colour = await along(cloud.shDegree > 0 ? PRICES : [], (colourPrice) => ({ colourPrice }));
-  return {
+  const trades: Trades = {
     cutAt: (error) => {
       const [dropped, coloured] = bestTrades(drop, colour, error);
       // The GPU compares in float32.
@@ -67,6 +68,12 @@ export async function findTrades(
       return { ...dropping.cutAt(threshold), colourPrice };
     },
   };
+  const { mergePrices } = evaluator;
+  if (mergePrices === undefined) return trades;
+  onStep('measuring what merged splats cost');
+  const merge = await along(mergePrices, (mergePrice) => ({ mergePrice }));
+  const saved = ({ degrees }: CutFigures): number => all - numbersOf(degrees);
+  return tradeMerges(trades, merge, evaluator, budget, saved, signal);
 }
 
 /** Numbers of a file with so many splats of each degree. */

@@ -14,6 +14,7 @@ export {
   type EconomyShare,
   type MaskGoal,
 } from './mask.js';
+export { MergingEvaluator, type MergingOptions } from './merge/merging-evaluator.js';
 export { decibels, meanSquare, Studio, type Image, type Painter } from './measure.js';
 export { PaintedEvaluator, type PaintedEvaluatorOptions } from './painted-evaluator.js';
 export type { TaskPool } from './parts/task-pool.js';

@@ -43,8 +43,7 @@ export class PaintedEvaluator implements Evaluator {
 
   async cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
     const { cloud, degrees } = reduce(this.#cloud, await this.scores(), cut);
-    const { sketcher = cpuPainter } = this.#options;
-    return { errors: await this.#errors(cloud, views, sketcher, signal), degrees: degreesOf(degrees) };
+    return { errors: await this.sketch(cloud, views, signal), degrees: degreesOf(degrees) };
   }
 
   async reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
@@ -55,6 +54,10 @@ export class PaintedEvaluator implements Evaluator {
   async compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
     const { studio = cpuPainter, sketcher = cpuPainter } = this.#options;
     return this.#errors(cloud, views, views === 'heldOut' ? studio : sketcher, signal);
+  }
+
+  async sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+    return this.#errors(cloud, views, this.#options.sketcher ?? cpuPainter, signal);
   }
 
   destroy(): void {

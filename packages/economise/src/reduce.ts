@@ -13,6 +13,8 @@ export interface Cut {
   readonly removalPrice?: number;
   /** Mean squared error that a splat's coefficient is worth: those that save less go; 0, the default, keeps all. */
   readonly colourPrice?: number;
+  /** Pairs of splats that look like one at a mean squared error up to this become one, by evaluators that merge ({@link MergingEvaluator}); 0, the default, merges none. */
+  readonly mergePrice?: number;
 }
 
 /** A cloud with its least needed parts gone. */
@@ -21,6 +23,8 @@ export interface ReducedCloud {
   readonly cloud: GaussianCloud;
   /** [N] degree that each splat keeps. */
   readonly degrees: Uint8Array;
+  /** [N] its number in the source; of a merged splat that of one that it was made of. */
+  readonly kept: Uint32Array;
 }
 
 /** Which splats stay, and how much of their colours. */
@@ -58,6 +62,11 @@ export function reduceTo(cloud: GaussianCloud, choice: Choice): ReducedCloud {
   return reduced;
 }
 
+/** Some splats of a cloud, in an order. */
+export function splatsOf(cloud: GaussianCloud, numbers: Uint32Array): GaussianCloud {
+  return reduceTo(cloud, { kept: numbers, degrees: new Uint8Array(numbers.length).fill(cloud.shDegree) }).cloud;
+}
+
 /** The same, in parts. What is left lies in memory that the pool's tasks share. */
 export async function reduceInParts(cloud: GaussianCloud, choice: Choice, pool: TaskPool): Promise<ReducedCloud> {
   const reduced = roomFor(cloud, choice, pool);
@@ -74,7 +83,7 @@ export async function reduceInParts(cloud: GaussianCloud, choice: Choice, pool: 
 function roomFor(cloud: GaussianCloud, { kept, degrees }: Choice, pool: TaskPool): ReducedCloud {
   const highest = degreesOf(degrees).findLastIndex((count) => count > 0);
   const columns = allocateColumns(kept.length, Math.max(0, highest) as ShDegree, pool);
-  return { cloud: { ...cloud, ...columns, count: kept.length }, degrees };
+  return { cloud: { ...cloud, ...columns, count: kept.length }, degrees, kept };
 }
 
 /** The degree at which error and the price of what is kept add up to least. */

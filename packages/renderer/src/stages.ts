@@ -13,6 +13,7 @@ export { scaleRotationFactor } from './pack/factor.js';
 export { DETAIL_NUMBERS, DETAIL_PLACES } from './detail/chunk-detail.js';
 export { buildLevels } from './detail/build-levels.js';
 export { emptyList, listPages, NONE, putBelow, type PageList } from './detail/page-list.js';
+export * as splatRows from './detail/splat-rows.js';
 export { DetailTable } from './detail/detail-table.js';
 export { PAGE_CHUNKS } from './detail/manifest.js';
 export { MOST_FETCHES, MOST_UNDER_WAY, PageTraffic } from './detail/page-traffic.js';

@@ -183,6 +183,10 @@ export class GpuEvaluator implements Evaluator {
     }
   }
 
+  sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+    return this.compare(cloud, views, signal);
+  }
+
   destroy(): void {
     for (const errors of this.#errors.values()) errors.destroy();
     this.#renderer.destroy();

@@ -1,4 +1,4 @@
-import type { ReducedCloud } from '../reduce.js';
+import type { WrittenCloud } from './index.js';
 import { arraysOf, columnsOf } from '../parts/cloud-memory.js';
 import { inline, partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
 import { EXTENSION, glbColumns, placeBounds, type GlbColumn, type Placed } from './glb-columns.js';
@@ -27,7 +27,7 @@ interface Primitive {
  *
  * @returns the file, in memory that the pool's tasks share
  */
-export async function writeGlb({ cloud, degrees }: ReducedCloud, pool: TaskPool = inline): Promise<Uint8Array> {
+export async function writeGlb({ cloud, degrees }: WrittenCloud, pool: TaskPool = inline): Promise<Uint8Array> {
   const placed = { columns: columnsOf(cloud), origin: cloud.origin };
   const primitives = [0, 1, 2, 3].flatMap((degree) => primitiveOf(placed, splatsOf(degrees, degree), degree));
   const { json, byteLength, starts } = describe(primitives);

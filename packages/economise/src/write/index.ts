@@ -1,16 +1,19 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
 import { writePly } from './ply.js';
 import { writeSpz } from './spz.js';
 
+/** What is written of a reduced cloud. */
+export type WrittenCloud = Pick<ReducedCloud, 'cloud' | 'degrees'>;
+
 /** A way to write a scene: how precise, and how. */
 export interface Encoding {
   /** For people. */
   readonly title: string;
   /** @param pool does what can be done in parts; the file then lies in its memory */
-  readonly write: (reduced: ReducedCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
+  readonly write: (reduced: WrittenCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
 }
 
 const spz = (shBits: number): Encoding => ({
@@ -22,18 +25,34 @@ const spz = (shBits: number): Encoding => ({
 const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
   ['.spz', [spz(4), spz(5), spz(6), spz(8)]],
   ['.glb', [{ title: 'GLB, a primitive for each degree', write: writeGlb }]],
-  ['.ply', [{ title: 'PLY, float32', write: ({ cloud }: ReducedCloud) => writePly(cloud) }]],
+  ['.ply', [{ title: 'PLY, float32', write: ({ cloud }: WrittenCloud) => writePly(cloud) }]],
 ]);
 
-/** The ways to write a file of this name. Throws `argument/value` for a name whose extension is none of ours. */
-export function encodingsFor(name: string): readonly Encoding[] {
+/**
+ * The ways to write a file of this name.
+ * @throws GaussianSplatError `argument/value` for a name whose extension is none of ours, and for a scene trained with antialiasing where the format cannot say so.
+ */
+export function encodingsFor(
+  name: string,
+  { antialiased }: Pick<GaussianCloud, 'antialiased'> = { antialiased: false },
+): readonly Encoding[] {
   const extension = /\.[a-z]+$/i.exec(name)?.[0].toLowerCase() ?? '';
   const found = ENCODINGS.get(extension);
-  if (found) return found;
-  throw new GaussianSplatError('argument/value', {
-    where: name,
-    expected: `a name that ends in ${[...ENCODINGS.keys()].join(', ')}`,
-    found: extension || 'no extension',
-    remedy: 'choose .glb for accuracy, .spz for size, .ply for tools that know nothing else',
-  });
+  if (found === undefined) {
+    throw new GaussianSplatError('argument/value', {
+      where: name,
+      expected: `a name that ends in ${[...ENCODINGS.keys()].join(', ')}`,
+      found: extension || 'no extension',
+      remedy: 'choose .glb for accuracy, .spz for size, .ply for tools that know nothing else',
+    });
+  }
+  if (antialiased && extension === '.glb') {
+    throw new GaussianSplatError('argument/value', {
+      where: name,
+      expected: 'a format that tells of scenes trained with antialiasing: .ply or .spz',
+      found: 'KHR_gaussian_splatting, which has no place for it',
+      remedy: 'choose .ply for accuracy, .spz for size',
+    });
+  }
+  return found;
 }

@@ -1,4 +1,4 @@
-import type { Matrix3 } from './linear.js';
+import type { Matrix3 } from '@gaussian-splat/core';
 
 /** Real spherical harmonics of one band in the order and with the signs of 3D Gaussian Splatting. */
 const BANDS: readonly ((x: number, y: number, z: number) => number[])[] = [

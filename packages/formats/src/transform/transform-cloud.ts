@@ -1,14 +1,15 @@
-import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import {
   determinant,
   matrixOfQuaternion,
   multiply3,
   orthogonalFactor,
   quaternionOfMatrix,
+  shCoefficientCount,
   symmetricEigen,
   transposed,
+  type GaussianCloud,
   type Matrix3,
-} from './linear.js';
+} from '@gaussian-splat/core';
 import { shRotation } from './sh-rotation.js';
 
 /** Relative difference from a rotation with one scale up to which a matrix counts as one. */

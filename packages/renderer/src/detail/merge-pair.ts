@@ -3,6 +3,7 @@ import {
   areaOf,
   BLUE,
   GREEN,
+  joinMoments,
   MASS,
   OPACITY,
   RED,
@@ -58,25 +59,13 @@ export function mergePair(rows: Float64Array, i: number, j: number, dilation: nu
   const mass = rows[i + MASS] + rows[j + MASS];
   const p = rows[i + MASS] / mass;
   const q = rows[j + MASS] / mass;
-  const dx = rows[j + X] - rows[i + X];
-  const dy = rows[j + Y] - rows[i + Y];
-  const dz = rows[j + Z] - rows[i + Z];
   const moved = displacement(rows, i, j);
   const spread = p * rows[i + SPREAD] + q * rows[j + SPREAD] + p * q * moved;
   const low = dilation * spread;
   const cover = jointCover(rows, i, j, low);
   const largest = Math.max(rows[i + OPACITY], rows[j + OPACITY]);
   rows[i + SPREAD] = spread;
-  rows[i + XX] = p * rows[i + XX] + q * rows[j + XX] + p * q * dx * dx;
-  rows[i + XY] = p * rows[i + XY] + q * rows[j + XY] + p * q * dx * dy;
-  rows[i + XZ] = p * rows[i + XZ] + q * rows[j + XZ] + p * q * dx * dz;
-  rows[i + YY] = p * rows[i + YY] + q * rows[j + YY] + p * q * dy * dy;
-  rows[i + YZ] = p * rows[i + YZ] + q * rows[j + YZ] + p * q * dy * dz;
-  rows[i + ZZ] = p * rows[i + ZZ] + q * rows[j + ZZ] + p * q * dz * dz;
-  rows[i + TRACE] = rows[i + XX] + rows[i + YY] + rows[i + ZZ];
-  rows[i + X] += q * dx;
-  rows[i + Y] += q * dy;
-  rows[i + Z] += q * dz;
+  joinMoments(rows, i, j, p);
   rows[i + RED] = p * rows[i + RED] + q * rows[j + RED];
   rows[i + GREEN] = p * rows[i + GREEN] + q * rows[j + GREEN];
   rows[i + BLUE] = p * rows[i + BLUE] + q * rows[j + BLUE];

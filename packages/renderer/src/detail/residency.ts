@@ -80,6 +80,14 @@ export class Residency {
     return this.#slots.count;
   }
 
+  /** The most pixels that a page costs which the last look wishes for and which is not there; 0 if all are. */
+  get lacking(): number {
+    let most = 0;
+    for (let page = 0; page < this.#list.count; page++)
+      if (this.#wish[page] > most && !this.isResident(page)) most = this.#wish[page];
+    return most;
+  }
+
   /** Pixels that doing without a page would cost, as of the last look; 0 if that does not wish for it. */
   need(page: number): number {
     return this.#wish[page];

@@ -31,7 +31,7 @@ export function areaOf(rows: Float64Array, p: number, low = 0): number {
 }
 
 /** Writes a covariance from its lower triangular root, which is at `at` of `factors` as xx, yx, yy, zx, zy, zz. */
-export function covarianceOf(factors: Float32Array, at: number, rows: Float64Array, p: number): void {
+export function covarianceOf(factors: Float32Array | Float64Array, at: number, rows: Float64Array, p: number): void {
   const xx = factors[at];
   const yx = factors[at + 1];
   const yy = factors[at + 2];
@@ -61,4 +61,22 @@ export function factorOf(rows: Float64Array, p: number, out: Float32Array, at: n
   out[at + 3] = zx;
   out[at + 4] = zy;
   out[at + 5] = Math.sqrt(Math.max(0, rows[p + ZZ] - zx * zx - zy * zy));
+}
+
+/** Gives the splat at `i` the mean and the covariance of the two at `i` and `j`, which count for the shares `p` and 1 − `p`. */
+export function joinMoments(rows: Float64Array, i: number, j: number, p: number): void {
+  const q = 1 - p;
+  const dx = rows[j + X] - rows[i + X];
+  const dy = rows[j + Y] - rows[i + Y];
+  const dz = rows[j + Z] - rows[i + Z];
+  rows[i + XX] = p * rows[i + XX] + q * rows[j + XX] + p * q * dx * dx;
+  rows[i + XY] = p * rows[i + XY] + q * rows[j + XY] + p * q * dx * dy;
+  rows[i + XZ] = p * rows[i + XZ] + q * rows[j + XZ] + p * q * dx * dz;
+  rows[i + YY] = p * rows[i + YY] + q * rows[j + YY] + p * q * dy * dy;
+  rows[i + YZ] = p * rows[i + YZ] + q * rows[j + YZ] + p * q * dy * dz;
+  rows[i + ZZ] = p * rows[i + ZZ] + q * rows[j + ZZ] + p * q * dz * dz;
+  rows[i + TRACE] = rows[i + XX] + rows[i + YY] + rows[i + ZZ];
+  rows[i + X] += q * dx;
+  rows[i + Y] += q * dy;
+  rows[i + Z] += q * dz;
 }

@@ -159,12 +159,21 @@ export class StreamedGaussians implements GaussianScene {
     return this.#memory.byteLength;
   }
 
-  /** Pages on the GPU, all pages, and pages that are on their way or still taking the place of others. */
-  get progress(): { readonly resident: number; readonly total: number; readonly coming: number } {
+  /**
+   * Pages on the GPU, all pages, and pages that are on their way or still taking the place of others. `error` tells by how many pixels places are off at most whose pages are not there, as of
+   * the last look (those out of view count an eighth): at rest, with nothing coming, what a larger `memoryBudget` would mend.
+   */
+  get progress(): {
+    readonly resident: number;
+    readonly total: number;
+    readonly coming: number;
+    readonly error: number;
+  } {
     return {
       resident: this.#residency.residents,
       total: this.#source.list.count,
       coming: this.#traffic.underWay + this.#placing,
+      error: this.#residency.lacking,
     };
   }
 

@@ -65,29 +65,37 @@ export function quaternionOfMatrix(m: Matrix3): [number, number, number, number]
   return [q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm];
 }
 
+const AXIS_PAIRS = [
+  [0, 1],
+  [0, 2],
+  [1, 2],
+] as const;
+
 /** Eigenvalues of a symmetric matrix, and its eigenvectors as the columns of a rotation (Jacobi's method). */
 export function symmetricEigen(m: Matrix3): { values: [number, number, number]; vectors: number[] } {
-  let a = [...m];
-  let v = [1, 0, 0, 0, 1, 0, 0, 0, 1];
+  const a = [...m];
+  const vectors = [1, 0, 0, 0, 1, 0, 0, 0, 1];
   for (let sweep = 0; sweep < 24; sweep++) {
     const off = a[1] * a[1] + a[2] * a[2] + a[5] * a[5];
     if (off <= 1e-30 * (a[0] * a[0] + a[4] * a[4] + a[8] * a[8])) break;
-    for (const [p, q] of [
-      [0, 1],
-      [0, 2],
-      [1, 2],
-    ]) {
+    for (const [p, q] of AXIS_PAIRS) {
       const apq = a[3 * p + q];
       if (apq === 0) continue;
       const theta = (a[4 * q] - a[4 * p]) / (2 * apq);
       const t = (theta < 0 ? -1 : 1) / (Math.abs(theta) + Math.sqrt(theta * theta + 1));
       const c = 1 / Math.sqrt(t * t + 1);
       const s = t * c;
-      const turn = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-      [turn[4 * p], turn[4 * q], turn[3 * p + q], turn[3 * q + p]] = [c, c, s, -s];
-      a = multiply3(transposed(turn), multiply3(a, turn));
-      v = multiply3(v, turn);
+      for (let k = 0; k < 3; k++) turn(a, 3 * p + k, 3 * q + k, c, s);
+      for (let k = 0; k < 3; k++) turn(a, 3 * k + p, 3 * k + q, c, s);
+      for (let k = 0; k < 3; k++) turn(vectors, 3 * k + p, 3 * k + q, c, s);
     }
   }
-  return { values: [a[0], a[4], a[8]], vectors: v };
+  return { values: [a[0], a[4], a[8]], vectors };
+}
+
+/** Turns two entries, as a pair, by an angle whose cosine and sine are given. */
+function turn(entries: number[], p: number, q: number, c: number, s: number): void {
+  const [first, second] = [entries[p], entries[q]];
+  entries[p] = c * first - s * second;
+  entries[q] = s * first + c * second;
 }

@@ -1,0 +1,75 @@
+import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCloud } from '@gaussian-splat/core';
+import { splatRows } from '@gaussian-splat/renderer/stages';
+import { splatsOf, type ReducedCloud } from '../reduce.js';
+import type { Merges } from './find-merges.js';
+import { writeRow } from './splat-row.js';
+
+const { joinMoments, ROW, X, XX, XY, XZ, Y, YY, YZ, Z, ZZ } = splatRows;
+const NOWHERE = -1;
+
+/**
+ * What is left of a reduced cloud when all merges up to a price are made. Where one of two has been dropped, the other stays as it is: nothing is saved twice. A merged splat keeps as many bands of colour as
+ * that of both which keeps more, and comes where the first of them did. The source is left as it is.
+ * @param price mean squared error of an image that a merge may cost by itself
+ */
+export function applyMerges(reduced: ReducedCloud, merges: Merges, price: number): ReducedCloud {
+  const { cloud, kept } = reduced;
+  const places = placesOf(kept, merges);
+  const rows = new Float64Array(ROW * cloud.count);
+  const [opacities, sh, degrees] = [cloud.opacities.slice(), cloud.sh.slice(), reduced.degrees.slice()];
+  const numbers = 3 * shCoefficientCount(cloud.shDegree);
+  const [isMerged, isGone, isClosed] = [0, 1, 2].map(() => new Uint8Array(cloud.count));
+  // Of each splat the first place of those that it was made of.
+  const leads = Uint32Array.from(kept.keys());
+  for (let k = 0; k < merges.prices.length; k++) {
+    const [i, j] = [places[merges.into[k]], places[merges.from[k]]];
+    if (i === NOWHERE || j === NOWHERE || isClosed[i] || isClosed[j] || merges.prices[k] > price) {
+      // What would have been made of these cannot be.
+      if (i !== NOWHERE) isClosed[i] = 1;
+      if (j !== NOWHERE) isClosed[j] = 1;
+      continue;
+    }
+    for (const place of [i, j]) if (!isMerged[place]) writeRow(cloud, place, rows);
+    const share = merges.shares[k];
+    joinMoments(rows, ROW * i, ROW * j, share);
+    opacities[i] = merges.opacities[k];
+    for (let n = 0; n < numbers; n++)
+      sh[numbers * i + n] = share * sh[numbers * i + n] + (1 - share) * sh[numbers * j + n];
+    degrees[i] = Math.max(degrees[i], degrees[j]);
+    leads[i] = Math.min(leads[i], leads[j]);
+    isMerged[i] = isGone[j] = 1;
+  }
+  const shaped = shapesFrom(rows, isMerged, { ...cloud, opacities, sh });
+  const staying = new Uint32Array(cloud.count).fill(cloud.count);
+  for (let place = 0; place < cloud.count; place++) if (!isGone[place]) staying[leads[place]] = place;
+  const left = staying.filter((place) => place < cloud.count);
+  return {
+    cloud: splatsOf(shaped, left),
+    degrees: Uint8Array.from(left, (place) => degrees[place]),
+    kept: Uint32Array.from(left, (place) => kept[place]),
+  };
+}
+
+/** [N] where the splats of the source are in the reduced cloud; N at least what merges name. */
+function placesOf(kept: Uint32Array, { into, from }: Merges): Int32Array {
+  const most = [kept, into, from].reduce((most, list) => list.reduce((a, b) => Math.max(a, b), most), 0);
+  const places = new Int32Array(most + 1).fill(NOWHERE);
+  for (let place = 0; place < kept.length; place++) places[kept[place]] = place;
+  return places;
+}
+
+/** A cloud with the centres and shapes that some of its splats were given. @param isChosen [N] 1 for those */
+function shapesFrom(rows: Float64Array, isChosen: Uint8Array, cloud: GaussianCloud): GaussianCloud {
+  const [positions, scales, rotations] = [cloud.positions.slice(), cloud.scales.slice(), cloud.rotations.slice()];
+  for (let i = 0, p = 0; i < cloud.count; i++, p += ROW) {
+    if (!isChosen[i]) continue;
+    const [xx, xy, xz, yy, yz, zz] = [XX, XY, XZ, YY, YZ, ZZ].map((entry) => rows[p + entry]);
+    const { values, vectors } = symmetricEigen([xx, xy, xz, xy, yy, yz, xz, yz, zz]);
+    for (const [axis, entry] of [X, Y, Z].entries()) {
+      positions[3 * i + axis] = rows[p + entry];
+      scales[3 * i + axis] = Math.sqrt(Math.max(0, values[axis]));
+    }
+    rotations.set(quaternionOfMatrix(vectors), 4 * i);
+  }
+  return { ...cloud, positions, scales, rotations };
+}

@@ -1,0 +1,80 @@
+import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
+import { degreesOf, type Cut, type ReducedCloud } from '../reduce.js';
+import type { Ranking } from '../score.js';
+import { applyMerges } from './apply-merges.js';
+import { findMerges, type Merges } from './find-merges.js';
+
+export interface MergingOptions {
+  /** Views that pairs are looked at in: those that splats are scored in. */
+  readonly views: readonly Camera[];
+  /** Merges are found until they are estimated to cost so much, mean squared error of the images: that of the figure that is asked for. */
+  readonly mostError: number;
+}
+
+/** Parts of the splats that merges would save, at whose prices it is measured what they cost. */
+const MERGED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
+
+/**
+ * An evaluator whose cuts merge splats, too, besides what another one does. Merges are found and made in plain code; what they cost is measured on pictures by the other, which draws the cloud that they
+ * leave.
+ */
+export class MergingEvaluator implements Evaluator {
+  readonly #inner: Evaluator;
+  readonly #cloud: GaussianCloud;
+  readonly #options: MergingOptions;
+  #merges: Merges | undefined;
+
+  /**
+   * @param inner is destroyed with this one
+   * @param cloud the one that `inner` looks at
+   */
+  constructor(inner: Evaluator, cloud: GaussianCloud, options: MergingOptions) {
+    this.#inner = inner;
+    this.#cloud = cloud;
+    this.#options = options;
+  }
+
+  /** Prices to measure merges at, the lowest first. */
+  get mergePrices(): readonly number[] {
+    const prices = this.#found.prices.slice().sort();
+    const places = MERGED_SHARES.map((share) => Math.floor(share * this.#cloud.count) - 1);
+    return [...new Set(places.filter((k) => k >= 0 && k < prices.length).map((k) => prices[k]))];
+  }
+
+  async rank(signal?: AbortSignal): Promise<Ranking> {
+    const ranking = await this.#inner.rank(signal);
+    signal?.throwIfAborted();
+    const { views, mostError } = this.#options;
+    this.#merges = findMerges(this.#cloud, ranking, views, mostError);
+    return ranking;
+  }
+
+  async cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
+    if (!cut.mergePrice) return this.#inner.cut(cut, views, signal);
+    const { cloud, degrees } = await this.reduce(cut, signal);
+    return { errors: await this.sketch(cloud, views, signal), degrees: degreesOf(degrees) };
+  }
+
+  async reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
+    const reduced = await this.#inner.reduce(cut, signal);
+    return cut.mergePrice ? applyMerges(reduced, this.#found, cut.mergePrice) : reduced;
+  }
+
+  compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+    return this.#inner.compare(cloud, views, signal);
+  }
+
+  sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+    return this.#inner.sketch(cloud, views, signal);
+  }
+
+  destroy(): void {
+    this.#inner.destroy();
+  }
+
+  get #found(): Merges {
+    if (this.#merges === undefined) throw new Error('MergingEvaluator: rank() comes before all else');
+    return this.#merges;
+  }
+}

@@ -1,0 +1,182 @@
+import { shCoefficientCount, type Camera, type GaussianCloud } from '@gaussian-splat/core';
+import { splatRows } from '@gaussian-splat/renderer/stages';
+import { DILATION } from '../cpu-project.js';
+import { writeRow } from './splat-row.js';
+import { AMPLITUDE, SEEN, seenSplats, U, UU, UV, V, VV } from './seen-splats.js';
+
+const { joinMoments, MASS, ROW, X, Y, Z } = splatRows;
+/** Squared difference of a splat's colour to what lies behind it, a channel: the mean of captured scenes. */
+const CONTRAST = 0.05;
+/** A pair that fewer views show is left alone. */
+const LEAST_VIEWS = 4;
+/** ∫ Y² over the sphere is 1: a coefficient's square over this is the mean square of what it adds. */
+const SPHERE = 4 * Math.PI;
+
+/**
+ * Splats that may be merged, and what that would cost. A merged splat has the first two moments of both, each weighed by what the views see of it, its colour is the mean with the same weights, and
+ * its opacity is what covers as much in the views as both did. A slot holds a splat of the cloud, or what it was merged into.
+ */
+export class PairCosts {
+  /** [N] see splat-rows.ts of the renderer. */
+  readonly rows: Float64Array;
+  /** Of the pair that was looked at last: the share of the first, and the opacity of both as one. */
+  share = 1;
+  opacity = 0;
+  readonly #views: number;
+  readonly #pixels: number;
+  readonly #seen: Float32Array;
+  /** [N] the part of a splat's opacity that shows where it shows most: what lies before it hides the rest. */
+  readonly #visible: Float32Array;
+  readonly #sh: Float32Array;
+  readonly #numbers: number;
+  readonly #antialiased: boolean;
+
+  /**
+   * @param contribution [N] largest weight in a pixel, see {@link Ranking}
+   * @param views some from all around: a pair that looks like one splat from here may not from there
+   */
+  constructor(cloud: GaussianCloud, contribution: Float32Array, views: readonly Camera[]) {
+    const { count } = cloud;
+    this.#views = views.length;
+    this.#pixels = views.reduce((sum, { width, height }) => sum + width * height, 0) / views.length;
+    this.#seen = seenSplats(cloud, views);
+    this.#sh = cloud.sh.slice();
+    this.#numbers = 3 * shCoefficientCount(cloud.shDegree);
+    this.#antialiased = cloud.antialiased;
+    this.#visible = new Float32Array(count);
+    this.rows = new Float64Array(ROW * count);
+    for (let i = 0; i < count; i++) {
+      writeRow(cloud, i, this.rows);
+      this.#weigh(i, contribution[i]);
+    }
+  }
+
+  /** [N, 3] where the splats are. */
+  positions(): Float32Array {
+    const count = this.rows.length / ROW;
+    const found = new Float32Array(3 * count);
+    for (let i = 0; i < count; i++) for (const axis of [X, Y, Z]) found[3 * i + axis] = this.rows[ROW * i + axis];
+    return found;
+  }
+
+  /**
+   * Mean squared error of a view's image, peak 1, if two splats become one; Infinity where they cannot.
+   * The two, of weights w in a view, and the one in their place differ by w₁G₁ + w₂G₂ − wG before whatever lies behind, and by the differences of their colours to the mean; the squares of Gaussians have
+   * integrals in closed form, ∫ G₁ G₂ = 2π √|Σ₁| √|Σ₂| / √|Σ₁ + Σ₂| · exp(−δᵀ (Σ₁ + Σ₂)⁻¹ δ / 2).
+   * @param step looks at every so many-th view only
+   */
+  cost(i: number, j: number, step = 1): number {
+    const { rows } = this;
+    const seen = this.#seen;
+    const p = rows[ROW * i + MASS] / (rows[ROW * i + MASS] + rows[ROW * j + MASS]);
+    const q = 1 - p;
+    if (!(p >= 0)) return Infinity;
+    const [seeI, seeJ] = [this.#visible[i], this.#visible[j]];
+    const visible = p * seeI + q * seeJ;
+    // Sums over views, all areas in units of 2π: of the cover and its product with that of one, of squares and products of what is seen.
+    let [covered, ownSquare, squares, products, own, apart, views] = [0, 0, 0, 0, 0, 0, 0];
+    const stride = SEEN * step;
+    let b = SEEN * this.#views * j;
+    for (let a = SEEN * this.#views * i, end = a + SEEN * this.#views; a < end; a += stride, b += stride) {
+      if (seen[a + AMPLITUDE] === 0 || seen[b + AMPLITUDE] === 0) continue;
+      views++;
+      const [du, dv] = [seen[b + U] - seen[a + U], seen[b + V] - seen[a + V]];
+      const [uuA, uvA, vvA] = [seen[a + UU], seen[a + UV], seen[a + VV]];
+      const [uuB, uvB, vvB] = [seen[b + UU], seen[b + UV], seen[b + VV]];
+      const uu = p * uuA + q * uuB + p * q * du * du;
+      const uv = p * uvA + q * uvB + p * q * du * dv;
+      const vv = p * vvA + q * vvB + p * q * dv * dv;
+      const areaA = Math.sqrt(uuA * vvA - uvA * uvA);
+      const areaB = Math.sqrt(uuB * vvB - uvB * uvB);
+      const area = Math.sqrt(uu * vv - uv * uv);
+      const amplitude = visible * (this.#antialiased ? compensation(uu, uv, vv) : 1);
+      const both = areaA * areaB * overlap(uuA + uuB, uvA + uvB, vvA + vvB, du, dv);
+      const withA = areaA * area * overlap(uuA + uu, uvA + uv, vvA + vv, q * du, q * dv);
+      const withB = areaB * area * overlap(uuB + uu, uvB + uv, vvB + vv, p * du, p * dv);
+      let weightA = seeI * seen[a + AMPLITUDE];
+      let weightB = seeJ * seen[b + AMPLITUDE];
+      const alone = weightA * areaA + weightB * areaB;
+      const cover = alone - Math.max(seeI, seeJ) * seen[a + AMPLITUDE] * seen[b + AMPLITUDE] * both;
+      weightA *= cover / alone;
+      weightB *= cover / alone;
+      covered += cover * amplitude * area;
+      ownSquare += (amplitude * area) ** 2;
+      squares += (weightA * weightA * areaA + weightB * weightB * areaB) / 2 + 2 * weightA * weightB * both;
+      products += amplitude * (weightA * withA + weightB * withB);
+      own += (amplitude * amplitude * area) / 2;
+      const [offA, offB] = [weightA * q, weightB * p];
+      apart += (offA * offA * areaA + offB * offB * areaB) / 2 - 2 * offA * offB * both;
+    }
+    if (views * step < LEAST_VIEWS) return Infinity;
+    const opacity = covered / ownSquare;
+    this.share = p;
+    this.opacity = opacity;
+    if (!(opacity <= 1)) return Infinity;
+    const shape = Math.max(0, squares - 2 * opacity * products + opacity * opacity * own);
+    const square = this.#colourDifference(i, j) * Math.max(0, apart) + CONTRAST * shape;
+    return (2 * Math.PI * square) / (views * this.#pixels);
+  }
+
+  /** Makes slot `i` the pair that was looked at last, which was `i` and `j`. */
+  join(i: number, j: number): void {
+    const { rows, share: p, opacity } = this;
+    const q = 1 - p;
+    const seen = this.#seen;
+    joinMoments(rows, ROW * i, ROW * j, p);
+    rows[ROW * i + MASS] += rows[ROW * j + MASS];
+    this.#visible[i] = p * this.#visible[i] + q * this.#visible[j];
+    for (let k = 0; k < this.#numbers; k++) {
+      const at = this.#numbers * i + k;
+      this.#sh[at] = p * this.#sh[at] + q * this.#sh[this.#numbers * j + k];
+    }
+    for (let view = 0; view < this.#views; view++) {
+      const [a, b] = [SEEN * (this.#views * i + view), SEEN * (this.#views * j + view)];
+      const isSeen = seen[a + AMPLITUDE] > 0 && seen[b + AMPLITUDE] > 0;
+      const [du, dv] = [seen[b + U] - seen[a + U], seen[b + V] - seen[a + V]];
+      seen[a + U] += q * du;
+      seen[a + V] += q * dv;
+      seen[a + UU] = p * seen[a + UU] + q * seen[b + UU] + p * q * du * du;
+      seen[a + UV] = p * seen[a + UV] + q * seen[b + UV] + p * q * du * dv;
+      seen[a + VV] = p * seen[a + VV] + q * seen[b + VV] + p * q * dv * dv;
+      const compensated = this.#antialiased ? compensation(seen[a + UU], seen[a + UV], seen[a + VV]) : 1;
+      seen[a + AMPLITUDE] = isSeen ? opacity * compensated : 0;
+    }
+  }
+
+  /** What a splat weighs in means: the cover that shows, over all views. */
+  #weigh(i: number, contribution: number): void {
+    const seen = this.#seen;
+    let [most, cover] = [0, 0];
+    for (let view = 0; view < this.#views; view++) {
+      const at = SEEN * (this.#views * i + view);
+      const amplitude = seen[at + AMPLITUDE];
+      if (amplitude === 0) continue;
+      most = Math.max(most, amplitude);
+      cover += amplitude * Math.sqrt(seen[at + UU] * seen[at + VV] - seen[at + UV] ** 2);
+    }
+    this.#visible[i] = most > 0 ? Math.min(1, contribution / most) : 0;
+    this.rows[ROW * i + MASS] = this.#visible[i] * cover;
+  }
+
+  /** Mean square over all directions of how far the colours of two splats are apart, a channel. */
+  #colourDifference(i: number, j: number): number {
+    let sum = 0;
+    for (let k = 0, a = this.#numbers * i, b = this.#numbers * j; k < this.#numbers; k++) {
+      const difference = this.#sh[a + k] - this.#sh[b + k];
+      sum += difference * difference;
+    }
+    return sum / (3 * SPHERE);
+  }
+}
+
+/** ∫ G₁ G₂ over 2π √|Σ₁| √|Σ₂|, from the sum of the covariances and the distance of the centres. */
+function overlap(uu: number, uv: number, vv: number, du: number, dv: number): number {
+  const determinant = uu * vv - uv * uv;
+  return Math.exp((-0.5 * (vv * du * du - 2 * uv * du * dv + uu * dv * dv)) / determinant) / Math.sqrt(determinant);
+}
+
+/** Share of its opacity that a splat keeps when the dilation, which the covariance has in it, makes it larger. */
+function compensation(uu: number, uv: number, vv: number): number {
+  const determinant = uu * vv - uv * uv;
+  return Math.sqrt(Math.max(0, (uu - DILATION) * (vv - DILATION) - uv * uv) / determinant);
+}
