@@ -73,6 +73,14 @@ test('the index in both dialects: boxes with their runs, the coarsest first, at 
   assert.equal(environment?.url, 'https://lod.test/a%20b/https%3A//x.test/m', 'no other server');
 });
 
+test('an index that names more splats than there can be is refused before anything is allocated for them', () => {
+  const text = new TextDecoder().decode(folder.index).replaceAll(/"count":150/g, '"count":1e9');
+  assert.throws(
+    () => readLodScene(new TextEncoder().encode(text), 'lod-meta.json', INDEX),
+    (error: GaussianSplatError) => error.code === 'decode/header' && /4,000,000,\d+/.test(error.message),
+  );
+});
+
 test('the coarsest runs and the environment are what the reader of whole scenes finds, and no other file is fetched', async () => {
   const server = new Server(folder);
   const found = await readCoarsest(scene, new SogFiles(), server.fetch, 'lod-meta.json');

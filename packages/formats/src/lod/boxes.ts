@@ -1,3 +1,5 @@
+import { grouped } from '../bytes.js';
+import { damaged } from '../damaged.js';
 import { partAddress } from '../open-part.js';
 import { parseLodMeta } from './meta.js';
 
@@ -31,6 +33,9 @@ export interface LodScene {
   readonly environment: SogAddress | undefined;
 }
 
+/** Splats of all levels together that an index may name: what is kept of each 256 of them before any is there is allocated at once. */
+const MOST_SPLATS = 2 ** 31;
+
 /**
  * Reads the index of a streamed SOG scene, `lod-meta.json`, for those who fetch it box by box.
  * @param name what error messages call it
@@ -47,6 +52,10 @@ export function readLodScene(bytes: Uint8Array, name: string, url: string): LodS
       .flatMap((run) => (run && run.count > 0 ? { ...addresses[run.file], first: run.offset, count: run.count } : []))
       .reverse(),
   }));
+  const total = boxes.reduce((sum, { runs }) => runs.reduce((own, { count }) => own + count, sum), 0);
+  if (total > MOST_SPLATS) {
+    throw damaged(`${name}, tree`, `at most ${grouped(MOST_SPLATS)} splats`, grouped(total), 'decode/header');
+  }
   return {
     boxes: boxes.filter(({ runs }) => runs.length > 0),
     environment: environment === undefined ? undefined : addressOf(environment),
