@@ -1,6 +1,7 @@
 /** The built pages in Chromium: small runs of ours beside another renderer. Needs `npm run build`, which `npm test` does. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { onlyInFull } from '../support/extent.js';
 import { scriptModule } from './load.js';
 
 const { runPage } = await scriptModule('lib/browser-page.mjs');
@@ -38,7 +39,7 @@ test('the benchmark page measures a list in one report', { timeout: 180_000 }, a
   await assert.rejects(runPage('bench/index.html', { ...SMALL, paths: 'nowhere' }), /path: expected orbit/);
 });
 
-test('what hangs overhead is not visible', { timeout: 180_000 }, async () => {
+test('what hangs overhead is not visible', { timeout: 180_000, skip: onlyInFull }, async () => {
   const common = { ...SMALL, rounds: '1', w: '96', h: '64', phases: 'wall' };
   const overhead = { ...common, layout: 'overhead', visible: '5000' };
   // Both of several copies: a scene by itself is not cut to whole chunks.

@@ -7,6 +7,7 @@ import { readScene } from '@gaussian-splat/formats';
 import { readFileSync } from 'node:fs';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, describeCloseness } from '../support/compare.js';
+import { onlyInFull } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { cameraAt, room } from '../support/scenes.js';
 
@@ -46,7 +47,7 @@ for (const { name, cloud, camera } of views) {
   });
 }
 
-test('fewer pixels are in no quality: what they cost depends on the scene', async () => {
+test('fewer pixels are in no quality: what they cost depends on the scene', { skip: onlyInFull }, async () => {
   const device = await serialDevice();
   const [lowest, scales] = [Math.min(...Object.values(LIMITS)), [0.9, 0.75, 0.5]];
   const figures = new Map(scales.map((scale) => [scale, [] as number[]]));
