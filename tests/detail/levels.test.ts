@@ -20,6 +20,7 @@ import { randomSource } from '../support/gpu.js';
 import { heaps } from '../support/scenes/heaps.js';
 import { lodFolder, openLod, pick, type FetchPart } from '../support/lod-folder.js';
 import { psnr } from '../support/metrics.js';
+import { drawUntilCalm } from '../support/draw-until-calm.js';
 import { anyDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
@@ -106,25 +107,6 @@ test('in a flight over a small pool, with levels that come late, in any order, o
   );
   [renderer, scene, target].forEach((owner) => owner.destroy());
 });
-
-/** Draws until nothing more comes. */
-async function drawUntilCalm(
-  scene: StreamedGaussians,
-  renderer: Renderer,
-  camera: Camera,
-  detail: number,
-): Promise<void> {
-  const device = await anyDevice();
-  const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
-  for (let [calm, frames] = [0, 0]; calm < 10 && frames < 3000; frames++) {
-    const { resident } = scene.progress;
-    renderer.render({ gaussians: scene, camera, target, detail });
-    await device.queue.onSubmittedWorkDone();
-    await pause(2);
-    calm = scene.progress.resident === resident && scene.progress.coming === 0 ? calm + 1 : 0;
-  }
-  target.destroy();
-}
 
 test('a scene that has room for all is, without an error, the picture of the scene that was loaded whole', async () => {
   const device = await anyDevice();

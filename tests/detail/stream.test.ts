@@ -9,6 +9,7 @@ import { detailFolder, type DetailFolder } from '../support/detail-folder.js';
 import { shareDrawn, type DetailView } from '../support/detail-twin.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
+import { drawUntilCalm } from '../support/draw-until-calm.js';
 import { anyDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { readRows } from '../support/read-rows.js';
@@ -22,25 +23,6 @@ const viewFrom = (distance: number, angle = 0.4, target: Vector3 = [0, 0, 0]): C
   cameraAt([distance * Math.cos(angle), -0.5 * distance, distance * Math.sin(angle)], target, {
     ...{ width: 96, height: 64, fovXDegrees: 60, near: 0.01 },
   });
-
-/** Draws until nothing more comes. */
-async function drawUntilCalm(
-  scene: StreamedGaussians,
-  renderer: Renderer,
-  camera: Camera,
-  detail: number,
-): Promise<void> {
-  const device = await anyDevice();
-  const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
-  for (let [calm, frames] = [0, 0]; calm < 8 && frames < 600; frames++) {
-    const { resident } = scene.progress;
-    renderer.render({ gaussians: scene, camera, target, detail });
-    await device.queue.onSubmittedWorkDone();
-    await pause(1);
-    calm = scene.progress.resident === resident && scene.progress.coming === 0 ? calm + 1 : 0;
-  }
-  target.destroy();
-}
 
 const openAll = async (source: DetailFolder, memoryBudget?: number): Promise<StreamedGaussians> =>
   StreamedGaussians.open(await anyDevice(), source.manifest, { fetchPage: source.fetchPage, memoryBudget });
