@@ -10,7 +10,6 @@ import { notFinite, turnedAway } from '../stability/support/pictures.js';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { psnr } from '../support/metrics.js';
 import type { Miscompilation } from '../support/miscompilation.js';
-import { onlyInFull } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
 import { readFrame } from '../support/read-frame.js';
@@ -75,24 +74,20 @@ async function drawTurning(device: GPUDevice, rasterizer: RasterizerName): Promi
 }
 
 for (const rasterizer of ['quads', 'tiles'] as const) {
-  test(
-    `${rasterizer}: numbers that another stage decided by may be rounded either way`,
-    { skip: rasterizer === 'tiles' && onlyInFull },
-    async () => {
-      const [expected, visible] = await drawTurning(await serialDevice(), rasterizer);
-      for (const side of [1, -1]) {
-        const { device, befallen } = await faultyDevice(movedBy(side));
-        const [pixels, kept] = await drawTurning(device, rasterizer);
-        device.destroy();
-        assert.ok(befallen.includes('gs.project'), befallen.join());
-        assert.equal(befallen.length, rasterizer === 'tiles' ? 3 : 1, befallen.join());
-        assert.deepEqual([kept, notFinite(pixels)], [visible, 0]);
-        const decibels = psnr(pixels, expected, { channels: 4 });
-        console.log(`${rasterizer}, moved ${side > 0 ? 'up' : 'down'}: ${decibels.toFixed(1)} dB`);
-        assert.ok(decibels >= 70, `${decibels} dB`);
-      }
-    },
-  );
+  test(`${rasterizer}: numbers that another stage decided by may be rounded either way`, async () => {
+    const [expected, visible] = await drawTurning(await serialDevice(), rasterizer);
+    for (const side of [1, -1]) {
+      const { device, befallen } = await faultyDevice(movedBy(side));
+      const [pixels, kept] = await drawTurning(device, rasterizer);
+      device.destroy();
+      assert.ok(befallen.includes('gs.project'), befallen.join());
+      assert.equal(befallen.length, rasterizer === 'tiles' ? 3 : 1, befallen.join());
+      assert.deepEqual([kept, notFinite(pixels)], [visible, 0]);
+      const decibels = psnr(pixels, expected, { channels: 4 });
+      console.log(`${rasterizer}, moved ${side > 0 ? 'up' : 'down'}: ${decibels.toFixed(1)} dB`);
+      assert.ok(decibels >= 70, `${decibels} dB`);
+    }
+  });
 }
 
 after(endNodeDevice);
