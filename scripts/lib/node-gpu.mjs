@@ -1,7 +1,9 @@
 /** A WebGPU adapter in Node, through Dawn. Run under `gpuEnvironment()`. */
 import { create, globals } from 'webgpu';
+import { calmPolling } from './calm-polling.mjs';
 
 Object.assign(globalThis, globals);
+calmPolling();
 
 /** Dawn, by its options. It must not be collected while a device of it lives. */
 const made = new Map();
