@@ -36,7 +36,7 @@ test('20,000 mutations: a header or a named error, the same in one piece and in 
   const { uniform } = seededRandom(42);
   const random = (): number => uniform(0, 1);
   const files = fixtureNames().map(fixtureBytes);
-  const start = performance.now();
+  const start = process.cpuUsage();
   let refused = 0;
   for (let i = 0; i < 20_000; i++) {
     const bytes = mutate(files[i % files.length], random);
@@ -48,8 +48,8 @@ test('20,000 mutations: a header or a named error, the same in one piece and in 
     else assert.deepEqual(inPieces, result);
   }
   assert.ok(refused > 2_000 && refused < 20_000, `${refused} refused`);
-  const seconds = (performance.now() - start) / 1000;
-  assert.ok(seconds < 60, `${seconds} s`);
+  const seconds = process.cpuUsage(start).user / 1e6;
+  assert.ok(seconds < 60, `${seconds} s of work`);
 });
 
 /** Flips, replaces, inserts, removes or repeats bytes, mostly in the first and last 200, where the structure is. */
@@ -108,9 +108,10 @@ test('lengths that lie are corrupt, whatever they claim', async () => {
 test('a file of 60 MB of empty fields is refused within seconds', async () => {
   const bytes = new Uint8Array(60_000_000);
   for (let i = 0; i < bytes.length; i += 2) bytes[i] = 0x0a;
-  const start = performance.now();
+  const start = process.cpuUsage();
   bytes.set([8, 8]);
   const result = await outcome(bytes);
   assert.ok(result instanceof GaussianSplatError && result.code === 'decode/unsupported', String(result));
-  assert.ok(performance.now() - start < 20_000, `${performance.now() - start} ms`);
+  const seconds = process.cpuUsage(start).user / 1e6;
+  assert.ok(seconds < 20, `${seconds} s of work`);
 });
