@@ -11,14 +11,11 @@ import { showSteps } from './pace/show-steps.js';
 import { Stage } from './pace/stage.js';
 import { writePly } from './peers/ply.js';
 import { sendReport } from './run/report.js';
-import { quantile } from './run/summary.js';
 import { placeCopies } from './scene/placement.js';
 
-/** Seconds that a size is looked at to know what the whole picture takes there. */
-const CALIBRATION_SECONDS = 1.5;
-/** Sides at which that is, of the usual ones, and by which they shrink where pictures are not whole. */
-const [SMALLER, SHRINK] = [0.5, 0.7];
-const LEAST_SIDE = 32;
+/** Seconds of motion at a size before it is known what the whole picture takes there, and the sizes, of the usual sides. */
+const CALIBRATION_SECONDS = 1;
+const CALIBRATION_SIDES = [0.5, 1.5];
 
 /** Address of the scene: that of the file, or of as many splats of copies side by side. */
 async function sceneOf({ scene, splats }) {
@@ -29,28 +26,22 @@ async function sceneOf({ scene, splats }) {
   return URL.createObjectURL(writePly(cloud, copies));
 }
 
-/** What pictures in motion took at a size where they are whole. */
+/** What the whole picture takes at a size, right after motion: the clock of a GPU that rests is another one. */
 async function wholeTimeAt(stage, plan, side) {
-  for (let s = side; s * plan.width >= LEAST_SIDE; s *= SHRINK) {
-    stage.resize(s * plan.width, s * plan.height);
-    const rows = await move(stage, CALIBRATION_SECONDS, plan);
-    const late = rowsOf(rows, 0, 500);
-    const whole = late.filter(({ moving, span }) => moving === 'whole' && span !== null).map(({ span }) => span);
-    const { width, height } = stage.state;
-    if (late.at(-1)?.moving === 'whole' && whole.length > 0)
-      return { pixels: width * height, milliseconds: quantile(whole, 0.5), side: s };
-  }
-  throw new Error('pictures in motion are whole at no size: nothing to begin with');
+  stage.resize(side * plan.width, side * plan.height);
+  await move(stage, CALIBRATION_SECONDS, plan);
+  const { wholeMs } = await comeToRest(stage, { compares: false });
+  const { width, height } = stage.state;
+  return { pixels: width * height, milliseconds: wholeMs };
 }
 
 /** The elements become as large as takes a multiple of the target. */
 async function resizeFor(load, stage, plan) {
-  const larger = await wholeTimeAt(stage, plan, 1);
-  const smaller = await wholeTimeAt(stage, plan, SMALLER * larger.side);
+  const known = [];
+  for (const side of CALIBRATION_SIDES) known.push(await wholeTimeAt(stage, plan, side));
   const target = stage.elements[0].stats.pace.targetMs;
   const most = (plan.most / Math.max(plan.width, plan.height)) ** 2 * plan.width * plan.height;
-  const side = Math.sqrt(pixelsFor(load * target, [smaller, larger], most) / (plan.width * plan.height));
-  return { known: [smaller, larger], side };
+  return { known, side: Math.sqrt(pixelsFor(load * target, known, most) / (plan.width * plan.height)) };
 }
 
 /** One step: motion under the load as it was, the step, motion, rest. */

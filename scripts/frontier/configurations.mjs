@@ -19,6 +19,7 @@ export const configurations = [
   { name: '32-bit keys', tier: 'lever', options: { depthKeyBits: 32 } },
   { name: 'sort every 0.5 degrees', tier: 'lever', options: { sortAngle: 0.0087 } },
   { name: 'sort every 2 degrees', tier: 'lever', options: { sortAngle: 0.035 } },
+  { name: 'sort every 4 degrees', tier: 'lever', options: { sortAngle: 0.07 } },
   { name: 'stop at 1/1000', tier: 'lever', options: { transmittanceMin: 1e-3 } },
   { name: 'stop at 1/255', tier: 'lever', options: { transmittanceMin: 1 / 255 } },
   { name: 'stop at 1/64', tier: 'lever', options: { transmittanceMin: 1 / 64 } },

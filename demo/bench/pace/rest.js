@@ -1,4 +1,5 @@
 /** When the true image is on show after the cameras have come to rest, and whether it is the one that `toBlob()` hands out. */
+import { quantile } from '../run/summary.js';
 import { decibels } from './figures.js';
 
 /** Ms that it may take, and between two looks. */
@@ -21,8 +22,8 @@ const lastDrawn = (elements) =>
 
 /**
  * Moves the cameras a last time and waits.
- * @returns ms from the last picture that was drawn in motion until the GPU was done with the true images of all elements, what the slowest of them took there, and
- * how the one on show compares with `toBlob()`
+ * @returns ms from the last picture that was drawn in motion until the GPU was done with the true images of all elements, what they took, their median,, and
+ * how the first one on show compares with `toBlob()`
  */
 export async function comeToRest(stage, { compares }) {
   const { elements } = stage;
@@ -31,7 +32,10 @@ export async function comeToRest(stage, { compares }) {
   const since = Math.max(...(await drawn));
   const { done, shown } = await trueImages(elements);
   await wait(300);
-  const wholeMs = Math.max(...elements.map(({ stats }) => stats.pace.lastMs ?? NaN));
+  const wholeMs = quantile(
+    elements.map(({ stats }) => stats.pace.lastMs ?? NaN),
+    0.5,
+  );
   const picture = compares && shown !== undefined ? await compareWithBlob(elements[0], shown) : undefined;
   return { restMs: Math.round(done - since), wholeMs: Number(wholeMs.toFixed(3)), picture };
 }

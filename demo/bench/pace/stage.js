@@ -12,7 +12,7 @@ export class Stage {
   #size = { width: 0, height: 0 };
 
   /** @param plan see readPlan; the address of the scene may be another one. */
-  constructor(box, url, { attributes }, count) {
+  constructor(box, url, { attributes, distance }, count) {
     this.#box = box;
     for (let i = 0; i < count; i++) {
       const element = document.createElement('gaussian-splat');
@@ -21,7 +21,7 @@ export class Stage {
       );
       this.#elements.push(element);
     }
-    this.distance = 1;
+    this.distance = distance;
   }
 
   /** Loads all scenes and shows the first. */

@@ -22,12 +22,12 @@ const FAST_COST = 0.72;
 /** The levers of a quality that a frame can have without other memory. */
 function frameLeversOf({
   depthKeyBits,
-  occludedBelow,
+  sortAngle,
   transmittanceMin,
   alphaMin,
   visibleSets,
 }: Levers): Partial<FrameLevers> {
-  return { depthKeyBits, occludedBelow, transmittanceMin, alphaMin, visibleSets };
+  return { depthKeyBits, sortAngle, transmittanceMin, alphaMin, visibleSets };
 }
 
 /**
