@@ -19,15 +19,12 @@ const SCALES = [0.84, 0.71, 0.59, 0.5, 0.42, 0.35, 0.25];
 const BALANCED_COST = 0.73;
 const FAST_COST = 0.72;
 
-/** The levers of a quality that a frame can have without other memory. */
-function frameLeversOf({
-  depthKeyBits,
-  sortAngle,
-  transmittanceMin,
-  alphaMin,
-  visibleSets,
-}: Levers): Partial<FrameLevers> {
-  return { depthKeyBits, sortAngle, transmittanceMin, alphaMin, visibleSets };
+/**
+ * The levers of a quality that every frame gains by. An order that is kept spares most frames a sort, but those that make it anew take the longest, and a picture is in time if
+ * those are (docs/decisions/0014).
+ */
+function frameLeversOf({ depthKeyBits, transmittanceMin, alphaMin, visibleSets }: Levers): Partial<FrameLevers> {
+  return { depthKeyBits, transmittanceMin, alphaMin, visibleSets };
 }
 
 /**
