@@ -38,7 +38,7 @@ const PATH_FRAMES = 600;
 
 /**
  * Frames that lead to a compared view, in turns, so that what a renderer keeps from frame to frame shows in it: an orbit turns by 0.477 degrees a frame, and so an order that
- * is kept over 0.5 or 2 degrees is as old as it gets after 9 frames, one over 4 degrees after 8.
+ * is kept over 1 or 2 degrees is as old as it gets after 8 or 9 frames, one over 4 degrees after 8.
  */
 const LEAD_INS = [9, 8];
 

@@ -17,7 +17,7 @@ export const configurations = [
   { name: 'SH degree 0', tier: 'lever', options: { shDegree: 0 } },
   { name: '16-bit keys', tier: 'lever', options: { depthKeyBits: 16 } },
   { name: '32-bit keys', tier: 'lever', options: { depthKeyBits: 32 } },
-  { name: 'sort every 0.5 degrees', tier: 'lever', options: { sortAngle: 0.0087 } },
+  { name: 'sort every degree', tier: 'lever', options: { sortAngle: 0.0175 } },
   { name: 'sort every 2 degrees', tier: 'lever', options: { sortAngle: 0.035 } },
   { name: 'sort every 4 degrees', tier: 'lever', options: { sortAngle: 0.07 } },
   { name: 'stop at 1/1000', tier: 'lever', options: { transmittanceMin: 1e-3 } },

@@ -29,7 +29,7 @@ export interface Pace {
   readonly changedAt: number;
   /** The last change was towards the true image. */
   readonly climbed: boolean;
-  /** What frames took before the last change, ms. */
+  /** What frames took before the last change, or the first of several climbs to rungs that are no dearer, ms. */
   readonly before: number;
   /** No climb to a rung before this time, and how often one to it was in vain. */
   readonly barred: Readonly<Record<number, { readonly until: number; readonly failures: number }>>;
@@ -118,15 +118,13 @@ function isNoDearer({ recent, climbed, before }: Pace): boolean {
   return climbed && quantile(recent, COUNTED) <= NO_LONGER * before;
 }
 
-const change = (pace: Pace, now: number, level: number, reason: PaceReason): Pace => ({
-  ...pace,
-  level,
-  reason,
-  recent: [],
-  changedAt: now,
-  climbed: level < pace.level,
-  before: quantile(pace.recent, COUNTED),
-});
+function change(pace: Pace, now: number, level: number, reason: PaceReason): Pace {
+  const usual = quantile(pace.recent, COUNTED);
+  const climbed = level < pace.level;
+  // Rungs that are no dearer than one another must not add up to one that is.
+  const before = climbed && isNoDearer(pace) ? Math.min(pace.before, usual) : usual;
+  return { ...pace, level, reason, recent: [], changedAt: now, climbed, before };
+}
 
 /** The smallest of the values that at least this share of them do not exceed. */
 export function quantile(values: readonly number[], share: number): number {
