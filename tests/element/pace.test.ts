@@ -147,6 +147,17 @@ test('where fewer pixels take longer than all, the true image comes back, though
   }
 });
 
+test('rungs that are each a little dearer than the one below are not climbed one after the other where the lowest is too slow', () => {
+  const shares = COSTS.map((_, level) => 1.04 ** (LOWEST - level));
+  const gpu = { hertz: 60, fixed: 0, shares, load: () => 1.2, noise: 0, spikes: 0, latency: 2, seed: 1 };
+  const levels = run(gpu, 30_000).frames.map(({ at, level }) => (at < 1_000 ? LOWEST : level));
+  assert.ok(levels.includes(LOWEST - 1), 'the one above is tried');
+  assert.ok(
+    levels.every((level) => level >= LOWEST - 2),
+    `${Math.min(...levels)}`,
+  );
+});
+
 test('noise and spikes: no picture of the display is missed in the usual frame, and the level stays quiet', () => {
   fc.assert(
     fc.property(fc.record({ ...anyGpu, load: fc.double({ min: 0.2, max: 3, noNaN: true }) }), ({ load, ...gpu }) => {
