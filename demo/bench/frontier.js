@@ -17,7 +17,7 @@ import { makeReferences } from './quality/reference.js';
 
 const query = new URLSearchParams(location.search);
 
-/** The table's lines that `only` (a regular expression over names) leaves, on the scene that the address describes. */
+/** The table's lines, or those that the address has (`lines`, as JSON), that `only` (a regular expression over names) leaves, on the scene that the address describes. */
 async function chosen() {
   const [base] = await readConfigurations(query, () => []);
   const only = new RegExp(query.get('only') ?? '', 'i');
@@ -27,7 +27,8 @@ async function chosen() {
       base[key],
     ]),
   );
-  const entries = table.filter(({ name }) => only.test(name)).map((line) => ({ ...DEFAULTS, ...line, ...common }));
+  const lines = query.has('lines') ? JSON.parse(query.get('lines')) : table;
+  const entries = lines.filter(({ name }) => only.test(name)).map((line) => ({ ...DEFAULTS, ...line, ...common }));
   if (entries.length === 0) throw new RangeError(`only: no configuration's name matches ${only}`);
   return { common, entries };
 }
@@ -35,14 +36,18 @@ async function chosen() {
 /** Frames of the path over which the compared views are spread: ten seconds. The measured frames are its first ones. */
 const PATH_FRAMES = 600;
 
-/** Frames that lead to a compared view, so that what a renderer keeps from frame to frame shows in it. */
-const LEAD_IN = 6;
+/**
+ * Frames that lead to a compared view, in turns, so that what a renderer keeps from frame to frame shows in it: an orbit turns by 0.477 degrees a frame, and so an order that
+ * is kept over 1 or 2 degrees is as old as it gets after 8 or 9 frames, one over 4 degrees after 8.
+ */
+const LEAD_INS = [9, 8];
 
 /** `count` of the path's cameras, evenly spaced, each with the cameras that lead to it. */
 const spread = (cameras, count) =>
   Array.from({ length: count }, (_, i) => {
-    const at = LEAD_IN + Math.floor((i * (cameras.length - LEAD_IN)) / count);
-    return { camera: cameras[at], before: cameras.slice(at - LEAD_IN, at) };
+    const [longest, leadIn] = [Math.max(...LEAD_INS), LEAD_INS[i % LEAD_INS.length]];
+    const at = longest + Math.floor((i * (cameras.length - longest)) / count);
+    return { camera: cameras[at], before: cameras.slice(at - leadIn, at) };
   });
 
 async function judge(subjects, entry, moments, references) {

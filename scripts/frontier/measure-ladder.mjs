@@ -21,7 +21,7 @@ import { root } from '../lib/run.mjs';
 const SCENE = 'demo/scenes/skull.spz';
 const [WIDTH, HEIGHT, FOCAL] = [480, 270, 300];
 /** Frames of a rung in each round; the first fills caches and does not count. The camera turns, so that splats are sorted. */
-const [FRAMES, ROUNDS] = [3, 2];
+const [FRAMES, ROUNDS] = [3, 4];
 const UNCOUNTED = 1;
 
 const adapter = await requestNodeAdapter();

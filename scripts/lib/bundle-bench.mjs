@@ -10,6 +10,7 @@ const ENTRIES = [
   'detail',
   'frontier',
   'generators',
+  'pace',
   'run/fetch-worker',
   'stability',
   'quality/oracle-worker',

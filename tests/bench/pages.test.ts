@@ -60,3 +60,27 @@ test('the frontier page compares with the oracle', { timeout: 180_000 }, async (
   assert.ok(half.quality.psnr < full.quality.psnr - 10, `half: ${half.quality.psnr} dB`);
   assert.equal(pointsOf(report).length, 2);
 });
+
+test(
+  'the page of pictures in motion: real elements, a step, figures of it and the true image',
+  { timeout: 180_000 },
+  async () => {
+    const query = {
+      n: '300',
+      width: '64',
+      height: '48',
+      seconds: '1.3',
+      before: '0.2',
+      attributes: '{"detail":"off"}',
+    };
+    const report = await runPage('bench/pace.html', { ...query, steps: 'elements:2' });
+    assert.equal(report.error, undefined);
+    const [{ elements, target, span, interval, timed, restMs, wholeMs, levels }] = report.steps;
+    assert.equal(elements, 2);
+    // Two share what the display leaves to one: 0.8 of an interval of 60 Hz or less.
+    assert.ok(target > 0 && target <= (0.8 * 1000) / 60 / 2 + 0.01, `${target} ms`);
+    assert.ok(timed > 0 && span.p95 >= span.p50 && span.p50 > 0, JSON.stringify(span));
+    assert.ok(interval.p50 > 0 && wholeMs > 0 && restMs >= 0);
+    assert.ok(levels.length > 0 && levels[0].at < 200);
+  },
+);

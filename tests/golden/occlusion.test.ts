@@ -48,7 +48,7 @@ const PATHS = {
   ],
 } as unknown as Record<string, (step: number) => [number[], number[]]>;
 
-// The levers of `balanced` and `fast`, with the figures that those are held to.
+// As much as keeps the figures that `balanced` and `fast` are held to.
 for (const { path, occludedBelow, least } of [
   { path: 'turning', occludedBelow: 0.03, least: 42 },
   { path: 'strafing', occludedBelow: 0.03, least: 42 },

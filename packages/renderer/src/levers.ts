@@ -31,7 +31,10 @@ export interface Levers {
    * them too long. Frames of tiles that may have much to do are divided further without being asked. 1 to 256.
    */
   readonly submissions: number;
-  /** Radians that the camera may turn before an order of all splats is made anew. */
+  /**
+   * Radians that the camera may turn before splats are sorted again. Scenes of at most 2²⁰ splats keep an order of them all meanwhile, where the camera turns by at most
+   * half of that a frame; larger ones, and a camera that turns faster, have the visible splats sorted for each frame.
+   */
   readonly sortAngle: number;
   /**
    * Tiles leave out splats behind what took all pixels of their tiles to this transmittance or less in the last frame; 0 leaves out
@@ -64,6 +67,8 @@ export interface Levers {
   /** Share of the target's width and height that is really drawn; the rest is interpolated. Above 0, at most 1. */
   readonly resolutionScale: number;
 }
+
+const radians = (degrees: number): number => (degrees * Math.PI) / 180;
 
 /** The levers that leave nothing out: what scenes were trained with. */
 const EXACT: Levers = {
@@ -98,25 +103,24 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
     ...EXACT,
     rasterizer: 'tiles',
     accumulation: 'rgba32float',
-    depthKeyBits: 32,
     sortAngle: 0,
   },
   default: EXACT,
   balanced: {
     ...EXACT,
-    occludedBelow: 0.03,
-    transmittanceMin: 1 / 255,
+    depthKeyBits: 16,
+    sortAngle: radians(2),
+    transmittanceMin: 1 / 500,
     alphaMin: 1.1 / 255,
     visibleSets: true,
-    depthKeyBits: 16,
   },
   fast: {
     ...EXACT,
-    occludedBelow: 0.1,
-    transmittanceMin: 1 / 100,
+    depthKeyBits: 16,
+    sortAngle: radians(4),
+    transmittanceMin: 1 / 200,
     alphaMin: 1.25 / 255,
     visibleSets: true,
-    depthKeyBits: 16,
   },
 };
 
@@ -128,6 +132,7 @@ export type FrameLevers = Pick<Levers, (typeof FRAME_LEVERS)[number]>;
 
 const FRAME_LEVERS = [
   'depthKeyBits',
+  'sortAngle',
   'occludedBelow',
   'transmittanceMin',
   'alphaMin',

@@ -6,6 +6,10 @@ import type { PageTable } from './page-table.js';
 
 /** Radians under which a camera counts as not having turned. */
 const STILL = 2e-5;
+/** Most splats whose order is kept while the camera turns: beyond, the frames that sort all of them would take several times as long as the others. */
+const MOST_KEPT = 1 << 20;
+/** Turns that an order must last to be made while the camera turns: sorting all splats costs more than sorting the visible ones. */
+const LEAST_TURNS = 2;
 /** Frames of a turning camera after which the order of all splats, useless meanwhile, is given up. */
 const TURNING_FRAMES = 64;
 
@@ -35,22 +39,24 @@ export class OrderPolicy {
   }
 
   /**
-   * Sees to an order of all splats where one is of use: for the first frame, and for the first of those between which the camera
-   * does not turn. While it turns, or the content changes, only the visible splats are sorted. Call {@link settle} after submitting.
+   * Sees to an order of all splats where one is of use: for the first frame, for the first of those between which the camera
+   * does not turn, and while it turns so slowly that frames share an order. Else, and where the content changes, only the visible
+   * splats are sorted. Call {@link settle} after submitting.
    * @returns whether the order serves this frame
    */
   prepare(encoder: GPUCommandEncoder, camera: Camera, { sortAngle, isAskedFor, timer }: OrderOccasion): boolean {
     const depthOrder = this.#depthOrder;
+    const kept = this.#keptAngle(sortAngle);
     const axis = axisOf(camera);
     const turned = this.#lastAxis === undefined ? 0 : angleBetween(this.#lastAxis, axis);
     this.#lastAxis = axis;
     // Of a streamed scene most splats are not in view, and others come and go: sorting all of them never pays.
     const isStill = this.#content.isStill(this.#table.version) && !this.#table.isStreamed;
-    if (depthOrder.serves(camera, sortAngle)) {
+    if (depthOrder.serves(camera, kept)) {
       this.#turningFrames = 0;
       return true;
     }
-    const isUseful = isAskedFor || (isStill && (turned <= Math.min(STILL, sortAngle) || sortAngle > STILL));
+    const isUseful = isAskedFor || (isStill && turned <= Math.max(Math.min(STILL, kept), kept / LEAST_TURNS));
     if (isUseful && depthOrder.isPossible) {
       depthOrder.record(encoder, camera, timer);
       return true;
@@ -61,6 +67,10 @@ export class OrderPolicy {
 
   /** Frees what only the sorting needed. Where all splats are sorted again and again, by a lever that reuses orders or because each frame asks for it, the buffers are kept. */
   settle({ sortAngle, isAskedFor }: Omit<OrderOccasion, 'timer'>): void {
-    if (sortAngle <= STILL && !isAskedFor) this.#depthOrder.settle();
+    if (this.#keptAngle(sortAngle) <= STILL && !isAskedFor) this.#depthOrder.settle();
+  }
+
+  #keptAngle(sortAngle: number): number {
+    return this.#depthOrder.length > MOST_KEPT ? Math.min(STILL, sortAngle) : sortAngle;
   }
 }

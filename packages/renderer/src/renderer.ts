@@ -152,8 +152,7 @@ export class Renderer {
     table.update();
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const { sortAngle } = this.levers;
-    const occasion = { sortAngle, isAskedFor: notes !== undefined };
+    const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined };
     const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
     table.look(drawn, { ...levers, ...detail }, isOrdered, this.#occlusion.tiles);

@@ -29,6 +29,8 @@ export interface Pace {
   readonly changedAt: number;
   /** The last change was towards the true image. */
   readonly climbed: boolean;
+  /** What frames took before the last change, or the first of several climbs to rungs that are no dearer, ms. */
+  readonly before: number;
   /** No climb to a rung before this time, and how often one to it was in vain. */
   readonly barred: Readonly<Record<number, { readonly until: number; readonly failures: number }>>;
 }
@@ -49,6 +51,12 @@ const THREE_FRAMES_SLOW = 1.25;
 const ENOUGH_FRAMES = 12;
 /** Between a change and a climb, ms. */
 const HOLD_MS = 500;
+/**
+ * After so long without a change, ms, a rung up is tried whatever it can cost: wide GPUs were seen to take longer for few pixels than for many. Where the frames
+ * then take no longer, within the tolerance, the pace stays there, and the next rung is tried after a hold.
+ */
+const TRIAL_MS = 6_000;
+const NO_LONGER = 1.05;
 /** A climb that ends sooner, ms, was in vain; the rung is then left alone for a while, each time for twice as long. */
 const IN_VAIN_MS = 2_000;
 const FIRST_BAR_MS = 5_000;
@@ -61,6 +69,7 @@ export const INITIAL_PACE: Pace = {
   recent: [],
   changedAt: -Infinity,
   climbed: false,
+  before: 0,
   barred: {},
 };
 
@@ -69,7 +78,7 @@ export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, 
   if (level !== pace.level) return pace;
   const known = { ...pace, recent: [...pace.recent, milliseconds].slice(-MEMORY) };
   const excess = excessOf(known.recent, rules.targetMs);
-  if (excess !== null) return level + 1 < rules.costs.length ? fall(known, now, excess, rules) : known;
+  if (excess !== null && level + 1 < rules.costs.length && !isNoDearer(known)) return fall(known, now, excess, rules);
   return mayClimb(known, now, rules) ? change(known, now, level - 1, 'spare') : known;
 }
 
@@ -94,21 +103,28 @@ function fall(pace: Pace, now: number, excess: number, { costs }: PaceRules): Pa
   return { ...next, barred: { ...barred, [level]: { until, failures } } };
 }
 
-/** Additive increase: one rung, after a hold, if its frames would be in time even at the most that it can cost. */
-function mayClimb({ level, recent, changedAt, barred }: Pace, now: number, { costs, targetMs }: PaceRules): boolean {
+/** Additive increase: one rung, after a hold, if its frames would be in time even at the most that it can cost; or to try it. */
+function mayClimb(pace: Pace, now: number, { costs, targetMs }: PaceRules): boolean {
+  const { level, recent, changedAt, barred } = pace;
   if (level === 0 || now - changedAt < HOLD_MS || recent.length < ENOUGH_FRAMES) return false;
   if (now < (barred[level - 1]?.until ?? -Infinity)) return false;
-  return quantile(recent, COUNTED) * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs;
+  const usual = quantile(recent, COUNTED);
+  if (usual * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs) return true;
+  return now - changedAt >= TRIAL_MS || isNoDearer(pace);
 }
 
-const change = (pace: Pace, now: number, level: number, reason: PaceReason): Pace => ({
-  ...pace,
-  level,
-  reason,
-  recent: [],
-  changedAt: now,
-  climbed: level < pace.level,
-});
+/** Frames take no longer than on the rung below, from which the pace has climbed: there is nothing to be won there. */
+function isNoDearer({ recent, climbed, before }: Pace): boolean {
+  return climbed && quantile(recent, COUNTED) <= NO_LONGER * before;
+}
+
+function change(pace: Pace, now: number, level: number, reason: PaceReason): Pace {
+  const usual = quantile(pace.recent, COUNTED);
+  const climbed = level < pace.level;
+  // Rungs that are no dearer than one another must not add up to one that is.
+  const before = climbed && isNoDearer(pace) ? Math.min(pace.before, usual) : usual;
+  return { ...pace, level, reason, recent: [], changedAt: now, climbed, before };
+}
 
 /** The smallest of the values that at least this share of them do not exceed. */
 export function quantile(values: readonly number[], share: number): number {

@@ -1,0 +1,121 @@
+/** The page of pictures in motion: elements in a page, steps of the load, and whether they keep in time. See docs/benchmark.md. */
+import { fetchScene, readScene } from '@gaussian-splat/formats';
+import { LADDER } from '../../packages/element/dist/pace/ladder.js';
+import { showError, showProgress } from './page/show.js';
+import { Burner } from './pace/burner.js';
+import { figuresOf, pixelsFor, summarize } from './pace/figures.js';
+import { move, rowsOf } from './pace/motion.js';
+import { readPlan } from './pace/plan.js';
+import { comeToRest } from './pace/rest.js';
+import { showSteps } from './pace/show-steps.js';
+import { Stage } from './pace/stage.js';
+import { writePly } from './peers/ply.js';
+import { sendReport } from './run/report.js';
+import { placeCopies } from './scene/placement.js';
+
+/** Seconds of motion at a size before it is known what the whole picture takes there, and the sizes, of the usual sides. */
+const CALIBRATION_SECONDS = 1;
+const CALIBRATION_SIDES = [0.5, 1.5];
+
+/** Address of the scene: that of the file, or of as many splats of copies side by side. */
+async function sceneOf({ scene, splats }) {
+  const url = new URL(scene, location.href).href;
+  if (splats === 0) return url;
+  const cloud = await readScene(await fetchScene(url), { name: scene });
+  const { copies } = placeCopies({ base: cloud.count, count: splats });
+  return URL.createObjectURL(writePly(cloud, copies));
+}
+
+/** What the whole picture takes at a size, right after motion: the clock of a GPU that rests is another one. */
+async function wholeTimeAt(stage, plan, side) {
+  stage.resize(side * plan.width, side * plan.height);
+  await move(stage, CALIBRATION_SECONDS, plan);
+  const { wholeMs } = await comeToRest(stage, { compares: false });
+  const { width, height } = stage.state;
+  return { pixels: width * height, milliseconds: wholeMs };
+}
+
+/** The elements become as large as takes a multiple of the target. */
+async function resizeFor(load, stage, plan) {
+  const known = [];
+  for (const side of CALIBRATION_SIDES) known.push(await wholeTimeAt(stage, plan, side));
+  const target = stage.elements[0].stats.pace.targetMs;
+  const most = (plan.most / Math.max(plan.width, plan.height)) ** 2 * plan.width * plan.height;
+  return { known, side: Math.sqrt(pixelsFor(load * target, known, most) / (plan.width * plan.height)) };
+}
+
+/** One step: motion under the load as it was, the step, motion, rest. */
+async function measureStep({ what, value }, { stage, plan, burner, now, ladder }) {
+  const sizes = what === 'load' ? await resizeFor(value, stage, plan) : undefined;
+  if (sizes) stage.resize(now.side * plan.width, now.side * plan.height);
+  const other = { speed: plan.speed, onFrame: () => burner?.burn(now.burn * stage.elements[0].stats.pace.targetMs) };
+  await move(stage, plan.before, other);
+  const side = sizes?.side ?? (what === 'size' ? value : now.side);
+  if (what === 'elements') stage.show(value);
+  if (what === 'distance') stage.distance = value;
+  if (what === 'burn') now.burn = value;
+  now.side = side;
+  stage.resize(side * plan.width, side * plan.height);
+  const rows = await move(stage, plan.seconds, other);
+  const rest = await comeToRest(stage, plan);
+  const ofElements = stage.elements.map((_, i) => figuresOf(rowsOf(rows, i), ladder));
+  const { target, ...figures } = summarize(ofElements, rows);
+  const frames = rowsOf(rows, 0).map(({ at, span, moving }) => [Math.round(at), span, ladder.indexOf(moving)]);
+  return {
+    step: `${what} ${value}`,
+    ...stage.state,
+    burn: now.burn,
+    target,
+    load: Number((rest.wholeMs / target).toFixed(3)),
+    ...figures,
+    ...rest,
+    ...(sizes ? { calibration: sizes.known } : {}),
+    ...(plan.keepsFrames ? { frames } : {}),
+  };
+}
+
+/** Names of all levels, the true image first. */
+const NAMES = LADDER.map(({ name }) => name);
+
+async function measure(plan, steps) {
+  await customElements.whenDefined('gaussian-splat');
+  showProgress('loading');
+  const most = Math.max(1, ...plan.steps.filter(({ what }) => what === 'elements').map(({ value }) => value));
+  const stage = new Stage(document.getElementById('stage'), await sceneOf(plan), plan, most);
+  stage.resize(plan.width, plan.height);
+  await stage.load();
+  const burner = plan.steps.some(({ what }) => what === 'burn') ? await Burner.open() : undefined;
+  const now = { side: 1, burn: 0 };
+  for (const step of plan.steps) {
+    if (performance.now() > 1000 * plan.limit) break;
+    showProgress(`${step.what} ${step.value}`);
+    steps.push(await measureStep(step, { stage, plan, burner, now, ladder: NAMES }));
+    showSteps(steps);
+  }
+  const left = plan.steps.length - steps.length;
+  return { left, splats: stage.elements[0].stats.modelled, burnerRoundsPerMs: burner?.perMs };
+}
+
+const query = new URLSearchParams(location.search);
+if (location.search.length > 1) {
+  const { userAgent, hardwareConcurrency } = navigator;
+  const report = {
+    kind: 'pace',
+    date: new Date().toISOString(),
+    userAgent,
+    processors: hardwareConcurrency,
+    steps: [],
+  };
+  try {
+    report.plan = readPlan(query);
+    const { info } = (await navigator.gpu?.requestAdapter()) ?? {};
+    report.adapter = info && { vendor: info.vendor, description: info.description };
+    Object.assign(report, await measure(report.plan, report.steps));
+    showSteps(report.steps, report);
+  } catch (error) {
+    // What was measured before is reported all the same.
+    report.error = String(error.stack ?? error);
+    showError(error);
+  }
+  await sendReport(report, query.get('report'));
+}

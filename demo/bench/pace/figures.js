@@ -1,0 +1,78 @@
+/** From the frames of a step of the load to its figures: pure. */
+import { quantile } from '../run/summary.js';
+
+/** What is asked of a step, ms: in time from here on, at most one reversal until there. */
+export const [IN_TIME_AFTER, QUIET_UNTIL] = [1_000, 5_000];
+
+const rounded = (value) => (value === undefined ? null : Number(value.toFixed(3)));
+
+/** How often a row of levels changes its direction. */
+export function reversals(levels) {
+  const steps = levels
+    .slice(1)
+    .map((level, i) => Math.sign(level - levels[i]))
+    .filter((step) => step !== 0);
+  return steps.slice(1).filter((step, i) => step !== steps[i]).length;
+}
+
+/** Levels with the time, ms after the step, at which each began. */
+export function levelsOf(frames) {
+  return frames
+    .filter(({ moving }, i) => i === 0 || moving !== frames[i - 1].moving)
+    .map(({ at, moving }) => ({ at: Math.round(at), level: moving }));
+}
+
+/**
+ * Figures of one element.
+ * @param frames {{at: number, interval: number, moving: string, target: number, span: number | null}[]} each frame of the display: ms after the step, ms since the
+ * frame before, the level of pictures in motion, what a frame may take, and what one took that became known since
+ * @param ladder names of all levels, the true image first
+ */
+export function figuresOf(frames, ladder) {
+  const late = frames.filter(({ at }) => at >= IN_TIME_AFTER);
+  const early = frames.filter(({ at }) => at < QUIET_UNTIL);
+  const shares = late.filter(({ span }) => span !== null).map(({ span, target }) => span / target);
+  return {
+    target: rounded(frames.at(-1)?.target),
+    timed: shares.length,
+    /** Of what a frame may take. */
+    span: { p50: rounded(quantile(shares, 0.5)), p95: rounded(quantile(shares, 0.95)) },
+    reversals: reversals(early.map(({ moving }) => ladder.indexOf(moving))),
+    levels: levelsOf(frames),
+  };
+}
+
+/** The worst of the elements' figures, and what they share. */
+export function summarize(ofElements, frames) {
+  const worst = (of) => Math.max(...ofElements.map(of));
+  const late = frames.filter(({ at }) => at >= IN_TIME_AFTER).map(({ interval }) => interval);
+  return {
+    target: ofElements[0].target,
+    span: { p50: worst(({ span }) => span.p50 ?? 0), p95: worst(({ span }) => span.p95 ?? 0) },
+    timed: Math.min(...ofElements.map(({ timed }) => timed)),
+    interval: { p50: rounded(quantile(late, 0.5)), p95: rounded(quantile(late, 0.95)) },
+    reversals: worst((figures) => figures.reversals),
+    levels: ofElements[0].levels,
+  };
+}
+
+/** dB between two pictures of 8 bits over the pixels that either covers; `identical`, or `empty` where neither covers any. */
+export function decibels(a, b) {
+  let [sum, count] = [0, 0];
+  for (let i = 0; i < a.length; i += 4) {
+    const isCovered = a[i] + a[i + 1] + a[i + 2] + b[i] + b[i + 1] + b[i + 2] > 0;
+    if (!isCovered) continue;
+    for (let k = i; k < i + 3; k++) sum += (a[k] - b[k]) ** 2;
+    count += 3;
+  }
+  if (count === 0) return 'empty';
+  return sum === 0 ? 'identical' : rounded(-10 * Math.log10(sum / count / 255 ** 2));
+}
+
+/** Pixels of a picture that takes a time, by what two sizes took (`fixed + perPixel * pixels`); 256 at least. */
+export function pixelsFor(milliseconds, [a, b], most) {
+  const perPixel = (b.milliseconds - a.milliseconds) / (b.pixels - a.pixels);
+  if (!(perPixel > 0)) return most;
+  const fixed = b.milliseconds - perPixel * b.pixels;
+  return Math.max(256, Math.min(most, (milliseconds - fixed) / perPixel));
+}

@@ -1,0 +1,62 @@
+/** What to do to the page, from its address: sizes, and steps of load one after the other. */
+
+/**
+ * Changes of the load; each is one number.
+ * @property distance of the camera, as a multiple of that from which the scene fills the picture
+ * @property size of the elements' sides, as a multiple of `width` and `height`
+ * @property elements that are on show
+ * @property load the elements become as large as takes this multiple of the target, were all drawn whole
+ * @property burn time that other work of the page takes of the GPU in each frame, as a multiple of the target
+ */
+export const CHANGES = ['distance', 'size', 'elements', 'load', 'burn'];
+
+const STEPS =
+  'distance:0.6,distance:3,distance:0.6,size:2,size:1,elements:4,elements:1,load:0.5,load:1,load:2,load:3,load:0.5,burn:0.5,burn:2,burn:0';
+
+/** `distance:3,size:2` as changes. @returns {{what: string, value: number}[]} */
+export function parseSteps(text) {
+  return text.split(',').map((word) => {
+    const [what, number] = word.split(':');
+    const value = Number(number);
+    const isPossible = CHANGES.includes(what) && number !== undefined && value >= 0 && (what === 'burn' || value > 0);
+    if (!isPossible) throw new RangeError(`steps: expected ${CHANGES.join(', ')} with a number, found "${word}"`);
+    return { what, value };
+  });
+}
+
+/** All that the address may say. */
+export function readPlan(query) {
+  const number = (name, fallback) => {
+    const value = Number(query.get(name) ?? fallback);
+    if (!(value >= 0)) throw new RangeError(`${name}: expected a number, found "${query.get(name)}"`);
+    return value;
+  };
+  return {
+    scene: query.get('scene') ?? '../scenes/skull.spz',
+    /** The scene is repeated on the ground up to so many; 0: as it is. */
+    splats: number(query.has('n') ? 'n' : 'splats', 0),
+    /** Of the camera at first, as in the steps. */
+    distance: number('distance', 1),
+    /** Device pixels. */
+    width: number('width', 960),
+    height: number('height', 540),
+    /** Longest side that a step may lead to, device pixels. */
+    most: number('most', 8192),
+    /** Of each step, before the camera rests. */
+    seconds: number('seconds', 6),
+    /** Of motion under the load as it was, before each step. */
+    before: number('before', 1),
+    /** Seconds after which no further step is begun. */
+    limit: number('limit', 600),
+    /** Degrees a second. */
+    speed: number('speed', 28.6),
+    /** Other attributes of the elements. */
+    attributes: JSON.parse(query.get('attributes') ?? '{}'),
+    /** Compares the picture at rest with `toBlob()`. */
+    compares: query.get('compare') !== '0',
+    /** Keeps the times of all frames of the first element in the report. */
+    keepsFrames: query.get('keep') === '1',
+    steps: parseSteps(query.get('steps') ?? STEPS),
+    report: query.get('report'),
+  };
+}

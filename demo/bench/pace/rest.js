@@ -1,0 +1,92 @@
+/** When the true image is on show after the cameras have come to rest, and whether it is the one that `toBlob()` hands out. */
+import { quantile } from '../run/summary.js';
+import { decibels } from './figures.js';
+
+/** Ms that it may take, and between two looks: looking all the time would keep a processor from drawing. */
+const [LIMIT, LOOK] = [20_000, 1];
+/** Longest side of what is compared, in pixels from the middle of the picture. */
+const CROP = 1024;
+
+const wait = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+
+/** The last picture of a motion, as it was submitted, for each element. */
+const lastDrawn = (elements) =>
+  Promise.all(
+    elements.map(
+      (element) =>
+        new Promise((resolve) =>
+          element.addEventListener('camera-change', () => resolve(performance.now()), { once: true }),
+        ),
+    ),
+  );
+
+/**
+ * Moves the cameras a last time and waits.
+ * @returns ms from the last picture that was drawn in motion until the GPU was done with the true images of all elements, what they took, their median,, and
+ * how the first one on show compares with `toBlob()`
+ */
+export async function comeToRest(stage, { compares }) {
+  const { elements } = stage;
+  const drawn = lastDrawn(elements);
+  stage.turn(0.3);
+  const since = Math.max(...(await drawn));
+  const { done, shown } = await trueImages(elements);
+  await wait(300);
+  const wholeMs = quantile(
+    elements.map(({ stats }) => stats.pace.lastMs ?? NaN),
+    0.5,
+  );
+  const picture = compares && shown !== undefined ? await compareWithBlob(elements[0], shown) : undefined;
+  return { restMs: Math.round(done - since), wholeMs: Number(wholeMs.toFixed(3)), picture };
+}
+
+/**
+ * Waits for the true images of all elements.
+ * @returns when the GPU was done with them, and what the first element's canvas showed: it can be read in the task that draws it only, by callbacks that come after the
+ * element's, so this one is asked for again and again
+ */
+async function trueImages(elements) {
+  const isWhole = ({ stats }) => stats.pace.drawn === 'whole';
+  const canvas = elements[0].shadowRoot.querySelector('canvas');
+  const end = performance.now() + LIMIT;
+  let shown;
+  let handle = 0;
+  while (!elements.every(isWhole)) {
+    if (performance.now() > end) throw new Error(`no true image within ${LIMIT} ms`);
+    cancelAnimationFrame(handle);
+    const wasWhole = isWhole(elements[0]);
+    handle = requestAnimationFrame(() => {
+      if (!wasWhole && isWhole(elements[0])) shown ??= pixelsOf(canvas);
+    });
+    await wait(LOOK);
+  }
+  cancelAnimationFrame(handle);
+  return { done: await submittedWorkDone(elements[0]), shown };
+}
+
+/** When the device that all elements of a page share has done what it was given. */
+async function submittedWorkDone(element) {
+  const lease = await element.constructor.sharedDevice.acquire();
+  await lease.device.queue.onSubmittedWorkDone();
+  lease.release();
+  return performance.now();
+}
+
+/** The middle of a picture over black, RGBA of 8 bits. */
+function pixelsOf(picture) {
+  const [width, height] = [picture.width, picture.height].map((side) => Math.min(CROP, side));
+  const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
+  context.fillStyle = 'black';
+  context.fillRect(0, 0, width, height);
+  const [x, y] = [(picture.width - width) >> 1, (picture.height - height) >> 1];
+  context.drawImage(picture, x, y, width, height, 0, 0, width, height);
+  return context.getImageData(0, 0, width, height).data;
+}
+
+/** A PNG cannot hold colours that are brighter than their alpha, so what is compared is the canvas that the file is made of. */
+async function compareWithBlob(element, shown) {
+  const file = element.toBlob();
+  const found = decibels(shown, pixelsOf(element.shadowRoot.querySelector('canvas')));
+  await file;
+  return found;
+}
