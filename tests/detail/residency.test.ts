@@ -152,10 +152,10 @@ function costs(pages: number, slots: number): { look: number; page: number } {
 }
 
 test('a look and a page cost what their numbers make of it, not their product', () => {
-  const [small, large] = [costs(3610, 1063), costs(14_440, 4251)];
+  const [small, large] = [costs(16_750, 4375), costs(67_010, 17_500)];
   const text = ({ look, page }: typeof small): string =>
     `${look.toFixed(3)} ms a look, ${(1000 * page).toFixed(1)} µs a page`;
-  console.log(`3,610 pages and 1,063 slots: ${text(small)}; 14,440 and 4,251: ${text(large)}`);
+  console.log(`16,750 pages and 4,375 slots: ${text(small)}; 67,010 and 17,500: ${text(large)}`);
   assert.ok(large.look < 8 * small.look + 0.5, 'four times the pages, more than eight times the look');
   assert.ok(large.page < 3 * small.page + 0.02, 'four times the slots, and no longer a matter of microseconds');
 });

@@ -80,14 +80,6 @@ export class Residency {
     return this.#slots.count;
   }
 
-  /** The most pixels that a page costs which the last look wishes for and which is not there; 0 if all are. */
-  get lacking(): number {
-    let most = 0;
-    for (let page = 0; page < this.#list.count; page++)
-      if (this.#wish[page] > most && !this.isResident(page)) most = this.#wish[page];
-    return most;
-  }
-
   /** Pixels that doing without a page would cost, as of the last look; 0 if that does not wish for it. */
   need(page: number): number {
     return this.#wish[page];
@@ -102,8 +94,8 @@ export class Residency {
   note(wishes: Float32Array): void {
     this.#look++;
     this.#noRoomFor = Infinity;
+    this.#wish.set(wishes.subarray(0, this.#list.count));
     for (let page = 0; page < this.#list.count; page++) {
-      this.#wish[page] = wishes[page];
       if (wishes[page] > 0) this.#wishedAt[page] = this.#look;
     }
     this.#listMissing();
@@ -183,7 +175,7 @@ export class Residency {
   #listMissing(): void {
     this.#missing.clear();
     for (let page = 0; page < this.#list.count; page++) {
-      if (this.#isMissing(page)) this.#missing.add(page, this.#wish[page]);
+      if (this.#wish[page] > 0 && this.#isMissing(page)) this.#missing.add(page, this.#wish[page]);
     }
     this.#missing.order();
   }
