@@ -55,6 +55,27 @@ test('missing pages are named in the order of what doing without them costs', ()
   assert.ok(residency.residents > 200);
 });
 
+test('a page at hand comes before those that are needed up to four times as much, and keeps none of them away where it finds no room', () => {
+  const list = pageTree(17);
+  const isAtHand = (page: number): boolean => page === 16;
+  const residency = new Residency(list, 2, isAtHand);
+  residency.begin(0);
+  residency.settle(0);
+  const look = (...needs: [page: number, need: number][]): void => {
+    const wishes = new Float32Array(17);
+    for (const [page, need] of needs) wishes[page] = need;
+    residency.note(wishes);
+  };
+  look([1, 5], [16, 1]);
+  assert.equal(residency.nextMissing(), 1, 'five times as much');
+  assert.ok(residency.begin(1) && residency.settle(1));
+  look([1, 5], [2, 9], [16, 3]);
+  assert.equal(residency.nextMissing(), 16);
+  assert.equal(residency.begin(16), false, 'what is there is needed more');
+  assert.equal(residency.nextMissing(), 2);
+  assert.ok(residency.begin(2) && residency.settle(2));
+});
+
 test('with room for all, everything that a view wishes for is there in the end', () => {
   const list = pageTree(3000);
   const residency = opened(list, 3000);

@@ -111,16 +111,18 @@ class Server {
 /** Flies. @returns the seconds of the flight, without those before it */
 export async function fly(pages: FlightPages, options: FlightOptions): Promise<FlightSecond[]> {
   const { list } = pages;
-  const residency = new Residency(list, options.slots);
-  residency.begin(0);
-  residency.settle(0);
   const server = new Server(options);
   const files = new PageFiles((file) => server.fetch(parseInt(file)), options.kept);
+  const nameOf = (page: number): string => {
+    const { file } = list.place(page);
+    return `${file.chunks} ${file.file} ${options.isWithoutCopies ? list.translate(page).join() : ''}`;
+  };
+  const residency = new Residency(list, options.slots, (page) => files.has(nameOf(page)));
+  residency.begin(0);
+  residency.settle(0);
   const traffic = new PageTraffic(residency, {
     fetch: async (page, signal) => {
-      const { file } = list.place(page);
-      const copy = options.isWithoutCopies ? list.translate(page).join() : '';
-      await files.get(`${file.chunks} ${file.file} ${copy}`, signal);
+      await files.get(nameOf(page), signal);
       return Uint32Array.of(page);
     },
     onArrival: () => undefined,

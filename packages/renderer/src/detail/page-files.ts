@@ -44,6 +44,11 @@ export class PageFiles {
     }
   }
 
+  /** True for a file that is kept. */
+  has(file: string): boolean {
+    return this.#entries.get(file)?.size !== undefined;
+  }
+
   #begin(file: string): Entry {
     const controller = new AbortController();
     const entry: Entry = { bytes: this.#fetch(file, controller.signal), controller, waiting: 0 };

@@ -16,6 +16,8 @@ export interface PageSource {
    * chunks as {@link list} says.
    */
   readonly fetch: (page: number, signal: AbortSignal) => Promise<Uint32Array<ArrayBuffer>>;
+  /** True for a page that need not be fetched: it is placed before others that are needed as much. */
+  readonly isAtHand?: (page: number) => boolean;
   /** Called once with each page that came, when there is a slot for it. */
   readonly prepare?: (page: number, words: Uint32Array<ArrayBuffer>) => void;
 }
@@ -46,7 +48,8 @@ export function folderSource(
   };
   const prepare = (page: number, words: Uint32Array<ArrayBuffer>): void =>
     movePage(words, list.translate(page), manifest, list.chunks[page]);
-  return { scene: manifest, list, fetch, prepare };
+  const isAtHand = (page: number): boolean => files.has(list.place(page).file.file);
+  return { scene: manifest, list, fetch, isAtHand, prepare };
 }
 
 /** A copy of the words of one page of a file, laid out as a file of that page alone would be. */

@@ -107,7 +107,7 @@ export class StreamedGaussians implements GaussianScene {
       throw error;
     }
     this.pages = this.#pool.pages;
-    this.#residency = new Residency(list, slots);
+    this.#residency = new Residency(list, slots, source.isAtHand);
     this.#traffic = new PageTraffic(this.#residency, {
       fetch: async (page, signal) => {
         const words = await source.fetch(page, signal);
