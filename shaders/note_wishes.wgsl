@@ -1,5 +1,5 @@
-// Which pages of a streamed scene the view asks for, whether they are there or not: those of chunks that are off by more than is
-// allowed. One thread for each chunk; not in every frame.
+// Which pages of a streamed scene the view asks for, or will ask for when they have come, whether they are there or not: those of chunks that are off by
+// more than is allowed. One thread for each chunk; not in every frame.
 #import shared/chunk_visibility
 #import shared/detail
 #import shared/group
@@ -8,12 +8,22 @@
 @group(0) @binding(1) var<storage, read> chunks: array<Chunk>;
 @group(0) @binding(2) var<storage, read> details: array<ChunkDetail>;
 @group(0) @binding(3) var<storage, read> chunk_shares: array<f32>;
-// For each streamed page the bits of the pixels that doing without it costs, or 0.
+// For each streamed page the bits of the pixels that doing without it costs, or 0. The first page is always there: in its place the most that the view lacks.
 @group(0) @binding(4) var<storage, read_write> wishes: array<atomic<u32>>;
+// Where the camera will be: the columns of `local_to_camera`, and the eye.
+@group(0) @binding(5) var<uniform> ahead: array<vec4f, 5>;
 
 const WISH_THREADS = 64u;
 // How much less a page out of view is wished for: a camera that turns finds it there.
 const UNSEEN = 0.125;
+
+// Pixels that doing without what is finer costs a view.
+fn wish_of(seen: View, chunk: Chunk, d: ChunkDetail) -> f32 {
+  let allowed = max(seen.detail, chunk_shares[arrayLength(&chunk_shares) - 1u]);
+  let pixels = screen_error(seen, d.sphere, d.full_error);
+  if (refined(pixels, allowed, seen.detail_fade) == 0u) { return 0.0; }
+  return select(UNSEEN * pixels, pixels, may_be_visible(seen, chunk));
+}
 
 @compute @workgroup_size(WISH_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -22,9 +32,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let d = details[chunk];
   let page = d.children & CHILD_PAGE_MASK;
   if (page >= arrayLength(&wishes)) { return; }
-  let allowed = max(view.detail, chunk_shares[arrayLength(&chunk_shares) - 1u]);
-  let pixels = screen_error(view, d.sphere, d.full_error);
-  if (refined(pixels, allowed, view.detail_fade) == 0u) { return; }
-  let wish = select(UNSEEN * pixels, pixels, may_be_visible(view, chunks[chunk]));
-  atomicMax(&wishes[page], bitcast<u32>(wish));
+  var later = view;
+  later.local_to_camera = mat4x4f(ahead[0], ahead[1], ahead[2], ahead[3]);
+  later.eye = ahead[4].xyz;
+  let now = wish_of(view, chunks[chunk], d);
+  let wish = max(now, wish_of(later, chunks[chunk], d));
+  if (wish > 0.0) { atomicMax(&wishes[page], bitcast<u32>(wish)); }
+  if (now > 0.0 && d.error == 0.0) { atomicMax(&wishes[0], bitcast<u32>(now)); }
 }

@@ -13,7 +13,7 @@ import {
   StreamedGaussians,
   type PageSource,
 } from '@gaussian-splat/renderer';
-import { constants, NONE, PAGE_CHUNKS } from '@gaussian-splat/renderer/stages';
+import { constants, NONE, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { checkBoxes } from '../support/covered-boxes.js';
 import { randomSource } from '../support/gpu.js';
@@ -38,7 +38,7 @@ const viewFrom = (distance: number, angle = 0.4, x = 0): Camera =>
 /** Bytes of a slot, by what a page of docs/detail-pages.md has. */
 function slotBytes({ scene }: PageSource): number {
   const words = { int8: [2, 4, 8, 14], float16: [2, 6, 14, 24] }[scene.shPrecision][scene.shDegree];
-  return 4 * PAGE_CHUNKS * (8 + 12 + CULL_GROUP * (8 + words));
+  return 4 * SLOT_CHUNKS * (8 + 12 + CULL_GROUP * (8 + words));
 }
 
 test('pages of levels: slots by what the index says, errors that grow, one sphere for a box', () => {
@@ -48,7 +48,7 @@ test('pages of levels: slots by what the index says, errors that grow, one spher
   assert.equal(list.count, 1 + 3 + 2 + 3 + 2);
   assert.equal(levels.firstChunks[0], 1, 'one chunk of nothing for the box without a coarsest level');
   levels.pages.forEach(({ box, level, count, sphere, error }, p) => {
-    assert.equal(list.slots[p + 1], Math.ceil(Math.ceil(count / CULL_GROUP) / PAGE_CHUNKS));
+    assert.equal(list.slots[p + 1], Math.ceil(Math.ceil(count / CULL_GROUP) / SLOT_CHUNKS));
     assert.equal(list.parent[p + 1], level === 1 ? 0 : p);
     const next = levels.pages[p + 1];
     if (next?.box === box) assert.ok(error > next.error && sphere === next.sphere);
@@ -76,7 +76,7 @@ test('in a flight over a small pool, with levels that come late, in any order, o
       levels.scene,
     );
   });
-  const slots = source.list.slots[0] + 5;
+  const slots = source.list.slots[0] + 25;
   const total = source.list.slots.reduce((sum, own) => sum + own, 0);
   assert.ok(total > 2 * slots, `${total} slots in all, ${slots} in the pool`);
   const scene = await StreamedGaussians.openSource(device, source, {
@@ -207,10 +207,10 @@ test(
     const files = new SogFiles();
     const small = await openLod(
       ...([device, index, fetch] as const),
-      (source) => ({ memoryBudget: 6 * slotBytes(source), arrivalMs: 30 }),
+      (source) => ({ memoryBudget: 24 * slotBytes(source), arrivalMs: 30 }),
       files,
     );
-    assert.deepEqual([...small.source.list.slots], [1, 1, 1, 4, 1, 1, 4]);
+    assert.deepEqual([...small.source.list.slots], [2, 2, 5, 16, 2, 5, 16]);
     const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
     let most = 0;
     for (let frame = 0; frame < 40; frame++) {

@@ -55,6 +55,27 @@ test('missing pages are named in the order of what doing without them costs', ()
   assert.ok(residency.residents > 200);
 });
 
+test('a page at hand comes before those that are needed up to four times as much, and keeps none of them away where it finds no room', () => {
+  const list = pageTree(17);
+  const isAtHand = (page: number): boolean => page === 16;
+  const residency = new Residency(list, 2, isAtHand);
+  residency.begin(0);
+  residency.settle(0);
+  const look = (...needs: [page: number, need: number][]): void => {
+    const wishes = new Float32Array(17);
+    for (const [page, need] of needs) wishes[page] = need;
+    residency.note(wishes);
+  };
+  look([1, 5], [16, 1]);
+  assert.equal(residency.nextMissing(), 1, 'five times as much');
+  assert.ok(residency.begin(1) && residency.settle(1));
+  look([1, 5], [2, 9], [16, 3]);
+  assert.equal(residency.nextMissing(), 16);
+  assert.equal(residency.begin(16), false, 'what is there is needed more');
+  assert.equal(residency.nextMissing(), 2);
+  assert.ok(residency.begin(2) && residency.settle(2));
+});
+
 test('with room for all, everything that a view wishes for is there in the end', () => {
   const list = pageTree(3000);
   const residency = opened(list, 3000);
@@ -152,10 +173,10 @@ function costs(pages: number, slots: number): { look: number; page: number } {
 }
 
 test('a look and a page cost what their numbers make of it, not their product', () => {
-  const [small, large] = [costs(3610, 1063), costs(14_440, 4251)];
+  const [small, large] = [costs(16_750, 4375), costs(67_010, 17_500)];
   const text = ({ look, page }: typeof small): string =>
     `${look.toFixed(3)} ms a look, ${(1000 * page).toFixed(1)} µs a page`;
-  console.log(`3,610 pages and 1,063 slots: ${text(small)}; 14,440 and 4,251: ${text(large)}`);
+  console.log(`16,750 pages and 4,375 slots: ${text(small)}; 67,010 and 17,500: ${text(large)}`);
   assert.ok(large.look < 8 * small.look + 0.5, 'four times the pages, more than eight times the look');
   assert.ok(large.page < 3 * small.page + 0.02, 'four times the slots, and no longer a matter of microseconds');
 });

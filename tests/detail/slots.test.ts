@@ -5,7 +5,7 @@ import { setImmediate as turn } from 'node:timers/promises';
 import {
   MOST_UNDER_WAY,
   NONE,
-  PAGE_CHUNKS,
+  SLOT_CHUNKS,
   PageTraffic,
   Residency,
   type PageList,
@@ -87,9 +87,9 @@ test('whatever is wished for, comes or fails, pages are there whole or not at al
 test('a page that does not fit beside what is above it is never sent for, and keeps nothing else away', () => {
   // The finest run of the first box takes 10 slots; there are 12, of which the runs above it take 3.
   const list = boxList([
-    [20, 40, 200],
-    [20, 60],
-    [20, 20],
+    [4, 8, 40],
+    [4, 12],
+    [4, 4],
   ]);
   const residency = opened(list, 3 + 2 + 7);
   for (let look = 0; look < 4; look++) {
@@ -113,9 +113,9 @@ test('a page that does not fit beside what is above it is never sent for, and ke
 
 test('a large page for which too little can leave keeps no small one from coming that has room', () => {
   const list = boxList([
-    [20, 200],
-    [20, 100],
-    [20, 20],
+    [4, 40],
+    [4, 20],
+    [4, 4],
   ]);
   const residency = opened(list, 3 + 5 + 6);
   const look = (...wishes: number[]): void => residency.note(Float32Array.of(0, ...wishes));
@@ -165,7 +165,7 @@ test('views at rest come to rest in a pool that is too small, and nothing that h
 });
 
 test('what is under way is bounded in slots, not in pages', async () => {
-  const list = boxList(Array.from({ length: 200 }, (_, k) => [1, k % 3 === 0 ? 300 : 40]));
+  const list = boxList(Array.from({ length: 200 }, (_, k) => [1, k % 3 === 0 ? 60 : 8]));
   const residency = opened(list, 2000);
   const open: (() => void)[] = [];
   const sent: number[] = [];
@@ -199,6 +199,6 @@ test('what is under way is bounded in slots, not in pages', async () => {
   }
   assert.equal(residency.residents, list.count);
   assert.equal(traffic.underWay, 0);
-  assert.equal(list.chunks[1], 300);
-  assert.equal(list.slots[1], 300 / PAGE_CHUNKS);
+  assert.equal(list.chunks[1], 60);
+  assert.equal(list.slots[1], 60 / SLOT_CHUNKS);
 });

@@ -1,7 +1,7 @@
 /** Whether the levels of a streamed scene whose file has levels of its own cover each of its boxes exactly once. */
 import assert from 'node:assert/strict';
 import type { LevelScene, PageSource, StreamedGaussians } from '@gaussian-splat/renderer';
-import { DETAIL_NUMBERS, DETAIL_PLACES, PAGE_CHUNKS } from '@gaussian-splat/renderer/stages';
+import { DETAIL_NUMBERS, DETAIL_PLACES, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { shareDrawn, type DetailView } from './detail-twin.js';
 import { readRows } from './read-rows.js';
 
@@ -29,7 +29,7 @@ export async function checkBoxes(
   );
   const chunksOf = (page: number): [slot: number, chunk: number][] =>
     slotsOf(page).flatMap((slot) =>
-      [...Array(PAGE_CHUNKS).keys()].flatMap((chunk): [number, number][] =>
+      [...Array(SLOT_CHUNKS).keys()].flatMap((chunk): [number, number][] =>
         isEmpty(slot, chunk) ? [] : [[slot, chunk]],
       ),
     );

@@ -1,21 +1,11 @@
 /** Pages without files: what a scene of any size would have, for tests of who comes and goes. */
-import { emptyList, listPages, NONE, PAGE_CHUNKS, putBelow, type PageList } from '@gaussian-splat/renderer/stages';
+import { emptyList, NONE, SLOT_CHUNKS, putBelow, type PageList } from '@gaussian-splat/renderer/stages';
 
-/** Chunks of a page that have pages below them: all but the four upper ones. */
-const BELOW = PAGE_CHUNKS - 4;
-
-/** A full tree of so many pages, sixteen below each. */
-export function pageTree(count: number): PageList {
-  const pages = Array.from({ length: count }, (_, p) => ({
-    ...{ file: `page-${p}`, chunks: PAGE_CHUNKS, upper: p === 0 ? 1 : 4 },
-    parent: p === 0 ? undefined : ([Math.floor((p - 1) / BELOW), 4 + ((p - 1) % BELOW)] as const),
-  }));
-  return listPages({
-    ...{ format: 'gaussian-splat-detail', version: 1, splats: 0, shDegree: 0, shPrecision: 'int8' },
-    ...{ antialiased: false, origin: [0, 0, 0], trees: [{ pages }] },
-    bounds: { min: [0, 0, 0], max: [1, 1, 1], center: [0, 0, 0], radius: 1 },
-    instances: [{ tree: 0, translate: [0, 0, 0] }],
-  });
+/** A full tree of so many pages of a slot each, and so many below each. */
+export function pageTree(count: number, below = 16): PageList {
+  const list = emptyList(new Uint32Array(count).fill(1));
+  for (let page = 1; page < count; page++) list.parent[page] = Math.floor((page - 1) / below);
+  return list;
 }
 
 /**
@@ -43,7 +33,7 @@ export function wishesOf(
 export function boxList(boxes: readonly (readonly number[])[]): PageList {
   const coarsest = boxes.reduce((sum, [chunks]) => sum + chunks, 0);
   const chunks = [coarsest, ...boxes.flatMap((runs) => runs.slice(1))];
-  const list = emptyList(Uint32Array.from(chunks, (count) => Math.ceil(count / PAGE_CHUNKS)));
+  const list = emptyList(Uint32Array.from(chunks, (count) => Math.ceil(count / SLOT_CHUNKS)));
   list.chunks.set(chunks);
   list.upper.set(chunks);
   let [page, first] = [1, 0];

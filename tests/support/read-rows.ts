@@ -1,5 +1,5 @@
 import type { StreamedGaussians } from '@gaussian-splat/renderer';
-import { DETAIL_NUMBERS, PAGE_CHUNKS } from '@gaussian-splat/renderer/stages';
+import { DETAIL_NUMBERS, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { anyDevice } from './node-device.js';
 
 /** Detail rows of each slot of a streamed scene, as they are on the GPU. */
@@ -14,7 +14,7 @@ export async function readRows(scene: StreamedGaussians): Promise<Float32Array[]
     await staging.mapAsync(0x1);
     const all = new Float32Array(staging.getMappedRange().slice(0));
     staging.destroy();
-    const stride = DETAIL_NUMBERS * PAGE_CHUNKS;
+    const stride = DETAIL_NUMBERS * SLOT_CHUNKS;
     for (let at = 0; at + stride <= all.length; at += stride) rows.push(all.subarray(at, at + stride));
   }
   return rows;

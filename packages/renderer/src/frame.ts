@@ -1,3 +1,4 @@
+import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings, Stages } from './bindings.js';
 import type { DepthOrder } from './depth-order.js';
 import type { Wishes } from './gaussian-scene.js';
@@ -10,6 +11,7 @@ export interface Frame {
   readonly stages: Stages;
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
+  readonly camera: Camera;
   /** Bits of the keys. */
   readonly keyBits: number;
   readonly occlusion: Occlusion;
@@ -57,9 +59,9 @@ function keepWithinBudget(pass: GPUComputePassEncoder, { stages, bindings }: Fra
 }
 
 /** Streamed scenes that want to know now which pages the view asks for. */
-function wishesDue({ bindings }: Frame): Wishes[] {
+function wishesDue({ bindings, camera }: Frame): Wishes[] {
   const all = new Set(bindings.pages.flatMap(({ wishes }) => (wishes ? [wishes.of] : [])));
-  return [...all].filter((wishes) => wishes.isDue());
+  return [...all].filter((wishes) => wishes.isDue(camera));
 }
 
 function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly Wishes[]): void {

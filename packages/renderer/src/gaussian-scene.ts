@@ -1,4 +1,4 @@
-import type { ShDegree, Vector3 } from '@gaussian-splat/core';
+import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { Resource } from './gpu/kernel.js';
 import type { ShPrecision } from './pack/sh.js';
 import type { Surroundings } from './sides.js';
@@ -25,8 +25,8 @@ export type NotedPage = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_s
 export interface Wishes {
   /** Binds a page of the pool, for {@link Wishes.note}. */
   bind(page: NotedPage): GPUBindGroup;
-  /** True for a frame in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
-  isDue(): boolean;
+  /** Called with the camera of each frame. True for one in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
+  isDue(camera: Camera): boolean;
   begin(encoder: GPUCommandEncoder): void;
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void;
   copy(encoder: GPUCommandEncoder): void;

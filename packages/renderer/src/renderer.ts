@@ -160,6 +160,7 @@ export class Renderer {
       stages: this.#stages,
       bindings,
       scratch,
+      camera: drawn,
       keyBits: levers.depthKeyBits,
       occlusion: this.#occlusion,
       depthOrder: isOrdered ? depthOrder : undefined,

@@ -1,9 +1,9 @@
 import { DETAIL_NUMBERS } from './chunk-detail.js';
-import { PAGE_CHUNKS } from './manifest.js';
+import { SLOT_CHUNKS } from './manifest.js';
 
-const SLOT_NUMBERS = DETAIL_NUMBERS * PAGE_CHUNKS;
-/** Slots without a change that are written along with those on both sides: 960 bytes cost less than another write. */
-const BRIDGED = 8;
+const SLOT_NUMBERS = DETAIL_NUMBERS * SLOT_CHUNKS;
+/** Slots without a change that are written along with those on both sides: their 8 kB cost less than another write. */
+export const BRIDGED = 40;
 
 /** The detail rows of all slots as they should be on the GPU. What has changed is written once a frame, neighbours in one piece. */
 export class DetailTable {

@@ -2,7 +2,7 @@ import { GaussianSplatError, shCoefficientCount, type GaussianCloud, type ShDegr
 import { mortonOrder } from '../pack/morton.js';
 import { usableIndices } from '../pack/pack.js';
 import type { LevelPage, LevelScene } from './level-pages.js';
-import { PAGE_CHUNKS, pageLayout } from './manifest.js';
+import { SLOT_CHUNKS, pageLayout } from './manifest.js';
 import { joinSlots, packRun } from './pack-run.js';
 import { emptyList, putBelow, type PageList } from './page-list.js';
 import type { PageSource, StreamedScene } from './page-source.js';
@@ -53,7 +53,7 @@ function shOfDegree(cloud: GaussianCloud, degree: ShDegree): Float32Array {
 function listLevels({ first, firstChunks, pages, scene }: LevelScene): PageList {
   const total = first.length / pageLayout(scene, 1).total;
   const chunks = [total, ...pages.map(({ count }) => chunksOf(count))];
-  const list = emptyList(Uint32Array.from(chunks, (count) => Math.ceil(count / PAGE_CHUNKS)));
+  const list = emptyList(Uint32Array.from(chunks, (count) => Math.ceil(count / SLOT_CHUNKS)));
   list.chunks.set(chunks);
   list.upper.set(chunks);
   let [boxBefore, start] = [0, 0];

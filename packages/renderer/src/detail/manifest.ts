@@ -5,21 +5,23 @@ import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { shWords, type ShPrecision } from '../pack/sh.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
 
-/** Chunks of a page at most: four that have one parent, and what those four stand for. */
-export const PAGE_CHUNKS = 20;
+/** Chunks that stand for the same one, at most: those of a page, which fill a slot of the pool. */
+export const SLOT_CHUNKS = 4;
+/** Chunks of a file at most: four that have one parent, and what those four stand for. */
+const FILE_CHUNKS = 20;
 
-/** One page of a tree: a file of its own. */
+/** A file of a tree: a page of chunks that have one parent, and behind it the pages below each of these chunks in turn, all full but the last. */
 export interface TreePage {
   /** Address, relative to the manifest. */
   readonly file: string;
   readonly chunks: number;
-  /** How many of them, the first, have their parent in another page or none. */
+  /** How many of them, the first, have their parent in another file or none. */
   readonly upper: number;
-  /** Page of the tree that holds the chunk above, and the number of that chunk in it. None for the first page of a tree. */
+  /** File of the tree that holds the chunk above, and the number of that chunk in it. None for the first file of a tree. */
   readonly parent?: readonly [page: number, chunk: number];
 }
 
-/** Pages that hang together, parents before children. */
+/** Files that hang together, parents before children. */
 export interface Tree {
   readonly pages: readonly TreePage[];
 }
@@ -29,12 +31,12 @@ export interface TreeInstance {
   readonly tree: number;
   /** World units, added to every position of the tree. */
   readonly translate: Vector3;
-  /** Page of the first instance, and chunk in it, that the tree is the detail of. None for the first instance. */
+  /** File of the first instance, and chunk in it, that the tree is the detail of. None for the first instance. */
   readonly parent?: readonly [page: number, chunk: number];
 }
 
 /**
- * What `detail.json` says of a streamed scene. Pages are numbered through all instances, the first instance first.
+ * What `detail.json` says of a streamed scene.
  * docs/detail-pages.md describes the files.
  */
 export interface DetailManifest {
@@ -54,7 +56,7 @@ export interface DetailManifest {
 /** What the size of a page depends on. */
 export type PageFormat = Pick<DetailManifest, 'shDegree' | 'shPrecision'>;
 
-/** Words of each part of a page's file, one after the other. */
+/** Words of each part of a file, or of a page, one after the other. */
 export function pageLayout(
   { shDegree, shPrecision }: PageFormat,
   chunks: number,
@@ -111,19 +113,19 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
 type Fail = (path: string, expected: string, found: unknown) => never;
 
 function checkTree(tree: Tree, fail: Fail): void {
-  if (!Array.isArray(tree?.pages) || tree.pages.length === 0) fail('pages', 'one page or more', tree);
+  if (!Array.isArray(tree?.pages) || tree.pages.length === 0) fail('pages', 'one file or more', tree);
   tree.pages.forEach((page, p) => {
     const isFine =
       typeof page?.file === 'string' &&
       isCount(page.chunks) &&
       page.chunks >= 1 &&
-      page.chunks <= PAGE_CHUNKS &&
       isCount(page.upper) &&
       page.upper >= 1 &&
-      page.upper <= Math.min(4, page.chunks) &&
+      page.upper <= Math.min(SLOT_CHUNKS, page.chunks) &&
+      page.chunks <= page.upper * (1 + SLOT_CHUNKS) &&
       (p === 0) === (page.parent === undefined) &&
       (p === 0 || isPlace(page.parent, tree.pages.slice(0, p)));
-    if (!isFine) fail(`pages[${p}]`, `a file of 1 to ${PAGE_CHUNKS} chunks below an earlier page`, page);
+    if (!isFine) fail(`pages[${p}]`, `a file of 1 to ${FILE_CHUNKS} chunks below an earlier one`, page);
   });
 }
 

@@ -4,7 +4,7 @@ import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS, packKept } from '../pack/pack.js';
 import { shWords, type ShPrecision } from '../pack/sh.js';
 import { detailRows, DETAIL_NUMBERS } from './chunk-detail.js';
-import { PAGE_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
+import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import { packFiller } from './pack-level.js';
 import { chunksOf } from './splat-level.js';
 
@@ -61,8 +61,8 @@ export function joinSlots(runs: readonly PackedRun[], format: PageFormat): Uint3
     const errors = { count: 1, spheres: Float32Array.from(sphere), errors: Float32Array.of(error) };
     const row = detailRows(errors, undefined);
     for (let c = 0; c < chunks.length / CHUNK_NUMBERS; c++, at++) {
-      const slot = at - (at % PAGE_CHUNKS);
-      const layout = pageLayout(format, Math.min(PAGE_CHUNKS, total - slot));
+      const slot = at - (at % SLOT_CHUNKS);
+      const layout = pageLayout(format, Math.min(SLOT_CHUNKS, total - slot));
       const [start, k] = [one.total * slot, at - slot];
       const part = <T>(values: { subarray(from: number, end: number): T }, size: number): T =>
         values.subarray(size * c, size * (c + 1));

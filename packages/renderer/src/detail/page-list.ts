@@ -1,5 +1,5 @@
 import type { Vector3 } from '@gaussian-splat/core';
-import { PAGE_CHUNKS, type DetailManifest } from './manifest.js';
+import { SLOT_CHUNKS, type DetailManifest, type Tree, type TreePage } from './manifest.js';
 
 /** Stands for no page. */
 export const NONE = 0xffffffff;
@@ -7,7 +7,7 @@ export const NONE = 0xffffffff;
 /** The pages of a streamed scene, parents before children. */
 export interface PageList {
   readonly count: number;
-  /** [P] slots that a page takes, one for each {@link PAGE_CHUNKS} chunks. */
+  /** [P] slots that a page takes, one for each {@link SLOT_CHUNKS} chunks. */
   readonly slots: Uint32Array;
   /** [P] chunks of a page; those of a run are fewer if some of its splats cannot be drawn. */
   readonly chunks: Uint32Array;
@@ -19,16 +19,21 @@ export interface PageList {
   readonly parentChunks: Uint32Array;
   /** [P] where a page's chunks begin in {@link children}. */
   readonly firstChunk: Uint32Array;
-  /** Page that holds what each chunk stands for, or {@link NONE}; {@link PAGE_CHUNKS} for each slot. */
+  /** Page that holds what each chunk stands for, or {@link NONE}; {@link SLOT_CHUNKS} for each slot. */
   readonly children: Uint32Array;
 }
 
-/** The pages of all instances of a scene, numbered through. */
+/** Where a page of a folder lies: in a file, of so many chunks, from one of them on. */
+export interface PagePlace {
+  readonly file: TreePage;
+  readonly first: number;
+  readonly chunks: number;
+}
+
+/** The pages of all instances of a scene, numbered through, the first instance first. */
 export interface InstanceList extends PageList {
-  readonly file: (page: number) => string;
+  readonly place: (page: number) => PagePlace;
   readonly translate: (page: number) => Vector3;
-  /** [P] number of the first page of a page's instance. */
-  readonly first: Uint32Array;
 }
 
 /** Pages of so many slots each, none of which is below another yet. */
@@ -38,7 +43,7 @@ export function emptyList(slots: Uint32Array): PageList {
   let chunks = 0;
   for (let page = 0; page < count; page++) {
     firstChunk[page] = chunks;
-    chunks += PAGE_CHUNKS * slots[page];
+    chunks += SLOT_CHUNKS * slots[page];
   }
   return {
     ...{ count, slots, firstChunk, chunks: new Uint32Array(count), upper: new Uint32Array(count) },
@@ -58,8 +63,8 @@ export function putBelow(list: PageList, page: number, parent: number, firstChun
 
 /** Numbers of the pages below the chunks of a page that are in one of its slots, {@link NONE} where there is none. */
 export function childrenIn(list: PageList, page: number, slot: number): Uint32Array {
-  const from = list.firstChunk[page] + PAGE_CHUNKS * slot;
-  return list.children.subarray(from, from + Math.min(PAGE_CHUNKS, list.chunks[page] - PAGE_CHUNKS * slot));
+  const from = list.firstChunk[page] + SLOT_CHUNKS * slot;
+  return list.children.subarray(from, from + Math.min(SLOT_CHUNKS, list.chunks[page] - SLOT_CHUNKS * slot));
 }
 
 /** [P] 1 for pages that with all that is above them take more than so many slots. */
@@ -71,27 +76,61 @@ export function largerThan(most: number, { count, slots, parent }: PageList): Ui
   return Uint8Array.from(withAbove, (needed) => (needed > most ? 1 : 0));
 }
 
+/** A page of a tree, and the page and chunk in it that it is below. */
+interface TreePart extends PagePlace {
+  readonly parent?: readonly [part: number, chunk: number];
+}
+
+/** The pages of a tree, and for each of its files the first of them. */
+function partsOf({ pages }: Tree): { readonly parts: readonly TreePart[]; readonly firsts: readonly number[] } {
+  const [parts, firsts]: [TreePart[], number[]] = [[], []];
+  for (const file of pages) {
+    const { chunks, upper, parent } = file;
+    const first = parts.length;
+    firsts.push(first);
+    parts.push({ file, first: 0, chunks: upper, parent: parent && partAt(pages, firsts, parent) });
+    for (let at = upper, above = 0; at < chunks; at += SLOT_CHUNKS, above++) {
+      parts.push({ file, first: at, chunks: Math.min(SLOT_CHUNKS, chunks - at), parent: [first, above] });
+    }
+  }
+  return { parts, firsts };
+}
+
+/** The page that holds a chunk of a file, and its number there. */
+function partAt(
+  files: readonly TreePage[],
+  firsts: readonly number[],
+  [file, chunk]: readonly [number, number],
+): [part: number, chunk: number] {
+  const lower = chunk - files[file].upper;
+  if (lower < 0) return [firsts[file], chunk];
+  return [firsts[file] + 1 + Math.floor(lower / SLOT_CHUNKS), lower % SLOT_CHUNKS];
+}
+
 export function listPages({ trees, instances }: DetailManifest): InstanceList {
-  const count = instances.reduce((sum, { tree }) => sum + trees[tree].pages.length, 0);
-  const list = { ...emptyList(new Uint32Array(count).fill(1)), first: new Uint32Array(count) };
+  const cut = trees.map(partsOf);
+  const count = instances.reduce((sum, { tree }) => sum + cut[tree].parts.length, 0);
+  const list = emptyList(new Uint32Array(count).fill(1));
   const instanceOf = new Uint32Array(count);
+  const firstOf = new Uint32Array(instances.length);
   let first = 0;
-  instances.forEach((instance, i) => {
-    trees[instance.tree].pages.forEach(({ chunks, upper, parent }, p) => {
-      const page = first + p;
-      instanceOf[page] = i;
-      list.first[page] = first;
-      list.chunks[page] = chunks;
-      list.upper[page] = upper;
-      const above = parent ? [first + parent[0], parent[1]] : instance.parent;
-      if (above === undefined) return;
-      putBelow(list, page, above[0], above[1], 1);
+  instances.forEach(({ tree, parent: above }, i) => {
+    const { parts } = cut[tree];
+    firstOf[i] = first;
+    parts.forEach(({ chunks, parent }, p) => {
+      instanceOf[first + p] = i;
+      list.chunks[first + p] = chunks;
+      list.upper[first + p] = chunks;
+      if (parent) putBelow(list, first + p, first + parent[0], parent[1], 1);
+      // The first instance has the first numbers.
+      else if (above)
+        putBelow(list, first + p, ...partAt(trees[instances[0].tree].pages, cut[instances[0].tree].firsts, above), 1);
     });
-    first += trees[instance.tree].pages.length;
+    first += parts.length;
   });
   return {
     ...list,
-    file: (page) => trees[instances[instanceOf[page]].tree].pages[page - list.first[page]].file,
+    place: (page) => cut[instances[instanceOf[page]].tree].parts[page - firstOf[instanceOf[page]]],
     translate: (page) => instances[instanceOf[page]].translate,
   };
 }

@@ -1,4 +1,4 @@
-import type { Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage } from '../gaussian-scene.js';
 import { pageCapacity } from '../gaussian-buffers.js';
 import { constants } from '../generated/shaders.js';
@@ -8,15 +8,32 @@ import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { shWords } from '../pack/sh.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
-import { PAGE_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
+import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
+import type { PageList } from './page-list.js';
 
-const SLOT_SPLATS = PAGE_CHUNKS * constants.CULL_GROUP;
+const SLOT_SPLATS = SLOT_CHUNKS * constants.CULL_GROUP;
 /** Largest buffer of a pool, in bytes: several of this size are found where one large one is not (iOS). */
 const LARGEST_BUFFER = 1 << 27;
 
 /** Bytes of GPU memory that one slot takes. */
 export function slotBytes(format: PageFormat): number {
-  return 4 * pageLayout(format, PAGE_CHUNKS).total;
+  return 4 * pageLayout(format, SLOT_CHUNKS).total;
+}
+
+/**
+ * Slots of which so many bytes are enough, and no more than the pages take.
+ * @throws GaussianSplatError `out-of-memory/budget` if the first page does not fit.
+ */
+export function slotsFor(format: PageFormat, list: PageList, budget: number): number {
+  const all = list.slots.reduce((sum, slots) => sum + slots, 0);
+  const slots = Math.min(all, Math.floor(budget / slotBytes(format)));
+  if (slots >= list.slots[0]) return slots;
+  throw new GaussianSplatError('out-of-memory/budget', {
+    where: 'streamed scene',
+    expected: `at least ${list.slots[0] * slotBytes(format)} bytes of GPU memory for one page`,
+    found: `${Math.floor(budget)} bytes (memoryBudget)`,
+    remedy: 'raise the budget',
+  });
 }
 
 /** Slots on the GPU, allocated once, each with room for one page of a streamed scene or a part of it. What is in a slot without page is never drawn. */
@@ -42,8 +59,8 @@ export class PagePool {
         count: SLOT_SPLATS * own,
         geometry: buffer('geometry', GEOMETRY_WORDS * SLOT_SPLATS * own),
         sh: buffer('sh', stride * SLOT_SPLATS * own),
-        chunks: buffer('chunks', CHUNK_NUMBERS * PAGE_CHUNKS * own),
-        details: buffer('details', DETAIL_NUMBERS * PAGE_CHUNKS * own),
+        chunks: buffer('chunks', CHUNK_NUMBERS * SLOT_CHUNKS * own),
+        details: buffer('details', DETAIL_NUMBERS * SLOT_CHUNKS * own),
       };
     });
   }
@@ -55,15 +72,15 @@ export class PagePool {
     const layout = pageLayout(this.#format, chunks);
     const stride = shWords(this.#format.shDegree, this.#format.shPrecision);
     const geometryAt = layout.chunks + layout.details;
-    queue.writeBuffer(page.chunks, 4 * CHUNK_NUMBERS * PAGE_CHUNKS * place, words, 0, layout.chunks);
+    queue.writeBuffer(page.chunks, 4 * CHUNK_NUMBERS * SLOT_CHUNKS * place, words, 0, layout.chunks);
     queue.writeBuffer(page.geometry, 4 * GEOMETRY_WORDS * SLOT_SPLATS * place, words, geometryAt, layout.geometry);
     queue.writeBuffer(page.sh, 4 * stride * SLOT_SPLATS * place, words, geometryAt + layout.geometry, layout.sh);
   }
 
-  /** Writes detail rows, {@link PAGE_CHUNKS} for each slot from the given one on; all of them lie in one buffer. */
+  /** Writes detail rows, {@link SLOT_CHUNKS} for each slot from the given one on; all of them lie in one buffer. */
   writeDetails(first: number, rows: Float32Array<ArrayBuffer>): void {
     const { page, place } = this.#find(first);
-    this.#device.queue.writeBuffer(page.details!, 4 * DETAIL_NUMBERS * PAGE_CHUNKS * place, rows);
+    this.#device.queue.writeBuffer(page.details!, 4 * DETAIL_NUMBERS * SLOT_CHUNKS * place, rows);
   }
 
   #find(slot: number): { page: GaussianPage; place: number } {

@@ -1,10 +1,12 @@
 import { NONE } from './page-list.js';
 import type { Residency } from './residency.js';
 
-/** Pages being fetched at a time. */
-export const MOST_FETCHES = 8;
-/** Slots of pages being fetched or waiting for their upload, from which on no other is sent for: at most 21 MB of the page's memory, and one page of any size. */
-export const MOST_UNDER_WAY = 32;
+/** Pages being fetched at a time; a file holds up to five. */
+export const MOST_FETCHES = 64;
+/** Slots of pages being fetched or waiting for their upload, from which on no other is sent for: at most 32 MB of the page's memory, and one page of any size. */
+export const MOST_UNDER_WAY = 240;
+/** How much a page counts in the mean time of arrival when the next one has come. */
+const MEMORY = 0.95;
 /** Milliseconds before a page that did not come is asked for again. */
 const RETRY_MS = 4_000;
 
@@ -20,6 +22,8 @@ export interface TrafficOptions {
   /** A page waits for its upload, or is known not to come. */
   readonly onArrival: () => void;
   readonly onError: (error: unknown) => void;
+  /** Milliseconds since any moment. Default: `performance.now`. */
+  readonly now?: () => number;
 }
 
 /**
@@ -31,7 +35,12 @@ export class PageTraffic {
   readonly #options: TrafficOptions;
   readonly #fetching = new Map<number, AbortController>();
   readonly #waiting = new Map<number, Uint32Array<ArrayBuffer>>();
+  /** Those that wait and are wished for, the most needed last; undefined if that has to be found anew. */
+  #order: number[] | undefined;
   readonly #failedAt = new Map<number, number>();
+  readonly #sentAt = new Map<number, number>();
+  readonly #now: () => number;
+  #arrivalMs = 0;
   #slotsUnderWay = 0;
   #abandoned = 0;
   #isClosed = false;
@@ -39,6 +48,7 @@ export class PageTraffic {
   constructor(residency: Residency, options: TrafficOptions) {
     this.#residency = residency;
     this.#options = options;
+    this.#now = options.now ?? (() => performance.now());
   }
 
   /** Pages being fetched or waiting. */
@@ -56,8 +66,14 @@ export class PageTraffic {
     return this.#abandoned;
   }
 
+  /** Milliseconds from when a page is sent for until it is handed over, as a mean of the last ones; 0 before any has been. */
+  get arrivalMs(): number {
+    return this.#arrivalMs;
+  }
+
   /** To be called after each look: gives up what the last looks do not wish for and sends for what they do. */
   follow(): void {
+    this.#order = undefined;
     for (const page of [...this.#fetching.keys(), ...this.#waiting.keys()]) {
       if (this.#residency.isForgotten(page)) this.#abandon(page);
     }
@@ -75,14 +91,12 @@ export class PageTraffic {
 
   /** Hands over the most needed of the pages that wait; undefined if the last look wishes for none of them. */
   next(): FetchedPage | undefined {
-    let [most, need] = [NONE, 0];
-    for (const page of this.#waiting.keys()) {
-      if (this.#residency.need(page) > need) [most, need] = [page, this.#residency.need(page)];
-    }
-    if (most === NONE) return undefined;
+    const most = this.#nextWaiting();
+    if (most === undefined) return undefined;
     const words = this.#waiting.get(most)!;
     this.#waiting.delete(most);
     this.#slotsUnderWay -= this.#residency.slotsFor(most);
+    this.#noteArrival(most);
     return { page: most, words };
   }
 
@@ -99,14 +113,27 @@ export class PageTraffic {
     this.#waiting.clear();
   }
 
+  #nextWaiting(): number | undefined {
+    const need = (page: number): number => this.#residency.need(page);
+    this.#order ??= [...this.#waiting.keys()].filter((page) => need(page) > 0).sort((a, b) => need(a) - need(b));
+    return this.#order.pop();
+  }
+
   #hasFailedLately(page: number): boolean {
-    return performance.now() - (this.#failedAt.get(page) ?? -Infinity) < RETRY_MS;
+    return this.#now() - (this.#failedAt.get(page) ?? -Infinity) < RETRY_MS;
+  }
+
+  #noteArrival(page: number): void {
+    const took = this.#now() - this.#sentAt.get(page)!;
+    this.#sentAt.delete(page);
+    this.#arrivalMs = this.#arrivalMs === 0 ? took : MEMORY * this.#arrivalMs + (1 - MEMORY) * took;
   }
 
   #abandon(page: number): void {
     this.#fetching.get(page)?.abort();
     this.#fetching.delete(page);
     this.#waiting.delete(page);
+    this.#sentAt.delete(page);
     this.#slotsUnderWay -= this.#residency.slotsFor(page);
     this.#residency.giveUp(page);
     this.#abandoned++;
@@ -115,6 +142,7 @@ export class PageTraffic {
   async #bring(page: number): Promise<void> {
     const controller = new AbortController();
     this.#fetching.set(page, controller);
+    this.#sentAt.set(page, this.#now());
     this.#slotsUnderWay += this.#residency.slotsFor(page);
     // A page that was given up may have been sent for again meanwhile: that is another fetch.
     const isOver = (): boolean => this.#fetching.get(page) !== controller;
@@ -122,12 +150,14 @@ export class PageTraffic {
       const words = await this.#options.fetch(page, controller.signal);
       if (isOver()) return;
       this.#waiting.set(page, words);
+      this.#order = undefined;
       this.#failedAt.delete(page);
     } catch (error) {
       if (isOver()) return;
       this.#slotsUnderWay -= this.#residency.slotsFor(page);
       this.#residency.giveUp(page);
-      this.#failedAt.set(page, performance.now());
+      this.#sentAt.delete(page);
+      this.#failedAt.set(page, this.#now());
       this.#options.onError(error);
     }
     this.#fetching.delete(page);

@@ -1,5 +1,5 @@
 import { DetailTable } from './detail-table.js';
-import { PAGE_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
+import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import { childrenIn, NONE, type PageList } from './page-list.js';
 import { PageRows } from './page-rows.js';
 import type { Residency } from './residency.js';
@@ -29,7 +29,7 @@ export class PlacedRows {
     const above =
       parent[page] === NONE
         ? undefined
-        : this.#rowsOf(parent[page], parentChunk[page]).above(parentChunk[page] % PAGE_CHUNKS);
+        : this.#rowsOf(parent[page], parentChunk[page]).above(parentChunk[page] % SLOT_CHUNKS);
     const slots = this.#residency.slotsOf(page);
     parts.forEach((words, k) => {
       const chunks = words.length / pageLayout(format, 1).total;
@@ -37,7 +37,7 @@ export class PlacedRows {
       const rows = this.#rows[slots[k]];
       const numbers = new Float32Array(words.buffer, words.byteOffset + 4 * from, details);
       rows.load(numbers, childrenIn(this.#list, page, k).subarray(0, chunks));
-      if (above) rows.setAbove(Math.min(chunks, Math.max(0, upper[page] - PAGE_CHUNKS * k)), above);
+      if (above) rows.setAbove(Math.min(chunks, Math.max(0, upper[page] - SLOT_CHUNKS * k)), above);
       this.#table.touch(slots[k]);
     });
   }
@@ -66,7 +66,7 @@ export class PlacedRows {
   }
 
   #rowsOf(page: number, chunk: number): PageRows {
-    return this.#rows[this.#residency.slotsOf(page)[Math.floor(chunk / PAGE_CHUNKS)]];
+    return this.#rows[this.#residency.slotsOf(page)[Math.floor(chunk / SLOT_CHUNKS)]];
   }
 
   #setBelow(page: number, arrived: number): void {
@@ -76,8 +76,8 @@ export class PlacedRows {
     const first = this.#list.parentChunk[page];
     const end = first + this.#list.parentChunks[page];
     for (let chunk = first; chunk < end; chunk++) {
-      const slot = slots[Math.floor(chunk / PAGE_CHUNKS)];
-      this.#rows[slot].setBelow(chunk % PAGE_CHUNKS, arrived);
+      const slot = slots[Math.floor(chunk / SLOT_CHUNKS)];
+      this.#rows[slot].setBelow(chunk % SLOT_CHUNKS, arrived);
       this.#table.touch(slot);
     }
   }

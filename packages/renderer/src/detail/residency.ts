@@ -4,6 +4,8 @@ import { PageSlots, type Settled } from './page-slots.js';
 
 /** How much more pixels a page must save than one that has to leave for it, both being wished for. */
 const WORTH = 1.5;
+/** How many times sooner than by its need a page is sent for that need not be fetched. */
+const AT_HAND = 4;
 /** Looks in a row that must not wish for a page on its way before it is given up: views that look in turn wish for different pages. */
 const PATIENCE = 2;
 
@@ -17,6 +19,7 @@ const PATIENCE = 2;
 export class Residency {
   readonly #slots: PageSlots;
   readonly #list: PageList;
+  readonly #isAtHand: (page: number) => boolean;
   /** [P] pixels that doing without a page would cost, when last looked, and at which look it was last wished for. */
   readonly #wish: Float32Array;
   readonly #wishedAt: Uint32Array;
@@ -39,8 +42,10 @@ export class Residency {
   #noRoomFor = Infinity;
   #look = 0;
 
-  constructor(list: PageList, slots: number) {
+  /** @param isAtHand true for a page that need not be fetched */
+  constructor(list: PageList, slots: number, isAtHand: (page: number) => boolean = () => false) {
     this.#list = list;
+    this.#isAtHand = isAtHand;
     this.#slots = new PageSlots(list.count, slots);
     this.#wish = new Float32Array(list.count);
     this.#wishedAt = new Uint32Array(list.count);
@@ -80,14 +85,6 @@ export class Residency {
     return this.#slots.count;
   }
 
-  /** The most pixels that a page costs which the last look wishes for and which is not there; 0 if all are. */
-  get lacking(): number {
-    let most = 0;
-    for (let page = 0; page < this.#list.count; page++)
-      if (this.#wish[page] > most && !this.isResident(page)) most = this.#wish[page];
-    return most;
-  }
-
   /** Pixels that doing without a page would cost, as of the last look; 0 if that does not wish for it. */
   need(page: number): number {
     return this.#wish[page];
@@ -102,8 +99,8 @@ export class Residency {
   note(wishes: Float32Array): void {
     this.#look++;
     this.#noRoomFor = Infinity;
+    this.#wish.set(wishes.subarray(0, this.#list.count));
     for (let page = 0; page < this.#list.count; page++) {
-      this.#wish[page] = wishes[page];
       if (wishes[page] > 0) this.#wishedAt[page] = this.#look;
     }
     this.#listMissing();
@@ -127,7 +124,8 @@ export class Residency {
     if (parent !== NONE) this.#hold(parent);
     if (!this.#makeRoom(page)) {
       if (parent !== NONE) this.#release(parent);
-      // What is needed less and takes as many slots finds no room either.
+      // What is needed less and takes as many slots finds no room either; what comes after a page at hand may be needed more.
+      if (this.#isAtHand(page)) return false;
       this.#noRoomFor = this.#list.slots[page];
       if (this.#noRoomFor === 1) this.#missing.clear();
       return false;
@@ -183,7 +181,8 @@ export class Residency {
   #listMissing(): void {
     this.#missing.clear();
     for (let page = 0; page < this.#list.count; page++) {
-      if (this.#isMissing(page)) this.#missing.add(page, this.#wish[page]);
+      if (this.#wish[page] === 0 || !this.#isMissing(page)) continue;
+      this.#missing.add(page, this.#wish[page] * (this.#isAtHand(page) ? AT_HAND : 1));
     }
     this.#missing.order();
   }

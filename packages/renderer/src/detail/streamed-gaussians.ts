@@ -1,18 +1,19 @@
-import { GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import type { Bounds, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
 import type { ShPrecision } from '../pack/sh.js';
 import { ARRIVAL_MS, Arrivals } from './arrivals.js';
-import { PAGE_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
+import { SLOT_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
 import { NONE } from './page-list.js';
-import { PagePool, slotBytes } from './page-pool.js';
+import { PagePool, slotBytes, slotsFor } from './page-pool.js';
 import { folderSource, type PageSource } from './page-source.js';
 import { PageTraffic } from './page-traffic.js';
 import { PlacedRows } from './placed-rows.js';
 import { Residency } from './residency.js';
 import { UploadPace } from './upload-pace.js';
+import { aheadMs } from './camera-motion.js';
 import { WishReader } from './wish-reader.js';
 
 export interface PoolOptions {
@@ -30,7 +31,7 @@ export interface PoolOptions {
 
 export interface StreamOptions extends PoolOptions {
   /**
-   * Fetches a page's file, named relative to the manifest; 8 at a time at most. Aborted when no view wishes for it any more, and when the scene is destroyed. Best done in a
+   * Fetches a file of pages, named relative to the manifest; 64 at a time at most. Aborted when no view wishes for any of them any more, and when the scene is destroyed. Best done in a
    * worker: reading a response costs a thread more than all else that a page needs.
    */
   readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>;
@@ -77,6 +78,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly #arrivals: Arrivals;
   #upload: Upload | undefined;
   #isDestroyed = false;
+  #lacking = 0;
   #uploaded = { pages: 0, bytes: 0, milliseconds: 0 };
   #version = 1;
 
@@ -87,25 +89,25 @@ export class StreamedGaussians implements GaussianScene {
     this.bounds = bounds;
     this.#source = source;
     this.#options = options;
-    const slots = slotsFor(source, options.memoryBudget ?? DEFAULT_BUDGET);
-    this.count = slots * PAGE_CHUNKS * constants.CULL_GROUP;
+    const slots = slotsFor(scene, list, options.memoryBudget ?? DEFAULT_BUDGET);
+    this.count = slots * SLOT_CHUNKS * constants.CULL_GROUP;
     this.#reservation = MemoryLedger.of(device).reserve('pages of a streamed scene', slots * slotBytes(scene));
     this.#memory = new GpuMemory(device);
     try {
       this.#pool = new PagePool(device, this.#memory, scene, slots);
-      this.wishes = new WishReader(
-        device,
-        this.#memory,
-        list.count,
-        (wishes) => this.#take(wishes),
-        () => this.#options.onChange?.(),
-      );
+      this.wishes = new WishReader(device, this.#memory, {
+        pages: list.count,
+        origin,
+        aheadMs: () => aheadMs(this.#traffic.arrivalMs),
+        onWishes: (wishes, lacking) => this.#take(wishes, lacking),
+        onStale: () => this.#options.onChange?.(),
+      });
     } catch (error) {
       this.destroy();
       throw error;
     }
     this.pages = this.#pool.pages;
-    this.#residency = new Residency(list, slots);
+    this.#residency = new Residency(list, slots, source.isAtHand);
     this.#traffic = new PageTraffic(this.#residency, {
       fetch: async (page, signal) => {
         const words = await source.fetch(page, signal);
@@ -173,11 +175,11 @@ export class StreamedGaussians implements GaussianScene {
       resident: this.#residency.residents,
       total: this.#source.list.count,
       coming: this.#traffic.underWay + this.#placing,
-      error: this.#residency.lacking,
+      error: this.#lacking,
     };
   }
 
-  /** For each slot of the pool the page in it, as pages are numbered in the manifest; undefined for an empty one. */
+  /** For each slot of the pool the page in it, as pages are numbered through all files and instances of the manifest; undefined for an empty one. */
   get pagesInSlots(): readonly (number | undefined)[] {
     return Array.from(this.#residency.pageIn, (page) => (page === NONE ? undefined : page));
   }
@@ -273,8 +275,9 @@ export class StreamedGaussians implements GaussianScene {
     this.#rows.flush(this.#pool.slotsPerBuffer, (first, rows) => this.#pool.writeDetails(first, rows));
   }
 
-  #take(wishes: Float32Array): void {
+  #take(wishes: Float32Array, lacking: number): void {
     if (this.#isDestroyed) return;
+    this.#lacking = lacking;
     this.#residency.note(wishes);
     this.#traffic.follow();
   }
@@ -285,20 +288,8 @@ const chunksIn = ({ length }: Uint32Array, scene: PageSource['scene']): number =
 
 /** The words of each slot. */
 function partsOf(words: Uint32Array<ArrayBuffer>, scene: PageSource['scene']): Uint32Array<ArrayBuffer>[] {
-  const stride = pageLayout(scene, PAGE_CHUNKS).total;
+  const stride = pageLayout(scene, SLOT_CHUNKS).total;
   return Array.from({ length: Math.ceil(words.length / stride) }, (_, k) =>
     words.subarray(stride * k, stride * (k + 1)),
   );
-}
-
-function slotsFor({ scene, list }: PageSource, budget: number): number {
-  const all = list.slots.reduce((sum, slots) => sum + slots, 0);
-  const slots = Math.min(all, Math.floor(budget / slotBytes(scene)));
-  if (slots >= list.slots[0]) return slots;
-  throw new GaussianSplatError('out-of-memory/budget', {
-    where: 'streamed scene',
-    expected: `at least ${list.slots[0] * slotBytes(scene)} bytes of GPU memory for one page`,
-    found: `${Math.floor(budget)} bytes (memoryBudget)`,
-    remedy: 'raise the budget',
-  });
 }

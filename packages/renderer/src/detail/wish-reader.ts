@@ -1,48 +1,63 @@
+import type { Camera, Vector3 } from '@gaussian-splat/core';
 import type { NotedPage, Wishes } from '../gaussian-scene.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { NoteWishesStage } from '../stages/note-wishes.js';
+import { cameraValues } from '../view.js';
+import { CameraMotion } from './camera-motion.js';
 
-/** Frames between two looks at what is wished for. */
+/** Frames between two looks at what is wished for: of a camera that rests, and of one that moves. */
 const INTERVAL = 6;
+const MOVING_INTERVAL = 3;
 /** Milliseconds after which a view that nobody has looked at is drawn once more, to look. */
 const STALE_MS = 120;
+
+/** Numbers of `ahead` in shaders/note_wishes.wgsl: four columns and the eye. */
+const AHEAD_NUMBERS = 20;
+
+export interface WishReaderOptions {
+  readonly pages: number;
+  /** Of the scene: world position that all positions are relative to. */
+  readonly origin: Vector3;
+  /** Milliseconds that a page takes until it is there: so far ahead of a camera that moves is looked. */
+  readonly aheadMs: () => number;
+  /** Called with the pixels that doing without each page costs the view, or the one that it will have become; and with the most that the view lacks. */
+  readonly onWishes: (wishes: Float32Array, lacking: number) => void;
+  /** Called when the last view has not been looked at for want of another frame. */
+  readonly onStale: () => void;
+}
 
 /** Brings what views wish for back from the GPU, now and then, with nobody waiting for it. */
 export class WishReader implements Wishes {
   readonly #stage: NoteWishesStage;
-  /** For each page the bits of the pixels that doing without it costs, a float32; cleared before each look. */
+  /** For each page the bits of the pixels that doing without it costs, a float32; at 0, the page that is always there, what the view lacks. Cleared before each look. */
   readonly #wishes: GPUBuffer;
   readonly #staging: GPUBuffer;
-  readonly #onWishes: (wishes: Float32Array) => void;
-  readonly #onStale: () => void;
+  readonly #ahead: GPUBuffer;
+  readonly #device: GPUDevice;
+  readonly #options: WishReaderOptions;
+  readonly #motion = new CameraMotion();
   #frames = INTERVAL;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isReading = false;
 
-  /**
-   * @param onWishes called with the pixels that doing without each page costs
-   * @param onStale called when the last view has not been looked at for want of another frame
-   */
-  constructor(
-    device: GPUDevice,
-    memory: GpuMemory,
-    pages: number,
-    onWishes: (wishes: Float32Array) => void,
-    onStale: () => void,
-  ) {
+  constructor(device: GPUDevice, memory: GpuMemory, options: WishReaderOptions) {
+    this.#device = device;
+    this.#options = options;
     this.#stage = new NoteWishesStage(device);
-    const { storage, copySource, copyDestination, mapRead } = BUFFER_USAGE;
-    this.#wishes = memory.buffer('gs.wishes', 4 * pages, storage | copySource | copyDestination);
-    this.#staging = memory.buffer('gs.wishes.staging', 4 * pages, mapRead | copyDestination);
-    this.#onWishes = onWishes;
-    this.#onStale = onStale;
+    const { storage, uniform, copySource, copyDestination, mapRead } = BUFFER_USAGE;
+    const bytes = 4 * options.pages;
+    this.#wishes = memory.buffer('gs.wishes', bytes, storage | copySource | copyDestination);
+    this.#staging = memory.buffer('gs.wishes.staging', bytes, mapRead | copyDestination);
+    this.#ahead = memory.buffer('gs.wishes.ahead', 4 * AHEAD_NUMBERS, uniform | copyDestination);
   }
 
   /** True for a frame that must note wishes; then {@link begin}, {@link note}, {@link copy} and, after the submit, {@link read} follow. */
-  isDue(): boolean {
+  isDue(camera: Camera): boolean {
     clearTimeout(this.#timer);
-    const isDue = this.#frames >= INTERVAL && !this.#isReading;
+    this.#motion.observe(camera, performance.now());
+    const interval = this.#motion.isMoving ? MOVING_INTERVAL : INTERVAL;
+    const isDue = this.#frames >= interval && !this.#isReading;
     this.#frames = isDue ? 1 : this.#frames + 1;
     if (!isDue) this.#timer = setTimeout(() => this.#look(), STALE_MS);
     return isDue;
@@ -54,15 +69,21 @@ export class WishReader implements Wishes {
 
   #look(): void {
     this.#frames = INTERVAL;
-    this.#onStale();
+    this.#options.onStale();
   }
 
   begin(encoder: GPUCommandEncoder): void {
     encoder.clearBuffer(this.#wishes);
+    const { origin, aheadMs } = this.#options;
+    const { local_to_camera, eye } = cameraValues(this.#motion.ahead(aheadMs()), origin);
+    const numbers = new Float32Array(AHEAD_NUMBERS);
+    numbers.set(local_to_camera as ArrayLike<number>);
+    numbers.set(eye as ArrayLike<number>, AHEAD_NUMBERS - 4);
+    this.#device.queue.writeBuffer(this.#ahead, 0, numbers);
   }
 
   bind(page: NotedPage): GPUBindGroup {
-    return this.#stage.bind({ ...page, wishes: this.#wishes });
+    return this.#stage.bind({ ...page, ahead: this.#ahead, wishes: this.#wishes });
   }
 
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
@@ -80,7 +101,7 @@ export class WishReader implements Wishes {
         const wishes = new Float32Array(this.#staging.getMappedRange().slice(0));
         this.#staging.unmap();
         this.#isReading = false;
-        this.#onWishes(wishes);
+        this.#options.onWishes(wishes, wishes[0]);
       },
       // The device is lost, or the scene was destroyed meanwhile.
       () => undefined,

@@ -1,0 +1,126 @@
+import {
+  cross,
+  dot,
+  eyeOf,
+  length,
+  scale,
+  subtract,
+  type Camera,
+  type Matrix4,
+  type Vector3,
+} from '@gaussian-splat/core';
+
+/** Milliseconds over which motion is measured, twice: the present stretch and the one before it. */
+const STRETCH_MS = 50;
+/** Milliseconds without a camera after which what came before says nothing of what comes next. */
+const PAUSE_MS = 250;
+/** A camera may speed up by so much from one stretch to the next. */
+const MOST_GROWTH = 2;
+/** Radians that a camera is thought to turn at most. */
+const MOST_TURN = 1;
+/** How far rows may be from unit length for a matrix to count as rotation and translation. */
+const SKEW = 1e-3;
+
+/** Milliseconds from when a page is wished for until that has been read back and the page is sent for; most by which a camera is looked ahead of. */
+const [LOOK_MS, MOST_AHEAD_MS] = [150, 500];
+
+/** How far ahead of a camera its pages are wished for, in milliseconds. @param arrivalMs milliseconds that a page takes to come */
+export const aheadMs = (arrivalMs: number): number => Math.min(MOST_AHEAD_MS, LOOK_MS + arrivalMs);
+
+interface Sample {
+  readonly camera: Camera;
+  readonly eye: Vector3;
+  readonly at: number;
+}
+
+/** World units and radians (about an axis in camera coordinates) per millisecond. */
+interface Velocity {
+  readonly moves: Vector3;
+  readonly turns: Vector3;
+}
+
+const STILL: Vector3 = [0, 0, 0];
+
+/**
+ * How a camera moves, and so where it will be: it keeps the speed of the last twentieth of a second, as far as the twentieth before agrees. What rests, jumps, goes to and fro, or is not
+ * looked at for a while is thought to stay where it is.
+ */
+export class CameraMotion {
+  readonly #samples: Sample[] = [];
+
+  /** Takes note of a camera. @param now milliseconds */
+  observe(camera: Camera, now: number): void {
+    const last = this.#samples.at(-1);
+    if (last && now - last.at > PAUSE_MS) this.#samples.length = 0;
+    this.#samples.push({ camera, eye: eyeOf(camera.worldToCamera), at: now });
+    // The oldest is the last that is two stretches old; frames that take longer than a stretch leave three.
+    while (this.#samples.length > 3 && now - this.#samples[1].at >= 2 * STRETCH_MS) this.#samples.shift();
+  }
+
+  /** True while the camera moves or turns. */
+  get isMoving(): boolean {
+    const { moves, turns } = this.#velocity();
+    return length(moves) > 0 || length(turns) > 0;
+  }
+
+  /** Where the camera that was noted last will be after so many milliseconds; that camera itself while it does not move. */
+  ahead(milliseconds: number): Camera {
+    const { camera, eye } = this.#samples.at(-1)!;
+    const { moves, turns } = this.#velocity();
+    const angle = Math.min(MOST_TURN, milliseconds * length(turns));
+    if (length(moves) === 0 && angle === 0) return camera;
+    const place = eye.map((x, axis) => x + milliseconds * moves[axis]) as unknown as Vector3;
+    return { ...camera, worldToCamera: turned(camera.worldToCamera, turns, angle, place) };
+  }
+
+  #velocity(): Velocity {
+    const samples = this.#samples;
+    const last = samples.length - 1;
+    if (last < 2) return { moves: STILL, turns: STILL };
+    let middle = last - 1;
+    while (middle > 1 && samples[last].at - samples[middle].at < STRETCH_MS) middle--;
+    const [before, now] = [between(samples[0], samples[middle]), between(samples[middle], samples[last])];
+    return { moves: lasting(before.moves, now.moves), turns: lasting(before.turns, now.turns) };
+  }
+}
+
+/** What is left of a speed, given the one before: nothing if they go against one another, else at most {@link MOST_GROWTH} times the one before. */
+function lasting(before: Vector3, now: Vector3): Vector3 {
+  if (dot(before, now) <= 0) return STILL;
+  return scale(now, Math.min(1, (MOST_GROWTH * length(before)) / length(now)));
+}
+
+function between(from: Sample, to: Sample): Velocity {
+  const milliseconds = Math.max(1e-3, to.at - from.at);
+  const [a, b] = [from.camera.worldToCamera, to.camera.worldToCamera];
+  const moves = scale(subtract(to.eye, from.eye), 1 / milliseconds);
+  return { moves, turns: isRigid(a) && isRigid(b) ? scale(rotationVector(a, b), 1 / milliseconds) : STILL };
+}
+
+const row = (m: Matrix4, k: number): Vector3 => [m[4 * k], m[4 * k + 1], m[4 * k + 2]];
+
+const isRigid = (m: Matrix4): boolean => [0, 1, 2].every((k) => Math.abs(length(row(m, k)) - 1) < SKEW);
+
+/** Axis times angle of the rotation B Aᵀ that takes the axes of one camera to those of another. */
+function rotationVector(a: Matrix4, b: Matrix4): Vector3 {
+  const of = (i: number, j: number): number => dot(row(b, i), row(a, j));
+  const twice: Vector3 = [of(2, 1) - of(1, 2), of(0, 2) - of(2, 0), of(1, 0) - of(0, 1)];
+  const sine = length(twice) / 2;
+  // Half a turn between two frames has no axis, and is no motion.
+  if (sine < 1e-9) return STILL;
+  return scale(twice, Math.atan2(sine, (of(0, 0) + of(1, 1) + of(2, 2) - 1) / 2) / (2 * sine));
+}
+
+/** A camera's matrix, its axes turned about one in camera coordinates by an angle (Rodrigues' formula), its eye put in a place. */
+function turned(m: Matrix4, about: Vector3, angle: number, eye: Vector3): Float64Array {
+  const axis = angle === 0 ? STILL : scale(about, 1 / length(about));
+  const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
+  const column = (k: number): Vector3 => {
+    const v: Vector3 = [m[k], m[4 + k], m[8 + k]];
+    const [across, along] = [cross(axis, v), dot(axis, v) * (1 - cosine)];
+    return [0, 1, 2].map((i) => cosine * v[i] + sine * across[i] + along * axis[i]) as unknown as Vector3;
+  };
+  const columns = [column(0), column(1), column(2)];
+  const rows = [0, 1, 2].map((i) => columns.map((c) => c[i]) as unknown as Vector3);
+  return Float64Array.from(rows.flatMap((r) => [...r, -dot(r, eye)]).concat(0, 0, 0, 1));
+}

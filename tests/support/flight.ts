@@ -1,0 +1,205 @@
+/** The flight of demo/bench/detail.js without a GPU and without a clock: the same path, the real rules of who comes and goes, a server of known speed. */
+import { lookAt, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
+import {
+  aheadMs,
+  CameraMotion,
+  PageFiles,
+  PageTraffic,
+  Residency,
+  SLOT_CHUNKS,
+  UploadPace,
+} from '@gaussian-splat/renderer/stages';
+import { setImmediate as turn } from 'node:timers/promises';
+import type { FlightPages } from './flight-pages.js';
+
+const FRAME_MS = 1000 / 60;
+/** Frames from a look to when it has been read back. */
+const READ_BACK = 2;
+/** Frames between two looks at a camera that moves. */
+const LOOK = 3;
+
+export interface FlightOptions {
+  readonly bounds: Bounds;
+  readonly width: number;
+  readonly height: number;
+  /** Of the pool. */
+  readonly slots: number;
+  /** Of a page in a slot. */
+  readonly bytes: number;
+  /** Seconds at the place where the flight begins, and of the flight. */
+  readonly warm: number;
+  readonly seconds: number;
+  /** Milliseconds until a file comes, and bytes a second of all of them. */
+  readonly latencyMs: number;
+  readonly bandwidth: number;
+  /** Milliseconds of the page's thread for a megabyte. */
+  readonly uploadMs: number;
+  /** Bytes of files that are kept, and whether copies of a tree have files of their own, as no folder has them: such a scene is one without copies. */
+  readonly kept: number;
+  readonly isWithoutCopies?: boolean;
+  /** Wishes are those of the present view alone. */
+  readonly isStill?: boolean;
+}
+
+/** Low over the scene, along a curve that turns, now and then up to where all of it is in sight. */
+export function flightCamera(
+  share: number,
+  { bounds, width, height }: Pick<FlightOptions, 'bounds' | 'width' | 'height'>,
+): Camera {
+  const { center, min, max } = bounds;
+  const [x, z] = [(max[0] - min[0]) / 2, (max[2] - min[2]) / 2];
+  const place = (s: number): Vector3 => [
+    center[0] + 0.8 * x * Math.sin(2 * Math.PI * s),
+    center[1] - 0.05 * x - 0.5 * x * Math.sin(Math.PI * s) ** 8,
+    center[2] + 0.8 * z * Math.sin(4 * Math.PI * s),
+  ];
+  const ahead = place(share + 0.02);
+  return {
+    ...{ width, height, fx: height, fy: height, cx: width / 2, cy: height / 2, near: 0.05, far: Infinity },
+    worldToCamera: lookAt(place(share), [ahead[0], ahead[1] + 0.02 * x, ahead[2]], [0, -1, 0]),
+  };
+}
+
+/** What a second of the flight ended with. */
+export interface FlightSecond {
+  /** Most pixels that anything in view is off because a page is not there: at its end, and the mean of its frames. */
+  readonly error: number;
+  readonly mean: number;
+  readonly pages: number;
+  readonly files: number;
+}
+
+/** Answers after a while, one after the other. */
+class Server {
+  readonly #open: { readonly at: number; readonly arrive: () => void }[] = [];
+  readonly #options: FlightOptions;
+  #freeAt = 0;
+  now = 0;
+
+  constructor(options: FlightOptions) {
+    this.#options = options;
+  }
+
+  files = 0;
+
+  readonly fetch = (chunks: number): Promise<ArrayBuffer> => {
+    this.files++;
+    const { latencyMs, bandwidth } = this.#options;
+    const bytes = (this.#options.bytes * chunks) / SLOT_CHUNKS;
+    this.#freeAt = Math.max(this.now, this.#freeAt) + (1000 * bytes) / bandwidth;
+    const at = Math.max(this.now + latencyMs, this.#freeAt);
+    return new Promise((resolve) => this.#open.push({ at, arrive: () => resolve(new ArrayBuffer(bytes)) }));
+  };
+
+  /** Lets time pass. */
+  async run(until: number): Promise<void> {
+    for (;;) {
+      let next = -1;
+      this.#open.forEach(({ at }, k) => {
+        if (at <= until && (next < 0 || at < this.#open[next].at)) next = k;
+      });
+      if (next < 0) break;
+      const [{ at, arrive }] = this.#open.splice(next, 1);
+      this.now = at;
+      arrive();
+      await turn();
+    }
+    this.now = until;
+  }
+}
+
+/** Flies. @returns the seconds of the flight, without those before it */
+export async function fly(pages: FlightPages, options: FlightOptions): Promise<FlightSecond[]> {
+  const { list } = pages;
+  const server = new Server(options);
+  const files = new PageFiles((file) => server.fetch(parseInt(file)), options.kept);
+  const nameOf = (page: number): string => {
+    const { file } = list.place(page);
+    return `${file.chunks} ${file.file} ${options.isWithoutCopies ? list.translate(page).join() : ''}`;
+  };
+  const residency = new Residency(list, options.slots, (page) => files.has(nameOf(page)));
+  residency.begin(0);
+  residency.settle(0);
+  const traffic = new PageTraffic(residency, {
+    fetch: async (page, signal) => {
+      await files.get(nameOf(page), signal);
+      return Uint32Array.of(page);
+    },
+    onArrival: () => undefined,
+    onError: (error) => {
+      throw error;
+    },
+    now: () => server.now,
+  });
+  const [pace, motion] = [new UploadPace(), new CameraMotion()];
+  const rows: FlightSecond[] = [];
+  let look: { readonly wishes: Float32Array; readonly frame: number } | undefined;
+  let [sum, placed] = [0, 0];
+  const all = Math.round(60 * (options.warm + options.seconds));
+  for (let frame = 0; frame < all; frame++) {
+    await server.run(frame * FRAME_MS);
+    placed += upload(residency, traffic, pace, { now: server.now, ...options });
+    traffic.sendForMore();
+    // Files that are kept come at once.
+    await turn();
+    const camera = flightCamera(Math.max(0, (frame / 60 - options.warm) / options.seconds), options);
+    motion.observe(camera, server.now);
+    if (look && frame >= look.frame + READ_BACK) {
+      residency.note(look.wishes);
+      traffic.follow();
+      look = undefined;
+    }
+    if (look === undefined && frame % LOOK === 0) {
+      const ahead = options.isStill ? camera : motion.ahead(aheadMs(traffic.arrivalMs));
+      look = { wishes: wishesOf(pages, residency, [camera, ahead]), frame };
+    }
+    const error = lacking(pages, residency, camera);
+    sum += error;
+    if ((frame + 1) % 60 > 0) continue;
+    rows.push({ error, mean: sum / 60, pages: placed, files: server.files });
+    [sum, placed, server.files] = [0, 0, 0];
+  }
+  return rows.slice(options.warm);
+}
+
+function upload(
+  residency: Residency,
+  traffic: PageTraffic,
+  pace: UploadPace,
+  { now, bytes, uploadMs }: { readonly now: number; readonly bytes: number; readonly uploadMs: number },
+): number {
+  const most = pace.startFrame(now);
+  let [used, placed] = [0, 0];
+  while (used === 0 || used + bytes <= most) {
+    const next = traffic.next();
+    if (next === undefined) break;
+    used += bytes;
+    if (residency.settle(next.page)) placed++;
+    else traffic.refused();
+  }
+  if (used > 0) pace.note(used, (used / 1e6) * uploadMs);
+  return placed;
+}
+
+/** Pixels that a view may be off. */
+const ALLOWED = 1;
+
+function wishesOf(pages: FlightPages, residency: Residency, cameras: readonly Camera[]): Float32Array {
+  const { list } = pages;
+  const wishes = new Float32Array(list.count);
+  for (const camera of new Set(cameras)) {
+    pages.wish(camera, ALLOWED, (page, pixels) => {
+      if (pixels > wishes[page] && residency.isResident(list.parent[page])) wishes[page] = pixels;
+    });
+  }
+  return wishes;
+}
+
+function lacking(pages: FlightPages, residency: Residency, camera: Camera): number {
+  let most = 0;
+  pages.wish(camera, ALLOWED, (page, pixels, isVisible) => {
+    if (!isVisible || pixels <= most || residency.isResident(page)) return;
+    if (residency.isResident(pages.list.parent[page])) most = pixels;
+  });
+  return most;
+}
