@@ -6,6 +6,7 @@ import { decibels, mean, meanSquareOf } from './measure.js';
 import { readInParts } from './parts/read-in-parts.js';
 import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
+import { gainOf, MOST_GAIN, refinedCut, searchRefined, type RefinedCut } from './refine/search-refined.js';
 import { Stopwatch } from './stopwatch.js';
 import { encodingsFor, type Encoding } from './write/index.js';
 
@@ -36,7 +37,7 @@ export interface Economised {
   readonly decibels: number;
   readonly worstDecibels: number;
   readonly cut: Cut;
-  /** How long each kind of work took, s: `score`, `search`, `fit`, `write` (and read again), `judge`; with several encodings `encode`. */
+  /** How long each kind of work took, s: `score`, `search`, `refine`, `fit`, `write` (and read again), `judge`; with several encodings `encode`. */
   readonly seconds: Readonly<Record<string, number>>;
 }
 
@@ -65,27 +66,30 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   const { encoding, rounding } = await chooseEncoding(cloud, encodings, target, options);
   watch.lap('encode');
   const budget = target - rounding;
-  const trades = await findTrades(cloud, ranking, evaluator, budget, options);
+  const most = evaluator.refine ? gainOf(MOST_GAIN) * budget : budget;
+  const trades = await findTrades(cloud, ranking, evaluator, most, options);
   watch.lap('search');
-  let filling = await scaleToFit(trades, evaluator, budget, options);
+  let found: RefinedCut | undefined = evaluator.refine && (await searchRefined(trades, evaluator, budget, options));
+  if (found) watch.lap('refine');
+  let filling = found?.filling ?? (await scaleToFit(trades, evaluator, budget, options));
   watch.lap('fit');
   for (let tries = 0; tries < MAX_TRIES; tries++) {
-    const cut = trades.cutAt(filling * budget);
-    const reduced = await evaluator.reduce(cut, signal);
+    const { cut, reduced } = found ?? (await refinedCut(trades, evaluator, budget, filling, signal));
     const bytes = await encoding.write(reduced, pool);
     const written = await readInParts(bytes, { name: options.name, signal }, pool);
     watch.lap('write');
-    const found = await evaluator.compare(written, 'heldOut', signal);
+    const errors = await evaluator.compare(written, 'heldOut', signal);
     watch.lap('judge');
-    onStep(`held-out views: ${decibels(mean(found)).toFixed(2)} dB`);
-    if (mean(found) <= target)
+    onStep(`held-out views: ${decibels(mean(errors)).toFixed(2)} dB`);
+    if (mean(errors) <= target)
       return {
-        ...summary(cloud, reduced, cut, found),
+        ...summary(cloud, reduced, cut, errors),
         bytes: unshared(bytes),
         encoding: encoding.title,
         seconds: watch.seconds,
       };
     filling *= SHRINK;
+    found = undefined;
   }
   throw unreachable(options, 'less, whatever was kept');
 }
