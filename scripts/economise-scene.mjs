@@ -120,8 +120,8 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const measuring = isGpu
     ? await GpuEvaluator.create(device, cloud, views, { pool })
     : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
-  const looser = refine ? RefiningEvaluator.mostGain : 0;
-  const merging = { views: views.scored, mostError: 10 ** ((looser - minDecibels) / 10) };
+  const mostError = 10 ** (-minDecibels / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
+  const merging = { views: views.scored, mostError };
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
   const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;

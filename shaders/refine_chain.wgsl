@@ -13,6 +13,8 @@
 // SCREEN_NUMBERS of each splat; zero again afterwards, for the next view.
 @group(0) @binding(4) var<storage, read_write> screen: array<f32>;
 @group(0) @binding(5) var<storage, read_write> gradients: array<f32>;
+// Sums of the weights of each splat, and of how much the channels change with it.
+@group(0) @binding(6) var<storage, read_write> influences: array<vec2f>;
 
 fn add(i: u32, step: u32, value: f32) {
   gradients[step * refine_view.row + i] += refine_view.weight * value;
@@ -58,6 +60,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     screen[at] = 0.0;
   }
   if (!is_seen) { return; }
+  influences[i] = max(influences[i], refine_view.weight * vec2f(seen[9] / WEIGHT_PART, seen[10] / CHANGE_PART));
   let n = row_of(i);
   let position = vec3f(numbers[n], numbers[n + 1u], numbers[n + 2u]);
   chain_colour(i, position, vec3f(seen[0], seen[1], seen[2]));
@@ -115,9 +118,10 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     add(i, GROWTH_STEP + k, dot(axes[k], by_axes[k]));
     turns[k] = own.scales[k] * (transpose(own.axes) * (transpose(to_camera) * by_axes[k]));
   }
-  add(i, TURN_STEP, turns[1].z - turns[2].y);
-  add(i, TURN_STEP + 1u, turns[2].x - turns[0].z);
-  add(i, TURN_STEP + 2u, turns[0].y - turns[1].x);
+  let swing = swings(stride);
+  add(i, TURN_STEP, swing.x * (turns[1].z - turns[2].y));
+  add(i, TURN_STEP + 1u, swing.y * (turns[2].x - turns[0].z));
+  add(i, TURN_STEP + 2u, swing.z * (turns[0].y - turns[1].x));
   let opacity = 1.0 / (1.0 + exp(-numbers[n + LOGIT_AT]));
   add(i, LOGIT_STEP, seen[3] * (1.0 - opacity));
 }

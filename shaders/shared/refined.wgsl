@@ -15,8 +15,12 @@ const LOGIT_STEP = 9u;
 const SH_STEP = 10u;
 
 // What a picture's pixels tell of a splat: by its colour, and the sums of q, q·u, q·v, q·u², q·u·v and q·v², where q is the derivative by the
-// logarithm of alpha and u, v are where the pixel lies in the ellipse.
-const SCREEN_NUMBERS = 9u;
+// logarithm of alpha and u, v are where the pixel lies in the ellipse; then, whatever the error, a part of the sum of its weights, and one of how much all
+// channels change with that logarithm.
+const SCREEN_NUMBERS = 11u;
+
+const WEIGHT_PART = 0.25;
+const CHANGE_PART = 0.0625;
 
 const REFINE_GROUP = 64u;
 
@@ -28,7 +32,7 @@ struct RefineView {
 }
 
 // Least length of an axis along which a splat moves, in those of its longest one.
-const LEAST_AXIS = 0.1;
+const LEAST_AXIS = 0.02;
 
 struct Turned {
   // Columns of the rotation.
@@ -51,4 +55,11 @@ fn turned(q: vec4f, logarithms: vec3f) -> Turned {
 // How far a step of 1 moves a splat along each of its axes.
 fn strides(scales: vec3f) -> vec3f {
   return max(scales, vec3f(LEAST_AXIS * max(scales.x, max(scales.y, scales.z))));
+}
+
+// How far a step of 1 turns it about each of them: long and thin ones less, so that their ends do not go farther than they are wide.
+fn swings(stride: vec3f) -> vec3f {
+  let a = stride.yzx;
+  let b = stride.zxy;
+  return min(a, b) / max(a, b);
 }

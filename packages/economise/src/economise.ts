@@ -6,7 +6,7 @@ import { decibels, mean, meanSquareOf } from './measure.js';
 import { readInParts } from './parts/read-in-parts.js';
 import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
-import { gainOf, MOST_GAIN, refinedCut, searchRefined, type RefinedCut } from './refine/search-refined.js';
+import { LEFT_BY_REFINING, refinedCut, searchRefined, type RefinedCut } from './refine/search-refined.js';
 import { Stopwatch } from './stopwatch.js';
 import { encodingsFor, type Encoding } from './write/index.js';
 
@@ -66,8 +66,8 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   const { encoding, rounding } = await chooseEncoding(cloud, encodings, target, options);
   watch.lap('encode');
   const budget = target - rounding;
-  const most = evaluator.refine ? gainOf(MOST_GAIN) * budget : budget;
-  const trades = await findTrades(cloud, ranking, evaluator, most, options);
+  const leftByRefining = evaluator.refine ? LEFT_BY_REFINING : 1;
+  const trades = await findTrades(cloud, ranking, evaluator, budget, { ...options, leftByRefining });
   watch.lap('search');
   let found: RefinedCut | undefined = evaluator.refine && (await searchRefined(trades, evaluator, budget, options));
   if (found) watch.lap('refine');

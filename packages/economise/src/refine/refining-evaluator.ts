@@ -7,7 +7,7 @@ import type { Cut, ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
 import { RefinedScene } from './refined-scene.js';
 import { SceneFitter, USUAL_DESCENT, type Descent } from './scene-fitter.js';
-import { MOST_GAIN } from './search-refined.js';
+import { LEFT_BY_REFINING } from './search-refined.js';
 
 export interface RefiningOptions {
   /** Draws the pictures that splats are fitted to, and goes over them backwards. */
@@ -23,8 +23,8 @@ export interface RefiningOptions {
  * GPU: 16 bytes for each pixel of the views. A splat takes 1.0 kB there at degree 3 while it is fitted.
  */
 export class RefiningEvaluator implements Evaluator {
-  /** dB below the figure that is asked for, at which cuts are still worth trying: merges must be found up to that error (`MergingOptions.mostError`). */
-  static readonly mostGain = MOST_GAIN;
+  /** Part of the error of drops and merges that is taken to be left by refining: merges must be found up to so much more (`MergingOptions.mostError`). */
+  static readonly leftByRefining = LEFT_BY_REFINING;
   readonly #inner: Evaluator;
   readonly #cloud: GaussianCloud;
   readonly #options: RefiningOptions;

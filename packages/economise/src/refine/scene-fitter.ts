@@ -13,17 +13,12 @@ import { REFINE_GROUP, refineBackward, refineChain, refineStep, SCREEN_NUMBERS }
 import { layouts } from '../gpu/layouts.js';
 import { NO_VIEW } from '../gpu/no-view.js';
 import type { PictureErrors } from '../gpu/picture-errors.js';
-import { readBack } from '../gpu/read-back.js';
 import type { RefinedScene } from './refined-scene.js';
 
 const { TILE } = constants;
 /** Bindings begin at multiples of 256 bytes. */
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
 const SMALL_STRIDE = 256;
-const COUNTS_BYTES = 16;
-/** Views that are drawn before any counts, and how often they are until all had room. */
-const REHEARSED = 4;
-const MOST_TRIES = 4;
 /** Views after which the CPU waits for the GPU. */
 const AHEAD = 16;
 
@@ -54,11 +49,12 @@ export interface Descent {
   readonly keepSquare: number;
   /** Derivatives far below this move little: of the squared error of a picture, over all its pixels. */
   readonly least: number;
+  readonly isAdam: boolean;
 }
 
 export const USUAL_DESCENT: Descent = {
-  ...{ steps: 432, viewsAtOnce: 1, lastRate: 0.05, keepMean: 0.9, keepSquare: 0.99, least: 1e-8 },
-  rates: { position: 0.01, growth: 0.01, turn: 0.005, logit: 0.02, constant: 0.005, harmonic: 0.001 },
+  ...{ steps: 432, viewsAtOnce: 1, lastRate: 0.05, keepMean: 0.9, keepSquare: 0.99, least: 1e-8, isAdam: true },
+  rates: { position: 0, growth: 0, turn: 0, logit: 0.02, constant: 0.005, harmonic: 0.001 },
 };
 
 /** Fits the splats of a scene to pictures by gradient descent. */
@@ -89,7 +85,8 @@ export class SceneFitter {
   /** Goes down, for so many steps. */
   async fit(descent: Descent, signal?: AbortSignal): Promise<void> {
     const { steps, viewsAtOnce, lastRate } = descent;
-    await this.#rehearse(signal);
+    // Draws all views until the renderer has room for the scene: what lacks splats has wrong derivatives.
+    await this.#errors.measure(this.#scene);
     const order = viewOrder(this.#errors.exhibits.length);
     let looks = 0;
     for (let step = 0; step < steps; step++) {
@@ -119,13 +116,13 @@ export class SceneFitter {
     const bindings = backward.bind({ ...painted, ...pictures, screen: this.#scene.screen });
     backward.dispatchGrid(pass, bindings, Math.ceil(camera.width / TILE), Math.ceil(camera.height / TILE));
     const chain = rareKernelOf(this.#device, refineChain);
-    this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients }, p) => {
+    this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients, influences }, p) => {
       const place = this.#scene.parts.length * view + p;
       const bytes = 4 * SCREEN_NUMBERS;
       const bound = chain.bind({
         view: { buffer: this.#views, offset: VIEW_STRIDE * place, size: rendererLayouts.View.size },
         refine_view: { buffer: this.#refineViews, offset: SMALL_STRIDE * place, size: layouts.RefineView.size },
-        ...{ numbers, degrees, gradients },
+        ...{ numbers, degrees, gradients, influences },
         screen: { buffer: this.#scene.screen, offset: bytes * first, size: bytes * row },
       });
       chain.dispatch(pass, bound, Math.ceil(page.count / REFINE_GROUP));
@@ -139,17 +136,18 @@ export class SceneFitter {
   }
 
   /** @param number of the step, from 1 on @param share of the rates that is left */
-  #step(number: number, share: number, { rates, keepMean, keepSquare, least }: Descent): void {
+  #step(number: number, share: number, { rates, keepMean, keepSquare, least, isAdam, viewsAtOnce }: Descent): void {
     const kernel = rareKernelOf(this.#device, refineStep);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.step' });
     const pass = encoder.beginComputePass({ label: 'gs.refine.step' });
-    this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means }, p) => {
+    this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means, influences }, p) => {
       const bytes = new ArrayBuffer(layouts.RefineStep.size);
       writeStruct(
         layouts.RefineStep,
         {
           ...{ splat_count: page.count, row, harmonics: 3 * shCoefficientCount(this.#scene.shDegree) },
           ...{ keep_mean: keepMean, keep_square: keepSquare, least },
+          ...{ is_adam: +isAdam, look_share: viewsAtOnce },
           mean_scale: 1 / (1 - keepMean ** number),
           square_scale: 1 / (1 - keepSquare ** number),
           ...{ position_rate: share * rates.position, growth_rate: share * rates.growth },
@@ -159,33 +157,12 @@ export class SceneFitter {
         bytes,
       );
       this.#device.queue.writeBuffer(this.#steps[p], 0, bytes);
-      const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means });
+      const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means, influences });
       kernel.dispatch(pass, bindings, Math.ceil(page.count / REFINE_GROUP));
     });
     this.#scene.pack(pass);
     pass.end();
     this.#device.queue.submit([encoder.finish()]);
-  }
-
-  /** Draws a few views until the renderer has room for the scene. */
-  async #rehearse(signal: AbortSignal | undefined): Promise<void> {
-    const { exhibits } = this.#errors;
-    const { copySource, copyDestination } = BUFFER_USAGE;
-    const counts = this.#memory.buffer('gs.refine.counts', COUNTS_BYTES, copySource | copyDestination);
-    const step = Math.max(1, Math.floor(exhibits.length / REHEARSED));
-    for (const { camera } of exhibits.filter((_, k) => k % step === 0).slice(0, REHEARSED)) {
-      for (let tries = 0; tries < MOST_TRIES; tries++) {
-        signal?.throwIfAborted();
-        const target = this.#errors.targetOf(camera);
-        this.#renderer.render({ gaussians: this.#scene, camera, target, notes: {} });
-        const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.rehearse' });
-        this.#renderer.copyCounts(encoder, counts, 0);
-        this.#device.queue.submit([encoder.finish()]);
-        const [bytes] = await readBack(this.#device, [{ buffer: counts }]);
-        if (this.#renderer.hadRoom(new Uint32Array(bytes))) break;
-      }
-    }
-    this.#memory.free(counts);
   }
 
   /** `View` and `RefineView` of each view and part. */

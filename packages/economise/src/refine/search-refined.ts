@@ -3,16 +3,13 @@ import type { FitOptions, Trades } from '../fit.js';
 import { decibels, mean } from '../measure.js';
 import type { Cut, ReducedCloud } from '../reduce.js';
 
-/** How much more error a cut is measured up to where what it leaves is refined, dB, and how much more is tried first. */
-export const MOST_GAIN = 9;
-const FIRST_GAIN = 5;
+/** Part of the error of drops and merges that is taken to be left by refining: the search is of cuts that err so much more, and what is really left is measured. */
+export const LEFT_BY_REFINING = 0.4;
 /** Cuts that are refined, and how near to the figure one must come. */
 const TRIES = 4;
 const NEAR_ENOUGH = 0.97;
 /** How the error may grow with the one that is allowed, both as logarithms: what two tries tell beyond it is noise. */
 const [LEAST_SLOPE, MOST_SLOPE] = [0.5, 2];
-
-export const gainOf = (decibels: number): number => 10 ** (decibels / 10);
 
 /** A cut, and what it leaves once that is refined. */
 export interface RefinedCut {
@@ -48,9 +45,9 @@ export async function searchRefined(
   const tried: { readonly filling: number; readonly error: number }[] = [];
   let best: RefinedCut | undefined;
   let least: RefinedCut | undefined;
-  let next = gainOf(FIRST_GAIN);
+  let next = 1;
   for (let tries = 0; tries < TRIES; tries++) {
-    onStep(`refining a cut of ${decibels(next * budget).toFixed(1)} dB`);
+    onStep(`refining what ${next.toFixed(2)} of the expected error allows`);
     const found = await refinedCut(trades, evaluator, budget, next, signal);
     const errors: number[] = [];
     for (const views of ['searched', 'heldOut'] as const)
@@ -61,7 +58,7 @@ export async function searchRefined(
     if (error <= budget && next > (best?.filling ?? 0)) best = found;
     if (next < (least?.filling ?? Infinity)) least = found;
     if (error <= budget && error > NEAR_ENOUGH * budget) break;
-    next = Math.min(gainOf(MOST_GAIN), nextFilling(tried, budget));
+    next = nextFilling(tried, budget);
     if (tried.some(({ filling }) => filling === next)) break;
   }
   return (best ?? least)!;
