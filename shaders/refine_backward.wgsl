@@ -82,12 +82,9 @@ fn unblend(pixel: ptr<function, Pixel>, k: u32) {
   add_fixed(k, 0u, by_color.x);
   add_fixed(k, 1u, by_color.y);
   add_fixed(k, 2u, by_color.z);
-  add_fixed(k, 9u, WEIGHT_PART * weight);
   // One that is as opaque as may be does not become more so.
   if (own > ALPHA_MAX) { return; }
-  let change = alpha * (before * color - (*pixel).behind / (1.0 - alpha));
-  let q = dot((*pixel).slope, change);
-  add_fixed(k, 10u, CHANGE_PART * dot(abs(change), vec3f(1.0)));
+  let q = alpha * dot((*pixel).slope, before * color - (*pixel).behind / (1.0 - alpha));
   add_fixed(k, 3u, q);
   add_fixed(k, 4u, q * u);
   add_fixed(k, 5u, q * v);

@@ -13,8 +13,6 @@
 // SCREEN_NUMBERS of each splat; zero again afterwards, for the next view.
 @group(0) @binding(4) var<storage, read_write> screen: array<f32>;
 @group(0) @binding(5) var<storage, read_write> gradients: array<f32>;
-// Sums of the weights of each splat, and of how much the channels change with it.
-@group(0) @binding(6) var<storage, read_write> influences: array<vec2f>;
 
 fn add(i: u32, step: u32, value: f32) {
   gradients[step * refine_view.row + i] += refine_view.weight * value;
@@ -60,7 +58,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     screen[at] = 0.0;
   }
   if (!is_seen) { return; }
-  influences[i] = max(influences[i], refine_view.weight * vec2f(seen[9] / WEIGHT_PART, seen[10] / CHANGE_PART));
   let n = row_of(i);
   let position = vec3f(numbers[n], numbers[n + 1u], numbers[n + 2u]);
   chain_colour(i, position, vec3f(seen[0], seen[1], seen[2]));

@@ -15,9 +15,6 @@ struct RefineStep {
   square_scale: f32,
   // Derivatives far below this move little.
   least: f32,
-  is_adam: u32,
-  // 1 / looks so far
-  look_share: f32,
   // How far a step goes.
   position_rate: f32,
   growth_rate: f32,
@@ -34,23 +31,20 @@ struct RefineStep {
 @group(0) @binding(3) var<storage, read_write> gradients: array<f32>;
 // Means of the derivatives, and of their squares.
 @group(0) @binding(4) var<storage, read_write> means: array<vec2f>;
-@group(0) @binding(5) var<storage, read> influences: array<vec2f>;
 
 // How far to go along one of the numbers that are sought, before its rate.
-fn stride_along(i: u32, number: u32, influence: f32) -> f32 {
+fn stride_along(i: u32, number: u32) -> f32 {
   let at = number * step.row + i;
   let g = gradients[at];
   gradients[at] = 0.0;
   let old = means[at];
   let mean = mix(vec2f(g, g * g), old, vec2f(step.keep_mean, step.keep_square));
   means[at] = mean;
-  if (step.is_adam == 2u) { return -mean.x * step.mean_scale / (sqrt(mean.y * step.square_scale) + step.least) * inverseSqrt(max(influence, 0.1)); }
-  if (step.is_adam == 0u) { return -mean.x * step.mean_scale / (influence + step.least); }
   return -mean.x * step.mean_scale / (sqrt(mean.y * step.square_scale) + step.least);
 }
 
-fn vector_along(i: u32, number: u32, influence: f32) -> vec3f {
-  return vec3f(stride_along(i, number, influence), stride_along(i, number + 1u, influence), stride_along(i, number + 2u, influence));
+fn vector_along(i: u32, number: u32) -> vec3f {
+  return vec3f(stride_along(i, number), stride_along(i, number + 1u), stride_along(i, number + 2u));
 }
 
 @compute @workgroup_size(REFINE_GROUP)
@@ -62,12 +56,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let r = n + ROTATION_AT;
   let q = vec4f(numbers[r], numbers[r + 1u], numbers[r + 2u], numbers[r + 3u]);
   let own = turned(q, vec3f(numbers[s], numbers[s + 1u], numbers[s + 2u]));
-  let influence = step.look_share * influences[i];
   let stride = strides(own.scales);
-  let shift = own.axes * (stride * step.position_rate * vector_along(i, 0u, influence.y));
-  let growth = step.growth_rate * vector_along(i, GROWTH_STEP, influence.y);
+  let shift = own.axes * (stride * step.position_rate * vector_along(i, 0u));
+  let growth = step.growth_rate * vector_along(i, GROWTH_STEP);
   // A turn by a small angle about the splat's own axes: q (1, turn / 2).
-  let h = 0.5 * step.turn_rate * swings(stride) * vector_along(i, TURN_STEP, influence.y);
+  let h = 0.5 * step.turn_rate * swings(stride) * vector_along(i, TURN_STEP);
   let v = q.yzw;
   let turned_q = normalize(vec4f(q.x - dot(v, h), v + q.x * h + cross(v, h)));
   for (var k = 0u; k < 3u; k++) {
@@ -75,11 +68,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     numbers[s + k] += growth[k];
   }
   for (var k = 0u; k < 4u; k++) { numbers[r + k] = turned_q[k]; }
-  numbers[n + LOGIT_AT] += step.logit_rate * stride_along(i, LOGIT_STEP, influence.y);
+  numbers[n + LOGIT_AT] += step.logit_rate * stride_along(i, LOGIT_STEP);
   let degree = degrees[i];
   let kept = 3u * (degree + 1u) * (degree + 1u);
   for (var k = 0u; k < kept; k++) {
     let rate = select(step.harmonic_rate, step.constant_rate, k < 3u);
-    numbers[n + SH_AT + k] += rate * stride_along(i, SH_STEP + k, influence.x);
+    numbers[n + SH_AT + k] += rate * stride_along(i, SH_STEP + k);
   }
 }

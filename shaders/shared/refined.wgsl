@@ -15,12 +15,8 @@ const LOGIT_STEP = 9u;
 const SH_STEP = 10u;
 
 // What a picture's pixels tell of a splat: by its colour, and the sums of q, q·u, q·v, q·u², q·u·v and q·v², where q is the derivative by the
-// logarithm of alpha and u, v are where the pixel lies in the ellipse; then, whatever the error, a part of the sum of its weights, and one of how much all
-// channels change with that logarithm.
-const SCREEN_NUMBERS = 11u;
-
-const WEIGHT_PART = 0.25;
-const CHANGE_PART = 0.0625;
+// logarithm of alpha and u, v are where the pixel lies in the ellipse.
+const SCREEN_NUMBERS = 9u;
 
 const REFINE_GROUP = 64u;
 

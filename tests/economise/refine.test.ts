@@ -17,7 +17,7 @@ import { CloudBuffers } from '../../packages/economise/src/gpu/cloud-buffers.js'
 import { PictureErrors } from '../../packages/economise/src/gpu/picture-errors.js';
 import { readBack } from '../../packages/economise/src/gpu/read-back.js';
 import { RefinedScene } from '../../packages/economise/src/refine/refined-scene.js';
-import { SceneFitter, USUAL_DESCENT } from '../../packages/economise/src/refine/scene-fitter.js';
+import { SceneFitter } from '../../packages/economise/src/refine/scene-fitter.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
@@ -207,7 +207,7 @@ test('a few steps come nearer in views that were not fitted, and leave the sourc
 test('the figure is kept with fewer splats, and the source is left as it is', async () => {
   const whole = twins(200);
   const dealt = dealtViewsAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 });
-  const options = { minDecibels: 45, name: 'a.glb' };
+  const options = { minDecibels: 43, name: 'a.glb' };
   const painted = (): PaintedEvaluator => new PaintedEvaluator(whole, { views: dealt });
   const without = await economise(whole, { ...options, evaluator: painted() });
   const rates = { position: 0, growth: 0, turn: 0, logit: 0.08, constant: 0.004, harmonic: 0.001 };
@@ -217,8 +217,8 @@ test('the figure is kept with fewer splats, and the source is left as it is', as
   const written = await readScene(result.bytes, { name: 'a.glb' });
   const errors = await evaluator.compare(written, 'heldOut');
   const found = decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
-  console.log(`45 dB: ${result.splats.after} of 200 splats, ${without.splats.after} without; ${found.toFixed(1)} dB`);
-  assert.ok(found >= 45 && Math.abs(found - result.decibels) < 1e-6, `${found} dB`);
+  console.log(`43 dB: ${result.splats.after} of 200 splats, ${without.splats.after} without; ${found.toFixed(1)} dB`);
+  assert.ok(found >= 43 && Math.abs(found - result.decibels) < 1e-6, `${found} dB`);
   assert.ok(result.splats.after < 0.97 * without.splats.after);
   assert.equal(written.count, result.splats.after);
   assert.deepEqual(whole, twins(200));

@@ -36,8 +36,6 @@ export interface RefinedPart {
   /** array<f32> and array<vec2f>: a row for each number that is sought. */
   readonly gradients: GPUBuffer;
   readonly means: GPUBuffer;
-  /** array<vec2f>: how much pictures change with each splat. */
-  readonly influences: GPUBuffer;
   readonly packing: GPUBindGroup;
 }
 
@@ -177,7 +175,6 @@ export class RefinedScene implements GaussianScene {
       ...{ page, first, row, numbers, packing },
       degrees: buffer('degrees', 4 * count, Uint32Array.from(degrees.subarray(begin, begin + count))),
       gradients: buffer('gradients', FLOAT_BYTES * sought * row),
-      influences: buffer('influences', 2 * FLOAT_BYTES * row),
       means: buffer('means', 2 * FLOAT_BYTES * sought * row),
     };
   }

@@ -3,6 +3,7 @@ import { Renderer } from '@gaussian-splat/renderer';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import { CloudBuffers } from '../gpu/cloud-buffers.js';
 import { PictureErrors } from '../gpu/picture-errors.js';
+import { mean } from '../measure.js';
 import type { Cut, ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
 import { RefinedScene } from './refined-scene.js';
@@ -76,7 +77,9 @@ export class RefiningEvaluator implements Evaluator {
     try {
       const fitter = new SceneFitter(device, this.#renderer, scene, pictures);
       try {
-        await fitter.fit({ ...USUAL_DESCENT, ...descent }, signal);
+        const before = await fitter.fit({ ...USUAL_DESCENT, ...descent }, signal);
+        // Few steps, or steps that are too large, may lead away.
+        if (mean(await pictures.measure(scene)) >= mean(before)) return reduced;
       } finally {
         fitter.destroy();
       }

@@ -49,12 +49,11 @@ export interface Descent {
   readonly keepSquare: number;
   /** Derivatives far below this move little: of the squared error of a picture, over all its pixels. */
   readonly least: number;
-  readonly isAdam: boolean;
 }
 
 export const USUAL_DESCENT: Descent = {
-  ...{ steps: 432, viewsAtOnce: 1, lastRate: 0.05, keepMean: 0.9, keepSquare: 0.99, least: 1e-8, isAdam: true },
-  rates: { position: 0, growth: 0, turn: 0, logit: 0.02, constant: 0.005, harmonic: 0.001 },
+  ...{ steps: 1296, viewsAtOnce: 1, lastRate: 0.05, keepMean: 0.9, keepSquare: 0.99, least: 1e-8 },
+  rates: { position: 0, growth: 0.003, turn: 0.003, logit: 0.02, constant: 0.005, harmonic: 0.001 },
 };
 
 /** Fits the splats of a scene to pictures by gradient descent. */
@@ -82,11 +81,11 @@ export class SceneFitter {
     );
   }
 
-  /** Goes down, for so many steps. */
-  async fit(descent: Descent, signal?: AbortSignal): Promise<void> {
+  /** Goes down, for so many steps. @returns [views] errors before */
+  async fit(descent: Descent, signal?: AbortSignal): Promise<readonly number[]> {
     const { steps, viewsAtOnce, lastRate } = descent;
     // Draws all views until the renderer has room for the scene: what lacks splats has wrong derivatives.
-    await this.#errors.measure(this.#scene);
+    const before = await this.#errors.measure(this.#scene);
     const order = viewOrder(this.#errors.exhibits.length);
     let looks = 0;
     for (let step = 0; step < steps; step++) {
@@ -98,6 +97,7 @@ export class SceneFitter {
       this.#step(step + 1, lastRate ** (step / steps), descent);
     }
     await this.#device.queue.onSubmittedWorkDone();
+    return before;
   }
 
   /** Adds the derivatives of one view to those of the scene. */
@@ -116,13 +116,13 @@ export class SceneFitter {
     const bindings = backward.bind({ ...painted, ...pictures, screen: this.#scene.screen });
     backward.dispatchGrid(pass, bindings, Math.ceil(camera.width / TILE), Math.ceil(camera.height / TILE));
     const chain = rareKernelOf(this.#device, refineChain);
-    this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients, influences }, p) => {
+    this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients }, p) => {
       const place = this.#scene.parts.length * view + p;
       const bytes = 4 * SCREEN_NUMBERS;
       const bound = chain.bind({
         view: { buffer: this.#views, offset: VIEW_STRIDE * place, size: rendererLayouts.View.size },
         refine_view: { buffer: this.#refineViews, offset: SMALL_STRIDE * place, size: layouts.RefineView.size },
-        ...{ numbers, degrees, gradients, influences },
+        ...{ numbers, degrees, gradients },
         screen: { buffer: this.#scene.screen, offset: bytes * first, size: bytes * row },
       });
       chain.dispatch(pass, bound, Math.ceil(page.count / REFINE_GROUP));
@@ -136,18 +136,17 @@ export class SceneFitter {
   }
 
   /** @param number of the step, from 1 on @param share of the rates that is left */
-  #step(number: number, share: number, { rates, keepMean, keepSquare, least, isAdam, viewsAtOnce }: Descent): void {
+  #step(number: number, share: number, { rates, keepMean, keepSquare, least }: Descent): void {
     const kernel = rareKernelOf(this.#device, refineStep);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.step' });
     const pass = encoder.beginComputePass({ label: 'gs.refine.step' });
-    this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means, influences }, p) => {
+    this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means }, p) => {
       const bytes = new ArrayBuffer(layouts.RefineStep.size);
       writeStruct(
         layouts.RefineStep,
         {
           ...{ splat_count: page.count, row, harmonics: 3 * shCoefficientCount(this.#scene.shDegree) },
           ...{ keep_mean: keepMean, keep_square: keepSquare, least },
-          ...{ is_adam: +isAdam, look_share: viewsAtOnce },
           mean_scale: 1 / (1 - keepMean ** number),
           square_scale: 1 / (1 - keepSquare ** number),
           ...{ position_rate: share * rates.position, growth_rate: share * rates.growth },
@@ -157,7 +156,7 @@ export class SceneFitter {
         bytes,
       );
       this.#device.queue.writeBuffer(this.#steps[p], 0, bytes);
-      const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means, influences });
+      const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means });
       kernel.dispatch(pass, bindings, Math.ceil(page.count / REFINE_GROUP));
     });
     this.#scene.pack(pass);
