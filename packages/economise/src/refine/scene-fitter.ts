@@ -13,12 +13,15 @@ import { REFINE_GROUP, refineBackward, refineChain, refineStep, SCREEN_NUMBERS }
 import { layouts } from '../gpu/layouts.js';
 import { NO_VIEW } from '../gpu/no-view.js';
 import type { PictureErrors } from '../gpu/picture-errors.js';
+import { mean } from '../measure.js';
 import type { RefinedScene } from './refined-scene.js';
 
 const { TILE } = constants;
 /** Bindings begin at multiples of 256 bytes. */
 const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
 const SMALL_STRIDE = 256;
+/** Mean squared error that the rates are for: 51 dB. Nearer pictures are approached in smaller steps, as their root is. */
+const USUAL_ERROR = 10 ** -5.1;
 /** Views after which the CPU waits for the GPU. */
 const AHEAD = 16;
 
@@ -86,6 +89,7 @@ export class SceneFitter {
     const { steps, viewsAtOnce, lastRate } = descent;
     // Draws all views until the renderer has room for the scene: what lacks splats has wrong derivatives.
     const before = await this.#errors.measure(this.#scene);
+    const pace = Math.min(1, Math.sqrt(mean(before) / USUAL_ERROR));
     const order = viewOrder(this.#errors.exhibits.length);
     let looks = 0;
     for (let step = 0; step < steps; step++) {
@@ -94,7 +98,7 @@ export class SceneFitter {
         this.look(order[looks % order.length]);
         if (looks % AHEAD === AHEAD - 1) await this.#device.queue.onSubmittedWorkDone();
       }
-      this.#step(step + 1, lastRate ** (step / steps), descent);
+      this.#step(step + 1, pace * lastRate ** (step / steps), descent);
     }
     await this.#device.queue.onSubmittedWorkDone();
     return before;
