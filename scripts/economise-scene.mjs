@@ -31,7 +31,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
                   auto (default): gpu where there is one
   --threads N     that share what comes in parts: reading a large PLY, writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
   --merge         merges splats that look like one, too: more go at the same figure, for several times the seconds
-  --refine        fits the splats that stay to pictures of the whole scene, on the GPU, and drops more where that helps; try with and without
+  --refine        fits the splats that stay to pictures of the whole scene, on the GPU, and drops more where that helps
   --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
 `;
 

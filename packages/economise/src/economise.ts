@@ -1,12 +1,12 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import type { Evaluator } from './evaluator.js';
-import { findTrades, scaleToFit } from './fit.js';
+import { findTrades, numbersOf, scaleToFit } from './fit.js';
 import { decibels, mean, meanSquareOf } from './measure.js';
 import { readInParts } from './parts/read-in-parts.js';
 import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
-import { LEFT_BY_REFINING, refinedCut, searchRefined, type RefinedCut } from './refine/search-refined.js';
+import { cutCloud, searchRefined, type CutCloud, type Plan } from './refine/search-refined.js';
 import { Stopwatch } from './stopwatch.js';
 import { encodingsFor, type Encoding } from './write/index.js';
 
@@ -66,15 +66,19 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   const { encoding, rounding } = await chooseEncoding(cloud, encodings, target, options);
   watch.lap('encode');
   const budget = target - rounding;
-  const leftByRefining = evaluator.refine ? LEFT_BY_REFINING : 1;
-  const trades = await findTrades(cloud, ranking, evaluator, budget, { ...options, leftByRefining });
+  const trades = await findTrades(cloud, ranking, evaluator, budget, options);
   watch.lap('search');
-  let found: RefinedCut | undefined = evaluator.refine && (await searchRefined(trades, evaluator, budget, options));
-  if (found) watch.lap('refine');
-  let filling = found?.filling ?? (await scaleToFit(trades, evaluator, budget, options));
+  let plan: Plan = { trades, filling: await scaleToFit(trades, evaluator, budget, options), isRefined: false };
   watch.lap('fit');
+  let ready: CutCloud | undefined;
+  if (evaluator.refine) {
+    ready = await cutCloud(plan, evaluator, budget, signal);
+    const refined = await searchRefined(cloud, ranking, evaluator, budget, options);
+    if (refined && numbersIn(refined.reduced) < numbersIn(ready.reduced)) [plan, ready] = [refined.plan, refined];
+    watch.lap('refine');
+  }
   for (let tries = 0; tries < MAX_TRIES; tries++) {
-    const { cut, reduced } = found ?? (await refinedCut(trades, evaluator, budget, filling, signal));
+    const { cut, reduced } = ready ?? (await cutCloud(plan, evaluator, budget, signal));
     const bytes = await encoding.write(reduced, pool);
     const written = await readInParts(bytes, { name: options.name, signal }, pool);
     watch.lap('write');
@@ -88,8 +92,8 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
         encoding: encoding.title,
         seconds: watch.seconds,
       };
-    filling *= SHRINK;
-    found = undefined;
+    plan = { ...plan, filling: SHRINK * plan.filling };
+    ready = undefined;
   }
   throw unreachable(options, 'less, whatever was kept');
 }
@@ -139,6 +143,8 @@ function summary(
     cut,
   };
 }
+
+const numbersIn = ({ degrees }: ReducedCloud): number => numbersOf(degreesOf(degrees));
 
 function unreachable({ name, minDecibels }: EconomiseOptions, found: string): GaussianSplatError {
   return new GaussianSplatError('argument/value', {

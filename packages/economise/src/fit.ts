@@ -86,7 +86,7 @@ export async function findTrades(
 }
 
 /** Numbers of a file with so many splats of each degree. */
-function numbersOf(degrees: readonly number[]): number {
+export function numbersOf(degrees: readonly number[]): number {
   return degrees.reduce((sum, splats, degree) => sum + splats * (OTHER_NUMBERS + 3 * (degree + 1) ** 2), 0);
 }
 
