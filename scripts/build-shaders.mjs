@@ -30,6 +30,9 @@ RARE[ECONOMISE] = [
   'note_sides',
   'picture_error',
   'picture_error_sum',
+  'refine_backward',
+  'refine_chain',
+  'refine_step',
 ];
 const fileOf = (stage) => Object.keys(RARE).find((file) => RARE[file].includes(stage)) ?? 'shaders';
 const IMPORT = /^#import (\S+)$/gm;

@@ -10,6 +10,7 @@ import {
   GpuEvaluator,
   MergingEvaluator,
   PaintedEvaluator,
+  RefiningEvaluator,
   Studio,
   viewsBetween,
 } from '@gaussian-splat/economise';
@@ -30,6 +31,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
                   auto (default): gpu where there is one
   --threads N     that share what comes in parts: reading a large PLY, writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
   --merge         merges splats that look like one, too: more go at the same figure, for several times the seconds
+  --refine        fits the splats that stay to pictures of the whole scene, on the GPU, and drops more where that helps
   --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
 `;
 
@@ -54,6 +56,7 @@ function parseOptions(args) {
         scored: { ...text, default: '216' },
         threads: { ...text, default: String(usualThreads()) },
         merge: { type: 'boolean', default: false },
+        refine: { type: 'boolean', default: false },
         help: { type: 'boolean' },
       },
     });
@@ -68,7 +71,7 @@ function parseOptions(args) {
   if (values.out === undefined) throw new UsageError('--out is missing');
   const [scene, out] = [resolve(from, positionals[0]), resolve(from, values.out)];
   if (scene === out) throw new UsageError('--out: expected another file than SCENE, which is never changed');
-  const { views, report, scorer, merge } = values;
+  const { views, report, scorer, merge, refine } = values;
   if (!['auto', 'gpu', 'cpu'].includes(scorer))
     throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
   const scored = Number(values.scored);
@@ -77,7 +80,7 @@ function parseOptions(args) {
   const threads = Number(values.threads);
   if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
     throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
-  return { scene, out, minDecibels, views, report, scorer, scored, threads, merge };
+  return { scene, out, minDecibels, views, report, scorer, scored, threads, merge, refine };
 }
 
 function readViews(path, bounds, scored) {
@@ -100,7 +103,7 @@ async function openDevice(scorer) {
   return { device, isGpu };
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored, threads, merge }) {
+async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored, threads, merge, refine }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
   // The file and the driver take their time at the same time.
@@ -117,8 +120,10 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const measuring = isGpu
     ? await GpuEvaluator.create(device, cloud, views, { pool })
     : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
-  const merging = { views: views.scored, mostError: 10 ** (-minDecibels / 10) };
-  const evaluator = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
+  const mostError = 10 ** (-minDecibels / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
+  const merging = { views: views.scored, mostError };
+  const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
+  const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;
   const result = await economise(cloud, {
     ...{ minDecibels, name: out, evaluator, pool },

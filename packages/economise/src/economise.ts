@@ -1,11 +1,12 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import type { Evaluator } from './evaluator.js';
-import { findTrades, scaleToFit } from './fit.js';
+import { findTrades, numbersOf, scaleToFit } from './fit.js';
 import { decibels, mean, meanSquareOf } from './measure.js';
 import { readInParts } from './parts/read-in-parts.js';
 import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
+import { cutCloud, searchRefined, type CutCloud, type Plan } from './refine/search-refined.js';
 import { Stopwatch } from './stopwatch.js';
 import { encodingsFor, type Encoding } from './write/index.js';
 
@@ -36,7 +37,7 @@ export interface Economised {
   readonly decibels: number;
   readonly worstDecibels: number;
   readonly cut: Cut;
-  /** How long each kind of work took, s: `score`, `search`, `fit`, `write` (and read again), `judge`; with several encodings `encode`. */
+  /** How long each kind of work took, s: `score`, `search`, `refine`, `fit`, `write` (and read again), `judge`; with several encodings `encode`. */
   readonly seconds: Readonly<Record<string, number>>;
 }
 
@@ -67,25 +68,32 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   const budget = target - rounding;
   const trades = await findTrades(cloud, ranking, evaluator, budget, options);
   watch.lap('search');
-  let filling = await scaleToFit(trades, evaluator, budget, options);
+  let plan: Plan = { trades, filling: await scaleToFit(trades, evaluator, budget, options), isRefined: false };
   watch.lap('fit');
+  let ready: CutCloud | undefined;
+  if (evaluator.refine) {
+    ready = await cutCloud(plan, evaluator, budget, signal);
+    const refined = await searchRefined(cloud, ranking, evaluator, budget, options);
+    if (refined && numbersIn(refined.reduced) < numbersIn(ready.reduced)) [plan, ready] = [refined.plan, refined];
+    watch.lap('refine');
+  }
   for (let tries = 0; tries < MAX_TRIES; tries++) {
-    const cut = trades.cutAt(filling * budget);
-    const reduced = await evaluator.reduce(cut, signal);
+    const { cut, reduced } = ready ?? (await cutCloud(plan, evaluator, budget, signal));
     const bytes = await encoding.write(reduced, pool);
     const written = await readInParts(bytes, { name: options.name, signal }, pool);
     watch.lap('write');
-    const found = await evaluator.compare(written, 'heldOut', signal);
+    const errors = await evaluator.compare(written, 'heldOut', signal);
     watch.lap('judge');
-    onStep(`held-out views: ${decibels(mean(found)).toFixed(2)} dB`);
-    if (mean(found) <= target)
+    onStep(`held-out views: ${decibels(mean(errors)).toFixed(2)} dB`);
+    if (mean(errors) <= target)
       return {
-        ...summary(cloud, reduced, cut, found),
+        ...summary(cloud, reduced, cut, errors),
         bytes: unshared(bytes),
         encoding: encoding.title,
         seconds: watch.seconds,
       };
-    filling *= SHRINK;
+    plan = { ...plan, filling: SHRINK * plan.filling };
+    ready = undefined;
   }
   throw unreachable(options, 'less, whatever was kept');
 }
@@ -135,6 +143,8 @@ function summary(
     cut,
   };
 }
+
+const numbersIn = ({ degrees }: ReducedCloud): number => numbersOf(degreesOf(degrees));
 
 function unreachable({ name, minDecibels }: EconomiseOptions, found: string): GaussianSplatError {
   return new GaussianSplatError('argument/value', {

@@ -28,6 +28,8 @@ export interface Evaluator {
   compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
   /** [views] the same, as quickly as {@link cut} finds errors: near enough for a search. */
   sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
+  /** Fits what a cut left to pictures of the scene, by evaluators that do ({@link RefiningEvaluator}). What it is given is left as it is. */
+  refine?(reduced: ReducedCloud, signal?: AbortSignal): Promise<ReducedCloud>;
   /** Frees what the evaluator holds. */
   destroy(): void;
   /** Prices at which merges are measured, the lowest first; undefined for an evaluator that merges nothing. */

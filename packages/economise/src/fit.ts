@@ -1,6 +1,6 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { CutFigures, Evaluator } from './evaluator.js';
-import { tradeMerges } from './merge/trade-merges.js';
+import { tradeMerges, type MeasuredCut } from './merge/trade-merges.js';
 import { mean } from './measure.js';
 import { valuesAtPlaces } from './order.js';
 import type { Cut } from './reduce.js';
@@ -25,8 +25,10 @@ export interface Trades {
   readonly cutAt: (error: number) => Cut;
 }
 
-/** How a search is watched and ended. */
+/** How a search is watched and ended, and what it may count on. */
 export interface FitOptions {
+  /** Part of the error of drops and merges that refining leaves; 1, the default, where nothing is refined. What fewer bands cost stays as it is. */
+  readonly leftByRefining?: number;
   readonly signal?: AbortSignal;
   readonly onStep?: (step: string) => void;
 }
@@ -43,23 +45,23 @@ export async function findTrades(
   ranking: Ranking,
   evaluator: Evaluator,
   budget: number,
-  { signal, onStep = () => undefined }: FitOptions,
+  { leftByRefining: left = 1, signal, onStep = () => undefined }: FitOptions,
 ): Promise<Trades> {
   const all = cloud.count * (OTHER_NUMBERS + 3 * (cloud.shDegree + 1) ** 2);
-  const along = (thresholds: readonly number[], cutAt: (threshold: number) => Cut): Promise<TradeCurve> =>
+  const along = (thresholds: readonly number[], cutAt: (threshold: number) => Cut, part: number): Promise<TradeCurve> =>
     measureTrades(
       thresholds,
       async (threshold) => {
         const { errors, degrees } = await evaluator.cut(cutAt(threshold), 'searched', signal);
-        return { threshold, error: mean(errors), saved: all - numbersOf(degrees) };
+        return { threshold, error: part * mean(errors), saved: all - numbersOf(degrees) };
       },
       budget,
     );
   onStep('measuring what dropped splats cost');
   const dropping = await chooseDropping(ranking, evaluator, signal);
-  const drop = await along(dropping.thresholds, dropping.cutAt);
+  const drop = await along(dropping.thresholds, dropping.cutAt, left);
   onStep('measuring what fewer bands of colour cost');
-  const colour = await along(cloud.shDegree > 0 ? PRICES : [], (colourPrice) => ({ colourPrice }));
+  const colour = await along(cloud.shDegree > 0 ? PRICES : [], (colourPrice) => ({ colourPrice }), 1);
   const trades: Trades = {
     cutAt: (error) => {
       const [dropped, coloured] = bestTrades(drop, colour, error);
@@ -71,13 +73,20 @@ export async function findTrades(
   const { mergePrices } = evaluator;
   if (mergePrices === undefined) return trades;
   onStep('measuring what merged splats cost');
-  const merge = await along(mergePrices, (mergePrice) => ({ mergePrice }));
+  const merge = await along(mergePrices, (mergePrice) => ({ mergePrice }), left);
   const saved = ({ degrees }: CutFigures): number => all - numbersOf(degrees);
-  return tradeMerges(trades, merge, evaluator, budget, saved, signal);
+  const measure = async (cut: Cut): Promise<MeasuredCut> => {
+    const figures = await evaluator.cut(cut, 'searched', signal);
+    const error = mean(figures.errors);
+    if (left === 1) return { error, saved: saved(figures) };
+    const { errors } = await evaluator.cut({ ...cut, colourPrice: 0 }, 'searched', signal);
+    return { error: error - (1 - left) * Math.min(error, mean(errors)), saved: saved(figures) };
+  };
+  return tradeMerges(trades, merge, budget, measure);
 }
 
 /** Numbers of a file with so many splats of each degree. */
-function numbersOf(degrees: readonly number[]): number {
+export function numbersOf(degrees: readonly number[]): number {
   return degrees.reduce((sum, splats, degree) => sum + splats * (OTHER_NUMBERS + 3 * (degree + 1) ** 2), 0);
 }
 

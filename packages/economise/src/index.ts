@@ -19,6 +19,8 @@ export { decibels, meanSquare, Studio, type Image, type Painter } from './measur
 export { PaintedEvaluator, type PaintedEvaluatorOptions } from './painted-evaluator.js';
 export type { TaskPool } from './parts/task-pool.js';
 export { degreesOf, reduce, type Cut, type ReducedCloud } from './reduce.js';
+export { RefiningEvaluator, type RefiningOptions } from './refine/refining-evaluator.js';
+export type { Descent, Rates } from './refine/scene-fitter.js';
 export { scoreSplats, type Ranking, type Scores } from './score.js';
 export type { ContributionScorer } from './scorer.js';
 export {

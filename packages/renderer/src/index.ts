@@ -29,7 +29,7 @@ export { checkManifest, type DetailManifest } from './detail/manifest.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
 export { readPacked, selectPacked } from './pack/packed-scene.js';
 export type { ShPrecision } from './pack/sh.js';
-export type { AccumulationFormat, FrameNotes, RasterizerName } from './rasterizers/rasterizer.js';
+export type { AccumulationFormat, FrameNotes, NotedFrame, RasterizerName } from './rasterizers/rasterizer.js';
 export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
 export { PictureTensor, type PictureFit, type PictureShape } from './pictures/picture-tensor.js';
 export { Renderer } from './renderer.js';

@@ -13,7 +13,7 @@ import { writeStruct } from './gpu/struct.js';
 import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
 import { Occlusion } from './occlusion.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
-import type { OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
 import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
@@ -119,6 +119,11 @@ export class Renderer {
   get byteLength(): number {
     const parts = [this.#memory, this.#resources, this.#rasterizer, this.#occlusion, this.#accumulation?.texture];
     return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+  }
+
+  /** What the last frame that took notes was painted from; undefined before there is one. */
+  get noted(): NotedFrame | undefined {
+    return this.#rasterizer.noted;
   }
 
   /**

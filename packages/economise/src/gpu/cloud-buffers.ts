@@ -71,7 +71,8 @@ export class CloudBuffers implements GaussianScene {
   }
 }
 
-function pageOf(memory: GpuMemory, degree: ShDegree, count: number): GaussianPage {
+/** An empty page, which the stage `ingest` may fill. */
+export function pageOf(memory: GpuMemory, degree: ShDegree, count: number): GaussianPage {
   const { storage, copySource } = BUFFER_USAGE;
   const buffer = (name: string, bytes: number): GPUBuffer =>
     memory.buffer(`gs.economise.${name}`, bytes, storage | copySource);

@@ -17,7 +17,7 @@ const ALIGNED_TILES = 256 / SUM_BYTES;
 export type Pause = () => Promise<void>;
 
 /** A view, and the picture that others are held against. */
-interface Exhibit {
+export interface Exhibit {
   readonly camera: Camera;
   readonly reference: GPUTexture;
   readonly columns: number;
@@ -36,6 +36,7 @@ export class PictureErrors {
   /** Pictures at hand, by their size. */
   readonly #targets = new Map<string, GPUTexture>();
   readonly #exhibits: readonly Exhibit[];
+  #covered: readonly number[] = [];
   readonly #errors: GPUBuffer;
   readonly #counts: GPUBuffer;
   readonly #sum: GPUBindGroup;
@@ -75,7 +76,8 @@ export class PictureErrors {
   ): Promise<PictureErrors> {
     const made = new PictureErrors(device, renderer, views);
     try {
-      await made.#draw(gaussians, ({ reference }) => reference, pause);
+      const sums = new Float32Array(await made.#draw(gaussians, ({ reference }) => reference, pause));
+      made.#covered = views.map((_, k) => sums[2 * k + 1]);
       return made;
     } catch (error) {
       made.destroy();
@@ -83,9 +85,19 @@ export class PictureErrors {
     }
   }
 
+  /** The views, and the pictures in them. */
+  get exhibits(): readonly Exhibit[] {
+    return this.#exhibits;
+  }
+
+  /** [views] pixels that the references cover. */
+  get covered(): readonly number[] {
+    return this.#covered;
+  }
+
   /** [views] mean squared error of the colours, peak 1, over the pixels that the reference covers; 0 where it covers none. */
   async measure(gaussians: GaussianScene, pause?: Pause): Promise<number[]> {
-    const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.#targetOf(camera), pause));
+    const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.targetOf(camera), pause));
     return this.#exhibits.map((_, k) => (sums[2 * k + 1] === 0 ? 0 : sums[2 * k] / (3 * sums[2 * k + 1])));
   }
 
@@ -97,7 +109,7 @@ export class PictureErrors {
 
   #exhibit(camera: Camera, tiles: GPUBufferBinding): Exhibit {
     const reference = this.#texture(camera, 'gs.economise.reference');
-    const image = this.#targetOf(camera).createView();
+    const image = this.targetOf(camera).createView();
     return {
       ...{ camera, reference },
       columns: Math.ceil(camera.width / ERROR_TILE),
@@ -106,7 +118,8 @@ export class PictureErrors {
     };
   }
 
-  #targetOf(camera: Camera): GPUTexture {
+  /** A picture to draw a view into. */
+  targetOf(camera: Camera): GPUTexture {
     const key = `${camera.width} x ${camera.height}`;
     const target = this.#targets.get(key) ?? this.#texture(camera, 'gs.economise.picture');
     this.#targets.set(key, target);

@@ -1,8 +1,12 @@
-import type { CutFigures, Evaluator } from '../evaluator.js';
 import type { Trades } from '../fit.js';
-import { mean } from '../measure.js';
 import type { Cut } from '../reduce.js';
 import type { TradeCurve } from '../search.js';
+
+/** What a cut costs, mean squared error, and how many numbers of the file it saves. */
+export interface MeasuredCut {
+  readonly error: number;
+  readonly saved: number;
+}
 
 /** Shares of the error that are tried for merges. */
 const MERGE_SHARES = [0, 0.25, 0.5, 0.75, 0.9, 1];
@@ -13,15 +17,12 @@ const NEAR_ENOUGH = 0.97;
 /**
  * How much of the error should go to merges, and how much to the rest. Splats that are dropped and splats that are merged are often the same ones, so that what both save together is measured, in the searched
  * views, and not added up.
- * @param saved numbers of the file that a cut saves
  */
 export async function tradeMerges(
   others: Trades,
   merge: TradeCurve,
-  evaluator: Evaluator,
   budget: number,
-  saved: (figures: CutFigures) => number,
-  signal: AbortSignal | undefined,
+  measure: (cut: Cut) => Promise<MeasuredCut>,
 ): Promise<Trades> {
   let [best, most] = [others, -1];
   for (const share of MERGE_SHARES) {
@@ -31,11 +32,10 @@ export async function tradeMerges(
     });
     let [fits, fails, next] = [0, Infinity, 1];
     for (let tries = 0; tries < TRIES; tries++) {
-      const figures = await evaluator.cut(cutAt(next * budget), 'searched', signal);
-      const error = mean(figures.errors);
+      const { error, saved } = await measure(cutAt(next * budget));
       if (error <= budget) {
         fits = next;
-        if (saved(figures) > most) [best, most] = [{ cutAt: scaled(cutAt, next) }, saved(figures)];
+        if (saved > most) [best, most] = [{ cutAt: scaled(cutAt, next) }, saved];
         if (error > NEAR_ENOUGH * budget) break;
       } else fails = next;
       const guess = error > 0 ? (next * 0.99 * budget) / error : 2 * next;

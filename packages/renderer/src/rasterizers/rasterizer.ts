@@ -55,6 +55,20 @@ export interface FrameNotes {
   readonly depth?: GPUTexture;
 }
 
+/** What a frame that took notes was painted from, for passes that go over it again. All of it is the renderer's: to be read before the next frame. */
+export interface NotedFrame {
+  /** `BinView` of shaders/shared/bins.wgsl. */
+  readonly view: GPUBuffer;
+  /** array<ProjectedSplat> by slot. */
+  readonly splats: GPUBuffer;
+  /** array<vec2u>: a slot and the tiles of the bin that it touches, bin by bin and in depth order. */
+  readonly pairs: GPUBuffer;
+  /** array<vec2u>: of each bin the first pair, and the one behind the last. */
+  readonly ranges: GPUBuffer;
+  /** Numbers of the splats by slot, as {@link FrameNotes.contributions} counts them. */
+  readonly survivors: GPUBuffer;
+}
+
 /** Levers that rasterizers know. */
 export type PaintingLevers = Pick<Levers, 'alphaMin' | 'transmittanceMin' | 'occludedBelow'>;
 
@@ -90,6 +104,8 @@ export interface Rasterizer {
   readonly byteLength: number;
   /** `Plan` of the pairs of splat and bin, where there are pairs. */
   readonly pairPlan?: GPUBuffer;
+  /** What the last frame that took notes was painted from. */
+  readonly noted?: NotedFrame;
   /** True if the rasterizer can write a final image of this format by itself. */
   finishes(format: GPUTextureFormat): boolean;
   /** Remembers the buffers; called again only when they are replaced. */

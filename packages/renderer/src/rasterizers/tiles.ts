@@ -18,6 +18,7 @@ import { sortedIn, SortStage, type SortBindings, type SortName } from '../stages
 import type {
   AccumulationFormat,
   FrameNotes,
+  NotedFrame,
   OrderKind,
   Painting,
   PaintingLevers,
@@ -97,6 +98,7 @@ export class TilesRasterizer implements Rasterizer {
   readonly #bound = new Map<string, GridBindings>();
   /** Where notes go that nobody asked for. */
   #nowhere: Required<FrameNotes> | undefined;
+  #noted: NotedFrame | undefined;
 
   constructor(device: GPUDevice, accumulation: AccumulationFormat, sort: SortName) {
     this.#device = device;
@@ -115,6 +117,10 @@ export class TilesRasterizer implements Rasterizer {
 
   get pairPlan(): GPUBuffer | undefined {
     return this.#buffers?.plan;
+  }
+
+  get noted(): NotedFrame | undefined {
+    return this.#noted;
   }
 
   finishes(format: GPUTextureFormat): boolean {
@@ -312,8 +318,7 @@ export class TilesRasterizer implements Rasterizer {
       }),
     };
     return (kernel as unknown as ComputeKernel<typeof rasterizeTilesNoting>).bind({
-      ...this.#painted(bound, image),
-      survivors: this.#inputs!.survivors,
+      ...(this.#noted = { ...this.#painted(bound, image), survivors: this.#inputs!.survivors }),
       contributions: contributions ?? this.#nowhere.contributions,
       depths: (depth ?? this.#nowhere.depth).createView(),
     });

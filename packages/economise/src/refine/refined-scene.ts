@@ -1,0 +1,215 @@
+import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import type { GaussianPage, GaussianScene } from '@gaussian-splat/renderer';
+import {
+  BUFFER_USAGE,
+  constants,
+  GpuMemory,
+  IngestStage,
+  layouts as rendererLayouts,
+  pageCapacity,
+  recentred,
+  withMemoryCheck,
+  writeStruct,
+} from '@gaussian-splat/renderer/stages';
+import { LOGIT_AT, ROTATION_AT, SCALE_AT, SCREEN_NUMBERS, SH_AT, SH_STEP } from '../generated/shaders.js';
+import { pageOf } from '../gpu/cloud-buffers.js';
+import { readBack } from '../gpu/read-back.js';
+import type { ReducedCloud } from '../reduce.js';
+
+const { CULL_GROUP, SHAPE_LOG_SCALE, COLOR_COEFFICIENT_MAJOR } = constants;
+const FLOAT_BYTES = 4;
+/** Logits beyond it are opacities of 0 or 1 in float32, and scales below it of no size: what has no finite logarithm gets one. */
+const MOST_LOGIT = 15;
+const LEAST_SCALE = 1e-20;
+
+/** A page of splats whose numbers are sought. */
+export interface RefinedPart {
+  readonly page: GaussianPage;
+  /** Number of its first splat among all, which is a multiple of 256. */
+  readonly first: number;
+  /** Splats in whole chunks: from one row of `gradients` and `means` to the next. */
+  readonly row: number;
+  /** array<f32>: what shaders/shared/refined.wgsl has of each splat. */
+  readonly numbers: GPUBuffer;
+  /** array<u32>: the degree that each splat keeps. */
+  readonly degrees: GPUBuffer;
+  /** array<f32> and array<vec2f>: a row for each number that is sought. */
+  readonly gradients: GPUBuffer;
+  readonly means: GPUBuffer;
+  readonly packing: GPUBindGroup;
+}
+
+/** A cloud on the GPU whose numbers change from picture to picture: float32 numbers, and the packed splats that the renderer draws. */
+export class RefinedScene implements GaussianScene {
+  readonly count: number;
+  readonly shDegree: GaussianScene['shDegree'];
+  readonly shPrecision = 'float16';
+  readonly antialiased: boolean;
+  readonly origin: GaussianScene['origin'];
+  readonly pages: readonly GaussianPage[];
+  readonly parts: readonly RefinedPart[];
+  /** array<f32>: SCREEN_NUMBERS of each splat, of every page whole chunks. */
+  readonly screen: GPUBuffer;
+  readonly #device: GPUDevice;
+  readonly #memory: GpuMemory;
+  readonly #ingest: IngestStage;
+  readonly #cloud: GaussianCloud;
+  #version = 0;
+
+  private constructor(
+    device: GPUDevice,
+    { cloud, degrees }: Omit<ReducedCloud, 'kept'>,
+    memory: GpuMemory,
+    most: number,
+  ) {
+    this.#device = device;
+    this.#memory = memory;
+    this.#cloud = cloud;
+    this.#ingest = new IngestStage(device);
+    ({ count: this.count, shDegree: this.shDegree, antialiased: this.antialiased, origin: this.origin } = cloud);
+    const { storage, copyDestination } = BUFFER_USAGE;
+    const parts: RefinedPart[] = [];
+    let first = 0;
+    for (let begin = 0; begin < cloud.count; begin += most) {
+      const part = this.#partOf(begin, Math.min(most, cloud.count - begin), first, degrees);
+      first += part.row;
+      parts.push(part);
+    }
+    this.parts = parts;
+    this.pages = parts.map(({ page }) => page);
+    const bytes = FLOAT_BYTES * SCREEN_NUMBERS * Math.max(CULL_GROUP, first);
+    this.screen = memory.buffer('gs.refine.screen', bytes, storage | copyDestination);
+    this.#packAll();
+  }
+
+  /**
+   * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each number of a splat, some 1.1 kB at degree 3 with what is drawn.
+   * @param mostSplats of a page; default what the device's limits allow
+   * @throws GaussianSplatError `out-of-memory/*`
+   */
+  static async of(
+    device: GPUDevice,
+    reduced: Omit<ReducedCloud, 'kept'>,
+    mostSplats = Infinity,
+  ): Promise<RefinedScene> {
+    const memory = new GpuMemory(device);
+    const sought = SH_STEP + 3 * shCoefficientCount(reduced.cloud.shDegree);
+    const capacity = pageCapacity(device, 2 * FLOAT_BYTES * sought);
+    const most = Math.min(capacity, CULL_GROUP * Math.max(1, Math.floor(mostSplats / CULL_GROUP)));
+    try {
+      const cloud = recentred(reduced.cloud);
+      const make = (): RefinedScene => new RefinedScene(device, { ...reduced, cloud }, memory, most);
+      return await withMemoryCheck(device, `${reduced.cloud.count} splats to refine`, make);
+    } catch (error) {
+      memory.destroy();
+      throw error;
+    }
+  }
+
+  get version(): number {
+    return this.#version;
+  }
+
+  /** Makes what is drawn from the numbers. To be recorded after whatever changed them. */
+  pack(pass: GPUComputePassEncoder): void {
+    for (const { packing, page } of this.parts) this.#ingest.record(pass, packing, page.count);
+    this.#version++;
+  }
+
+  /** The cloud as the numbers are now. */
+  async read(): Promise<GaussianCloud> {
+    const width = this.#width;
+    const read = await readBack(
+      this.#device,
+      this.parts.map(({ numbers, page }) => ({ buffer: numbers, byteLength: FLOAT_BYTES * width * page.count })),
+    );
+    const [positions, scales, rotations] = [3, 3, 4].map((size) => new Float32Array(size * this.count));
+    const opacities = new Float32Array(this.count);
+    const sh = new Float32Array((width - SH_AT) * this.count);
+    let i = 0;
+    for (const bytes of read) {
+      const numbers = new Float32Array(bytes);
+      for (let at = 0; at < numbers.length; at += width, i++) {
+        positions.set(numbers.subarray(at, at + 3), 3 * i);
+        for (let k = 0; k < 3; k++) scales[3 * i + k] = Math.exp(numbers[at + SCALE_AT + k]);
+        rotations.set(numbers.subarray(at + ROTATION_AT, at + LOGIT_AT), 4 * i);
+        opacities[i] = 1 / (1 + Math.exp(-numbers[at + LOGIT_AT]));
+        sh.set(numbers.subarray(at + SH_AT, at + width), (width - SH_AT) * i);
+      }
+    }
+    return { ...this.#cloud, positions, scales, rotations, opacities, sh };
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+  }
+
+  get #width(): number {
+    return SH_AT + 3 * shCoefficientCount(this.shDegree);
+  }
+
+  #packAll(): void {
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.pack' });
+    const pass = encoder.beginComputePass({ label: 'gs.refine.pack' });
+    this.pack(pass);
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  #partOf(begin: number, count: number, first: number, degrees: Uint8Array): RefinedPart {
+    const { storage, copySource, uniform } = BUFFER_USAGE;
+    const row = CULL_GROUP * Math.ceil(count / CULL_GROUP);
+    const sought = SH_STEP + this.#width - SH_AT;
+    const buffer = (name: string, bytes: number, content?: Uint32Array): GPUBuffer =>
+      this.#memory.buffer(`gs.refine.${name}`, bytes, storage | copySource, content);
+    const page = pageOf(this.#memory, this.shDegree, count);
+    const rows = numbersOf(this.#cloud, begin, count, this.#width);
+    const numbers = buffer('numbers', rows.byteLength, new Uint32Array(rows.buffer));
+    const bytes = this.#ingestOf(count);
+    const packing = this.#ingest.bind({
+      ingest: this.#memory.buffer('gs.refine.ingest', bytes.byteLength, uniform, new Uint32Array(bytes)),
+      ...{ positions: numbers, shapes: numbers, rotations: numbers, colors: numbers, opacities: numbers },
+      ...{ gaussians: page.geometry, sh: page.sh, chunks: page.chunks },
+    });
+    return {
+      ...{ page, first, row, numbers, packing },
+      degrees: buffer('degrees', 4 * count, Uint32Array.from(degrees.subarray(begin, begin + count))),
+      gradients: buffer('gradients', FLOAT_BYTES * sought * row),
+      means: buffer('means', 2 * FLOAT_BYTES * sought * row),
+    };
+  }
+
+  /** `Ingest` of rows of numbers. */
+  #ingestOf(count: number): ArrayBuffer {
+    const bytes = new ArrayBuffer(rendererLayouts.Ingest.size);
+    const width = this.#width;
+    writeStruct(
+      rendererLayouts.Ingest,
+      {
+        ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 1 },
+        ...{ shape_kind: SHAPE_LOG_SCALE, color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: this.shDegree },
+        ...{ positions: [0, width], shapes: [SCALE_AT, width], rotations: [ROTATION_AT, width] },
+        ...{ colors: [SH_AT, width], opacities: [LOGIT_AT, width] },
+      },
+      bytes,
+    );
+    return bytes;
+  }
+}
+
+/** [count, width] the numbers of some splats. */
+function numbersOf(cloud: GaussianCloud, begin: number, count: number, width: number): Float32Array<ArrayBuffer> {
+  const rows = new Float32Array(width * count);
+  for (let k = 0, at = 0; k < count; k++, at += width) {
+    const i = begin + k;
+    const opacity = cloud.opacities[i];
+    const logit = Math.log(opacity / (1 - opacity));
+    rows.set(cloud.positions.subarray(3 * i, 3 * i + 3), at);
+    for (let axis = 0; axis < 3; axis++)
+      rows[at + SCALE_AT + axis] = Math.log(Math.max(LEAST_SCALE, cloud.scales[3 * i + axis]));
+    rows.set(cloud.rotations.subarray(4 * i, 4 * i + 4), at + ROTATION_AT);
+    rows[at + LOGIT_AT] = Math.min(MOST_LOGIT, Math.max(-MOST_LOGIT, logit));
+    rows.set(cloud.sh.subarray((width - SH_AT) * i, (width - SH_AT) * (i + 1)), at + SH_AT);
+  }
+  return rows;
+}

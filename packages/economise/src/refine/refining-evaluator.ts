@@ -1,0 +1,127 @@
+import { GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
+import { Renderer } from '@gaussian-splat/renderer';
+import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
+import { CloudBuffers } from '../gpu/cloud-buffers.js';
+import { PictureErrors } from '../gpu/picture-errors.js';
+import { mean } from '../measure.js';
+import type { Cut, ReducedCloud } from '../reduce.js';
+import type { Ranking } from '../score.js';
+import { RefinedScene } from './refined-scene.js';
+import { SceneFitter, USUAL_DESCENT, type Descent } from './scene-fitter.js';
+import { LEFT_BY_REFINING } from './search-refined.js';
+
+export interface RefiningOptions {
+  /** Draws the pictures that splats are fitted to, and goes over them backwards. */
+  readonly device: GPUDevice;
+  /** Views of these pictures: those that splats are scored in. None of them may be searched or held out. */
+  readonly views: readonly Camera[];
+  /** How splats are fitted; what is left out is as usual. */
+  readonly descent?: Partial<Descent>;
+}
+
+/**
+ * An evaluator whose cuts can be refined, besides what another one does: the splats that stay are fitted to pictures of the whole scene, by gradient descent through the rasterizer. The pictures stay on the
+ * GPU: 16 bytes for each pixel of the views. A splat takes 1.1 kB there at degree 3 while it is fitted.
+ */
+export class RefiningEvaluator implements Evaluator {
+  /** Part of the error of drops and merges that is taken to be left by refining: merges must be found up to so much more (`MergingOptions.mostError`). */
+  static readonly leftByRefining = LEFT_BY_REFINING;
+  readonly #inner: Evaluator;
+  readonly #cloud: GaussianCloud;
+  readonly #options: RefiningOptions;
+  readonly #renderer: Renderer;
+  #pictures: Promise<PictureErrors> | undefined;
+
+  /**
+   * @param inner is destroyed with this one
+   * @param cloud the one that `inner` looks at
+   * @throws GaussianSplatError `unsupported/no-webgpu` without a device; `argument/value` without a view
+   */
+  constructor(inner: Evaluator, cloud: GaussianCloud, options: RefiningOptions) {
+    requireMeans(options);
+    this.#inner = inner;
+    this.#cloud = cloud;
+    this.#options = options;
+    this.#renderer = new Renderer(options.device, { quality: 'reference' });
+  }
+
+  get mergePrices(): readonly number[] | undefined {
+    return this.#inner.mergePrices;
+  }
+
+  rank(signal?: AbortSignal): Promise<Ranking> {
+    return this.#inner.rank(signal);
+  }
+
+  cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures> {
+    return this.#inner.cut(cut, views, signal);
+  }
+
+  reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud> {
+    return this.#inner.reduce(cut, signal);
+  }
+
+  compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+    return this.#inner.compare(cloud, views, signal);
+  }
+
+  sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]> {
+    return this.#inner.sketch(cloud, views, signal);
+  }
+
+  async refine(reduced: ReducedCloud, signal?: AbortSignal): Promise<ReducedCloud> {
+    const { device, descent } = this.#options;
+    const pictures = await (this.#pictures ??= this.#draw());
+    signal?.throwIfAborted();
+    const scene = await RefinedScene.of(device, reduced);
+    try {
+      const fitter = new SceneFitter(device, this.#renderer, scene, pictures);
+      try {
+        const before = await fitter.fit({ ...USUAL_DESCENT, ...descent }, signal);
+        // Few steps, or steps that are too large, may lead away.
+        if (mean(await pictures.measure(scene)) >= mean(before)) return reduced;
+      } finally {
+        fitter.destroy();
+      }
+      return { ...reduced, cloud: await scene.read() };
+    } finally {
+      scene.destroy();
+    }
+  }
+
+  destroy(): void {
+    this.#inner.destroy();
+    this.#renderer.destroy();
+    void this.#pictures?.then(
+      (pictures) => pictures.destroy(),
+      () => undefined,
+    );
+  }
+
+  async #draw(): Promise<PictureErrors> {
+    const { device, views } = this.#options;
+    const whole = await CloudBuffers.upload(device, this.#cloud);
+    try {
+      return await PictureErrors.of(device, this.#renderer, whole, views);
+    } finally {
+      whole.destroy();
+    }
+  }
+}
+
+function requireMeans({ device, views }: Partial<RefiningOptions>): void {
+  if (device === undefined)
+    throw new GaussianSplatError('unsupported/no-webgpu', {
+      where: 'RefiningOptions.device',
+      expected: 'a GPUDevice: splats are fitted by compute shaders',
+      found: 'none',
+      remedy: 'ask an adapter for one (SwiftShader’s will do, slowly), or do without refining',
+    });
+  if (!views || views.length === 0)
+    throw new GaussianSplatError('argument/value', {
+      where: 'RefiningOptions.views',
+      expected: 'one view or more',
+      found: 'none',
+      remedy: 'give the views that splats are scored in',
+    });
+}

@@ -1,0 +1,202 @@
+import { shCoefficientCount } from '@gaussian-splat/core';
+import type { Renderer } from '@gaussian-splat/renderer';
+import {
+  BUFFER_USAGE,
+  cameraValues,
+  constants,
+  GpuMemory,
+  layouts as rendererLayouts,
+  rareKernelOf,
+  writeStruct,
+} from '@gaussian-splat/renderer/stages';
+import { REFINE_GROUP, refineBackward, refineChain, refineStep, SCREEN_NUMBERS } from '../generated/shaders.js';
+import { layouts } from '../gpu/layouts.js';
+import { NO_VIEW } from '../gpu/no-view.js';
+import type { PictureErrors } from '../gpu/picture-errors.js';
+import { mean } from '../measure.js';
+import type { RefinedScene } from './refined-scene.js';
+
+const { TILE } = constants;
+/** Bindings begin at multiples of 256 bytes. */
+const VIEW_STRIDE = 256 * Math.ceil(rendererLayouts.View.size / 256);
+const SMALL_STRIDE = 256;
+/** Mean squared error that the rates are for: 51 dB. Nearer pictures are approached in smaller steps, as their root is. */
+const USUAL_ERROR = 10 ** -5.1;
+/** Views after which the CPU waits for the GPU. */
+const AHEAD = 16;
+
+/** How far a step goes along each kind of number: Adam's rates at the beginning. */
+export interface Rates {
+  /** In sizes of the splat along its own axes. */
+  readonly position: number;
+  /** Of the logarithms of the scales. */
+  readonly growth: number;
+  /** Radians about the splat's own axes. */
+  readonly turn: number;
+  readonly logit: number;
+  /** Of the coefficients of degree 0, and of the others. */
+  readonly constant: number;
+  readonly harmonic: number;
+}
+
+/** How splats are fitted. */
+export interface Descent {
+  readonly steps: number;
+  /** Views whose derivatives make a step. */
+  readonly viewsAtOnce: number;
+  readonly rates: Rates;
+  /** What is left of the rates at the end: they fall by the same part from step to step. */
+  readonly lastRate: number;
+  /** What is left of Adam's means of derivatives and of their squares from step to step. */
+  readonly keepMean: number;
+  readonly keepSquare: number;
+  /** Derivatives far below this move little: of the squared error of a picture, over all its pixels. */
+  readonly least: number;
+}
+
+export const USUAL_DESCENT: Descent = {
+  ...{ steps: 1296, viewsAtOnce: 1, lastRate: 0.05, keepMean: 0.9, keepSquare: 0.99, least: 1e-8 },
+  rates: { position: 0, growth: 0.003, turn: 0.003, logit: 0.02, constant: 0.005, harmonic: 0.001 },
+};
+
+/** Fits the splats of a scene to pictures by gradient descent. */
+export class SceneFitter {
+  readonly #device: GPUDevice;
+  readonly #renderer: Renderer;
+  readonly #scene: RefinedScene;
+  readonly #errors: PictureErrors;
+  readonly #memory: GpuMemory;
+  readonly #views: GPUBuffer;
+  readonly #refineViews: GPUBuffer;
+  readonly #steps: readonly GPUBuffer[];
+
+  /** @param errors the pictures to come near to */
+  constructor(device: GPUDevice, renderer: Renderer, scene: RefinedScene, errors: PictureErrors) {
+    this.#device = device;
+    this.#renderer = renderer;
+    this.#scene = scene;
+    this.#errors = errors;
+    this.#memory = new GpuMemory(device);
+    const { uniform, copyDestination } = BUFFER_USAGE;
+    [this.#views, this.#refineViews] = this.#writeViews();
+    this.#steps = scene.parts.map(() =>
+      this.#memory.buffer('gs.refine.step', layouts.RefineStep.size, uniform | copyDestination),
+    );
+  }
+
+  /** Goes down, for so many steps. @returns [views] errors before */
+  async fit(descent: Descent, signal?: AbortSignal): Promise<readonly number[]> {
+    const { steps, viewsAtOnce, lastRate } = descent;
+    // Draws all views until the renderer has room for the scene: what lacks splats has wrong derivatives.
+    const before = await this.#errors.measure(this.#scene);
+    const pace = Math.min(1, Math.sqrt(mean(before) / USUAL_ERROR));
+    const order = viewOrder(this.#errors.exhibits.length);
+    let looks = 0;
+    for (let step = 0; step < steps; step++) {
+      for (let k = 0; k < viewsAtOnce; k++, looks++) {
+        signal?.throwIfAborted();
+        this.look(order[looks % order.length]);
+        if (looks % AHEAD === AHEAD - 1) await this.#device.queue.onSubmittedWorkDone();
+      }
+      this.#step(step + 1, pace * lastRate ** (step / steps), descent);
+    }
+    await this.#device.queue.onSubmittedWorkDone();
+    return before;
+  }
+
+  /** Adds the derivatives of one view to those of the scene. */
+  look(view: number): void {
+    const { camera, reference } = this.#errors.exhibits[view];
+    const image = this.#errors.targetOf(camera);
+    this.#renderer.render({ gaussians: this.#scene, camera, target: image, notes: {} });
+    const noted = this.#renderer.noted;
+    if (noted === undefined) return;
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.look' });
+    const pass = encoder.beginComputePass({ label: 'gs.refine.look' });
+    const backward = rareKernelOf(this.#device, refineBackward);
+    const { view: tiles, splats, pairs, ranges, survivors } = noted;
+    const painted = { view: tiles, splats, pairs, ranges, survivors };
+    const pictures = { image: image.createView(), reference: reference.createView() };
+    const bindings = backward.bind({ ...painted, ...pictures, screen: this.#scene.screen });
+    backward.dispatchGrid(pass, bindings, Math.ceil(camera.width / TILE), Math.ceil(camera.height / TILE));
+    const chain = rareKernelOf(this.#device, refineChain);
+    this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients }, p) => {
+      const place = this.#scene.parts.length * view + p;
+      const bytes = 4 * SCREEN_NUMBERS;
+      const bound = chain.bind({
+        view: { buffer: this.#views, offset: VIEW_STRIDE * place, size: rendererLayouts.View.size },
+        refine_view: { buffer: this.#refineViews, offset: SMALL_STRIDE * place, size: layouts.RefineView.size },
+        ...{ numbers, degrees, gradients },
+        screen: { buffer: this.#scene.screen, offset: bytes * first, size: bytes * row },
+      });
+      chain.dispatch(pass, bound, Math.ceil(page.count / REFINE_GROUP));
+    });
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  destroy(): void {
+    this.#memory.destroy();
+  }
+
+  /** @param number of the step, from 1 on @param share of the rates that is left */
+  #step(number: number, share: number, { rates, keepMean, keepSquare, least }: Descent): void {
+    const kernel = rareKernelOf(this.#device, refineStep);
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.step' });
+    const pass = encoder.beginComputePass({ label: 'gs.refine.step' });
+    this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means }, p) => {
+      const bytes = new ArrayBuffer(layouts.RefineStep.size);
+      writeStruct(
+        layouts.RefineStep,
+        {
+          ...{ splat_count: page.count, row, harmonics: 3 * shCoefficientCount(this.#scene.shDegree) },
+          ...{ keep_mean: keepMean, keep_square: keepSquare, least },
+          mean_scale: 1 / (1 - keepMean ** number),
+          square_scale: 1 / (1 - keepSquare ** number),
+          ...{ position_rate: share * rates.position, growth_rate: share * rates.growth },
+          ...{ turn_rate: share * rates.turn, logit_rate: share * rates.logit },
+          ...{ constant_rate: share * rates.constant, harmonic_rate: share * rates.harmonic },
+        },
+        bytes,
+      );
+      this.#device.queue.writeBuffer(this.#steps[p], 0, bytes);
+      const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means });
+      kernel.dispatch(pass, bindings, Math.ceil(page.count / REFINE_GROUP));
+    });
+    this.#scene.pack(pass);
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
+  /** `View` and `RefineView` of each view and part. */
+  #writeViews(): [GPUBuffer, GPUBuffer] {
+    const { parts, origin, antialiased, shDegree } = this.#scene;
+    const { exhibits, covered } = this.#errors;
+    const places = parts.length * exhibits.length;
+    const [views, small] = [VIEW_STRIDE, SMALL_STRIDE].map((stride) => new ArrayBuffer(stride * places));
+    exhibits.forEach(({ camera }, k) => {
+      const values = {
+        ...{ ...NO_VIEW, ...cameraValues(camera, origin) },
+        ...{ antialiased: +antialiased, sh_degree: shDegree },
+      };
+      const weight = covered[k] > 0 ? (camera.width * camera.height) / covered[k] : 0;
+      parts.forEach(({ page, row }, p) => {
+        const place = parts.length * k + p;
+        writeStruct(rendererLayouts.View, { ...values, splat_count: page.count }, views, VIEW_STRIDE * place);
+        writeStruct(layouts.RefineView, { row, weight }, small, SMALL_STRIDE * place);
+      });
+    });
+    const { uniform } = BUFFER_USAGE;
+    return [views, small].map((bytes) =>
+      this.#memory.buffer('gs.refine.views', bytes.byteLength, uniform, new Uint32Array(bytes)),
+    ) as [GPUBuffer, GPUBuffer];
+  }
+}
+
+/** All views, those far apart in the list next to one another. */
+function viewOrder(count: number): number[] {
+  const gcd = (a: number, b: number): number => (b === 0 ? a : gcd(b, a % b));
+  let step = Math.max(1, Math.round(0.618 * count));
+  while (gcd(step, count) !== 1) step++;
+  return Array.from({ length: count }, (_, k) => (k * step) % count);
+}

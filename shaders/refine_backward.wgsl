@@ -1,0 +1,148 @@
+// From the pixels of a picture back to the splats that painted it: how the squared error to another picture changes with their colours and ellipses. One workgroup for each
+// tile of 16 x 16 pixels and one thread a pixel, front to back as the tiles were painted: what lies behind a splat is the finished colour without what was painted so far,
+// so that nothing need be kept. Derivatives are summed over the pixels of a tile in fixed point, and then added to those of the splat.
+#import shared/bins
+#import shared/coverage
+#import shared/bits
+#import shared/refined
+
+@group(0) @binding(0) var<uniform> view: BinView;
+@group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
+// Slot, and the tiles of the bin that the splat touches: bin by bin, in depth order.
+@group(0) @binding(2) var<storage, read> pairs: array<vec2u>;
+@group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
+// Numbers of the splats by slot.
+@group(0) @binding(4) var<storage, read> survivors: array<u32>;
+// Premultiplied red, green, blue and alpha.
+@group(0) @binding(5) var image: texture_2d<f32>;
+@group(0) @binding(6) var reference: texture_2d<f32>;
+// SCREEN_NUMBERS of each splat, bits of float32.
+@group(0) @binding(7) var<storage, read_write> screen: array<atomic<u32>>;
+
+const TILE_THREADS = TILE * TILE;
+// Pairs that are looked at together.
+const PAIR_BATCH = 128u;
+const PAIR_BATCH_WORDS = PAIR_BATCH / 32u;
+// Larger differences of a channel count as if they were so large: outliers must not lead.
+const MOST_DIFFERENCE = 0.0625;
+// Steps of the fixed point in 1, and the largest number that a pixel adds: 256 of them fit an i32.
+const FIXED = 16777216.0;
+const MOST_FIXED = 8388607.0;
+
+var<workgroup> slots: array<u32, PAIR_BATCH>;
+var<workgroup> shapes: array<vec4f, PAIR_BATCH>;
+var<workgroup> paints: array<vec4u, PAIR_BATCH>;
+var<workgroup> hits: array<atomic<u32>, PAIR_BATCH_WORDS>;
+var<workgroup> sums: array<atomic<i32>, PAIR_BATCH * SCREEN_NUMBERS>;
+var<workgroup> unfinished: atomic<u32>;
+var<workgroup> is_open: u32;
+
+fn add_fixed(k: u32, number: u32, value: f32) {
+  atomicAdd(&sums[k * SCREEN_NUMBERS + number], i32(clamp(round(value * FIXED), -MOST_FIXED, MOST_FIXED)));
+}
+
+fn add_float(at: u32, value: f32) {
+  var old = atomicLoad(&screen[at]);
+  loop {
+    let result = atomicCompareExchangeWeak(&screen[at], old, bitcast<u32>(bitcast<f32>(old) + value));
+    if (result.exchanged) { break; }
+    old = result.old_value;
+  }
+}
+
+struct Pixel {
+  place: vec2f,
+  // Derivative of the squared error by each channel.
+  slope: vec3f,
+  // What has not been painted yet.
+  behind: vec3f,
+  transmittance: f32,
+  is_finished: bool,
+}
+
+// As `blend` of paint_tiles, and what the pixel tells of splat k of the batch.
+fn unblend(pixel: ptr<function, Pixel>, k: u32) {
+  let shape = shapes[k];
+  let offset = (*pixel).place - shape.xy;
+  let u = offset.x * shape.z;
+  let v = (offset.y - shape.w * offset.x) * bitcast<f32>(paints[k].x);
+  let own = bitcast<f32>(paints[k].w) * exp(-0.5 * (u * u + v * v));
+  if (own < view.alpha_min) { return; }
+  let alpha = min(ALPHA_MAX, own);
+  let before = (*pixel).transmittance;
+  let weight = before * alpha;
+  if (before - weight <= view.transmittance_min) {
+    (*pixel).is_finished = true;
+    return;
+  }
+  let color = vec3f(unpack2x16float(paints[k].y), unpack2x16float(paints[k].z).x);
+  (*pixel).transmittance = before - weight;
+  (*pixel).behind -= weight * color;
+  let by_color = weight * (*pixel).slope;
+  add_fixed(k, 0u, by_color.x);
+  add_fixed(k, 1u, by_color.y);
+  add_fixed(k, 2u, by_color.z);
+  // One that is as opaque as may be does not become more so.
+  if (own > ALPHA_MAX) { return; }
+  let q = alpha * dot((*pixel).slope, before * color - (*pixel).behind / (1.0 - alpha));
+  add_fixed(k, 3u, q);
+  add_fixed(k, 4u, q * u);
+  add_fixed(k, 5u, q * v);
+  add_fixed(k, 6u, q * u * u);
+  add_fixed(k, 7u, q * u * v);
+  add_fixed(k, 8u, q * v * v);
+}
+
+@compute @workgroup_size(TILE_THREADS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let tile = workgroup_id.xy;
+  let position = tile * TILE + vec2u(lane % TILE, lane / TILE);
+  let bin = tile / vec2u(BIN_COLUMNS, BIN_ROWS);
+  let in_bin = tile % vec2u(BIN_COLUMNS, BIN_ROWS);
+  let tile_bit = 1u << (in_bin.y * BIN_COLUMNS + in_bin.x);
+  let range = ranges[bin.y * view.bins.x + bin.x];
+
+  var pixel = Pixel(vec2f(position) + 0.5, vec3f(0.0), vec3f(0.0), 1.0, true);
+  if (all(position < textureDimensions(reference))) {
+    let expected = textureLoad(reference, position, 0);
+    let painted = textureLoad(image, position, 0).xyz;
+    pixel.is_finished = expected.w == 0.0;
+    pixel.slope = 2.0 * clamp(painted - expected.xyz, vec3f(-MOST_DIFFERENCE), vec3f(MOST_DIFFERENCE));
+    pixel.behind = painted;
+  }
+  for (var first = range.x; first < range.y; first += PAIR_BATCH) {
+    if (lane < PAIR_BATCH_WORDS) { atomicStore(&hits[lane], 0u); }
+    if (lane == 0u) { atomicStore(&unfinished, 0u); }
+    for (var k = lane; k < PAIR_BATCH * SCREEN_NUMBERS; k += TILE_THREADS) { atomicStore(&sums[k], 0); }
+    workgroupBarrier();
+    if (lane < PAIR_BATCH && first + lane < range.y) {
+      let pair = pairs[first + lane];
+      if ((pair.y & tile_bit) != 0u) {
+        let s = splats[pair.x];
+        slots[lane] = pair.x;
+        shapes[lane] = s.shape;
+        paints[lane] = s.paint;
+        atomicOr(&hits[lane / 32u], 1u << (lane % 32u));
+      }
+    }
+    workgroupBarrier();
+    for (var word = 0u; word < PAIR_BATCH_WORDS; word++) {
+      var ahead = atomicLoad(&hits[word]);
+      while (ahead > 0u && !pixel.is_finished) {
+        unblend(&pixel, word * 32u + zeros_below(ahead));
+        ahead &= ahead - 1u;
+      }
+    }
+    if (!pixel.is_finished) { atomicStore(&unfinished, 1u); }
+    workgroupBarrier();
+    if (lane < PAIR_BATCH && (atomicLoad(&hits[lane / 32u]) & (1u << (lane % 32u))) != 0u) {
+      let at = SCREEN_NUMBERS * survivors[slots[lane]];
+      for (var number = 0u; number < SCREEN_NUMBERS; number++) {
+        let sum = atomicLoad(&sums[lane * SCREEN_NUMBERS + number]);
+        if (sum != 0) { add_float(at + number, f32(sum) / FIXED); }
+      }
+    }
+    if (lane == 0u) { is_open = atomicLoad(&unfinished); }
+    if (workgroupUniformLoad(&is_open) == 0u) { break; }
+  }
+}

@@ -1,0 +1,78 @@
+// Moves the numbers of each splat against their derivatives: Adam (Kingma and Ba 2015). Derivatives are zero again afterwards, for the next views.
+#import shared/group
+#import shared/refined
+
+struct RefineStep {
+  splat_count: u32,
+  // From one row to the next.
+  row: u32,
+  // Harmonics of a splat in memory, all channels.
+  harmonics: u32,
+  // What is left of the means of derivatives and of their squares, and what makes these right while there were few.
+  keep_mean: f32,
+  keep_square: f32,
+  mean_scale: f32,
+  square_scale: f32,
+  // Derivatives far below this move little.
+  least: f32,
+  // How far a step goes.
+  position_rate: f32,
+  growth_rate: f32,
+  turn_rate: f32,
+  logit_rate: f32,
+  constant_rate: f32,
+  harmonic_rate: f32,
+}
+
+@group(0) @binding(0) var<uniform> step: RefineStep;
+@group(0) @binding(1) var<storage, read_write> numbers: array<f32>;
+// For each splat the degree that it keeps.
+@group(0) @binding(2) var<storage, read> degrees: array<u32>;
+@group(0) @binding(3) var<storage, read_write> gradients: array<f32>;
+// Means of the derivatives, and of their squares.
+@group(0) @binding(4) var<storage, read_write> means: array<vec2f>;
+
+// How far to go along one of the numbers that are sought, before its rate.
+fn stride_along(i: u32, number: u32) -> f32 {
+  let at = number * step.row + i;
+  let g = gradients[at];
+  gradients[at] = 0.0;
+  let old = means[at];
+  let mean = mix(vec2f(g, g * g), old, vec2f(step.keep_mean, step.keep_square));
+  means[at] = mean;
+  return -mean.x * step.mean_scale / (sqrt(mean.y * step.square_scale) + step.least);
+}
+
+fn vector_along(i: u32, number: u32) -> vec3f {
+  return vec3f(stride_along(i, number), stride_along(i, number + 1u), stride_along(i, number + 2u));
+}
+
+@compute @workgroup_size(REFINE_GROUP)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let i = group_index(workgroup_id) * REFINE_GROUP + lane;
+  if (i >= step.splat_count) { return; }
+  let n = i * (SH_AT + step.harmonics);
+  let s = n + SCALE_AT;
+  let r = n + ROTATION_AT;
+  let q = vec4f(numbers[r], numbers[r + 1u], numbers[r + 2u], numbers[r + 3u]);
+  let own = turned(q, vec3f(numbers[s], numbers[s + 1u], numbers[s + 2u]));
+  let stride = strides(own.scales);
+  let shift = own.axes * (stride * step.position_rate * vector_along(i, 0u));
+  let growth = step.growth_rate * vector_along(i, GROWTH_STEP);
+  // A turn by a small angle about the splat's own axes: q (1, turn / 2).
+  let h = 0.5 * step.turn_rate * swings(stride) * vector_along(i, TURN_STEP);
+  let v = q.yzw;
+  let turned_q = normalize(vec4f(q.x - dot(v, h), v + q.x * h + cross(v, h)));
+  for (var k = 0u; k < 3u; k++) {
+    numbers[n + k] += shift[k];
+    numbers[s + k] += growth[k];
+  }
+  for (var k = 0u; k < 4u; k++) { numbers[r + k] = turned_q[k]; }
+  numbers[n + LOGIT_AT] += step.logit_rate * stride_along(i, LOGIT_STEP);
+  let degree = degrees[i];
+  let kept = 3u * (degree + 1u) * (degree + 1u);
+  for (var k = 0u; k < kept; k++) {
+    let rate = select(step.harmonic_rate, step.constant_rate, k < 3u);
+    numbers[n + SH_AT + k] += rate * stride_along(i, SH_STEP + k);
+  }
+}

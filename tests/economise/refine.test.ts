@@ -1,0 +1,241 @@
+/** What refining makes of what cuts leave: derivatives against those of plain code, and what it gains in views that it was not fitted to. */
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import { boundsOf, GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
+import {
+  cpuPainter,
+  dealtViewsAround,
+  decibels,
+  economise,
+  meanSquare,
+  PaintedEvaluator,
+  RefiningEvaluator,
+} from '@gaussian-splat/economise';
+import { readScene } from '@gaussian-splat/formats';
+import { Renderer } from '@gaussian-splat/renderer';
+import { CloudBuffers } from '../../packages/economise/src/gpu/cloud-buffers.js';
+import { PictureErrors } from '../../packages/economise/src/gpu/picture-errors.js';
+import { readBack } from '../../packages/economise/src/gpu/read-back.js';
+import { RefinedScene } from '../../packages/economise/src/refine/refined-scene.js';
+import { SceneFitter } from '../../packages/economise/src/refine/scene-fitter.js';
+import { smallCloud } from '../formats/support/small-cloud.js';
+import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { seededRandom } from '../support/random.js';
+
+const SIZE = 32;
+const DEGREE = 1;
+const NUMBERS = 12;
+
+/** A ball of large splats, some of them inside, whose colours depend on the view. */
+function ball(count: number): GaussianCloud {
+  const cloud = smallCloud(count, DEGREE, 7);
+  for (let i = 0; i < count; i++) {
+    const p = cloud.positions.subarray(3 * i, 3 * i + 3);
+    const radius = (i % 4 === 0 ? 0.5 : 1) / Math.hypot(...p);
+    p.forEach((value, k) => (p[k] = value * radius));
+    cloud.scales.set([0.15 + 0.1 * (i % 3), 0.25, 0.12 + 0.05 * (i % 2)], 3 * i);
+    cloud.opacities[i] = 0.1 + 0.8 * ((0.618 * i) % 1);
+    for (let k = 0; k < NUMBERS; k++) cloud.sh[NUMBERS * i + k] *= k < 3 ? 0.6 : 0.1;
+  }
+  return cloud;
+}
+
+/** A ball of half as many splats, each of them twice: with one of two gone, the other can stand for both. */
+function twins(count: number): GaussianCloud {
+  const cloud = ball(count);
+  for (let i = 0; i < count; i++) {
+    cloud.opacities[i] *= 0.4;
+    if (i % 2 === 0) continue;
+    for (const values of [cloud.positions, cloud.scales, cloud.rotations, cloud.opacities, cloud.sh]) {
+      const width = values.length / count;
+      values.copyWithin(width * i, width * (i - 1), width * i);
+    }
+  }
+  return cloud;
+}
+
+/** The same with all its numbers off by a little. */
+function disturbed(cloud: GaussianCloud): GaussianCloud {
+  const random = seededRandom(3);
+  const off = (values: Float32Array, by: (value: number) => number): Float32Array => values.map(by);
+  const near = (size: number): number => random.uniform(-size, size);
+  return {
+    ...cloud,
+    positions: off(cloud.positions, (value) => value + near(0.006)),
+    scales: off(cloud.scales, (value) => value * (1 + near(0.02))),
+    opacities: off(cloud.opacities, (value) => value * (1 + near(0.02))),
+    sh: off(cloud.sh, (value) => value + near(0.02)),
+  };
+}
+
+let device: GPUDevice;
+let renderer: Renderer;
+
+before(async () => {
+  device = await serialDevice();
+  renderer = new Renderer(device, { quality: 'reference' });
+});
+
+async function picturesOf(cloud: GaussianCloud, views: readonly Camera[]): Promise<PictureErrors> {
+  const gaussians = await CloudBuffers.upload(device, cloud);
+  const pictures = await PictureErrors.of(device, renderer, gaussians, views);
+  gaussians.destroy();
+  return pictures;
+}
+
+/** Squared error of the colours over the covered pixels, as the fitter weighs it. */
+function lossOf(images: readonly Float32Array[], references: readonly Float32Array[]): number {
+  return images.reduce((sum, image, k) => sum + 3 * SIZE * SIZE * meanSquare(image, references[k]), 0);
+}
+
+/** One number of a splat moved along what the fitter seeks. */
+function moved(cloud: GaussianCloud, i: number, number: number, by: number): GaussianCloud {
+  const [positions, scales, rotations] = [cloud.positions.slice(), cloud.scales.slice(), cloud.rotations.slice()];
+  const [opacities, sh] = [cloud.opacities.slice(), cloud.sh.slice()];
+  const [w, x, y, z] = rotations.subarray(4 * i, 4 * i + 4);
+  const axis = number % 3;
+  const e = [0, 1, 2].map((k) => +(k === axis));
+  if (number < 3) {
+    const own = scales.subarray(3 * i, 3 * i + 3);
+    const step = by * Math.max(own[axis], 0.02 * Math.max(...own));
+    const along = [
+      [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
+      [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
+      [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
+    ][axis];
+    along.forEach((value, k) => (positions[3 * i + k] += step * value));
+  } else if (number < 6) scales[3 * i + axis] *= Math.exp(by);
+  else if (number < 9) {
+    const [s, t] = [1, 2].map((k) => scales[3 * i + ((axis + k) % 3)]);
+    const [a, b, c] = e.map((value) => (by / 2) * value * Math.min(s / t, t / s));
+    const q = [
+      w - x * a - y * b - z * c,
+      x + w * a + y * c - z * b,
+      y + w * b + z * a - x * c,
+      z + w * c + x * b - y * a,
+    ];
+    const length = Math.hypot(...q);
+    rotations.set(
+      q.map((value) => value / length),
+      4 * i,
+    );
+  } else if (number === 9) opacities[i] = 1 / (1 + (1 / opacities[i] - 1) * Math.exp(-by));
+  else sh[NUMBERS * i + number - 10] += by;
+  return { ...cloud, positions, scales, rotations, opacities, sh };
+}
+
+/** What the fitter seeks: the kinds of numbers, the first of each and the one behind the last. */
+const KINDS = {
+  positions: [0, 3],
+  scales: [3, 6],
+  rotations: [6, 9],
+  opacity: [9, 10],
+  colour: [10, 13],
+  bands: [13, 22],
+};
+const STEP = 1e-2;
+
+for (const antialiased of [false, true]) {
+  test(`derivatives are those of plain code's pictures${antialiased ? ', antialiased' : ''}`, async () => {
+    const count = 40;
+    const whole = { ...ball(count), antialiased };
+    const cloud = disturbed(whole);
+    const views = dealtViewsAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 }).scored.slice(0, 2);
+    const pictures = await picturesOf(whole, views);
+    // A splat that keeps fewer bands.
+    const degrees = new Uint8Array(count).fill(DEGREE);
+    degrees[3] = 0;
+    const scene = await RefinedScene.of(device, { cloud, degrees });
+    const fitter = new SceneFitter(device, renderer, scene, pictures);
+    views.forEach((_, k) => fitter.look(k));
+    const [{ gradients, row }] = scene.parts;
+    const found = new Float32Array((await readBack(device, [{ buffer: gradients }]))[0]);
+    const references = await cpuPainter.draw(whole, views);
+    const loss = async (other: GaussianCloud): Promise<number> =>
+      lossOf(await cpuPainter.draw(other, views), references);
+    for (const [kind, [first, end]] of Object.entries(KINDS)) {
+      let [apart, size] = [0, 0];
+      for (let i = 0; i < count; i += 5) {
+        for (let number = first; number < end; number++) {
+          const [less, more] = [moved(cloud, i, number, -STEP), moved(cloud, i, number, STEP)];
+          const expected = ((await loss(more)) - (await loss(less))) / (2 * STEP);
+          apart += (found[number * row + i] - expected) ** 2;
+          size += expected ** 2;
+        }
+      }
+      // Splats that begin to paint a pixel, or cease to, do so at once: differences have that, derivatives do not.
+      const off = Math.sqrt(apart / size);
+      assert.ok(size > 0 && off < 0.12, `${kind}: ${off.toFixed(3)} apart`);
+    }
+    for (let number = 13; number < 22; number++) assert.equal(found[number * row + 3], 0, 'a band that went');
+    fitter.destroy();
+    scene.destroy();
+    pictures.destroy();
+  });
+}
+
+test('a few steps come nearer in views that were not fitted, and leave the source as it is', async () => {
+  const count = 120;
+  const whole = ball(count);
+  const dealt = dealtViewsAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 });
+  const kept = Uint32Array.from({ length: 114 }, (_, k) => k + 6);
+  const first = (values: Float32Array): Float32Array => values.slice((6 * values.length) / count);
+  const { positions, scales, rotations, opacities, sh } = whole;
+  const cloud: GaussianCloud = {
+    ...{ ...whole, count: 114, positions: first(positions), scales: first(scales) },
+    ...{ rotations: first(rotations), opacities: first(opacities), sh: first(sh) },
+  };
+  const before = structuredClone(cloud);
+  const evaluator = new RefiningEvaluator(new PaintedEvaluator(whole, { views: dealt }), whole, {
+    ...{ device, views: dealt.scored.slice(0, 12) },
+    descent: { steps: 20 },
+  });
+  const degrees = new Uint8Array(114).fill(DEGREE);
+  const refined = await evaluator.refine({ cloud, degrees, kept });
+  assert.deepEqual(cloud, before);
+  assert.deepEqual([refined.kept, refined.degrees], [kept, degrees]);
+  const figure = async (other: GaussianCloud): Promise<number> => {
+    const errors = await evaluator.compare(other, 'heldOut');
+    return decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
+  };
+  const [without, reached] = [await figure(cloud), await figure(refined.cloud)];
+  console.log(`a twentieth gone: ${without.toFixed(1)} dB, refined ${reached.toFixed(1)} dB`);
+  assert.ok(reached > without + 1, `${reached} dB, ${without} dB without`);
+  evaluator.destroy();
+});
+
+test('the figure is kept with fewer splats, and the source is left as it is', async () => {
+  const whole = twins(200);
+  const dealt = dealtViewsAround(boundsOf(whole), { width: SIZE, height: SIZE, scored: 24 });
+  const options = { minDecibels: 43, name: 'a.glb' };
+  const painted = (): PaintedEvaluator => new PaintedEvaluator(whole, { views: dealt });
+  const without = await economise(whole, { ...options, evaluator: painted() });
+  const rates = { position: 0, growth: 0, turn: 0, logit: 0.08, constant: 0.004, harmonic: 0.001 };
+  const descent = { rates, steps: 16 };
+  const evaluator = new RefiningEvaluator(painted(), whole, { device, views: dealt.scored.slice(0, 12), descent });
+  const result = await economise(whole, { ...options, evaluator });
+  const written = await readScene(result.bytes, { name: 'a.glb' });
+  const errors = await evaluator.compare(written, 'heldOut');
+  const found = decibels(errors.reduce((sum, error) => sum + error, 0) / errors.length);
+  console.log(`43 dB: ${result.splats.after} of 200 splats, ${without.splats.after} without; ${found.toFixed(1)} dB`);
+  assert.ok(found >= 43 && Math.abs(found - result.decibels) < 1e-6, `${found} dB`);
+  assert.ok(result.splats.after < 0.97 * without.splats.after);
+  assert.equal(written.count, result.splats.after);
+  assert.deepEqual(whole, twins(200));
+  evaluator.destroy();
+});
+
+test('without a device it says so', () => {
+  const cloud = ball(4);
+  const views = dealtViewsAround(boundsOf(cloud));
+  const options = { device: undefined as unknown as GPUDevice, views: views.scored };
+  assert.throws(
+    () => new RefiningEvaluator(new PaintedEvaluator(cloud, { views }), cloud, options),
+    (error) => error instanceof GaussianSplatError && error.code === 'unsupported/no-webgpu',
+  );
+});
+
+after(async () => {
+  renderer.destroy();
+  await endNodeDevice();
+});
