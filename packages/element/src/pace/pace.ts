@@ -35,8 +35,8 @@ export interface Pace {
   readonly barred: Readonly<Record<number, { readonly until: number; readonly failures: number }>>;
 }
 
-/** `start`: nothing is known yet; `slow`: frames took too long; `spare`: there was time to spare. */
-export type PaceReason = 'start' | 'slow' | 'spare';
+/** `start`: nothing is known yet; `slow`: frames took too long; `spare`: there was time to spare; `trial`: it may be that more of the picture takes no longer. */
+export type PaceReason = 'start' | 'slow' | 'spare' | 'trial';
 
 /** Frames that are remembered, and the share of them that counts: a slow frame now and then is nobody's fault. */
 const MEMORY = 20;
@@ -79,7 +79,8 @@ export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, 
   const known = { ...pace, recent: [...pace.recent, milliseconds].slice(-MEMORY) };
   const excess = excessOf(known.recent, rules.targetMs);
   if (excess !== null && level + 1 < rules.costs.length && !isNoDearer(known)) return fall(known, now, excess, rules);
-  return mayClimb(known, now, rules) ? change(known, now, level - 1, 'spare') : known;
+  const reason = climbReason(known, now, rules);
+  return reason === null ? known : change(known, now, level - 1, reason);
 }
 
 /** How long frames take where they take too long, as a share of the target; null where they do not. */
@@ -103,14 +104,14 @@ function fall(pace: Pace, now: number, excess: number, { costs }: PaceRules): Pa
   return { ...next, barred: { ...barred, [level]: { until, failures } } };
 }
 
-/** Additive increase: one rung, after a hold, if its frames would be in time even at the most that it can cost; or to try it. */
-function mayClimb(pace: Pace, now: number, { costs, targetMs }: PaceRules): boolean {
+/** Additive increase: one rung, after a hold, if its frames would be in time even at the most that it can cost; or to try it. Null: stay. */
+function climbReason(pace: Pace, now: number, { costs, targetMs }: PaceRules): PaceReason | null {
   const { level, recent, changedAt, barred } = pace;
-  if (level === 0 || now - changedAt < HOLD_MS || recent.length < ENOUGH_FRAMES) return false;
-  if (now < (barred[level - 1]?.until ?? -Infinity)) return false;
+  if (level === 0 || now - changedAt < HOLD_MS || recent.length < ENOUGH_FRAMES) return null;
+  if (now < (barred[level - 1]?.until ?? -Infinity)) return null;
   const usual = quantile(recent, COUNTED);
-  if (usual * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs) return true;
-  return now - changedAt >= TRIAL_MS || isNoDearer(pace);
+  if (usual * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs) return 'spare';
+  return now - changedAt >= TRIAL_MS || isNoDearer(pace) ? 'trial' : null;
 }
 
 /** Frames take no longer than on the rung below, from which the pace has climbed: there is nothing to be won there. */
