@@ -1,6 +1,7 @@
 // From the pixels of a picture back to the splats that painted it: how the squared error to another picture changes with their colours and ellipses. One workgroup for each
 // tile of 16 x 16 pixels and one thread a pixel, front to back as the tiles were painted: what lies behind a splat is the finished colour without what was painted so far,
-// so that nothing need be kept. Derivatives are summed over the pixels of a tile in fixed point, and then added to those of the splat.
+// so that nothing need be kept. Derivatives are summed in fixed point, over the pixels of a tile and then over the tiles: in whichever order tiles come, the sums are the same,
+// and none waits for another or tries again.
 #import shared/bins
 #import shared/coverage
 #import shared/bits
@@ -16,8 +17,8 @@
 // Premultiplied red, green, blue and alpha.
 @group(0) @binding(5) var image: texture_2d<f32>;
 @group(0) @binding(6) var reference: texture_2d<f32>;
-// SCREEN_NUMBERS of each splat, bits of float32.
-@group(0) @binding(7) var<storage, read_write> screen: array<atomic<u32>>;
+// SCREEN_NUMBERS of each splat, two words each: see `of_fixed`.
+@group(0) @binding(7) var<storage, read_write> screen: array<atomic<i32>>;
 
 const TILE_THREADS = TILE * TILE;
 // Pairs that are looked at together.
@@ -25,8 +26,7 @@ const PAIR_BATCH = 128u;
 const PAIR_BATCH_WORDS = PAIR_BATCH / 32u;
 // Larger differences of a channel count as if they were so large: outliers must not lead.
 const MOST_DIFFERENCE = 0.0625;
-// Steps of the fixed point in 1, and the largest number that a pixel adds: 256 of them fit an i32.
-const FIXED = 16777216.0;
+// The largest number of steps that a pixel adds: 256 of them fit an i32.
 const MOST_FIXED = 8388607.0;
 
 var<workgroup> slots: array<u32, PAIR_BATCH>;
@@ -41,13 +41,10 @@ fn add_fixed(k: u32, number: u32, value: f32) {
   atomicAdd(&sums[k * SCREEN_NUMBERS + number], i32(clamp(round(value * FIXED), -MOST_FIXED, MOST_FIXED)));
 }
 
-fn add_float(at: u32, value: f32) {
-  var old = atomicLoad(&screen[at]);
-  loop {
-    let result = atomicCompareExchangeWeak(&screen[at], old, bitcast<u32>(bitcast<f32>(old) + value));
-    if (result.exchanged) { break; }
-    old = result.old_value;
-  }
+// What a tile has summed up: at most 65,536 of them fit.
+fn add_words(at: u32, sum: i32) {
+  atomicAdd(&screen[2u * at], sum & 0xffff);
+  atomicAdd(&screen[2u * at + 1u], sum >> 16u);
 }
 
 struct Pixel {
@@ -139,7 +136,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
       let at = SCREEN_NUMBERS * survivors[slots[lane]];
       for (var number = 0u; number < SCREEN_NUMBERS; number++) {
         let sum = atomicLoad(&sums[lane * SCREEN_NUMBERS + number]);
-        if (sum != 0) { add_float(at + number, f32(sum) / FIXED); }
+        if (sum != 0) { add_words(at + number, sum); }
       }
     }
     if (lane == 0u) { is_open = atomicLoad(&unfinished); }

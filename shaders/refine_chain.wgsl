@@ -10,8 +10,8 @@
 @group(0) @binding(2) var<storage, read> numbers: array<f32>;
 // For each splat the degree that it keeps.
 @group(0) @binding(3) var<storage, read> degrees: array<u32>;
-// SCREEN_NUMBERS of each splat; zero again afterwards, for the next view.
-@group(0) @binding(4) var<storage, read_write> screen: array<f32>;
+// SCREEN_NUMBERS of each splat, in fixed point; zero again afterwards, for the next view.
+@group(0) @binding(4) var<storage, read_write> screen: array<vec2i>;
 @group(0) @binding(5) var<storage, read_write> gradients: array<f32>;
 
 fn add(i: u32, step: u32, value: f32) {
@@ -53,9 +53,9 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var is_seen = false;
   for (var k = 0u; k < SCREEN_NUMBERS; k++) {
     let at = SCREEN_NUMBERS * i + k;
-    seen[k] = screen[at];
+    seen[k] = of_fixed(screen[at]);
     is_seen = is_seen || seen[k] != 0.0;
-    screen[at] = 0.0;
+    screen[at] = vec2i(0);
   }
   if (!is_seen) { return; }
   let n = row_of(i);

@@ -17,6 +17,16 @@ const SH_STEP = 10u;
 // What a picture's pixels tell of a splat: by its colour, and the sums of q, q·u, q·v, q·u², q·u·v and q·v², where q is the derivative by the
 // logarithm of alpha and u, v are where the pixel lies in the ellipse.
 const SCREEN_NUMBERS = 9u;
+// Bytes of each: two words of a sum in fixed point.
+const SCREEN_BYTES = 8u;
+// Steps of the fixed point in 1.
+const FIXED = 16777216.0;
+
+// A sum of integers whose lower halves are added up in x, an u32, and whose upper halves in y: a single word would not hold what many tiles add.
+fn of_fixed(words: vec2i) -> f32 {
+  let low = bitcast<u32>(words.x);
+  return (f32(words.y + i32(low >> 16u)) * 65536.0 + f32(low & 0xffffu)) / FIXED;
+}
 
 const REFINE_GROUP = 64u;
 

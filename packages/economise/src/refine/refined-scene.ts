@@ -11,7 +11,7 @@ import {
   withMemoryCheck,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
-import { LOGIT_AT, ROTATION_AT, SCALE_AT, SCREEN_NUMBERS, SH_AT, SH_STEP } from '../generated/shaders.js';
+import { LOGIT_AT, ROTATION_AT, SCALE_AT, SCREEN_BYTES, SCREEN_NUMBERS, SH_AT, SH_STEP } from '../generated/shaders.js';
 import { pageOf } from '../gpu/cloud-buffers.js';
 import { readBack } from '../gpu/read-back.js';
 import type { ReducedCloud } from '../reduce.js';
@@ -48,7 +48,7 @@ export class RefinedScene implements GaussianScene {
   readonly origin: GaussianScene['origin'];
   readonly pages: readonly GaussianPage[];
   readonly parts: readonly RefinedPart[];
-  /** array<f32>: SCREEN_NUMBERS of each splat, of every page whole chunks. */
+  /** array<vec2i>: SCREEN_NUMBERS of each splat in fixed point, of every page whole chunks. */
   readonly screen: GPUBuffer;
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
@@ -77,7 +77,7 @@ export class RefinedScene implements GaussianScene {
     }
     this.parts = parts;
     this.pages = parts.map(({ page }) => page);
-    const bytes = FLOAT_BYTES * SCREEN_NUMBERS * Math.max(CULL_GROUP, first);
+    const bytes = SCREEN_BYTES * SCREEN_NUMBERS * Math.max(CULL_GROUP, first);
     this.screen = memory.buffer('gs.refine.screen', bytes, storage | copyDestination);
     this.#packAll();
   }

@@ -9,7 +9,7 @@ import {
   rareKernelOf,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
-import { REFINE_GROUP, refineBackward, refineChain, refineStep, SCREEN_NUMBERS } from '../generated/shaders.js';
+import { REFINE_GROUP, refineBackward, refineChain, refineStep, SCREEN_BYTES, SCREEN_NUMBERS } from '../generated/shaders.js';
 import { layouts } from '../gpu/layouts.js';
 import { NO_VIEW } from '../gpu/no-view.js';
 import type { PictureErrors } from '../gpu/picture-errors.js';
@@ -122,7 +122,7 @@ export class SceneFitter {
     const chain = rareKernelOf(this.#device, refineChain);
     this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients }, p) => {
       const place = this.#scene.parts.length * view + p;
-      const bytes = 4 * SCREEN_NUMBERS;
+      const bytes = SCREEN_BYTES * SCREEN_NUMBERS;
       const bound = chain.bind({
         view: { buffer: this.#views, offset: VIEW_STRIDE * place, size: rendererLayouts.View.size },
         refine_view: { buffer: this.#refineViews, offset: SMALL_STRIDE * place, size: layouts.RefineView.size },
