@@ -37,7 +37,12 @@ export async function makeDevice(optional: readonly GPUFeatureName[] = []): Prom
   const requiredFeatures = optional.filter((feature) => adapter.features.has(feature));
   const device = await adapter.requestDevice({ requiredFeatures, requiredLimits: { maxStorageBuffersPerShaderStage } });
   // What the element finds on SwiftShader, which takes seconds to compile the rest.
-  const choice = JSON.stringify({ rasterizer: 'quads', accumulation: 'rgba16float', threads: 'serial', sort: 'serial' });
+  const choice = JSON.stringify({
+    rasterizer: 'quads',
+    accumulation: 'rgba16float',
+    threads: 'serial',
+    sort: 'serial',
+  });
   await chooseVariants(device, { store: { getItem: () => choice, setItem: () => undefined } });
   return device;
 }

@@ -9,7 +9,14 @@ import {
   rareKernelOf,
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
-import { REFINE_GROUP, refineBackward, refineChain, refineStep, SCREEN_BYTES, SCREEN_NUMBERS } from '../generated/shaders.js';
+import {
+  REFINE_GROUP,
+  refineBackward,
+  refineChain,
+  refineStep,
+  SCREEN_BYTES,
+  SCREEN_NUMBERS,
+} from '../generated/shaders.js';
 import { layouts } from '../gpu/layouts.js';
 import { NO_VIEW } from '../gpu/no-view.js';
 import type { PictureErrors } from '../gpu/picture-errors.js';
