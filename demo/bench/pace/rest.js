@@ -22,7 +22,7 @@ const lastDrawn = (elements) =>
 
 /**
  * Moves the cameras a last time and waits.
- * @returns ms from the last picture that was drawn in motion until the GPU was done with the true images of all elements, what they took, their median,, and
+ * @returns ms from the last picture that was drawn in motion until the GPU was done with the true images of all elements, what they took, their median, and
  * how the first one on show compares with `toBlob()`
  */
 export async function comeToRest(stage, { compares }) {

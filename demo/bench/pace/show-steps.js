@@ -1,10 +1,6 @@
 /** The steps of a load as a table. */
 
-const made = (name, properties = {}, children = []) => {
-  const element = Object.assign(document.createElement(name), properties);
-  element.append(...children);
-  return element;
-};
+import { element } from '../page/show.js';
 
 const COLUMNS = [
   ['step', ({ step }) => step],
@@ -21,14 +17,14 @@ const COLUMNS = [
 
 /** @param report the whole of it, once all is measured */
 export function showSteps(steps, report) {
-  const head = COLUMNS.map(([title]) => made('th', { textContent: title }));
-  const rows = steps.map((step) => COLUMNS.map(([, text]) => made('td', { textContent: text(step) })));
-  const table = made('table', {}, [
-    made('thead', {}, [made('tr', {}, head)]),
-    made(
+  const head = COLUMNS.map(([title]) => element('th', { textContent: title }));
+  const rows = steps.map((step) => COLUMNS.map(([, text]) => element('td', { textContent: text(step) })));
+  const table = element('table', {}, [
+    element('thead', {}, [element('tr', {}, head)]),
+    element(
       'tbody',
       {},
-      rows.map((cells) => made('tr', {}, cells)),
+      rows.map((cells) => element('tr', {}, cells)),
     ),
   ]);
   document.getElementById('results').replaceChildren(table);

@@ -1,7 +1,8 @@
 /** Results for people: a table with small bars, and everything else as JSON. */
 import { adapterName } from '../run/environment.js';
 
-const element = (name, properties = {}, children = []) => {
+/** An element with these properties and children. */
+export const element = (name, properties = {}, children = []) => {
   const made = Object.assign(document.createElement(name), properties);
   made.append(...children);
   return made;
