@@ -66,9 +66,9 @@ test('a size for a time: along the line through two that are known, and no furth
     { pixels: 1000, milliseconds: 2 },
     { pixels: 2000, milliseconds: 3 },
   ];
-  assert.equal(pixelsFor(6, known, 1e6), 5000);
-  assert.equal(pixelsFor(6, known, 4000), 4000);
-  assert.equal(pixelsFor(0.1, known, 1e6), 256);
+  assert.equal(pixelsFor(41, known, 1e6), 40_000);
+  assert.equal(pixelsFor(60, known, 2e4), 2e4);
+  assert.equal(pixelsFor(0.1, known, 1e6), 128 ** 2);
   const flat = known.map(({ pixels }) => ({ pixels, milliseconds: 2 }));
   assert.equal(pixelsFor(6, flat, 1e6), 1e6);
 });

@@ -82,5 +82,15 @@ test(
     assert.ok(timed > 0 && span.p95 >= span.p50 && span.p50 > 0, JSON.stringify(span));
     assert.ok(interval.p50 > 0 && wholeMs > 0 && restMs >= 0);
     assert.ok(levels.length > 0 && levels[0].at < 200);
+
+    // A budget is one of what the whole picture takes, whatever else is on show.
+    const budgeted = await runPage('bench/pace.html', { ...query, budget: '40', compare: '0', steps: 'elements:2' });
+    assert.equal(budgeted.error, undefined);
+    const [step] = budgeted.steps;
+    assert.ok(step.target > 2 * target && step.load < 0.5, `${step.load} of ${step.target} ms`);
+    assert.ok(
+      step.levels.every(({ level }: { level: string }) => level === 'whole'),
+      JSON.stringify(step.levels),
+    );
   },
 );

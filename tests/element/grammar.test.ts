@@ -28,6 +28,7 @@ const ABSENT: RawAttributes = {
   touchAction: null,
   up: null,
   maxPixelRatio: null,
+  frameBudget: null,
   quality: null,
   maxShDegree: null,
   detail: null,
@@ -141,6 +142,7 @@ test('an absent attribute takes its default in silence', () => {
   assert.equal(read.touchAction, 'pan-y');
   assert.equal(read.interpolationDecay, 50);
   assert.equal(read.maxPixelRatio, Infinity);
+  assert.equal(read.frameBudget, Infinity);
   assert.equal(read.quality, 'auto');
   assert.equal(read.maxShDegree, 3);
   assert.equal(read.detail, 'auto');
@@ -158,6 +160,7 @@ test('a malformed attribute takes its default with one warning that says what wa
     up: 'up',
     'interpolation-decay': 'interpolationDecay',
     'max-pixel-ratio': 'maxPixelRatio',
+    'frame-budget': 'frameBudget',
     quality: 'quality',
     'max-sh-degree': 'maxShDegree',
   })) {

@@ -62,6 +62,7 @@ const settings = (changes: Record<string, string> = {}): CameraSettings =>
       touchAction: null,
       up: null,
       maxPixelRatio: null,
+      frameBudget: null,
       quality: null,
       maxShDegree: null,
       detail: null,

@@ -15,6 +15,7 @@ for (const wholeMs of [20, 100, 200, 230]) {
     const pace = new PaceController({
       isOn: () => true,
       scheduler: () => display,
+      frameBudget: () => Infinity,
       requestFrame: () => (asked = true),
       onPace: () => undefined,
     });
@@ -41,4 +42,27 @@ for (const wholeMs of [20, 100, 200, 230]) {
 test('true images that can not be in time are begun as soon as rest can be told, those of unknown time as late as may be', () => {
   assert.equal(waitForRest(900, INTERVAL), 50);
   assert.equal(waitForRest(0, INTERVAL), 150);
+});
+
+test('what a frame may take is what the page says, else a share of the display that elements divide', () => {
+  const scheduler = { displayInterval: INTERVAL, clients: 2 } as FrameScheduler;
+  let budget = Infinity;
+  const ignored = (): void => undefined;
+  const pace = new PaceController({
+    ...{ isOn: () => true, scheduler: () => scheduler, frameBudget: () => budget },
+    ...{ requestFrame: ignored, onPace: ignored },
+  });
+  assert.equal(pace.targetMs, (0.8 * INTERVAL) / 2);
+  for (budget of [2, 40]) {
+    assert.equal(pace.targetMs, budget);
+    // A frame that the page has room for, and then one that it has not.
+    for (const [share, falls] of [
+      [0.9, false],
+      [5, true],
+    ] as const) {
+      pace.reset();
+      for (let frame = 0; frame < 4; frame++) pace.sample(0, share * budget);
+      assert.equal(pace.report.moving !== 'whole', falls, `${share} of ${budget} ms`);
+    }
+  }
 });

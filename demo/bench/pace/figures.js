@@ -69,10 +69,13 @@ export function decibels(a, b) {
   return sum === 0 ? 'identical' : rounded(-10 * Math.log10(sum / count / 255 ** 2));
 }
 
-/** Pixels of a picture that takes a time, by what two sizes took (`fixed + perPixel * pixels`); 256 at least. */
+/** Fewest pixels of a picture: what is smaller has all its splats in a tile or two, and takes the longer for it. */
+const LEAST_PIXELS = 128 ** 2;
+
+/** Pixels of a picture that takes a time, by what two sizes took (`fixed + perPixel * pixels`). */
 export function pixelsFor(milliseconds, [a, b], most) {
   const perPixel = (b.milliseconds - a.milliseconds) / (b.pixels - a.pixels);
   if (!(perPixel > 0)) return most;
   const fixed = b.milliseconds - perPixel * b.pixels;
-  return Math.max(256, Math.min(most, (milliseconds - fixed) / perPixel));
+  return Math.max(LEAST_PIXELS, Math.min(most, (milliseconds - fixed) / perPixel));
 }

@@ -42,6 +42,8 @@ export function readPlan(query) {
     height: number('height', 540),
     /** Longest side that a step may lead to, device pixels. */
     most: number('most', 8192),
+    /** What pictures in motion may take, as a multiple of what the whole one takes at first; 0: as the display says. */
+    budget: number('budget', 0),
     /** Of each step, before the camera rests. */
     seconds: number('seconds', 6),
     /** Of motion under the load as it was, before each step. */

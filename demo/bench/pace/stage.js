@@ -31,6 +31,11 @@ export class Stage {
     this.show(1);
   }
 
+  /** What a picture in motion may take, ms on the GPU. */
+  set frameBudget(milliseconds) {
+    for (const element of this.#elements) element.frameBudget = milliseconds;
+  }
+
   /** The elements on show. */
   get elements() {
     return this.#elements.slice(0, this.#shown);

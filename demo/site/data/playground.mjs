@@ -2,7 +2,7 @@
 import manifest from './manifest.mjs';
 
 const GROUPS = {
-  Picture: ['quality', 'max-sh-degree', 'detail', 'max-pixel-ratio', 'postprocess'],
+  Picture: ['quality', 'max-sh-degree', 'detail', 'max-pixel-ratio', 'frame-budget', 'postprocess'],
   Camera: ['camera-controls', 'camera-orbit', 'camera-target', 'field-of-view', 'navigation'],
   'Scene and page': ['alt', 'poster', 'loading', 'reveal', 'crossorigin', 'up'],
   Motion: ['auto-rotate', 'auto-rotate-delay', 'rotation-per-second', 'interpolation-decay'],

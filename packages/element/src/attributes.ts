@@ -59,6 +59,7 @@ export interface RawAttributes {
   readonly touchAction: Raw;
   readonly up: Raw;
   readonly maxPixelRatio: Raw;
+  readonly frameBudget: Raw;
   readonly quality: Raw;
   readonly maxShDegree: Raw;
   readonly detail: Raw;
@@ -81,6 +82,8 @@ export interface Attributes {
   readonly touchAction: TouchAction;
   /** Most drawn pixels for one CSS pixel. */
   readonly maxPixelRatio: number;
+  /** Most that a picture in motion may take on the GPU, ms; infinite where the display says. */
+  readonly frameBudget: number;
   /** The renderer's mix of accuracy and speed. */
   readonly quality: QualityChoice;
   /** Spherical harmonics above this degree are not evaluated. */
@@ -128,6 +131,7 @@ const threeSeconds = milliseconds(3_000);
 const rotationPerSecond = angleGrammar('5.625deg');
 // Far below any ratio in use, so that 0 is refused but thumbnails of pixels are not.
 const maxPixelRatio = numberGrammar(Infinity, 1 / 64, 'drawn pixels for each CSS pixel, above 0');
+const frameBudget = numberGrammar(Infinity, 0.01, 'milliseconds, 0.01 or more');
 
 /** Reads all attributes; `warn` gets one sentence for each malformed one. */
 export function readAttributes(raw: RawAttributes, warn: (sentence: string) => void): Attributes {
@@ -139,6 +143,7 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
     interpolationDecay: read('interpolation-decay', raw.interpolationDecay, interpolationDecay),
     touchAction: read('touch-action', raw.touchAction, touchAction),
     maxPixelRatio: read('max-pixel-ratio', raw.maxPixelRatio, maxPixelRatio),
+    frameBudget: read('frame-budget', raw.frameBudget, frameBudget),
     quality: read('quality', raw.quality, quality),
     maxShDegree: Number(read('max-sh-degree', raw.maxShDegree, maxShDegree)) as ShDegree,
     detail: read('detail', raw.detail, detail),

@@ -27,6 +27,7 @@ export class SplatProperties extends LitElement {
     disablePan: { type: Boolean, attribute: 'disable-pan' },
     up: {},
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
+    frameBudget: { attribute: 'frame-budget' },
     quality: {},
     maxShDegree: { attribute: 'max-sh-degree' },
     detail: {},
@@ -89,6 +90,8 @@ export class SplatProperties extends LitElement {
   declare up: 'x' | '-x' | 'y' | '-y' | 'z' | '-z' | null;
   /** Most drawn pixels for one CSS pixel; default no limit. */
   declare maxPixelRatio: number | string | null;
+  /** Milliseconds of the GPU that a picture in motion may take with `quality="auto"`; default 0.8 of the display's interval, shared by the elements that draw at the same time. */
+  declare frameBudget: number | string | null;
   /**
    * Accuracy against speed. `auto`, the default: `default` at rest and, in motion, as much of it as the display leaves time for. `reference`, `default`,
    * `balanced`, `fast`: always that.

@@ -206,6 +206,7 @@ export class Stage {
       canvasOf: canvas,
       isVisible: () => this.#visibility.isVisible,
       maxPixelRatio: () => attributes().maxPixelRatio,
+      frameBudget: () => attributes().frameBudget,
       rendering: () => ({ quality: attributes().quality, shDegree: attributes().maxShDegree }),
       decayMs: () => (prefersReducedMotion() ? 0 : attributes().interpolationDecay),
       beforeFrame: (now) => this.behaviours.advance(now),

@@ -53,6 +53,8 @@ export interface PaceOptions {
   /** False where the page has chosen a quality. */
   readonly isOn: () => boolean;
   readonly scheduler: () => FrameScheduler;
+  /** What the page allows a frame, ms; infinite where the display says. */
+  readonly frameBudget: () => number;
   readonly requestFrame: () => void;
   /** Called for each frame that was timed: whether pictures in motion are drawn whole. */
   readonly onPace: (isWhole: boolean) => void;
@@ -77,8 +79,10 @@ export class PaceController {
     this.#options = options;
   }
 
-  /** What a frame may take on the GPU, ms: elements that draw at the same time share it. */
+  /** What a frame may take on the GPU, ms: what the page says, else a share of the display's interval, which elements that draw at the same time share. */
   get targetMs(): number {
+    const budget = this.#options.frameBudget();
+    if (budget < Infinity) return budget;
     const { displayInterval, clients } = this.#options.scheduler();
     return (SHARE_OF_INTERVAL * displayInterval) / Math.max(1, clients);
   }

@@ -19,6 +19,8 @@ export interface ViewOptions {
   /** False where nobody would see a frame. */
   readonly isVisible: () => boolean;
   readonly maxPixelRatio: () => number;
+  /** Most that a picture in motion may take on the GPU, ms; infinite where the display says. */
+  readonly frameBudget: () => number;
   /** How its frames are drawn. */
   readonly rendering: () => Omit<Rendering, 'quality'> & { readonly quality: QualityChoice };
   /** Time constant of the camera's motion, ms. */
@@ -64,6 +66,7 @@ export class ViewController implements FrameClient {
     this.pace = new PaceController({
       isOn: () => options.rendering().quality === 'auto' && (this.#scene?.isMeasurable ?? false),
       scheduler: options.scheduler,
+      frameBudget: options.frameBudget,
       requestFrame: () => this.requestFrame(),
       onPace: options.onPace,
     });
