@@ -10,6 +10,21 @@ export function nonDominated(points) {
   return points.filter((point) => !points.some((other) => dominates(other, point))).sort((a, b) => a.ms - b.ms);
 }
 
+/** Shares of a time, and dB, that a run does not tell apart: `default` beside itself comes out so far off. */
+const [SAME_TIME, SAME_DECIBELS] = [0.01, 0.05];
+
+/**
+ * Points that leave nothing to be said for one: they are as fast, as true and as small, and clearly better in one of the three. What others hold is not known, and counts as nothing.
+ * @param points {{ms: number, psnr: number, bytes?: number}[]} milliseconds, dB and bytes for each splat.
+ */
+export function passing(point, points) {
+  const bytesOf = ({ bytes = 0 }) => bytes;
+  const isNoWorse = ({ ms, psnr, bytes = 0 }) => ms <= point.ms && psnr >= point.psnr && bytes <= bytesOf(point);
+  const isBetter = ({ ms, psnr, bytes = 0 }) =>
+    ms < (1 - SAME_TIME) * point.ms || psnr > point.psnr + SAME_DECIBELS || bytes < bytesOf(point);
+  return points.filter((other) => isNoWorse(other) && isBetter(other));
+}
+
 /**
  * Area that the points dominate below `reference.ms` and above `reference.psnr`, in decades of time times dB: one number
  * that grows when anything gets faster or truer.
@@ -39,7 +54,7 @@ export function pointsOf({ results, standard }) {
   return results
     .filter((result) => !result.error)
     .map((result) => ({ ...result, time: timeOf(result, standard) }))
-    .map(({ configuration, quality, time }) => ({
+    .map(({ configuration, quality, time, bytes }) => ({
       name: configuration.name,
       tier: configuration.tier,
       peer: configuration.peer,
@@ -49,5 +64,6 @@ export function pointsOf({ results, standard }) {
       psnr: Math.min(120, quality.psnr),
       worst: quality.worst,
       ssim: quality.ssim,
+      bytes: bytes?.perSplat,
     }));
 }

@@ -6,7 +6,7 @@ import { adapterName } from '../../demo/bench/run/environment.js';
 import { runPage } from '../lib/browser-page.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
-import { hypervolume, nonDominated, pointsOf, timeOf } from './front.mjs';
+import { hypervolume, nonDominated, passing, pointsOf, timeOf } from './front.mjs';
 
 const USAGE = `usage: npm run frontier -- [options]
 
@@ -88,19 +88,26 @@ function slugOf(adapter) {
 }
 
 function describe(report) {
-  const front = new Set(nonDominated(pointsOf(report)).map(({ name }) => name));
+  const points = pointsOf(report);
+  const front = new Set(nonDominated(points).map(({ name }) => name));
   const lines = report.results.map((result) => {
-    const { configuration, error, quality } = result;
+    const { configuration, error, quality, bytes } = result;
     const { name } = configuration;
     if (error) return `  ${name.padEnd(28)} left out: ${error.split('\n')[0]}`;
     const time = timeOf(result, report.standard).ms.toFixed(2);
-    const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  SSIM ${quality.ssim.toFixed(4)}`;
+    const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  SSIM ${quality.ssim.toFixed(4)}${bytes ? `  ${bytes.perSplat} B` : ''}`;
     return `${front.has(name) ? '*' : ' '} ${name.padEnd(28)}${numbers}`;
   });
-  const area = hypervolume(pointsOf(report));
+  const area = hypervolume(points);
+  const tiers = points.filter(({ tier }) => tier === 'tier');
+  const passed = tiers.map((tier) => [tier.name, passing(tier, points).map(({ name }) => name)]);
   return [
     ...lines,
     `* nothing is both faster and truer; ${area.toFixed(2)} decades x dB within 16.6 ms and above 36 dB`,
+    ...passed.map(
+      ([name, by]) =>
+        `  ${name}: ${by.length > 0 ? `passed by ${by.join(', ')}` : 'nothing is as fast, as true and as small, and clearly better in one of these'}`,
+    ),
   ].join('\n');
 }
 

@@ -14,7 +14,7 @@ const { parseObject, readConfigurations, readRun } = await benchModule('run/conf
 const { watchOptions } = await benchModule('run/levers.js');
 const { visit, visitInTurns } = await benchModule('run/measure.js');
 const { compareImages } = await benchModule('quality/metrics.js');
-const { nonDominated, hypervolume, pointsOf } = await scriptModule('frontier/front.mjs');
+const { nonDominated, hypervolume, passing, pointsOf } = await scriptModule('frontier/front.mjs');
 const { configurations } = await scriptModule('frontier/configurations.mjs');
 const { placeLabels } = await scriptModule('frontier/labels.mjs');
 const { drawChart } = await scriptModule('frontier/chart.mjs');
@@ -151,6 +151,22 @@ test('a lever that saves in most frames and pays in some is charged for both', a
     ),
   ]);
   assert.equal(dear.ratio.span.p50, 1.5);
+});
+
+test('a line is passed by what is as fast, as true and as small, and clearly better in one of these', () => {
+  const line = { name: 'line', ms: 2, psnr: 60, bytes: 100 };
+  const others = [
+    { name: 'twin', ms: 1.99, psnr: 60.01, bytes: 100 },
+    { name: 'larger', ms: 1, psnr: 70, bytes: 101 },
+    { name: 'truer', ms: 2, psnr: 61, bytes: 100 },
+    { name: 'smaller', ms: 2, psnr: 60, bytes: 99 },
+    { name: 'slower', ms: 3, psnr: 90, bytes: 1 },
+    { name: 'stranger', ms: 1, psnr: 60 },
+  ];
+  assert.deepEqual(
+    passing(line, [line, ...others]).map(({ name }: { name: string }) => name),
+    ['truer', 'smaller', 'stranger'],
+  );
 });
 
 test('images are compared as a display shows them, where anything is seen', () => {

@@ -32,7 +32,7 @@ function adapterName({ vendor, architecture, description }) {
 }
 
 function rowOf(result, standard) {
-  const { configuration, quality } = result;
+  const { configuration, quality, bytes } = result;
   const { kind, ms } = timeOf(result, standard);
   return {
     name: configuration.name,
@@ -41,5 +41,6 @@ function rowOf(result, standard) {
     clock: kind === 'span' ? 'GPU' : 'wall',
     psnr: quality.psnr.toFixed(1),
     worst: quality.worst.toFixed(1),
+    bytes: bytes?.perSplat.toFixed(0) ?? '',
   };
 }
