@@ -19,8 +19,8 @@ interface Gpu {
   readonly load: (now: number) => number;
   /** Share of a frame that no rung makes cheaper. */
   readonly fixed: number;
-  /** What each rung takes, as a share of the first; the ladder's costs unless given. */
-  readonly shares?: readonly number[];
+  /** What each rung takes at a time, as a share of the first; the ladder's costs unless given. */
+  readonly shares?: (now: number) => readonly number[];
   /** Relative spread of times; and how many frames in a hundred take three times as long. */
   readonly noise: number;
   readonly spikes: number;
@@ -52,7 +52,7 @@ function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Pace; tar
     }
     if (free > at + interval) continue;
     const { level } = pace;
-    const whole = gpu.load(at) * (gpu.fixed + (1 - gpu.fixed) * (gpu.shares ?? COSTS)[level]);
+    const whole = gpu.load(at) * (gpu.fixed + (1 - gpu.fixed) * (gpu.shares?.(at) ?? COSTS)[level]);
     const spread = 1 + gpu.noise * (random() + random() + random() - 1.5);
     const share = whole * spread * (random() < gpu.spikes / 100 ? 3 : 1);
     const spent = share * targetMs;
@@ -121,7 +121,7 @@ test('a wide GPU, where fewer pixels win little: load steps are kept to as on ot
   fc.assert(
     fc.property(loads, ({ before, after, ...gpu }) => {
       const load = (now: number): number => (now < STEP_MS ? before : after);
-      const { frames } = run({ ...gpu, fixed: 0, shares: WIDE, load, noise: 0.06, spikes: 0 }, 2 * STEP_MS);
+      const { frames } = run({ ...gpu, fixed: 0, shares: () => WIDE, load, noise: 0.06, spikes: 0 }, 2 * STEP_MS);
       const found = p95(frames, STEP_MS + 1_000, 2 * STEP_MS);
       assert.ok(found <= TOLERANCE, `p95 is ${found} of the target`);
       assert.ok(reversals(frames, STEP_MS, STEP_MS + 5_000) <= 1, 'reversals');
@@ -130,26 +130,44 @@ test('a wide GPU, where fewer pixels win little: load steps are kept to as on ot
   );
 });
 
-test('where fewer pixels take longer than all, the true image comes back, though no climb looked cheap enough', () => {
+test('a picture becomes so small that fewer pixels take longer than all: the true image comes back, though no climb looked cheap enough', () => {
   for (const [load, fixed] of [
     [0.48, 0],
     [0.58, 0],
     [0.7, 0.1],
   ]) {
-    const gpu = { hertz: 60, fixed, shares: SMALL, noise: 0.06, spikes: 0, latency: 2, seed: 11 };
-    const { frames } = run({ ...gpu, load: (now) => (now < 2_000 ? 5 : load) }, 20_000);
-    assert.equal(frames.find(({ at }) => at > 2_000)?.level, LOWEST);
-    const share = frames.filter(({ at }) => at > 15_000).map(({ level }) => level);
-    assert.ok(
-      share.every((level) => level === 0),
-      `load ${load}: ${share.join(' ')}`,
+    const gpu = { hertz: 60, fixed, noise: 0.06, spikes: 0, latency: 2, seed: 11 };
+    const isLarge = (now: number): boolean => now < 8_000;
+    const { frames } = run(
+      { ...gpu, load: (now) => (isLarge(now) ? 2.2 : load), shares: (now) => (isLarge(now) ? WIDE : SMALL) },
+      20_000,
     );
+    assert.ok(frames.find(({ at }) => at > 8_000)!.level > 5, 'the large one takes the lowest rungs');
+    const levels = frames.filter(({ at }) => at > 14_000).map(({ level }) => level);
+    assert.ok(
+      levels.every((level) => level === 0),
+      `load ${load}: ${levels.join(' ')}`,
+    );
+  }
+});
+
+test('a rung down that makes frames longer is taken back at once, and the pace does not go there again for long', () => {
+  for (const latency of [0, 1, 2, 3]) {
+    const gpu = { hertz: 60, fixed: 0, shares: () => SMALL, noise: 0.06, spikes: 0, latency, seed: 12 };
+    const { frames } = run({ ...gpu, load: (now) => (now < 2_000 ? 0.5 : 1.5) }, 8_000);
+    const after = frames.filter(({ at }) => at > 2_000);
+    assert.ok(
+      after.some(({ level }) => level > 0),
+      'less is tried',
+    );
+    assert.ok(after.filter(({ level }) => SMALL[level] > 1.25).length < 12, 'frames that were the worse for it');
+    assert.ok(reversals(frames, 2_000, 7_000) <= 1, `${reversals(frames, 2_000, 7_000)} reversals`);
   }
 });
 
 test('rungs that are each a little dearer than the one below are not climbed one after the other where the lowest is too slow', () => {
   const shares = COSTS.map((_, level) => 1.04 ** (LOWEST - level));
-  const gpu = { hertz: 60, fixed: 0, shares, load: () => 1.2, noise: 0, spikes: 0, latency: 2, seed: 1 };
+  const gpu = { hertz: 60, fixed: 0, shares: () => shares, load: () => 1.2, noise: 0, spikes: 0, latency: 2, seed: 1 };
   const levels = run(gpu, 30_000).frames.map(({ at, level }) => (at < 1_000 ? LOWEST : level));
   assert.ok(levels.includes(LOWEST - 1), 'the one above is tried');
   assert.ok(

@@ -3,9 +3,11 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
 import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
+import { LADDER } from '../../packages/element/src/pace/ladder.js';
 import { waitForRest } from '../../packages/element/src/pace/rest.js';
 
 const INTERVAL = 1000 / 60;
+const PIXELS = 1e6;
 const display = { displayInterval: INTERVAL, clients: 1 } as FrameScheduler;
 
 for (const wholeMs of [20, 100, 200, 230]) {
@@ -22,19 +24,23 @@ for (const wholeMs of [20, 100, 200, 230]) {
     // A motion that is drawn whole at first, and soon no longer.
     let now = 1000;
     for (let frame = 0; frame < 20; frame++, now += INTERVAL) {
-      const { level } = pace.plan({ now, hasChanged: true, goesOn: true });
+      const { level } = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
       pace.sample(level, level === 0 ? wholeMs : 10);
     }
-    const { level } = pace.plan({ now, hasChanged: true, goesOn: false });
+    const { level } = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: false });
     assert.ok(level > 0, 'in motion with less');
     assert.equal(asked, false);
     let waited = 0;
     for (; !asked && waited < 1000; waited++) context.mock.timers.tick(1);
     assert.ok(waited >= 50 && waited <= 150, `begun after ${waited} ms`);
     assert.ok(waited + INTERVAL + wholeMs <= 300, `on show after ${waited + INTERVAL + wholeMs} ms`);
-    assert.equal(pace.plan({ now: now + waited, hasChanged: false, goesOn: false }).level, 0, 'the true image');
+    assert.equal(
+      pace.plan({ now: now + waited, pixels: PIXELS, hasChanged: false, goesOn: false }).level,
+      0,
+      'the true image',
+    );
     // A hand that goes on right away moves as it did.
-    assert.ok(pace.plan({ now: now + waited + 5, hasChanged: true, goesOn: true }).level > 0);
+    assert.ok(pace.plan({ now: now + waited + 5, pixels: PIXELS, hasChanged: true, goesOn: true }).level > 0);
     pace.stop();
   });
 }
@@ -65,4 +71,30 @@ test('what a frame may take is what the page says, else a share of the display t
       assert.equal(pace.report.moving !== 'whole', falls, `${share} of ${budget} ms`);
     }
   }
+});
+
+test('pictures that are small already are not made smaller, whatever they take', () => {
+  const ignored = (): void => undefined;
+  const pace = new PaceController({
+    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
+    ...{ requestFrame: ignored, onPace: ignored },
+  });
+  const levelOf = (pixels: number): number => {
+    for (let now = 1000; now < 3000; now += INTERVAL) {
+      const { level } = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
+      pace.sample(level, 100);
+    }
+    return pace.plan({ now: 3000, pixels, hasChanged: true, goesOn: true }).level;
+  };
+  const scaleOf = (level: number): number => LADDER[level].levers?.resolutionScale ?? 1;
+  for (const side of [32, 128, 256, 1024]) {
+    pace.reset();
+    const scale = scaleOf(levelOf(side ** 2));
+    assert.ok(scale === 1 || (scale * side) ** 2 >= 8192, `${scale} of ${side}`);
+    assert.equal(scale < 1, side > 100, `${scale} of ${side}`);
+  }
+  assert.ok(
+    scaleOf(levelOf(1024 ** 2)) < scaleOf(levelOf(128 ** 2)),
+    'a picture that shrinks takes what was chosen back',
+  );
 });

@@ -1,7 +1,7 @@
 import type { FrameLevers } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
-import { LADDER } from '../pace/ladder.js';
-import { INITIAL_PACE, keepPace, quantile, type Pace, type PaceReason } from '../pace/pace.js';
+import { LADDER, rungsFor } from '../pace/ladder.js';
+import { INITIAL_PACE, keepPace, quantile, withinRungs, type Pace, type PaceReason } from '../pace/pace.js';
 import { waitForRest } from '../pace/rest.js';
 
 /** Share of the display's interval that frames may take on the GPU: the page and its compositor need the rest. */
@@ -27,6 +27,8 @@ const WHOLE: FramePlan = { level: 0, levers: undefined };
 export interface FrameOccasion {
   /** requestAnimationFrame's clock, ms. */
   readonly now: number;
+  /** Of the whole picture. */
+  readonly pixels: number;
   /** It shows something else than the frame before: the camera has moved, or the scene has. */
   readonly hasChanged: boolean;
   /** The camera will go on moving. */
@@ -67,6 +69,7 @@ export interface PaceOptions {
 export class PaceController {
   readonly #options: PaceOptions;
   #pace: Pace = INITIAL_PACE;
+  #rungs = LADDER.length;
   #changedAt = -Infinity;
   #drawn = 0;
   /** What the last frame took, of those that are known. */
@@ -97,7 +100,9 @@ export class PaceController {
   /**
    * How to draw the next frame. A single change after a rest is drawn whole at once; what goes on to change is in motion.
    */
-  plan({ now, hasChanged, goesOn }: FrameOccasion): FramePlan {
+  plan({ now, pixels, hasChanged, goesOn }: FrameOccasion): FramePlan {
+    this.#rungs = rungsFor(pixels);
+    this.#pace = withinRungs(this.#pace, this.#rungs);
     const pause = Math.max(MOTION_MS, Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * this.#lastMs));
     const isMotion = hasChanged && (goesOn || now - this.#changedAt < pause);
     if (hasChanged) this.#changedAt = now;
@@ -116,7 +121,7 @@ export class PaceController {
     if (level === 0) this.#wholeMs = milliseconds;
     if (!this.#options.isOn()) return;
     const sample = { now: performance.now(), level, milliseconds };
-    this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS });
+    this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS.slice(0, this.#rungs) });
     this.#options.onPace(this.#pace.level === 0);
   }
 

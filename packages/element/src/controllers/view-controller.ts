@@ -158,7 +158,9 @@ export class ViewController implements FrameClient {
     const { version } = scene.gaussians;
     const hasChanged = first === undefined && (cameraMoved || version !== this.#drawnVersion);
     this.#drawnVersion = version;
-    const { level, levers } = this.pace.plan({ now, hasChanged, goesOn: this.#options.camera.isMoving });
+    const pixels = request.camera.width * request.camera.height;
+    const goesOn = this.#options.camera.isMoving;
+    const { level, levers } = this.pace.plan({ now, pixels, hasChanged, goesOn });
     // Who has chosen a quality pays for no clock.
     const onTime =
       this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(level, spent) : undefined;

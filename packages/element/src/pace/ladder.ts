@@ -51,3 +51,14 @@ export const LADDER: readonly Rung[] = [
     cost: FAST_COST * resolutionScale ** 2,
   })),
 ];
+
+/** Fewest pixels that a rung leaves: the parts of a smaller picture have so many splats each that it takes the longer. */
+const LEAST_PIXELS = 8192;
+
+/** How many rungs serve a picture of so many pixels: the first ones. */
+export function rungsFor(pixels: number): number {
+  return LADDER.filter(({ levers }) => {
+    const scale = levers?.resolutionScale;
+    return scale === undefined || scale ** 2 * pixels >= LEAST_PIXELS;
+  }).length;
+}

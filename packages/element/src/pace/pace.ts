@@ -29,13 +29,15 @@ export interface Pace {
   readonly changedAt: number;
   /** The last change was towards the true image. */
   readonly climbed: boolean;
-  /** What frames took before the last change, or the first of several climbs to rungs that are no dearer, ms. */
+  /** Level before the last change, or before the first of several falls that won nothing. */
+  readonly from: number;
+  /** What frames took then, or before the first of several climbs to rungs that are no dearer, ms. */
   readonly before: number;
   /** No climb to a rung before this time, and how often one to it was in vain. */
   readonly barred: Readonly<Record<number, { readonly until: number; readonly failures: number }>>;
 }
 
-/** `start`: nothing is known yet; `slow`: frames took too long; `spare`: there was time to spare; `trial`: it may be that more of the picture takes no longer. */
+/** `start`: nothing is known yet; `slow`: frames took too long; `spare`: there was time to spare; `trial`: more of the picture takes no longer, or it may be so. */
 export type PaceReason = 'start' | 'slow' | 'spare' | 'trial';
 
 /** Frames that are remembered, and the share of them that counts: a slow frame now and then is nobody's fault. */
@@ -57,6 +59,11 @@ const HOLD_MS = 500;
  */
 const TRIAL_MS = 6_000;
 const NO_LONGER = 1.05;
+/** A rung down is taken back where, this soon after it, ms, all of three frames take so much longer than those before: small pictures leave most of a wide GPU idle. */
+const HARM_MS = 1_000;
+const HARMFUL = 1.25;
+/** A rung up that took frames down to such a share is followed by the next without a hold. */
+const FASTER = 0.9;
 /** A climb that ends sooner, ms, was in vain; the rung is then left alone for a while, each time for twice as long. */
 const IN_VAIN_MS = 2_000;
 const FIRST_BAR_MS = 5_000;
@@ -69,6 +76,7 @@ export const INITIAL_PACE: Pace = {
   recent: [],
   changedAt: -Infinity,
   climbed: false,
+  from: 0,
   before: 0,
   barred: {},
 };
@@ -77,8 +85,9 @@ export const INITIAL_PACE: Pace = {
 export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, rules: PaceRules): Pace {
   if (level !== pace.level) return pace;
   const known = { ...pace, recent: [...pace.recent, milliseconds].slice(-MEMORY) };
+  if (isHarmful(known, now)) return change(known, now, known.from, 'trial');
   const excess = excessOf(known.recent, rules.targetMs);
-  if (excess !== null && level + 1 < rules.costs.length && !isNoDearer(known)) return fall(known, now, excess, rules);
+  if (excess !== null && level + 1 < rules.costs.length && !isKeptThough(known, now)) return fall(known, now, excess, rules);
   const reason = climbReason(known, now, rules);
   return reason === null ? known : change(known, now, level - 1, reason);
 }
@@ -93,11 +102,14 @@ function excessOf(recent: readonly number[], targetMs: number): number | null {
 }
 
 /** Multiplicative decrease: to the first rung whose cost would do, were all of the cost in what the rungs take away. */
-function fall(pace: Pace, now: number, excess: number, { costs }: PaceRules): Pace {
-  const { level, climbed, changedAt, barred } = pace;
+function fall(pace: Pace, now: number, excess: number, { costs, targetMs }: PaceRules): Pace {
+  const { level, climbed, changedAt, barred, before, from } = pace;
   const affordable = costs[level] / excess;
   const lower = costs.findIndex((cost, rung) => rung > level && cost <= affordable);
-  const next = change(pace, now, lower === -1 ? costs.length - 1 : lower, 'slow');
+  // The last frames, not those before the load grew. Falls that win nothing are held against the frames before the first.
+  const isInVain = !climbed && now - changedAt < HARM_MS && excess * targetMs >= before;
+  const held = isInVain ? { before, from } : { before: excess * targetMs, from: level };
+  const next = { ...change(pace, now, lower === -1 ? costs.length - 1 : lower, 'slow'), ...held };
   if (!climbed || now - changedAt > IN_VAIN_MS) return next;
   const failures = (barred[level]?.failures ?? 0) + 1;
   const until = now + Math.min(LONGEST_BAR_MS, FIRST_BAR_MS * 2 ** (failures - 1));
@@ -107,11 +119,26 @@ function fall(pace: Pace, now: number, excess: number, { costs }: PaceRules): Pa
 /** Additive increase: one rung, after a hold, if its frames would be in time even at the most that it can cost; or to try it. Null: stay. */
 function climbReason(pace: Pace, now: number, { costs, targetMs }: PaceRules): PaceReason | null {
   const { level, recent, changedAt, barred } = pace;
-  if (level === 0 || now - changedAt < HOLD_MS || recent.length < ENOUGH_FRAMES) return null;
+  if (level === 0 || now - changedAt < holdOf(pace) || recent.length < ENOUGH_FRAMES) return null;
   if (now < (barred[level - 1]?.until ?? -Infinity)) return null;
   const usual = quantile(recent, COUNTED);
   if (usual * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs) return 'spare';
   return now - changedAt >= TRIAL_MS || isNoDearer(pace) ? 'trial' : null;
+}
+
+/** Frames take longer than on the rung above, from which the pace has fallen. */
+function isHarmful({ recent, climbed, changedAt, before }: Pace, now: number): boolean {
+  const three = recent.slice(-3);
+  return !climbed && three.length === 3 && now - changedAt < HARM_MS && Math.min(...three) > HARMFUL * before;
+}
+
+/** What is too slow stays where the rung below was no faster, until that is long ago. */
+function isKeptThough(pace: Pace, now: number): boolean {
+  return isNoDearer(pace) && now - pace.changedAt < LONGEST_BAR_MS;
+}
+
+function holdOf({ recent, climbed, before }: Pace): number {
+  return climbed && quantile(recent, COUNTED) <= FASTER * before ? 0 : HOLD_MS;
 }
 
 /** Frames take no longer than on the rung below, from which the pace has climbed: there is nothing to be won there. */
@@ -124,7 +151,12 @@ function change(pace: Pace, now: number, level: number, reason: PaceReason): Pac
   const climbed = level < pace.level;
   // Rungs that are no dearer than one another must not add up to one that is.
   const before = climbed && isNoDearer(pace) ? Math.min(pace.before, usual) : usual;
-  return { ...pace, level, reason, recent: [], changedAt: now, climbed, before };
+  return { ...pace, level, reason, recent: [], changedAt: now, climbed, from: pace.level, before };
+}
+
+/** The pace where only the first so many rungs serve. */
+export function withinRungs(pace: Pace, rungs: number): Pace {
+  return pace.level < rungs ? pace : { ...pace, level: rungs - 1, recent: [] };
 }
 
 /** The smallest of the values that at least this share of them do not exceed. */
