@@ -10,6 +10,7 @@ import { comeToRest } from './pace/rest.js';
 import { showSteps } from './pace/show-steps.js';
 import { Stage } from './pace/stage.js';
 import { writePly } from './peers/ply.js';
+import { withDegree } from './scene/degree.js';
 import { sendReport } from './run/report.js';
 import { quantile } from './run/summary.js';
 import { placeCopies } from './scene/placement.js';
@@ -19,10 +20,10 @@ const CALIBRATION_SECONDS = 1;
 const CALIBRATION_SIDES = [0.5, 1.5];
 
 /** Address of the scene: that of the file, or of as many splats of copies side by side. */
-async function sceneOf({ scene, splats }) {
+async function sceneOf({ scene, splats, degree }) {
   const url = new URL(scene, location.href).href;
   if (splats === 0) return url;
-  const cloud = await readScene(await fetchScene(url), { name: scene });
+  const cloud = withDegree(await readScene(await fetchScene(url), { name: scene }), degree);
   const { copies } = placeCopies({ base: cloud.count, count: splats });
   return URL.createObjectURL(writePly(cloud, copies));
 }

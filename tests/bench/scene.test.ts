@@ -16,6 +16,7 @@ const { placeCopies } = await benchModule('scene/placement.js');
 const { tileCloud, packCopies, firstSplats } = await benchModule('scene/tiling.js');
 const { camerasAlong, PATH_NAMES } = await benchModule('scene/paths.js');
 const { writePly } = await benchModule('peers/ply.js');
+const { withDegree } = await benchModule('scene/degree.js');
 
 const small: GaussianCloud = firstSplats(room().cloud, 300);
 const SIZE = { width: 320, height: 180 };
@@ -108,6 +109,18 @@ function repeated(cloud: GaussianCloud, count: number): GaussianCloud {
   }));
   return firstSplats(tileCloud(cloud, copies), count) as GaussianCloud;
 }
+
+test('a cloud with fewer bands of colour has the first ones', async () => {
+  assert.equal(small.shDegree, 3);
+  assert.equal(withDegree(small, 3), small);
+  for (const degree of [0, 2]) {
+    const file = writePly(withDegree(small, degree), [{ offset: [0, 0, 0], length: small.count }]) as Blob;
+    const cloud = await readScene(new Uint8Array(await file.arrayBuffer()), { name: 'scene.ply' });
+    assert.equal(cloud.shDegree, degree);
+    const width = 3 * (degree + 1) ** 2;
+    cloud.sh.forEach((value, k) => assert.equal(value, small.sh[48 * Math.floor(k / width) + (k % width)]));
+  }
+});
 
 test('a PLY for other renderers reads back as the tiled cloud', async () => {
   const { copies } = placeCopies({ base: small.count, count: 700 });
