@@ -18,6 +18,8 @@ import { placeCopies } from './scene/placement.js';
 /** Seconds of motion at a size before it is known what the whole picture takes there, and the sizes, of the usual sides. */
 const CALIBRATION_SECONDS = 1;
 const CALIBRATION_SIDES = [0.5, 1.5];
+/** Names of all levels, the true image first. */
+const NAMES = LADDER.map(({ name }) => name);
 
 /** Address of the scene: that of the file, or of as many splats of copies side by side. */
 async function sceneOf({ scene, splats, degree }) {
@@ -28,19 +30,29 @@ async function sceneOf({ scene, splats, degree }) {
   return URL.createObjectURL(writePly(cloud, copies));
 }
 
+/** Milliseconds after a frame's begin, when the elements' work should be done. */
+const GAP_BEGINS = 8;
+
+/** The page's other work in a frame: beside the elements', and in the gap after it. */
+function work(burner, { stage, plan, now }) {
+  burner?.burn(now.burn * stage.elements[0].stats.pace.targetMs);
+  if (plan.warm > 0) setTimeout(() => burner.burn(plan.warm), GAP_BEGINS);
+}
+
 /** What the whole picture takes at a size, right after motion: the clock of a GPU that rests is another one. */
-async function wholeTimeAt(stage, plan, side) {
+async function wholeTimeAt({ stage, plan, motion }, side) {
   stage.resize(side * plan.width, side * plan.height);
-  await move(stage, CALIBRATION_SECONDS, plan);
+  await move(stage, CALIBRATION_SECONDS, motion);
   const { wholeMs } = await comeToRest(stage, { compares: false });
   const { width, height } = stage.state;
   return { pixels: width * height, milliseconds: wholeMs };
 }
 
 /** The elements become as large as takes a multiple of the target. */
-async function resizeFor(load, stage, plan) {
+async function resizeFor(load, bench) {
+  const { stage, plan } = bench;
   const known = [];
-  for (const side of CALIBRATION_SIDES) known.push(await wholeTimeAt(stage, plan, side));
+  for (const side of CALIBRATION_SIDES) known.push(await wholeTimeAt(bench, side));
   const target = stage.elements[0].stats.pace.targetMs;
   const most = (plan.most / Math.max(plan.width, plan.height)) ** 2 * plan.width * plan.height;
   return { known, side: Math.sqrt(pixelsFor(load * target, known, most) / (plan.width * plan.height)) };
@@ -50,29 +62,29 @@ async function resizeFor(load, stage, plan) {
 const VISITS = 4;
 
 /** What the whole picture takes at first: the median of the last visits. */
-async function firstTime(stage, plan) {
+async function firstTime(bench) {
   const times = [];
-  for (let visit = 0; visit < VISITS; visit++) times.push((await wholeTimeAt(stage, plan, 1)).milliseconds);
+  for (let visit = 0; visit < VISITS; visit++) times.push((await wholeTimeAt(bench, 1)).milliseconds);
   return quantile(times.slice(1), 0.5);
 }
 
 /** One step: motion under the load as it was, the step, motion, rest. */
-async function measureStep({ what, value }, { stage, plan, burner, now, ladder }) {
-  const sizes = what === 'load' ? await resizeFor(value, stage, plan) : undefined;
+async function measureStep({ what, value }, bench) {
+  const { stage, plan, now, motion } = bench;
+  const sizes = what === 'load' ? await resizeFor(value, bench) : undefined;
   if (sizes) stage.resize(now.side * plan.width, now.side * plan.height);
-  const other = { speed: plan.speed, onFrame: () => burner?.burn(now.burn * stage.elements[0].stats.pace.targetMs) };
-  await move(stage, plan.before, other);
+  await move(stage, plan.before, motion);
   const side = sizes?.side ?? (what === 'size' ? value : now.side);
   if (what === 'elements') stage.show(value);
   if (what === 'distance') stage.distance = value;
   if (what === 'burn') now.burn = value;
   now.side = side;
   stage.resize(side * plan.width, side * plan.height);
-  const rows = await move(stage, plan.seconds, other);
+  const rows = await move(stage, plan.seconds, motion);
   const rest = await comeToRest(stage, plan);
-  const ofElements = stage.elements.map((_, i) => figuresOf(rowsOf(rows, i), ladder));
+  const ofElements = stage.elements.map((_, i) => figuresOf(rowsOf(rows, i), NAMES));
   const { target, ...figures } = summarize(ofElements, rows);
-  const frames = rowsOf(rows, 0).map(({ at, span, moving }) => [Math.round(at), span, ladder.indexOf(moving)]);
+  const frames = rowsOf(rows, 0).map(({ at, span, moving }) => [Math.round(at), span, NAMES.indexOf(moving)]);
   return {
     step: `${what} ${value}`,
     ...stage.state,
@@ -86,9 +98,6 @@ async function measureStep({ what, value }, { stage, plan, burner, now, ladder }
   };
 }
 
-/** Names of all levels, the true image first. */
-const NAMES = LADDER.map(({ name }) => name);
-
 async function measure(plan, steps) {
   await customElements.whenDefined('gaussian-splat');
   showProgress('loading');
@@ -96,13 +105,15 @@ async function measure(plan, steps) {
   const stage = new Stage(document.getElementById('stage'), await sceneOf(plan), plan, most);
   stage.resize(plan.width, plan.height);
   await stage.load();
-  const burner = plan.steps.some(({ what }) => what === 'burn') ? await Burner.open() : undefined;
-  if (plan.budget > 0) stage.frameBudget = plan.budget * (await firstTime(stage, plan));
+  const burns = plan.warm > 0 || plan.steps.some(({ what }) => what === 'burn');
+  const burner = burns ? await Burner.open() : undefined;
   const now = { side: 1, burn: 0 };
+  const bench = { stage, plan, now, motion: { speed: plan.speed, onFrame: () => work(burner, { stage, plan, now }) } };
+  if (plan.budget > 0) stage.frameBudget = plan.budget * (await firstTime(bench));
   for (const step of plan.steps) {
     if (performance.now() > 1000 * plan.limit) break;
     showProgress(`${step.what} ${step.value}`);
-    steps.push(await measureStep(step, { stage, plan, burner, now, ladder: NAMES }));
+    steps.push(await measureStep(step, bench));
     showSteps(steps);
   }
   const left = plan.steps.length - steps.length;

@@ -46,6 +46,8 @@ export function readPlan(query) {
     most: number('most', 8192),
     /** What pictures in motion may take, as a multiple of what the whole one takes at first; 0: as the display says. */
     budget: number('budget', 0),
+    /** Milliseconds of other work for the GPU in the second half of each frame: what is idle most of the time runs at a fraction of its clock. */
+    warm: number('warm', 0),
     /** Of each step, before the camera rests. */
     seconds: number('seconds', 6),
     /** Of motion under the load as it was, before each step. */
