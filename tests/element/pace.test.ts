@@ -140,10 +140,10 @@ test('a picture becomes so small that fewer pixels take longer than all: the tru
     const isLarge = (now: number): boolean => now < 8_000;
     const { frames } = run(
       { ...gpu, load: (now) => (isLarge(now) ? 2.2 : load), shares: (now) => (isLarge(now) ? WIDE : SMALL) },
-      20_000,
+      26_000,
     );
     assert.ok(frames.find(({ at }) => at > 8_000)!.level > 5, 'the large one takes the lowest rungs');
-    const levels = frames.filter(({ at }) => at > 14_000).map(({ level }) => level);
+    const levels = frames.filter(({ at }) => at > 22_000).map(({ level }) => level);
     assert.ok(
       levels.every((level) => level === 0),
       `load ${load}: ${levels.join(' ')}`,
@@ -162,6 +162,23 @@ test('a rung down that makes frames longer is taken back at once, and the pace d
     );
     assert.ok(after.filter(({ level }) => SMALL[level] > 1.25).length < 12, 'frames that were the worse for it');
     assert.ok(reversals(frames, 2_000, 7_000) <= 1, `${reversals(frames, 2_000, 7_000)} reversals`);
+  }
+});
+
+test('where no rung wins anything the picture stays whole, or comes back to it at once and stays', () => {
+  for (const [load, latency] of [
+    [1.3, 0],
+    [2.5, 2],
+    [6, 3],
+  ]) {
+    const gpu = { hertz: 60, fixed: 1, noise: 0.06, spikes: 0, latency, seed: 13 };
+    const { frames } = run({ ...gpu, load: () => load }, 30_000);
+    const late = frames.filter(({ at }) => at > 4_000);
+    assert.ok(
+      late.every(({ level }) => level === 0),
+      `load ${load}: ${late.map(({ level }) => level).join(' ')}`,
+    );
+    assert.ok(reversals(frames, 0, 5_000) <= 1, `${reversals(frames, 0, 5_000)} reversals`);
   }
 });
 

@@ -82,7 +82,7 @@ test('pictures that are small already are not made smaller, whatever they take',
   const levelOf = (pixels: number): number => {
     for (let now = 1000; now < 3000; now += INTERVAL) {
       const { level } = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
-      pace.sample(level, 100);
+      pace.sample(level, 1000 * LADDER[level].cost);
     }
     return pace.plan({ now: 3000, pixels, hasChanged: true, goesOn: true }).level;
   };

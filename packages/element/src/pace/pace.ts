@@ -62,6 +62,8 @@ const NO_LONGER = 1.05;
 /** A rung down is taken back where, this soon after it, ms, all of three frames take so much longer than those before: small pictures leave most of a wide GPU idle. */
 const HARM_MS = 1_000;
 const HARMFUL = 1.25;
+/** So are all rungs where the lowest has not brought frames below such a share: the picture would be less for nothing. */
+const IN_VAIN = 0.95;
 /** A rung up that took frames down to such a share is followed by the next without a hold. */
 const FASTER = 0.9;
 /** A climb that ends sooner, ms, was in vain; the rung is then left alone for a while, each time for twice as long. */
@@ -85,9 +87,10 @@ export const INITIAL_PACE: Pace = {
 export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, rules: PaceRules): Pace {
   if (level !== pace.level) return pace;
   const known = { ...pace, recent: [...pace.recent, milliseconds].slice(-MEMORY) };
-  if (isHarmful(known, now)) return change(known, now, known.from, 'trial');
+  const isLowest = level + 1 === rules.costs.length;
+  if (isHarmful(known, now) || (isLowest && isForNothing(known))) return change(known, now, known.from, 'trial');
   const excess = excessOf(known.recent, rules.targetMs);
-  if (excess !== null && level + 1 < rules.costs.length && !isKeptThough(known, now)) return fall(known, now, excess, rules);
+  if (excess !== null && !isLowest && !isKeptThough(known, now)) return fall(known, now, excess, rules);
   const reason = climbReason(known, now, rules);
   return reason === null ? known : change(known, now, level - 1, reason);
 }
@@ -130,6 +133,11 @@ function climbReason(pace: Pace, now: number, { costs, targetMs }: PaceRules): P
 function isHarmful({ recent, climbed, changedAt, before }: Pace, now: number): boolean {
   const three = recent.slice(-3);
   return !climbed && three.length === 3 && now - changedAt < HARM_MS && Math.min(...three) > HARMFUL * before;
+}
+
+/** Frames take as long as before the pace fell: looked at once, when there are enough of them. */
+function isForNothing({ recent, climbed, before, reason }: Pace): boolean {
+  return !climbed && reason === 'slow' && recent.length === ENOUGH_FRAMES && quantile(recent, 0.5) >= IN_VAIN * before;
 }
 
 /** What is too slow stays where the rung below was no faster, until that is long ago. */
