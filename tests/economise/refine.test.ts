@@ -229,7 +229,7 @@ test('a few steps come nearer in views that were not fitted, and leave the sourc
   evaluator.destroy();
 });
 
-/** A ball with a grain on it and, last, a large thin splat: of views that have an eye in it it fills all or nothing. */
+/** A ball with a grain on it and, last, a large faint splat: of views that have an eye in it it fills all or nothing. */
 function veiled(ball: GaussianCloud, eye: readonly number[]): GaussianCloud {
   const behind = (values: Float32Array, grain: readonly number[], veil: readonly number[]): Float32Array =>
     Float32Array.from([...values, ...grain, ...veil]);
