@@ -85,7 +85,7 @@ export class RefinedScene implements GaussianScene {
   }
 
   /**
-   * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each number of a splat, some 1.1 kB at degree 3 with what is drawn.
+   * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each number of a splat, some 1.2 kB at degree 3 with what is drawn.
    * @param mostSplats of a page; default what the device's limits allow
    * @throws GaussianSplatError `out-of-memory/*`
    */
