@@ -79,15 +79,21 @@ fn unblend(pixel: ptr<function, Pixel>, k: u32) {
   add_fixed(k, 0u, by_color.x);
   add_fixed(k, 1u, by_color.y);
   add_fixed(k, 2u, by_color.z);
+  add_fixed(k, 9u, BEND_UNIT * weight * weight);
   // One that is as opaque as may be does not become more so.
   if (own > ALPHA_MAX) { return; }
-  let q = alpha * dot((*pixel).slope, before * color - (*pixel).behind / (1.0 - alpha));
+  let by_alpha = alpha * (before * color - (*pixel).behind / (1.0 - alpha));
+  let q = dot((*pixel).slope, by_alpha);
   add_fixed(k, 3u, q);
   add_fixed(k, 4u, q * u);
   add_fixed(k, 5u, q * v);
   add_fixed(k, 6u, q * u * u);
   add_fixed(k, 7u, q * u * v);
   add_fixed(k, 8u, q * v * v);
+  let bend = BEND_UNIT * dot(by_alpha, by_alpha);
+  let square = u * u + v * v;
+  add_fixed(k, 10u, bend);
+  add_fixed(k, 11u, bend * square * square);
 }
 
 @compute @workgroup_size(TILE_THREADS)

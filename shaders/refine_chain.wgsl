@@ -13,6 +13,14 @@
 // SCREEN_NUMBERS of each splat, in fixed point; zero again afterwards, for the next view.
 @group(0) @binding(4) var<storage, read_write> screen: array<vec2i>;
 @group(0) @binding(5) var<storage, read_write> gradients: array<f32>;
+// Of each splat the largest curvatures in a view: see BEND_COLOUR.
+@group(0) @binding(6) var<storage, read_write> bends: array<vec4f>;
+
+// A splat that has an eye within so many of its sizes is not moved. What a step costs there derivatives do not tell: that the near plane cuts off all of it at once, and that it passes
+// before or behind others in the order of depth.
+const NEAR_SIZES = 64.0;
+const NO_MOVE = 1e30;
+const FOUR_PI = 12.566371;
 
 fn add(i: u32, step: u32, value: f32) {
   gradients[step * refine_view.row + i] += refine_view.weight * value;
@@ -49,6 +57,14 @@ fn chain_colour(i: u32, position: vec3f, by_color: vec3f) {
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let i = group_index(workgroup_id) * REFINE_GROUP + lane;
   if (i >= view.splat_count) { return; }
+  let n = row_of(i);
+  let position = vec3f(numbers[n], numbers[n + 1u], numbers[n + 2u]);
+  let s = n + SCALE_AT;
+  let r = n + ROTATION_AT;
+  let own = turned(vec4f(numbers[r], numbers[r + 1u], numbers[r + 2u], numbers[r + 3u]), vec3f(numbers[s], numbers[s + 1u], numbers[s + 2u]));
+  var p = (view.local_to_camera * vec4f(position, 1.0)).xyz;
+  let reach = NEAR_SIZES * max(own.scales.x, max(own.scales.y, own.scales.z));
+  if (dot(p, p) < reach * reach) { bends[i][BEND_POSITION] = NO_MOVE; }
   var seen: array<f32, SCREEN_NUMBERS>;
   var is_seen = false;
   for (var k = 0u; k < SCREEN_NUMBERS; k++) {
@@ -58,15 +74,9 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     screen[at] = vec2i(0);
   }
   if (!is_seen) { return; }
-  let n = row_of(i);
-  let position = vec3f(numbers[n], numbers[n + 1u], numbers[n + 2u]);
   chain_colour(i, position, vec3f(seen[0], seen[1], seen[2]));
 
-  let s = n + SCALE_AT;
-  let r = n + ROTATION_AT;
-  let own = turned(vec4f(numbers[r], numbers[r + 1u], numbers[r + 2u], numbers[r + 3u]), vec3f(numbers[s], numbers[s + 1u], numbers[s + 2u]));
   let to_camera = mat3x3f(view.local_to_camera[0].xyz, view.local_to_camera[1].xyz, view.local_to_camera[2].xyz);
-  var p = (view.local_to_camera * vec4f(position, 1.0)).xyz;
   p.z = max(p.z, view.near);
   let xy = p.xy / p.z;
   let t = clamp(xy, view.jacobian_min, view.jacobian_max);
@@ -110,7 +120,13 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   // Rows to columns: by each axis of the splat, in the scene.
   let by_axes = transpose(mat3x3f(by_a0, by_a1, by_a2));
   var turns: array<vec3f, 3>;
+  var most_shift = 0.0;
   for (var k = 0u; k < 3u; k++) {
+    let shift = to_camera * own.axes[k] * stride[k] / p.z;
+    let on_screen = (shift.xy - xy * shift.z) * view.focal;
+    let in_ellipse = vec2f(x * on_screen.x, lean * on_screen.x + y * on_screen.y);
+    // By Cauchy and Schwarz: the derivative by u is u times the one by the logarithm of alpha, the one by a size u².
+    most_shift = max(most_shift, dot(in_ellipse, in_ellipse) * sqrt(seen[10] * seen[11]) + shift.z * shift.z * seen[11]);
     add(i, k, stride[k] * dot(own.axes[k], by_position));
     add(i, GROWTH_STEP + k, dot(axes[k], by_axes[k]));
     turns[k] = own.scales[k] * (transpose(own.axes) * (transpose(to_camera) * by_axes[k]));
@@ -121,4 +137,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   add(i, TURN_STEP + 2u, swing.z * (turns[0].y - turns[1].x));
   let opacity = 1.0 / (1.0 + exp(-numbers[n + LOGIT_AT]));
   add(i, LOGIT_STEP, seen[3] * (1.0 - opacity));
+  let bases = f32((degrees[i] + 1u) * (degrees[i] + 1u)) / FOUR_PI;
+  let bend = vec4f(bases * seen[9], (1.0 - opacity) * (1.0 - opacity) * seen[10], seen[11], most_shift);
+  bends[i] = max(bends[i], 2.0 * refine_view.weight / BEND_UNIT * bend);
 }

@@ -15,6 +15,8 @@ struct RefineStep {
   square_scale: f32,
   // Derivatives far below this move little.
   least: f32,
+  // Part of Newton's step, along one number alone and by the largest curvature in a view, beyond which none goes.
+  newton: f32,
   // How far a step goes.
   position_rate: f32,
   growth_rate: f32,
@@ -31,20 +33,29 @@ struct RefineStep {
 @group(0) @binding(3) var<storage, read_write> gradients: array<f32>;
 // Means of the derivatives, and of their squares.
 @group(0) @binding(4) var<storage, read_write> means: array<vec2f>;
+// Of each splat the largest curvatures in a view: see BEND_COLOUR.
+@group(0) @binding(5) var<storage, read> bends: array<vec4f>;
 
-// How far to go along one of the numbers that are sought, before its rate.
-fn stride_along(i: u32, number: u32) -> f32 {
+const LEAST_BEND = 1e-30;
+
+// How far to go along one of the numbers that are sought.
+fn stride_along(i: u32, number: u32, rate: f32, bend: u32) -> f32 {
   let at = number * step.row + i;
   let g = gradients[at];
   gradients[at] = 0.0;
   let old = means[at];
   let mean = mix(vec2f(g, g * g), old, vec2f(step.keep_mean, step.keep_square));
   means[at] = mean;
-  return -mean.x * step.mean_scale / (sqrt(mean.y * step.square_scale) + step.least);
+  let pace = min(rate / (sqrt(mean.y * step.square_scale) + step.least), step.newton / max(LEAST_BEND, bends[i][bend]));
+  return -mean.x * step.mean_scale * pace;
 }
 
-fn vector_along(i: u32, number: u32) -> vec3f {
-  return vec3f(stride_along(i, number), stride_along(i, number + 1u), stride_along(i, number + 2u));
+fn vector_along(i: u32, number: u32, rate: f32, bend: u32) -> vec3f {
+  return vec3f(
+    stride_along(i, number, rate, bend),
+    stride_along(i, number + 1u, rate, bend),
+    stride_along(i, number + 2u, rate, bend),
+  );
 }
 
 @compute @workgroup_size(REFINE_GROUP)
@@ -57,10 +68,10 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let q = vec4f(numbers[r], numbers[r + 1u], numbers[r + 2u], numbers[r + 3u]);
   let own = turned(q, vec3f(numbers[s], numbers[s + 1u], numbers[s + 2u]));
   let stride = strides(own.scales);
-  let shift = own.axes * (stride * step.position_rate * vector_along(i, 0u));
-  let growth = step.growth_rate * vector_along(i, GROWTH_STEP);
+  let shift = own.axes * (stride * vector_along(i, 0u, step.position_rate, BEND_POSITION));
+  let growth = vector_along(i, GROWTH_STEP, step.growth_rate, BEND_SHAPE);
   // A turn by a small angle about the splat's own axes: q (1, turn / 2).
-  let h = 0.5 * step.turn_rate * swings(stride) * vector_along(i, TURN_STEP);
+  let h = 0.5 * swings(stride) * vector_along(i, TURN_STEP, step.turn_rate, BEND_SHAPE);
   let v = q.yzw;
   let turned_q = normalize(vec4f(q.x - dot(v, h), v + q.x * h + cross(v, h)));
   for (var k = 0u; k < 3u; k++) {
@@ -68,11 +79,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     numbers[s + k] += growth[k];
   }
   for (var k = 0u; k < 4u; k++) { numbers[r + k] = turned_q[k]; }
-  numbers[n + LOGIT_AT] += step.logit_rate * stride_along(i, LOGIT_STEP);
+  numbers[n + LOGIT_AT] += stride_along(i, LOGIT_STEP, step.logit_rate, BEND_LOGIT);
   let degree = degrees[i];
   let kept = 3u * (degree + 1u) * (degree + 1u);
   for (var k = 0u; k < kept; k++) {
     let rate = select(step.harmonic_rate, step.constant_rate, k < 3u);
-    numbers[n + SH_AT + k] += rate * stride_along(i, SH_STEP + k);
+    numbers[n + SH_AT + k] += stride_along(i, SH_STEP + k, rate, BEND_COLOUR);
   }
 }

@@ -15,8 +15,10 @@ const LOGIT_STEP = 9u;
 const SH_STEP = 10u;
 
 // What a picture's pixels tell of a splat: by its colour, and the sums of q, q·u, q·v, q·u², q·u·v and q·v², where q is the derivative by the
-// logarithm of alpha and u, v are where the pixel lies in the ellipse.
-const SCREEN_NUMBERS = 9u;
+// logarithm of alpha and u, v are where the pixel lies in the ellipse. Then how much the squared error bends, times BEND_UNIT: the squares of what the
+// pixel changes by with the colour and with the logarithm of alpha, and the latter times (u² + v²)².
+const SCREEN_NUMBERS = 12u;
+const BEND_UNIT = 0.125;
 // Bytes of each: two words of a sum in fixed point.
 const SCREEN_BYTES = 8u;
 // Steps of the fixed point in 1.
@@ -27,6 +29,13 @@ fn of_fixed(words: vec2i) -> f32 {
   let low = bitcast<u32>(words.x);
   return (f32(words.y + i32(low >> 16u)) * 65536.0 + f32(low & 0xffffu)) / FIXED;
 }
+
+// Curvatures of a view's squared error (Gauss and Newton's: without how the picture itself bends): by all harmonics of a channel at once, by the logit, and
+// bounds of those by any scale or turn, and by any step along an axis.
+const BEND_COLOUR = 0u;
+const BEND_LOGIT = 1u;
+const BEND_SHAPE = 2u;
+const BEND_POSITION = 3u;
 
 const REFINE_GROUP = 64u;
 

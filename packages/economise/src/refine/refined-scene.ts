@@ -36,6 +36,8 @@ export interface RefinedPart {
   /** array<f32> and array<vec2f>: a row for each number that is sought. */
   readonly gradients: GPUBuffer;
   readonly means: GPUBuffer;
+  /** array<vec4f>: of each splat the largest curvatures in a view. */
+  readonly bends: GPUBuffer;
   readonly packing: GPUBindGroup;
 }
 
@@ -83,7 +85,7 @@ export class RefinedScene implements GaussianScene {
   }
 
   /**
-   * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each number of a splat, some 1.1 kB at degree 3 with what is drawn.
+   * Uploads a reduced cloud. It takes 16 bytes of GPU memory for each number of a splat, some 1.2 kB at degree 3 with what is drawn.
    * @param mostSplats of a page; default what the device's limits allow
    * @throws GaussianSplatError `out-of-memory/*`
    */
@@ -157,11 +159,11 @@ export class RefinedScene implements GaussianScene {
   }
 
   #partOf(begin: number, count: number, first: number, degrees: Uint8Array): RefinedPart {
-    const { storage, copySource, uniform } = BUFFER_USAGE;
+    const { storage, copySource, copyDestination, uniform } = BUFFER_USAGE;
     const row = CULL_GROUP * Math.ceil(count / CULL_GROUP);
     const sought = SH_STEP + this.#width - SH_AT;
     const buffer = (name: string, bytes: number, content?: Uint32Array): GPUBuffer =>
-      this.#memory.buffer(`gs.refine.${name}`, bytes, storage | copySource, content);
+      this.#memory.buffer(`gs.refine.${name}`, bytes, storage | copySource | copyDestination, content);
     const page = pageOf(this.#memory, this.shDegree, count);
     const rows = numbersOf(this.#cloud, begin, count, this.#width);
     const numbers = buffer('numbers', rows.byteLength, new Uint32Array(rows.buffer));
@@ -176,6 +178,7 @@ export class RefinedScene implements GaussianScene {
       degrees: buffer('degrees', 4 * count, Uint32Array.from(degrees.subarray(begin, begin + count))),
       gradients: buffer('gradients', FLOAT_BYTES * sought * row),
       means: buffer('means', 2 * FLOAT_BYTES * sought * row),
+      bends: buffer('bends', 4 * FLOAT_BYTES * row),
     };
   }
 

@@ -21,7 +21,7 @@ export interface RefiningOptions {
 
 /**
  * An evaluator whose cuts can be refined, besides what another one does: the splats that stay are fitted to pictures of the whole scene, by gradient descent through the rasterizer. The pictures stay on the
- * GPU: 16 bytes for each pixel of the views. A splat takes 1.1 kB there at degree 3 while it is fitted.
+ * GPU: 16 bytes for each pixel of the views. A splat takes 1.2 kB there at degree 3 while it is fitted.
  */
 export class RefiningEvaluator implements Evaluator {
   /** Part of the error of drops and merges that is taken to be left by refining: merges must be found up to so much more (`MergingOptions.mostError`). */

@@ -34,7 +34,7 @@ const AHEAD = 16;
 
 /** How far a step goes along each kind of number: Adam's rates at the beginning. */
 export interface Rates {
-  /** In sizes of the splat along its own axes. */
+  /** In sizes of the splat along its own axes. Those that are large or near to an eye are not moved. */
   readonly position: number;
   /** Of the logarithms of the scales. */
   readonly growth: number;
@@ -59,11 +59,16 @@ export interface Descent {
   readonly keepSquare: number;
   /** Derivatives far below this move little: of the squared error of a picture, over all its pixels. */
   readonly least: number;
+  /**
+   * Part of Newton's step, along one number alone and by the largest curvature in a view, beyond which none goes. Adam's steps are as long where derivatives are small: of a splat
+   * that fills one view and shows little in the others these would lead it anywhere.
+   */
+  readonly newton: number;
 }
 
 export const USUAL_DESCENT: Descent = {
-  ...{ steps: 1296, viewsAtOnce: 1, lastRate: 0.05, keepMean: 0.9, keepSquare: 0.99, least: 1e-8 },
-  rates: { position: 0, growth: 0.003, turn: 0.003, logit: 0.02, constant: 0.005, harmonic: 0.001 },
+  ...{ steps: 2592, viewsAtOnce: 1, lastRate: 0.03, keepMean: 0.9, keepSquare: 0.99, least: 1e-8, newton: 0.3 },
+  rates: { position: 0.003, growth: 0.003, turn: 0.003, logit: 0.02, constant: 0.005, harmonic: 0.001 },
 };
 
 /** Fits the splats of a scene to pictures by gradient descent. */
@@ -98,6 +103,7 @@ export class SceneFitter {
     const before = await this.#errors.measure(this.#scene);
     const pace = Math.min(1, Math.sqrt(mean(before) / USUAL_ERROR));
     const order = viewOrder(this.#errors.exhibits.length);
+    await this.#survey(signal);
     let looks = 0;
     for (let step = 0; step < steps; step++) {
       for (let k = 0; k < viewsAtOnce; k++, looks++) {
@@ -127,13 +133,13 @@ export class SceneFitter {
     const bindings = backward.bind({ ...painted, ...pictures, screen: this.#scene.screen });
     backward.dispatchGrid(pass, bindings, Math.ceil(camera.width / TILE), Math.ceil(camera.height / TILE));
     const chain = rareKernelOf(this.#device, refineChain);
-    this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients }, p) => {
+    this.#scene.parts.forEach(({ page, first, row, numbers, degrees, gradients, bends }, p) => {
       const place = this.#scene.parts.length * view + p;
       const bytes = SCREEN_BYTES * SCREEN_NUMBERS;
       const bound = chain.bind({
         view: { buffer: this.#views, offset: VIEW_STRIDE * place, size: rendererLayouts.View.size },
         refine_view: { buffer: this.#refineViews, offset: SMALL_STRIDE * place, size: layouts.RefineView.size },
-        ...{ numbers, degrees, gradients },
+        ...{ numbers, degrees, gradients, bends },
         screen: { buffer: this.#scene.screen, offset: bytes * first, size: bytes * row },
       });
       chain.dispatch(pass, bound, Math.ceil(page.count / REFINE_GROUP));
@@ -142,22 +148,34 @@ export class SceneFitter {
     this.#device.queue.submit([encoder.finish()]);
   }
 
+  /** Looks at all views for the curvatures alone, before anything moves. */
+  async #survey(signal: AbortSignal | undefined): Promise<void> {
+    for (let view = 0; view < this.#errors.exhibits.length; view++) {
+      signal?.throwIfAborted();
+      this.look(view);
+      if (view % AHEAD === AHEAD - 1) await this.#device.queue.onSubmittedWorkDone();
+    }
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.survey' });
+    for (const { gradients } of this.#scene.parts) encoder.clearBuffer(gradients);
+    this.#device.queue.submit([encoder.finish()]);
+  }
+
   destroy(): void {
     this.#memory.destroy();
   }
 
   /** @param number of the step, from 1 on @param share of the rates that is left */
-  #step(number: number, share: number, { rates, keepMean, keepSquare, least }: Descent): void {
+  #step(number: number, share: number, { rates, keepMean, keepSquare, least, newton }: Descent): void {
     const kernel = rareKernelOf(this.#device, refineStep);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.step' });
     const pass = encoder.beginComputePass({ label: 'gs.refine.step' });
-    this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means }, p) => {
+    this.#scene.parts.forEach(({ page, row, numbers, degrees, gradients, means, bends }, p) => {
       const bytes = new ArrayBuffer(layouts.RefineStep.size);
       writeStruct(
         layouts.RefineStep,
         {
           ...{ splat_count: page.count, row, harmonics: 3 * shCoefficientCount(this.#scene.shDegree) },
-          ...{ keep_mean: keepMean, keep_square: keepSquare, least },
+          ...{ keep_mean: keepMean, keep_square: keepSquare, least, newton },
           mean_scale: 1 / (1 - keepMean ** number),
           square_scale: 1 / (1 - keepSquare ** number),
           ...{ position_rate: share * rates.position, growth_rate: share * rates.growth },
@@ -167,7 +185,7 @@ export class SceneFitter {
         bytes,
       );
       this.#device.queue.writeBuffer(this.#steps[p], 0, bytes);
-      const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means });
+      const bindings = kernel.bind({ step: this.#steps[p], numbers, degrees, gradients, means, bends });
       kernel.dispatch(pass, bindings, Math.ceil(page.count / REFINE_GROUP));
     });
     this.#scene.pack(pass);
