@@ -121,7 +121,7 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
     ? await GpuEvaluator.create(device, cloud, views, { pool })
     : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
   const mostError = 10 ** (-minDecibels / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
-  const merging = { views: views.scored, mostError };
+  const merging = { views: views.scored, mostError, pool };
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
   const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;

@@ -17,6 +17,8 @@ import {
 import { readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { covarianceOf } from '../support/generator-tensors.js';
+import { findMerges } from '../../packages/economise/src/merge/find-merges.js';
+import { ThreadPool } from '../../scripts/lib/thread-pool.mjs';
 
 const SIZE = { width: 120, height: 80 };
 const SPLATS = 600;
@@ -202,3 +204,17 @@ for (const minDecibels of [57, 44]) {
     assert.ok((result.cut.mergePrice ?? 0) > 0);
   });
 }
+
+test('threads find the merges that one finds', async () => {
+  const ranking = await new PaintedEvaluator(scene, { views }).rank();
+  const alone = await findMerges(scene, ranking, views.scored, 1e-4);
+  assert.ok(alone.into.length > 100, `${alone.into.length} merges`);
+  for (const threads of [2, 3]) {
+    const pool = new ThreadPool(threads, 1000);
+    try {
+      assert.deepEqual(await findMerges(scene, ranking, views.scored, 1e-4, pool), alone);
+    } finally {
+      await pool.close();
+    }
+  }
+});

@@ -1,17 +1,17 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { ascendingOrder } from '../order.js';
 import type { Ranking } from '../score.js';
-import { nearestNeighbours } from './neighbours.js';
-import { PairCosts } from './pair-costs.js';
+import { inline, partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
+import { treeOf } from './neighbours.js';
+import { FAVOURITES } from './pair-candidates.js';
+import { PairCosts, pairState, type PairState } from './pair-costs.js';
 
 /** Views that pairs are looked at in: with half as many the wrong pairs are taken, with three times as many none better. */
 const VIEWS = 16;
-/** Neighbours that a splat may be merged with, and how many of them are looked at in all views rather than in every fourth. */
-const NEIGHBOURS = 10;
-const FAVOURITES = 4;
-const GLANCE = 4;
 /** Rounds of pairs: each may make one of two that were made before. */
 const MOST_ROUNDS = 6;
+/** A splat's pairs take as long as moving so many splats. */
+const MOVES = 32;
 /** Part of the pairs of a round that are merged at most, the cheapest: others may find better partners in the next. */
 const PART = 0.5;
 
@@ -39,21 +39,25 @@ interface Pairs {
  * matters. Estimates are too low by a factor of ten or so, but in the right order.
  * @param views to look at pairs in; sixteen of them, evenly, are
  * @param mostError mean squared error of the images that matters at most
+ * @param pool looks at pairs, whatever its size with the same result
  */
-export function findMerges(
+export async function findMerges(
   cloud: GaussianCloud,
   { contribution, removalError }: Ranking,
   views: readonly Camera[],
   mostError: number,
-): Merges {
-  const costs = new PairCosts(cloud, contribution, evenly(views, VIEWS));
+  pool: TaskPool = inline,
+): Promise<Merges> {
+  const chosen = poolFor(pool, MOVES * cloud.count);
+  const state = pairState(cloud, contribution, evenly(views, VIEWS), (bytes) => chosen.allocate(bytes));
+  const costs = new PairCosts(state);
   const merges = { into: [], from: [], shares: [], opacities: [], prices: [] } as Record<keyof Merges, number[]>;
   const prices = new Float32Array(cloud.count);
   // Splats that too few views looked at stay as they are.
   let slots = Uint32Array.from(removalError.keys()).filter((i) => Number.isFinite(removalError[i]));
   let spent = 0;
   for (let round = 0; round < MOST_ROUNDS && spent < mostError; round++) {
-    const { first, second, costs: found } = pairsOf(costs, slots, cloud.count);
+    const { first, second, costs: found } = pairsOf(await candidatesOf(state, slots, chosen), cloud.count);
     const isGone = new Uint8Array(cloud.count);
     const most = Math.ceil(PART * first.length);
     for (let k = 0; k < most && spent < mostError; k++) {
@@ -88,8 +92,7 @@ function evenly(views: readonly Camera[], most: number): Camera[] {
 }
 
 /** Pairs of which no two share a splat: the cheapest of all, the cheapest of the rest, and so on. */
-function pairsOf(costs: PairCosts, slots: Uint32Array, count: number): Pairs {
-  const candidates = candidatesOf(costs, slots);
+function pairsOf(candidates: Pairs, count: number): Pairs {
   const isTaken = new Uint8Array(count);
   const pairs: [number, number, number][] = [];
   for (const k of ascendingOrder(candidates.costs)) {
@@ -106,25 +109,26 @@ function pairsOf(costs: PairCosts, slots: Uint32Array, count: number): Pairs {
 }
 
 /** Each splat with those of its neighbours that it looks most alike with. */
-function candidatesOf(costs: PairCosts, slots: Uint32Array): Pairs {
-  const neighbours = nearestNeighbours(costs.positions(), slots, NEIGHBOURS);
+async function candidatesOf(state: PairState, slots: Uint32Array, pool: TaskPool): Promise<Pairs> {
+  const allocate = (bytes: number): ArrayBufferLike => pool.allocate(bytes);
+  const count = state.visible.length;
+  const positions = new PairCosts(state).positions(new Float32Array(allocate(12 * count), 0, 3 * count));
+  const tree = treeOf(positions, slots, allocate);
   const room = FAVOURITES * slots.length;
-  const [first, second, found] = [new Uint32Array(room), new Uint32Array(room), new Float32Array(room)];
-  const glances = new Float32Array(NEIGHBOURS);
-  let count = 0;
-  for (let k = 0; k < slots.length; k++) {
-    const i = slots[k];
-    const own = neighbours.subarray(NEIGHBOURS * k, NEIGHBOURS * (k + 1));
-    for (let n = 0; n < NEIGHBOURS; n++) glances[n] = own[n] < 0 ? Infinity : costs.cost(i, own[n], GLANCE);
-    for (let n = 0; n < FAVOURITES; n++) {
-      const best = glances.indexOf(Math.min(...glances));
-      if (!Number.isFinite(glances[best])) break;
-      glances[best] = Infinity;
-      const cost = costs.cost(i, own[best]);
-      if (!Number.isFinite(cost)) continue;
-      [first[count], second[count], found[count]] = [i, own[best], cost];
-      count++;
-    }
-  }
-  return { first: first.subarray(0, count), second: second.subarray(0, count), costs: found.subarray(0, count) };
+  const partners = new Uint32Array(allocate(4 * room), 0, room);
+  const costs = new Float32Array(allocate(4 * room), 0, room);
+  const parts = partsOf(MOVES * slots.length, pool);
+  const inputs = parts.map((part) => {
+    const [first, end] = [part.first, part.end].map((move) => Math.round(move / MOVES));
+    const [from, to] = [FAVOURITES * first, FAVOURITES * end];
+    const own = { partners: partners.subarray(from, to), costs: costs.subarray(from, to) };
+    return { state, tree, slots: slots.slice(first, end), ...own };
+  });
+  await pool.run('findPartners', inputs);
+  const found = Uint32Array.from(costs.keys()).filter((k) => Number.isFinite(costs[k]));
+  return {
+    first: found.map((k) => slots[Math.floor(k / FAVOURITES)]),
+    second: found.map((k) => partners[k]),
+    costs: Float32Array.from(found, (k) => costs[k]),
+  };
 }

@@ -1,5 +1,6 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
+import { inline, type TaskPool } from '../parts/task-pool.js';
 import { degreesOf, type Cut, type ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
 import { applyMerges } from './apply-merges.js';
@@ -10,13 +11,15 @@ export interface MergingOptions {
   readonly views: readonly Camera[];
   /** Merges are found until they are estimated to cost so much, mean squared error of the images: that of the figure that is asked for. */
   readonly mostError: number;
+  /** Finds them in parts; default {@link inline}. */
+  readonly pool?: TaskPool;
 }
 
 /** Parts of the splats that merges would save, at whose prices it is measured what they cost. */
 const MERGED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 
 /**
- * An evaluator whose cuts merge splats, too, besides what another one does. Merges are found and made in plain code; what they cost is measured on pictures by the other, which draws the cloud that they
+ * An evaluator whose cuts merge splats, too, besides what another one does. Merges are found and made in plain code, found in threads where there are; what they cost is measured on pictures by the other, which draws the cloud that they
  * leave.
  */
 export class MergingEvaluator implements Evaluator {
@@ -45,8 +48,8 @@ export class MergingEvaluator implements Evaluator {
   async rank(signal?: AbortSignal): Promise<Ranking> {
     const ranking = await this.#inner.rank(signal);
     signal?.throwIfAborted();
-    const { views, mostError } = this.#options;
-    this.#merges = findMerges(this.#cloud, ranking, views, mostError);
+    const { views, mostError, pool = inline } = this.#options;
+    this.#merges = await findMerges(this.#cloud, ranking, views, mostError, pool);
     return ranking;
   }
 

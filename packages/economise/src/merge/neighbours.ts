@@ -1,57 +1,75 @@
 /** Points of a leaf, which are compared one by one. */
 const LEAF = 12;
 
-/** A part of a k-d tree: the points from `first` to `end` of its order, and their bounds. */
-interface Box {
-  readonly first: number;
-  readonly end: number;
-  readonly low: readonly number[];
-  readonly high: readonly number[];
-  readonly halves?: readonly [Box, Box];
+/** Numbers of a box: least x, y, z and greatest. */
+const BOX = 6;
+
+/** A k-d tree of points, in arrays that threads can share. */
+export interface PointTree {
+  /** [N, 3] */
+  readonly positions: Float32Array;
+  /** Numbers of the points that count, those of a leaf next to one another. */
+  readonly order: Uint32Array;
+  /** Bounds of the parts of `order`: of all, and of part n in 2n + 1 and 2n + 2 those of its halves. */
+  readonly boxes: Float32Array;
 }
 
 /**
- * The nearest neighbours of points among one another.
+ * Puts points into a tree.
  * @param positions [N, 3]
  * @param points numbers of those that count
+ * @param allocate gives memory for the tree's own arrays
+ */
+export function treeOf(
+  positions: Float32Array,
+  points: Uint32Array,
+  allocate: (byteLength: number) => ArrayBufferLike,
+): PointTree {
+  const order = new Uint32Array(allocate(4 * points.length), 0, points.length);
+  order.set(points);
+  const depth = Math.max(0, Math.ceil(Math.log2(points.length / LEAF)));
+  const numbers = BOX * (2 ** (depth + 1) - 1);
+  const tree = { positions, order, boxes: new Float32Array(allocate(4 * numbers), 0, numbers) };
+  putBox(tree, 0, 0, order.length);
+  return tree;
+}
+
+/**
+ * The nearest neighbours of points among those of a tree.
+ * @param points numbers of points
  * @param most neighbours of a point
  * @returns [points, most] numbers of the neighbours, the nearest first; -1 where there are fewer
  */
-export function nearestNeighbours(positions: Float32Array, points: Uint32Array, most: number): Int32Array {
-  const order = points.slice();
-  const tree = boxOf(positions, order, 0, order.length);
+export function nearestNeighbours(tree: PointTree, points: Uint32Array, most: number): Int32Array {
   const found = new Int32Array(most * points.length).fill(-1);
   const distances = new Float64Array(most);
   for (let k = 0; k < points.length; k++) {
     distances.fill(Infinity);
-    search(positions, order, tree, points[k], distances, found.subarray(most * k, most * (k + 1)));
+    search(tree, 0, 0, tree.order.length, points[k], distances, found.subarray(most * k, most * (k + 1)));
   }
   return found;
 }
 
 /** Puts points in the order of a k-d tree: those of each box are halved along its longest side. */
-function boxOf(positions: Float32Array, order: Uint32Array, first: number, end: number): Box {
-  const [low, high] = [0, 1, 2].reduce<[number[], number[]]>(
-    ([lows, highs], axis) => {
-      let [least, most] = [Infinity, -Infinity];
-      for (let k = first; k < end; k++) {
-        const value = positions[3 * order[k] + axis];
-        if (value < least) least = value;
-        if (value > most) most = value;
-      }
-      return [
-        [...lows, least],
-        [...highs, most],
-      ];
-    },
-    [[], []],
-  );
-  if (end - first <= LEAF) return { first, end, low, high };
-  const sides = high.map((value, axis) => value - low[axis]);
+function putBox(tree: PointTree, node: number, first: number, end: number): void {
+  const { positions, order, boxes } = tree;
+  const at = BOX * node;
+  for (let axis = 0; axis < 3; axis++) {
+    let [least, most] = [Infinity, -Infinity];
+    for (let k = first; k < end; k++) {
+      const value = positions[3 * order[k] + axis];
+      if (value < least) least = value;
+      if (value > most) most = value;
+    }
+    boxes[at + axis] = least;
+    boxes[at + 3 + axis] = most;
+  }
+  if (end - first <= LEAF) return;
+  const sides = [0, 1, 2].map((axis) => boxes[at + 3 + axis] - boxes[at + axis]);
   const middle = (first + end) >> 1;
   halve(positions, order, first, end, sides.indexOf(Math.max(...sides)));
-  const halves = [boxOf(positions, order, first, middle), boxOf(positions, order, middle, end)] as const;
-  return { first, end, low, high, halves };
+  putBox(tree, 2 * node + 1, first, middle);
+  putBox(tree, 2 * node + 2, middle, end);
 }
 
 /** Hoare's selection (1961): what is less than the middle one comes before it, what is larger after it. */
@@ -75,25 +93,33 @@ function halve(positions: Float32Array, order: Uint32Array, first: number, end: 
   }
 }
 
-/** Looks for what is nearer than what was found. @param distances squared, ascending, of what is in `found` */
+/**
+ * Looks for what is nearer than what was found.
+ * @param node of the tree, whose points are those from `first` to `end` of its order
+ * @param distances squared, ascending, of what is in `found`
+ */
 function search(
-  positions: Float32Array,
-  order: Uint32Array,
-  box: Box,
+  tree: PointTree,
+  node: number,
+  first: number,
+  end: number,
   point: number,
   distances: Float64Array,
   found: Int32Array,
 ): void {
   const last = distances.length - 1;
-  if (distanceTo(box, positions, point) >= distances[last]) return;
-  if (box.halves) {
-    const [a, b] = box.halves;
-    const isFirst = distanceTo(a, positions, point) <= distanceTo(b, positions, point);
-    search(positions, order, isFirst ? a : b, point, distances, found);
-    search(positions, order, isFirst ? b : a, point, distances, found);
+  if (distanceTo(tree, node, point) >= distances[last]) return;
+  const { positions, order } = tree;
+  if (end - first > LEAF) {
+    const middle = (first + end) >> 1;
+    const [a, b] = [2 * node + 1, 2 * node + 2];
+    const isFirst = distanceTo(tree, a, point) <= distanceTo(tree, b, point);
+    if (isFirst) search(tree, a, first, middle, point, distances, found);
+    search(tree, b, middle, end, point, distances, found);
+    if (!isFirst) search(tree, a, first, middle, point, distances, found);
     return;
   }
-  for (let k = box.first; k < box.end; k++) {
+  for (let k = first; k < end; k++) {
     const other = order[k];
     if (other === point) continue;
     const dx = positions[3 * other] - positions[3 * point];
@@ -112,11 +138,12 @@ function search(
 }
 
 /** Squared distance of a point to a box. */
-function distanceTo({ low, high }: Box, positions: Float32Array, point: number): number {
+function distanceTo({ positions, boxes }: PointTree, node: number, point: number): number {
   let sum = 0;
   for (let axis = 0; axis < 3; axis++) {
     const value = positions[3 * point + axis];
-    const outside = value < low[axis] ? low[axis] - value : value > high[axis] ? value - high[axis] : 0;
+    const [low, high] = [boxes[BOX * node + axis], boxes[BOX * node + 3 + axis]];
+    const outside = value < low ? low - value : value > high ? value - high : 0;
     sum += outside * outside;
   }
   return sum;

@@ -12,50 +12,81 @@ const LEAST_VIEWS = 4;
 /** ∫ Y² over the sphere is 1: a coefficient's square over this is the mean square of what it adds. */
 const SPHERE = 4 * Math.PI;
 
+/** What is known of the splats that may be merged: plain arrays, which threads can share. */
+export interface PairState {
+  /** [N] see splat-rows.ts of the renderer. */
+  readonly rows: Float64Array;
+  /** [N, views] what views see of them: seen-splats.ts. */
+  readonly seen: Float32Array;
+  /** [N] the part of a splat's opacity that shows where it shows most: what lies before it hides the rest. */
+  readonly visible: Float32Array;
+  /** [N, numbers] */
+  readonly sh: Float32Array;
+  readonly numbers: number;
+  readonly views: number;
+  /** Of a view, the mean of all. */
+  readonly pixels: number;
+  readonly antialiased: boolean;
+}
+
+/**
+ * @param contribution [N] largest weight in a pixel, see {@link Ranking}
+ * @param views some from all around: a pair that looks like one splat from here may not from there
+ * @param allocate gives memory for what is known, 0.4 kB a splat and its harmonics
+ */
+export function pairState(
+  cloud: GaussianCloud,
+  contribution: Float32Array,
+  views: readonly Camera[],
+  allocate: (byteLength: number) => ArrayBufferLike,
+): PairState {
+  const { count, antialiased } = cloud;
+  const floats = (length: number): Float32Array => new Float32Array(allocate(4 * length), 0, length);
+  const state = {
+    rows: new Float64Array(allocate(8 * ROW * count), 0, ROW * count),
+    seen: seenSplats(cloud, views, floats(SEEN * views.length * count)),
+    visible: floats(count),
+    sh: floats(cloud.sh.length),
+    numbers: 3 * shCoefficientCount(cloud.shDegree),
+    views: views.length,
+    pixels: views.reduce((sum, { width, height }) => sum + width * height, 0) / views.length,
+    antialiased,
+  };
+  state.sh.set(cloud.sh);
+  for (let i = 0; i < count; i++) {
+    writeRow(cloud, i, state.rows);
+    weigh(state, i, contribution[i]);
+  }
+  return state;
+}
+
 /**
  * Splats that may be merged, and what that would cost. A merged splat has the first two moments of both, each weighed by what the views see of it, its colour is the mean with the same weights, and
  * its opacity is what covers as much in the views as both did. A slot holds a splat of the cloud, or what it was merged into.
  */
 export class PairCosts {
-  /** [N] see splat-rows.ts of the renderer. */
-  readonly rows: Float64Array;
   /** Of the pair that was looked at last: the share of the first, and the opacity of both as one. */
   share = 1;
   opacity = 0;
+  readonly #state: PairState;
+  readonly #rows: Float64Array;
   readonly #views: number;
-  readonly #pixels: number;
   readonly #seen: Float32Array;
-  /** [N] the part of a splat's opacity that shows where it shows most: what lies before it hides the rest. */
   readonly #visible: Float32Array;
   readonly #sh: Float32Array;
   readonly #numbers: number;
   readonly #antialiased: boolean;
 
-  /**
-   * @param contribution [N] largest weight in a pixel, see {@link Ranking}
-   * @param views some from all around: a pair that looks like one splat from here may not from there
-   */
-  constructor(cloud: GaussianCloud, contribution: Float32Array, views: readonly Camera[]) {
-    const { count } = cloud;
-    this.#views = views.length;
-    this.#pixels = views.reduce((sum, { width, height }) => sum + width * height, 0) / views.length;
-    this.#seen = seenSplats(cloud, views);
-    this.#sh = cloud.sh.slice();
-    this.#numbers = 3 * shCoefficientCount(cloud.shDegree);
-    this.#antialiased = cloud.antialiased;
-    this.#visible = new Float32Array(count);
-    this.rows = new Float64Array(ROW * count);
-    for (let i = 0; i < count; i++) {
-      writeRow(cloud, i, this.rows);
-      this.#weigh(i, contribution[i]);
-    }
+  constructor(state: PairState) {
+    this.#state = state;
+    ({ rows: this.#rows, views: this.#views, seen: this.#seen, visible: this.#visible } = state);
+    ({ sh: this.#sh, numbers: this.#numbers, antialiased: this.#antialiased } = state);
   }
 
-  /** [N, 3] where the splats are. */
-  positions(): Float32Array {
-    const count = this.rows.length / ROW;
-    const found = new Float32Array(3 * count);
-    for (let i = 0; i < count; i++) for (const axis of [X, Y, Z]) found[3 * i + axis] = this.rows[ROW * i + axis];
+  /** Puts where the splats are into `found`, [N, 3]. */
+  positions(found: Float32Array): Float32Array {
+    const count = this.#rows.length / ROW;
+    for (let i = 0; i < count; i++) for (const axis of [X, Y, Z]) found[3 * i + axis] = this.#rows[ROW * i + axis];
     return found;
   }
 
@@ -66,7 +97,7 @@ export class PairCosts {
    * @param step looks at every so many-th view only
    */
   cost(i: number, j: number, step = 1): number {
-    const { rows } = this;
+    const rows = this.#rows;
     const seen = this.#seen;
     const p = rows[ROW * i + MASS] / (rows[ROW * i + MASS] + rows[ROW * j + MASS]);
     const q = 1 - p;
@@ -114,12 +145,13 @@ export class PairCosts {
     if (!(opacity <= 1)) return Infinity;
     const shape = Math.max(0, squares - 2 * opacity * products + opacity * opacity * own);
     const square = this.#colourDifference(i, j) * Math.max(0, apart) + CONTRAST * shape;
-    return (2 * Math.PI * square) / (views * this.#pixels);
+    return (2 * Math.PI * square) / (views * this.#state.pixels);
   }
 
   /** Makes slot `i` the pair that was looked at last, which was `i` and `j`. */
   join(i: number, j: number): void {
-    const { rows, share: p, opacity } = this;
+    const { share: p, opacity } = this;
+    const rows = this.#rows;
     const q = 1 - p;
     const seen = this.#seen;
     joinMoments(rows, ROW * i, ROW * j, p);
@@ -143,21 +175,6 @@ export class PairCosts {
     }
   }
 
-  /** What a splat weighs in means: the cover that shows, over all views. */
-  #weigh(i: number, contribution: number): void {
-    const seen = this.#seen;
-    let [most, cover] = [0, 0];
-    for (let view = 0; view < this.#views; view++) {
-      const at = SEEN * (this.#views * i + view);
-      const amplitude = seen[at + AMPLITUDE];
-      if (amplitude === 0) continue;
-      most = Math.max(most, amplitude);
-      cover += amplitude * Math.sqrt(seen[at + UU] * seen[at + VV] - seen[at + UV] ** 2);
-    }
-    this.#visible[i] = most > 0 ? Math.min(1, contribution / most) : 0;
-    this.rows[ROW * i + MASS] = this.#visible[i] * cover;
-  }
-
   /** Mean square over all directions of how far the colours of two splats are apart, a channel. */
   #colourDifference(i: number, j: number): number {
     let sum = 0;
@@ -167,6 +184,20 @@ export class PairCosts {
     }
     return sum / (3 * SPHERE);
   }
+}
+
+/** What a splat weighs in means: the cover that shows, over all views. */
+function weigh({ rows, seen, visible, views }: PairState, i: number, contribution: number): void {
+  let [most, cover] = [0, 0];
+  for (let view = 0; view < views; view++) {
+    const at = SEEN * (views * i + view);
+    const amplitude = seen[at + AMPLITUDE];
+    if (amplitude === 0) continue;
+    most = Math.max(most, amplitude);
+    cover += amplitude * Math.sqrt(seen[at + UU] * seen[at + VV] - seen[at + UV] ** 2);
+  }
+  visible[i] = most > 0 ? Math.min(1, contribution / most) : 0;
+  rows[ROW * i + MASS] = visible[i] * cover;
 }
 
 /** ∫ G₁ G₂ over 2π √|Σ₁| √|Σ₂|, from the sum of the covariances and the distance of the centres. */

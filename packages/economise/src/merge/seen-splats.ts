@@ -10,9 +10,8 @@ export const [UU, UV, VV] = [2, 3, 4] as const;
 /** Opacity on the screen; 0 for a splat that is not in the view. */
 export const AMPLITUDE = 5;
 
-/** What views see of splats. @returns [N, views, SEEN], rows of a splat next to one another */
-export function seenSplats(cloud: GaussianCloud, views: readonly Camera[]): Float32Array {
-  const seen = new Float32Array(cloud.count * views.length * SEEN);
+/** What views see of splats, put into zeros. @param seen [N, views, SEEN], rows of a splat next to one another @returns `seen` */
+export function seenSplats(cloud: GaussianCloud, views: readonly Camera[], seen: Float32Array): Float32Array {
   const roots = factors(cloud);
   views.forEach((camera, view) => {
     const { count, source, ellipses } = project(cloud, roots, camera);
