@@ -163,7 +163,7 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
 
 function upload(
   residency: Residency,
-  traffic: PageTraffic,
+  traffic: PageTraffic<Uint32Array>,
   pace: UploadPace,
   { now, bytes, uploadMs }: { readonly now: number; readonly bytes: number; readonly uploadMs: number },
 ): number {

@@ -1,6 +1,8 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
 import { NONE } from './page-list.js';
+import { movePoints } from './slot-words.js';
 
 const { ARRIVAL_STEPS, CHILD_PAGE_BITS, CHILD_PAGE_MASK } = constants;
 
@@ -24,11 +26,15 @@ export class PageRows {
 
   /**
    * Takes chunks over that nothing is below of yet.
-   * @param details as in a page's file
+   * @param details as in a page's file; they become those of the place
+   * @param by world units, added to all positions
    * @param children numbers of the pages below each chunk, or {@link NONE}
    */
-  load(details: Float32Array, children: Uint32Array): void {
+  load(details: Float32Array, by: Vector3, children: Uint32Array): void {
     this.clear();
+    for (const sphere of [DETAIL_PLACES.sphere, DETAIL_PLACES.parentSphere]) {
+      movePoints(details, sphere, DETAIL_NUMBERS, by);
+    }
     this.numbers.set(details);
     this.#children = children;
     this.#children.forEach((child, chunk) => child !== NONE && this.setBelow(chunk, 0));

@@ -1,8 +1,10 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import { DetailTable } from './detail-table.js';
-import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
+import { SLOT_CHUNKS, type PageFormat } from './manifest.js';
 import { childrenIn, NONE, type PageList } from './page-list.js';
 import { PageRows } from './page-rows.js';
 import type { Residency } from './residency.js';
+import { numbersOf, type SlotWords } from './slot-words.js';
 
 /** The detail rows of all slots, page by page: which chunks are drawn, and in which share, while pages come and go. */
 export class PlacedRows {
@@ -22,9 +24,10 @@ export class PlacedRows {
 
   /**
    * Takes over what a page says of its chunks. Nothing below it is there, and it has not arrived at all.
-   * @param parts words of each slot that holds chunks, as in a page's file
+   * @param parts words of each slot that holds chunks
+   * @param by world units, added to all positions
    */
-  load(page: number, parts: readonly Uint32Array<ArrayBuffer>[], format: PageFormat): void {
+  load(page: number, parts: readonly SlotWords[], format: PageFormat, by: Vector3): void {
     const { upper, parent, parentChunk } = this.#list;
     const above =
       parent[page] === NONE
@@ -32,11 +35,9 @@ export class PlacedRows {
         : this.#rowsOf(parent[page], parentChunk[page]).above(parentChunk[page] % SLOT_CHUNKS);
     const slots = this.#residency.slotsOf(page);
     parts.forEach((words, k) => {
-      const chunks = words.length / pageLayout(format, 1).total;
-      const { chunks: from, details } = pageLayout(format, chunks);
+      const { chunks } = words;
       const rows = this.#rows[slots[k]];
-      const numbers = new Float32Array(words.buffer, words.byteOffset + 4 * from, details);
-      rows.load(numbers, childrenIn(this.#list, page, k).subarray(0, chunks));
+      rows.load(numbersOf(words, 'details', format), by, childrenIn(this.#list, page, k).subarray(0, chunks));
       if (above) rows.setAbove(Math.min(chunks, Math.max(0, upper[page] - SLOT_CHUNKS * k)), above);
       this.#table.touch(slots[k]);
     });
