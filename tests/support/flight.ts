@@ -180,14 +180,14 @@ function upload(
   return placed;
 }
 
-/** Pixels that a view may be off. */
-const ALLOWED = 1;
+/** Pixels that a view may be off, and from which on pages are wished for: see shaders/note_wishes.wgsl. */
+const [ALLOWED, SOON] = [1, 0.93];
 
 function wishesOf(pages: FlightPages, residency: Residency, cameras: readonly Camera[]): Float32Array {
   const { list } = pages;
   const wishes = new Float32Array(list.count);
   for (const camera of new Set(cameras)) {
-    pages.wish(camera, ALLOWED, (page, pixels) => {
+    pages.wish(camera, SOON, (page, pixels) => {
       if (pixels > wishes[page] && residency.isResident(list.parent[page])) wishes[page] = pixels;
     });
   }
