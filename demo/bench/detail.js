@@ -21,8 +21,8 @@ const pace = query.get('pace') ?? 'display';
 
 /** How much of the curve is flown in these seconds: with 0.5 the first half, half as fast. */
 const speed = number('speed', 1);
-/** `views=0` leaves the views at rest out. */
-const hasViews = query.get('views') !== '0';
+/** Places of the flight that are looked at at rest, by the share of the curve before them. */
+const views = (query.get('views') ?? '0.1,0.3,0.5,0.9').split(',').filter(Boolean).map(Number);
 
 /** Seconds that a view may take to have all its pages, and after which everything is reported as far as it has come. */
 const [settleSeconds, limit] = [number('settle', 5), number('limit', warm + seconds + 60)];
@@ -125,7 +125,7 @@ async function measure() {
   await fly(all, report.warmUp, 'warm-up', warm, () => cameraOf(0));
   await fly(all, report.flight, 'flight', seconds, cameraOf);
   report.bytes = { scene: scene.byteLength, renderer: renderer.byteLength, ledger: MemoryLedger.of(device).bytes };
-  if (hasViews) await compare(all, report.atRest);
+  await compare(all, views, report.atRest);
 }
 
 /** The report in the page, for scripts, and to whoever has asked for it. */

@@ -3,9 +3,6 @@ import { readPixels } from '../run/read-pixels.js';
 import { flightCamera } from './flight-path.js';
 import { drawn, rounded } from './second.js';
 
-/** Places of the flight. */
-const VIEWS = [0.1, 0.3, 0.5, 0.9];
-
 /**
  * Draws one view until nothing more comes, or its time is up: a pool that is too small for a view goes on exchanging pages for a while.
  * @returns seconds taken, and pages on their way at the end: 0 if the view has all that it gets
@@ -37,12 +34,13 @@ function psnr(a, b) {
 
 /**
  * The picture of each view within the budget against one of a quarter of the error and four times the budget.
+ * @param shares of the flight's curve, before each view
  * @param views gets a row for each
  */
-export async function compare(all, views) {
+export async function compare(all, shares, views) {
   const { manifest, width, height, levers, progress } = all;
   const { detail, splatBudget } = levers;
-  for (const share of VIEWS) {
+  for (const share of shares) {
     if (progress.left === 0) throw new Error('the time was up');
     const camera = flightCamera(share, { bounds: manifest.bounds, width, height });
     progress.begin(`the view at ${share} of the flight`);

@@ -11,7 +11,7 @@ import { DETAIL_NUMBERS } from './chunk-detail.js';
 import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import type { PageList } from './page-list.js';
 import { SlotMover } from './slot-mover.js';
-import { movePoints, numbersOf, rangeOf, type SlotWords } from './slot-words.js';
+import { chunkLayout, movePoints, numbersOf, startOf, type ChunkLayout, type SlotWords } from './slot-words.js';
 
 const SLOT_SPLATS = SLOT_CHUNKS * constants.CULL_GROUP;
 /** Largest buffer of a pool, in bytes: several of this size are found where one large one is not (iOS). */
@@ -42,14 +42,16 @@ export function slotsFor(format: PageFormat, list: PageList, budget: number): nu
 export class PagePool {
   readonly pages: readonly GaussianPage[];
   readonly #device: GPUDevice;
-  readonly #format: PageFormat;
+  readonly #layout: ChunkLayout;
+  /** Boxes of the chunks of the slot that is written. */
+  readonly #boxes = new Float32Array(CHUNK_NUMBERS * SLOT_CHUNKS);
   /** Slots that lie in one buffer. */
   readonly slotsPerBuffer: number;
   readonly #mover: SlotMover;
 
   constructor(device: GPUDevice, memory: GpuMemory, format: PageFormat, slots: number) {
     this.#device = device;
-    this.#format = format;
+    this.#layout = chunkLayout(format);
     const stride = shWords(format.shDegree, format.shPrecision);
     const bytes = 4 * Math.max(GEOMETRY_WORDS, stride);
     const capacity = Math.min(pageCapacity(device, bytes), Math.floor(LARGEST_BUFFER / bytes));
@@ -77,16 +79,17 @@ export class PagePool {
   write(slot: number, words: SlotWords, by: Vector3): void {
     const { page, place } = this.#find(slot);
     const { queue } = this.#device;
-    const format = this.#format;
-    const boxes = numbersOf(words, 'chunks', format);
-    for (const corner of [0, 4]) movePoints(boxes, corner, CHUNK_NUMBERS, by);
-    queue.writeBuffer(page.chunks, 4 * CHUNK_NUMBERS * SLOT_CHUNKS * place, boxes);
-    const put = (part: 'geometry' | 'sh', stride: number): void => {
-      const { at, size } = rangeOf(words, part, format);
-      queue.writeBuffer(page[part], 4 * stride * SLOT_SPLATS * place, words.words, at, size);
-    };
-    put('geometry', GEOMETRY_WORDS);
-    put('sh', shWords(format.shDegree, format.shPrecision));
+    const layout = this.#layout;
+    const first = SLOT_CHUNKS * place;
+    const boxes = this.#boxes;
+    boxes.set(numbersOf(words, 'chunks', layout));
+    const end = CHUNK_NUMBERS * words.chunks;
+    for (let corner = 0; corner < CHUNK_NUMBERS; corner += 4) movePoints(boxes, corner, end, CHUNK_NUMBERS, by);
+    queue.writeBuffer(page.chunks, 4 * CHUNK_NUMBERS * first, boxes, 0, end);
+    for (const part of ['geometry', 'sh'] as const) {
+      const from = startOf(words, part, layout);
+      queue.writeBuffer(page[part], 4 * layout[part] * first, words.words, from, layout[part] * words.chunks);
+    }
     this.#mover.note(slot, by);
   }
 

@@ -26,18 +26,17 @@ export class PageRows {
 
   /**
    * Takes chunks over that nothing is below of yet.
-   * @param details as in a page's file; they become those of the place
+   * @param details as in a page's file
    * @param by world units, added to all positions
    * @param children numbers of the pages below each chunk, or {@link NONE}
    */
   load(details: Float32Array, by: Vector3, children: Uint32Array): void {
     this.clear();
-    for (const sphere of [DETAIL_PLACES.sphere, DETAIL_PLACES.parentSphere]) {
-      movePoints(details, sphere, DETAIL_NUMBERS, by);
-    }
     this.numbers.set(details);
+    movePoints(this.numbers, DETAIL_PLACES.sphere, details.length, DETAIL_NUMBERS, by);
+    movePoints(this.numbers, DETAIL_PLACES.parentSphere, details.length, DETAIL_NUMBERS, by);
     this.#children = children;
-    this.#children.forEach((child, chunk) => child !== NONE && this.setBelow(chunk, 0));
+    for (let chunk = 0; chunk < children.length; chunk++) if (children[chunk] !== NONE) this.setBelow(chunk, 0);
   }
 
   /** Nothing is in the slot that might be drawn. */
@@ -69,11 +68,13 @@ export class PageRows {
 
   /** How far the page itself has arrived. */
   setArrived(arrived: number): void {
-    this.#children.forEach((child, chunk) => {
+    const children = this.#children;
+    for (let chunk = 0; chunk < children.length; chunk++) {
+      const child = children[chunk];
       const page = child === NONE ? CHILD_PAGE_MASK : child;
       this.#words[DETAIL_NUMBERS * chunk + DETAIL_PLACES.children] = (page | (arrived << CHILD_PAGE_BITS)) >>> 0;
       // What such a chunk stands for is in this page, too, or is nothing.
       if (child === NONE) this.setBelow(chunk, arrived);
-    });
+    }
   }
 }

@@ -16,31 +16,23 @@ type Part = 'chunks' | 'details' | 'geometry' | 'sh';
 
 const PARTS: readonly Part[] = ['chunks', 'details', 'geometry', 'sh'];
 
-/** Where a part of a slot's words begins, and how many there are. */
-export function rangeOf(
-  { of, first, chunks }: SlotWords,
-  part: Part,
-  format: PageFormat,
-): { at: number; size: number } {
-  const layout = pageLayout(format, of);
-  let at = 0;
-  for (const before of PARTS) {
-    if (before === part) break;
-    at += layout[before];
-  }
-  const own = layout[part] / of;
-  return { at: at + own * first, size: own * chunks };
+/** Words of one chunk, part by part. */
+export type ChunkLayout = ReturnType<typeof pageLayout>;
+
+export const chunkLayout = (format: PageFormat): ChunkLayout => pageLayout(format, 1);
+
+/** Where a part of a slot's words begins. */
+export function startOf({ of, first }: SlotWords, part: Part, layout: ChunkLayout): number {
+  let before = 0;
+  for (let k = 0; PARTS[k] !== part; k++) before += layout[PARTS[k]];
+  return of * before + first * layout[part];
 }
 
-/** A copy of a part of a slot's words, as numbers. */
-export function numbersOf(slot: SlotWords, part: Part, format: PageFormat): Float32Array<ArrayBuffer> {
-  const { at, size } = rangeOf(slot, part, format);
+/** A part of a slot's words, as numbers that nobody may change. */
+export function numbersOf(slot: SlotWords, part: Part, layout: ChunkLayout): Float32Array<ArrayBuffer> {
   const { buffer, byteOffset } = slot.words;
-  return new Float32Array(buffer, byteOffset + 4 * at, size).slice();
+  return new Float32Array(buffer, byteOffset + 4 * startOf(slot, part, layout), slot.chunks * layout[part]);
 }
-
-/** Bytes that a slot's words have. */
-export const byteLengthOf = ({ chunks }: SlotWords, format: PageFormat): number => 4 * pageLayout(format, chunks).total;
 
 /** Words of a page that lie slot by slot, each laid out on its own, all but the last full. */
 export function slotBySlot(words: Uint32Array<ArrayBuffer>, format: PageFormat): SlotWords[] {
@@ -52,9 +44,10 @@ export function slotBySlot(words: Uint32Array<ArrayBuffer>, format: PageFormat):
   });
 }
 
-/** Moves the points that begin at every so many numbers. */
-export function movePoints(numbers: Float32Array, first: number, stride: number, [x, y, z]: Vector3): void {
-  for (let at = first; at < numbers.length; at += stride) {
+/** Moves the points that begin at every so many numbers. No array, no closure: hundreds of pages come in a frame. */
+export function movePoints(numbers: Float32Array, first: number, end: number, stride: number, by: Vector3): void {
+  const [x, y, z] = by;
+  for (let at = first; at < end; at += stride) {
     numbers[at] += x;
     numbers[at + 1] += y;
     numbers[at + 2] += z;

@@ -12,7 +12,7 @@ import { folderSource, type PageSource } from './page-source.js';
 import { PageTraffic } from './page-traffic.js';
 import { PlacedRows } from './placed-rows.js';
 import { Residency } from './residency.js';
-import { byteLengthOf, type SlotWords } from './slot-words.js';
+import type { SlotWords } from './slot-words.js';
 import { UploadPace } from './upload-pace.js';
 import { aheadMs } from './camera-motion.js';
 import { WishReader } from './wish-reader.js';
@@ -80,6 +80,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly #residency: Residency;
   readonly #traffic: PageTraffic<readonly SlotWords[]>;
   readonly #pace = new UploadPace();
+  readonly #slotBytes: number;
   readonly #rows: PlacedRows;
   readonly #arrivals: Arrivals;
   #upload: Upload | undefined;
@@ -123,7 +124,8 @@ export class StreamedGaussians implements GaussianScene {
       onArrival: () => this.#options.onChange?.(),
       onError: (error) => this.#options.onError?.(error),
     });
-    this.#rows = new PlacedRows(list, this.#residency);
+    this.#rows = new PlacedRows(list, this.#residency, scene);
+    this.#slotBytes = slotBytes(scene);
     this.#arrivals = new Arrivals(list, options.arrivalMs ?? ARRIVAL_MS, (page, arrived) =>
       this.#rows.setArrived(page, arrived),
     );
@@ -231,14 +233,14 @@ export class StreamedGaussians implements GaussianScene {
   #uploadSome(most: number): void {
     const start = performance.now();
     let bytes = 0;
-    while (bytes === 0 || bytes + slotBytes(this.#source.scene) <= most) {
+    while (bytes === 0 || bytes + this.#slotBytes <= most) {
       if (this.#upload === undefined) {
         const next = this.#traffic.next();
         if (next === undefined) break;
         if (!this.#begin(next.page, next.words)) {
           this.#traffic.refused();
           // A page that finds no slot has cost its share of the thread as well.
-          for (const part of next.words) bytes += byteLengthOf(part, this.#source.scene);
+          for (const { chunks } of next.words) bytes += this.#bytesOf(chunks);
           continue;
         }
       }
@@ -263,19 +265,22 @@ export class StreamedGaussians implements GaussianScene {
   /** Uploads what belongs in one slot of a page. With the last of them the page takes part in the picture. @returns bytes */
   #writeSlot(upload: Upload): number {
     const { page, slots, parts, by } = upload;
-    const { scene } = this.#source;
     const words = parts[upload.written];
-    const bytes = byteLengthOf(words, scene);
+    const bytes = this.#bytesOf(words.chunks);
     this.#pool.write(slots[upload.written++], words, by);
     this.#uploaded.bytes += bytes;
     if (upload.written === parts.length) {
       this.#upload = undefined;
-      this.#rows.load(page, parts, scene, by);
+      this.#rows.load(page, parts, by);
       this.#arrivals.begin(page);
       this.#uploaded.pages++;
       this.#version++;
     }
     return bytes;
+  }
+
+  #bytesOf(chunks: number): number {
+    return (chunks * this.#slotBytes) / SLOT_CHUNKS;
   }
 
   #finishWrites(): void {
