@@ -44,9 +44,9 @@ export function slotBySlot(words: Uint32Array<ArrayBuffer>, format: PageFormat):
   });
 }
 
-/** Moves the points that begin at every so many numbers. No array, no closure: hundreds of pages come in a frame. */
+/** Moves the points that begin at every so many numbers, as shaders/move_slots.wgsl does: by float32. No array, no closure: hundreds of pages come in a frame. */
 export function movePoints(numbers: Float32Array, first: number, end: number, stride: number, by: Vector3): void {
-  const [x, y, z] = by;
+  const [x, y, z] = [Math.fround(by[0]), Math.fround(by[1]), Math.fround(by[2])];
   for (let at = first; at < end; at += stride) {
     numbers[at] += x;
     numbers[at + 1] += y;
