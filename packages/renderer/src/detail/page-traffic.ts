@@ -3,7 +3,7 @@ import type { Residency } from './residency.js';
 
 /** Pages being fetched at a time; a file holds up to five. */
 export const MOST_FETCHES = 64;
-/** Slots of pages being fetched or waiting for their upload, from which on no other is sent for: at most 32 MB of the page's memory, and one page of any size. */
+/** Slots of pages being fetched or waiting for their upload, from which on no other is sent for: at most 31 MB of the page's memory, and one page of any size; where they lie in files with others, these files. */
 export const MOST_UNDER_WAY = 240;
 /** How much a page counts in the mean time of arrival when the next one has come. */
 const MEMORY = 0.95;
