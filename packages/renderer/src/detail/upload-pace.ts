@@ -5,8 +5,8 @@ const GROWTH = 1 / 512;
 /** Bounds in milliseconds. */
 const [LEAST_MS, MOST_MS] = [1, 5];
 /**
- * Most bytes for one frame, whatever they cost the thread: what the GPU process and the GPU do with them is not measured. So many in each frame made none late, bursts of up to 16 MB
- * did (docs/detail-pages.md).
+ * Most bytes for one frame, whatever they cost the thread: what the GPU process and the GPU do with them is not measured. So many in each frame were seen to make none late
+ * (docs/detail-pages.md); more has not been tried.
  */
 export const MOST_UPLOAD_BYTES = 7e6;
 /** What bytes are thought to cost before any has been uploaded: that of 650 MB a second. */
