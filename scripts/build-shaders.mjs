@@ -16,7 +16,7 @@ const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
 /** Stages that few pages need, by the file that has them. */
 const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
-  'streamed-shaders': ['note_wishes'],
+  'streamed-shaders': ['move_slots', 'note_wishes'],
 };
 /** Those of another package, which takes shared parts from the renderer. */
 const ECONOMISE = 'economise';

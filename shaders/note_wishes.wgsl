@@ -17,11 +17,13 @@ const WISH_THREADS = 64u;
 // How much less a page out of view is wished for: a camera that turns finds it there.
 const UNSEEN = 0.125;
 
-// Pixels that doing without what is finer costs a view.
-fn wish_of(seen: View, chunk: Chunk, d: ChunkDetail) -> f32 {
-  let allowed = max(seen.detail, chunk_shares[arrayLength(&chunk_shares) - 1u]);
+// Share of the pixels that are allowed from which on a page is wished for, though nothing of it is drawn yet: the view lacks it soon.
+const SOON = 0.93;
+
+// Pixels that doing without what is finer costs a view, from so many of them on.
+fn wish_of(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, least: f32) -> f32 {
   let pixels = screen_error(seen, d.sphere, d.full_error);
-  if (refined(pixels, allowed, seen.detail_fade) == 0u) { return 0.0; }
+  if (pixels <= least && refined(pixels, allowed, seen.detail_fade) == 0u) { return 0.0; }
   return select(UNSEEN * pixels, pixels, may_be_visible(seen, chunk));
 }
 
@@ -35,8 +37,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var later = view;
   later.local_to_camera = mat4x4f(ahead[0], ahead[1], ahead[2], ahead[3]);
   later.eye = ahead[4].xyz;
-  let now = wish_of(view, chunks[chunk], d);
-  let wish = max(now, wish_of(later, chunks[chunk], d));
+  let allowed = max(view.detail, chunk_shares[arrayLength(&chunk_shares) - 1u]);
+  let soon = SOON * allowed;
+  let wish = max(wish_of(view, chunks[chunk], d, allowed, soon), wish_of(later, chunks[chunk], d, allowed, soon));
   if (wish > 0.0) { atomicMax(&wishes[page], bitcast<u32>(wish)); }
-  if (now > 0.0 && d.error == 0.0) { atomicMax(&wishes[0], bitcast<u32>(now)); }
+  if (d.error > 0.0) { return; }
+  let now = wish_of(view, chunks[chunk], d, allowed, allowed);
+  if (now > 0.0) { atomicMax(&wishes[0], bitcast<u32>(now)); }
 }

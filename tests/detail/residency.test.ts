@@ -180,3 +180,23 @@ test('a look and a page cost what their numbers make of it, not their product', 
   assert.ok(large.look < 8 * small.look + 0.5, 'four times the pages, more than eight times the look');
   assert.ok(large.page < 3 * small.page + 0.02, 'four times the slots, and no longer a matter of microseconds');
 });
+
+test('of pages that find no room one is tried, and a page that is needed more and must be fetched comes nonetheless', () => {
+  const list = pageTree(401, 400);
+  const residency = new Residency(list, 11, (page) => page !== 400);
+  const look = (need: (page: number) => number): number[] => {
+    residency.note(Float32Array.from({ length: list.count }, (_, page) => need(page)));
+    const tried: number[] = [];
+    for (let page = residency.nextMissing(); page !== NONE; page = residency.nextMissing()) {
+      tried.push(page);
+      if (residency.begin(page)) residency.settle(page);
+    }
+    return tried;
+  };
+  look((page) => (page === 0 ? 100 : 0));
+  assert.equal(look((page) => (page <= 10 ? 100 : 0)).length, 10);
+  assert.equal(residency.residents, 11);
+  const tried = look((page) => (page <= 10 ? 100 : page === 400 ? 200 : 101 + page / 1000));
+  assert.deepEqual(tried, [399, 400]);
+  assert.ok(residency.isResident(400));
+});

@@ -50,7 +50,7 @@ class Server {
 interface Pool {
   readonly list: PageList;
   readonly residency: Residency;
-  readonly traffic: PageTraffic;
+  readonly traffic: PageTraffic<Uint32Array>;
   readonly server: Server;
   readonly errors: unknown[];
   /** Looks with the given shares of the parents' needs; returns the wishes. */

@@ -7,9 +7,13 @@ import { fly, type FlightSecond } from './flight.js';
 
 const [given, ...values] = process.argv.slice(2);
 if (given === undefined)
-  throw new Error('usage: npm run detail:flight -- FOLDER [slots] [latency in ms] [bytes of a slot]');
+  throw new Error(
+    'usage: npm run detail:flight -- FOLDER [slots] [latency in ms] [bytes of a slot] [--copies] [--speed=SHARE]',
+  );
 const folder = resolve(process.env.INIT_CWD ?? process.cwd(), given);
-const [slots = 17_500, latencyMs = 7, bytes = 65_856] = values.filter((value) => value !== '--copies').map(Number);
+const [slots = 17_500, latencyMs = 7, bytes = 65_856] = values.filter((value) => !value.startsWith('--')).map(Number);
+const named = (name: string, fallback: number): number =>
+  Number(values.find((value) => value.startsWith(`--${name}=`))?.split('=')[1] ?? fallback);
 const manifest = checkManifest(JSON.parse(readFileSync(join(folder, 'detail.json'), 'utf8')), folder);
 const files = new Map<string, ArrayBuffer>();
 const fileOf = (file: string): ArrayBuffer => {
@@ -25,9 +29,10 @@ const options = {
   bytes,
   warm: 3,
   seconds: 15,
+  speed: named('speed', 1),
   latencyMs,
   bandwidth: 8e8,
-  uploadMs: 0.46,
+  uploadMs: named('upload', 0.46),
   kept: 64e6,
   isWithoutCopies: !process.argv.includes('--copies'),
 };
@@ -37,6 +42,7 @@ console.log(`${pages.list.count} pages, ${slots} slots of ${bytes} bytes, ${late
 for (const isStill of [true, false]) {
   const rows = await fly(pages, { ...options, isStill });
   console.log(isStill ? 'wishes of the view' : 'and of where it will be');
+  console.log(`  degrees turned in each second: ${rows.map(({ turned }) => turned.toFixed(0)).join(' ')}`);
   console.log(`  pixels at the ends of seconds: ${rows.map(({ error }) => error.toFixed(1)).join(' ')}`);
   console.log(
     `  mean ${mean(rows, ({ error }) => error)}, of all frames ${mean(rows, (row) => row.mean)}; ${mean(rows, (row) => row.pages)} pages and ${mean(rows, (row) => row.files)} files a second`,

@@ -1,5 +1,5 @@
 /** The flight of demo/bench/detail.js without a GPU and without a clock: the same path, the real rules of who comes and goes, a server of known speed. */
-import { lookAt, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
+import type { Bounds, Camera } from '@gaussian-splat/core';
 import {
   aheadMs,
   CameraMotion,
@@ -10,6 +10,7 @@ import {
   UploadPace,
 } from '@gaussian-splat/renderer/stages';
 import { setImmediate as turn } from 'node:timers/promises';
+import { benchModule } from '../bench/load.js';
 import type { FlightPages } from './flight-pages.js';
 
 const FRAME_MS = 1000 / 60;
@@ -29,6 +30,8 @@ export interface FlightOptions {
   /** Seconds at the place where the flight begins, and of the flight. */
   readonly warm: number;
   readonly seconds: number;
+  /** How much of the path is flown in these seconds. Default 1. */
+  readonly speed?: number;
   /** Milliseconds until a file comes, and bytes a second of all of them. */
   readonly latencyMs: number;
   readonly bandwidth: number;
@@ -41,30 +44,22 @@ export interface FlightOptions {
   readonly isStill?: boolean;
 }
 
-/** Low over the scene, along a curve that turns, now and then up to where all of it is in sight. */
-export function flightCamera(
-  share: number,
-  { bounds, width, height }: Pick<FlightOptions, 'bounds' | 'width' | 'height'>,
-): Camera {
-  const { center, min, max } = bounds;
-  const [x, z] = [(max[0] - min[0]) / 2, (max[2] - min[2]) / 2];
-  const place = (s: number): Vector3 => [
-    center[0] + 0.8 * x * Math.sin(2 * Math.PI * s),
-    center[1] - 0.05 * x - 0.5 * x * Math.sin(Math.PI * s) ** 8,
-    center[2] + 0.8 * z * Math.sin(4 * Math.PI * s),
-  ];
-  const ahead = place(share + 0.02);
-  return {
-    ...{ width, height, fx: height, fy: height, cx: width / 2, cy: height / 2, near: 0.05, far: Infinity },
-    worldToCamera: lookAt(place(share), [ahead[0], ahead[1] + 0.02 * x, ahead[2]], [0, -1, 0]),
-  };
-}
+/** The path that the benchmark page flies. */
+const {
+  flightCamera,
+  degreesBetween,
+}: {
+  flightCamera: (share: number, view: Pick<FlightOptions, 'bounds' | 'width' | 'height'>) => Camera;
+  degreesBetween: (a: Camera, b: Camera) => number;
+} = await benchModule('detail/flight-path.js');
 
 /** What a second of the flight ended with. */
 export interface FlightSecond {
   /** Most pixels that anything in view is off because a page is not there: at its end, and the mean of its frames. */
   readonly error: number;
   readonly mean: number;
+  /** Degrees that the camera turned. */
+  readonly turned: number;
   readonly pages: number;
   readonly files: number;
 }
@@ -134,7 +129,8 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
   const [pace, motion] = [new UploadPace(), new CameraMotion()];
   const rows: FlightSecond[] = [];
   let look: { readonly wishes: Float32Array; readonly frame: number } | undefined;
-  let [sum, placed] = [0, 0];
+  let [sum, placed, turned] = [0, 0, 0];
+  let before: Camera | undefined;
   const all = Math.round(60 * (options.warm + options.seconds));
   for (let frame = 0; frame < all; frame++) {
     await server.run(frame * FRAME_MS);
@@ -142,7 +138,10 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
     traffic.sendForMore();
     // Files that are kept come at once.
     await turn();
-    const camera = flightCamera(Math.max(0, (frame / 60 - options.warm) / options.seconds), options);
+    const passed = Math.max(0, (frame / 60 - options.warm) / options.seconds);
+    const camera = flightCamera((options.speed ?? 1) * passed, options);
+    turned += before ? degreesBetween(before, camera) : 0;
+    before = camera;
     motion.observe(camera, server.now);
     if (look && frame >= look.frame + READ_BACK) {
       residency.note(look.wishes);
@@ -156,15 +155,15 @@ export async function fly(pages: FlightPages, options: FlightOptions): Promise<F
     const error = lacking(pages, residency, camera);
     sum += error;
     if ((frame + 1) % 60 > 0) continue;
-    rows.push({ error, mean: sum / 60, pages: placed, files: server.files });
-    [sum, placed, server.files] = [0, 0, 0];
+    rows.push({ error, mean: sum / 60, turned, pages: placed, files: server.files });
+    [sum, placed, turned, server.files] = [0, 0, 0, 0];
   }
   return rows.slice(options.warm);
 }
 
 function upload(
   residency: Residency,
-  traffic: PageTraffic,
+  traffic: PageTraffic<Uint32Array>,
   pace: UploadPace,
   { now, bytes, uploadMs }: { readonly now: number; readonly bytes: number; readonly uploadMs: number },
 ): number {
@@ -181,14 +180,14 @@ function upload(
   return placed;
 }
 
-/** Pixels that a view may be off. */
-const ALLOWED = 1;
+/** Pixels that a view may be off, and from which on pages are wished for: see shaders/note_wishes.wgsl. */
+const [ALLOWED, SOON] = [1, 0.93];
 
 function wishesOf(pages: FlightPages, residency: Residency, cameras: readonly Camera[]): Float32Array {
   const { list } = pages;
   const wishes = new Float32Array(list.count);
   for (const camera of new Set(cameras)) {
-    pages.wish(camera, ALLOWED, (page, pixels) => {
+    pages.wish(camera, SOON, (page, pixels) => {
       if (pixels > wishes[page] && residency.isResident(list.parent[page])) wishes[page] = pixels;
     });
   }

@@ -29,7 +29,7 @@ const FULL = 0.92;
 const SLACK = 0.7;
 /** Bytes that giving up room must free. */
 const LEAST_SAVING = 32 << 20;
-const BYTES_PER_VISIBLE = 52;
+const BYTES_PER_VISIBLE = 48;
 const BYTES_PER_PAIR = 24;
 /** Frames between two looks once the first frames have been looked at. */
 const INTERVAL = 16;

@@ -10,8 +10,10 @@ export class Arrivals {
   readonly #list: PageList;
   readonly #milliseconds: number;
   readonly #setArrived: (page: number, arrived: number) => void;
-  /** How much of their time has passed, 0 to 1. */
-  readonly #passed = new Map<number, number>();
+  /** [P] how much of the time of a page has passed, 0 to 1; 1 for those that are not {@link #arriving}. */
+  readonly #passed: Float32Array;
+  /** Parents before children. */
+  readonly #arriving = new Set<number>();
   #steppedAt = 0;
 
   /**
@@ -22,37 +24,42 @@ export class Arrivals {
     this.#list = list;
     this.#milliseconds = milliseconds;
     this.#setArrived = setArrived;
+    this.#passed = new Float32Array(list.count).fill(1);
   }
 
   /** Pages that have not arrived whole. */
   get count(): number {
-    return this.#passed.size;
+    return this.#arriving.size;
   }
 
   /** A page is there from now on. One that nothing is above of has arrived. */
   begin(page: number): void {
     const isAtOnce = this.#list.parent[page] === NONE || this.#milliseconds === 0;
-    if (!isAtOnce) this.#passed.set(page, 0);
+    if (!isAtOnce) {
+      this.#arriving.add(page);
+      this.#passed[page] = 0;
+    }
     this.#setArrived(page, isAtOnce ? ARRIVED : 0);
   }
 
   /** A page has left. */
   forget(page: number): void {
-    this.#passed.delete(page);
+    this.#arriving.delete(page);
+    this.#passed[page] = 1;
   }
 
-  /** Lets all go another step. @returns false if there were none */
+  /** Lets all go another step: thousands in each frame of a flight. @returns false if there were none */
   step(now: number): boolean {
-    const passed = (now - this.#steppedAt) / this.#milliseconds;
+    const elapsed = (now - this.#steppedAt) / this.#milliseconds;
     this.#steppedAt = now;
-    if (this.#passed.size === 0) return false;
-    const step = Math.min(1 / LEAST_STEPS, passed);
-    for (const [page, before] of this.#passed) {
-      const most = this.#passed.get(this.#list.parent[page]) ?? 1;
-      const passedNow = Math.min(most, before + step);
-      if (passedNow === 1) this.#passed.delete(page);
-      else this.#passed.set(page, passedNow);
-      this.#setArrived(page, Math.round(ARRIVED * eased(passedNow)));
+    if (this.#arriving.size === 0) return false;
+    const step = Math.min(1 / LEAST_STEPS, elapsed);
+    const [passed, { parent }] = [this.#passed, this.#list];
+    for (const page of this.#arriving) {
+      const next = Math.min(passed[parent[page]], passed[page] + step);
+      passed[page] = next;
+      if (next === 1) this.#arriving.delete(page);
+      this.#setArrived(page, Math.round(ARRIVED * eased(next)));
     }
     return true;
   }

@@ -21,8 +21,8 @@ const MOST_TURN = 1;
 /** How far rows may be from unit length for a matrix to count as rotation and translation. */
 const SKEW = 1e-3;
 
-/** Milliseconds from when a page is wished for until that has been read back and the page is sent for; most by which a camera is looked ahead of. */
-const [LOOK_MS, MOST_AHEAD_MS] = [150, 500];
+/** Milliseconds for a page, and for the one above it that has to be there first, to be wished for, read back and sent for; most by which a camera is looked ahead of. */
+const [LOOK_MS, MOST_AHEAD_MS] = [250, 600];
 
 /** How far ahead of a camera its pages are wished for, in milliseconds. @param arrivalMs milliseconds that a page takes to come */
 export const aheadMs = (arrivalMs: number): number => Math.min(MOST_AHEAD_MS, LOOK_MS + arrivalMs);

@@ -6,6 +6,7 @@ import { SLOT_CHUNKS, pageLayout } from './manifest.js';
 import { joinSlots, packRun } from './pack-run.js';
 import { emptyList, putBelow, type PageList } from './page-list.js';
 import type { PageSource, StreamedScene } from './page-source.js';
+import { slotBySlot, type SlotWords } from './slot-words.js';
 import { chunksOf } from './splat-level.js';
 
 /**
@@ -77,11 +78,11 @@ export function levelSource(
   const { scene, pages } = levels;
   const list = listLevels(levels);
   const chunk = pageLayout(scene, 1).total;
-  const fetch = async (page: number, signal: AbortSignal): Promise<Uint32Array<ArrayBuffer>> => {
-    if (page === 0) return levels.first;
+  const fetch = async (page: number, signal: AbortSignal): Promise<SlotWords[]> => {
+    if (page === 0) return slotBySlot(levels.first, scene);
     const words = await fetchLevel(pages[page - 1], signal);
     const chunks = words.length / chunk;
-    if (Number.isInteger(chunks) && chunks >= 1 && chunks <= list.chunks[page]) return words;
+    if (Number.isInteger(chunks) && chunks >= 1 && chunks <= list.chunks[page]) return slotBySlot(words, scene);
     throw new GaussianSplatError('decode/truncated', {
       where: `level ${pages[page - 1].level} of box ${pages[page - 1].box}`,
       expected: `1 to ${list.chunks[page]} chunks of ${4 * chunk} bytes`,

@@ -6,7 +6,7 @@ import { shWords, type ShPrecision } from '../pack/sh.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
 
 /** Chunks that stand for the same one, at most: those of a page, which fill a slot of the pool. */
-export const SLOT_CHUNKS = 4;
+export const { SLOT_CHUNKS } = constants;
 /** Chunks of a file at most: four that have one parent, and what those four stand for. */
 const FILE_CHUNKS = 20;
 

@@ -12,6 +12,11 @@ export class PageHeap {
     this.#ranks = new Float32Array(capacity);
   }
 
+  /** The largest number; -Infinity if there is none. */
+  get largest(): number {
+    return this.#count === 0 ? -Infinity : this.#ranks[0];
+  }
+
   clear(): void {
     this.#count = 0;
   }

@@ -7,9 +7,11 @@ import type { GpuMemory } from '../gpu/memory.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { shWords } from '../pack/sh.js';
-import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
+import { DETAIL_NUMBERS } from './chunk-detail.js';
 import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import type { PageList } from './page-list.js';
+import { SlotMover } from './slot-mover.js';
+import { chunkLayout, movePoints, numbersOf, startOf, type ChunkLayout, type SlotWords } from './slot-words.js';
 
 const SLOT_SPLATS = SLOT_CHUNKS * constants.CULL_GROUP;
 /** Largest buffer of a pool, in bytes: several of this size are found where one large one is not (iOS). */
@@ -40,13 +42,16 @@ export function slotsFor(format: PageFormat, list: PageList, budget: number): nu
 export class PagePool {
   readonly pages: readonly GaussianPage[];
   readonly #device: GPUDevice;
-  readonly #format: PageFormat;
+  readonly #layout: ChunkLayout;
+  /** Boxes of the chunks of the slot that is written. */
+  readonly #boxes = new Float32Array(CHUNK_NUMBERS * SLOT_CHUNKS);
   /** Slots that lie in one buffer. */
   readonly slotsPerBuffer: number;
+  readonly #mover: SlotMover;
 
   constructor(device: GPUDevice, memory: GpuMemory, format: PageFormat, slots: number) {
     this.#device = device;
-    this.#format = format;
+    this.#layout = chunkLayout(format);
     const stride = shWords(format.shDegree, format.shPrecision);
     const bytes = 4 * Math.max(GEOMETRY_WORDS, stride);
     const capacity = Math.min(pageCapacity(device, bytes), Math.floor(LARGEST_BUFFER / bytes));
@@ -63,18 +68,34 @@ export class PagePool {
         details: buffer('details', DETAIL_NUMBERS * SLOT_CHUNKS * own),
       };
     });
+    this.#mover = new SlotMover(device, memory, this.pages, this.slotsPerBuffer);
   }
 
-  /** Puts so many chunks, laid out as in a page's file, into a slot; its details are written by {@link writeDetails}. */
-  write(slot: number, words: Uint32Array<ArrayBuffer>, chunks: number): void {
+  /**
+   * Puts chunks into a slot, straight from the file that they lie in: a copy costs the thread more than all else. Their details are written by {@link writeDetails}; {@link flush} must
+   * follow before the slot is drawn.
+   * @param by world units, added to all positions
+   */
+  write(slot: number, words: SlotWords, by: Vector3): void {
     const { page, place } = this.#find(slot);
     const { queue } = this.#device;
-    const layout = pageLayout(this.#format, chunks);
-    const stride = shWords(this.#format.shDegree, this.#format.shPrecision);
-    const geometryAt = layout.chunks + layout.details;
-    queue.writeBuffer(page.chunks, 4 * CHUNK_NUMBERS * SLOT_CHUNKS * place, words, 0, layout.chunks);
-    queue.writeBuffer(page.geometry, 4 * GEOMETRY_WORDS * SLOT_SPLATS * place, words, geometryAt, layout.geometry);
-    queue.writeBuffer(page.sh, 4 * stride * SLOT_SPLATS * place, words, geometryAt + layout.geometry, layout.sh);
+    const layout = this.#layout;
+    const first = SLOT_CHUNKS * place;
+    const boxes = this.#boxes;
+    boxes.set(numbersOf(words, 'chunks', layout));
+    const end = CHUNK_NUMBERS * words.chunks;
+    for (let corner = 0; corner < CHUNK_NUMBERS; corner += 4) movePoints(boxes, corner, end, CHUNK_NUMBERS, by);
+    queue.writeBuffer(page.chunks, 4 * CHUNK_NUMBERS * first, boxes, 0, end);
+    for (const part of ['geometry', 'sh'] as const) {
+      const from = startOf(words, part, layout);
+      queue.writeBuffer(page[part], 4 * layout[part] * first, words.words, from, layout[part] * words.chunks);
+    }
+    this.#mover.note(slot, by);
+  }
+
+  /** Submits what is left to do for slots that were written. */
+  flush(): void {
+    this.#mover.flush();
   }
 
   /** Writes detail rows, {@link SLOT_CHUNKS} for each slot from the given one on; all of them lie in one buffer. */
@@ -85,28 +106,5 @@ export class PagePool {
 
   #find(slot: number): { page: GaussianPage; place: number } {
     return { page: this.pages[Math.floor(slot / this.slotsPerBuffer)], place: slot % this.slotsPerBuffer };
-  }
-}
-
-/** Moves everything in a page's file that is a position. */
-export function movePage(words: Uint32Array<ArrayBuffer>, by: Vector3, format: PageFormat, chunks: number): void {
-  if (by.every((value) => value === 0)) return;
-  const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
-  const layout = pageLayout(format, chunks);
-  const [details, geometry] = [layout.chunks, layout.chunks + layout.details];
-  // The two corners of a box.
-  for (const corner of [0, 4]) movePoints(floats, corner, details, CHUNK_NUMBERS, by);
-  for (const sphere of [DETAIL_PLACES.sphere, DETAIL_PLACES.parentSphere]) {
-    movePoints(floats, details + sphere, geometry, DETAIL_NUMBERS, by);
-  }
-  movePoints(floats, geometry, geometry + layout.geometry, GEOMETRY_WORDS, by);
-}
-
-/** Moves the points that begin at every so many numbers. No closure, no array: of what a page costs the thread this is the largest part. */
-function movePoints(floats: Float32Array, first: number, end: number, stride: number, [x, y, z]: Vector3): void {
-  for (let at = first; at < end; at += stride) {
-    floats[at] += x;
-    floats[at + 1] += y;
-    floats[at + 2] += z;
   }
 }

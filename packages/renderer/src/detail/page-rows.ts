@@ -1,6 +1,8 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { DETAIL_NUMBERS, DETAIL_PLACES } from './chunk-detail.js';
 import { NONE } from './page-list.js';
+import { movePoints } from './slot-words.js';
 
 const { ARRIVAL_STEPS, CHILD_PAGE_BITS, CHILD_PAGE_MASK } = constants;
 
@@ -25,13 +27,16 @@ export class PageRows {
   /**
    * Takes chunks over that nothing is below of yet.
    * @param details as in a page's file
+   * @param by world units, added to all positions
    * @param children numbers of the pages below each chunk, or {@link NONE}
    */
-  load(details: Float32Array, children: Uint32Array): void {
+  load(details: Float32Array, by: Vector3, children: Uint32Array): void {
     this.clear();
     this.numbers.set(details);
+    movePoints(this.numbers, DETAIL_PLACES.sphere, details.length, DETAIL_NUMBERS, by);
+    movePoints(this.numbers, DETAIL_PLACES.parentSphere, details.length, DETAIL_NUMBERS, by);
     this.#children = children;
-    this.#children.forEach((child, chunk) => child !== NONE && this.setBelow(chunk, 0));
+    for (let chunk = 0; chunk < children.length; chunk++) if (children[chunk] !== NONE) this.setBelow(chunk, 0);
   }
 
   /** Nothing is in the slot that might be drawn. */
@@ -63,11 +68,13 @@ export class PageRows {
 
   /** How far the page itself has arrived. */
   setArrived(arrived: number): void {
-    this.#children.forEach((child, chunk) => {
+    const children = this.#children;
+    for (let chunk = 0; chunk < children.length; chunk++) {
+      const child = children[chunk];
       const page = child === NONE ? CHILD_PAGE_MASK : child;
       this.#words[DETAIL_NUMBERS * chunk + DETAIL_PLACES.children] = (page | (arrived << CHILD_PAGE_BITS)) >>> 0;
       // What such a chunk stands for is in this page, too, or is nothing.
       if (child === NONE) this.setBelow(chunk, arrived);
-    });
+    }
   }
 }

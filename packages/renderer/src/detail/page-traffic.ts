@@ -3,7 +3,7 @@ import type { Residency } from './residency.js';
 
 /** Pages being fetched at a time; a file holds up to five. */
 export const MOST_FETCHES = 64;
-/** Slots of pages being fetched or waiting for their upload, from which on no other is sent for: at most 32 MB of the page's memory, and one page of any size. */
+/** Slots of pages being fetched or waiting for their upload, from which on no other is sent for: at most 31 MB of the page's memory, and one page of any size; where they lie in files with others, these files. */
 export const MOST_UNDER_WAY = 240;
 /** How much a page counts in the mean time of arrival when the next one has come. */
 const MEMORY = 0.95;
@@ -11,14 +11,14 @@ const MEMORY = 0.95;
 const RETRY_MS = 4_000;
 
 /** A page that has come. */
-export interface FetchedPage {
+export interface FetchedPage<Words> {
   readonly page: number;
-  readonly words: Uint32Array<ArrayBuffer>;
+  readonly words: Words;
 }
 
-export interface TrafficOptions {
+export interface TrafficOptions<Words> {
   /** Rejects for a page that cannot be had. */
-  readonly fetch: (page: number, signal: AbortSignal) => Promise<Uint32Array<ArrayBuffer>>;
+  readonly fetch: (page: number, signal: AbortSignal) => Promise<Words>;
   /** A page waits for its upload, or is known not to come. */
   readonly onArrival: () => void;
   readonly onError: (error: unknown) => void;
@@ -30,11 +30,11 @@ export interface TrafficOptions {
  * Pages on their way from the server to a slot: the most needed are sent for first and handed over first, a bounded number is under way, and what nobody wishes for any
  * more is given up wherever it is.
  */
-export class PageTraffic {
+export class PageTraffic<Words> {
   readonly #residency: Residency;
-  readonly #options: TrafficOptions;
+  readonly #options: TrafficOptions<Words>;
   readonly #fetching = new Map<number, AbortController>();
-  readonly #waiting = new Map<number, Uint32Array<ArrayBuffer>>();
+  readonly #waiting = new Map<number, Words>();
   /** Those that wait and are wished for, the most needed last; undefined if that has to be found anew. */
   #order: number[] | undefined;
   readonly #failedAt = new Map<number, number>();
@@ -45,7 +45,7 @@ export class PageTraffic {
   #abandoned = 0;
   #isClosed = false;
 
-  constructor(residency: Residency, options: TrafficOptions) {
+  constructor(residency: Residency, options: TrafficOptions<Words>) {
     this.#residency = residency;
     this.#options = options;
     this.#now = options.now ?? (() => performance.now());
@@ -90,7 +90,7 @@ export class PageTraffic {
   }
 
   /** Hands over the most needed of the pages that wait; undefined if the last look wishes for none of them. */
-  next(): FetchedPage | undefined {
+  next(): FetchedPage<Words> | undefined {
     const most = this.#nextWaiting();
     if (most === undefined) return undefined;
     const words = this.#waiting.get(most)!;

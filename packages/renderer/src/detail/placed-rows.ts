@@ -1,8 +1,10 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import { DetailTable } from './detail-table.js';
-import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
+import { SLOT_CHUNKS, type PageFormat } from './manifest.js';
 import { childrenIn, NONE, type PageList } from './page-list.js';
 import { PageRows } from './page-rows.js';
 import type { Residency } from './residency.js';
+import { chunkLayout, numbersOf, type ChunkLayout, type SlotWords } from './slot-words.js';
 
 /** The detail rows of all slots, page by page: which chunks are drawn, and in which share, while pages come and go. */
 export class PlacedRows {
@@ -11,8 +13,10 @@ export class PlacedRows {
   readonly #table: DetailTable;
   /** Of each slot. */
   readonly #rows: readonly PageRows[];
+  readonly #layout: ChunkLayout;
 
-  constructor(list: PageList, residency: Residency) {
+  constructor(list: PageList, residency: Residency, format: PageFormat) {
+    this.#layout = chunkLayout(format);
     this.#list = list;
     this.#residency = residency;
     const slots = residency.pageIn.length;
@@ -22,9 +26,10 @@ export class PlacedRows {
 
   /**
    * Takes over what a page says of its chunks. Nothing below it is there, and it has not arrived at all.
-   * @param parts words of each slot that holds chunks, as in a page's file
+   * @param parts words of each slot that holds chunks
+   * @param by world units, added to all positions
    */
-  load(page: number, parts: readonly Uint32Array<ArrayBuffer>[], format: PageFormat): void {
+  load(page: number, parts: readonly SlotWords[], by: Vector3): void {
     const { upper, parent, parentChunk } = this.#list;
     const above =
       parent[page] === NONE
@@ -32,11 +37,9 @@ export class PlacedRows {
         : this.#rowsOf(parent[page], parentChunk[page]).above(parentChunk[page] % SLOT_CHUNKS);
     const slots = this.#residency.slotsOf(page);
     parts.forEach((words, k) => {
-      const chunks = words.length / pageLayout(format, 1).total;
-      const { chunks: from, details } = pageLayout(format, chunks);
+      const { chunks } = words;
       const rows = this.#rows[slots[k]];
-      const numbers = new Float32Array(words.buffer, words.byteOffset + 4 * from, details);
-      rows.load(numbers, childrenIn(this.#list, page, k).subarray(0, chunks));
+      rows.load(numbersOf(words, 'details', this.#layout), by, childrenIn(this.#list, page, k).subarray(0, chunks));
       if (above) rows.setAbove(Math.min(chunks, Math.max(0, upper[page] - SLOT_CHUNKS * k)), above);
       this.#table.touch(slots[k]);
     });
@@ -44,10 +47,8 @@ export class PlacedRows {
 
   /** How far, 0 to `ARRIVED`, a page has arrived: so far the chunks above give way to it. */
   setArrived(page: number, arrived: number): void {
-    for (const slot of this.#residency.slotsOf(page)) {
-      this.#rows[slot].setArrived(arrived);
-      this.#table.touch(slot);
-    }
+    if (this.#list.slots[page] === 1) this.#setSlot(this.#residency.slotOf[page], arrived);
+    else for (const slot of this.#residency.slotsOf(page)) this.#setSlot(slot, arrived);
     this.#setBelow(page, arrived);
   }
 
@@ -69,11 +70,22 @@ export class PlacedRows {
     return this.#rows[this.#residency.slotsOf(page)[Math.floor(chunk / SLOT_CHUNKS)]];
   }
 
+  #setSlot(slot: number, arrived: number): void {
+    this.#rows[slot].setArrived(arrived);
+    this.#table.touch(slot);
+  }
+
   #setBelow(page: number, arrived: number): void {
     const parent = this.#list.parent[page];
     if (parent === NONE) return;
-    const slots = this.#residency.slotsOf(parent);
     const first = this.#list.parentChunk[page];
+    if (this.#list.slots[parent] === 1 && this.#list.parentChunks[page] === 1) {
+      const slot = this.#residency.slotOf[parent];
+      this.#rows[slot].setBelow(first, arrived);
+      this.#table.touch(slot);
+      return;
+    }
+    const slots = this.#residency.slotsOf(parent);
     const end = first + this.#list.parentChunks[page];
     for (let chunk = first; chunk < end; chunk++) {
       const slot = slots[Math.floor(chunk / SLOT_CHUNKS)];

@@ -38,8 +38,8 @@ export class Residency {
   /** Slots of those, and of pages on their way. */
   #slotsAside = 0;
   #slotsComing = 0;
-  /** The last look has found no room for pages of so many slots. */
-  #noRoomFor = Infinity;
+  /** The last look has found no room for a page of so many slots that was needed so much. */
+  #noRoom = { slots: Infinity, need: 0 };
   #look = 0;
 
   /** @param isAtHand true for a page that need not be fetched */
@@ -98,7 +98,7 @@ export class Residency {
   /** Takes note of a look: for each page the pixels that doing without it would cost, 0 for those that nobody wishes for. */
   note(wishes: Float32Array): void {
     this.#look++;
-    this.#noRoomFor = Infinity;
+    this.#noRoom = { slots: Infinity, need: 0 };
     this.#wish.set(wishes.subarray(0, this.#list.count));
     for (let page = 0; page < this.#list.count; page++) {
       if (wishes[page] > 0) this.#wishedAt[page] = this.#look;
@@ -112,22 +112,24 @@ export class Residency {
    * @returns {@link NONE} if there is none
    */
   nextMissing(): number {
-    for (let page = this.#missing.pop(); page !== NONE; page = this.#missing.pop()) {
-      if (this.#list.slots[page] < this.#noRoomFor && this.#isMissing(page)) return page;
+    // Thousands may find no room: none is tried that is needed no more, and takes no less, than one that has found none.
+    const { slots, need } = this.#noRoom;
+    while (slots > 1 || this.#missing.largest > need) {
+      const page = this.#missing.pop();
+      if (page === NONE) return NONE;
+      const hasNoRoom = this.#list.slots[page] >= slots && this.#wish[page] <= need;
+      if (!hasNoRoom && this.#isMissing(page)) return page;
     }
     return NONE;
   }
 
-  /** Starts bringing a page if there is room for it, or something to leave that is needed less; if not, nothing as large is missing until the next look. */
+  /** Starts bringing a page if there is room for it, or something to leave that is needed less; if not, nothing as large that is needed no more is missing until the next look. */
   begin(page: number): boolean {
     const parent = this.#list.parent[page];
     if (parent !== NONE) this.#hold(parent);
     if (!this.#makeRoom(page)) {
       if (parent !== NONE) this.#release(parent);
-      // What is needed less and takes as many slots finds no room either; what comes after a page at hand may be needed more.
-      if (this.#isAtHand(page)) return false;
-      this.#noRoomFor = this.#list.slots[page];
-      if (this.#noRoomFor === 1) this.#missing.clear();
+      this.#noteNoRoom(this.#list.slots[page], this.#wish[page]);
       return false;
     }
     this.#coming.add(page);
@@ -170,6 +172,12 @@ export class Residency {
   /** Slots that pages on their way will need and not find empty. */
   get #lackingSlots(): number {
     return Math.max(0, this.#slotsComing - this.#slots.empty);
+  }
+
+  #noteNoRoom(slots: number, need: number): void {
+    const before = this.#noRoom;
+    if (slots > before.slots) return;
+    this.#noRoom = { slots, need: slots === before.slots ? Math.max(need, before.need) : need };
   }
 
   #isMissing(page: number): boolean {

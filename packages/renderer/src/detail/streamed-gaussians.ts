@@ -5,13 +5,14 @@ import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
 import { MemoryLedger, type Reservation } from '../memory-ledger.js';
 import type { ShPrecision } from '../pack/sh.js';
 import { ARRIVAL_MS, Arrivals } from './arrivals.js';
-import { SLOT_CHUNKS, pageLayout, type DetailManifest } from './manifest.js';
+import { SLOT_CHUNKS, type DetailManifest } from './manifest.js';
 import { NONE } from './page-list.js';
 import { PagePool, slotBytes, slotsFor } from './page-pool.js';
 import { folderSource, type PageSource } from './page-source.js';
 import { PageTraffic } from './page-traffic.js';
 import { PlacedRows } from './placed-rows.js';
 import { Residency } from './residency.js';
+import type { SlotWords } from './slot-words.js';
 import { UploadPace } from './upload-pace.js';
 import { aheadMs } from './camera-motion.js';
 import { WishReader } from './wish-reader.js';
@@ -40,12 +41,17 @@ export interface StreamOptions extends PoolOptions {
 /** Fits a phone. */
 const DEFAULT_BUDGET = 256e6;
 
+/** Of pages that stand where their words say. */
+const IN_PLACE: Vector3 = [0, 0, 0];
+
 /** A page that has slots, and which of its parts are in them already. */
 interface Upload {
   readonly page: number;
   readonly slots: readonly number[];
   /** Words of each slot that holds chunks. */
-  readonly parts: readonly Uint32Array<ArrayBuffer>[];
+  readonly parts: readonly SlotWords[];
+  /** World units. */
+  readonly by: Vector3;
   written: number;
 }
 
@@ -72,8 +78,9 @@ export class StreamedGaussians implements GaussianScene {
   readonly #reservation: Reservation;
   readonly #pool: PagePool;
   readonly #residency: Residency;
-  readonly #traffic: PageTraffic;
+  readonly #traffic: PageTraffic<readonly SlotWords[]>;
   readonly #pace = new UploadPace();
+  readonly #slotBytes: number;
   readonly #rows: PlacedRows;
   readonly #arrivals: Arrivals;
   #upload: Upload | undefined;
@@ -117,7 +124,8 @@ export class StreamedGaussians implements GaussianScene {
       onArrival: () => this.#options.onChange?.(),
       onError: (error) => this.#options.onError?.(error),
     });
-    this.#rows = new PlacedRows(list, this.#residency);
+    this.#rows = new PlacedRows(list, this.#residency, scene);
+    this.#slotBytes = slotBytes(scene);
     this.#arrivals = new Arrivals(list, options.arrivalMs ?? ARRIVAL_MS, (page, arrived) =>
       this.#rows.setArrived(page, arrived),
     );
@@ -143,7 +151,7 @@ export class StreamedGaussians implements GaussianScene {
       scene.#residency.begin(0);
       const words = await source.fetch(0, new AbortController().signal);
       if (scene.#begin(0, words)) while (scene.#upload) scene.#writeSlot(scene.#upload);
-      scene.#writeDetails();
+      scene.#finishWrites();
       return scene;
     } catch (error) {
       scene.destroy();
@@ -202,7 +210,7 @@ export class StreamedGaussians implements GaussianScene {
     const start = performance.now();
     if (this.#arrivals.step(start)) this.#version++;
     this.#uploadSome(this.#pace.startFrame(start));
-    this.#writeDetails();
+    this.#finishWrites();
     this.#uploaded.milliseconds += performance.now() - start;
     this.#traffic.sendForMore();
     if (this.#traffic.waiting + this.#placing > 0) queueMicrotask(() => this.#options.onChange?.());
@@ -225,14 +233,14 @@ export class StreamedGaussians implements GaussianScene {
   #uploadSome(most: number): void {
     const start = performance.now();
     let bytes = 0;
-    while (bytes === 0 || bytes + slotBytes(this.#source.scene) <= most) {
+    while (bytes === 0 || bytes + this.#slotBytes <= most) {
       if (this.#upload === undefined) {
         const next = this.#traffic.next();
         if (next === undefined) break;
         if (!this.#begin(next.page, next.words)) {
           this.#traffic.refused();
           // A page that finds no slot has cost its share of the thread as well.
-          bytes += next.words.byteLength;
+          for (const { chunks } of next.words) bytes += this.#bytesOf(chunks);
           continue;
         }
       }
@@ -242,7 +250,7 @@ export class StreamedGaussians implements GaussianScene {
   }
 
   /** Finds slots for a page; what leaves them gives way to what is above it with this frame. @returns false if there are none */
-  #begin(page: number, words: Uint32Array<ArrayBuffer>): boolean {
+  #begin(page: number, parts: readonly SlotWords[]): boolean {
     const place = this.#residency.settle(page);
     if (place === undefined) return false;
     for (const { page: leaver, slots } of place.left) {
@@ -250,28 +258,33 @@ export class StreamedGaussians implements GaussianScene {
       this.#rows.leave(leaver, slots);
       this.#version++;
     }
-    this.#source.prepare?.(page, words);
-    this.#upload = { page, slots: place.slots, parts: partsOf(words, this.#source.scene), written: 0 };
+    this.#upload = { page, slots: place.slots, parts, by: this.#source.translate?.(page) ?? IN_PLACE, written: 0 };
     return true;
   }
 
   /** Uploads what belongs in one slot of a page. With the last of them the page takes part in the picture. @returns bytes */
   #writeSlot(upload: Upload): number {
-    const { page, slots, parts } = upload;
+    const { page, slots, parts, by } = upload;
     const words = parts[upload.written];
-    this.#pool.write(slots[upload.written++], words, chunksIn(words, this.#source.scene));
-    this.#uploaded.bytes += words.byteLength;
+    const bytes = this.#bytesOf(words.chunks);
+    this.#pool.write(slots[upload.written++], words, by);
+    this.#uploaded.bytes += bytes;
     if (upload.written === parts.length) {
       this.#upload = undefined;
-      this.#rows.load(page, parts, this.#source.scene);
+      this.#rows.load(page, parts, by);
       this.#arrivals.begin(page);
       this.#uploaded.pages++;
       this.#version++;
     }
-    return words.byteLength;
+    return bytes;
   }
 
-  #writeDetails(): void {
+  #bytesOf(chunks: number): number {
+    return (chunks * this.#slotBytes) / SLOT_CHUNKS;
+  }
+
+  #finishWrites(): void {
+    this.#pool.flush();
     this.#rows.flush(this.#pool.slotsPerBuffer, (first, rows) => this.#pool.writeDetails(first, rows));
   }
 
@@ -281,15 +294,4 @@ export class StreamedGaussians implements GaussianScene {
     this.#residency.note(wishes);
     this.#traffic.follow();
   }
-}
-
-/** Chunks that are laid out as in a page's file. */
-const chunksIn = ({ length }: Uint32Array, scene: PageSource['scene']): number => length / pageLayout(scene, 1).total;
-
-/** The words of each slot. */
-function partsOf(words: Uint32Array<ArrayBuffer>, scene: PageSource['scene']): Uint32Array<ArrayBuffer>[] {
-  const stride = pageLayout(scene, SLOT_CHUNKS).total;
-  return Array.from({ length: Math.ceil(words.length / stride) }, (_, k) =>
-    words.subarray(stride * k, stride * (k + 1)),
-  );
 }

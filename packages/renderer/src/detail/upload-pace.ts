@@ -4,8 +4,11 @@ export const UPLOAD_SHARE = { least: 1 / 8, most: 1 / 4 } as const;
 const GROWTH = 1 / 512;
 /** Bounds in milliseconds. */
 const [LEAST_MS, MOST_MS] = [1, 5];
-/** Most bytes for one frame, whatever they cost the thread: what the GPU process and the GPU do with them is not measured. */
-export const MOST_UPLOAD_BYTES = 16e6;
+/**
+ * Most bytes for one frame, whatever they cost the thread: what the GPU process and the GPU do with them is not measured. So many in each frame were seen to make none late
+ * (docs/detail-pages.md); more has not been tried.
+ */
+export const MOST_UPLOAD_BYTES = 7e6;
 /** What bytes are thought to cost before any has been uploaded: that of 650 MB a second. */
 const [FIRST_MS, FIRST_BYTES] = [2, 1.3e6];
 /** How much an upload counts when the next one has been made: clocks of browsers that tick once a millisecond come out right on average. */

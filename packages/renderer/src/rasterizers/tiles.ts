@@ -42,6 +42,7 @@ interface Grid {
 
 /** Buffers whose size follows the scene. */
 interface PairBuffers {
+  /** Until pairs are sorted, the second of {@link bins}: it is first written then. */
   readonly rects: GPUBuffer;
   readonly groupPairs: GPUBuffer;
   readonly plan: GPUBuffer;
@@ -206,18 +207,15 @@ export class TilesRasterizer implements Rasterizer {
       this.#memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination | indirect);
     // `bin_index` writes its bits in whole groups.
     const pairs = PROJECT_GROUP * Math.ceil(pairCapacity / PROJECT_GROUP);
-    const two = (name: string, bytes: number): [GPUBuffer, GPUBuffer] => [
-      buffer(`${name}_a`, bytes * pairs),
-      buffer(`${name}_b`, bytes * pairs),
-    ];
+    const bins: [GPUBuffer, GPUBuffer] = [buffer('bins_a', 4 * pairs), buffer('bins_b', 4 * Math.max(pairs, capacity))];
     const groupPairs = buffer('group_pairs', scanBytes(groups));
     this.#device.queue.writeBuffer(this.#scanLength, 0, Uint32Array.of(groupPairs.size / 4 - 1));
     return {
-      rects: buffer('rects', 4 * capacity),
+      rects: bins[1],
       groupPairs,
       plan: buffer('plan', layouts.Plan.size + layouts.PagePlan.size),
-      bins: two('bins', 4),
-      pairs: two('pairs', PAIR_BYTES),
+      bins,
+      pairs: [buffer('pairs_a', PAIR_BYTES * pairs), buffer('pairs_b', PAIR_BYTES * pairs)],
       digitCounts: buffer('digit_counts', 4 * DIGITS * Math.ceil(pairCapacity / SORT_BLOCK)),
       digitTotals: buffer('digit_totals', 4 * DIGITS),
     };

@@ -1,0 +1,67 @@
+/** Views of a streamed scene at rest: what they settle to, and how far that is from a picture of more splats. */
+import { readPixels } from '../run/read-pixels.js';
+import { flightCamera } from './flight-path.js';
+import { drawn, rounded } from './second.js';
+
+/**
+ * Draws one view until nothing more comes, or its time is up: a pool that is too small for a view goes on exchanging pages for a while.
+ * @returns seconds taken, and pages on their way at the end: 0 if the view has all that it gets
+ */
+async function settle({ device, renderer, scene, target, turn, progress, settleSeconds }, request) {
+  const start = performance.now();
+  const took = () => (performance.now() - start) / 1000;
+  for (let calm = 0; calm < 20 && took() < Math.min(settleSeconds, progress.left);) {
+    const { resident } = scene.progress;
+    renderer.render({ ...request, gaussians: scene, target });
+    await drawn(device);
+    await turn();
+    calm = scene.progress.resident === resident && scene.progress.coming === 0 ? calm + 1 : 0;
+  }
+  return { seconds: rounded(took()), coming: scene.progress.coming };
+}
+
+/** PSNR over the pixels that either picture covers; `identical` for the same picture twice, `empty` where neither covers any. */
+function psnr(a, b) {
+  let [sum, count] = [0, 0];
+  for (let i = 0; i < a.length; i += 4) {
+    if (a[i + 3] === 0 && b[i + 3] === 0) continue;
+    for (let k = 0; k < 4; k++) sum += (a[i + k] - b[i + k]) ** 2;
+    count += 4;
+  }
+  if (count === 0) return 'empty';
+  return sum === 0 ? 'identical' : rounded(-10 * Math.log10(sum / count));
+}
+
+/**
+ * The picture of each view within the budget against one of a quarter of the error and four times the budget.
+ * @param shares of the flight's curve, before each view
+ * @param views gets a row for each
+ */
+export async function compare(all, shares, views) {
+  const { manifest, width, height, levers, progress } = all;
+  const { detail, splatBudget } = levers;
+  for (const share of shares) {
+    if (progress.left === 0) throw new Error('the time was up');
+    const camera = flightCamera(share, { bounds: manifest.bounds, width, height });
+    progress.begin(`the view at ${share} of the flight`);
+    const settled = await settle(all, { camera, ...levers });
+    const picture = await readPixels(all.device, all.target);
+    const { visible, budgetError } = await all.renderer.readStatistics();
+    const { resident, error } = all.scene.progress;
+    const rest = { resident, poolError: rounded(error) };
+    progress.begin(`the view at ${share} of the flight, four times finer`);
+    const finerSettled = await settle(all, { camera, detail: detail / 4, splatBudget: 4 * splatBudget });
+    const finer = await readPixels(all.device, all.target);
+    const more = await all.renderer.readStatistics();
+    views.push({
+      ...{ share, settled, visible, budgetError: rounded(budgetError), ...rest },
+      against: {
+        settled: finerSettled,
+        visible: more.visible,
+        budgetError: rounded(more.budgetError),
+        overflow: more.overflow,
+        decibels: psnr(picture, finer),
+      },
+    });
+  }
+}

@@ -1,0 +1,65 @@
+import type { Vector3 } from '@gaussian-splat/core';
+import { layouts } from '../generated/shaders.js';
+import type { GaussianPage } from '../gaussian-scene.js';
+import { BUFFER_USAGE } from '../gpu/kernel.js';
+import type { GpuMemory } from '../gpu/memory.js';
+import { MoveSlotsStage } from '../stages/move-slots.js';
+
+/** Slots that are moved in one submission. */
+const MOST_MOVES = 256;
+const MOVE_WORDS = layouts.SlotMove.size / 4;
+const { by: BY, slot: SLOT } = layouts.SlotMove.fields;
+
+/** Moves what was written into slots, on the GPU: reading and writing it on the page's thread would cost that as much as the upload. */
+export class SlotMover {
+  readonly #device: GPUDevice;
+  readonly #stage: MoveSlotsStage;
+  readonly #pages: readonly { readonly moves: GPUBuffer; readonly bindings: GPUBindGroup }[];
+  readonly #slotsPerBuffer: number;
+  readonly #pending = new Map<number, Vector3>();
+
+  constructor(device: GPUDevice, memory: GpuMemory, pages: readonly GaussianPage[], slotsPerBuffer: number) {
+    this.#device = device;
+    this.#stage = new MoveSlotsStage(device);
+    this.#slotsPerBuffer = slotsPerBuffer;
+    const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination;
+    this.#pages = pages.map(({ geometry }) => {
+      const moves = memory.buffer('gs.pool.moves', 4 * MOVE_WORDS * MOST_MOVES, usage);
+      return { moves, bindings: this.#stage.bind({ moves, gaussians: geometry }) };
+    });
+  }
+
+  /** A slot has been filled, with what belongs elsewhere by so much; whatever was in it before is forgotten. */
+  note(slot: number, by: Vector3): void {
+    this.#pending.delete(slot);
+    if (by.every((value) => value === 0)) return;
+    this.#pending.set(slot, by);
+    if (this.#pending.size === MOST_MOVES) this.flush();
+  }
+
+  /** Submits the moves of what has been noted. */
+  flush(): void {
+    if (this.#pending.size === 0) return;
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.pool.move' });
+    const pass = encoder.beginComputePass({ label: 'gs.pool.move' });
+    this.#pages.forEach(({ moves, bindings }, page) => {
+      const own = [...this.#pending].filter(([slot]) => Math.floor(slot / this.#slotsPerBuffer) === page);
+      if (own.length === 0) return;
+      this.#device.queue.writeBuffer(moves, 0, this.#pack(own));
+      this.#stage.record(pass, bindings, own.length);
+    });
+    pass.end();
+    this.#device.queue.submit([encoder.finish()]);
+    this.#pending.clear();
+  }
+
+  #pack(moves: readonly (readonly [number, Vector3])[]): Uint32Array<ArrayBuffer> {
+    const words = new Uint32Array(MOVE_WORDS * moves.length);
+    const floats = new Float32Array(words.buffer);
+    moves.forEach(([slot, by], k) => {
+      floats.set(by, MOVE_WORDS * k + BY.offset / 4);
+      words[MOVE_WORDS * k + SLOT.offset / 4] = slot % this.#slotsPerBuffer;
+    });
+    return words;
+  }
+}

@@ -1,0 +1,26 @@
+// Moves the splats of slots that were filled from a file which serves several places: of each slot those of one workgroup.
+#import shared/gaussian
+#import shared/group
+
+struct SlotMove {
+  by: vec3f,
+  slot: u32,
+}
+
+@group(0) @binding(0) var<storage, read> moves: array<SlotMove>;
+@group(0) @binding(1) var<storage, read_write> gaussians: array<PackedGaussian>;
+
+// Chunks that a slot has room for.
+const SLOT_CHUNKS = 4u;
+const SLOT_SPLATS = SLOT_CHUNKS * CULL_GROUP;
+const MOVE_THREADS = 256u;
+
+@compute @workgroup_size(MOVE_THREADS)
+fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
+  let one = moves[workgroup_id.x];
+  let first = one.slot * SLOT_SPLATS;
+  for (var k = lane; k < SLOT_SPLATS; k += MOVE_THREADS) {
+    let head = gaussians[first + k].head;
+    gaussians[first + k].head = vec4u(bitcast<vec3u>(bitcast<vec3f>(head.xyz) + one.by), head.w);
+  }
+}
