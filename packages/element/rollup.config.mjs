@@ -9,11 +9,13 @@ import { fileURLToPath } from 'node:url';
 import { nodeResolve } from '@rollup/plugin-node-resolve';
 import terser from '@rollup/plugin-terser';
 import { minifyTemplateLiterals } from 'rollup-plugin-minify-template-literals';
+import { shortShaders } from './scripts/shader-plugin.mjs';
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 
 const plugins = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
+  shortShaders(),
   minifyTemplateLiterals({ include: [path('./dist/styles.js'), path('./dist/template.js')] }),
   terser({ module: true, ecma: 2022, compress: { passes: 2 }, format: { comments: false } }),
 ];

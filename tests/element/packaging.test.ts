@@ -51,7 +51,7 @@ test(
 const ELSEWHERE: Readonly<Record<string, string>> = {
   'manifests of streamed scenes': 'JSON that npm run detail wrote',
   'pages of streamed scenes': 'gs.wishes.staging',
-  'the stage that notes their wishes': 'read_write> wishes',
+  'the stage that notes their wishes': 'note_wishes',
   sequences: 'a path with {0001} in it',
   'headers of .ksplat': 'a .ksplat section header',
   'what is said of files that are no scene': 'a git-LFS pointer, which only names the real file',

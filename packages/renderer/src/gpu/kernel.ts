@@ -187,7 +187,7 @@ export function rareKernelOf<S extends ShaderDescription>(
 
 /**
  * A shader with a piece of its text replaced, for what WGSL has no way to leave open: the format of a storage texture, the type of an
- * array's elements.
+ * array's elements. Names in the text must be among those that the CDN build keeps: packages/element/scripts/shader-plugin.mjs.
  * @param variant tells it from the original among the things made once for a device
  */
 export function specialise<S extends ShaderDescription>(shader: S, variant: string, from: string, to: string): S {

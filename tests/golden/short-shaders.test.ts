@@ -1,0 +1,198 @@
+/** The shaders of the CDN build, whose names and spaces are shortened, do what those of the packages do. */
+import assert from 'node:assert/strict';
+import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { basename, dirname, join } from 'node:path';
+import { after, test } from 'node:test';
+import { fileURLToPath, pathToFileURL } from 'node:url';
+import { SORT_NAMES, canSort, givesKnownAnswer } from '@gaussian-splat/renderer/stages';
+import * as stages from '@gaussian-splat/renderer/stages';
+import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { endNodeDevice } from '../support/node-device.js';
+
+/** What this test needs of the plugin's own module and the others. */
+interface Plugin {
+  readonly piecesIn: (text: string) => Map<string, string>;
+  readonly REPLACED: Replaced;
+  readonly SHADER_FILES: readonly string[];
+  readonly shortShaders: () => {
+    buildStart(): void;
+    transform(code: string, id: string): { readonly code: string } | null;
+  };
+}
+interface Replaced {
+  readonly keptNames: readonly string[];
+  readonly keptLines: RegExp;
+}
+interface Token {
+  readonly lexeme: string;
+  readonly type: { readonly name: string };
+}
+type Placed = readonly { readonly binding: number }[];
+interface Reflect {
+  readonly WgslScanner: new (code: string) => { scanTokens(): Token[] };
+  readonly WgslReflect: new (code: string) => Readonly<Record<'uniforms' | 'storage' | 'textures', Placed>>;
+}
+const scripts = '../../packages/element/scripts/';
+const { piecesIn, REPLACED, SHADER_FILES, shortShaders } = (await import(`${scripts}shader-plugin.mjs`)) as Plugin;
+const { shortened } = (await import(`${scripts}short-wgsl.mjs`)) as {
+  shortened: (pieces: Map<string, string>, options: Replaced) => Map<string, string>;
+};
+const reflection: string = 'wgsl_reflect/wgsl_reflect.module.js';
+const { WgslReflect, WgslScanner } = (await import(reflection)) as Reflect;
+
+interface Stage {
+  readonly name: string;
+  readonly bindings: Readonly<Record<string, { readonly binding: number; readonly type: string }>>;
+  code: string;
+}
+
+const isStage = (value: unknown): value is Stage => typeof value === 'object' && value !== null && 'code' in value;
+const stagesIn = (module: object): Stage[] => Object.values(module).filter(isStage);
+const cache = fileURLToPath(new URL('../../.cache/', import.meta.url));
+mkdirSync(cache, { recursive: true });
+const folder = mkdtempSync(join(cache, 'short-shaders-'));
+after(() => {
+  rmSync(folder, { recursive: true, force: true });
+  endNodeDevice();
+});
+
+/** The stages of all files, as the build and as the bundle has them. */
+async function bothForms(): Promise<{ readable: Stage[]; short: Stage[] }> {
+  const plugin = shortShaders();
+  plugin.buildStart();
+  const [readable, short]: [Stage[], Stage[]] = [[], []];
+  for (const file of SHADER_FILES) {
+    const { code } = plugin.transform(readFileSync(file, 'utf8'), file)!;
+    const own = join(folder, basename(dirname(dirname(dirname(file)))));
+    cpSync(dirname(file), own, { recursive: true });
+    // Those of economise take their shared pieces from the renderer's.
+    const copy = join(own, basename(file));
+    writeFileSync(copy, code.replace('@gaussian-splat/renderer/stages', '../renderer/shaders.js'));
+    short.push(...stagesIn((await import(pathToFileURL(copy).href)) as object));
+    readable.push(...stagesIn((await import(pathToFileURL(file).href)) as object));
+  }
+  return { readable, short };
+}
+
+const forms = await bothForms();
+
+const scan = (code: string): Token[] => new WgslScanner(code).scanTokens();
+
+test('token by token they are the same but for names, and each name has one other', () => {
+  assert.equal(forms.short.length, forms.readable.length);
+  assert.ok(forms.readable.length > 45, `${forms.readable.length} stages`);
+  const [shortOf, nameOf] = [new Map<string, string>(), new Map<string, string>()];
+  let [before, now] = [0, 0];
+  forms.readable.forEach(({ name, code }, k) => {
+    const [was, is] = [scan(code), scan(forms.short[k].code)];
+    assert.equal(is.length, was.length, name);
+    was.forEach(({ lexeme, type }, at) => {
+      const short = is[at].lexeme;
+      if (type.name !== 'ident' || is[at].type.name !== 'ident')
+        return assert.equal(short, lexeme, `${name}: token ${at}`);
+      assert.equal(shortOf.get(lexeme) ?? short, short, `${name}: ${lexeme}`);
+      assert.equal(nameOf.get(short) ?? lexeme, lexeme, `${name}: ${short}`);
+      shortOf.set(lexeme, short);
+      nameOf.set(short, lexeme);
+    });
+    before += code.length;
+    now += forms.short[k].code.length;
+  });
+  for (const name of REPLACED.keptNames) assert.equal(shortOf.get(name) ?? name, name);
+  console.log(`${shortOf.size} names; ${before} characters, ${now} short`);
+  assert.ok(now < 0.75 * before);
+});
+
+test('bindings are where they were', () => {
+  forms.short.forEach(({ name, bindings, code }) => {
+    const { uniforms, storage, textures } = new WgslReflect(code);
+    const found = [...uniforms, ...storage, ...textures].map(({ binding }) => binding).sort((a, b) => a - b);
+    const expected = Object.values(bindings).map(({ binding }) => binding);
+    assert.deepEqual(
+      found,
+      expected.sort((a, b) => a - b),
+      name,
+    );
+  });
+});
+
+/** A device of its own, with what there is of some features. */
+async function deviceWith(...wanted: GPUFeatureName[]): Promise<GPUDevice> {
+  const adapter = await requestNodeAdapter();
+  return adapter.requestDevice({ requiredFeatures: wanted.filter((name) => adapter.features.has(name)) });
+}
+
+test('Dawn takes every one of them', async () => {
+  const device = await deviceWith('subgroups');
+  for (const { name, code: own } of forms.short) {
+    const code = name.endsWith('_subgroups') ? `enable subgroups;\n${own}` : own;
+    if (code !== own && !device.features.has('subgroups')) continue;
+    const { messages } = await device.createShaderModule({ code }).getCompilationInfo();
+    assert.deepEqual(
+      messages.map(({ message }) => message),
+      [],
+      name,
+    );
+  }
+  device.destroy();
+});
+
+test('every variant of theirs gives the known answer', async () => {
+  const own = new Map(forms.short.map((stage) => [stage.name, stage.code]));
+  // In this process the renderer has those of the bundle from here on; a device of its own has none of the others yet.
+  for (const stage of stagesIn(stages)) stage.code = own.get(stage.name)!;
+  const device = await deviceWith('subgroups', 'float32-blendable');
+  for (const sort of SORT_NAMES.filter((name) => canSort(device, name))) {
+    for (const rasterizer of ['quads', 'tiles'] as const) {
+      const threads = sort === 'serial' ? 'serial' : 'parallel';
+      assert.ok(await givesKnownAnswer(device, { threads, rasterizer, sort }), `${sort} ${rasterizer}`);
+      assert.ok(
+        await givesKnownAnswer(device, { threads, rasterizer, sort, sortAngle: 0.03 }),
+        `${sort} ${rasterizer}, kept`,
+      );
+    }
+  }
+  device.destroy();
+});
+
+/** WGSL that is easily spoiled. */
+const HARD = `struct View {
+eye: vec3f,
+w: f32,
+}
+override is_final: bool = false;
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read_write> position: array<u32>;
+fn shade(distance: f32, step: f32) -> f32 {
+let taken = distance - -step;
+let near = length(view.eye) > 1.0 && !(taken >= 2.0);
+return select(view.w, frexp(taken).fract, near || is_final);
+}
+@vertex
+fn main(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+let far = distance(view.eye, vec3f(1.0).zyx);
+var<private> unused: f32;
+return vec4f(shade(far, 0.5e-3), f32(position[index]) , 0.0, 1.0);
+}`;
+
+test('words of the language, overridable constants and shadowed functions stay', () => {
+  const short = shortened(new Map([['hard', HARD]]), { keptNames: ['taken'], keptLines: /^let far/ }).get('hard')!;
+  for (const word of [
+    'is_final',
+    '@builtin(position)',
+    'vertex_index',
+    'distance(',
+    '.fract',
+    '.zyx',
+    'fn main(',
+    'taken',
+    '0.5e-3',
+  ]) {
+    assert.ok(short.includes(word), `${word}:\n${short}`);
+  }
+  assert.match(short, /taken=distance- -/);
+  assert.match(short, /\n@vertex\nfn main/);
+  assert.match(short, /let \w+ = distance\(/);
+  assert.doesNotMatch(short, /shade|view|near/i);
+  assert.equal(piecesIn('export const aPart = "fn \\"x\\"\\n";\n').get('aPart'), 'fn "x"\n');
+});
