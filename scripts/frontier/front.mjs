@@ -49,11 +49,16 @@ export function timeOf(result, standard) {
   return { kind, ms: ratio && common ? ratio.p50 * common.p50 : result[kind].p50 };
 }
 
+/** Bytes of GPU memory for each splat of the scene as it is, whether a configuration leaves some out or adds coarser ones. */
+export function bytesASplat({ bytes }, { splats }) {
+  return bytes && (bytes.scene + bytes.renderer) / splats;
+}
+
 /** The points of a report. */
-export function pointsOf({ results, standard }) {
+export function pointsOf({ results, standard, scene }) {
   return results
     .filter((result) => !result.error)
-    .map((result) => ({ ...result, time: timeOf(result, standard) }))
+    .map((result) => ({ ...result, time: timeOf(result, standard), bytes: bytesASplat(result, scene) }))
     .map(({ configuration, quality, time, bytes }) => ({
       name: configuration.name,
       tier: configuration.tier,
@@ -64,6 +69,6 @@ export function pointsOf({ results, standard }) {
       psnr: Math.min(120, quality.psnr),
       worst: quality.worst,
       ssim: quality.ssim,
-      bytes: bytes?.perSplat,
+      bytes,
     }));
 }

@@ -6,7 +6,7 @@ import { adapterName } from '../../demo/bench/run/environment.js';
 import { runPage } from '../lib/browser-page.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
-import { hypervolume, nonDominated, passing, pointsOf, timeOf } from './front.mjs';
+import { bytesASplat, hypervolume, nonDominated, passing, pointsOf, timeOf } from './front.mjs';
 
 const USAGE = `usage: npm run frontier -- [options]
 
@@ -91,11 +91,12 @@ function describe(report) {
   const points = pointsOf(report);
   const front = new Set(nonDominated(points).map(({ name }) => name));
   const lines = report.results.map((result) => {
-    const { configuration, error, quality, bytes } = result;
+    const { configuration, error, quality } = result;
+    const bytes = bytesASplat(result, report.scene)?.toFixed(1);
     const { name } = configuration;
     if (error) return `  ${name.padEnd(28)} left out: ${error.split('\n')[0]}`;
     const time = timeOf(result, report.standard).ms.toFixed(2);
-    const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  SSIM ${quality.ssim.toFixed(4)}${bytes ? `  ${bytes.perSplat} B` : ''}`;
+    const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  SSIM ${quality.ssim.toFixed(4)}${bytes ? `  ${bytes} B` : ''}`;
     return `${front.has(name) ? '*' : ' '} ${name.padEnd(28)}${numbers}`;
   });
   const area = hypervolume(points);

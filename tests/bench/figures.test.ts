@@ -114,9 +114,12 @@ test('beside a standard a clock that changes within the run changes nothing', as
   assert.ok(slower.span.p50 > 2 * same.span.p50, 'what the times alone say');
   assert.ok(Math.abs(same.ratio.span.p50 - 1) < 0.01 && Math.abs(slower.ratio.span.p50 - 1.5) < 0.01);
   const quality = { psnr: 60, worst: 1, ssim: 0.99 };
-  const results = [same, slower].map((one, i) => ({ ...one, quality, configuration: { name: `${i}` } }));
+  // What leaves splats out counts for the scene as it was.
+  const bytes = { scene: 4000, renderer: 1000, perSplat: 1 };
+  const results = [same, slower].map((one, i) => ({ ...one, quality, bytes, configuration: { name: `${i}` } }));
   const common = summarizeStandard(visits.map((one) => ({ visits: [one] })));
-  const [a, b] = pointsOf({ results, standard: common });
+  const [a, b] = pointsOf({ results, standard: common, scene: { splats: 50 } });
+  assert.equal(a.bytes, 100);
   assert.ok(Math.abs(b.ms / a.ms - 1.5) < 0.02, `${a.ms} and ${b.ms} ms`);
   assert.equal((await visit(subject(2), cameras, how)).ratios, undefined);
 });

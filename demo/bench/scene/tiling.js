@@ -75,11 +75,11 @@ async function withSides(device, around, uploads) {
   return sided;
 }
 
-/** What the element's `economy` leaves of it, at so many dB. */
+/** What the element's `economy` leaves of it at so many dB, however long looking takes. */
 async function withoutUnseen(device, around, [whole, ...more], decibels) {
   try {
     if (more.length > 0) throw new RangeError('economy: expected splats that fit one upload');
-    const { packed } = await (await LiveMask.of(device, whole, around)).masked({ decibels });
+    const { packed } = await (await LiveMask.of(device, whole, around, { patienceMs: Infinity })).masked({ decibels });
     return [await GaussianBuffers.upload(device, packed)];
   } finally {
     for (const upload of [whole, ...more]) upload.destroy();
