@@ -127,6 +127,23 @@ test('JSON with a buffer of its own, and with one written as text', async () => 
   assertSameCloud(await readScene(text('a%20b.bin'), { name: 'a.gltf', openPart }), inside);
 });
 
+test('JSON is known as glTF in whatever order its keys come', async () => {
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(400, 3) }]], [{ mesh: 0 }], [0]);
+  const inside = await readScene(writeGlb(json, buffer), { name: 'a' });
+  const { asset, buffers, ...rest } = json;
+  const uri = `data:application/octet-stream;base64,${buffer.toString('base64')}`;
+  const embedded = { buffers: [{ ...(buffers as object[])[0], uri }] };
+  assert.ok(uri.length > 65_536);
+  for (const file of [
+    { ...embedded, ...rest, asset },
+    { ...rest, ...embedded, asset: { extras: { author: {} }, version: '2.0' } },
+  ]) {
+    const text = JSON.stringify(file);
+    assertSameCloud(await readScene(Buffer.from(text), { name: 'a' }), inside);
+    assertSameCloud(await readScene(Buffer.from(`\ufeff\n${text}\n`), { name: 'a' }), inside);
+  }
+});
+
 test('what the extension allows and we do not draw is refused by name', async () => {
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(2, 0) }]], [{ mesh: 0 }], [0]);
   type Splats = { extensions: { KHR_gaussian_splatting: Record<string, unknown> } };

@@ -3,7 +3,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 
 const latin1 = new TextDecoder('latin1');
 
-/** Bytes `start` to `end` as text, one character for each byte; only ASCII characters are meaningful. */
+/** Bytes `start` to `end` (negative: counted from the end) as text, one character for each byte; only ASCII characters are meaningful. */
 export function asciiOf(bytes: Uint8Array, start = 0, end = bytes.length): string {
   return latin1.decode(bytes.subarray(start, end));
 }
@@ -12,6 +12,11 @@ export function asciiOf(bytes: Uint8Array, start = 0, end = bytes.length): strin
 export function startsWith(bytes: Uint8Array, signature: readonly number[] | string, at = 0): boolean {
   const expected = typeof signature === 'string' ? Array.from(signature, (c) => c.charCodeAt(0)) : signature;
   return bytes.length >= at + expected.length && expected.every((byte, i) => bytes[at + i] === byte);
+}
+
+/** True if the file begins as an object in JSON does; a byte-order mark and space may come before. */
+export function isJsonObject(bytes: Uint8Array): boolean {
+  return /^(\u00ef\u00bb\u00bf)?\s*\{/.test(asciiOf(bytes, 0, 64));
 }
 
 /** A view of the same bytes for reading numbers of any type and byte order. */
