@@ -125,6 +125,15 @@ test('JSON with a buffer of its own, and with one written as text', async () => 
   assertSameCloud(await readScene(text(embedded), { name: 'a.gltf' }), inside);
   const openPart = async (path: string): Promise<Uint8Array> => (assert.equal(path, 'a b.bin'), new Uint8Array(buffer));
   assertSameCloud(await readScene(text('a%20b.bin'), { name: 'a.gltf', openPart }), inside);
+  assertSameCloud(await readScene(text('a%20b.bin?v=3#x'), { name: 'a.gltf', openPart }), inside);
+});
+
+test('a buffer of 50 MB written as text', async () => {
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(6, 1) }]], [{ mesh: 0 }], [0]);
+  const padded = Buffer.concat([buffer, Buffer.alloc(51e6)]);
+  const uri = `data:application/octet-stream;base64,${padded.toString('base64')}`;
+  const file = Buffer.from(JSON.stringify({ ...json, buffers: [{ uri, byteLength: padded.length }] }));
+  assertSameCloud(await readScene(file, { name: 'a' }), await readScene(writeGlb(json, buffer), { name: 'a' }));
 });
 
 test('JSON is known as glTF in whatever order its keys come', async () => {

@@ -12,13 +12,15 @@ export interface GltfFile {
 }
 
 const MAX_JSON_BYTES = 1 << 26;
+/** Buffers may be written into the JSON itself; no browser has much longer strings. */
+const MAX_TEXT_BYTES = 500_000_000;
 const HEADER_BYTES = 12;
 
 /** Takes a GLB, or a glTF in JSON, apart. */
 export function openContainer(bytes: Uint8Array, name: string): GltfFile {
   const file = startsWith(bytes, 'glTF')
     ? openGlb(bytes, name)
-    : { json: parseJson(bytes, name, MAX_JSON_BYTES), binary: undefined };
+    : { json: parseJson(bytes, name, MAX_TEXT_BYTES), binary: undefined };
   const { asset } = file.json;
   const version = typeof asset === 'object' && asset !== null ? (asset as Json).version : undefined;
   if (typeof version !== 'string' || !version.startsWith('2.')) {
