@@ -167,6 +167,11 @@ test('what the extension allows and we do not draw is refused by name', async ()
   await expectRefusal(other, 'decode/unsupported', /EXT_other/, { name: 'a.glb' });
   const loop = writeGlb({ ...json, nodes: [{ children: [0] }] }, buffer);
   await expectRefusal(loop, 'decode/header', /nodes that contain themselves/, { name: 'a.glb' });
+  const { meshes } = json as { meshes: { primitives: object[] }[] };
+  const primitives = Array.from({ length: 2000 }, () => meshes[0].primitives[0]);
+  const nodes = [{ children: Array.from({ length: 9000 }, () => 1) }, { mesh: 0 }];
+  const repeated = writeGlb({ ...json, nodes, meshes: [{ primitives }] }, buffer);
+  await expectRefusal(repeated, 'decode/header', /at most 100,000 primitives/, { name: 'a.glb' });
   const copies = Array.from({ length: 9000 }, () => ({ mesh: 0 }));
   assert.equal(
     (

@@ -12,6 +12,9 @@ import { noParts } from './sog.js';
 /** glTF's axes are left, up and forward, seen from what is shown; a cloud's are right, down and forward. */
 const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 
+/** Primitives of splats in a scene, each time that one is shown counted: a short file can name the same ones over and over. */
+const MAX_PRIMITIVES = 100_000;
+
 /** The same mesh in many places is copied for each: at most so many bytes of splats for each byte of the file. */
 const MAX_GROWTH = 4_096;
 
@@ -72,16 +75,32 @@ function open({ bytes, name, openPart }: SceneSource): {
 } {
   const document = new GltfDocument(openContainer(bytes, name), name, openPart ?? noParts(name));
   const placed: PlacedSplats[] = [];
+  const known = new Map<number, MeshParts>();
   let others = 0;
   for (const { mesh, toScene } of placedMeshes(document)) {
-    const { primitives } = document.item('meshes', mesh);
-    if (!Array.isArray(primitives)) document.fail(`meshes[${mesh}].primitives`, 'a list', primitives);
-    for (const [k, primitive] of (primitives as unknown[]).entries()) {
-      if (isSplats(primitive)) placed.push({ primitive, path: `meshes[${mesh}].primitives[${k}]`, toScene });
-      else others++;
-    }
+    const parts = known.get(mesh) ?? partsOf(document, mesh);
+    known.set(mesh, parts);
+    others += parts.others;
+    if (placed.length + parts.splats.length > MAX_PRIMITIVES)
+      document.fail('nodes', `at most ${grouped(MAX_PRIMITIVES)} primitives of splats in the scene`, 'more');
+    for (const splats of parts.splats) placed.push({ ...splats, toScene });
   }
   return { document, placed, others };
+}
+
+/** The primitives of a mesh. */
+interface MeshParts {
+  readonly splats: readonly Omit<PlacedSplats, 'toScene'>[];
+  readonly others: number;
+}
+
+function partsOf(document: GltfDocument, mesh: number): MeshParts {
+  const { primitives } = document.item('meshes', mesh);
+  if (!Array.isArray(primitives)) return document.fail(`meshes[${mesh}].primitives`, 'a list', primitives);
+  const splats = primitives.flatMap((primitive: unknown, k) =>
+    isSplats(primitive) ? { primitive, path: `meshes[${mesh}].primitives[${k}]` } : [],
+  );
+  return { splats, others: primitives.length - splats.length };
 }
 
 /** The part of a range that lies in `count` splats from number `at` on, counted from there. */
