@@ -165,6 +165,22 @@ test('what the extension allows and we do not draw is refused by name', async ()
   await expectRefusal(linear, 'decode/unsupported', /srgb_rec709_display.*lin_rec709/, { name: 'a.glb' });
   const other = changed((splats) => (splats.extensions = { EXT_other: {} }));
   await expectRefusal(other, 'decode/unsupported', /EXT_other/, { name: 'a.glb' });
+  const accessors = json.accessors as { bufferView?: number }[];
+  const without = accessors.map(({ bufferView, ...rest }, k) => (k === 3 ? rest : { ...rest, bufferView }));
+  const zeros = writeGlb({ ...json, accessors: without }, buffer);
+  await expectRefusal(zeros, 'decode/unsupported', /accessors\[3\].*bufferView/, { name: 'a.glb' });
+  const sparse = accessors.map((accessor, k) => (k === 3 ? { ...accessor, sparse: {} } : accessor));
+  await expectRefusal(writeGlb({ ...json, accessors: sparse }, buffer), 'decode/unsupported', /sparse/, { name: 'a' });
+  for (const required of ['EXT_meshopt_compression', 'EXT_mesh_gpu_instancing', 'ACME_warp', 7]) {
+    const file = writeGlb({ ...json, extensionsRequired: ['KHR_gaussian_splatting', required] }, buffer);
+    await expectRefusal(file, 'decode/unsupported', new RegExp(`extensionsRequired.*${required}`), { name: 'a.glb' });
+  }
+  const harmless = [
+    ...['KHR_gaussian_splatting', 'KHR_gaussian_splatting_compression_spz_2', 'KHR_mesh_quantization'],
+    ...['KHR_materials_unlit', 'KHR_texture_basisu', 'EXT_texture_webp', 'KHR_lights_punctual', 'EXT_mesh_features'],
+  ];
+  const inside = await readScene(writeGlb({ ...json, extensionsRequired: harmless }, buffer), { name: 'a.glb' });
+  assert.equal(inside.count, 2);
   const loop = writeGlb({ ...json, nodes: [{ children: [0] }] }, buffer);
   await expectRefusal(loop, 'decode/header', /nodes that contain themselves/, { name: 'a.glb' });
   const { meshes } = json as { meshes: { primitives: object[] }[] };

@@ -77,8 +77,15 @@ export class GltfDocument {
       COMPONENTS.get(accessor.componentType) ??
       this.fail(`${path}.componentType`, '5120 to 5126', accessor.componentType);
     const width = WIDTHS.get(accessor.type) ?? this.fail(`${path}.type`, 'SCALAR to VEC4', accessor.type);
-    if (accessor.sparse !== undefined) {
-      throw damaged(`${this.name}, ${path}`, 'an accessor without "sparse"', 'a sparse one', 'decode/unsupported');
+    // Without a view it is all zeros, or would be without "sparse".
+    if (accessor.sparse !== undefined || accessor.bufferView === undefined) {
+      const found = accessor.sparse === undefined ? 'one without "bufferView"' : 'one with "sparse"';
+      throw damaged(
+        `${this.name}, ${path}`,
+        'an accessor whose numbers all lie in a buffer',
+        found,
+        'decode/unsupported',
+      );
     }
     const count = this.accessorCount(index);
     const view = this.item('bufferViews', accessor.bufferView);
