@@ -57,12 +57,15 @@ for (const [what, node, linear] of [
   ['turned and scaled alike', { rotation: [0.1, 0.7, -0.2, 0.678232998], scale: [1.7, 1.7, 1.7] }, undefined],
   ['mirrored', { scale: [-1, 1, 1] }, [-1, 0, 0, 0, 1, 0, 0, 0, 1]],
   ['stretched', { scale: [3, 1, 0.5] }, [3, 0, 0, 0, 1, 0, 0, 0, 0.5]],
+  ['flattened', { scale: [1, 2, 0] }, [1, 0, 0, 0, 2, 0, 0, 0, 0]],
+  ['flattened askew', { matrix: [1, 1, 0, 0, 0, 0, 2, 0, 2, 2, 2, 0, 0, 0, 0, 1] }, [1, 0, 2, 1, 0, 2, 0, 2, 2]],
   ['sheared', { matrix: [1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0.2, 2, 0, 4, 5, 6, 1] }, [1, 0.5, 0, 0, 1, 0.2, 0, 0, 2]],
 ] as const) {
   test(`a node that is ${what} moves covariances and turns colours`, async () => {
     const cloud = smallCloud(12, 3, 5);
     const found = await read([[{ cloud }]], [{ children: [1] }, { mesh: 0, ...node }], [0]);
-    const isSheared = what === 'stretched' || what === 'sheared';
+    const keepsShapes = what === 'turned and scaled alike' || what === 'mirrored';
+    assert.equal(found.count, 12);
     const m = linear ?? rotationTimes(node.rotation, 1.7);
     const toCloud = Array.from({ length: 9 }, (_, k) => FLIP[4 * Math.floor(k / 3)] * m[k]);
     const random = seededRandom(9);
@@ -72,7 +75,7 @@ for (const [what, node, linear] of [
         3e-6,
         'covariance',
       );
-      if (isSheared) continue;
+      if (!keepsShapes) continue;
       // What is seen in a turned direction is what was seen in the old one.
       const d = random.direction();
       const size = Math.cbrt(Math.abs(determinant(toCloud)));
@@ -85,6 +88,13 @@ for (const [what, node, linear] of [
     }
   });
 }
+
+test('a node that leaves a line or a point leaves its splats out, and those of others alone', async () => {
+  const cloud = smallCloud(4, 1);
+  const nodes = [{ mesh: 0 }, { mesh: 0, scale: [0, 0, 0] }, { mesh: 0, scale: [0, 3, 0] }];
+  const found = await read([[{ cloud }]], nodes, [0, 1, 2]);
+  assert.deepEqual([found.count, found.droppedCount], [4, 8]);
+});
 
 function rotationTimes([x, y, z, w]: readonly number[], scale: number): number[] {
   return [
