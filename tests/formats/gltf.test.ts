@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
-import { readScene } from '@gaussian-splat/formats';
+import { readScene, splatRanges } from '@gaussian-splat/formats';
 import { shBasis } from '../oracle/sh.js';
 import { seededRandom } from '../support/random.js';
 import { assertAtMost, assertSameCloud, expectRefusal, largestDifference } from './support/expect.js';
@@ -88,6 +88,27 @@ for (const [what, node, linear] of [
     }
   });
 }
+
+test('places far from (0, 0, 0) keep their digits', async () => {
+  const cloud = smallCloud(9, 1);
+  const translation = [4_010_226.25, -735_123.5, 4_887_042.125];
+  const nodes = [{ translation, rotation: [0, 0, Math.SQRT1_2, Math.SQRT1_2], children: [1, 2] }, { mesh: 0 }];
+  const near = { mesh: 0, translation: [20, 0, 0] };
+  const found = await read([[{ cloud }]], [...nodes, near], [0]);
+  assert.equal(found.count, 18);
+  for (let i = 0; i < 18; i++) {
+    const [x, y, z] = cloud.positions.subarray(3 * (i % 9), 3 * (i % 9) + 3);
+    const shift = i < 9 ? 0 : 20;
+    // A quarter turn about z, the node's place, and then left and up become right and down.
+    const expected = [y - translation[0], -(x + shift) - translation[1], z + translation[2]];
+    for (let axis = 0; axis < 3; axis++) {
+      const world = found.origin[axis] + found.positions[3 * i + axis];
+      assertAtMost(Math.abs(world - expected[axis]), 4e-6, `splat ${i}, axis ${axis}`);
+    }
+  }
+  const { json, buffer } = buildGltf([[{ cloud }]], [...nodes, near], [0]);
+  assert.equal(await splatRanges(writeGlb(json, buffer), 'a.glb'), undefined);
+});
 
 test('a node that leaves a line or a point leaves its splats out, and those of others alone', async () => {
   const cloud = smallCloud(4, 1);
