@@ -5,7 +5,7 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { buffersOf } from './buffers-of.js';
 import { fetchFile } from './fetch-file.js';
-import { loadScene } from './load-scene.js';
+import { loadScene, named } from './load-scene.js';
 import type {
   BoxRequest,
   LoadedBoxes,
@@ -36,15 +36,14 @@ interface WorkerScope {
 function serve(scope: WorkerScope): void {
   const running = new Map<number, AbortController>();
 
-  /** Does what a message asks for, and answers. What is called throws errors with names, or the reason of an abort, which nobody waits for. */
+  /** Does what a message asks for, and answers: with an error, too, that nobody has named, such as that of code that cannot be loaded. For what was called off nobody waits. */
   async function answer(id: number, work: (signal: AbortSignal) => Promise<void>): Promise<void> {
     const abort = new AbortController();
     running.set(id, abort);
     try {
       await work(abort.signal);
     } catch (error) {
-      if (error instanceof GaussianSplatError) scope.postMessage({ type: 'error', id, error: error.toData() });
-      else if (!abort.signal.aborted) throw error;
+      if (!abort.signal.aborted) scope.postMessage({ type: 'error', id, error: named(error, 'scene worker').toData() });
     } finally {
       running.delete(id);
     }
