@@ -157,6 +157,7 @@ test('JSON with a buffer of its own, and with one written as text', async () => 
   const openPart = async (path: string): Promise<Uint8Array> => (assert.equal(path, 'a b.bin'), new Uint8Array(buffer));
   assertSameCloud(await readScene(text('a%20b.bin'), { name: 'a.gltf', openPart }), inside);
   assertSameCloud(await readScene(text('a%20b.bin?v=3#x'), { name: 'a.gltf', openPart }), inside);
+  await expectRefusal(text('b.bin'), 'decode/unsupported', /only this one.*, s\/scene\.glb/, { name: 's/a.gltf' });
 });
 
 test('a buffer of 50 MB written as text', async () => {

@@ -91,7 +91,7 @@ function open({ bytes, name, openPart }: SceneSource): {
   placed: PlacedSplats[];
   others: number;
 } {
-  const document = new GltfDocument(openContainer(bytes, name), name, openPart ?? noParts(name));
+  const document = new GltfDocument(openContainer(bytes, name), name, openPart ?? noParts(name, 'scene.glb'));
   const placed: PlacedSplats[] = [];
   const known = new Map<number, MeshParts>();
   let others = 0;
