@@ -2,7 +2,6 @@
  * The module worker that loads scenes. Where a page refuses workers it imports this same module and calls
  * {@link loadScene} and the others itself; then nothing here listens.
  */
-import { GaussianSplatError } from '@gaussian-splat/core';
 import { buffersOf } from './buffers-of.js';
 import { fetchFile } from './fetch-file.js';
 import { loadScene, named } from './load-scene.js';
@@ -77,19 +76,12 @@ function serve(scope: WorkerScope): void {
       scope.postMessage({ type: 'boxes', id, boxes }, buffersOf(boxes.levels));
     });
 
-  async function buildLevels({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> {
-    const abort = new AbortController();
-    running.set(id, abort);
-    try {
+  const buildLevels = ({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> =>
+    answer(id, async (signal) => {
       const { levelsInTurns } = await import('./levels-in-turns.js');
-      const levels = await levelsInTurns(packed, abort.signal);
+      const levels = await levelsInTurns(packed, signal);
       scope.postMessage({ type: 'levels', id, levels }, levels ? buffersOf(levels, levels.coarser) : []);
-    } catch (error) {
-      if (!abort.signal.aborted) scope.postMessage({ type: 'error', id, error: outOfMemory(error).toData() });
-    } finally {
-      running.delete(id);
-    }
-  }
+    });
 
   scope.addEventListener('message', ({ data }) => {
     if (data.type === 'load') void load(data);
@@ -100,17 +92,6 @@ function serve(scope: WorkerScope): void {
     else running.get(data.id)?.abort();
   });
   scope.postMessage({ type: 'ready' });
-}
-
-/** Nothing but memory can be missing for levels of a scene that is on show. */
-function outOfMemory(cause: unknown): GaussianSplatError {
-  return new GaussianSplatError('out-of-memory/allocation', {
-    where: 'levels of detail',
-    expected: 'memory enough to build them',
-    found: cause instanceof Error ? cause.message : String(cause),
-    remedy: 'use a smaller scene, or write it with npm run detail',
-    cause,
-  });
 }
 
 const isWorker = typeof document === 'undefined' && 'WorkerGlobalScope' in globalThis;
