@@ -64,14 +64,21 @@ export function grouped(value: number): string {
   return String(value).replace(/\B(?=(\d{3})+$)/g, ',');
 }
 
+/** Bytes of a buffer that are reserved at once; longer files grow into place. */
+const MAX_RESERVED = 2 ** 28;
+/** How many times as many bytes as have come are reserved next, where so many are expected. */
+const MAX_GROWTH = 8;
+
 /** A byte buffer that grows as chunks arrive. */
 export class GrowingBytes {
+  readonly #expected: number;
   #bytes: Uint8Array<ArrayBuffer>;
   #length = 0;
 
-  /** @param capacity bytes to reserve at once; a guess that may be wrong either way. */
-  constructor(capacity: number) {
-    this.#bytes = new Uint8Array(capacity);
+  /** @param expected bytes that will come; a guess that may be wrong either way. */
+  constructor(expected: number) {
+    this.#expected = expected;
+    this.#bytes = new Uint8Array(Math.min(expected, MAX_RESERVED));
   }
 
   get length(): number {
@@ -81,7 +88,8 @@ export class GrowingBytes {
   append(chunk: Uint8Array): void {
     const needed = this.#length + chunk.length;
     if (needed > this.#bytes.length) {
-      const larger = new Uint8Array(Math.max(needed, 2 * this.#bytes.length));
+      const growth = needed > this.#expected ? 2 * needed : Math.min(this.#expected, MAX_GROWTH * needed);
+      const larger = new Uint8Array(growth);
       larger.set(this.#bytes.subarray(0, this.#length));
       this.#bytes = larger;
     }

@@ -2,9 +2,6 @@ import { GrowingBytes } from './bytes.js';
 import { badStatus, forbidden, interrupted, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
-/** Largest Content-Length that is believed at once; longer files grow into place. */
-const MAX_RESERVED_BYTES = 2 ** 28;
-
 /** One file on its way, over one connection after another. */
 export class Download {
   readonly #address: URL;
@@ -44,7 +41,7 @@ export class Download {
     this.#response = response;
     this.#total = lengthOf(response);
     this.#tag = tagOf(response);
-    this.#body = new GrowingBytes(Math.min(this.#total ?? 65_536, MAX_RESERVED_BYTES));
+    this.#body = new GrowingBytes(this.#total ?? 65_536);
   }
 
   /** Asks for what is missing. False if the server sends something else, or the file has changed. */
