@@ -32,6 +32,12 @@ const ROUTES: Readonly<Record<string, RequestListener>> = {
   },
   // Breaks after every 70,000 bytes, and knows ranges.
   '/resumable': ranged('"a"'),
+  // Breaks once, and knows no ranges.
+  '/anew': (_, response) => {
+    response.writeHead(200, { 'Content-Length': CONTENT.length });
+    if (requests++ > 0) return void response.end(CONTENT);
+    response.write(CONTENT.subarray(0, 100_000), () => setTimeout(() => response.destroy(), 20));
+  },
   // Changes between two requests.
   '/changing': ranged(() => `"${requests++}"`),
   '/private': (_, response) => response.writeHead(403).end('no'),
@@ -142,6 +148,14 @@ test('a connection that breaks is taken up where it stopped', async () => {
     'bytes only ever become more',
   );
   await assert.rejects(fetchScene(`${base}/resumable`, { retries: 2 }), /network\/interrupted/);
+});
+
+test('a connection that breaks to a server that knows no ranges is begun again, as long as that gets farther', async () => {
+  requests = 0;
+  assertSameNumbers(await fetchScene(`${base}/anew`), CONTENT);
+  assert.equal(requests, 2);
+  requests = 0;
+  await assert.rejects(fetchScene(`${base}/anew`, { retries: 0 }), /network\/interrupted/);
 });
 
 test('a file that has changed meanwhile is not patched together', async () => {
