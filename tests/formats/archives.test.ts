@@ -1,7 +1,7 @@
 /** Scenes of several files: ZIP archives and streamed SOG. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { strToU8, zipSync } from 'fflate';
+import { deflateSync, strToU8, zipSync } from 'fflate';
 import { readScene } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { assertSameCloud, expectRefusal } from './support/expect.js';
@@ -40,6 +40,70 @@ test('archives with several scenes, and with sizes that deflate cannot reach, ar
   const directory = Buffer.from(bomb).indexOf('PK\x01\x02', 0, 'latin1');
   new DataView(bomb.buffer, bomb.byteOffset).setUint32(directory + 24, 0x7fffffff, true);
   await expectRefusal(bomb, 'decode/corrupt', /a size that deflate can reach.*2,147,483,647/, { name: 'a.zip' });
+});
+
+test('what archivers write beside and around files is passed over', async () => {
+  const direct = await readScene(ksplat, { name: 'a.ksplat' });
+  const around = {
+    'a/._scene.ksplat': strToU8('x'),
+    '__MACOSX/scene.ksplat': strToU8('x'),
+    'meta.json': strToU8('{"author":{}}'),
+  };
+  const beside = zipSync({ 'a/': new Uint8Array(0), ...around, 'a/scene.ksplat': ksplat });
+  assertSameCloud(await readScene(beside, { name: 'a.zip' }), direct);
+  const plain = Buffer.from(zipSync({ 'scene.ksplat': ksplat }, { level: 0 }));
+  const comment = Buffer.from('PK\x05\x06 is how directories begin', 'latin1');
+  plain.writeUInt16LE(comment.length, plain.length - 2);
+  assertSameCloud(await readScene(Buffer.concat([plain, comment]), { name: 'a.zip' }), direct);
+});
+
+/** The same archive with its one entry, its place and the directory told in 64 bits, and its sizes behind the content. */
+function inZip64(content: Uint8Array, path: string, count = 1): Buffer {
+  const deflated = deflateSync(content);
+  const long = (...values: number[]): Buffer => Buffer.from(BigUint64Array.from(values, BigInt).buffer);
+  const words = (...values: number[]): Buffer => Buffer.from(Uint32Array.from(values).buffer);
+  const shorts = (...values: number[]): Buffer => Buffer.from(Uint16Array.from(values).buffer);
+  const sizes = long(content.length, deflated.length);
+  const local = Buffer.concat([
+    ...[words(0x04034b50), shorts(45, 8, 8, 0, 0), words(0, 0, 0), shorts(path.length, 0), Buffer.from(path)],
+    ...[deflated, words(0x08074b50, 0), sizes],
+  ]);
+  const directory = Buffer.concat([
+    ...[words(0x02014b50), shorts(45, 45, 8, 8, 0, 0), words(0, 0xffffffff, 0xffffffff)],
+    ...[shorts(path.length, 36, 0, 0, 0), words(0), words(0xffffffff), Buffer.from(path)],
+    ...[shorts(0x5455, 4), words(0), shorts(1, 24), sizes, long(0)],
+  ]);
+  const end = Buffer.concat([
+    ...[words(0x06064b50), long(44), shorts(45, 45), words(0, 0), long(count, count, directory.length, local.length)],
+    ...[words(0x07064b50, 0), long(local.length + directory.length), words(1)],
+    ...[words(0x06054b50), shorts(0, 0, 0xffff, 0xffff), words(0xffffffff, 0xffffffff), shorts(0)],
+  ]);
+  return Buffer.concat([local, directory, end]);
+}
+
+test('ZIP64, with sizes behind the content', async () => {
+  const direct = await readScene(ksplat, { name: 'a.ksplat' });
+  assertSameCloud(await readScene(inZip64(ksplat, 'scene.ksplat'), { name: 'a.zip' }), direct);
+});
+
+test('directories that announce more than they hold are refused at once', async () => {
+  const start = performance.now();
+  for (const count of [2, 99_999, 4e9]) {
+    const code = count > 1e5 ? 'decode/unsupported' : 'decode/corrupt';
+    await expectRefusal(inZip64(ksplat, 'scene.ksplat', count), code, /found (1 of|4,000)/, { name: 'a.zip' });
+  }
+  assert.ok(performance.now() - start < 1_000, `${performance.now() - start} ms`);
+});
+
+test('encrypted files and compressions that are not deflate are refused by name', async () => {
+  const changed = (byte: number, value: number): Uint8Array => {
+    const zip = zipSync({ 'scene.ksplat': ksplat });
+    zip[Buffer.from(zip).indexOf('PK\x01\x02', 0, 'latin1') + byte] = value;
+    return zip;
+  };
+  await expectRefusal(changed(8, 1), 'decode/unsupported', /scene\.ksplat.*encrypted/, { name: 'a.zip' });
+  await expectRefusal(changed(10, 14), 'decode/unsupported', /scene\.ksplat.*method 14/, { name: 'a.zip' });
+  await expectRefusal(changed(42, 9), 'decode/corrupt', /scene\.ksplat.*at byte 9/, { name: 'a.zip' });
 });
 
 const [fine, coarse, sky] = [smallCloud(30, 1, 1), smallCloud(10, 1, 2), smallCloud(3, 0, 3)];

@@ -4,6 +4,7 @@ import type { AddressInfo } from 'node:net';
 import { gzipSync } from 'node:zlib';
 import { after, before, test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { GrowingBytes } from '../../packages/formats/src/bytes.js';
 import { fetchScene } from '@gaussian-splat/formats';
 import { assertSameNumbers } from './support/expect.js';
 
@@ -31,6 +32,12 @@ const ROUTES: Readonly<Record<string, RequestListener>> = {
   },
   // Breaks after every 70,000 bytes, and knows ranges.
   '/resumable': ranged('"a"'),
+  // Breaks once, and knows no ranges.
+  '/anew': (_, response) => {
+    response.writeHead(200, { 'Content-Length': CONTENT.length });
+    if (requests++ > 0) return void response.end(CONTENT);
+    response.write(CONTENT.subarray(0, 100_000), () => setTimeout(() => response.destroy(), 20));
+  },
   // Changes between two requests.
   '/changing': ranged(() => `"${requests++}"`),
   '/private': (_, response) => response.writeHead(403).end('no'),
@@ -143,6 +150,14 @@ test('a connection that breaks is taken up where it stopped', async () => {
   await assert.rejects(fetchScene(`${base}/resumable`, { retries: 2 }), /network\/interrupted/);
 });
 
+test('a connection that breaks to a server that knows no ranges is begun again, as long as that gets farther', async () => {
+  requests = 0;
+  assertSameNumbers(await fetchScene(`${base}/anew`), CONTENT);
+  assert.equal(requests, 2);
+  requests = 0;
+  await assert.rejects(fetchScene(`${base}/anew`, { retries: 0 }), /network\/interrupted/);
+});
+
 test('a file that has changed meanwhile is not patched together', async () => {
   await expectFailure(
     `${base}/changing`,
@@ -188,4 +203,22 @@ test('aborting before, while waiting and while reading rejects with AbortError',
 test('a reason of the caller passes through', async () => {
   const reason = new Error('the element was removed');
   await assert.rejects(fetchScene(`${base}/whole`, { signal: AbortSignal.abort(reason) }), reason);
+});
+
+test('a large file of known length takes its own size of memory, and any length may be wrong', () => {
+  const known = new GrowingBytes(300e6);
+  known.append(new Uint8Array(2 ** 28));
+  known.append(new Uint8Array(1000).fill(7));
+  assert.deepEqual(
+    [known.view().buffer.byteLength, known.length, known.view()[2 ** 28 + 999]],
+    [300e6, 2 ** 28 + 1000, 7],
+  );
+  for (const expected of [0, 5, 1e15]) {
+    const wrong = new GrowingBytes(expected);
+    for (let k = 0; k < 100; k++) wrong.append(Uint8Array.of(k, k));
+    assert.deepEqual(
+      Array.from(wrong.view()),
+      Array.from({ length: 200 }, (_, k) => k >> 1),
+    );
+  }
 });

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { GaussianCloud, Vector3 } from '@gaussian-splat/core';
-import { readScene } from '@gaussian-splat/formats';
+import { readScene, splatRanges } from '@gaussian-splat/formats';
 import { shBasis } from '../oracle/sh.js';
 import { seededRandom } from '../support/random.js';
 import { assertAtMost, assertSameCloud, expectRefusal, largestDifference } from './support/expect.js';
@@ -57,12 +57,15 @@ for (const [what, node, linear] of [
   ['turned and scaled alike', { rotation: [0.1, 0.7, -0.2, 0.678232998], scale: [1.7, 1.7, 1.7] }, undefined],
   ['mirrored', { scale: [-1, 1, 1] }, [-1, 0, 0, 0, 1, 0, 0, 0, 1]],
   ['stretched', { scale: [3, 1, 0.5] }, [3, 0, 0, 0, 1, 0, 0, 0, 0.5]],
+  ['flattened', { scale: [1, 2, 0] }, [1, 0, 0, 0, 2, 0, 0, 0, 0]],
+  ['flattened askew', { matrix: [1, 1, 0, 0, 0, 0, 2, 0, 2, 2, 2, 0, 0, 0, 0, 1] }, [1, 0, 2, 1, 0, 2, 0, 2, 2]],
   ['sheared', { matrix: [1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0.2, 2, 0, 4, 5, 6, 1] }, [1, 0.5, 0, 0, 1, 0.2, 0, 0, 2]],
 ] as const) {
   test(`a node that is ${what} moves covariances and turns colours`, async () => {
     const cloud = smallCloud(12, 3, 5);
     const found = await read([[{ cloud }]], [{ children: [1] }, { mesh: 0, ...node }], [0]);
-    const isSheared = what === 'stretched' || what === 'sheared';
+    const keepsShapes = what === 'turned and scaled alike' || what === 'mirrored';
+    assert.equal(found.count, 12);
     const m = linear ?? rotationTimes(node.rotation, 1.7);
     const toCloud = Array.from({ length: 9 }, (_, k) => FLIP[4 * Math.floor(k / 3)] * m[k]);
     const random = seededRandom(9);
@@ -72,7 +75,7 @@ for (const [what, node, linear] of [
         3e-6,
         'covariance',
       );
-      if (isSheared) continue;
+      if (!keepsShapes) continue;
       // What is seen in a turned direction is what was seen in the old one.
       const d = random.direction();
       const size = Math.cbrt(Math.abs(determinant(toCloud)));
@@ -85,6 +88,34 @@ for (const [what, node, linear] of [
     }
   });
 }
+
+test('places far from (0, 0, 0) keep their digits', async () => {
+  const cloud = smallCloud(9, 1);
+  const translation = [4_010_226.25, -735_123.5, 4_887_042.125];
+  const nodes = [{ translation, rotation: [0, 0, Math.SQRT1_2, Math.SQRT1_2], children: [1, 2] }, { mesh: 0 }];
+  const near = { mesh: 0, translation: [20, 0, 0] };
+  const found = await read([[{ cloud }]], [...nodes, near], [0]);
+  assert.equal(found.count, 18);
+  for (let i = 0; i < 18; i++) {
+    const [x, y, z] = cloud.positions.subarray(3 * (i % 9), 3 * (i % 9) + 3);
+    const shift = i < 9 ? 0 : 20;
+    // A quarter turn about z, the node's place, and then left and up become right and down.
+    const expected = [y - translation[0], -(x + shift) - translation[1], z + translation[2]];
+    for (let axis = 0; axis < 3; axis++) {
+      const world = found.origin[axis] + found.positions[3 * i + axis];
+      assertAtMost(Math.abs(world - expected[axis]), 4e-6, `splat ${i}, axis ${axis}`);
+    }
+  }
+  const { json, buffer } = buildGltf([[{ cloud }]], [...nodes, near], [0]);
+  assert.equal(await splatRanges(writeGlb(json, buffer), 'a.glb'), undefined);
+});
+
+test('a node that leaves a line or a point leaves its splats out, and those of others alone', async () => {
+  const cloud = smallCloud(4, 1);
+  const nodes = [{ mesh: 0 }, { mesh: 0, scale: [0, 0, 0] }, { mesh: 0, scale: [0, 3, 0] }];
+  const found = await read([[{ cloud }]], nodes, [0, 1, 2]);
+  assert.deepEqual([found.count, found.droppedCount], [4, 8]);
+});
 
 function rotationTimes([x, y, z, w]: readonly number[], scale: number): number[] {
   return [
@@ -125,6 +156,33 @@ test('JSON with a buffer of its own, and with one written as text', async () => 
   assertSameCloud(await readScene(text(embedded), { name: 'a.gltf' }), inside);
   const openPart = async (path: string): Promise<Uint8Array> => (assert.equal(path, 'a b.bin'), new Uint8Array(buffer));
   assertSameCloud(await readScene(text('a%20b.bin'), { name: 'a.gltf', openPart }), inside);
+  assertSameCloud(await readScene(text('a%20b.bin?v=3#x'), { name: 'a.gltf', openPart }), inside);
+  await expectRefusal(text('b.bin'), 'decode/unsupported', /only this one.*, s\/scene\.glb/, { name: 's/a.gltf' });
+});
+
+test('a buffer of 50 MB written as text', async () => {
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(6, 1) }]], [{ mesh: 0 }], [0]);
+  const padded = Buffer.concat([buffer, Buffer.alloc(51e6)]);
+  const uri = `data:application/octet-stream;base64,${padded.toString('base64')}`;
+  const file = Buffer.from(JSON.stringify({ ...json, buffers: [{ uri, byteLength: padded.length }] }));
+  assertSameCloud(await readScene(file, { name: 'a' }), await readScene(writeGlb(json, buffer), { name: 'a' }));
+});
+
+test('JSON is known as glTF in whatever order its keys come', async () => {
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(400, 3) }]], [{ mesh: 0 }], [0]);
+  const inside = await readScene(writeGlb(json, buffer), { name: 'a' });
+  const { asset, buffers, ...rest } = json;
+  const uri = `data:application/octet-stream;base64,${buffer.toString('base64')}`;
+  const embedded = { buffers: [{ ...(buffers as object[])[0], uri }] };
+  assert.ok(uri.length > 65_536);
+  for (const file of [
+    { ...embedded, ...rest, asset },
+    { ...rest, ...embedded, asset: { extras: { author: {} }, version: '2.0' } },
+  ]) {
+    const text = JSON.stringify(file);
+    assertSameCloud(await readScene(Buffer.from(text), { name: 'a' }), inside);
+    assertSameCloud(await readScene(Buffer.from(`\ufeff\n${text}\n`), { name: 'a' }), inside);
+  }
 });
 
 test('what the extension allows and we do not draw is refused by name', async () => {
@@ -139,8 +197,29 @@ test('what the extension allows and we do not draw is refused by name', async ()
   await expectRefusal(linear, 'decode/unsupported', /srgb_rec709_display.*lin_rec709/, { name: 'a.glb' });
   const other = changed((splats) => (splats.extensions = { EXT_other: {} }));
   await expectRefusal(other, 'decode/unsupported', /EXT_other/, { name: 'a.glb' });
+  const accessors = json.accessors as { bufferView?: number }[];
+  const without = accessors.map(({ bufferView, ...rest }, k) => (k === 3 ? rest : { ...rest, bufferView }));
+  const zeros = writeGlb({ ...json, accessors: without }, buffer);
+  await expectRefusal(zeros, 'decode/unsupported', /accessors\[3\].*bufferView/, { name: 'a.glb' });
+  const sparse = accessors.map((accessor, k) => (k === 3 ? { ...accessor, sparse: {} } : accessor));
+  await expectRefusal(writeGlb({ ...json, accessors: sparse }, buffer), 'decode/unsupported', /sparse/, { name: 'a' });
+  for (const required of ['EXT_meshopt_compression', 'EXT_mesh_gpu_instancing', 'ACME_warp', 7]) {
+    const file = writeGlb({ ...json, extensionsRequired: ['KHR_gaussian_splatting', required] }, buffer);
+    await expectRefusal(file, 'decode/unsupported', new RegExp(`extensionsRequired.*${required}`), { name: 'a.glb' });
+  }
+  const harmless = [
+    ...['KHR_gaussian_splatting', 'KHR_gaussian_splatting_compression_spz_2', 'KHR_mesh_quantization'],
+    ...['KHR_materials_unlit', 'KHR_texture_basisu', 'EXT_texture_webp', 'KHR_lights_punctual', 'EXT_mesh_features'],
+  ];
+  const inside = await readScene(writeGlb({ ...json, extensionsRequired: harmless }, buffer), { name: 'a.glb' });
+  assert.equal(inside.count, 2);
   const loop = writeGlb({ ...json, nodes: [{ children: [0] }] }, buffer);
   await expectRefusal(loop, 'decode/header', /nodes that contain themselves/, { name: 'a.glb' });
+  const { meshes } = json as { meshes: { primitives: object[] }[] };
+  const primitives = Array.from({ length: 2000 }, () => meshes[0].primitives[0]);
+  const nodes = [{ children: Array.from({ length: 9000 }, () => 1) }, { mesh: 0 }];
+  const repeated = writeGlb({ ...json, nodes, meshes: [{ primitives }] }, buffer);
+  await expectRefusal(repeated, 'decode/header', /at most 100,000 primitives/, { name: 'a.glb' });
   const copies = Array.from({ length: 9000 }, () => ({ mesh: 0 }));
   assert.equal(
     (

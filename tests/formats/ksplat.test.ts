@@ -1,7 +1,13 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { readScene } from '@gaussian-splat/formats';
-import { assertAtMost, expectRefusal, largestDifference, largestRotationError } from './support/expect.js';
+import {
+  assertAtMost,
+  assertSameCloud,
+  expectRefusal,
+  largestDifference,
+  largestRotationError,
+} from './support/expect.js';
 import { writeKsplat } from './support/ksplat-writer.js';
 import { smallCloud } from './support/small-cloud.js';
 
@@ -26,6 +32,13 @@ for (const level of [0, 1, 2] as const) {
     });
   }
 }
+
+test('the number of sections that were filled is not asked for, as GaussianSplats3D does not', async () => {
+  const file = writeKsplat(smallCloud(23, 1), { level: 1 });
+  const without = Uint8Array.from(file);
+  new DataView(without.buffer).setUint32(8, 0, true);
+  assertSameCloud(await readScene(without, { name: 'a.ksplat' }), await readScene(file, { name: 'a.ksplat' }));
+});
 
 test('headers that announce more than the file has are refused before anything is allocated', async () => {
   const file = writeKsplat(smallCloud(23, 1), { level: 1 });

@@ -73,6 +73,12 @@ test('the index in both dialects: boxes with their runs, the coarsest first, at 
   assert.equal(environment?.url, 'https://lod.test/a%20b/https%3A//x.test/m', 'no other server');
 });
 
+test('any number of boxes may lie side by side', () => {
+  const box = '{"bound":{"min":[0,0,0],"max":[1,1,1]},"lods":{"0":{"file":0,"count":1}}}';
+  const text = `{"lodLevels":1,"filenames":["a"],"tree":{"children":[${new Array(300_000).fill(box).join(',')}]}}`;
+  assert.equal(readLodScene(new TextEncoder().encode(text), 'lod-meta.json', INDEX).boxes.length, 300_000);
+});
+
 test('an index that names more splats than there can be is refused before anything is allocated for them', () => {
   const text = new TextDecoder().decode(folder.index).replaceAll(/"count":150/g, '"count":1e9');
   assert.throws(

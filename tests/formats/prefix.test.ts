@@ -1,10 +1,11 @@
 /** Files that are still arriving: what is there is read, and it is the same as in the whole file. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { gzipSync } from 'node:zlib';
 import { shCoefficientCount } from '@gaussian-splat/core';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { assertSameNumbers } from './support/expect.js';
+import { assertAtMost, assertSameNumbers } from './support/expect.js';
 
 const HALF = 0.5;
 const FILES: readonly [file: string, share: number, splats: [number, number], degree: number][] = [
@@ -47,6 +48,21 @@ test(
     assert.equal(await readPrefix(new Uint8Array(0)), undefined);
   },
 );
+
+test('of a beginning that announces more than it can hold nothing is inflated', async () => {
+  const inflated = Buffer.alloc(3e8);
+  inflated.write('NGSP', 'latin1');
+  // Version 2, 2 ** 32 - 1 splats.
+  inflated.writeUInt32LE(2, 4);
+  inflated.writeUInt32LE(0xffffffff, 8);
+  const file = gzipSync(inflated);
+  const before = process.memoryUsage().arrayBuffers;
+  let peak = 0;
+  const watching = setInterval(() => (peak = Math.max(peak, process.memoryUsage().arrayBuffers - before)), 1);
+  assert.equal(await readPrefix(file, { name: 'a.spz' }), undefined);
+  clearInterval(watching);
+  assertAtMost(peak, 1e8, 'bytes of memory');
+});
 
 test('a large scene is previewed before it is whole', { skip: needsSharedData }, async () => {
   const folder = 'scenes/playbot-streamed/1_0/';

@@ -155,10 +155,11 @@ describe('other real files', { skip: needsSharedData }, () => {
     assertAtMost(largestDifference(splat.sh, clamped), 1 / 255 / 0.282 + 1e-3, 'rotations of .splat');
   });
 
+  const folder = 'cases/splat-transform-fixtures';
+
   test('the minimal SPZ files of a peer: gzip and plain are one scene, v3 and v4 another', async () => {
-    const name = 'cases/splat-transform-fixtures/minimal';
     const [raw, v2, v3, v4] = await Promise.all(
-      ['-raw', '-v2', '-v3', '-v4'].map((kind) => read(`${name}${kind}.spz`)),
+      ['-raw', '-v2', '-v3', '-v4'].map((kind) => read(`${folder}/minimal${kind}.spz`)),
     );
     assertSameCloud(raw, v2);
     assertSameCloud(v3, v4);
@@ -166,6 +167,15 @@ describe('other real files', { skip: needsSharedData }, () => {
     assert.deepEqual(Array.from(v3.positions, Math.abs), [1, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 0]);
     for (const opacity of raw.opacities) assertAtMost(Math.abs(opacity - 0.9), 0.003, 'opacity 0.9');
     for (const scale of raw.scales) assertAtMost(Math.abs(scale / 0.1 - 1), 0.04, 'scale 0.1');
+  });
+
+  test('the minimal .ksplat and .splat of a peer are one scene', async () => {
+    const [ksplat, splat] = await Promise.all(['ksplat', 'splat'].map((kind) => read(`${folder}/minimal.${kind}`)));
+    assert.deepEqual([ksplat.count, splat.count], [4, 4]);
+    assertAtMost(largestDifference(ksplat.positions, splat.positions), 0, 'positions');
+    assertAtMost(largestDifference(ksplat.scales, splat.scales), 0, 'scales');
+    assertAtMost(largestDifference(ksplat.opacities, splat.opacities), 0, 'opacities');
+    assertAtMost(largestDifference(ksplat.sh, splat.sh), 0, 'colours');
   });
 
   test('bytes after the last splat are left alone', async () => {

@@ -14,6 +14,15 @@ test('a list and a numbered pattern', () => {
   assert.ok(isSequence(manifest({ frames: [] })) && !isSequence(text({ means: {} })));
 });
 
+test('a manifest may begin with space and with a byte-order mark', () => {
+  const inner = new TextDecoder().decode(manifest({ frames: ['a.spz'] }));
+  for (const before of ['\n  ', '\ufeff', '\ufeff\r\n']) {
+    const bytes = new TextEncoder().encode(before + inner);
+    assert.ok(isSequence(bytes), JSON.stringify(before));
+    assert.deepEqual(parseSequence(bytes, 'a.json').frames, ['a.spz']);
+  }
+});
+
 test('every frame is shown for its time', () => {
   const sequence = parseSequence(manifest({ frames: '{0}.spz', count: 48 }), 'a.json');
   for (let k = 0; k < 48; k++) {

@@ -2,7 +2,14 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { zipSync } from 'fflate';
 import { readScene } from '@gaussian-splat/formats';
-import { assertAtMost, coefficient, expectRefusal, largestDifference, largestRotationError } from './support/expect.js';
+import {
+  assertAtMost,
+  assertSameCloud,
+  coefficient,
+  expectRefusal,
+  largestDifference,
+  largestRotationError,
+} from './support/expect.js';
 import { smallCloud } from './support/small-cloud.js';
 import { writeSog, writeSogV1, type SogFiles } from './support/sog-writer.js';
 
@@ -34,6 +41,29 @@ test('version 1 gives every attribute to the bits of the format', async () => {
   assertAtMost(largestRotationError(read, cloud), 3e-5, 'rotations');
   assertAtMost(largestDifference(read.opacities, cloud.opacities), 0.01, 'opacities');
   assertAtMost(largestDifference(read.sh, coefficient(cloud, 0)), 0.5 * (2 / 255) + 1e-5, 'colours');
+});
+
+test('a codebook without its first entry, as early tools wrote it, goes on one step below the second', async () => {
+  const files = writeSog(cloud);
+  const meta = JSON.parse(new TextDecoder().decode(files['meta.json'])) as Record<
+    'scales' | 'sh0' | 'shN',
+    { codebook: (number | null)[] }
+  >;
+  const whole = structuredClone(meta);
+  for (const key of ['scales', 'sh0', 'shN'] as const) {
+    const [, second] = meta[key].codebook as number[];
+    const last = meta[key].codebook[255] as number;
+    meta[key].codebook[0] = null;
+    whole[key].codebook[0] = second + (second - last) / 255;
+  }
+  const read = (description: object) => {
+    const json = new TextEncoder().encode(JSON.stringify(description));
+    return readScene(bundle({ ...files, 'meta.json': json }), { name: 'a.sog' });
+  };
+  assertSameCloud(await read(meta), await read(whole));
+  meta.scales.codebook[7] = null;
+  const json = new TextEncoder().encode(JSON.stringify(meta));
+  await expectRefusal(bundle({ ...files, 'meta.json': json }), 'decode/header', /scales\.codebook/, { name: 'a.sog' });
 });
 
 test('images and descriptions that contradict each other are refused by name', async () => {

@@ -3,7 +3,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 
 const latin1 = new TextDecoder('latin1');
 
-/** Bytes `start` to `end` as text, one character for each byte; only ASCII characters are meaningful. */
+/** Bytes `start` to `end` (negative: counted from the end) as text, one character for each byte; only ASCII characters are meaningful. */
 export function asciiOf(bytes: Uint8Array, start = 0, end = bytes.length): string {
   return latin1.decode(bytes.subarray(start, end));
 }
@@ -12,6 +12,11 @@ export function asciiOf(bytes: Uint8Array, start = 0, end = bytes.length): strin
 export function startsWith(bytes: Uint8Array, signature: readonly number[] | string, at = 0): boolean {
   const expected = typeof signature === 'string' ? Array.from(signature, (c) => c.charCodeAt(0)) : signature;
   return bytes.length >= at + expected.length && expected.every((byte, i) => bytes[at + i] === byte);
+}
+
+/** True if the file begins as an object in JSON does; a byte-order mark and space may come before. */
+export function isJsonObject(bytes: Uint8Array): boolean {
+  return /^(\u00ef\u00bb\u00bf)?\s*\{/.test(asciiOf(bytes, 0, 64));
 }
 
 /** A view of the same bytes for reading numbers of any type and byte order. */
@@ -59,14 +64,21 @@ export function grouped(value: number): string {
   return String(value).replace(/\B(?=(\d{3})+$)/g, ',');
 }
 
+/** Bytes of a buffer that are reserved at once; longer files grow into place. */
+const MAX_RESERVED = 2 ** 28;
+/** How many times as many bytes as have come are reserved next, where so many are expected. */
+const MAX_GROWTH = 8;
+
 /** A byte buffer that grows as chunks arrive. */
 export class GrowingBytes {
+  readonly #expected: number;
   #bytes: Uint8Array<ArrayBuffer>;
   #length = 0;
 
-  /** @param capacity bytes to reserve at once; a guess that may be wrong either way. */
-  constructor(capacity: number) {
-    this.#bytes = new Uint8Array(capacity);
+  /** @param expected bytes that will come; a guess that may be wrong either way. */
+  constructor(expected: number) {
+    this.#expected = expected;
+    this.#bytes = new Uint8Array(Math.min(expected, MAX_RESERVED));
   }
 
   get length(): number {
@@ -76,7 +88,8 @@ export class GrowingBytes {
   append(chunk: Uint8Array): void {
     const needed = this.#length + chunk.length;
     if (needed > this.#bytes.length) {
-      const larger = new Uint8Array(Math.max(needed, 2 * this.#bytes.length));
+      const growth = needed > this.#expected ? 2 * needed : Math.min(this.#expected, MAX_GROWTH * needed);
+      const larger = new Uint8Array(growth);
       larger.set(this.#bytes.subarray(0, this.#length));
       this.#bytes = larger;
     }

@@ -2,9 +2,6 @@ import { GrowingBytes } from './bytes.js';
 import { badStatus, forbidden, interrupted, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
 
-/** Largest Content-Length that is believed at once; longer files grow into place. */
-const MAX_RESERVED_BYTES = 2 ** 28;
-
 /** One file on its way, over one connection after another. */
 export class Download {
   readonly #address: URL;
@@ -41,19 +38,27 @@ export class Download {
       await discard(response);
       throw badStatus(this.#address, response);
     }
+    this.#begin(response);
+  }
+
+  #begin(response: Response): void {
     this.#response = response;
     this.#total = lengthOf(response);
     this.#tag = tagOf(response);
-    this.#body = new GrowingBytes(Math.min(this.#total ?? 65_536, MAX_RESERVED_BYTES));
+    this.#body = new GrowingBytes(this.#total ?? 65_536);
   }
 
-  /** Asks for what is missing. False if the server sends something else, or the file has changed. */
+  /** Asks for what is missing; of a server that sends the whole file again, that is taken. False if the server sends something else, or the file has changed. */
   async resume(): Promise<boolean> {
     const from = this.#body.length;
     this.#resumedAt = from;
     const response = await this.#request({ Range: `bytes=${from}-` }).catch(() => undefined);
     this.#options.signal?.throwIfAborted();
     if (response === undefined) return false;
+    if (response.status === 200) {
+      this.#begin(response);
+      return true;
+    }
     const tag = tagOf(response);
     const isSame = this.#tag === undefined || tag === undefined || tag === this.#tag;
     if (response.status === 206 && isSame && this.#isRest(response, from)) {

@@ -16,10 +16,10 @@ export interface FetchSceneOptions {
   readonly onProgress?: (loadedBytes: number, totalBytes: number | undefined) => void;
   /**
    * Called after every chunk with all bytes so far, which stay as they are, and the total as above. The download goes on when the
-   * promise fulfils.
+   * promise fulfils. A server that cannot go on where a connection broke begins again, and so do these bytes.
    */
   readonly onArrival?: (bytes: Uint8Array, totalBytes: number | undefined) => void | Promise<void>;
-  /** How often a download that broke off is taken up again where it stopped, if the server can do that; default 3. */
+  /** How often a download that broke off is taken up again, where it stopped if the server can do that; default 3. */
   readonly retries?: number;
 }
 
@@ -27,8 +27,8 @@ export interface FetchSceneOptions {
 const RETRY_DELAY_MS = 250;
 
 /**
- * Downloads a file with true progress. A connection that breaks off is taken up again where it stopped, by a range request, as
- * long as each try brings bytes and the file is still the same.
+ * Downloads a file with true progress. A connection that breaks off is taken up again where it stopped, by a range request, if the file is still the same; a server that
+ * knows no ranges begins again. Both as long as each try gets farther than the one before.
  *
  * @param url absolute, or relative to the page or worker script (which in a worker made from a blob has no address:
  * resolve the URL before).

@@ -1,4 +1,4 @@
-import { asciiOf, startsWith } from './bytes.js';
+import { asciiOf, isJsonObject, startsWith } from './bytes.js';
 import { looksLikeKsplat } from './ksplat/signature.js';
 import type { SceneFormat } from './scene-format.js';
 
@@ -10,14 +10,14 @@ const isPly = (bytes: Uint8Array): boolean => /^ply[ \t]*[\r\n]/.test(asciiOf(by
 const isCompressedPly = (bytes: Uint8Array): boolean =>
   isPly(bytes) && COMPRESSED_PLY_MARK.test(asciiOf(bytes, 0, HEADER_SAMPLE));
 const isGzip = (bytes: Uint8Array): boolean => startsWith(bytes, [0x1f, 0x8b]);
-/** A description in JSON with a key that no other has. Keys come in any order, so the sample is long. */
+/** A description in JSON with a key that no other has. Keys come in any order, and one may have megabytes (buffers of glTF), so the samples are long and of both ends. */
 const isJsonWith =
   (key: RegExp) =>
   (bytes: Uint8Array): boolean =>
-    /^(\u00ef\u00bb\u00bf)?\s*\{/.test(asciiOf(bytes, 0, 64)) && key.test(asciiOf(bytes, 0, HEADER_SAMPLE));
+    isJsonObject(bytes) && key.test(asciiOf(bytes, 0, HEADER_SAMPLE) + asciiOf(bytes, -HEADER_SAMPLE));
 const isLodMeta = isJsonWith(/"lodLevels"\s*:/);
 const isSogMeta = isJsonWith(/"means"\s*:/);
-const isGltf = isJsonWith(/"asset"\s*:\s*\{[^}]*"version"/);
+const isGltf = isJsonWith(/"(asset|bufferViews)"\s*:\s*[[{]/);
 const isNgsp = (bytes: Uint8Array): boolean => startsWith(bytes, 'NGSP');
 
 /** All formats that `readScene` reads; the first whose signature fits wins. */

@@ -52,6 +52,14 @@ describe('the scene worker', () => {
     assertEqual(workers.length, 3, 'workers');
   });
 
+  it('answers also where something fails that nobody foresaw', async () => {
+    const nothing = null as unknown as Parameters<typeof loader.openBoxes>[0];
+    const loader = GaussianSplatElement.sceneLoader;
+    const failed = loader.openBoxes(nothing, new AbortController().signal, () => undefined).catch((error) => error);
+    const error: unknown = await Promise.race([failed, delay(10_000)]);
+    assert(error instanceof Error && /decode\/corrupt/.test(error.message), `an error with a name: ${String(error)}`);
+  });
+
   it("that is refused gives way to the page's own thread, with one warning for all elements", async () => {
     type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
     const original = GaussianSplatElement.sceneLoader;

@@ -210,6 +210,16 @@ describe('src', () => {
   });
 });
 
+/** glTF whose numbers lie in another file. */
+const withoutBuffer = {
+  asset: { version: '2.0' },
+  nodes: [{ mesh: 0 }],
+  meshes: [{ primitives: [{ attributes: { POSITION: 0 }, extensions: { KHR_gaussian_splatting: {} } }] }],
+  accessors: [{ bufferView: 0, componentType: 5126, count: 1, type: 'VEC3' }],
+  bufferViews: [{ buffer: 0, byteLength: 12 }],
+  buffers: [{ uri: 'scene.bin', byteLength: 12 }],
+};
+
 describe('a bad source', () => {
   const cases: Readonly<Record<string, readonly [src: string, reason: string]>> = {
     'a missing file': ['/net/status/404', 'network/status'],
@@ -220,6 +230,10 @@ describe('a bad source', () => {
     'a broken connection': ['/net/cut/compass.ply', 'network/interrupted'],
     'no server': ['http://127.0.0.1:1/scene.ply', 'network/unreachable'],
     'no URL': ['http://', 'network/url'],
+    'a part of a scene that has no place': [
+      URL.createObjectURL(new Blob([JSON.stringify(withoutBuffer)])),
+      'decode/unsupported',
+    ],
     'a script': ['/tests/element/browser/fixtures/make.mjs', 'decode/unknown-format'],
   };
   for (const [name, [src, reason]] of Object.entries(cases)) {

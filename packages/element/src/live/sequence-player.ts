@@ -5,6 +5,7 @@ import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/rendere
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import type { LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
+import { FrameRoom } from './frame-room.js';
 import type { LiveListeners, LiveState, Timeline } from './live-model.js';
 
 export interface SequenceOptions {
@@ -21,10 +22,6 @@ export interface SequenceOptions {
   readonly beforeUpload: (byteLength: number) => void;
 }
 
-/** Seconds that are fetched ahead, and bytes of all frames that are kept in the page's memory; two frames always are. */
-const AHEAD_SECONDS = 2;
-const MOST_BYTES = 256 << 20;
-const LEAST_FRAMES = 2;
 /** Frames that are fetched and unpacked at once. */
 const AT_ONCE = 3;
 
@@ -47,7 +44,7 @@ export class SequencePlayer implements Timeline {
   readonly #sequence: SceneSequence;
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, Slot>();
-  readonly #room: number;
+  readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
   #shown = 0;
   #isGrowing = false;
@@ -64,9 +61,8 @@ export class SequencePlayer implements Timeline {
     this.#gaussians = gaussians;
     this.duration = sequence.durationSeconds;
     this.bounds = first.bounds;
-    const ahead = Math.ceil(AHEAD_SECONDS * sequence.framesPerSecond);
-    const inMemory = Math.floor(MOST_BYTES / bytesOf(first.packed));
-    this.#room = Math.max(LEAST_FRAMES, Math.min(sequence.frames.length, ahead, inMemory));
+    this.#room = new FrameRoom(sequence.frames.length, sequence.framesPerSecond);
+    this.#room.note(bytesOf(first.packed));
     this.#slots.set(0, { abort: new AbortController(), packed: first.packed });
   }
 
@@ -162,7 +158,7 @@ export class SequencePlayer implements Timeline {
 
   #wantedFrom(frame: number): number[] {
     const { length } = this.#sequence.frames;
-    const following = Array.from({ length: this.#room }, (_, k) => frame + k);
+    const following = Array.from({ length: this.#room.frames }, (_, k) => frame + k);
     return this.#options.loops() ? following.map((each) => each % length) : following.filter((each) => each < length);
   }
 
@@ -174,6 +170,7 @@ export class SequencePlayer implements Timeline {
     try {
       const url = this.#sequence.frames[frame];
       slot.packed = (await load(url, this.#options, shPrecision, slot.abort.signal, () => undefined)).packed;
+      this.#room.note(bytesOf(slot.packed));
     } catch (error) {
       if (slot.abort.signal.aborted) return;
       slot.isFailed = true;

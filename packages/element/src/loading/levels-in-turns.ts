@@ -1,11 +1,21 @@
 /** Loaded by the worker when first asked for. */
+import { GaussianSplatError } from '@gaussian-splat/core';
 import { buildPackedLevels, type PackedGaussians, type PackedLevels } from '@gaussian-splat/renderer';
 
 /** Milliseconds after which others have their turn: scenes that are loaded meanwhile, and whoever calls it off. */
 const TURN_MS = 30;
 
-/** Builds the levels of detail of a scene; rejects with the signal's reason. */
+/** Builds the levels of detail of a scene; rejects with GaussianSplatError `out-of-memory/allocation`, or the signal's reason. */
 export async function levelsInTurns(packed: PackedGaussians, signal: AbortSignal): Promise<PackedLevels | undefined> {
+  try {
+    return await build(packed, signal);
+  } catch (error) {
+    signal.throwIfAborted();
+    throw outOfMemory(error);
+  }
+}
+
+async function build(packed: PackedGaussians, signal: AbortSignal): Promise<PackedLevels | undefined> {
   const steps = buildPackedLevels(packed);
   for (let end = performance.now() + TURN_MS; ;) {
     const { done, value } = steps.next();
@@ -15,4 +25,15 @@ export async function levelsInTurns(packed: PackedGaussians, signal: AbortSignal
     signal.throwIfAborted();
     end = performance.now() + TURN_MS;
   }
+}
+
+/** Nothing but memory can be missing for levels of a scene that is on show. */
+function outOfMemory(cause: unknown): GaussianSplatError {
+  return new GaussianSplatError('out-of-memory/allocation', {
+    where: 'levels of detail',
+    expected: 'memory enough to build them',
+    found: cause instanceof Error ? cause.message : String(cause),
+    remedy: 'use a smaller scene, or write it with npm run detail',
+    cause,
+  });
 }

@@ -34,7 +34,8 @@ export async function loadScene(
       const { sequenceOf } = await import('./sequence-of.js');
       return sequenceOf(bytes, name, url);
     }
-    const openPart = openPartAt(url, options);
+    // Nothing lies beside what has no place.
+    const openPart = /^(blob|data):/.test(url) ? undefined : openPartAt(url, options);
     const level = request.levels ? 'all' : 0;
     const cloud = await readScene(bytes, { name, signal, openPart, level, onPreview: previews?.onPreview });
     signal.throwIfAborted();

@@ -2,10 +2,9 @@
  * The module worker that loads scenes. Where a page refuses workers it imports this same module and calls
  * {@link loadScene} and the others itself; then nothing here listens.
  */
-import { GaussianSplatError } from '@gaussian-splat/core';
 import { buffersOf } from './buffers-of.js';
 import { fetchFile } from './fetch-file.js';
-import { loadScene } from './load-scene.js';
+import { loadScene, named } from './load-scene.js';
 import type {
   BoxRequest,
   LoadedBoxes,
@@ -36,15 +35,14 @@ interface WorkerScope {
 function serve(scope: WorkerScope): void {
   const running = new Map<number, AbortController>();
 
-  /** Does what a message asks for, and answers. What is called throws errors with names, or the reason of an abort, which nobody waits for. */
+  /** Does what a message asks for, and answers: with an error, too, that nobody has named, such as that of code that cannot be loaded. For what was called off nobody waits. */
   async function answer(id: number, work: (signal: AbortSignal) => Promise<void>): Promise<void> {
     const abort = new AbortController();
     running.set(id, abort);
     try {
       await work(abort.signal);
     } catch (error) {
-      if (error instanceof GaussianSplatError) scope.postMessage({ type: 'error', id, error: error.toData() });
-      else if (!abort.signal.aborted) throw error;
+      if (!abort.signal.aborted) scope.postMessage({ type: 'error', id, error: named(error, 'scene worker').toData() });
     } finally {
       running.delete(id);
     }
@@ -78,19 +76,12 @@ function serve(scope: WorkerScope): void {
       scope.postMessage({ type: 'boxes', id, boxes }, buffersOf(boxes.levels));
     });
 
-  async function buildLevels({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> {
-    const abort = new AbortController();
-    running.set(id, abort);
-    try {
+  const buildLevels = ({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> =>
+    answer(id, async (signal) => {
       const { levelsInTurns } = await import('./levels-in-turns.js');
-      const levels = await levelsInTurns(packed, abort.signal);
+      const levels = await levelsInTurns(packed, signal);
       scope.postMessage({ type: 'levels', id, levels }, levels ? buffersOf(levels, levels.coarser) : []);
-    } catch (error) {
-      if (!abort.signal.aborted) scope.postMessage({ type: 'error', id, error: outOfMemory(error).toData() });
-    } finally {
-      running.delete(id);
-    }
-  }
+    });
 
   scope.addEventListener('message', ({ data }) => {
     if (data.type === 'load') void load(data);
@@ -101,17 +92,6 @@ function serve(scope: WorkerScope): void {
     else running.get(data.id)?.abort();
   });
   scope.postMessage({ type: 'ready' });
-}
-
-/** Nothing but memory can be missing for levels of a scene that is on show. */
-function outOfMemory(cause: unknown): GaussianSplatError {
-  return new GaussianSplatError('out-of-memory/allocation', {
-    where: 'levels of detail',
-    expected: 'memory enough to build them',
-    found: cause instanceof Error ? cause.message : String(cause),
-    remedy: 'use a smaller scene, or write it with npm run detail',
-    cause,
-  });
 }
 
 const isWorker = typeof document === 'undefined' && 'WorkerGlobalScope' in globalThis;

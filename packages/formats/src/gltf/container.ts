@@ -12,17 +12,33 @@ export interface GltfFile {
 }
 
 const MAX_JSON_BYTES = 1 << 26;
+/** Buffers may be written into the JSON itself; no browser has much longer strings. */
+const MAX_TEXT_BYTES = 500_000_000;
 const HEADER_BYTES = 12;
 
-/** Takes a GLB, or a glTF in JSON, apart. */
+/**
+ * What a file may require without touching splats: materials, textures, lights, metadata and the like, and compression that only meshes have. Integers in attributes
+ * (`KHR_mesh_quantization`) are read.
+ */
+const HARMLESS =
+  /^(KHR_gaussian_splatting|KHR_mesh_quantization|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))/;
+
+/** Takes a GLB, or a glTF in JSON, apart. Throws `decode/unsupported` where it requires what is not known here, as glTF asks of readers. */
 export function openContainer(bytes: Uint8Array, name: string): GltfFile {
   const file = startsWith(bytes, 'glTF')
     ? openGlb(bytes, name)
-    : { json: parseJson(bytes, name, MAX_JSON_BYTES), binary: undefined };
-  const { asset } = file.json;
+    : { json: parseJson(bytes, name, MAX_TEXT_BYTES), binary: undefined };
+  const { asset, extensionsRequired } = file.json;
   const version = typeof asset === 'object' && asset !== null ? (asset as Json).version : undefined;
   if (typeof version !== 'string' || !version.startsWith('2.')) {
     throw damaged(`${name}, asset.version`, 'glTF 2.x', show(version), 'decode/unsupported');
+  }
+  const unknown: unknown = Array.isArray(extensionsRequired)
+    ? extensionsRequired.find((extension) => typeof extension !== 'string' || !HARMLESS.test(extension))
+    : undefined;
+  if (unknown !== undefined) {
+    const expected = 'extensions that are known here, or that splats can do without';
+    throw damaged(`${name}, extensionsRequired`, expected, show(unknown), 'decode/unsupported');
   }
   return file;
 }

@@ -65,19 +65,19 @@ export function parseKsplatHeader(bytes: Uint8Array, name: string, isPrefix = fa
   const count = sections.reduce((sum, section) => sum + section.count, 0);
   if (count === 0) throw noSplats(where(16));
   const range = [view.getFloat32(36, true) || -1.5, view.getFloat32(40, true) || 1.5] as const;
-  const degree = Math.max(...sections.map((section) => section.degree)) as ShDegree;
+  const degree = sections.reduce<ShDegree>((most, own) => (own.degree > most ? own.degree : most), 0);
   return { level: level as KsplatHeader['level'], count, degree, coefficientRange: range, sections };
 }
 
 function parseSections(bytes: Uint8Array, name: string, level: 0 | 1 | 2): KsplatSection[] {
   const view = viewOf(bytes);
+  // The number at byte 8, of sections that were filled, is no guide: GaussianSplats3D does not ask for it, and there are files with 0.
   const maxSections = view.getUint32(4, true);
-  const sectionCount = Math.min(maxSections, view.getUint32(8, true));
   const dataStart = HEADER_BYTES + SECTION_HEADER_BYTES * maxSections;
   if (dataStart > bytes.length) throw cut(bytes, name, dataStart, `${grouped(maxSections)} section headers`);
   const sections: KsplatSection[] = [];
   let at = dataStart;
-  for (let k = 0; k < sectionCount; k++) {
+  for (let k = 0; k < maxSections; k++) {
     const { section, end } = parseSection(bytes, name, HEADER_BYTES + SECTION_HEADER_BYTES * k, at, level);
     sections.push(section);
     at = end;

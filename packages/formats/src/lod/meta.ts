@@ -75,7 +75,8 @@ function collectLeaves(root: unknown, levels: number, files: number, fail: Fail)
   while (open.length > 0) {
     const node = open.pop();
     if (!isObject(node)) return fail('tree', 'an object for each box', node);
-    if (Array.isArray(node.children)) open.push(...[...node.children].reverse());
+    // The first child is the next.
+    if (Array.isArray(node.children)) for (const child of [...node.children].reverse()) open.push(child);
     if (node.lods !== undefined) leaves.push(parseLeaf(node, levels, files, fail));
   }
   return leaves;

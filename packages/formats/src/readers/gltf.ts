@@ -12,6 +12,9 @@ import { noParts } from './sog.js';
 /** glTF's axes are left, up and forward, seen from what is shown; a cloud's are right, down and forward. */
 const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 
+/** Primitives of splats in a scene, each time that one is shown counted: a short file can name the same ones over and over. */
+const MAX_PRIMITIVES = 100_000;
+
 /** The same mesh in many places is copied for each: at most so many bytes of splats for each byte of the file. */
 const MAX_GROWTH = 4_096;
 
@@ -37,8 +40,7 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
     splats += own?.count ?? cloud.count;
     if (splats > MAX_GROWTH * bytes.length)
       document.fail('nodes', 'a mesh in some places', `${grouped(splats)} splats`);
-    transformCloud(cloud, multiply(TO_CLOUD, toScene));
-    clouds.push(cloud);
+    clouds.push(moved(cloud, multiply(TO_CLOUD, toScene)));
   }
   if (clouds.length === 1) return clouds[0];
   return mergeClouds(
@@ -47,10 +49,29 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   );
 }
 
-/** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time, because they are compressed. */
+/** True if a node moves so far, as georeferenced ones do, that float32 would round what it moves by more than a few hundredths of a millimetre. */
+const isFar = (map: Affine): boolean => [3, 7, 11].some((k) => Math.abs(map[k]) >= 1_000);
+
+/** The cloud in the scene. Far from (0, 0, 0) the place of one of its splats becomes the origin, so that the others keep their digits. */
+function moved(cloud: GaussianCloud, map: Affine): GaussianCloud {
+  if (!isFar(map) || cloud.count === 0) {
+    transformCloud(cloud, map);
+    return cloud;
+  }
+  const [x, y, z] = cloud.positions.subarray(0, 3).map((value) => (Number.isFinite(value) ? value : 0));
+  const at = (row: number): number => map[row] * x + map[row + 1] * y + map[row + 2] * z + map[row + 3];
+  const origin = [at(0), at(4), at(8)] as const;
+  transformCloud(
+    cloud,
+    map.map((value, k) => (k % 4 === 3 ? value - origin[k >> 2] : value)),
+  );
+  return { ...cloud, origin };
+}
+
+/** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time: because they are compressed, or lie so far that they have an origin of their own. */
 export function gltfSplats(source: SceneSource): { count: number; shDegree: ShDegree } | undefined {
   const { document, placed } = open(source);
-  if (!placed.every(({ primitive }) => isUncompressed(primitive))) return undefined;
+  if (!placed.every(({ primitive, toScene }) => isUncompressed(primitive) && !isFar(toScene))) return undefined;
   const found = placed.map(({ primitive }) => splatsIn(document, primitive));
   const count = found.reduce((sum, own) => sum + own.count, 0);
   const shDegree = found.reduce<ShDegree>((most, own) => (own.shDegree > most ? own.shDegree : most), 0);
@@ -70,18 +91,34 @@ function open({ bytes, name, openPart }: SceneSource): {
   placed: PlacedSplats[];
   others: number;
 } {
-  const document = new GltfDocument(openContainer(bytes, name), name, openPart ?? noParts(name));
+  const document = new GltfDocument(openContainer(bytes, name), name, openPart ?? noParts(name, 'scene.glb'));
   const placed: PlacedSplats[] = [];
+  const known = new Map<number, MeshParts>();
   let others = 0;
   for (const { mesh, toScene } of placedMeshes(document)) {
-    const { primitives } = document.item('meshes', mesh);
-    if (!Array.isArray(primitives)) document.fail(`meshes[${mesh}].primitives`, 'a list', primitives);
-    for (const [k, primitive] of (primitives as unknown[]).entries()) {
-      if (isSplats(primitive)) placed.push({ primitive, path: `meshes[${mesh}].primitives[${k}]`, toScene });
-      else others++;
-    }
+    const parts = known.get(mesh) ?? partsOf(document, mesh);
+    known.set(mesh, parts);
+    others += parts.others;
+    if (placed.length + parts.splats.length > MAX_PRIMITIVES)
+      document.fail('nodes', `at most ${grouped(MAX_PRIMITIVES)} primitives of splats in the scene`, 'more');
+    for (const splats of parts.splats) placed.push({ ...splats, toScene });
   }
   return { document, placed, others };
+}
+
+/** The primitives of a mesh. */
+interface MeshParts {
+  readonly splats: readonly Omit<PlacedSplats, 'toScene'>[];
+  readonly others: number;
+}
+
+function partsOf(document: GltfDocument, mesh: number): MeshParts {
+  const { primitives } = document.item('meshes', mesh);
+  if (!Array.isArray(primitives)) return document.fail(`meshes[${mesh}].primitives`, 'a list', primitives);
+  const splats = primitives.flatMap((primitive: unknown, k) =>
+    isSplats(primitive) ? { primitive, path: `meshes[${mesh}].primitives[${k}]` } : [],
+  );
+  return { splats, others: primitives.length - splats.length };
 }
 
 /** The part of a range that lies in `count` splats from number `at` on, counted from there. */

@@ -17,7 +17,7 @@ import { noParts } from './sog.js';
 export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   const { name, level = 0 } = source;
   const meta = parseLodMeta(source.bytes, name);
-  const open = source.openPart ?? noParts(name);
+  const open = source.openPart ?? noParts(name, 'scene.zip');
   const coarsest = runsAtLevel(meta, meta.levels - 1);
   const runs = level === 'all' ? runsAtAllLevels(meta) : runsAtLevel(meta, Math.min(level, meta.levels - 1));
   const around = await readEnvironment(meta, open, source);

@@ -15,15 +15,18 @@ export async function readSog(source: SceneSource): Promise<GaussianCloud> {
   return readSogImages(meta, source.openPart ?? noParts(source.name), source);
 }
 
-/** What is said where only the description is at hand. */
-export function noParts(name: string): (path: string) => Promise<never> {
+/**
+ * What is said where only the description is at hand.
+ * @param packed name of a file that could hold all of the scene
+ */
+export function noParts(name: string, packed = 'scene.sog'): (path: string) => Promise<never> {
   return (path) =>
     Promise.reject(
       new GaussianSplatError('decode/unsupported', {
         where: `${name}, ${path}`,
         expected: 'a way to open the other files of the scene',
         found: 'only this one file',
-        remedy: `load it by its address, or pack the folder into one file, ${name.replace(LAST_PART, 'scene.sog')}`,
+        remedy: `load it by its address, or pack the folder into one file, ${name.replace(LAST_PART, packed)}`,
       }),
     );
 }

@@ -64,9 +64,10 @@ async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud>
   const gunzip = new Gunzip(source);
   try {
     const header = parseSpzHeader(await gunzip.upTo(SPZ_HEADER_BYTES), name);
-    // The count is not yet to be believed; what is inflated is bounded by the bytes that have arrived.
-    const end = SPZ_HEADER_BYTES + bodyBytes({ ...header, degree: 0 }, header.version);
-    return unpackLegacy(await gunzip.upTo(end), header, name);
+    const plain = { ...header, degree: 0 } as const;
+    // More than the bytes so far can hold is not there yet, or never will be.
+    requirePlausibleCount(plain, bytes.length, name);
+    return unpackLegacy(await gunzip.upTo(SPZ_HEADER_BYTES + bodyBytes(plain, header.version)), header, name);
   } finally {
     gunzip.close();
   }

@@ -6,6 +6,8 @@ import { Archive } from '../zip/archive.js';
 
 /** Main files of scenes of several files, in the order in which they are looked for: an index names descriptions. */
 const DESCRIPTIONS = ['lod-meta.json', 'meta.json'];
+/** What macOS writes beside files, with their names. */
+const NO_CONTENT = /(^|\/)(__MACOSX\/|\._)/;
 const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
 
 /**
@@ -15,7 +17,7 @@ const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
 export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const { name, bytes } = source;
   const archive = new Archive(bytes, name);
-  const path = mainFile(archive.paths, name);
+  const path = mainFile(archive, name);
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const inner = archive.open(path);
   const format = findFormat(inner, path, '');
@@ -29,14 +31,12 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
 /** Marks an archive within an archive. */
 const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 
-function mainFile(paths: readonly string[], name: string): string {
-  const shallowest = (candidates: readonly string[]): string[] => {
-    const depth = Math.min(...candidates.map(depthOf));
-    return candidates.filter((path) => depthOf(path) === depth);
-  };
+function mainFile(archive: Archive, name: string): string {
+  const paths = archive.paths.filter((path) => !NO_CONTENT.test(path));
   for (const description of DESCRIPTIONS) {
-    const found = paths.filter((path) => path.split('/').pop() === description);
-    if (found.length > 0) return shallowest(found)[0];
+    const [found] = shallowest(paths.filter((path) => path.split('/').pop() === description));
+    // Other programs have a meta.json, too.
+    if (found !== undefined && findFormat(archive.open(found), '', '') !== undefined) return found;
   }
   const scenes = shallowest(paths.filter((path) => SCENE_FILE.test(path)));
   if (scenes.length === 1) return scenes[0];
@@ -44,6 +44,11 @@ function mainFile(paths: readonly string[], name: string): string {
   const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
   if (gltf.length === 1) return gltf[0];
   throw scenes.length === 0 ? noScene(name, paths, undefined) : severalScenes(name, scenes);
+}
+
+function shallowest(paths: readonly string[]): string[] {
+  const depth = paths.reduce((least, path) => Math.min(least, depthOf(path)), Infinity);
+  return paths.filter((path) => depthOf(path) === depth);
 }
 
 const depthOf = (path: string): number => path.split('/').length;

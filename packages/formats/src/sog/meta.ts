@@ -64,7 +64,10 @@ export function parseSogMeta(bytes: Uint8Array, name: string): SogMeta {
   const count = version === 2 ? json.count : Array.isArray(shape) ? shape[0] : undefined;
   if (!Number.isSafeInteger(count) || (count as number) < 0) fail('count', 'the number of splats', count);
   if (count === 0) throw noSplats(name);
-  const codebook = (key: string): Float32Array => tableOf(numbers(key, 'codebook', 1));
+  const codebook = (key: string): Float32Array => {
+    const mended = withFirst(part(key).codebook);
+    return tableOf(mended ?? numbers(key, 'codebook', 1));
+  };
   const between = (key: string, channels: number): Float32Array[] => {
     const [mins, maxs] = [numbers(key, 'mins', channels), numbers(key, 'maxs', channels)];
     return Array.from({ length: channels }, (_, k) => ramp(mins[k], maxs[k]));
@@ -97,6 +100,17 @@ export function parseSogMeta(bytes: Uint8Array, name: string): SogMeta {
     }
     return { degree: bands, paletteSize: paletteSize as number, values: codebook('shN'), files: files('shN', 2) };
   }
+}
+
+/**
+ * A codebook whose first entry is null, as early tools wrote it, and nothing else is amiss: that entry is taken to be one mean step below the second, which is what
+ * PlayCanvas shows. Undefined for all others.
+ */
+function withFirst(codebook: unknown): number[] | undefined {
+  if (!Array.isArray(codebook) || codebook.length < 2 || codebook[0] !== null) return undefined;
+  const rest = codebook.slice(1) as number[];
+  if (!rest.every((value) => Number.isFinite(value))) return undefined;
+  return [rest[0] - (rest[rest.length - 1] - rest[0]) / 255, ...rest];
 }
 
 /** Codebooks are padded to 256 entries with their last. */

@@ -20,24 +20,41 @@ const NEGLIGIBLE = 1e-12;
 
 /**
  * Moves a cloud by an affine map, in place: centres, covariances, and the directions of the spherical harmonics, which turn with the
- * map's rotation. Maps that flatten everything leave splats without extent, which readers drop.
+ * map's rotation. Maps that flatten splats make discs of them; those that leave no more than a line or a point leave splats without extent, which readers drop.
  *
  * @param map [3, 4], row by row: linear part and translation.
  */
 export function transformCloud(cloud: GaussianCloud, map: readonly number[]): void {
   const linear = [map[0], map[1], map[2], map[4], map[5], map[6], map[8], map[9], map[10]];
   movePositions(cloud.positions, linear, [map[3], map[7], map[11]]);
-  const volume = determinant(linear);
-  if (!Number.isFinite(volume) || Math.abs(volume) < 1e-36) {
+  const whole = filled(linear);
+  if (whole === undefined) {
     cloud.scales.fill(0);
     return;
   }
-  const turn = orthogonalFactor(linear);
-  const scale = Math.cbrt(Math.abs(volume));
+  const turn = orthogonalFactor(whole);
+  const scale = Math.cbrt(Math.abs(determinant(linear)));
   const isSimilar = linear.every((value, k) => Math.abs(value - scale * turn[k]) <= SIMILARITY * scale);
   if (isSimilar) turnShapes(cloud, turn, scale);
   else deformShapes(cloud, linear);
   turnHarmonics(cloud, turn);
+}
+
+/**
+ * The map, or for one that flattens another that turns alike and does not: its cofactors are the product of the axis that is lost and the one that nothing comes to lie
+ * along, as long as the product of the two scales that are left. Undefined where less than a plane is left.
+ */
+function filled(m: Matrix3): Matrix3 | undefined {
+  const volume = determinant(m);
+  if (Math.abs(volume) >= 1e-36) return Number.isFinite(volume) ? m : undefined;
+  const cofactor = (row: number, column: number): number => {
+    const [a, b] = [3 * ((row + 1) % 3), 3 * ((row + 2) % 3)];
+    const [c, d] = [(column + 1) % 3, (column + 2) % 3];
+    return m[a + c] * m[b + d] - m[a + d] * m[b + c];
+  };
+  const cofactors = m.map((_, k) => cofactor(Math.floor(k / 3), k % 3));
+  const area = Math.hypot(...cofactors);
+  return area >= 1e-24 && Number.isFinite(area) ? m.map((v, k) => v + cofactors[k] / Math.sqrt(area)) : undefined;
 }
 
 function movePositions(positions: Float32Array, m: Matrix3, [tx, ty, tz]: readonly number[]): void {

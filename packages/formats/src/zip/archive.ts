@@ -1,86 +1,70 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { unzipSync } from 'fflate';
+import { inflateSync } from 'fflate';
 import { grouped, quote, viewOf } from '../bytes.js';
 import { damaged } from '../damaged.js';
+import { readDirectory, type ZipEntry } from './directory.js';
 
 /** Deflate cannot compress better than this. */
 const MAX_COMPRESSION_RATIO = 1032;
-/** Entries of an archive; a streamed scene of 50 million splats has some thousands. */
-const MAX_ENTRIES = 100_000;
-const DIRECTORY_END = 0x06054b50;
-const DIRECTORY_END_BYTES = 22;
-
-/** A file within an archive. */
-interface Entry {
-  readonly path: string;
-  readonly compressedBytes: number;
-  readonly bytes: number;
-}
+const HEADER = 0x04034b50;
+const HEADER_BYTES = 30;
+const [STORED, DEFLATED] = [0, 8];
 
 /** A ZIP file whose entries are inflated one at a time, when they are asked for. */
 export class Archive {
-  readonly #bytes: Uint8Array;
+  readonly #file: Uint8Array;
   readonly #name: string;
-  readonly #entries = new Map<string, Entry>();
+  readonly #entries = new Map<string, ZipEntry>();
 
   /** Reads the directory. Throws `decode/corrupt`, `decode/truncated` or `decode/unsupported`. */
-  constructor(bytes: Uint8Array, name: string) {
-    this.#bytes = bytes;
+  constructor(file: Uint8Array, name: string) {
+    this.#file = file;
     this.#name = name;
-    requireDirectory(bytes, name);
-    this.#guarded(() =>
-      unzipSync(bytes, {
-        filter: ({ name: path, size, originalSize }) => {
-          if (!path.endsWith('/')) this.#add({ path, compressedBytes: size, bytes: originalSize });
-          return false;
-        },
-      }),
-    );
+    for (const entry of readDirectory(file, name)) {
+      const path = normalised(entry.path);
+      if (!isFolder(entry.path) && !this.#entries.has(path)) this.#entries.set(path, entry);
+    }
   }
 
-  /** Paths of all files, as the archive writes them. */
+  /** Paths of all files, with `/` between folders. */
   get paths(): string[] {
     return [...this.#entries.keys()];
   }
 
-  /** The content of a file. `path` may have `.` and `..` in it. */
+  /**
+   * The content of a file; not to be changed, for it may be the archive's own memory. Throws `decode/corrupt`, `decode/truncated` or `decode/unsupported`.
+   * @param path may have `.` and `..` in it
+   */
   open(path: string): Uint8Array {
     const entry = this.#entries.get(normalised(path));
     if (!entry) throw this.#missing(path);
+    const where = `${this.#name}, ${path}`;
+    if (entry.isEncrypted) throw damaged(where, 'a file without a password', 'an encrypted one', 'decode/unsupported');
+    if (entry.method !== STORED && entry.method !== DEFLATED) {
+      const found = `compression method ${entry.method}`;
+      throw damaged(where, 'a file that is stored or deflated', found, 'decode/unsupported');
+    }
     if (entry.bytes > MAX_COMPRESSION_RATIO * entry.compressedBytes + 64) {
       const found = `${grouped(entry.bytes)} bytes out of ${grouped(entry.compressedBytes)}`;
-      throw damaged(`${this.#name}, ${path}`, 'a size that deflate can reach', found);
+      throw damaged(where, 'a size that deflate can reach', found);
     }
-    let isTaken = false;
-    const files = this.#guarded(() =>
-      unzipSync(this.#bytes, {
-        filter: (file) => {
-          // Two entries of one name would both be inflated.
-          if (isTaken || normalised(file.name) !== normalised(path)) return false;
-          return (isTaken = true);
-        },
-      }),
-    );
-    const content = Object.values(files)[0];
-    if (content?.length === entry.bytes) return content;
-    throw damaged(`${this.#name}, ${path}`, `${grouped(entry.bytes)} bytes`, grouped(content?.length ?? 0));
+    const content = this.#contentOf(entry, where);
+    if (content.length === entry.bytes) return content;
+    throw damaged(where, `${grouped(entry.bytes)} bytes`, grouped(content.length));
   }
 
-  #add(entry: Entry): void {
-    if (this.#entries.size >= MAX_ENTRIES) {
-      throw damaged(this.#name, `at most ${grouped(MAX_ENTRIES)} files`, 'more', 'decode/unsupported');
-    }
-    const path = normalised(entry.path);
-    if (!this.#entries.has(path)) this.#entries.set(path, entry);
-  }
-
-  /** fflate's errors have words, but not the file's name. */
-  #guarded<T>(work: () => T): T {
+  #contentOf({ method, headerAt, compressedBytes, bytes }: ZipEntry, where: string): Uint8Array {
+    const view = viewOf(this.#file);
+    const isThere = headerAt + HEADER_BYTES <= view.byteLength && view.getUint32(headerAt, true) === HEADER;
+    if (!isThere) throw damaged(where, `the file at byte ${grouped(headerAt)}`, 'something else');
+    const start = headerAt + HEADER_BYTES + view.getUint16(headerAt + 26, true) + view.getUint16(headerAt + 28, true);
+    const stored = this.#file.subarray(start, start + compressedBytes);
+    if (method === STORED) return stored;
+    const out = allocate(bytes, where);
     try {
-      return work();
+      return inflateSync(stored, { out });
     } catch (cause) {
-      if (cause instanceof GaussianSplatError) throw cause;
-      throw damaged(this.#name, 'an intact ZIP file', (cause as Error).message || 'damage', 'decode/corrupt', cause);
+      throw damaged(where, 'an intact deflate stream', (cause as Error).message || 'damage', 'decode/corrupt', cause);
     }
   }
 
@@ -94,20 +78,21 @@ export class Archive {
   }
 }
 
-/** The directory stands at the end: without it the file is cut. */
-function requireDirectory(bytes: Uint8Array, name: string): void {
-  const view = viewOf(bytes);
-  const first = Math.max(0, bytes.length - DIRECTORY_END_BYTES - 65_535);
-  for (let at = bytes.length - DIRECTORY_END_BYTES; at >= first; at--) {
-    if (view.getUint32(at, true) === DIRECTORY_END) return;
+function allocate(bytes: number, where: string): Uint8Array {
+  try {
+    return new Uint8Array(bytes);
+  } catch (cause) {
+    throw new GaussianSplatError('out-of-memory/allocation', {
+      where,
+      expected: `memory for ${grouped(bytes)} bytes`,
+      found: 'an allocation that failed',
+      remedy: 'use a smaller scene, or one that is not packed',
+      cause,
+    });
   }
-  throw damaged(
-    `${name}, byte ${grouped(bytes.length)} (end of the file)`,
-    'the directory of a ZIP file',
-    'none',
-    'decode/truncated',
-  );
 }
+
+const isFolder = (path: string): boolean => /[\\/]$/.test(path);
 
 /** A path without `.` and `..`, which stay within the archive. */
 export function normalised(path: string): string {
