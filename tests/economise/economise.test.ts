@@ -1,7 +1,7 @@
 /** What the economiser measures, chooses and writes. Images are drawn on the CPU, but for one that the renderer is held against. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { boundsOf, eyeOf, type GaussianCloud } from '@gaussian-splat/core';
+import { add, boundsOf, eyeOf, lookAt, validateCamera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import {
   cpuPainter,
   cpuScorer,
@@ -204,6 +204,22 @@ test('between cameras there are views that are no camera, each halfway to its ne
     }
   }
   assert.deepEqual(viewsBetween(cameras.slice(0, 1)), []);
+});
+
+test('between cameras of one place that look in opposite directions there is no view', () => {
+  const directions: Vector3[] = [
+    [0, 0, 1],
+    [0, 0, -1],
+    [1, 0, 0],
+    [-1, 0, 0],
+  ];
+  // Pictures of panoramas come like this: four sides of each place.
+  const cameras = [0, 3, 6].flatMap((x) =>
+    directions.map((to) => ({ ...views.scored[0], worldToCamera: lookAt([x, 0, 0], add([x, 0, 0], to), [0, -1, 0]) })),
+  );
+  const between = viewsBetween(cameras);
+  assert.equal(between.length, 6, 'between neighbouring sides');
+  for (const view of between) validateCamera(view);
 });
 
 test('splats come in the order of what they contribute over their area, equal ones in that of the file', async () => {
