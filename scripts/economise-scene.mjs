@@ -137,7 +137,7 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const times = Object.entries(spent).map(([work, time]) => `${work} ${time.toFixed(2)}`);
   console.log(`
 asked        ${minDecibels.toFixed(2)} dB
-found        ${result.decibels.toFixed(2)} dB in ${views.heldOut.length} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
+found        ${result.decibels.toFixed(2)} dB in ${result.heldOutViews} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
 splats       ${splats.after} of ${splats.before} (${share(splats)})
 SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficients)}); splats by degree ${result.degrees.join(', ')}
 bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}

@@ -1,7 +1,16 @@
 /** What the economiser measures, chooses and writes. Images are drawn on the CPU, but for one that the renderer is held against. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { add, boundsOf, eyeOf, lookAt, validateCamera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import {
+  add,
+  boundsOf,
+  eyeOf,
+  lookAt,
+  validateCamera,
+  type Camera,
+  type GaussianCloud,
+  type Vector3,
+} from '@gaussian-splat/core';
 import {
   cpuPainter,
   cpuScorer,
@@ -154,6 +163,26 @@ test('the asked figure is met in held-out views, with less than there was', asyn
   assert.ok(result.splats.after <= 0.75 * result.splats.before, `${result.splats.after} splats`);
   assert.ok(result.coefficients.after <= 0.5 * result.coefficients.before, `${result.coefficients.after} coefficients`);
   assert.equal((await readScene(result.bytes, { name: 'a.glb' })).count, result.splats.after);
+});
+
+/** A camera that turns its back on what it looked at: what comes of axes that are not OpenCV's. */
+const away = (camera: Camera): Camera => ({
+  ...camera,
+  worldToCamera: camera.worldToCamera.map((value, k) => (k >= 4 && k < 12 ? -value : value)),
+});
+
+test('views that show nothing have no say in the figure, and the scene is refused where none shows anything', async () => {
+  const [first, second, third] = fewer.heldOut;
+  const lookedAt = (heldOut: Camera[]) => new PaintedEvaluator(scene, { views: { ...fewer, heldOut } });
+  const blind = lookedAt([first, away(second), away(third)]);
+  const result = await economise(scene, { minDecibels: 45, name: 'a.glb', evaluator: blind });
+  const written = await readScene(result.bytes, { name: 'a.glb' });
+  const [before, now] = [await cpuPainter.draw(scene, [first]), await cpuPainter.draw(written, [first])];
+  const found = decibels(meanSquare(now[0], before[0]));
+  assert.ok(Math.abs(result.decibels - found) < 1e-6, `${result.decibels} dB said, ${found} dB`);
+  assert.ok(found >= 45 && result.heldOutViews === 1, `${found} dB in ${result.heldOutViews} view`);
+  const options = { minDecibels: 45, name: 'a.glb', evaluator: lookedAt([away(first), away(second)]) };
+  await assert.rejects(economise(scene, options), /held-out views: expected views that show some of the scene/);
 });
 
 test('a format that cannot reach the figure is refused with what it can', async () => {

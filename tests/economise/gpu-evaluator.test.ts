@@ -151,6 +151,17 @@ test('errors are those of the pictures', async () => {
   assert.deepEqual(await evaluator.compare(scene, 'heldOut'), [0, 0]);
 });
 
+test('views that show nothing tell of no error', async () => {
+  const [first] = views.heldOut;
+  const worldToCamera = first.worldToCamera.map((value, k) => (k >= 4 && k < 12 ? -value : value));
+  const turned = { ...views, scored: [first], heldOut: [first, { ...first, worldToCamera }] };
+  const blind = await GpuEvaluator.create(device, scene, turned);
+  const darker = { ...scene, opacities: scene.opacities.map((value) => 0.9 * value) };
+  const errors = await blind.compare(darker, 'heldOut');
+  blind.destroy();
+  assert.ok(errors.length === 1 && errors[0] > 1e-5, errors.join());
+});
+
 const median = (values: Float32Array, share: number): number =>
   values.slice().sort()[Math.floor(share * values.length)];
 

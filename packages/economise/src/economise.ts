@@ -2,7 +2,7 @@ import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import type { Evaluator } from './evaluator.js';
 import { findTrades, numbersOf, scaleToFit } from './fit.js';
-import { decibels, mean, meanSquareOf } from './measure.js';
+import { decibels, errorTogether, meanSquareOf } from './measure.js';
 import { readInParts } from './parts/read-in-parts.js';
 import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
@@ -36,6 +36,8 @@ export interface Economised {
   /** dB over the covered pixels: of all held-out views together, and of the worst of them. */
   readonly decibels: number;
   readonly worstDecibels: number;
+  /** How many held-out views these are: those that show some of the scene. */
+  readonly heldOutViews: number;
   readonly cut: Cut;
   /** How long each kind of work took, s: `score`, `search`, `refine`, `fit`, `write` (and read again), `judge`; with several encodings `encode`. */
   readonly seconds: Readonly<Record<string, number>>;
@@ -53,7 +55,7 @@ const MAX_TRIES = 8;
  * which of the two is what saves most. The figure is measured on the written file, read again, in held-out
  * views: they scored and chose nothing, and could only ask for a smaller cut.
  *
- * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, or the file's name is of no known format.
+ * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, the file's name is of no known format, or views show nothing of the scene.
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
   const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
@@ -84,8 +86,9 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
     watch.lap('write');
     const errors = await evaluator.compare(written, 'heldOut', signal);
     watch.lap('judge');
-    onStep(`held-out views: ${decibels(mean(errors)).toFixed(2)} dB`);
-    if (mean(errors) <= target)
+    const error = errorTogether(errors, 'heldOut');
+    onStep(`held-out views: ${decibels(error).toFixed(2)} dB`);
+    if (error <= target)
       return {
         ...summary(cloud, reduced, cut, errors),
         bytes: unshared(bytes),
@@ -112,7 +115,7 @@ async function chooseEncoding(
   for (const encoding of encodings) {
     options.onStep?.(`rounding of ${encoding.title}`);
     const rounded = await readScene(await encoding.write(whole), { name: options.name });
-    const rounding = mean(await options.evaluator.compare(rounded, 'searched', options.signal));
+    const rounding = errorTogether(await options.evaluator.compare(rounded, 'searched', options.signal), 'searched');
     best = Math.min(best, rounding);
     const isLast = encoding === encodings[encodings.length - 1];
     if (rounding <= ROUNDING_SHARE * target || (isLast && rounding < 0.95 * target)) return { encoding, rounding };
@@ -138,7 +141,8 @@ function summary(
       after: keptCoefficients(degrees),
     },
     degrees: degreesOf(degrees),
-    decibels: decibels(mean(found)),
+    decibels: decibels(errorTogether(found, 'heldOut')),
+    heldOutViews: found.length,
     worstDecibels: decibels(Math.max(...found)),
     cut,
   };
