@@ -134,6 +134,19 @@ test('degrees go where colour does not depend on the view, at any price', async 
   assert.ok(degrees.filter((degree) => degree === 2).length >= 0.3 * cloud.count, 'the others keep it');
 });
 
+// Far above: no camera looks there.
+test('splats that no view looked at keep their colours, as they keep their place', async () => {
+  const positions = scene.positions.map((value, k) => (k < 30 && k % 3 === 1 ? value - 1000 : value));
+  const cloud = { ...scene, positions };
+  const { degrees, kept } = reduce(cloud, await scoreSplats(cloud, fewer.scored, cpuScorer(cloud)), {
+    removalPrice: 1e-4,
+    colourPrice: 1e-4,
+  });
+  const unseen = degrees.filter((_, k) => kept[k] < 10);
+  assert.deepEqual([...unseen], new Array(10).fill(2));
+  assert.ok(kept.length < 0.9 * cloud.count && degrees.filter((degree) => degree === 0).length > 0.5 * kept.length);
+});
+
 test('the most seen come first', async () => {
   const scores = await scored;
   const { cloud } = reduce(scene, scores, {});

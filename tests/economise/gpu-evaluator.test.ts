@@ -187,6 +187,23 @@ for (const [name, cutOf] of [
   });
 }
 
+// Far above: no camera looks there.
+test('splats that no view looked at keep their colours, as they keep their place', async () => {
+  const cloud = {
+    ...scene,
+    positions: scene.positions.map((value, k) => (k < 30 && k % 3 === 1 ? value - 1000 : value)),
+  };
+  const other = await GpuEvaluator.create(device, cloud, views);
+  await other.rank();
+  const cut = { removalPrice: 1e-4, colourPrice: 1e-4 };
+  const { degrees, kept, cloud: left } = await other.reduce(cut);
+  const expected = reduce(cloud, await other.scores(), cut);
+  other.destroy();
+  assert.deepEqual([...degrees.filter((_, k) => kept[k] < 10)], new Array(10).fill(3));
+  assert.ok(kept.length < 0.9 * COUNT && degrees.filter((degree) => degree === 0).length > 0.5 * kept.length);
+  assert.deepEqual([left, degrees], [expected.cloud, expected.degrees]);
+});
+
 test('a cut can be taken back', async () => {
   await evaluator.cut({ minContribution: 0.5 }, 'searched');
   const { errors, degrees } = await evaluator.cut({}, 'searched');
