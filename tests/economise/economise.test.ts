@@ -198,6 +198,22 @@ test('views that show nothing have no say in the figure, and the scene is refuse
   await assert.rejects(economise(scene, options), /held-out views: expected views that show some of the scene/);
 });
 
+test('a figure that is reached with every splat kept is reached, and where it is not it is said how near one comes', async () => {
+  const cloud = smallCloud(300, 1);
+  // Something can go at any figure.
+  for (let i = 0; i < 300; i++) for (let k = 3; k < 12; k++) cloud.sh[12 * i + k] *= 10 ** -(i % 7);
+  const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(1) };
+  const written = await readScene(await encodingsFor('a.glb')[0].write(whole), { name: 'a.glb' });
+  const [before, now] = [await cpuPainter.draw(cloud, fewer.heldOut), await cpuPainter.draw(written, fewer.heldOut)];
+  const rounding = decibels(now.reduce((sum, image, k) => sum + meanSquare(image, before[k]), 0) / now.length);
+  const smaller = (minDecibels: number) =>
+    economise(cloud, { minDecibels, name: 'a.glb', evaluator: new PaintedEvaluator(cloud, { views: fewer }) });
+  const { decibels: found } = await smaller(rounding - 0.3);
+  assert.ok(rounding < 120 && found >= rounding - 0.3, `${found} dB where rounding alone leaves ${rounding}`);
+  const most = `at most ${rounding.toFixed(1)} dB, with every splat kept`;
+  await assert.rejects(smaller(rounding + 3), (error: Error) => error.message.includes(most));
+});
+
 test('a format that cannot reach the figure is refused with what it can', async () => {
   const evaluator = new PaintedEvaluator(scene, { views: fewer });
   const options = { minDecibels: 70, name: 'a.spz', evaluator };

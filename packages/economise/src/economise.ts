@@ -45,9 +45,10 @@ export interface Economised {
 
 /** Share of the error that goes to rounding at most, before a finer encoding is tried. */
 const ROUNDING_SHARE = 0.6;
-/** How much less is taken where the written file misses the figure. */
+/** How much less is taken where the written file misses the figure; the next time as much less again than that. The last try keeps everything. */
 const SHRINK = 0.9;
 const MAX_TRIES = 8;
+const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
 
 /**
  * Makes a scene smaller without going below a figure: scores all splats by what the views would lack without them, drops the least missed,
@@ -79,7 +80,7 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
     if (refined && numbersIn(refined.reduced) < numbersIn(ready.reduced)) [plan, ready] = [refined.plan, refined];
     watch.lap('refine');
   }
-  for (let tries = 0; tries < MAX_TRIES; tries++) {
+  for (let tries = 1; ; tries++) {
     const { cut, reduced } = ready ?? (await cutCloud(plan, evaluator, budget, signal));
     const bytes = await encoding.write(reduced, pool);
     const written = await readInParts(bytes, { name: options.name, signal }, pool);
@@ -95,10 +96,11 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
         encoding: encoding.title,
         seconds: watch.seconds,
       };
-    plan = { ...plan, filling: SHRINK * plan.filling };
+    if (plan === WHOLE) throw unreachable(options, atMost(error));
+    const isLast = tries + 1 >= MAX_TRIES || plan.filling === 0;
+    plan = isLast ? WHOLE : { ...plan, filling: SHRINK ** tries * plan.filling };
     ready = undefined;
   }
-  throw unreachable(options, 'less, whatever was kept');
 }
 
 /** The smallest way to write the scene whose rounding leaves room for more. Where there is but one, the written file alone is judged. */
@@ -120,7 +122,7 @@ async function chooseEncoding(
     const isLast = encoding === encodings[encodings.length - 1];
     if (rounding <= ROUNDING_SHARE * target || (isLast && rounding < 0.95 * target)) return { encoding, rounding };
   }
-  throw unreachable(options, `at most ${decibels(best).toFixed(1)} dB, with every splat kept`);
+  throw unreachable(options, atMost(best));
 }
 
 /** The same bytes in memory that is nobody else's: much that takes bytes refuses shared ones. */
@@ -150,11 +152,13 @@ function summary(
 
 const numbersIn = ({ degrees }: ReducedCloud): number => numbersOf(degreesOf(degrees));
 
+const atMost = (error: number): string => `at most ${decibels(error).toFixed(1)} dB, with every splat kept`;
+
 function unreachable({ name, minDecibels }: EconomiseOptions, found: string): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
     where: name,
     expected: `${minDecibels} dB or more in the held-out views`,
     found,
-    remedy: 'write a more precise format (.glb or .ply), or ask for less',
+    remedy: 'write a more precise format (.ply; .glb in place of .spz), or ask for less',
   });
 }
