@@ -1,5 +1,5 @@
 /** The work behind `npm run economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
-import { readFileSync, statSync, writeFileSync } from 'node:fs';
+import { readFileSync, statSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
@@ -7,6 +7,7 @@ import {
   dealtViewsAround,
   dealViews,
   economise,
+  encodingsFor,
   GpuEvaluator,
   MergingEvaluator,
   PaintedEvaluator,
@@ -17,6 +18,7 @@ import {
 import { inline } from '@gaussian-splat/economise/parts';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
+import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
 import { readInThreads } from './lib/scene-in-parts.mjs';
 import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 
@@ -36,6 +38,9 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
 `;
 
 class UsageError extends Error {}
+
+/** Whether the file system says it: ENOENT, EACCES, ENOSPC. Its sentence is enough for people. */
+const isOfFiles = ({ code }) => /^E[A-Z]+$/.test(code);
 
 /** Folder that a person's relative paths start from: npm itself runs scripts in the project's root. */
 const from = process.env.INIT_CWD ?? process.cwd();
@@ -69,9 +74,11 @@ function parseOptions(args) {
   const minDecibels = Number(values['min-db']);
   if (!(minDecibels >= 10 && minDecibels <= 100)) throw new UsageError('--min-db: expected a number from 10 to 100');
   if (values.out === undefined) throw new UsageError('--out is missing');
-  const [scene, out] = [resolve(from, positionals[0]), resolve(from, values.out)];
-  if (scene === out) throw new UsageError('--out: expected another file than SCENE, which is never changed');
-  const { views, report, scorer, merge, refine } = values;
+  const { scorer, merge, refine } = values;
+  const [scene, out, views, report] = [positionals[0], values.out, values.views, values.report].map(
+    (path) => path && resolve(from, path),
+  );
+  checkFiles({ scene, out, views, report });
   if (!['auto', 'gpu', 'cpu'].includes(scorer))
     throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
   const scored = Number(values.scored);
@@ -83,9 +90,36 @@ function parseOptions(args) {
   return { scene, out, minDecibels, views, report, scorer, scored, threads, merge, refine };
 }
 
+/** All that can be said of files before the work. */
+function checkFiles({ scene, out, views, report }) {
+  encodingsFor(out);
+  for (const [option, path] of Object.entries({ out, report })) {
+    if (path === undefined) continue;
+    const other = (file) => new UsageError(`--${option}: expected another file than ${file}, which is never changed`);
+    if (isSameFile(path, scene)) throw other('SCENE');
+    if (views && isSameFile(path, views)) throw other('that of --views');
+    const obstacle = obstacleTo(path);
+    if (obstacle) throw new UsageError(`--${option}: ${obstacle}`);
+  }
+  if (report && isSameFile(report, out)) throw new UsageError('--report: expected another file than that of --out');
+}
+
+function parseViews(path) {
+  try {
+    const views = JSON.parse(readFileSync(path, 'utf8'))?.views;
+    if (Array.isArray(views)) return views;
+  } catch (error) {
+    if (!(error instanceof SyntaxError)) throw error;
+    throw new UsageError(`--views: ${path} is no JSON: ${error.message}`);
+  }
+  throw new UsageError(
+    `--views: expected {views: [{width, height, K, worldToCamera}, ...]}, found no list "views" in ${path}`,
+  );
+}
+
 function readViews(path, bounds, scored) {
   if (path === undefined) return dealtViewsAround(bounds, { scored });
-  const { views } = JSON.parse(readFileSync(resolve(from, path), 'utf8'));
+  const views = parseViews(path);
   const dealt = dealViews(views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`)));
   if (dealt.heldOut.length > 0) return { ...dealt, scored: [...dealt.scored, ...viewsBetween(dealt.scored)] };
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
@@ -129,7 +163,7 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
     ...{ minDecibels, name: out, evaluator, pool },
     onStep: (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`),
   });
-  writeFileSync(out, result.bytes);
+  writeWhole(out, result.bytes);
   const { splats, coefficients } = result;
   const spent = { read, prepare, ...result.seconds, total: seconds() };
   const share = ({ before, after }) => `${((100 * after) / Math.max(1, before)).toFixed(1)} %`;
@@ -137,13 +171,13 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const times = Object.entries(spent).map(([work, time]) => `${work} ${time.toFixed(2)}`);
   console.log(`
 asked        ${minDecibels.toFixed(2)} dB
-found        ${result.decibels.toFixed(2)} dB in ${views.heldOut.length} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
+found        ${result.decibels.toFixed(2)} dB in ${result.heldOutViews} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
 splats       ${splats.after} of ${splats.before} (${share(splats)})
 SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficients)}); splats by degree ${result.degrees.join(', ')}
 bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}
 seconds      ${times.join(', ')}`);
   const figures = { ...result, bytes: newBytes, minDecibels, seconds: spent };
-  if (report) writeFileSync(resolve(from, report), JSON.stringify(figures, null, 2));
+  if (report) writeWhole(report, JSON.stringify(figures, null, 2));
 }
 
 try {
@@ -154,7 +188,7 @@ try {
   process.exit(0);
 } catch (error) {
   if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
-  else if (error instanceof GaussianSplatError || error.code === 'ENOENT') console.error(error.message);
+  else if (error instanceof GaussianSplatError || isOfFiles(error)) console.error(error.message);
   else console.error(error);
   process.exit(error instanceof UsageError ? 2 : 1);
 }

@@ -95,12 +95,13 @@ fn find_shift(kept: u32, size: u32) {
   }
 }
 
-fn lower(i: u32, degree: u32, size: u32, energy: f32) {
+// Of a splat that too few views looked at it is not known what its colours are worth.
+fn lower(i: u32, degree: u32, size: u32, energy: f32, is_judged: bool) {
   let kept = (degree + 1u) * (degree + 1u);
-  var error = 0.0;
+  var error = select(UNJUDGED, 0.0, is_judged);
   for (var k = 0u; k < kept; k++) { shift[k] = vec3f(0.0); }
   if (energy > 0.0) {
-    error = squares_left(kept, size) / (3.0 * f32(lowering.views));
+    error = max(error, squares_left(kept, size) / (3.0 * f32(lowering.views)));
     find_shift(kept, size);
   }
   let record = i * lowered_numbers(lowering.sh_degree, lowering.sh_degree);
@@ -129,5 +130,5 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let prior = lowering.prior_views * s.energy / f32(max(1u, s.looks)) / (4.0 * PI);
   for (var k = 0u; k < size; k++) { matrix[at(k, k)] += prior; }
   factorise(size);
-  for (var degree = 0u; degree < lowering.sh_degree; degree++) { lower(i, degree, size, s.energy); }
+  for (var degree = 0u; degree < lowering.sh_degree; degree++) { lower(i, degree, size, s.energy, is_judged); }
 }

@@ -1,7 +1,16 @@
 /** What the economiser measures, chooses and writes. Images are drawn on the CPU, but for one that the renderer is held against. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
-import { boundsOf, eyeOf, type GaussianCloud } from '@gaussian-splat/core';
+import {
+  add,
+  boundsOf,
+  eyeOf,
+  lookAt,
+  validateCamera,
+  type Camera,
+  type GaussianCloud,
+  type Vector3,
+} from '@gaussian-splat/core';
 import {
   cpuPainter,
   cpuScorer,
@@ -125,6 +134,19 @@ test('degrees go where colour does not depend on the view, at any price', async 
   assert.ok(degrees.filter((degree) => degree === 2).length >= 0.3 * cloud.count, 'the others keep it');
 });
 
+// Far above: no camera looks there.
+test('splats that no view looked at keep their colours, as they keep their place', async () => {
+  const positions = scene.positions.map((value, k) => (k < 30 && k % 3 === 1 ? value - 1000 : value));
+  const cloud = { ...scene, positions };
+  const { degrees, kept } = reduce(cloud, await scoreSplats(cloud, fewer.scored, cpuScorer(cloud)), {
+    removalPrice: 1e-4,
+    colourPrice: 1e-4,
+  });
+  const unseen = degrees.filter((_, k) => kept[k] < 10);
+  assert.deepEqual([...unseen], new Array(10).fill(2));
+  assert.ok(kept.length < 0.9 * cloud.count && degrees.filter((degree) => degree === 0).length > 0.5 * kept.length);
+});
+
 test('the most seen come first', async () => {
   const scores = await scored;
   const { cloud } = reduce(scene, scores, {});
@@ -154,6 +176,42 @@ test('the asked figure is met in held-out views, with less than there was', asyn
   assert.ok(result.splats.after <= 0.75 * result.splats.before, `${result.splats.after} splats`);
   assert.ok(result.coefficients.after <= 0.5 * result.coefficients.before, `${result.coefficients.after} coefficients`);
   assert.equal((await readScene(result.bytes, { name: 'a.glb' })).count, result.splats.after);
+});
+
+/** A camera that turns its back on what it looked at: what comes of axes that are not OpenCV's. */
+const away = (camera: Camera): Camera => ({
+  ...camera,
+  worldToCamera: camera.worldToCamera.map((value, k) => (k >= 4 && k < 12 ? -value : value)),
+});
+
+test('views that show nothing have no say in the figure, and the scene is refused where none shows anything', async () => {
+  const [first, second, third] = fewer.heldOut;
+  const lookedAt = (heldOut: Camera[]) => new PaintedEvaluator(scene, { views: { ...fewer, heldOut } });
+  const blind = lookedAt([first, away(second), away(third)]);
+  const result = await economise(scene, { minDecibels: 45, name: 'a.glb', evaluator: blind });
+  const written = await readScene(result.bytes, { name: 'a.glb' });
+  const [before, now] = [await cpuPainter.draw(scene, [first]), await cpuPainter.draw(written, [first])];
+  const found = decibels(meanSquare(now[0], before[0]));
+  assert.ok(Math.abs(result.decibels - found) < 1e-6, `${result.decibels} dB said, ${found} dB`);
+  assert.ok(found >= 45 && result.heldOutViews === 1, `${found} dB in ${result.heldOutViews} view`);
+  const options = { minDecibels: 45, name: 'a.glb', evaluator: lookedAt([away(first), away(second)]) };
+  await assert.rejects(economise(scene, options), /held-out views: expected views that show some of the scene/);
+});
+
+test('a figure that is reached with every splat kept is reached, and where it is not it is said how near one comes', async () => {
+  const cloud = smallCloud(300, 1);
+  // Something can go at any figure.
+  for (let i = 0; i < 300; i++) for (let k = 3; k < 12; k++) cloud.sh[12 * i + k] *= 10 ** -(i % 7);
+  const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(1) };
+  const written = await readScene(await encodingsFor('a.glb')[0].write(whole), { name: 'a.glb' });
+  const [before, now] = [await cpuPainter.draw(cloud, fewer.heldOut), await cpuPainter.draw(written, fewer.heldOut)];
+  const rounding = decibels(now.reduce((sum, image, k) => sum + meanSquare(image, before[k]), 0) / now.length);
+  const smaller = (minDecibels: number) =>
+    economise(cloud, { minDecibels, name: 'a.glb', evaluator: new PaintedEvaluator(cloud, { views: fewer }) });
+  const { decibels: found } = await smaller(rounding - 0.3);
+  assert.ok(rounding < 120 && found >= rounding - 0.3, `${found} dB where rounding alone leaves ${rounding}`);
+  const most = `at most ${rounding.toFixed(1)} dB, with every splat kept`;
+  await assert.rejects(smaller(rounding + 3), (error: Error) => error.message.includes(most));
 });
 
 test('a format that cannot reach the figure is refused with what it can', async () => {
@@ -204,6 +262,22 @@ test('between cameras there are views that are no camera, each halfway to its ne
     }
   }
   assert.deepEqual(viewsBetween(cameras.slice(0, 1)), []);
+});
+
+test('between cameras of one place that look in opposite directions there is no view', () => {
+  const directions: Vector3[] = [
+    [0, 0, 1],
+    [0, 0, -1],
+    [1, 0, 0],
+    [-1, 0, 0],
+  ];
+  // Pictures of panoramas come like this: four sides of each place.
+  const cameras = [0, 3, 6].flatMap((x) =>
+    directions.map((to) => ({ ...views.scored[0], worldToCamera: lookAt([x, 0, 0], add([x, 0, 0], to), [0, -1, 0]) })),
+  );
+  const between = viewsBetween(cameras);
+  assert.equal(between.length, 6, 'between neighbouring sides');
+  for (const view of between) validateCamera(view);
 });
 
 test('splats come in the order of what they contribute over their area, equal ones in that of the file', async () => {

@@ -151,6 +151,17 @@ test('errors are those of the pictures', async () => {
   assert.deepEqual(await evaluator.compare(scene, 'heldOut'), [0, 0]);
 });
 
+test('views that show nothing tell of no error', async () => {
+  const [first] = views.heldOut;
+  const worldToCamera = first.worldToCamera.map((value, k) => (k >= 4 && k < 12 ? -value : value));
+  const turned = { ...views, scored: [first], heldOut: [first, { ...first, worldToCamera }] };
+  const blind = await GpuEvaluator.create(device, scene, turned);
+  const darker = { ...scene, opacities: scene.opacities.map((value) => 0.9 * value) };
+  const errors = await blind.compare(darker, 'heldOut');
+  blind.destroy();
+  assert.ok(errors.length === 1 && errors[0] > 1e-5, errors.join());
+});
+
 const median = (values: Float32Array, share: number): number =>
   values.slice().sort()[Math.floor(share * values.length)];
 
@@ -175,6 +186,23 @@ for (const [name, cutOf] of [
     });
   });
 }
+
+// Far above: no camera looks there.
+test('splats that no view looked at keep their colours, as they keep their place', async () => {
+  const cloud = {
+    ...scene,
+    positions: scene.positions.map((value, k) => (k < 30 && k % 3 === 1 ? value - 1000 : value)),
+  };
+  const other = await GpuEvaluator.create(device, cloud, views);
+  await other.rank();
+  const cut = { removalPrice: 1e-4, colourPrice: 1e-4 };
+  const { degrees, kept, cloud: left } = await other.reduce(cut);
+  const expected = reduce(cloud, await other.scores(), cut);
+  other.destroy();
+  assert.deepEqual([...degrees.filter((_, k) => kept[k] < 10)], new Array(10).fill(3));
+  assert.ok(kept.length < 0.9 * COUNT && degrees.filter((degree) => degree === 0).length > 0.5 * kept.length);
+  assert.deepEqual([left, degrees], [expected.cloud, expected.degrees]);
+});
 
 test('a cut can be taken back', async () => {
   await evaluator.cut({ minContribution: 0.5 }, 'searched');

@@ -6,7 +6,7 @@ export const PRIOR_VIEWS = 4;
 
 /** The colours of all splats with fewer bands. */
 export interface LoweredColours {
-  /** [N] the mean squared error of the views' images if this splat alone has them. */
+  /** [N] the mean squared error of the views' images if this splat alone has them; Infinity for splats that too few views looked at. */
   readonly error: Float32Array;
   /** [(degree + 1)², 3] coefficients of splat i: those that come nearest to the colours that the views saw. */
   of(i: number): Float32Array;

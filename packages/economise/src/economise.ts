@@ -2,7 +2,7 @@ import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import type { Evaluator } from './evaluator.js';
 import { findTrades, numbersOf, scaleToFit } from './fit.js';
-import { decibels, mean, meanSquareOf } from './measure.js';
+import { decibels, errorTogether, meanSquareOf } from './measure.js';
 import { readInParts } from './parts/read-in-parts.js';
 import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
@@ -36,6 +36,8 @@ export interface Economised {
   /** dB over the covered pixels: of all held-out views together, and of the worst of them. */
   readonly decibels: number;
   readonly worstDecibels: number;
+  /** How many held-out views these are: those that show some of the scene. */
+  readonly heldOutViews: number;
   readonly cut: Cut;
   /** How long each kind of work took, s: `score`, `search`, `refine`, `fit`, `write` (and read again), `judge`; with several encodings `encode`. */
   readonly seconds: Readonly<Record<string, number>>;
@@ -43,9 +45,10 @@ export interface Economised {
 
 /** Share of the error that goes to rounding at most, before a finer encoding is tried. */
 const ROUNDING_SHARE = 0.6;
-/** How much less is taken where the written file misses the figure. */
+/** How much less is taken where the written file misses the figure; the next time as much less again than that. The last try keeps everything. */
 const SHRINK = 0.9;
 const MAX_TRIES = 8;
+const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: false };
 
 /**
  * Makes a scene smaller without going below a figure: scores all splats by what the views would lack without them, drops the least missed,
@@ -53,7 +56,7 @@ const MAX_TRIES = 8;
  * which of the two is what saves most. The figure is measured on the written file, read again, in held-out
  * views: they scored and chose nothing, and could only ask for a smaller cut.
  *
- * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, or the file's name is of no known format.
+ * @throws GaussianSplatError `argument/value` if the format cannot reach the figure, the file's name is of no known format, or views show nothing of the scene.
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
   const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
@@ -77,25 +80,27 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
     if (refined && numbersIn(refined.reduced) < numbersIn(ready.reduced)) [plan, ready] = [refined.plan, refined];
     watch.lap('refine');
   }
-  for (let tries = 0; tries < MAX_TRIES; tries++) {
+  for (let tries = 1; ; tries++) {
     const { cut, reduced } = ready ?? (await cutCloud(plan, evaluator, budget, signal));
     const bytes = await encoding.write(reduced, pool);
     const written = await readInParts(bytes, { name: options.name, signal }, pool);
     watch.lap('write');
     const errors = await evaluator.compare(written, 'heldOut', signal);
     watch.lap('judge');
-    onStep(`held-out views: ${decibels(mean(errors)).toFixed(2)} dB`);
-    if (mean(errors) <= target)
+    const error = errorTogether(errors, 'heldOut');
+    onStep(`held-out views: ${decibels(error).toFixed(2)} dB`);
+    if (error <= target)
       return {
         ...summary(cloud, reduced, cut, errors),
         bytes: unshared(bytes),
         encoding: encoding.title,
         seconds: watch.seconds,
       };
-    plan = { ...plan, filling: SHRINK * plan.filling };
+    if (plan === WHOLE) throw unreachable(options, atMost(error));
+    const isLast = tries + 1 >= MAX_TRIES || plan.filling === 0;
+    plan = isLast ? WHOLE : { ...plan, filling: SHRINK ** tries * plan.filling };
     ready = undefined;
   }
-  throw unreachable(options, 'less, whatever was kept');
 }
 
 /** The smallest way to write the scene whose rounding leaves room for more. Where there is but one, the written file alone is judged. */
@@ -112,12 +117,12 @@ async function chooseEncoding(
   for (const encoding of encodings) {
     options.onStep?.(`rounding of ${encoding.title}`);
     const rounded = await readScene(await encoding.write(whole), { name: options.name });
-    const rounding = mean(await options.evaluator.compare(rounded, 'searched', options.signal));
+    const rounding = errorTogether(await options.evaluator.compare(rounded, 'searched', options.signal), 'searched');
     best = Math.min(best, rounding);
     const isLast = encoding === encodings[encodings.length - 1];
     if (rounding <= ROUNDING_SHARE * target || (isLast && rounding < 0.95 * target)) return { encoding, rounding };
   }
-  throw unreachable(options, `at most ${decibels(best).toFixed(1)} dB, with every splat kept`);
+  throw unreachable(options, atMost(best));
 }
 
 /** The same bytes in memory that is nobody else's: much that takes bytes refuses shared ones. */
@@ -138,7 +143,8 @@ function summary(
       after: keptCoefficients(degrees),
     },
     degrees: degreesOf(degrees),
-    decibels: decibels(mean(found)),
+    decibels: decibels(errorTogether(found, 'heldOut')),
+    heldOutViews: found.length,
     worstDecibels: decibels(Math.max(...found)),
     cut,
   };
@@ -146,11 +152,13 @@ function summary(
 
 const numbersIn = ({ degrees }: ReducedCloud): number => numbersOf(degreesOf(degrees));
 
+const atMost = (error: number): string => `at most ${decibels(error).toFixed(1)} dB, with every splat kept`;
+
 function unreachable({ name, minDecibels }: EconomiseOptions, found: string): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
     where: name,
     expected: `${minDecibels} dB or more in the held-out views`,
     found,
-    remedy: 'write a more precise format (.glb or .ply), or ask for less',
+    remedy: 'write a more precise format (.ply; .glb in place of .spz), or ask for less',
   });
 }

@@ -7,7 +7,7 @@ export type JudgedViews = 'searched' | 'heldOut';
 
 /** What a cut leaves of a scene, and what that costs. */
 export interface CutFigures {
-  /** [views] mean squared error of the colours of each picture, peak 1, over the pixels that the whole scene covers. */
+  /** Mean squared error of the colours of each picture, peak 1, over the pixels that the whole scene covers; views that show nothing of it are left out. */
   readonly errors: readonly number[];
   /** [4] splats that stay, by the degree of spherical harmonics that they keep. */
   readonly degrees: readonly number[];
@@ -24,9 +24,9 @@ export interface Evaluator {
   cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures>;
   /** What a cut leaves, to be written. */
   reduce(cut: Cut, signal?: AbortSignal): Promise<ReducedCloud>;
-  /** [views] errors of another cloud in place of the scene. */
+  /** Errors of another cloud in place of the scene, as {@link CutFigures.errors}. */
   compare(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
-  /** [views] the same, as quickly as {@link cut} finds errors: near enough for a search. */
+  /** The same, as quickly as {@link cut} finds errors: near enough for a search. */
   sketch(cloud: GaussianCloud, views: JudgedViews, signal?: AbortSignal): Promise<readonly number[]>;
   /** Fits what a cut left to pictures of the scene, by evaluators that do ({@link RefiningEvaluator}). What it is given is left as it is. */
   refine?(reduced: ReducedCloud, signal?: AbortSignal): Promise<ReducedCloud>;

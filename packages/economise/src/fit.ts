@@ -1,7 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { CutFigures, Evaluator } from './evaluator.js';
 import { tradeMerges, type MeasuredCut } from './merge/trade-merges.js';
-import { mean } from './measure.js';
+import { errorTogether } from './measure.js';
 import { valuesAtPlaces } from './order.js';
 import type { Cut } from './reduce.js';
 import type { Ranking } from './score.js';
@@ -53,7 +53,7 @@ export async function findTrades(
       thresholds,
       async (threshold) => {
         const { errors, degrees } = await evaluator.cut(cutAt(threshold), 'searched', signal);
-        return { threshold, error: part * mean(errors), saved: all - numbersOf(degrees) };
+        return { threshold, error: part * errorTogether(errors, 'searched'), saved: all - numbersOf(degrees) };
       },
       budget,
     );
@@ -77,10 +77,10 @@ export async function findTrades(
   const saved = ({ degrees }: CutFigures): number => all - numbersOf(degrees);
   const measure = async (cut: Cut): Promise<MeasuredCut> => {
     const figures = await evaluator.cut(cut, 'searched', signal);
-    const error = mean(figures.errors);
+    const error = errorTogether(figures.errors, 'searched');
     if (left === 1) return { error, saved: saved(figures) };
     const { errors } = await evaluator.cut({ ...cut, colourPrice: 0 }, 'searched', signal);
-    return { error: error - (1 - left) * Math.min(error, mean(errors)), saved: saved(figures) };
+    return { error: error - (1 - left) * Math.min(error, errorTogether(errors, 'searched')), saved: saved(figures) };
   };
   return tradeMerges(trades, merge, budget, measure);
 }
@@ -109,7 +109,7 @@ async function chooseDropping(
   });
   const trials: number[] = [];
   for (const { trial, cutAt } of candidates)
-    trials.push(mean((await evaluator.cut(cutAt(trial), 'searched', signal)).errors));
+    trials.push(errorTogether((await evaluator.cut(cutAt(trial), 'searched', signal)).errors, 'searched'));
   const { dropped, cutAt } = candidates[trials[0] <= trials[1] ? 0 : 1];
   const thresholds = [...new Set(dropped)].filter((price) => price > 0 && Number.isFinite(price));
   return { thresholds, cutAt };
@@ -128,7 +128,8 @@ export async function scaleToFit(
   onStep('finding what the held-out views allow');
   let [fits, fails, next] = [0, Infinity, 1];
   for (let tries = 0; tries < FIT_TRIES; tries++) {
-    const error = mean((await evaluator.cut(cutAt(next * budget), 'heldOut', signal)).errors);
+    const { errors } = await evaluator.cut(cutAt(next * budget), 'heldOut', signal);
+    const error = errorTogether(errors, 'heldOut');
     if (error <= budget) fits = next;
     else fails = next;
     if (fits === 1 || (error <= budget && error > NEAR_ENOUGH * budget)) break;

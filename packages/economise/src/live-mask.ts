@@ -10,7 +10,7 @@ import {
 import { MaskScene } from './gpu/mask-scene.js';
 import { PictureErrors } from './gpu/picture-errors.js';
 import type { MaskGoal } from './mask.js';
-import { decibels, mean } from './measure.js';
+import { decibelsTogether } from './measure.js';
 import { viewsAround } from './views.js';
 
 /** Values of GPUBufferUsage and GPUTextureUsage, which Node has only where Dawn was loaded. */
@@ -188,7 +188,7 @@ class Gauge {
     return async (slots) => {
       this.#signal?.throwIfAborted();
       this.#shown.show(slots);
-      return decibels(mean(await errors.measure(this.#shown, this.#pause)));
+      return decibelsTogether(await errors.measure(this.#shown, this.#pause));
     };
   }
 

@@ -23,7 +23,7 @@ import { NO_VIEW } from './gpu/no-view.js';
 import { PictureErrors } from './gpu/picture-errors.js';
 import { readBack } from './gpu/read-back.js';
 import { viewSizeOf, type ViewSize } from './live-mask.js';
-import { decibels, mean } from './measure.js';
+import { decibelsTogether } from './measure.js';
 import { viewsAround } from './views.js';
 
 const { View: viewLayout } = rendererLayouts;
@@ -103,7 +103,7 @@ export async function visibleSetsDecibels(
   try {
     const errors = await PictureErrors.of(device, renderer, sided.whole, views, pause);
     try {
-      return decibels(mean(await errors.measure(sided, pause)));
+      return decibelsTogether(await errors.measure(sided, pause));
     } finally {
       errors.destroy();
     }

@@ -1,5 +1,6 @@
-import type { Camera, GaussianCloud } from '@gaussian-splat/core';
+import { GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer, type Quality } from '@gaussian-splat/renderer';
+import type { JudgedViews } from './evaluator.js';
 
 /** An image, [height, width, 4] premultiplied red, green, blue and alpha in float32. */
 export type Image = Float32Array;
@@ -40,7 +41,10 @@ export class Studio implements Painter {
   }
 }
 
-/** Mean squared difference of the three colours, peak 1, over the pixels that the reference covers. */
+/** Whether any pixel of an image is covered. */
+export const isCovered = (image: Image): boolean => image.some((value, k) => k % 4 === 3 && value !== 0);
+
+/** Mean squared difference of the three colours, peak 1, over the pixels that the reference covers; 0 where it covers none. */
 export function meanSquare(image: Image, reference: Image): number {
   let sum = 0;
   let pixels = 0;
@@ -56,3 +60,23 @@ export const decibels = (meanSquare: number): number => -10 * Math.log10(meanSqu
 export const meanSquareOf = (decibels: number): number => 10 ** (-decibels / 10);
 export const mean = (values: readonly number[]): number =>
   values.reduce((sum, value) => sum + value, 0) / values.length;
+
+/** dB of some views together, by the errors of those that show anything; Infinity where none does. */
+export const decibelsTogether = (errors: readonly number[]): number =>
+  errors.length === 0 ? Infinity : decibels(mean(errors));
+
+/**
+ * The error of some views together.
+ * @param errors of those that show anything
+ * @throws GaussianSplatError `argument/value` if none does: nothing could be told of a cut
+ */
+export function errorTogether(errors: readonly number[], views: JudgedViews): number {
+  if (errors.length > 0) return mean(errors);
+  throw new GaussianSplatError('argument/value', {
+    where: views === 'heldOut' ? 'held-out views' : 'searched views',
+    expected: 'views that show some of the scene',
+    found: 'none that does',
+    remedy:
+      'check the axes (OpenCV: x right, y down, z forward), the units and the near planes of the cameras, or whether the scene paints anything',
+  });
+}

@@ -1,7 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { cpuPainter, cpuScorer } from './cpu-raster.js';
 import type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
-import { meanSquare, type Image, type Painter } from './measure.js';
+import { isCovered, meanSquare, type Image, type Painter } from './measure.js';
 import { degreesOf, reduce, type Cut, type ReducedCloud } from './reduce.js';
 import { scoreSplats, type Ranking, type Scores } from './score.js';
 import type { ContributionScorer } from './scorer.js';
@@ -74,7 +74,7 @@ export class PaintedEvaluator implements Evaluator {
     const expected = await this.#wholeBy(painter, views);
     signal?.throwIfAborted();
     const images = await painter.draw(cloud, this.#options.views[views]);
-    return images.map((image, k) => meanSquare(image, expected[k]));
+    return images.flatMap((image, k) => (isCovered(expected[k]) ? [meanSquare(image, expected[k])] : []));
   }
 
   #wholeBy(painter: Painter, views: JudgedViews): Promise<Image[]> {

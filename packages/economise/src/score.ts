@@ -16,7 +16,7 @@ export interface Scores extends Ranking {
   readonly lowered: readonly LoweredColours[];
 }
 
-/** A splat that fewer views looked at is kept: another view may show it in full. */
+/** A splat that fewer views looked at is kept, with all bands of its colour: another view may show it in full. */
 export const MIN_LOOKS = 3;
 
 /**
@@ -48,11 +48,14 @@ export async function scoreSplats(
     }
     if (cloud.shDegree > 0) colours.add(view, energy);
   }
-  for (let i = 0; i < count; i++) {
-    if (looks[i] < MIN_LOOKS) [contribution[i], removalError[i]] = [1, Infinity];
-  }
   colours.addPrior(looks);
-  return { contribution, removalError, lowered: colours.lowered() };
+  const lowered = colours.lowered();
+  for (let i = 0; i < count; i++) {
+    if (looks[i] >= MIN_LOOKS) continue;
+    [contribution[i], removalError[i]] = [1, Infinity];
+    for (const { error } of lowered) error[i] = Infinity;
+  }
+  return { contribution, removalError, lowered };
 }
 
 /** Counts the views in whose frame the centre of each splat lies. */

@@ -1,4 +1,4 @@
-import { DEFAULT_FAR, eyeOf, lookAt, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { cross, DEFAULT_FAR, eyeOf, lookAt, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
 
 export interface ViewOptions {
   readonly width?: number;
@@ -60,7 +60,7 @@ export interface DealtViews {
 
 /**
  * Views halfway between each camera and its nearest neighbour: what people see who move on from where pictures were taken. Scores of few cameras take
- * their very places for all there are.
+ * their very places for all there are. Between two that look in opposite directions, as of a panorama taken apart, there is none.
  */
 export function viewsBetween(views: readonly Camera[]): Camera[] {
   const eyes = views.map(({ worldToCamera }) => eyeOf(worldToCamera));
@@ -72,19 +72,24 @@ export function viewsBetween(views: readonly Camera[]): Camera[] {
     const nearest = distances.indexOf(Math.min(...distances));
     if (Number.isFinite(distances[nearest])) pairs.add([k, nearest].sort((a, b) => a - b).join());
   });
-  return [...pairs].map((pair) => {
+  return [...pairs].flatMap((pair) => {
     const [a, b] = pair.split(',').map(Number);
-    return { ...views[a], worldToCamera: halfway(views[a], views[b]) };
+    const worldToCamera = halfway(views[a], views[b]);
+    return worldToCamera ? [{ ...views[a], worldToCamera }] : [];
   });
 }
 
-/** A pose between two: the eye in the middle, the axes the mean ones, set at right angles again. */
-function halfway(a: Camera, b: Camera): Camera['worldToCamera'] {
+/** Mean axes that are shorter, or nearer to one line, tell no direction. */
+const LEAST_AXIS = 1e-3;
+
+/** A pose between two: the eye in the middle, the axes the mean ones, set at right angles again; undefined where these are none. */
+function halfway(a: Camera, b: Camera): Camera['worldToCamera'] | undefined {
   const [eyeA, eyeB] = [eyeOf(a.worldToCamera), eyeOf(b.worldToCamera)];
   const eye = eyeA.map((value, axis) => (value + eyeB[axis]) / 2) as [number, number, number];
   const axis = (row: number): Vector3 =>
     [0, 1, 2].map((k) => a.worldToCamera[4 * row + k] + b.worldToCamera[4 * row + k]) as [number, number, number];
   const [down, forward] = [axis(1), axis(2)];
+  if (Math.hypot(...cross(down, forward)) < LEAST_AXIS) return undefined;
   const target = eye.map((value, k) => value + forward[k]) as [number, number, number];
   return lookAt(eye, target, [-down[0], -down[1], -down[2]]);
 }

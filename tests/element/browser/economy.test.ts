@@ -1,7 +1,17 @@
 /** Less of a scene, at the page's wish, and all of it back again. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, claimFault, frames, show, showLoaded, until } from './support/harness.js';
+import {
+  assert,
+  assertEqual,
+  claimFault,
+  devices,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
 
 /** So many splats. */
 const BALL = '/net/ball/red.splat?ms=0&n=600';
@@ -83,6 +93,19 @@ describe('economy', () => {
     assertEqual(element.statistics?.splats, splats, 'splats');
     claimFault(/economy expects a share such as 60%, dB such as 57db, or views, found "little"/);
   });
+
+  it('a device that is lost while the scene is looked at, or later, takes nothing with it: no word of it, and then less of the scene again', async () => {
+    const element = show({ src: BALL, economy: '60%' });
+    await element.ready;
+    await frames(20);
+    for (const state of ['at once', 'later']) {
+      devices[devices.length - 1].destroy();
+      await nextEvent(element, 'contextrestored');
+      assertEqual([element.stats?.modelled, element.stats?.inMemory], [600, 600], `${state}: at first`);
+      await until(() => element.stats?.inMemory === 360, `${state}: less again`, 100_000);
+      assertEqual([element.stats?.modelled, element.stats?.spared], [600, 240], `${state}: of all`);
+    }
+  }).timeout(240_000);
 
   it('a scene that is taken away while it is looked at leaves nothing behind', async () => {
     const element = show({ src: BALL, economy: '50%' });

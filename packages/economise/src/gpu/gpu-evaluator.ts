@@ -223,7 +223,7 @@ export class GpuEvaluator implements Evaluator {
       for (let k = 0; k < scores.length; k += stride, i++) {
         const error = scores[k + removal.offset / 4];
         contribution[i] = scores[k + at.offset / 4];
-        removalError[i] = error >= shaders.UNJUDGED ? Infinity : error;
+        removalError[i] = judged(error);
       }
     }
     return { contribution, removalError };
@@ -237,7 +237,7 @@ export class GpuEvaluator implements Evaluator {
     return Array.from({ length: shDegree }, (_, degree) => {
       const [first, end] = [loweredNumbers(shDegree, degree), loweredNumbers(shDegree, degree + 1)];
       const error = new Float32Array(count);
-      for (let i = 0; i < count; i++) error[i] = partOf(i)[stride * (i % partSplats) + degree];
+      for (let i = 0; i < count; i++) error[i] = judged(partOf(i)[stride * (i % partSplats) + degree]);
       const of = (i: number): Float32Array => {
         const at = stride * (i % partSplats);
         return partOf(i).subarray(at + first, at + end);
@@ -246,3 +246,6 @@ export class GpuEvaluator implements Evaluator {
     });
   }
 }
+
+/** What the GPU found: WGSL has no infinity. */
+const judged = (error: number): number => (error >= shaders.UNJUDGED ? Infinity : error);

@@ -95,10 +95,10 @@ export class PictureErrors {
     return this.#covered;
   }
 
-  /** [views] mean squared error of the colours, peak 1, over the pixels that the reference covers; 0 where it covers none. */
+  /** Mean squared error of the colours, peak 1, over the pixels that the reference covers, in each view where it covers any. */
   async measure(gaussians: GaussianScene, pause?: Pause): Promise<number[]> {
     const sums = new Float32Array(await this.#draw(gaussians, ({ camera }) => this.targetOf(camera), pause));
-    return this.#exhibits.map((_, k) => (sums[2 * k + 1] === 0 ? 0 : sums[2 * k] / (3 * sums[2 * k + 1])));
+    return this.#covered.flatMap((pixels, k) => (pixels === 0 ? [] : [sums[2 * k] / (3 * pixels)]));
   }
 
   destroy(): void {

@@ -73,6 +73,8 @@ export class RefiningEvaluator implements Evaluator {
     const { device, descent } = this.#options;
     const pictures = await (this.#pictures ??= this.#draw());
     signal?.throwIfAborted();
+    // Nothing to come near to.
+    if (pictures.covered.every((pixels) => pixels === 0)) return reduced;
     const scene = await RefinedScene.of(device, reduced);
     try {
       const fitter = new SceneFitter(device, this.#renderer, scene, pictures);

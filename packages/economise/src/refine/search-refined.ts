@@ -1,7 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { Evaluator } from '../evaluator.js';
 import { findTrades, type FitOptions, type Trades } from '../fit.js';
-import { decibels, mean } from '../measure.js';
+import { decibels, errorTogether } from '../measure.js';
 import type { Cut, ReducedCloud } from '../reduce.js';
 import type { Ranking } from '../score.js';
 
@@ -69,7 +69,7 @@ export async function searchRefined(
     const found = { plan, ...(await cutCloud(plan, evaluator, budget, signal)) };
     const errors: number[] = [];
     for (const views of ['searched', 'heldOut'] as const)
-      errors.push(mean(await evaluator.sketch(found.reduced.cloud, views, signal)));
+      errors.push(errorTogether(await evaluator.sketch(found.reduced.cloud, views, signal), views));
     const error = Math.max(...errors);
     onStep(`refined: ${decibels(error).toFixed(2)} dB, ${found.reduced.cloud.count} splats`);
     tried.push({ filling: next, error });

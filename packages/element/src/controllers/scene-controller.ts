@@ -192,7 +192,6 @@ export class SceneController implements ReactiveController {
     } catch {
       if (!signal.aborted && this.#scene !== scene) await this.#attempt(request, signal, false, () => undefined);
     }
-    this.#host.requestUpdate();
   }
 
   /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
@@ -264,6 +263,7 @@ export class SceneController implements ReactiveController {
     await Promise.race([show(scene, entrance), scene.lost]);
     if (signal.aborted) return;
     if (scene.isLost) throw new DeviceLostError((await scene.lost).message);
+    this.#host.requestUpdate();
     void scene.lost.then(() => {
       if (this.#scene !== scene) return;
       // What will take its place has its own way back.

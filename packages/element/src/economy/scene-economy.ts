@@ -44,9 +44,19 @@ export class SceneEconomy {
    */
   async apply(goal: EconomyGoal | null, memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
     const either = AbortSignal.any([signal, this.#gone.signal]);
-    if (goal === 'views') return this.#showByView(memoryBudget, either);
+    try {
+      await this.#show(goal, memoryBudget, either);
+    } catch (error) {
+      // The buffers of a device that goes fail before it says that it is gone.
+      await Promise.race([this.#scene.lost, new Promise((resolve) => setTimeout(resolve, LOSS_MS))]);
+      throw error;
+    }
+  }
+
+  async #show(goal: EconomyGoal | null, memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
+    if (goal === 'views') return this.#showByView(memoryBudget, signal);
     this.#forgetSides();
-    return goal === null ? this.#showWhole(memoryBudget, either) : this.#showMasked(goal, memoryBudget, either);
+    return goal === null ? this.#showWhole(memoryBudget, signal) : this.#showMasked(goal, memoryBudget, signal);
   }
 
   async #showByView(memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
@@ -80,7 +90,7 @@ export class SceneEconomy {
   async #showWhole(memoryBudget: number | undefined, signal: AbortSignal): Promise<void> {
     if (!this.#isMasked) return;
     const { whole } = await this.#mask!;
-    this.#show(await GaussianBuffers.upload(this.#scene.device, whole, { memoryBudget }), signal);
+    this.#put(await GaussianBuffers.upload(this.#scene.device, whole, { memoryBudget }), signal);
     this.#isMasked = false;
     this.#report = WHOLE;
   }
@@ -91,7 +101,7 @@ export class SceneEconomy {
     signal.throwIfAborted();
     const { packed, decibels } = await mask.masked(goal, signal);
     const { whole } = mask;
-    this.#show(await GaussianBuffers.upload(this.#scene.device, packed, { memoryBudget }), signal);
+    this.#put(await GaussianBuffers.upload(this.#scene.device, packed, { memoryBudget }), signal);
     this.#isMasked = true;
     this.#report = { spared: whole.count - packed.count, decibels, byView: false };
   }
@@ -108,7 +118,7 @@ export class SceneEconomy {
   }
 
   /** Other splats in place of those on show, unless they come too late. */
-  #show(gaussians: GaussianBuffers, signal: AbortSignal): void {
+  #put(gaussians: GaussianBuffers, signal: AbortSignal): void {
     if (signal.aborted) gaussians.destroy();
     signal.throwIfAborted();
     this.#scene.replaceGaussians(gaussians);
@@ -116,6 +126,8 @@ export class SceneEconomy {
 }
 
 const WHOLE: EconomyReport = { spared: 0, decibels: null, byView: false };
+/** How long it takes at most until a lost device says so, ms. */
+const LOSS_MS = 200;
 /** What `balanced`, the best quality that leaves out what does not show, is held to. */
 const LEAST_DECIBELS = 42;
 

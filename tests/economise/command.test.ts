@@ -1,0 +1,102 @@
+/** `npm run economise` as people meet it: what it refuses before any work, what it writes, and that what it reads stays as it is. */
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { linkSync, mkdtempSync, readdirSync, readFileSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { boundsOf, type Camera } from '@gaussian-splat/core';
+import { encodingsFor, viewsAround } from '@gaussian-splat/economise';
+import { readScene } from '@gaussian-splat/formats';
+import { writeWhole } from '../../scripts/lib/output-file.mjs';
+import { smallCloud } from '../formats/support/small-cloud.js';
+
+const script = fileURLToPath(new URL('../../scripts/economise-scene.mjs', import.meta.url));
+const folder = mkdtempSync(join(tmpdir(), 'economise-'));
+after(() => rmSync(folder, { recursive: true }));
+
+const cloud = smallCloud(300, 1);
+const source = await encodingsFor('a.ply')[0].write({ cloud, degrees: new Uint8Array(300).fill(1) });
+const scene = join(folder, 'scene.ply');
+writeFileSync(scene, source);
+const rows = (m: Camera['worldToCamera']): number[][] => [0, 1, 2, 3].map((row) => [...m].slice(4 * row, 4 * row + 4));
+const views = viewsAround(boundsOf(cloud), 10, { width: 64, height: 36 }).map(
+  ({ width, height, fx, fy, cx, cy, worldToCamera }) => ({
+    ...{ width, height, worldToCamera: rows(worldToCamera) },
+    K: [
+      [fx, 0, cx],
+      [0, fy, cy],
+      [0, 0, 1],
+    ],
+  }),
+);
+const cameras = join(folder, 'views.json');
+writeFileSync(cameras, JSON.stringify({ views }));
+
+function command(...args: string[]): { status: number | null; said: string } {
+  const env = { ...process.env, INIT_CWD: folder };
+  const { status, stdout, stderr } = spawnSync(process.execPath, [script, ...args], { encoding: 'utf8', env });
+  return { status, said: stdout + stderr };
+}
+
+test('files that it reads are none that it writes, by whatever name', () => {
+  symlinkSync(scene, join(folder, 'link.ply'));
+  linkSync(scene, join(folder, 'twin.ply'));
+  for (const [args, reason] of [
+    [['--out', 'scene.ply'], /--out: expected another file than SCENE/],
+    [['--out', 'link.ply'], /--out: expected another file than SCENE/],
+    [['--out', 'twin.ply'], /--out: expected another file than SCENE/],
+    [['--out', 'a.glb', '--report', 'scene.ply'], /--report: expected another file than SCENE/],
+    [['--out', 'a.glb', '--views', 'views.json', '--report', './views.json'], /--report: .* that of --views/],
+    [['--out', 'a.glb', '--report', 'a.glb'], /--report: expected another file than that of --out/],
+  ] as const) {
+    const { status, said } = command('scene.ply', '--min-db', '40', ...args);
+    assert.equal(status, 2, said);
+    assert.match(said, reason);
+  }
+  assert.deepEqual(readFileSync(scene), Buffer.from(source));
+});
+
+test('what cannot be written or read is said before the work, for people', () => {
+  writeFileSync(join(folder, 'cameras.json'), '{"cameras": []}');
+  writeFileSync(join(folder, 'prose.json'), 'hello');
+  for (const [args, status, reason] of [
+    [['none.ply', '--out', 'nowhere/a.glb'], 2, /--out: the folder .*nowhere does not exist/],
+    [['none.ply', '--out', 'a.glb', '--report', '.'], 2, /--report: .* is a folder/],
+    [['none.ply', '--out', 'a.obj'], 1, /expected a name that ends in .*\[argument\/value\]/],
+    [['none.ply', '--out', 'a.glb'], 1, /^ENOENT: no such file.*none\.ply'$/m],
+    [['scene.ply', '--out', 'a.glb', '--views', 'cameras.json'], 2, /found no list "views"/],
+    [['scene.ply', '--out', 'a.glb', '--views', 'prose.json'], 2, /prose\.json is no JSON/],
+    [['scene.ply', '--out', 'a.glb', '--views', '.'], 1, /^EISDIR/m],
+  ] as const) {
+    const found = command('--min-db', '40', ...args);
+    assert.equal(found.status, status, found.said);
+    assert.match(found.said, reason);
+    assert.doesNotMatch(found.said, /\n {4}at /, 'no stack');
+  }
+});
+
+test('what it says of the written file is what a reader finds in it', async () => {
+  const { status, said } = command('scene.ply', '--min-db', '30', '--out', 'less.glb', '--views', 'views.json');
+  assert.equal(status, 0, said);
+  const bytes = readFileSync(join(folder, 'less.glb'));
+  const { count } = await readScene(bytes, { name: 'less.glb' });
+  assert.match(said, new RegExp(`splats +${count} of 300 `));
+  assert.match(said, new RegExp(`bytes +${bytes.length} of ${source.length} `));
+  assert.match(said, /found +3\d\.\d\d dB in 2 held-out views/);
+  assert.deepEqual(readFileSync(scene), Buffer.from(source));
+});
+
+test('where writing fails, what was there stays', () => {
+  const path = join(folder, 'there.glb');
+  writeWhole(path, 'first');
+  assert.throws(() => writeWhole(path, 5 as unknown as string));
+  assert.equal(readFileSync(path, 'utf8'), 'first');
+  writeWhole(path, 'second');
+  assert.equal(readFileSync(path, 'utf8'), 'second');
+  assert.deepEqual(
+    readdirSync(folder).filter((name) => name.endsWith('.part')),
+    [],
+  );
+});
