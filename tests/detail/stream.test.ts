@@ -267,6 +267,34 @@ test('a page of the wrong length, and a manifest with anything wrong in it, are 
   assert.throws(() => checkManifest(null, 'detail.json'), { code: 'decode/unsupported' });
 });
 
+test('a manifest in which two pages are below one chunk, a file has two lengths, or instances make more pages than there may be is refused', () => {
+  const root = { file: 'a', chunks: 5, upper: 1 };
+  const leaf = (file: string, parent: readonly [number, number], chunks = 4): object => ({
+    ...{ file, chunks, upper: chunks, parent },
+  });
+  const check = (pages: readonly object[], instances: readonly object[] = []): unknown => {
+    const first = { tree: 0, translate: [0, 0, 0] };
+    return checkManifest({ ...folder.manifest, trees: [{ pages }], instances: [first, ...instances] }, 'detail.json');
+  };
+  const copy = (parent: readonly [number, number]): object => ({ tree: 0, translate: [1, 0, 0], parent });
+  check([root, leaf('b', [0, 1]), leaf('c', [0, 2])], [copy([0, 3]), copy([0, 4]), copy([1, 0])]);
+  const refused = { code: 'decode/header', message: /nothing else is below/ };
+  assert.throws(() => check([root, leaf('b', [0, 1]), leaf('c', [0, 1])]), refused, 'two files');
+  assert.throws(() => check([root, leaf('b', [0, 0])]), refused, 'a file, and a page of the same file');
+  assert.throws(() => check([root, leaf('b', [0, 1])], [copy([0, 1])]), refused, 'a file and a copy');
+  assert.throws(() => check([root], [copy([0, 2]), copy([0, 2])]), refused, 'two copies');
+  assert.throws(() => check([root, leaf('b', [0, 1]), leaf('b', [0, 2], 3)]), {
+    code: 'decode/header',
+    message: /chunks of b/,
+  });
+  // 2 MB of text, 10 GB of memory.
+  const pages = Array.from({ length: 10_000 }, (_, p) =>
+    p === 0 ? root : leaf(`${p}`, p < 5 ? [0, p] : [(p - 1) >> 2, (p - 1) & 3]),
+  );
+  const places = Array.from({ length: 10_000 }, (_, k) => copy([5000 + (k >> 2), k & 3]));
+  assert.throws(() => check(pages, places), { code: 'decode/header', message: /at most 4194304 pages/ });
+});
+
 /** Most that the picture of a camera at rest changes from one frame to the next, in dB, while pages come. */
 async function largestChange(arrivalMs: number): Promise<{ decibels: number; frames: number; pages: number }> {
   const device = await anyDevice();
