@@ -41,6 +41,16 @@ test('a camera that moves and turns evenly is foreseen exactly, half a second an
   assert.ok(apart(slow.ahead(200), at(700)) < 1e-9);
 });
 
+test('a camera whose matrix is written over for every frame is foreseen as one that is made anew', () => {
+  const worldToCamera = new Float64Array(16);
+  const motion = watched(500, (time) => {
+    worldToCamera.set(cameraAt([1, 2, 3], 0.002 * time).worldToCamera);
+    return { ...lens, worldToCamera };
+  });
+  assert.ok(motion.isMoving);
+  assert.ok(apart(motion.ahead(200), cameraAt([1, 2, 3], 1.4)) < 1e-9);
+});
+
 test('nothing is foreseen of a camera that rests, jumps, goes to and fro or was not seen for a while', () => {
   const from: Vector3 = [1, 2, 3];
   const cases: [string, (time: number) => Camera][] = [
