@@ -2,7 +2,14 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { eyeOf, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { CameraMotion, MOST_UPLOAD_BYTES, PageFiles, UPLOAD_SHARE, UploadPace } from '@gaussian-splat/renderer/stages';
+import {
+  CameraMotion,
+  folderSource,
+  MOST_UPLOAD_BYTES,
+  PageFiles,
+  UPLOAD_SHARE,
+  UploadPace,
+} from '@gaussian-splat/renderer/stages';
 import { detailFolder } from '../support/detail-folder.js';
 import { FlightPages } from '../support/flight-pages.js';
 import { fly } from '../support/flight.js';
@@ -138,6 +145,27 @@ test('a fetch ends when the last who waits gives up, and a file that failed may 
   const third = files.get('a', new AbortController().signal);
   open.get('a')!.arrive();
   assert.equal((await third).byteLength, 1000);
+});
+
+test('a file that comes short is refused and fetched again, and a view of bytes is as good as their buffer', async () => {
+  const { manifest, files } = detailFolder(pebbles(2_000));
+  const { signal } = new AbortController();
+  const answers: (ArrayBuffer | Uint8Array)[] = [];
+  let fetched = 0;
+  const source = folderSource(manifest, () => {
+    fetched++;
+    return Promise.resolve(answers.shift() as ArrayBuffer);
+  });
+  const whole = files.get('part-0')!;
+  const padded = new Uint8Array(whole.byteLength + 24);
+  padded.set(new Uint8Array(whole), 8);
+  answers.push(whole.slice(8), padded.subarray(8, 8 + whole.byteLength));
+  await assert.rejects(source.fetch(0, signal), { code: 'decode/truncated' });
+  assert.ok(!source.isAtHand!(0));
+  const [{ words }] = await source.fetch(0, signal);
+  assert.deepEqual(words, new Uint32Array(whole));
+  await source.fetch(0, signal);
+  assert.equal(fetched, 2, 'kept');
 });
 
 /** Frames of a page that uploads all it may. @returns bytes of each, and the share after it */
