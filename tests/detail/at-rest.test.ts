@@ -83,6 +83,28 @@ test('within a budget of splats and a pool that is full, a view at rest comes to
   [drawing, picture].forEach((owner) => owner.destroy());
 });
 
+test('pages that do not come are asked for again, though the view is at rest', async () => {
+  const folder = detailFolder(pebbles(6_000));
+  const errors: unknown[] = [];
+  let isDown = true;
+  const { scene, live } = await open(folder, {
+    fetchPage: (file) =>
+      isDown && file !== 'part-0' ? Promise.reject(new Error(`${file}: offline`)) : folder.fetchPage(file),
+    onError: (error) => errors.push(error),
+  });
+  const [drawing, picture] = [await renderer(), await target()];
+  const draw = (): void =>
+    drawing.render({ gaussians: scene, camera: besides([0, 0, 0], 4, 1), target: picture, detail: 0.2 });
+  await live(3000, draw);
+  const { resident } = scene.progress;
+  assert.ok(errors.length > 0 && scene.progress.error > 0.2);
+  isDown = false;
+  await pause(4500);
+  await live(3000, draw);
+  assert.ok(scene.progress.resident > resident && scene.progress.error === 0, JSON.stringify(scene.progress));
+  [drawing, picture, scene].forEach((owner) => owner.destroy());
+});
+
 // Dawn keeps Node alive.
 after(() => {
   setImmediate(() => process.exit());
