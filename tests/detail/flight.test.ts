@@ -150,11 +150,11 @@ test('a fetch ends when the last who waits gives up, and a file that failed may 
 test('a file that comes short is refused and fetched again, and a view of bytes is as good as their buffer', async () => {
   const { manifest, files } = detailFolder(pebbles(2_000));
   const { signal } = new AbortController();
-  const answers: (ArrayBuffer | Uint8Array)[] = [];
+  const answers: (ArrayBuffer | Uint8Array<ArrayBuffer>)[] = [];
   let fetched = 0;
   const source = folderSource(manifest, () => {
     fetched++;
-    return Promise.resolve(answers.shift() as ArrayBuffer);
+    return Promise.resolve(answers.shift()!);
   });
   const whole = files.get('part-0')!;
   const padded = new Uint8Array(whole.byteLength + 24);

@@ -3,7 +3,14 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
 import type { Camera, Vector3 } from '@gaussian-splat/core';
-import { checkManifest, GaussianBuffers, packWithDetail, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import {
+  checkManifest,
+  GaussianBuffers,
+  MemoryLedger,
+  packWithDetail,
+  Renderer,
+  StreamedGaussians,
+} from '@gaussian-splat/renderer';
 import { constants, listPages, NONE, SLOT_CHUNKS, Residency } from '@gaussian-splat/renderer/stages';
 import { detailFolder, type DetailFolder } from '../support/detail-folder.js';
 import { shareDrawn, type DetailView } from '../support/detail-twin.js';
@@ -265,6 +272,36 @@ test('a page of the wrong length, and a manifest with anything wrong in it, are 
     );
   }
   assert.throws(() => checkManifest(null, 'detail.json'), { code: 'decode/unsupported' });
+});
+
+test('an opening that is given up ends its fetch and holds no memory, and a time that is none is refused', async () => {
+  const device = await anyDevice();
+  const before = MemoryLedger.of(device).entries.length;
+  const closing = new AbortController();
+  let isFetching = false;
+  let isAborted = false;
+  // A server that takes the request and never answers.
+  const fetchPage = (_: string, signal: AbortSignal): Promise<ArrayBuffer> =>
+    new Promise((_, reject) => {
+      isFetching = true;
+      signal.addEventListener('abort', () => {
+        isAborted = true;
+        reject(new Error('aborted'));
+      });
+    });
+  const opening = StreamedGaussians.open(device, folder.manifest, { fetchPage, signal: closing.signal });
+  while (!isFetching) await pause(1);
+  assert.equal(MemoryLedger.of(device).entries.length, before + 1);
+  const reason = new Error('the element is gone');
+  closing.abort(reason);
+  await assert.rejects(Promise.race([opening, pause(2000).then(() => 'still open')]), reason);
+  assert.ok(isAborted);
+  assert.equal(MemoryLedger.of(device).entries.length, before);
+  for (const arrivalMs of [-1, NaN, Infinity]) {
+    const open = StreamedGaussians.open(device, folder.manifest, { fetchPage: folder.fetchPage, arrivalMs });
+    await assert.rejects(open, { code: 'argument/value', message: /arrivalMs/ });
+  }
+  assert.equal(MemoryLedger.of(device).entries.length, before);
 });
 
 test('a manifest in which two pages are below one chunk, a file has two lengths, or instances make more pages than there may be is refused', () => {

@@ -28,7 +28,7 @@ const KEPT_BYTES = 64e6;
 /** The pages of a folder that `npm run detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again. */
 export function folderSource(
   manifest: DetailManifest,
-  fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>,
+  fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>,
 ): PageSource {
   const list = listPages(manifest);
   const lengthOf = (chunks: number): number => 4 * pageLayout(manifest, chunks).total;
