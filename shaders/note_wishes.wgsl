@@ -20,6 +20,10 @@ const UNSEEN = 0.125;
 // Share of the pixels that are allowed from which on a page is wished for, though nothing of it is drawn yet: the view lacks it soon.
 const SOON = 0.93;
 
+// Share of the pixels that a budget allows down to which a page that is there is still wished for. A page that comes takes of the budget, so more is allowed: with one bound it would
+// be wished for no more, leave, and be wished for again. Half an octave is four of the steps in which a budget is found.
+const KEPT = 0.7;
+
 // Pixels that doing without what is finer costs a view, from so many of them on.
 fn wish_of(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, least: f32) -> f32 {
   let pixels = screen_error(seen, d.sphere, d.full_error);
@@ -38,8 +42,10 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   later.local_to_camera = mat4x4f(ahead[0], ahead[1], ahead[2], ahead[3]);
   later.eye = ahead[4].xyz;
   let allowed = max(view.detail, chunk_shares[arrayLength(&chunk_shares) - 1u]);
-  let soon = SOON * allowed;
-  let wish = max(wish_of(view, chunks[chunk], d, allowed, soon), wish_of(later, chunks[chunk], d, allowed, soon));
+  let is_kept = d.error > 0.0 && allowed > view.detail;
+  let bound = select(allowed, max(view.detail, KEPT * allowed), is_kept);
+  let soon = SOON * bound;
+  let wish = max(wish_of(view, chunks[chunk], d, bound, soon), wish_of(later, chunks[chunk], d, bound, soon));
   if (wish > 0.0) { atomicMax(&wishes[page], bitcast<u32>(wish)); }
   if (d.error > 0.0) { return; }
   let now = wish_of(view, chunks[chunk], d, allowed, allowed);

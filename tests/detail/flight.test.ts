@@ -2,7 +2,14 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { eyeOf, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { CameraMotion, MOST_UPLOAD_BYTES, PageFiles, UPLOAD_SHARE, UploadPace } from '@gaussian-splat/renderer/stages';
+import {
+  CameraMotion,
+  folderSource,
+  MOST_UPLOAD_BYTES,
+  PageFiles,
+  UPLOAD_SHARE,
+  UploadPace,
+} from '@gaussian-splat/renderer/stages';
 import { detailFolder } from '../support/detail-folder.js';
 import { FlightPages } from '../support/flight-pages.js';
 import { fly } from '../support/flight.js';
@@ -39,6 +46,16 @@ test('a camera that moves and turns evenly is foreseen exactly, half a second an
   const slow = new CameraMotion();
   for (let time = 0; time <= 500; time += 100) slow.observe(at(time), time);
   assert.ok(apart(slow.ahead(200), at(700)) < 1e-9);
+});
+
+test('a camera whose matrix is written over for every frame is foreseen as one that is made anew', () => {
+  const worldToCamera = new Float64Array(16);
+  const motion = watched(500, (time) => {
+    worldToCamera.set(cameraAt([1, 2, 3], 0.002 * time).worldToCamera);
+    return { ...lens, worldToCamera };
+  });
+  assert.ok(motion.isMoving);
+  assert.ok(apart(motion.ahead(200), cameraAt([1, 2, 3], 1.4)) < 1e-9);
 });
 
 test('nothing is foreseen of a camera that rests, jumps, goes to and fro or was not seen for a while', () => {
@@ -128,6 +145,27 @@ test('a fetch ends when the last who waits gives up, and a file that failed may 
   const third = files.get('a', new AbortController().signal);
   open.get('a')!.arrive();
   assert.equal((await third).byteLength, 1000);
+});
+
+test('a file that comes short is refused and fetched again, and a view of bytes is as good as their buffer', async () => {
+  const { manifest, files } = detailFolder(pebbles(2_000));
+  const { signal } = new AbortController();
+  const answers: (ArrayBuffer | Uint8Array<ArrayBuffer>)[] = [];
+  let fetched = 0;
+  const source = folderSource(manifest, () => {
+    fetched++;
+    return Promise.resolve(answers.shift()!);
+  });
+  const whole = files.get('part-0')!;
+  const padded = new Uint8Array(whole.byteLength + 24);
+  padded.set(new Uint8Array(whole), 8);
+  answers.push(whole.slice(8), padded.subarray(8, 8 + whole.byteLength));
+  await assert.rejects(source.fetch(0, signal), { code: 'decode/truncated' });
+  assert.ok(!source.isAtHand!(0));
+  const [{ words }] = await source.fetch(0, signal);
+  assert.deepEqual(words, new Uint32Array(whole));
+  await source.fetch(0, signal);
+  assert.equal(fetched, 2, 'kept');
 });
 
 /** Frames of a page that uploads all it may. @returns bytes of each, and the share after it */

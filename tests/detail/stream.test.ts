@@ -3,7 +3,14 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { setTimeout as pause } from 'node:timers/promises';
 import type { Camera, Vector3 } from '@gaussian-splat/core';
-import { checkManifest, GaussianBuffers, packWithDetail, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import {
+  checkManifest,
+  GaussianBuffers,
+  MemoryLedger,
+  packWithDetail,
+  Renderer,
+  StreamedGaussians,
+} from '@gaussian-splat/renderer';
 import { constants, listPages, NONE, SLOT_CHUNKS, Residency } from '@gaussian-splat/renderer/stages';
 import { detailFolder, type DetailFolder } from '../support/detail-folder.js';
 import { shareDrawn, type DetailView } from '../support/detail-twin.js';
@@ -265,6 +272,64 @@ test('a page of the wrong length, and a manifest with anything wrong in it, are 
     );
   }
   assert.throws(() => checkManifest(null, 'detail.json'), { code: 'decode/unsupported' });
+});
+
+test('an opening that is given up ends its fetch and holds no memory, and a time that is none is refused', async () => {
+  const device = await anyDevice();
+  const before = MemoryLedger.of(device).entries.length;
+  const closing = new AbortController();
+  let isFetching = false;
+  let isAborted = false;
+  // A server that takes the request and never answers.
+  const fetchPage = (_: string, signal: AbortSignal): Promise<ArrayBuffer> =>
+    new Promise((_, reject) => {
+      isFetching = true;
+      signal.addEventListener('abort', () => {
+        isAborted = true;
+        reject(new Error('aborted'));
+      });
+    });
+  const opening = StreamedGaussians.open(device, folder.manifest, { fetchPage, signal: closing.signal });
+  while (!isFetching) await pause(1);
+  assert.equal(MemoryLedger.of(device).entries.length, before + 1);
+  const reason = new Error('the element is gone');
+  closing.abort(reason);
+  await assert.rejects(Promise.race([opening, pause(2000).then(() => 'still open')]), reason);
+  assert.ok(isAborted);
+  assert.equal(MemoryLedger.of(device).entries.length, before);
+  for (const arrivalMs of [-1, NaN, Infinity]) {
+    const open = StreamedGaussians.open(device, folder.manifest, { fetchPage: folder.fetchPage, arrivalMs });
+    await assert.rejects(open, { code: 'argument/value', message: /arrivalMs/ });
+  }
+  assert.equal(MemoryLedger.of(device).entries.length, before);
+});
+
+test('a manifest in which two pages are below one chunk, a file has two lengths, or instances make more pages than there may be is refused', () => {
+  const root = { file: 'a', chunks: 5, upper: 1 };
+  const leaf = (file: string, parent: readonly [number, number], chunks = 4): object => ({
+    ...{ file, chunks, upper: chunks, parent },
+  });
+  const check = (pages: readonly object[], instances: readonly object[] = []): unknown => {
+    const first = { tree: 0, translate: [0, 0, 0] };
+    return checkManifest({ ...folder.manifest, trees: [{ pages }], instances: [first, ...instances] }, 'detail.json');
+  };
+  const copy = (parent: readonly [number, number]): object => ({ tree: 0, translate: [1, 0, 0], parent });
+  check([root, leaf('b', [0, 1]), leaf('c', [0, 2])], [copy([0, 3]), copy([0, 4]), copy([1, 0])]);
+  const refused = { code: 'decode/header', message: /nothing else is below/ };
+  assert.throws(() => check([root, leaf('b', [0, 1]), leaf('c', [0, 1])]), refused, 'two files');
+  assert.throws(() => check([root, leaf('b', [0, 0])]), refused, 'a file, and a page of the same file');
+  assert.throws(() => check([root, leaf('b', [0, 1])], [copy([0, 1])]), refused, 'a file and a copy');
+  assert.throws(() => check([root], [copy([0, 2]), copy([0, 2])]), refused, 'two copies');
+  assert.throws(() => check([root, leaf('b', [0, 1]), leaf('b', [0, 2], 3)]), {
+    code: 'decode/header',
+    message: /chunks of b/,
+  });
+  // 2 MB of text, 10 GB of memory.
+  const pages = Array.from({ length: 10_000 }, (_, p) =>
+    p === 0 ? root : leaf(`${p}`, p < 5 ? [0, p] : [(p - 1) >> 2, (p - 1) & 3]),
+  );
+  const places = Array.from({ length: 10_000 }, (_, k) => copy([5000 + (k >> 2), k & 3]));
+  assert.throws(() => check(pages, places), { code: 'decode/header', message: /at most 4194304 pages/ });
 });
 
 /** Most that the picture of a camera at rest changes from one frame to the next, in dB, while pages come. */

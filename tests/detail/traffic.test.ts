@@ -57,7 +57,7 @@ interface Pool {
   readonly look: (share: (page: number) => number) => Float32Array;
 }
 
-function pool(pages: number, slots: number, below = 16): Pool {
+function pool(pages: number, slots: number, below = 16, now?: () => number): Pool {
   const list = pageTree(pages, below);
   const residency = new Residency(list, slots);
   residency.begin(0);
@@ -67,6 +67,7 @@ function pool(pages: number, slots: number, below = 16): Pool {
     fetch: server.fetch,
     onArrival: () => undefined,
     onError: (error) => errors.push(error),
+    now,
   });
   const look: Pool['look'] = (share) => {
     const wishes = wishesOf(list, (page) => residency.isResident(page), share);
@@ -169,6 +170,33 @@ test('pages that fail are told of once, make room for others, and nothing comes 
   await turn();
   assert.equal(all.errors.length, MOST_FETCHES);
   assert.equal(all.server.open.length, 0);
+});
+
+test('a page that fails again and again is asked for after 4 s, then 8 s, and so on', async () => {
+  let now = 0;
+  const all = pool(2, 2, 16, () => now);
+  const isAskedAt = (seconds: number): boolean => {
+    now = 1000 * seconds;
+    all.look(() => 0.5);
+    return all.server.open.length > 0;
+  };
+  const fail = async (): Promise<void> => {
+    all.server.open.splice(0).forEach((fetch) => fetch.fail());
+    await turn();
+  };
+  assert.ok(isAskedAt(0));
+  for (const [from, to] of [
+    [0, 4],
+    [4, 12],
+    [12, 28],
+  ]) {
+    await fail();
+    assert.ok(!isAskedAt(to - 0.1), `${to - from} s have not passed`);
+    assert.ok(isAskedAt(to));
+  }
+  await all.server.answer();
+  assert.deepEqual(place(all, 1), [1]);
+  all.traffic.close();
 });
 
 test('in a small pool, whatever comes in whatever order, what is above a page is there, and views at rest come to rest', async () => {

@@ -7,6 +7,7 @@ import { readCoarsest, readLodScene, readScene, SogFiles, type SogRun } from '@g
 import { lodFolder, pick, type LodFolder } from '../support/lod-folder.js';
 import { assertHelpful, assertSameCloud } from './support/expect.js';
 import { smallCloud } from './support/small-cloud.js';
+import { writeSog } from './support/sog-writer.js';
 
 const cloud = smallCloud(600, 1);
 const sky = smallCloud(7, 0, 3);
@@ -85,6 +86,23 @@ test('an index that names more splats than there can be is refused before anythi
     () => readLodScene(new TextEncoder().encode(text), 'lod-meta.json', INDEX),
     (error: GaussianSplatError) => error.code === 'decode/header' && /4,000,000,\d+/.test(error.message),
   );
+});
+
+test('a tree with more boxes below one node than a call has arguments is read, box by box and whole', async () => {
+  const count = 130_000;
+  const one = smallCloud(1, 0);
+  const splats = pick(one, new Array<number>(count).fill(0));
+  const bound = { min: [0, 0, 0], max: [1, 1, 1] };
+  const children = Array.from({ length: count }, (_, k) => ({ bound, lods: { 0: { file: 0, offset: k, count: 1 } } }));
+  const meta = { version: 1, lodLevels: 1, filenames: ['0_0/meta.json'], tree: { bound, children } };
+  const index = new TextEncoder().encode(JSON.stringify(meta));
+  const files = new Map(Object.entries(writeSog(splats)).map(([path, bytes]) => [`0_0/${path}`, bytes]));
+  assert.deepEqual(
+    readLodScene(index, 'lod-meta.json', INDEX).boxes.map(({ runs: [{ first }] }) => first),
+    [...Array(count).keys()],
+  );
+  const open = (path: string): Promise<Uint8Array> => Promise.resolve(files.get(path)!);
+  assert.equal((await readScene(index, { name: 'lod-meta.json', openPart: open })).count, count);
 });
 
 test('the coarsest runs and the environment are what the reader of whole scenes finds, and no other file is fetched', async () => {

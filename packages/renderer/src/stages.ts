@@ -19,6 +19,7 @@ export { BRIDGED, DetailTable } from './detail/detail-table.js';
 export { SLOT_CHUNKS } from './detail/manifest.js';
 export { MOST_FETCHES, MOST_UNDER_WAY, PageTraffic } from './detail/page-traffic.js';
 export { PageFiles } from './detail/page-files.js';
+export { folderSource } from './detail/page-source.js';
 export { Residency } from './detail/residency.js';
 export { MOST_UPLOAD_BYTES, UPLOAD_SHARE, UploadPace } from './detail/upload-pace.js';
 export { halfBits } from './pack/half.js';

@@ -42,6 +42,7 @@ export async function openStreamed(
   const caps = capsOf();
   const pool: PoolOptions = {
     memoryBudget: Math.min(memoryBudget, caps.bytes),
+    signal,
     onChange,
     // A page that is missing leaves what stands for it on show; the console tells whoever looks.
     onError: (error) => console.warn(error instanceof Error ? error.message : error),

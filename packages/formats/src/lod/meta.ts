@@ -68,7 +68,7 @@ function isCount(value: unknown): value is number {
   return Number.isSafeInteger(value) && (value as number) >= 0;
 }
 
-/** Walks the tree without recursion: its depth is the file's to choose. */
+/** Walks the tree without recursion, and hands no call a node's children one by one: its depth and breadth are the file's to choose. */
 function collectLeaves(root: unknown, levels: number, files: number, fail: Fail): LodLeaf[] {
   const leaves: LodLeaf[] = [];
   const open: unknown[] = [root];
@@ -76,7 +76,8 @@ function collectLeaves(root: unknown, levels: number, files: number, fail: Fail)
     const node = open.pop();
     if (!isObject(node)) return fail('tree', 'an object for each box', node);
     // The first child is the next.
-    if (Array.isArray(node.children)) for (const child of [...node.children].reverse()) open.push(child);
+    const children: unknown[] = Array.isArray(node.children) ? node.children : [];
+    for (let k = children.length - 1; k >= 0; k--) open.push(children[k]);
     if (node.lods !== undefined) leaves.push(parseLeaf(node, levels, files, fail));
   }
   return leaves;

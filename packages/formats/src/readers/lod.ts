@@ -43,7 +43,7 @@ async function readRuns(
     source.signal?.throwIfAborted();
     const cloud = await readPart(files[file], open, source);
     const own = runs.filter((run) => run.file === file);
-    parts.push(...partsOf(cloud, own, files[file], source.name));
+    for (const part of partsOf(cloud, own, files[file], source.name)) parts.push(part);
   }
   return parts;
 }

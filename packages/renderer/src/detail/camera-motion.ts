@@ -52,7 +52,9 @@ export class CameraMotion {
   observe(camera: Camera, now: number): void {
     const last = this.#samples.at(-1);
     if (last && now - last.at > PAUSE_MS) this.#samples.length = 0;
-    this.#samples.push({ camera, eye: eyeOf(camera.worldToCamera), at: now });
+    // Of whoever draws: one may write into the same matrix for every frame.
+    const worldToCamera = Float64Array.from(camera.worldToCamera);
+    this.#samples.push({ camera: { ...camera, worldToCamera }, eye: eyeOf(worldToCamera), at: now });
     // The oldest is the last that is two stretches old; frames that take longer than a stretch leave three.
     while (this.#samples.length > 3 && now - this.#samples[1].at >= 2 * STRETCH_MS) this.#samples.shift();
   }

@@ -9,6 +9,8 @@ import { DETAIL_NUMBERS } from './chunk-detail.js';
 export const { SLOT_CHUNKS } = constants;
 /** Chunks of a file at most: four that have one parent, and what those four stand for. */
 const FILE_CHUNKS = 20;
+/** Pages of all instances at most, for 4.3 billion splats. Each takes some 90 bytes of the page's memory before any is there, and shaders number them with 24 bits. */
+export const MOST_PAGES = 1 << 22;
 
 /** A file of a tree: a page of chunks that have one parent, and behind it the pages below each of these chunks in turn, all full but the last. */
 export interface TreePage {
@@ -107,7 +109,51 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
       (i === 0 || isPlace(instance.parent, trees![instances![0].tree].pages));
     if (!isFine) fail(`instances[${i}]`, 'a tree, where it stands, and the chunk above it', instance);
   });
+  checkPages(manifest as DetailManifest, fail);
   return manifest as DetailManifest;
+}
+
+/** What files and instances must agree in, each of which is fine by itself. */
+function checkPages({ trees, instances }: DetailManifest, fail: Fail): void {
+  const lengths = new Map<string, number>();
+  const taken = trees.map((tree, t) => {
+    const places = new Places(tree);
+    tree.pages.forEach(({ file, chunks, parent }, p) => {
+      const path = `trees[${t}].pages[${p}]`;
+      if ((lengths.get(file) ?? chunks) !== chunks) fail(path, `as many chunks of ${file} as elsewhere`, chunks);
+      if (parent && !places.take(parent)) fail(path, 'a chunk that nothing else is below', parent);
+      lengths.set(file, chunks);
+    });
+    return places;
+  });
+  const first = taken[instances[0].tree];
+  instances.forEach(({ parent }, i) => {
+    if (parent && !first.take(parent)) fail(`instances[${i}]`, 'a chunk that nothing else is below', parent);
+  });
+  const counts = trees.map(({ pages }) => pages.reduce((sum, file) => sum + pagesIn(file), 0));
+  const count = instances.reduce((sum, { tree }) => sum + counts[tree], 0);
+  if (count > MOST_PAGES) fail('instances', `at most ${MOST_PAGES} pages`, count);
+}
+
+/** Pages that lie in a file. */
+const pagesIn = ({ chunks, upper }: TreePage): number => 1 + Math.ceil((chunks - upper) / SLOT_CHUNKS);
+
+/** Chunks of a tree that have something below them. */
+class Places {
+  readonly #pages: readonly TreePage[];
+  readonly #taken = new Set<number>();
+
+  constructor({ pages }: Tree) {
+    this.#pages = pages;
+  }
+
+  /** Puts something below a chunk. @returns false if there is something already */
+  take([page, chunk]: readonly [number, number]): boolean {
+    const place = FILE_CHUNKS * page + chunk;
+    const isTaken = this.#taken.has(place) || chunk < pagesIn(this.#pages[page]) - 1;
+    this.#taken.add(place);
+    return !isTaken;
+  }
 }
 
 type Fail = (path: string, expected: string, found: unknown) => never;

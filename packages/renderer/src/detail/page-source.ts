@@ -25,29 +25,39 @@ export interface PageSource {
 /** Bytes of files that are kept: what is below a page is often wished for as soon as the page is there, and lies in the same file. */
 const KEPT_BYTES = 64e6;
 
-/** The pages of a folder that `npm run detail` wrote. */
+/** The pages of a folder that `npm run detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again. */
 export function folderSource(
   manifest: DetailManifest,
-  fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>,
+  fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>,
 ): PageSource {
   const list = listPages(manifest);
-  const files = new PageFiles(fetchPage, KEPT_BYTES);
+  const lengthOf = (chunks: number): number => 4 * pageLayout(manifest, chunks).total;
+  const lengths = new Map(
+    manifest.trees.flatMap(({ pages }) => pages.map(({ file, chunks }) => [file, lengthOf(chunks)])),
+  );
+  const fetchWhole = async (file: string, signal: AbortSignal): Promise<ArrayBuffer> =>
+    wholeFile(file, lengths.get(file)!, await fetchPage(file, signal));
+  const files = new PageFiles(fetchWhole, KEPT_BYTES);
   const fetch = async (page: number, signal: AbortSignal): Promise<SlotWords[]> => {
-    const { file: of, first, chunks: own } = list.place(page);
-    const { file, chunks } = of;
-    const bytes = await files.get(file, signal);
+    const { file, first, chunks } = list.place(page);
+    const bytes = await files.get(file.file, signal);
     signal.throwIfAborted();
-    const expected = 4 * pageLayout(manifest, chunks).total;
-    if (bytes.byteLength === expected) {
-      return [{ words: new Uint32Array(bytes), of: chunks, first, chunks: own }];
-    }
-    throw new GaussianSplatError('decode/truncated', {
-      where: file,
-      expected: `${expected} bytes`,
-      found: `${bytes.byteLength} bytes`,
-      remedy: 'upload the folder again, all files of it from one run of npm run detail',
-    });
+    return [{ words: new Uint32Array(bytes), of: file.chunks, first, chunks }];
   };
   const isAtHand = (page: number): boolean => files.has(list.place(page).file.file);
   return { scene: manifest, list, fetch, isAtHand, translate: list.translate };
 }
+
+/** The bytes of a file in a buffer of their own, whatever view of one they came in. */
+function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBufferView<ArrayBuffer>): ArrayBuffer {
+  if (bytes.byteLength === length) return ArrayBuffer.isView(bytes) ? bufferOf(bytes) : bytes;
+  throw new GaussianSplatError('decode/truncated', {
+    where,
+    expected: `${length} bytes`,
+    found: `${bytes.byteLength} bytes`,
+    remedy: 'upload the folder again, all files of it from one run of npm run detail',
+  });
+}
+
+const bufferOf = ({ buffer, byteOffset, byteLength }: ArrayBufferView<ArrayBuffer>): ArrayBuffer =>
+  buffer.slice(byteOffset, byteOffset + byteLength);

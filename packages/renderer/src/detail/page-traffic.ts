@@ -7,8 +7,18 @@ export const MOST_FETCHES = 64;
 export const MOST_UNDER_WAY = 240;
 /** How much a page counts in the mean time of arrival when the next one has come. */
 const MEMORY = 0.95;
-/** Milliseconds before a page that did not come is asked for again. */
+/** Milliseconds before a page that did not come is asked for again; twice as long after each further failure, so many times. */
 const RETRY_MS = 4_000;
+const MOST_DOUBLINGS = 6;
+
+/** Of pages that have been asked for again, or may be by every look. */
+const MAY_COME = -Infinity;
+
+/** How often in a row a page has not come, and until when it is not asked for. */
+interface Failure {
+  readonly times: number;
+  readonly until: number;
+}
 
 /** A page that has come. */
 export interface FetchedPage<Words> {
@@ -37,7 +47,8 @@ export class PageTraffic<Words> {
   readonly #waiting = new Map<number, Words>();
   /** Those that wait and are wished for, the most needed last; undefined if that has to be found anew. */
   #order: number[] | undefined;
-  readonly #failedAt = new Map<number, number>();
+  readonly #failures = new Map<number, Failure>();
+  #retry: ReturnType<typeof setTimeout> | undefined;
   readonly #sentAt = new Map<number, number>();
   readonly #now: () => number;
   #arrivalMs = 0;
@@ -108,6 +119,7 @@ export class PageTraffic<Words> {
   /** Ends everything; nothing is reported any more. */
   close(): void {
     this.#isClosed = true;
+    clearTimeout(this.#retry);
     for (const controller of this.#fetching.values()) controller.abort();
     this.#fetching.clear();
     this.#waiting.clear();
@@ -120,7 +132,31 @@ export class PageTraffic<Words> {
   }
 
   #hasFailedLately(page: number): boolean {
-    return this.#now() - (this.#failedAt.get(page) ?? -Infinity) < RETRY_MS;
+    return this.#now() < (this.#failures.get(page)?.until ?? MAY_COME);
+  }
+
+  #noteFailure(page: number): void {
+    const times = (this.#failures.get(page)?.times ?? 0) + 1;
+    const pause = RETRY_MS * 2 ** Math.min(times - 1, MOST_DOUBLINGS);
+    this.#failures.set(page, { times, until: this.#now() + pause });
+    this.#retryLater();
+  }
+
+  /** A view at rest makes no look: what the last one wished for is asked for again all the same. */
+  #retryLater(): void {
+    this.#retry ??= setTimeout(() => {
+      this.#retry = undefined;
+      let isNeeded = false;
+      for (const [page, { times, until }] of this.#failures) {
+        if (this.#hasFailedLately(page)) this.#retryLater();
+        else if (until > MAY_COME) {
+          this.#failures.set(page, { times, until: MAY_COME });
+          isNeeded ||= this.#residency.need(page) > 0;
+        }
+      }
+      if (isNeeded) this.#residency.relist();
+      this.sendForMore();
+    }, RETRY_MS);
   }
 
   #noteArrival(page: number): void {
@@ -151,13 +187,13 @@ export class PageTraffic<Words> {
       if (isOver()) return;
       this.#waiting.set(page, words);
       this.#order = undefined;
-      this.#failedAt.delete(page);
+      this.#failures.delete(page);
     } catch (error) {
       if (isOver()) return;
       this.#slotsUnderWay -= this.#residency.slotsFor(page);
       this.#residency.giveUp(page);
       this.#sentAt.delete(page);
-      this.#failedAt.set(page, this.#now());
+      this.#noteFailure(page);
       this.#options.onError(error);
     }
     this.#fetching.delete(page);

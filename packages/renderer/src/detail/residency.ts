@@ -123,6 +123,11 @@ export class Residency {
     return NONE;
   }
 
+  /** Lets {@link nextMissing} name again all that the last look wishes for and that is missing. */
+  relist(): void {
+    this.#listMissing();
+  }
+
   /** Starts bringing a page if there is room for it, or something to leave that is needed less; if not, nothing as large that is needed no more is missing until the next look. */
   begin(page: number): boolean {
     const parent = this.#list.parent[page];

@@ -1,4 +1,4 @@
-import type { Bounds, ShDegree, Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { GpuMemory, withMemoryCheck } from '../gpu/memory.js';
@@ -24,9 +24,11 @@ export interface PoolOptions {
    * Milliseconds in which a page that has come takes the place of what stood for it, in 16 frames at least; 0 for at once. Default 400.
    */
   readonly arrivalMs?: number;
+  /** Gives the opening up: it rejects with the signal's reason, and holds no memory. Of no effect once the scene is there. */
+  readonly signal?: AbortSignal;
   /** Called when another frame is asked for: a page has come, or what the last view lacks is not known yet. */
   readonly onChange?: () => void;
-  /** Called when a page does not come; what is above it stays on show, and it is asked for again after a while. */
+  /** Called when a page does not come; what is above it stays on show. It is asked for again after 4 s, after further failures twice as long each, up to 256 s. */
   readonly onError?: (error: unknown) => void;
 }
 
@@ -35,7 +37,7 @@ export interface StreamOptions extends PoolOptions {
    * Fetches a file of pages, named relative to the manifest; 64 at a time at most. Aborted when no view wishes for any of them any more, and when the scene is destroyed. Best done in a
    * worker: reading a response costs a thread more than all else that a page needs.
    */
-  readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer>;
+  readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>;
 }
 
 /** Fits a phone. */
@@ -53,6 +55,16 @@ interface Upload {
   /** World units. */
   readonly by: Vector3;
   written: number;
+}
+
+function requireTime(arrivalMs: number): void {
+  if (arrivalMs >= 0 && arrivalMs < Infinity) return;
+  throw new GaussianSplatError('argument/value', {
+    where: 'PoolOptions.arrivalMs',
+    expected: 'milliseconds, 0 or more',
+    found: String(arrivalMs),
+    remedy: 'leave the option out for the default',
+  });
 }
 
 /**
@@ -96,6 +108,7 @@ export class StreamedGaussians implements GaussianScene {
     this.bounds = bounds;
     this.#source = source;
     this.#options = options;
+    requireTime(options.arrivalMs ?? ARRIVAL_MS);
     const slots = slotsFor(scene, list, options.memoryBudget ?? DEFAULT_BUDGET);
     this.count = slots * SLOT_CHUNKS * constants.CULL_GROUP;
     this.#reservation = MemoryLedger.of(device).reserve('pages of a streamed scene', slots * slotBytes(scene));
@@ -134,7 +147,8 @@ export class StreamedGaussians implements GaussianScene {
   /**
    * Allocates the pool and fetches the coarsest page.
    * @param manifest see `checkManifest`
-   * @throws GaussianSplatError `out-of-memory/*` if there is no room; what `fetchPage` throws, `decode/truncated` for a page of the wrong length.
+   * @throws GaussianSplatError `out-of-memory/*` if there is no room; what `fetchPage` throws, `decode/truncated` for a page of the wrong length; `argument/value` for an `arrivalMs` that
+   * is no time; the reason of `signal`.
    */
   static open(device: GPUDevice, manifest: DetailManifest, options: StreamOptions): Promise<StreamedGaussians> {
     return this.openSource(device, folderSource(manifest, options.fetchPage), options);
@@ -142,19 +156,23 @@ export class StreamedGaussians implements GaussianScene {
 
   /**
    * The same for pages from anywhere.
-   * @throws GaussianSplatError `out-of-memory/*` if there is no room; what the source throws for the first page.
+   * @throws GaussianSplatError `out-of-memory/*` if there is no room; what the source throws for the first page; `argument/value` and the reason of `signal` as {@link open} does.
    */
   static async openSource(device: GPUDevice, source: PageSource, options: PoolOptions): Promise<StreamedGaussians> {
     const what = `streamed scene of ${source.scene.splats} splats`;
     const scene = await withMemoryCheck(device, what, () => new StreamedGaussians(device, source, options));
     try {
+      const { signal = new AbortController().signal } = options;
+      signal.throwIfAborted();
       scene.#residency.begin(0);
-      const words = await source.fetch(0, new AbortController().signal);
+      const words = await source.fetch(0, signal);
+      signal.throwIfAborted();
       if (scene.#begin(0, words)) while (scene.#upload) scene.#writeSlot(scene.#upload);
       scene.#finishWrites();
       return scene;
     } catch (error) {
       scene.destroy();
+      options.signal?.throwIfAborted();
       throw error;
     }
   }

@@ -1,0 +1,111 @@
+/** Pages that draw a frame only when one is asked for: views at rest come to what they need, and to rest. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { setTimeout as pause } from 'node:timers/promises';
+import type { Camera, Vector3 } from '@gaussian-splat/core';
+import { Renderer, StreamedGaussians, type StreamOptions } from '@gaussian-splat/renderer';
+import { constants, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
+import { detailFolder } from '../support/detail-folder.js';
+import { anyDevice } from '../support/node-device.js';
+import { cameraAt } from '../support/scenes.js';
+import { pebbles } from '../support/scenes/pebbles.js';
+
+const SLOT_BYTES = 4 * SLOT_CHUNKS * (8 + 12 + constants.CULL_GROUP * (8 + 4));
+const lens = { width: 96, height: 64, fovXDegrees: 60, near: 0.01 };
+const besides = (target: Vector3, distance: number, angle: number): Camera =>
+  cameraAt(
+    [target[0] + distance * Math.cos(angle), target[1] - 1, target[2] + distance * Math.sin(angle)],
+    target,
+    lens,
+  );
+
+/** A scene, and whoever draws it when asked to. */
+interface Page {
+  readonly scene: StreamedGaussians;
+  /** Draws when asked to, until nobody has asked for a second or the time is over. @returns milliseconds from the first frame to the last */
+  readonly live: (milliseconds: number, draw: () => void) => Promise<number>;
+}
+
+async function open(
+  folder: ReturnType<typeof detailFolder>,
+  options: Partial<StreamOptions> & { readonly slots?: number } = {},
+): Promise<Page> {
+  const device = await anyDevice();
+  let isAsked = true;
+  const { slots = 1000, ...others } = options;
+  const scene = await StreamedGaussians.open(device, folder.manifest, {
+    ...{ fetchPage: folder.fetchPage, memoryBudget: slots * SLOT_BYTES, arrivalMs: 50 },
+    ...others,
+    onChange: () => {
+      isAsked = true;
+    },
+  });
+  const live: Page['live'] = async (milliseconds, draw) => {
+    const start = performance.now();
+    let last = start;
+    while (performance.now() - start < milliseconds && performance.now() - last < 1000) {
+      if (isAsked) {
+        isAsked = false;
+        draw();
+        await device.queue.onSubmittedWorkDone();
+        last = performance.now();
+      }
+      await pause(4);
+    }
+    return last - start;
+  };
+  return { scene, live };
+}
+
+const target = async (): Promise<GPUTexture> =>
+  (await anyDevice()).createTexture({ size: [lens.width, lens.height], format: 'rgba8unorm', usage: 0x10 });
+const renderer = async (): Promise<Renderer> => new Renderer(await anyDevice(), { threads: 'serial', sort: 'serial' });
+
+test('within a budget of splats and a pool that is full, a view at rest comes to rest', async () => {
+  const places = [0, 1, 2, 3, 4, 5].map((k): Vector3 => [14 * (k % 3), 0, 14 * Math.floor(k / 3)]);
+  const folder = detailFolder(pebbles(40_000), places);
+  const [drawing, picture] = [await renderer(), await target()];
+  for (const [slots, splatBudget, angle] of [
+    [48, 16_500, 1.4],
+    [72, 24_000, 4.4],
+  ]) {
+    const { scene, live } = await open(folder, { slots });
+    const camera = besides([14, 0, 7], 2, angle);
+    const draw = (): void => drawing.render({ gaussians: scene, camera, target: picture, detail: 0.3, splatBudget });
+    const took = await live(8000, draw);
+    const { budgetError } = await drawing.readStatistics();
+    const { pages } = scene.traffic;
+    console.log(`${slots} slots: ${pages} pages in ${took.toFixed(0)} ms; within ${budgetError.toFixed(2)} pixels`);
+    assert.ok(took < 7000 && pages < 4 * slots, `${pages} pages in ${took} ms`);
+    assert.ok(budgetError > 0.3 && scene.progress.resident === slots, 'both are tight');
+    scene.destroy();
+  }
+  [drawing, picture].forEach((owner) => owner.destroy());
+});
+
+test('pages that do not come are asked for again, though the view is at rest', async () => {
+  const folder = detailFolder(pebbles(6_000));
+  const errors: unknown[] = [];
+  let isDown = true;
+  const { scene, live } = await open(folder, {
+    fetchPage: (file) =>
+      isDown && file !== 'part-0' ? Promise.reject(new Error(`${file}: offline`)) : folder.fetchPage(file),
+    onError: (error) => errors.push(error),
+  });
+  const [drawing, picture] = [await renderer(), await target()];
+  const draw = (): void =>
+    drawing.render({ gaussians: scene, camera: besides([0, 0, 0], 4, 1), target: picture, detail: 0.2 });
+  await live(3000, draw);
+  const { resident } = scene.progress;
+  assert.ok(errors.length > 0 && scene.progress.error > 0.2);
+  isDown = false;
+  await pause(4500);
+  await live(3000, draw);
+  assert.ok(scene.progress.resident > resident && scene.progress.error === 0, JSON.stringify(scene.progress));
+  [drawing, picture, scene].forEach((owner) => owner.destroy());
+});
+
+// Dawn keeps Node alive.
+after(() => {
+  setImmediate(() => process.exit());
+});
