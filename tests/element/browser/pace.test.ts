@@ -124,6 +124,19 @@ describe('the pace of pictures', () => {
     assertEqual(element.stats?.pace.drawn, 'whole', 'the step');
   });
 
+  it('of what is drawn no less than what is seen of it, with levels of detail and another quality, too', async () => {
+    const element = await showLoaded(
+      { src: SCENE.src, detail: '16px', quality: 'fast', 'camera-orbit': '0deg 75deg 400%' },
+      'width: 60px; height: 50px',
+    );
+    await until(() => element.stats!.detail.splats > 0, 'levels of detail', 40_000);
+    await frames(3);
+    await gpuIdle();
+    const { drawn, contributed } = (await element.updateStats())!;
+    assert(drawn !== null && contributed !== null, 'counts');
+    assert(contributed > 0 && contributed <= drawn, `${contributed} seen of ${drawn} drawn`);
+  });
+
   it('counts what is drawn and what of it is seen, when asked', async () => {
     const element = await showLoaded({}, 'width: 60px; height: 50px');
     assertEqual([element.stats?.drawn, element.stats?.contributed], [null, null], 'before');

@@ -235,7 +235,9 @@ export class GpuScene {
   async readCounts(camera: Camera): Promise<ReadCounts> {
     const { visible } = await this.#renderer.readStatistics();
     const { countContributing } = await import('./contributions.js');
-    return { drawn: visible, contributed: await countContributing(this.device, this.gaussians, camera) };
+    const { quality } = this.#rendering;
+    const view = { ...this.#detail, gaussians: this.#levels ?? this.gaussians, camera, quality };
+    return { drawn: visible, contributed: await countContributing(this.device, view) };
   }
 
   /** Frees the GPU memory and lets go of the device. */
