@@ -80,7 +80,7 @@ export class GpuScene {
     this.bounds = bounds;
     this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
-    this.#meter = new FrameMeter(lease.device, live === undefined);
+    this.#meter = new FrameMeter(lease.device, () => !live && !this.#filter);
   }
 
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
