@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
-import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
+import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import { LADDER } from '../../packages/element/src/pace/ladder.js';
 import { waitForRest } from '../../packages/element/src/pace/rest.js';
 
@@ -71,6 +71,58 @@ test('what a frame may take is what the page says, else a share of the display t
       assert.equal(pace.report.moving !== 'whole', falls, `${share} of ${budget} ms`);
     }
   }
+});
+
+/** A display that the test drives: a picture every interval. */
+function drivenDisplay(): { picture: () => void; restore: () => void } {
+  const page = globalThis as unknown as Record<string, unknown>;
+  const { requestAnimationFrame, document } = page;
+  const waiting: ((now: number) => void)[] = [];
+  page.requestAnimationFrame = (draw: (now: number) => void) => waiting.push(draw);
+  page.document = { visibilityState: 'visible' };
+  let now = 1000;
+  return {
+    picture: () => {
+      now += INTERVAL;
+      for (const draw of waiting.splice(0)) draw(now);
+    },
+    restore: () => void Object.assign(page, { requestAnimationFrame, document }),
+  };
+}
+
+test('an element that draws now and then leaves others all but their whole time; two that both move share it within a second', () => {
+  const { picture, restore } = drivenDisplay();
+  const scheduler = new FrameScheduler();
+  const ignored = (): void => undefined;
+  const pace = new PaceController({
+    ...{ isOn: () => true, scheduler: () => scheduler, frameBudget: () => Infinity },
+    ...{ requestFrame: ignored, onPace: ignored },
+  });
+  const levels: number[] = [];
+  // Its frames take 0.7 of what it may.
+  const moving = {
+    drawFrame: (now: number) => {
+      const { level } = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
+      levels.push(level);
+      pace.sample(level, 0.7 * 0.8 * INTERVAL * LADDER[level].cost);
+    },
+  };
+  const other = { drawFrame: ignored };
+  for (let k = 0; k < 240; k++) {
+    scheduler.request(moving);
+    if (k % 12 === 0) scheduler.request(other);
+    picture();
+  }
+  assert.equal(Math.max(...levels), 0, `levels ${levels.join(' ')}`);
+  for (let k = 0; k < 60; k++) {
+    scheduler.request(moving);
+    scheduler.request(other);
+    picture();
+  }
+  assert.ok(Math.abs(pace.targetMs / (0.4 * INTERVAL) - 1) < 0.03, `${pace.targetMs} ms`);
+  assert.ok(levels.at(-1)! > 0, 'half of the time is too little for the whole picture');
+  pace.stop();
+  restore();
 });
 
 test('pictures that are small already are not made smaller, whatever they take', () => {

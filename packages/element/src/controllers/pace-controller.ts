@@ -87,7 +87,7 @@ export class PaceController {
     const budget = this.#options.frameBudget();
     if (budget < Infinity) return budget;
     const { displayInterval, clients } = this.#options.scheduler();
-    return (SHARE_OF_INTERVAL * displayInterval) / Math.max(1, clients);
+    return (SHARE_OF_INTERVAL * displayInterval) / clients;
   }
 
   get report(): PaceReport {
