@@ -10,7 +10,7 @@ const INTERVAL = 1000 / 60;
 const PIXELS = 1e6;
 const display = { displayInterval: INTERVAL, clients: 1 } as FrameScheduler;
 
-for (const wholeMs of [20, 100, 200, 230]) {
+for (const wholeMs of [20, 100, 200, 214]) {
   test(`a true image of ${wholeMs} ms is on show 300 ms after rest, and not begun before 50 ms`, (context) => {
     context.mock.timers.enable({ apis: ['setTimeout'] });
     let asked = false;
@@ -33,7 +33,9 @@ for (const wholeMs of [20, 100, 200, 230]) {
     let waited = 0;
     for (; !asked && waited < 1000; waited++) context.mock.timers.tick(1);
     assert.ok(waited >= 50 && waited <= 150, `begun after ${waited} ms`);
-    assert.ok(waited + INTERVAL + wholeMs <= 300, `on show after ${waited + INTERVAL + wholeMs} ms`);
+    // The hand stopped up to an interval before what it did was drawn.
+    const shown = INTERVAL + waited + INTERVAL + wholeMs;
+    assert.ok(shown <= 300, `on show after ${shown} ms`);
     assert.equal(
       pace.plan({ now: now + waited, pixels: PIXELS, hasChanged: false, goesOn: false }).level,
       0,
