@@ -152,3 +152,56 @@ test('pictures that are small already are not made smaller, whatever they take',
     'a picture that shrinks takes what was chosen back',
   );
 });
+
+test('a scene that changes in every other picture of the display is in motion in those between, and rests as a camera does', (context) => {
+  context.mock.timers.enable({ apis: ['setTimeout'] });
+  const asked: number[] = [];
+  let now = 1000;
+  const pace = new PaceController({
+    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
+    ...{ requestFrame: () => void asked.push(now), onPace: () => undefined },
+  });
+  const frame = (hasChanged: boolean): number => {
+    const { level } = pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false });
+    pace.sample(level, 100 * LADDER[level].cost);
+    return level;
+  };
+  const levels: number[] = [];
+  for (let k = 0; k < 120; k++) {
+    levels.push(frame(k % 2 === 0));
+    context.mock.timers.tick(INTERVAL);
+    now += INTERVAL;
+  }
+  const between = levels.slice(60).filter((_, k) => k % 2 === 1);
+  assert.ok(Math.min(...between) > 0, `levels ${levels.slice(60).join(' ')}`);
+  assert.deepEqual(asked, [], 'no rest is looked for between');
+  // The last change: what is drawn besides does not put rest off.
+  for (let waited = 0; asked.length === 0 && waited < 300; waited += INTERVAL) {
+    assert.ok(frame(false) > 0, 'not yet at rest');
+    context.mock.timers.tick(INTERVAL);
+    now += INTERVAL;
+  }
+  assert.ok(asked.length === 1, 'rest is looked for');
+  assert.equal(frame(false), 0, 'the true image');
+  pace.stop();
+});
+
+test('a change that comes while the true image of a pause is drawn belongs to the motion before', (context) => {
+  context.mock.timers.enable({ apis: ['setTimeout'] });
+  const pace = new PaceController({
+    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
+    ...{ requestFrame: () => undefined, onPace: () => undefined },
+  });
+  const plan = (now: number, hasChanged: boolean): number =>
+    pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false }).level;
+  let now = 1000;
+  for (let k = 0; k < 30; k++, now += 50) {
+    const level = plan(now, true);
+    pace.sample(level, level === 0 ? 300 : 60);
+  }
+  context.mock.timers.tick(200);
+  assert.equal(plan(now, false), 0, 'the true image is begun');
+  // It takes 300 ms, and that is not known yet.
+  assert.ok(plan(now + 310, true) > 0, 'the hand goes on');
+  pace.stop();
+});

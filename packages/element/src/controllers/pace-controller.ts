@@ -103,17 +103,25 @@ export class PaceController {
   plan({ now, pixels, hasChanged, goesOn }: FrameOccasion): FramePlan {
     this.#rungs = rungsFor(pixels);
     this.#pace = withinRungs(this.#pace, this.#rungs);
-    const pause = Math.max(MOTION_MS, Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * this.#lastMs));
-    const isMotion = hasChanged && (goesOn || now - this.#changedAt < pause);
+    const pause = Math.max(
+      MOTION_MS,
+      Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * Math.max(this.#lastMs, this.#wholeMs)),
+    );
+    // Between two changes of one motion (a sequence of fewer pictures than the display's) what is drawn for other reasons is a part of it, until rest is due.
+    const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
-    clearTimeout(this.#restTimer);
     const { level } = this.#pace;
     this.#drawn = isMotion && this.#options.isOn() ? level : 0;
+    if (hasChanged || this.#drawn === 0) this.stop();
     if (this.#drawn === 0) return WHOLE;
-    const wait = waitForRest(this.#wholeMs, this.#options.scheduler().displayInterval);
-    this.#restTimer = setTimeout(this.#options.requestFrame, wait);
+    this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, this.#options.scheduler().displayInterval));
     return { level, levers: LADDER[level].levers };
   }
+
+  readonly #rest = (): void => {
+    this.#restTimer = undefined;
+    this.#options.requestFrame();
+  };
 
   /** What a frame took. */
   sample(level: number, milliseconds: number): void {
@@ -138,5 +146,6 @@ export class PaceController {
   /** No frame follows. */
   stop(): void {
     clearTimeout(this.#restTimer);
+    this.#restTimer = undefined;
   }
 }
