@@ -205,3 +205,25 @@ test('a change that comes while the true image of a pause is drawn belongs to th
   assert.ok(plan(now + 310, true) > 0, 'the hand goes on');
   pace.stop();
 });
+
+test('what was measured before the page chose a quality is not told, and not believed afterwards', () => {
+  let isOn = true;
+  const ignored = (): void => undefined;
+  const pace = new PaceController({
+    ...{ isOn: () => isOn, scheduler: () => display, frameBudget: () => Infinity },
+    ...{ requestFrame: ignored, onPace: ignored },
+  });
+  const frame = { pixels: PIXELS, hasChanged: true, goesOn: true };
+  for (let now = 1000; now < 2000; now += INTERVAL) {
+    const { level } = pace.plan({ now, ...frame });
+    pace.sample(level, 80 * LADDER[level].cost);
+  }
+  assert.ok(pace.report.moving !== 'whole' && pace.report.lastMs !== null);
+  isOn = false;
+  assert.equal(pace.plan({ now: 2000, ...frame }).level, 0);
+  // A frame of before is known only now.
+  pace.sample(0, 80);
+  const { drawn, moving, reason, frameMs, lastMs } = pace.report;
+  assert.deepEqual([drawn, moving, reason, frameMs, lastMs], ['whole', 'whole', 'start', null, null]);
+  pace.stop();
+});

@@ -101,6 +101,8 @@ export class PaceController {
    * How to draw the next frame. A single change after a rest is drawn whole at once; what goes on to change is in motion.
    */
   plan({ now, pixels, hasChanged, goesOn }: FrameOccasion): FramePlan {
+    // What was found before the page chose a quality says nothing of what is drawn now.
+    if (!this.#options.isOn()) this.reset();
     this.#rungs = rungsFor(pixels);
     this.#pace = withinRungs(this.#pace, this.#rungs);
     const pause = Math.max(
@@ -111,7 +113,7 @@ export class PaceController {
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
     const { level } = this.#pace;
-    this.#drawn = isMotion && this.#options.isOn() ? level : 0;
+    this.#drawn = isMotion ? level : 0;
     if (hasChanged || this.#drawn === 0) this.stop();
     if (this.#drawn === 0) return WHOLE;
     this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, this.#options.scheduler().displayInterval));
@@ -125,15 +127,15 @@ export class PaceController {
 
   /** What a frame took. */
   sample(level: number, milliseconds: number): void {
+    if (!this.#options.isOn()) return;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
-    if (!this.#options.isOn()) return;
     const sample = { now: performance.now(), level, milliseconds };
     this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS.slice(0, this.#rungs) });
     this.#options.onPace(this.#pace.level === 0);
   }
 
-  /** Another scene: nothing is known. */
+  /** Another scene, or another way to draw it: nothing is known. */
   reset(): void {
     this.stop();
     this.#pace = INITIAL_PACE;
