@@ -225,6 +225,19 @@ test('a GPU that is too slow for all comes to the lowest rung within few frames 
   );
 });
 
+test('a GPU that is far too slow, with much that no rung makes cheaper, turns at most once in five seconds', () => {
+  for (const load of [20, 40]) {
+    for (const seed of [1, 2, 3]) {
+      const gpu = { hertz: 60, load: () => load, fixed: 0.3, noise: 0.1, spikes: 0, latency: 2, seed };
+      const { frames } = run(gpu, 60_000);
+      for (let start = 0; start < 55_000; start += 500) {
+        const found = reversals(frames, start, start + 5_000);
+        assert.ok(found <= 1, `load ${load}: ${found} reversals after ${start} ms`);
+      }
+    }
+  }
+});
+
 test('when the load is gone the true image comes back, one rung after the other', () => {
   const load = (now: number): number => (now < 5_000 ? 4 : 0.2);
   const { frames } = run({ hertz: 60, load, fixed: 0.2, noise: 0.1, spikes: 0, latency: 2, seed: 4 }, 15_000);
@@ -275,7 +288,7 @@ test('the display: refresh rates are found among late frames, and slow frames ar
     return display.milliseconds;
   };
   const late = (ms: number, k: number): number => (k % 3 === 0 ? 2 * ms : ms);
-  for (const hertz of [60, 75, 120, 144, 240]) {
+  for (const hertz of [60, 75, 120, 144, 240, 360, 480, 540]) {
     const ms = 1000 / hertz;
     assert.ok(Math.abs(seen(Array.from({ length: 40 }, (_, k) => late(ms, k))) - ms) < 0.01, `${hertz} Hz`);
   }

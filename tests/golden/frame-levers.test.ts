@@ -9,6 +9,7 @@ import {
   type FrameLevers,
   type RasterizerName,
 } from '@gaussian-splat/renderer';
+import { spanOf } from '../../packages/renderer/src/gpu/span-timer.js';
 import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
@@ -148,10 +149,39 @@ test('the span of every frame comes back, beside the frames', async (t) => {
     spans.push(span);
   }
   assert.ok(spans.filter((span) => span !== null).length >= 10, String(spans));
+  // Painted in more submissions than there are timestamps for: it is the whole that counts.
+  const divided = new Renderer(device, { submissions: 40 });
+  const span = await new Promise<number | null>((resolve) => {
+    assert.ok(timer.expect(resolve));
+    divided.render({ gaussians, camera: views[0], target, timer });
+  });
+  assert.ok(span !== null && span > 0, `${span} ms in 40 submissions`);
+  divided.destroy();
   timer.destroy();
   renderer.destroy();
   gaussians.destroy();
   device.destroy();
+});
+
+test('frames that are shorter than a step of the clock take nothing; clocks that stand still or run backwards say nothing', () => {
+  const spans = (...frames: bigint[][]): (number | null)[] => {
+    let before = 0n;
+    return frames.map((stamps) => {
+      const [begin, milliseconds] = spanOf(BigUint64Array.from(stamps), before);
+      before = begin;
+      return milliseconds;
+    });
+  };
+  // Chromium's step: 0.1 ms.
+  assert.deepEqual(spans([300_000n, 300_000n], [17_000_000n, 17_000_000n, 17_000_000n, 17_100_000n]), [0, 0.1]);
+  assert.deepEqual(spans([5n, 5n], [5n, 5n], [5n, 5n]).slice(1), [null, null]);
+  assert.deepEqual(spans([0n, 0n], [0n, 9n]), [null, null]);
+  assert.deepEqual(spans([9_000_000n, 1_000_000n], [8_000_000n, 8_500_000n], [9_000_000n, 9_500_000n]), [
+    null,
+    null,
+    0.5,
+  ]);
+  assert.deepEqual(spans([1n, 90_000_000_000n]), [null]);
 });
 
 // Dawn keeps Node alive.

@@ -112,6 +112,6 @@ function whyDetail({ splats, pixels }: SceneStats['detail']): string[] {
 function whyPace(quality: QualityChoice, { moving, frameMs, targetMs }: PaceReport): string[] {
   if (quality !== 'auto') return quality === 'default' ? [] : [`The page asks for quality="${quality}".`];
   if (moving === 'whole') return [];
-  const found = frameMs === null ? '' : `; frames take ${frameMs.toFixed(1)} ms now`;
+  const found = frameMs === null ? '' : `; the last took ${frameMs.toFixed(1)} ms`;
   return [`In motion pictures are drawn with ${moving}, to keep to ${targetMs.toFixed(1)} ms${found}.`];
 }

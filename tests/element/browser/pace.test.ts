@@ -1,6 +1,6 @@
 /** Pictures in motion where every frame is too slow: less of them while they move, the true image when they rest. */
 import '@gaussian-splat/element';
-import type { GaussianSplatElement } from '@gaussian-splat/element';
+import { GaussianSplatElement, SharedDevice } from '@gaussian-splat/element';
 import { assert, assertEqual, delay, devices, frames, nextEvent, showLoaded, until } from './support/harness.js';
 import { screenOf } from './support/screen.js';
 
@@ -122,6 +122,50 @@ describe('the pace of pictures', () => {
     element.cameraOrbit = '5deg 75deg auto';
     await frames(3);
     assertEqual(element.stats?.pace.drawn, 'whole', 'the step');
+  });
+
+  it('without a clock on the GPU no element is charged with what others draw', async () => {
+    const adapter = await navigator.gpu.requestAdapter();
+    const device = await adapter!.requestDevice();
+    assert(!device.features.has('timestamp-query'), 'no clock');
+    const before = GaussianSplatElement.sharedDevice;
+    GaussianSplatElement.sharedDevice = new SharedDevice(async () => device, { keepDevice: true });
+    try {
+      // Whatever frames take is in time: all are whole, and so take the same.
+      const attributes = { ...SCENE, 'frame-budget': '60000', 'interpolation-decay': '0' };
+      const pair = [await showLoaded(attributes, SIZE), await showLoaded(attributes, SIZE)];
+      const turn = async (milliseconds: number): Promise<{ spent: number; elapsed: number }> => {
+        const began = performance.now();
+        const times = await Promise.all(pair.map((element) => turnFor(element, milliseconds)));
+        // The first may be of a frame before.
+        const spent = times.flatMap((each) => each.slice(1)).reduce((sum, time) => sum + time, 0);
+        return { spent, elapsed: performance.now() - began };
+      };
+      await turn(1_000);
+      const { spent, elapsed } = await turn(4_000);
+      console.log(`${spent.toFixed(0)} ms of frames in ${elapsed.toFixed(0)} ms`);
+      assert(spent > 0, 'frames were timed');
+      // The queue does one thing after the other.
+      assert(spent <= 1.2 * elapsed, `${spent} ms of frames in ${elapsed} ms`);
+    } finally {
+      document.body.replaceChildren();
+      await delay(100);
+      GaussianSplatElement.sharedDevice = before;
+      device.destroy();
+    }
+  });
+
+  it('of what is drawn no less than what is seen of it, with levels of detail and another quality, too', async () => {
+    const element = await showLoaded(
+      { src: SCENE.src, detail: '16px', quality: 'fast', 'camera-orbit': '0deg 75deg 400%' },
+      'width: 60px; height: 50px',
+    );
+    await until(() => element.stats!.detail.splats > 0, 'levels of detail', 40_000);
+    await frames(3);
+    await gpuIdle();
+    const { drawn, contributed } = (await element.updateStats())!;
+    assert(drawn !== null && contributed !== null, 'counts');
+    assert(contributed > 0 && contributed <= drawn, `${contributed} seen of ${drawn} drawn`);
   });
 
   it('counts what is drawn and what of it is seen, when asked', async () => {

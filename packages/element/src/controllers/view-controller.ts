@@ -110,8 +110,8 @@ export class ViewController implements FrameClient {
     const scene = this.#scene;
     // It may have left the viewport since it asked.
     if (scene === null || !this.#isDrawable) return;
-    const { size, camera, maxPixelRatio, decayMs, onCameraChange, onError } = this.#options;
-    const pixels = size.pixelSize(maxPixelRatio(), scene.device.limits.maxTextureDimension2D);
+    const { camera, decayMs, onCameraChange, onError } = this.#options;
+    const pixels = this.#pixelsOf(scene);
     // Without a size nothing is drawn; the observer of the size asks again when there is one.
     if (pixels === null) return this.#finishUnseen();
     this.#options.beforeFrame(now);
@@ -136,10 +136,7 @@ export class ViewController implements FrameClient {
     const scene = this.#scene;
     const canvas = this.#options.canvasOf();
     if (scene === null || scene.isLost || this.#first !== undefined || canvas === null) return null;
-    const pixels = this.#options.size.pixelSize(
-      this.#options.maxPixelRatio(),
-      scene.device.limits.maxTextureDimension2D,
-    );
+    const pixels = this.#pixelsOf(scene);
     if (pixels === null) return null;
     this.#applyRendering(scene);
     scene.render(this.#frameRequest(scene, pixels));
@@ -149,6 +146,11 @@ export class ViewController implements FrameClient {
   /** There is a scene, and somebody sees it or waits for its first frame. */
   get #isDrawable(): boolean {
     return this.#scene?.isLost === false && (this.#first !== undefined || this.#options.isVisible());
+  }
+
+  /** null where there is no size. */
+  #pixelsOf({ device }: GpuScene): PixelSize | null {
+    return this.#options.size.pixelSize(this.#options.maxPixelRatio(), device.limits.maxTextureDimension2D);
   }
 
   #render(scene: GpuScene, request: Frame, now: number, cameraMoved: boolean): void {

@@ -1,6 +1,5 @@
 /** Loaded only when a page asks what its splats contribute. */
-import type { Camera } from '@gaussian-splat/core';
-import { Renderer, type GaussianScene } from '@gaussian-splat/renderer';
+import { Renderer, type FrameRequest, type GaussianScene, type RendererOptions } from '@gaussian-splat/renderer';
 
 /** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits: half a step. */
 const LEAST_WEIGHT = 0.5 / 255;
@@ -9,30 +8,36 @@ const CHUNK = 256;
 /** Frames until buffers have room for all. */
 const MOST_TRIES = 4;
 
+/** A picture at rest. */
+export interface View
+  extends Pick<FrameRequest, 'camera' | 'detail' | 'splatBudget'>, Pick<RendererOptions, 'quality'> {
+  readonly gaussians: GaussianScene;
+}
+
 /**
  * Counts the splats that some pixel of a view shows. Draws the view with the compute rasterizer, whatever the page uses, and reads all weights back: for
  * panels, not for frames.
  */
-export async function countContributing(device: GPUDevice, scene: GaussianScene, camera: Camera): Promise<number> {
+export async function countContributing(device: GPUDevice, { quality, ...view }: View): Promise<number> {
   const { STORAGE, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
   const size =
     4 *
     CHUNK *
     Math.max(
       1,
-      scene.pages.reduce((sum, { count }) => sum + Math.ceil(count / CHUNK), 0),
+      view.gaussians.pages.reduce((sum, { count }) => sum + Math.ceil(count / CHUNK), 0),
     );
-  const renderer = new Renderer(device, { rasterizer: 'tiles' });
+  const renderer = new Renderer(device, { quality, rasterizer: 'tiles' });
   const contributions = device.createBuffer({ label: 'gs.contributions', size, usage: STORAGE | COPY_SRC });
   const staging = device.createBuffer({ label: 'gs.contributions.read', size, usage: MAP_READ | COPY_DST });
   const target = device.createTexture({
-    size: [camera.width, camera.height],
+    size: [view.camera.width, view.camera.height],
     format: 'rgba16float',
     usage: GPUTextureUsage.RENDER_ATTACHMENT,
   });
   try {
     for (let tries = 0; tries < MOST_TRIES; tries++) {
-      renderer.render({ gaussians: scene, camera, target, notes: { contributions } });
+      renderer.render({ ...view, target, notes: { contributions } });
       if (await renderer.isComplete()) break;
     }
     const encoder = device.createCommandEncoder({ label: 'gs.contributions' });

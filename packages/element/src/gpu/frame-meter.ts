@@ -2,6 +2,8 @@ import { SpanTimer, type FrameTimer } from '@gaussian-splat/renderer';
 
 /** So many frames in a row whose timestamps cannot be believed are enough. */
 const MAX_FAILURES = 8;
+/** When what was submitted was last known to be done, by whichever element: the page's one queue does one thing after the other. */
+let lastDone = -Infinity;
 
 /**
  * How long frames keep the GPU: by its own clock where the device has the feature `timestamp-query`, else by when their work is done. Nothing waits;
@@ -9,14 +11,13 @@ const MAX_FAILURES = 8;
  */
 export class FrameMeter {
   readonly #queue: GPUQueue;
-  /** Others that work on the same queue between frames (a generator) would be counted with them. */
-  readonly #mayGuess: boolean;
+  /** Others that work on the same queue between frames (a generator, a post-processor) would be counted with them. */
+  readonly #mayGuess: () => boolean;
   #timer: SpanTimer | undefined;
   #failures = 0;
-  #lastDone = -Infinity;
 
   /** @param mayGuess false where the time until work is done says nothing about the frame */
-  constructor(device: GPUDevice, mayGuess: boolean) {
+  constructor(device: GPUDevice, mayGuess: () => boolean) {
     this.#queue = device.queue;
     this.#mayGuess = mayGuess;
     if (device.features.has('timestamp-query')) this.#timer = new SpanTimer(device);
@@ -24,7 +25,7 @@ export class FrameMeter {
 
   /** False where frames cannot be timed at all. */
   get isAble(): boolean {
-    return this.#timer !== undefined || this.#mayGuess;
+    return this.#timer !== undefined || this.#mayGuess();
   }
 
   /**
@@ -41,7 +42,7 @@ export class FrameMeter {
     }
     const submitted = performance.now();
     draw(undefined);
-    if (this.#mayGuess) void this.#waitAside(submitted, onTime);
+    if (this.#mayGuess()) void this.#waitAside(submitted, onTime);
   }
 
   destroy(): void {
@@ -64,8 +65,8 @@ export class FrameMeter {
       return;
     }
     const done = performance.now();
-    const began = Math.max(submitted, this.#lastDone);
-    this.#lastDone = done;
+    const began = Math.max(submitted, lastDone);
+    lastDone = done;
     onTime(done - began);
   }
 }

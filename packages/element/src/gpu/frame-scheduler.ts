@@ -6,6 +6,9 @@ export interface FrameClient {
   drawFrame(now: number): void;
 }
 
+/** Frames over which those who draw are counted: who draws now and then takes little of what there is. */
+const MEMORY = 16;
+
 /** One requestAnimationFrame loop for all elements of a page; it runs only while one of them has asked for a frame. */
 export class FrameScheduler {
   #due = new Set<FrameClient>();
@@ -13,14 +16,14 @@ export class FrameScheduler {
   #handle = 0;
   #waitsForPage = false;
   readonly #interval = new DisplayInterval();
-  #clients = 0;
+  #clients = 1;
 
   /** Milliseconds between two pictures of the display. */
   get displayInterval(): number {
     return this.#interval.milliseconds;
   }
 
-  /** Clients that draw at the same time: those of the last frame. */
+  /** Clients that draw at the same time, on the average of the last frames: 1 or more. */
   get clients(): number {
     return this.#clients;
   }
@@ -65,7 +68,7 @@ export class FrameScheduler {
 
   #drawAll(now: number): void {
     [this.#due, this.#drawing] = [this.#drawing, this.#due];
-    this.#clients = this.#drawing.size;
+    this.#clients += (this.#drawing.size - this.#clients) / MEMORY;
     this.#interval.tick(now);
     for (const client of this.#drawing) {
       try {

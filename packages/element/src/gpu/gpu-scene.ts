@@ -80,7 +80,7 @@ export class GpuScene {
     this.bounds = bounds;
     this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
-    this.#meter = new FrameMeter(lease.device, live === undefined);
+    this.#meter = new FrameMeter(lease.device, () => !live && !this.#filter);
   }
 
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
@@ -235,7 +235,9 @@ export class GpuScene {
   async readCounts(camera: Camera): Promise<ReadCounts> {
     const { visible } = await this.#renderer.readStatistics();
     const { countContributing } = await import('./contributions.js');
-    return { drawn: visible, contributed: await countContributing(this.device, this.gaussians, camera) };
+    const { quality } = this.#rendering;
+    const view = { ...this.#detail, gaussians: this.#levels ?? this.gaussians, camera, quality };
+    return { drawn: visible, contributed: await countContributing(this.device, view) };
   }
 
   /** Frees the GPU memory and lets go of the device. */

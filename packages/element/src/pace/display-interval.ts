@@ -2,7 +2,8 @@ import { quantile } from './pace.js';
 
 /** What displays do that nothing is known of yet, and the slowest that is believed: frames that take too long look like a slow display. */
 const USUAL_MS = 1000 / 60;
-const LEAST_MS = 1000 / 360;
+/** No display is faster. */
+const LEAST_MS = 1;
 const MEMORY = 32;
 const ENOUGH = 8;
 /** Small enough that a frame or two that were late do not matter, large enough for one that came early. */

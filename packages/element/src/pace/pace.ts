@@ -88,7 +88,7 @@ export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, 
   if (level !== pace.level) return pace;
   const known = { ...pace, recent: [...pace.recent, milliseconds].slice(-MEMORY) };
   const isLowest = level + 1 === rules.costs.length;
-  if (isHarmful(known, now) || (isLowest && isForNothing(known))) return change(known, now, known.from, 'trial');
+  if (isHarmful(known, now) || (isLowest && isForNothing(known, now))) return change(known, now, known.from, 'trial');
   const excess = excessOf(known.recent, rules.targetMs);
   if (excess !== null && !isLowest && !isKeptThough(known, now)) return fall(known, now, excess, rules);
   const reason = climbReason(known, now, rules);
@@ -123,7 +123,7 @@ function fall(pace: Pace, now: number, excess: number, { costs, targetMs }: Pace
 function climbReason(pace: Pace, now: number, { costs, targetMs }: PaceRules): PaceReason | null {
   const { level, recent, changedAt, barred } = pace;
   if (level === 0 || now - changedAt < holdOf(pace) || recent.length < ENOUGH_FRAMES) return null;
-  if (now < (barred[level - 1]?.until ?? -Infinity)) return null;
+  if (isBarred(barred, level - 1, now)) return null;
   const usual = quantile(recent, COUNTED);
   if (usual * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs) return 'spare';
   return now - changedAt >= TRIAL_MS || isNoDearer(pace) ? 'trial' : null;
@@ -135,10 +135,14 @@ function isHarmful({ recent, climbed, changedAt, before }: Pace, now: number): b
   return !climbed && three.length === 3 && now - changedAt < HARM_MS && Math.min(...three) > HARMFUL * before;
 }
 
-/** Frames take as long as before the pace fell: looked at once, when there are enough of them. */
-function isForNothing({ recent, climbed, before, reason }: Pace): boolean {
-  return !climbed && reason === 'slow' && recent.length === ENOUGH_FRAMES && quantile(recent, 0.5) >= IN_VAIN * before;
+/** Frames take as long as before the pace fell: looked at once, when there are enough of them. Not where that was a fall from a climb in vain: what is dearer there is known. */
+function isForNothing({ recent, climbed, before, reason, barred, from }: Pace, now: number): boolean {
+  const isDue = !climbed && reason === 'slow' && recent.length === ENOUGH_FRAMES && !isBarred(barred, from, now);
+  return isDue && quantile(recent, 0.5) >= IN_VAIN * before;
 }
+
+const isBarred = (barred: Pace['barred'], level: number, now: number): boolean =>
+  now < (barred[level]?.until ?? -Infinity);
 
 /** What is too slow stays where the rung below was no faster, until that is long ago. */
 function isKeptThough(pace: Pace, now: number): boolean {

@@ -25,6 +25,8 @@ export class SpanTimer implements FrameTimer {
   #slot: Slot | undefined;
   #onSpan: ((milliseconds: number | null) => void) | undefined;
   #passes = 0;
+  /** Of the last frame that is known. */
+  #begin = 0n;
   #isDestroyed = false;
 
   /** The device must have the feature `timestamp-query`. */
@@ -59,15 +61,15 @@ export class SpanTimer implements FrameTimer {
   timestampWrites(): GPUComputePassTimestampWrites | undefined {
     const slot = this.#slot;
     if (slot === undefined) return undefined;
-    const at = slot.first + 2 * this.#passes++;
-    if (this.#passes > MAX_PASSES) return undefined;
+    // A frame that is divided into many submissions may have more: the last of them leaves the last pair.
+    if (this.#passes < MAX_PASSES) this.#passes++;
+    const at = slot.first + 2 * (this.#passes - 1);
     return { querySet: this.#queries, beginningOfPassWriteIndex: at, endOfPassWriteIndex: at + 1 };
   }
 
   endFrame(encoder: GPUCommandEncoder): void {
     const slot = this.#slot;
-    // A frame of more passes, one divided into many submissions, is not known as a whole.
-    if (slot === undefined || this.#passes === 0 || this.#passes > MAX_PASSES) return;
+    if (slot === undefined || this.#passes === 0) return;
     encoder.resolveQuerySet(this.#queries, slot.first, 2 * this.#passes, slot.resolved, 0);
     encoder.copyBufferToBuffer(slot.resolved, 0, slot.staging, 0, 16 * this.#passes);
     slot.isBusy = true;
@@ -84,7 +86,9 @@ export class SpanTimer implements FrameTimer {
         const stamps = new BigUint64Array(slot.staging.getMappedRange(0, 16 * passes).slice(0));
         slot.staging.unmap();
         slot.isBusy = false;
-        onSpan(spanOf(stamps));
+        const [begin, milliseconds] = spanOf(stamps, this.#begin);
+        this.#begin = begin;
+        onSpan(milliseconds);
       },
       // A lost device: nobody waits any more.
       () => undefined,
@@ -101,16 +105,21 @@ export class SpanTimer implements FrameTimer {
   }
 }
 
-/** Nanoseconds by pairs to milliseconds; null for clocks that stand still or run backwards. */
-export function spanOf(stamps: BigUint64Array): number | null {
+/** No frame takes longer and is still alive, ms. */
+const MOST_MS = 60_000;
+
+/**
+ * When a frame began, and how long it took. A frame may be shorter than a step of the clock, which browsers make 100 µs, and so take nothing.
+ * @param stamps nanoseconds, by pairs
+ * @param before when the frame before began, ns
+ * @returns null milliseconds for clocks that have stood still since then, or run backwards
+ */
+export function spanOf(stamps: BigUint64Array, before: bigint): [begin: bigint, milliseconds: number | null] {
   let [begin, end] = [stamps[0], stamps[1]];
   for (let i = 0; i < stamps.length; i += 2) {
     if (stamps[i] < begin) begin = stamps[i];
     if (stamps[i + 1] > end) end = stamps[i + 1];
   }
   const milliseconds = Number(end - begin) / 1e6;
-  return begin > 0n && milliseconds > 0 && milliseconds < MOST_MS ? milliseconds : null;
+  return [begin, begin > before && milliseconds >= 0 && milliseconds < MOST_MS ? milliseconds : null];
 }
-
-/** No frame takes longer and is still alive, ms. */
-const MOST_MS = 60_000;
