@@ -138,6 +138,33 @@ test('primitives of mixed degree and meshes in several places become one cloud',
   assertAtMost(Math.abs(found.positions[36] - (found.positions[0] - 10)), 1e-5, 'the second place');
 });
 
+test('drafts of the extension: other names, and opacities in the colours', async () => {
+  const cloud = smallCloud(7, 0);
+  const { json, buffer } = buildGltf([[{ cloud }]], [{ mesh: 0 }], [0]);
+  const recent = await readScene(writeGlb(json, buffer), { name: 'a.glb' });
+  const rgba = Float32Array.from({ length: 28 }, (_, k) =>
+    k % 4 === 3 ? cloud.opacities[k >> 2] : 0.5 + 0.28209479177387814 * cloud.sh[3 * (k >> 2) + (k % 4)],
+  );
+  const copy = structuredClone(json) as Record<'accessors' | 'bufferViews', object[]> & {
+    meshes: { primitives: { attributes: Record<string, number> }[] }[];
+  };
+  const [primitive] = copy.meshes[0].primitives;
+  const { POSITION, ...rest } = primitive.attributes;
+  copy.bufferViews.push({ buffer: 0, byteOffset: buffer.length, byteLength: rgba.byteLength });
+  const view = copy.bufferViews.length - 1;
+  copy.accessors.push({ bufferView: view, componentType: 5126, count: 7, type: 'VEC4' });
+  primitive.attributes = {
+    POSITION,
+    COLOR_0: copy.accessors.length - 1,
+    _ROTATION: rest['KHR_gaussian_splatting:ROTATION'],
+    _SCALE: rest['KHR_gaussian_splatting:SCALE'],
+  };
+  const file = writeGlb(copy as Record<string, unknown>, Buffer.concat([buffer, Buffer.from(rgba.buffer)]));
+  const draft = await readScene(file, { name: 'a.glb' });
+  assertAtMost(largestDifference(draft.sh, recent.sh), 1e-6, 'colours');
+  assertSameCloud({ ...draft, sh: recent.sh }, recent);
+});
+
 test('SPZ inside is the same scene as the SPZ file', async () => {
   const spz = writeSpz(rawSplats(9, 1), { version: 2 });
   const found = await read([[{ cloud: smallCloud(1, 0), spz }]], [{ mesh: 0 }], [0]);

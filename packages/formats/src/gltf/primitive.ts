@@ -93,7 +93,8 @@ async function readAttributes(
   range: SplatRange | undefined,
 ): Promise<GaussianCloud> {
   const attributes = isObject(primitive.attributes) ? primitive.attributes : {};
-  const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`];
+  // Drafts wrote _SCALE and _ROTATION.
+  const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
   const all = document.accessorCount(attributes.POSITION);
   const count = range ? range.end - range.first : all;
   const read = async (name: string, index: unknown, width: number): Promise<Float32Array> => {
@@ -111,7 +112,9 @@ async function readAttributes(
   const cloud = allocateCloud(count, degreeOf(own), document.name);
   cloud.positions.set(positions);
   cloud.scales.set(await read('SCALE', own('SCALE'), 3));
-  cloud.opacities.set(await read('OPACITY', own('OPACITY'), 1));
+  const opacity = own('OPACITY');
+  if (opacity !== undefined || attributes.COLOR_0 === undefined) cloud.opacities.set(await read('OPACITY', opacity, 1));
+  else setAlphas(cloud, await read('COLOR_0', attributes.COLOR_0, 4));
   toWFirst(await read('ROTATION', own('ROTATION'), 4), cloud.rotations);
   await readColours(cloud, own, attributes, read);
   return cloud;
@@ -120,6 +123,11 @@ async function readAttributes(
 function degreeOf(own: (name: string) => unknown): ShDegree {
   const bands = [1, 2, 3] as const;
   return bands.findLast((degree) => own(`SH_DEGREE_${degree}_COEF_0`) !== undefined) ?? 0;
+}
+
+/** Drafts had no opacities but those of the colours. */
+function setAlphas({ opacities }: DraftCloud, colours: Float32Array): void {
+  for (let i = 0; i < opacities.length; i++) opacities[i] = colours[4 * i + 3];
 }
 
 /** glTF writes quaternions (x, y, z, w). */
