@@ -212,6 +212,33 @@ test('JSON is known as glTF in whatever order its keys come', async () => {
   }
 });
 
+test('copies are bounded, and what is in the file once is not', async () => {
+  // 20,000 splats of 56 bytes: 1,917 copies are more than 2 GiB.
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(20_000, 0) }]], [{ mesh: 0 }], [0]);
+  const shown = (times: number): Uint8Array =>
+    writeGlb({ ...json, nodes: [{ children: new Array(times).fill(1) }, { mesh: 0 }] }, buffer);
+  await expectRefusal(shown(2_000), 'decode/header', /copies of at most 2,147,483,648 bytes/, { name: 'a.glb' });
+  // Two lines of JSON, and all splats in a file of their own.
+  const count = 2_900_000;
+  const view = { buffer: 0, byteOffset: 0, byteLength: 16 * count };
+  const accessor = { bufferView: 0, byteOffset: 0, componentType: 5126, count };
+  const [POSITION, SCALE, ROTATION, OPACITY] = [0, 0, 1, 2];
+  const own = { SCALE, ROTATION, OPACITY, SH_DEGREE_0_COEF_0: 0 };
+  const attributes = Object.fromEntries(Object.entries(own).map(([k, v]) => [`KHR_gaussian_splatting:${k}`, v]));
+  const large = {
+    asset: { version: '2.0' },
+    nodes: [{ mesh: 0 }],
+    meshes: [{ primitives: [{ attributes: { POSITION, ...attributes }, extensions: { KHR_gaussian_splatting: {} } }] }],
+    accessors: ['VEC3', 'VEC4', 'SCALAR'].map((type) => ({ ...accessor, type })),
+    bufferViews: [view],
+    buffers: [{ uri: 'a.bin', byteLength: view.byteLength }],
+  };
+  const file = Buffer.from(JSON.stringify(large));
+  assert.ok(count > 4_096 * file.length, `${file.length} bytes`);
+  const openPart = async (): Promise<Uint8Array> => new Uint8Array(new Float32Array(4 * count).fill(0.5).buffer);
+  assert.equal((await readScene(file, { name: 'a.gltf', openPart })).count, count);
+});
+
 test('what the extension allows and we do not draw is refused by name', async () => {
   const { json, buffer } = buildGltf([[{ cloud: smallCloud(2, 0) }]], [{ mesh: 0 }], [0]);
   type Splats = { extensions: { KHR_gaussian_splatting: Record<string, unknown> } };

@@ -29,6 +29,14 @@ export function isUncompressed(primitive: Json): boolean {
 
 const splatsOf = ({ extensions }: Json): Json => (extensions as Json)[EXTENSION] as Json;
 
+/** What tells the splats of a primitive from those of others: where their places, or all of their numbers, are. */
+export function sourceOf(primitive: Json): string {
+  const { extensions } = splatsOf(primitive);
+  const spz = isObject(extensions) ? SPZ_EXTENSIONS.map((name) => extensions[name]).find(isObject) : undefined;
+  if (spz) return `view ${String(spz.bufferView)}`;
+  return `accessor ${isObject(primitive.attributes) ? String(primitive.attributes.POSITION) : ''}`;
+}
+
 /** Splats of a primitive whose numbers lie open, and the degree of their spherical harmonics. */
 export function splatsIn(document: GltfDocument, { attributes }: Json): { count: number; shDegree: ShDegree } {
   const own = isObject(attributes) ? attributes : {};
