@@ -138,6 +138,33 @@ test('primitives of mixed degree and meshes in several places become one cloud',
   assertAtMost(Math.abs(found.positions[36] - (found.positions[0] - 10)), 1e-5, 'the second place');
 });
 
+test('drafts of the extension: other names, and opacities in the colours', async () => {
+  const cloud = smallCloud(7, 0);
+  const { json, buffer } = buildGltf([[{ cloud }]], [{ mesh: 0 }], [0]);
+  const recent = await readScene(writeGlb(json, buffer), { name: 'a.glb' });
+  const rgba = Float32Array.from({ length: 28 }, (_, k) =>
+    k % 4 === 3 ? cloud.opacities[k >> 2] : 0.5 + 0.28209479177387814 * cloud.sh[3 * (k >> 2) + (k % 4)],
+  );
+  const copy = structuredClone(json) as Record<'accessors' | 'bufferViews', object[]> & {
+    meshes: { primitives: { attributes: Record<string, number> }[] }[];
+  };
+  const [primitive] = copy.meshes[0].primitives;
+  const { POSITION, ...rest } = primitive.attributes;
+  copy.bufferViews.push({ buffer: 0, byteOffset: buffer.length, byteLength: rgba.byteLength });
+  const view = copy.bufferViews.length - 1;
+  copy.accessors.push({ bufferView: view, componentType: 5126, count: 7, type: 'VEC4' });
+  primitive.attributes = {
+    POSITION,
+    COLOR_0: copy.accessors.length - 1,
+    _ROTATION: rest['KHR_gaussian_splatting:ROTATION'],
+    _SCALE: rest['KHR_gaussian_splatting:SCALE'],
+  };
+  const file = writeGlb(copy as Record<string, unknown>, Buffer.concat([buffer, Buffer.from(rgba.buffer)]));
+  const draft = await readScene(file, { name: 'a.glb' });
+  assertAtMost(largestDifference(draft.sh, recent.sh), 1e-6, 'colours');
+  assertSameCloud({ ...draft, sh: recent.sh }, recent);
+});
+
 test('SPZ inside is the same scene as the SPZ file', async () => {
   const spz = writeSpz(rawSplats(9, 1), { version: 2 });
   const found = await read([[{ cloud: smallCloud(1, 0), spz }]], [{ mesh: 0 }], [0]);
@@ -183,6 +210,33 @@ test('JSON is known as glTF in whatever order its keys come', async () => {
     assertSameCloud(await readScene(Buffer.from(text), { name: 'a' }), inside);
     assertSameCloud(await readScene(Buffer.from(`\ufeff\n${text}\n`), { name: 'a' }), inside);
   }
+});
+
+test('copies are bounded, and what is in the file once is not', async () => {
+  // 20,000 splats of 56 bytes: 1,917 copies are more than 2 GiB.
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(20_000, 0) }]], [{ mesh: 0 }], [0]);
+  const shown = (times: number): Uint8Array =>
+    writeGlb({ ...json, nodes: [{ children: new Array(times).fill(1) }, { mesh: 0 }] }, buffer);
+  await expectRefusal(shown(2_000), 'decode/header', /copies of at most 2,147,483,648 bytes/, { name: 'a.glb' });
+  // Two lines of JSON, and all splats in a file of their own.
+  const count = 2_900_000;
+  const view = { buffer: 0, byteOffset: 0, byteLength: 16 * count };
+  const accessor = { bufferView: 0, byteOffset: 0, componentType: 5126, count };
+  const [POSITION, SCALE, ROTATION, OPACITY] = [0, 0, 1, 2];
+  const own = { SCALE, ROTATION, OPACITY, SH_DEGREE_0_COEF_0: 0 };
+  const attributes = Object.fromEntries(Object.entries(own).map(([k, v]) => [`KHR_gaussian_splatting:${k}`, v]));
+  const large = {
+    asset: { version: '2.0' },
+    nodes: [{ mesh: 0 }],
+    meshes: [{ primitives: [{ attributes: { POSITION, ...attributes }, extensions: { KHR_gaussian_splatting: {} } }] }],
+    accessors: ['VEC3', 'VEC4', 'SCALAR'].map((type) => ({ ...accessor, type })),
+    bufferViews: [view],
+    buffers: [{ uri: 'a.bin', byteLength: view.byteLength }],
+  };
+  const file = Buffer.from(JSON.stringify(large));
+  assert.ok(count > 4_096 * file.length, `${file.length} bytes`);
+  const openPart = async (): Promise<Uint8Array> => new Uint8Array(new Float32Array(4 * count).fill(0.5).buffer);
+  assert.equal((await readScene(file, { name: 'a.gltf', openPart })).count, count);
 });
 
 test('what the extension allows and we do not draw is refused by name', async () => {

@@ -1,9 +1,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { zipSync } from 'fflate';
-import { detectFormat, readScene, sceneFormats } from '@gaussian-splat/formats';
+import { detectFormat, readLodScene, readScene, sceneFormats, SogFiles } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { expectRefusal } from './support/expect.js';
+import { buildGltf } from './support/gltf-writer.js';
+import { smallCloud } from './support/small-cloud.js';
+import { writeSog } from './support/sog-writer.js';
 
 const text = (content: string): Uint8Array => new TextEncoder().encode(content);
 
@@ -42,6 +45,38 @@ for (const [what, bytes, code, message, name = 'file'] of KINDS) {
     await expectRefusal(bytes, code, message, { name });
   });
 }
+
+test('pages and pointers in place of a part of a scene are told as such', async () => {
+  const files = writeSog(smallCloud(40, 1));
+  const lod = text(
+    JSON.stringify({
+      lodLevels: 1,
+      filenames: ['0/meta.json'],
+      tree: { bound: { min: [0, 0, 0], max: [1, 1, 1] }, lods: { 0: { file: 0, count: 40 } } },
+    }),
+  );
+  const page = text('<!doctype html><title>Not found</title>');
+  const pointer = text('version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12345\n');
+  const brings = (path: string, bytes: Uint8Array) => async (wanted: string) =>
+    wanted === path ? bytes : files[wanted.split('/').at(-1)!];
+  const cases: [Uint8Array, string, Uint8Array, string, RegExp][] = [
+    [files['meta.json'], 'quats.webp', page, 'decode/html', /quats\.webp .*the file that the scene names.*web page/],
+    [files['meta.json'], 'shN_labels.webp', pointer, 'decode/lfs-pointer', /shN_labels\.webp .*git lfs pull/],
+    [lod, '0/meta.json', page, 'decode/html', /0\/meta\.json .*web page/],
+    [lod, '0/sh0.webp', pointer, 'decode/lfs-pointer', /0\/meta\.json, sh0\.webp .*git lfs pull/],
+  ];
+  for (const [scene, path, bytes, code, message] of cases) {
+    await expectRefusal(scene, code, message, { name: 'scene.json', openPart: brings(path, bytes) });
+    assert.ok(await readScene(scene, { openPart: brings('', bytes) }));
+  }
+  const { json, buffer } = buildGltf([[{ cloud: smallCloud(2, 0) }]], [{ mesh: 0 }], [0]);
+  const gltf = text(JSON.stringify({ ...json, buffers: [{ uri: 'a.bin', byteLength: buffer.length }] }));
+  const openPart = brings('a.bin', page);
+  await expectRefusal(gltf, 'decode/html', /scene\.gltf, a\.bin .*web page/, { name: 'scene.gltf', openPart });
+  const { boxes } = readLodScene(lod, 'lod-meta.json', 'https://x.test/lod-meta.json');
+  const fetch = async (url: string): Promise<Uint8Array> => brings('quats.webp', page)(new URL(url).pathname.slice(3));
+  await assert.rejects(new SogFiles().read(boxes[0].runs[0], fetch), /quats\.webp .*web page.*decode\/html/);
+});
 
 test('real files of other kinds are refused by name', { skip: needsSharedData }, async () => {
   const files: [string, string, RegExp][] = [

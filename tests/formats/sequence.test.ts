@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { frameAt, isSequence, parseSequence } from '@gaussian-splat/formats';
+import { sequenceOf } from '../../packages/element/src/loading/sequence-of.js';
 import { expectRefusal } from './support/expect.js';
 
 const text = (json: unknown): Uint8Array => new TextEncoder().encode(JSON.stringify(json));
@@ -21,6 +22,17 @@ test('a manifest may begin with space and with a byte-order mark', () => {
     assert.ok(isSequence(bytes), JSON.stringify(before));
     assert.deepEqual(parseSequence(bytes, 'a.json').frames, ['a.spz']);
   }
+});
+
+test('frames are seen from the address of their manifest, if it has one', () => {
+  const bytes = manifest({ frames: ['a b.spz', '../c.spz', 'https://x.test/d.spz'] });
+  assert.deepEqual(sequenceOf(bytes, 'a.json', 'https://y.test/e/a.json?v=1').frames, [
+    'https://y.test/e/a%20b.spz',
+    'https://y.test/c.spz',
+    'https://x.test/d.spz',
+  ]);
+  const nowhere = (): unknown => sequenceOf(bytes, 'a.json', 'blob:https://y.test/1-2');
+  assert.throws(nowhere, /a\.json, frames: expected addresses.*"a b\.spz".*decode\/unsupported/);
 });
 
 test('every frame is shown for its time', () => {

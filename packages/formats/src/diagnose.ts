@@ -81,10 +81,17 @@ function isOnnx(bytes: Uint8Array): boolean {
   return bytes.length > 8 && bytes[0] === 8 && bytes[1] > 0 && bytes[1] < 32 && [0x12, 0x3a].includes(bytes[2]);
 }
 
+const A_SCENE = 'a Gaussian splat scene (PLY, compressed PLY, SPZ, SOG, .splat, .ksplat or glTF)';
+
 /** The error that says what a file is that no reader knows: by its signature, by its name, or else by its bytes. */
-export function diagnose(bytes: Uint8Array, name: string, extension: string): GaussianSplatError {
+export function diagnose(
+  bytes: Uint8Array,
+  name: string,
+  extension: string,
+  expected: string = A_SCENE,
+): GaussianSplatError {
   const signed = foreignName(bytes);
-  if (signed) return refusal(SIGNED_KINDS[signed], name, bytes);
+  if (signed) return refusal(SIGNED_KINDS[signed], name, bytes, expected);
   const known = UNREAD_EXTENSIONS.get(extension);
   return known === undefined ? refusal(unsignedKind(bytes), name, bytes) : refusal(unread(known), name, undefined);
 }
@@ -96,11 +103,16 @@ export function describeContent(bytes: Uint8Array): string {
   return (signed ? SIGNED_KINDS[signed] : unsignedKind(bytes)).found;
 }
 
-function refusal(kind: ForeignKind, name: string, bytes: Uint8Array | undefined): GaussianSplatError {
+function refusal(
+  kind: ForeignKind,
+  name: string,
+  bytes: Uint8Array | undefined,
+  expected = A_SCENE,
+): GaussianSplatError {
   const start = bytes && kind.isText ? `: ${quote(sampleText(bytes).trim(), 40)}` : '';
   return new GaussianSplatError(kind.code, {
     where: bytes ? `${name} (${grouped(bytes.length)} bytes), byte 0` : name,
-    expected: 'a Gaussian splat scene (PLY, compressed PLY, SPZ, SOG, .splat, .ksplat or glTF)',
+    expected,
     found: kind.found + start,
     remedy: kind.remedy,
   });

@@ -1,4 +1,5 @@
 import { alignedTo4, grouped, hostIsLittleEndian } from '../bytes.js';
+import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
 import type { OpenPart, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
@@ -150,7 +151,8 @@ export class GltfDocument {
     if (typeof uri !== 'string') return this.fail(`buffers[${index}].uri`, 'an address', uri);
     if (uri.startsWith('data:')) return this.#decodeDataUri(uri, index);
     // What follows the path is for servers; the file that lies beside the scene is found without.
-    return this.#open(decodeSafely(uri.replace(/[?#][^]*$/, '')));
+    const path = decodeSafely(uri.replace(/[?#][^]*$/, ''));
+    return checkedPart(await this.#open(path), `${this.name}, ${path}`);
   }
 
   #decodeDataUri(uri: string, index: number): Uint8Array {

@@ -29,6 +29,14 @@ export function isUncompressed(primitive: Json): boolean {
 
 const splatsOf = ({ extensions }: Json): Json => (extensions as Json)[EXTENSION] as Json;
 
+/** What tells the splats of a primitive from those of others: where their places, or all of their numbers, are. */
+export function sourceOf(primitive: Json): string {
+  const { extensions } = splatsOf(primitive);
+  const spz = isObject(extensions) ? SPZ_EXTENSIONS.map((name) => extensions[name]).find(isObject) : undefined;
+  if (spz) return `view ${String(spz.bufferView)}`;
+  return `accessor ${isObject(primitive.attributes) ? String(primitive.attributes.POSITION) : ''}`;
+}
+
 /** Splats of a primitive whose numbers lie open, and the degree of their spherical harmonics. */
 export function splatsIn(document: GltfDocument, { attributes }: Json): { count: number; shDegree: ShDegree } {
   const own = isObject(attributes) ? attributes : {};
@@ -93,7 +101,8 @@ async function readAttributes(
   range: SplatRange | undefined,
 ): Promise<GaussianCloud> {
   const attributes = isObject(primitive.attributes) ? primitive.attributes : {};
-  const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`];
+  // Drafts wrote _SCALE and _ROTATION.
+  const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
   const all = document.accessorCount(attributes.POSITION);
   const count = range ? range.end - range.first : all;
   const read = async (name: string, index: unknown, width: number): Promise<Float32Array> => {
@@ -111,7 +120,9 @@ async function readAttributes(
   const cloud = allocateCloud(count, degreeOf(own), document.name);
   cloud.positions.set(positions);
   cloud.scales.set(await read('SCALE', own('SCALE'), 3));
-  cloud.opacities.set(await read('OPACITY', own('OPACITY'), 1));
+  const opacity = own('OPACITY');
+  if (opacity !== undefined || attributes.COLOR_0 === undefined) cloud.opacities.set(await read('OPACITY', opacity, 1));
+  else setAlphas(cloud, await read('COLOR_0', attributes.COLOR_0, 4));
   toWFirst(await read('ROTATION', own('ROTATION'), 4), cloud.rotations);
   await readColours(cloud, own, attributes, read);
   return cloud;
@@ -120,6 +131,11 @@ async function readAttributes(
 function degreeOf(own: (name: string) => unknown): ShDegree {
   const bands = [1, 2, 3] as const;
   return bands.findLast((degree) => own(`SH_DEGREE_${degree}_COEF_0`) !== undefined) ?? 0;
+}
+
+/** Drafts had no opacities but those of the colours. */
+function setAlphas({ opacities }: DraftCloud, colours: Float32Array): void {
+  for (let i = 0; i < opacities.length; i++) opacities[i] = colours[4 * i + 3];
 }
 
 /** glTF writes quaternions (x, y, z, w). */

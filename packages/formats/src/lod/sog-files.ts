@@ -1,5 +1,6 @@
 import { GaussianSplatError, keepUsable, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
+import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
 import { partAddress } from '../open-part.js';
 import { parseSogMeta } from '../sog/meta.js';
@@ -97,7 +98,7 @@ export class SogFiles {
     const leave = await this.#gate.enter();
     try {
       signal.throwIfAborted();
-      const bytes = await fetch(url, signal);
+      const bytes = await checkedPart(await fetch(url, signal), name);
       const open = (path: string): Promise<Uint8Array> => fetch(partAddress(url, path).href, signal);
       const cloud = await readSogImages(parseSogMeta(bytes, name), open, { bytes, name, signal });
       this.#keep(url, cloud);

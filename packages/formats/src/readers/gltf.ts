@@ -1,9 +1,9 @@
-import { GaussianSplatError, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { GaussianSplatError, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { openContainer, type Json } from '../gltf/container.js';
 import { GltfDocument } from '../gltf/document.js';
 import { multiply, placedMeshes, type Affine } from '../gltf/nodes.js';
-import { isSplats, isUncompressed, readPrimitive, splatsIn } from '../gltf/primitive.js';
+import { isSplats, isUncompressed, readPrimitive, sourceOf, splatsIn } from '../gltf/primitive.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
 import { transformCloud } from '../transform/transform-cloud.js';
@@ -15,8 +15,8 @@ const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 /** Primitives of splats in a scene, each time that one is shown counted: a short file can name the same ones over and over. */
 const MAX_PRIMITIVES = 100_000;
 
-/** The same mesh in many places is copied for each: at most so many bytes of splats for each byte of the file. */
-const MAX_GROWTH = 4_096;
+/** The same mesh in many places is copied for each, and copies take no bytes of the file: these, 9 million splats of degree 3, are all that copies may take. */
+const MAX_COPIED_BYTES = 2 ** 31;
 
 /**
  * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives of the default scene that hold splats, each moved by its nodes
@@ -24,10 +24,13 @@ const MAX_GROWTH = 4_096;
  * cameras, lights and animations are left out.
  */
 export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
-  const { bytes, name, signal, range } = source;
+  const { name, signal, range } = source;
   const { document, placed, others } = open(source);
   if (placed.length === 0) throw noSplats(document.json, name, others);
   const clouds: GaussianCloud[] = [];
+  const copies = new Copies(document);
+  for (const { primitive } of range ? [] : placed)
+    if (isUncompressed(primitive)) copies.count(primitive, splatsIn(document, primitive));
   let splats = 0;
   for (const { primitive, path, toScene } of placed) {
     signal?.throwIfAborted();
@@ -38,8 +41,7 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
     }
     const cloud = await readPrimitive(document, primitive, path, signal, own);
     splats += own?.count ?? cloud.count;
-    if (splats > MAX_GROWTH * bytes.length)
-      document.fail('nodes', 'a mesh in some places', `${grouped(splats)} splats`);
+    if (!isUncompressed(primitive)) copies.count(primitive, cloud);
     clouds.push(moved(cloud, multiply(TO_CLOUD, toScene)));
   }
   if (clouds.length === 1) return clouds[0];
@@ -47,6 +49,26 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
     clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
     name,
   );
+}
+
+/** Adds up what splats take that have been read before, for another place. */
+class Copies {
+  readonly #document: GltfDocument;
+  readonly #known = new Set<unknown>();
+  #bytes = 0;
+
+  constructor(document: GltfDocument) {
+    this.#document = document;
+  }
+
+  /** A primitive is shown once more. Throws `decode/header` where that is too much. */
+  count(primitive: Json, { count, shDegree }: Pick<GaussianCloud, 'count' | 'shDegree'>): void {
+    const source = sourceOf(primitive);
+    if (this.#known.has(source)) this.#bytes += 4 * count * (11 + 3 * shCoefficientCount(shDegree));
+    this.#known.add(source);
+    if (this.#bytes > MAX_COPIED_BYTES)
+      this.#document.fail('nodes', `copies of at most ${grouped(MAX_COPIED_BYTES)} bytes`, 'more');
+  }
 }
 
 /** True if a node moves so far, as georeferenced ones do, that float32 would round what it moves by more than a few hundredths of a millimetre. */

@@ -1,5 +1,6 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
+import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
 import { parseLodMeta, runsAtAllLevels, runsAtLevel, type LodMeta, type NodeRun } from '../lod/meta.js';
 import { levelRunsOf, type NodePart } from '../lod/node-parts.js';
@@ -63,7 +64,7 @@ async function readEnvironment(
 async function readPart(path: string, open: OpenPart, { name, signal }: SceneSource): Promise<GaussianCloud> {
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const own = `${name}, ${path}`;
-  const bytes = await open(path);
+  const bytes = await checkedPart(await open(path), own);
   const source: SceneSource = { bytes, name: own, signal };
   return readSogImages(parseSogMeta(bytes, own), (part) => open(folder + part), source);
 }

@@ -1,5 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
+import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
 import type { OpenPart } from '../scene-format.js';
 import { decodeWebp, webpSize, type WebpImage } from '../webp/decode.js';
@@ -23,7 +24,7 @@ export class Planes {
   /** Downloads an image. */
   async load(file: string): Promise<Uint8Array> {
     this.#signal?.throwIfAborted();
-    return this.#open(file);
+    return checkedPart(await this.#open(file), `${this.#name}, ${file}`);
   }
 
   /** A plane with one pixel for each splat: at least `count` pixels, and not many more. */

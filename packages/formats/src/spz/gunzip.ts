@@ -5,6 +5,12 @@ import type { SceneSource } from '../scene-format.js';
 /** Compressed bytes handed over at once: what they can inflate to, at most 17 MB, may arrive before anyone can stop. */
 const FEED_BYTES = 16_384;
 
+/**
+ * True of the error for bytes behind the end of the stream, which other readers of SPZ leave alone: padding, for one. All that is in the stream has come by then. Browsers tell
+ * it in words only, each in its own.
+ */
+const isBehind = (cause: unknown): boolean => /junk|extra bytes|after the end/i.test(String((cause as Error).message));
+
 /** Inflates a gzip file step by step, so that a header can be checked before its body is inflated. */
 export class Gunzip {
   readonly #source: SceneSource;
@@ -24,9 +30,12 @@ export class Gunzip {
   async upTo(length: number): Promise<Uint8Array> {
     while (this.#output.length < length && !this.#isEnded) {
       this.#source.signal?.throwIfAborted();
-      const { done, value } = await this.#reader.read().catch((cause: unknown) => this.#fail(cause));
-      if (done) this.#isEnded = true;
-      else this.#output.append(value);
+      const { value } = await this.#reader.read().catch((cause: unknown) => {
+        if (!isBehind(cause)) return this.#fail(cause);
+        return { value: undefined };
+      });
+      if (value) this.#output.append(value);
+      else this.#isEnded = true;
     }
     return this.#output.view();
   }
