@@ -27,7 +27,8 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
   --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
-                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 230 views around the subject, 6 of them held out
+                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 230 views around the subject, 6 of them held out.
+                  Larger ones are drawn with 1600 pixels a side
   --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
   --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
                   auto (default): gpu where there is one
@@ -117,10 +118,26 @@ function parseViews(path) {
   );
 }
 
+/** Longest side of a view, px: what captures are trained at. Larger pictures take gigabytes, or are beyond what a GPU draws. */
+const LARGEST_SIDE = 1600;
+
+/** The same view in fewer pixels, where it has too many. */
+function atMostLargest(camera) {
+  const share = LARGEST_SIDE / Math.max(camera.width, camera.height);
+  if (share >= 1) return camera;
+  const [width, height] = [camera.width, camera.height].map((side) => Math.max(1, Math.round(share * side)));
+  const [x, y] = [width / camera.width, height / camera.height];
+  return { ...camera, width, height, fx: x * camera.fx, fy: y * camera.fy, cx: x * camera.cx, cy: y * camera.cy };
+}
+
 function readViews(path, bounds, scored) {
   if (path === undefined) return dealtViewsAround(bounds, { scored });
   const views = parseViews(path);
-  const dealt = dealViews(views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`)));
+  const cameras = views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`));
+  const drawn = cameras.map(atMostLargest);
+  const smaller = drawn.filter((camera, k) => camera !== cameras[k]).length;
+  if (smaller > 0) console.log(`views        ${smaller} of ${views.length} in fewer pixels, ${LARGEST_SIDE} a side`);
+  const dealt = dealViews(drawn);
   if (dealt.heldOut.length > 0) return { ...dealt, scored: [...dealt.scored, ...viewsBetween(dealt.scored)] };
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
 }

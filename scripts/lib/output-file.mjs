@@ -15,18 +15,24 @@ export function obstacleTo(path) {
   const folder = dirname(path);
   if (!existsSync(folder)) return `the folder ${folder} does not exist`;
   if (existsSync(path) && statSync(path).isDirectory()) return `${path} is a folder`;
+  if (!mayWrite(existsSync(path) ? path : folder)) return `${path} may not be written`;
+}
+
+function mayWrite(path) {
   try {
-    accessSync(existsSync(path) ? path : folder, constants.W_OK);
-  } catch (error) {
-    return `${path} cannot be written (${error.code})`;
+    accessSync(path, constants.W_OK);
+    return true;
+  } catch {
+    return false;
   }
 }
 
 /** Writes a file whole or not at all: what is there stays until all of the new one is on the disk. */
 export function writeWhole(path, content) {
   const target = existsSync(path) ? realpathSync(path) : path;
-  // Pipes and devices are not replaced.
-  if (existsSync(target) && !statSync(target).isFile()) return writeFileSync(target, content);
+  // Neither pipes and devices are replaced, nor a file in a folder that nothing can be added to.
+  if (existsSync(target) && !(statSync(target).isFile() && mayWrite(dirname(target))))
+    return writeFileSync(target, content);
   const part = `${target}.${process.pid}.part`;
   try {
     writeFileSync(part, content);

@@ -88,6 +88,18 @@ test('what it says of the written file is what a reader finds in it', async () =
   assert.deepEqual(readFileSync(scene), Buffer.from(source));
 });
 
+test("photographs' own cameras are drawn with as many pixels as captures are trained at", () => {
+  const large = views.map(({ K: [[fx, , cx], [, fy, cy], last], ...view }) => ({
+    ...{ ...view, width: 9000, height: 90 },
+    K: [[fx * (9000 / 64), 0, cx * (9000 / 64)], [0, fy * (9000 / 64), cy * (900 / 36)], last],
+  }));
+  writeFileSync(join(folder, 'large.json'), JSON.stringify({ views: large }));
+  const { status, said } = command('scene.ply', '--min-db', '30', '--out', 'large.glb', '--views', 'large.json');
+  assert.equal(status, 0, said);
+  assert.match(said, /views +10 of 10 in fewer pixels, 1600 a side/);
+  assert.match(said, /found +3\d\.\d\d dB in 2 held-out views/);
+});
+
 test('where writing fails, what was there stays', () => {
   const path = join(folder, 'there.glb');
   writeWhole(path, 'first');

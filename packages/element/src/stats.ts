@@ -13,7 +13,7 @@ export interface SceneStats {
   readonly dropped: number;
   /** Of these, left out of all pictures because the attribute `economy` asks for it. */
   readonly spared: number;
-  /** dB to the whole scene in views around it that had no say; null unless `economy` asks for a figure or for `views`. */
+  /** dB to the whole scene in views around it that had no say, Infinity where they show no difference; null unless `economy` asks for a figure or for `views`. */
   readonly decibels: number | null;
   /** Splats on the GPU, those of levels of detail included. */
   readonly inMemory: number;
@@ -91,16 +91,20 @@ function whyDropped(dropped: number): string[] {
 
 function whySpared({ spared, decibels }: EconomyReport): string[] {
   if (spared === 0) return [];
-  const figure = decibels === null ? '' : `: ${decibels.toFixed(1)} dB to the whole scene`;
-  return [`${spared} splats that contribute least to views around the scene are left out${figure}.`];
+  return [`${spared} splats that contribute least to views around the scene are left out${figureOf(decibels)}.`];
 }
 
 function whyByView({ byView, decibels }: EconomyReport): string[] {
   if (!byView) return [];
-  const figure = decibels === null ? '' : `: ${decibels.toFixed(1)} dB to the whole scene`;
+  const figure = figureOf(decibels);
   return [
     `Pictures that are drawn with less than the whole leave out splats that do not show from their side${figure}.`,
   ];
+}
+
+function figureOf(decibels: number | null): string {
+  if (decibels === null) return '';
+  return decibels === Infinity ? ', without a trace' : `: ${decibels.toFixed(1)} dB to the whole scene`;
 }
 
 function whyDetail({ splats, pixels }: SceneStats['detail']): string[] {

@@ -86,6 +86,8 @@ describe('economy', () => {
   it('what is no economy is said once, and the scene stays whole', async () => {
     const element = await showLoaded({ economy: 'little' });
     const { splats } = element.statistics!;
+    // All of it is no fault: sliders end there.
+    await showLoaded({ economy: '100%' });
     await frames(10);
     await until(() => true, 'a moment');
     element.requestUpdate();
@@ -105,6 +107,8 @@ describe('economy', () => {
       await until(() => element.stats?.inMemory === 360, `${state}: less again`, 100_000);
       assertEqual([element.stats?.modelled, element.stats?.spared], [600, 240], `${state}: of all`);
     }
+    element.economy = '1';
+    await until(() => element.stats?.inMemory === 600, 'all of it');
   }).timeout(240_000);
 
   it('a scene that is taken away while it is looked at leaves nothing behind', async () => {

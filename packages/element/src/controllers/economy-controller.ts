@@ -1,4 +1,3 @@
-import type { EconomyGoal } from '@gaussian-splat/economise';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import type { Economy } from '../economy/scene-economy.js';
 
@@ -63,11 +62,7 @@ export class EconomyController {
   async #apply(scene: GpuScene, wish: string | null, signal: AbortSignal): Promise<void> {
     try {
       const { goalOf, SceneEconomy } = await import('../economy/scene-economy.js');
-      const goal: EconomyGoal | null = goalOf(wish);
-      if (wish !== null && goal === null)
-        this.#options.warn(
-          `<gaussian-splat>: economy expects a share such as 60%, dB such as 57db, or views, found ${JSON.stringify(wish)}.`,
-        );
+      const goal = goalOf(wish, this.#options.warn);
       if (signal.aborted || (goal === null && this.#economy === undefined)) return;
       this.#economy ??= new SceneEconomy(scene);
       await this.#economy.apply(goal, this.#options.memoryBudget(), signal);

@@ -14,7 +14,18 @@ import type { GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
 /** What the element's core knows of this module. */
 export type Economy = SceneEconomy;
 
-export const goalOf = parseEconomyGoal;
+/** 100 %, as a share or a percentage. */
+const ALL = /^\s*(1(\.0*)?|100(\.0*)?\s*%)\s*$/;
+
+/** What the attribute asks for, null for all of the scene; what is none of its words is told to `warn`. */
+export function goalOf(wish: string | null, warn: (sentence: string) => void): EconomyGoal | null {
+  const goal = parseEconomyGoal(wish);
+  if (goal === null && wish !== null && !ALL.test(wish))
+    warn(
+      `<gaussian-splat>: economy expects a share such as 60%, dB such as 57db, or views, found ${JSON.stringify(wish)}.`,
+    );
+  return goal;
+}
 
 /** A scene on show, of which what no view needs can be left out, and taken back. */
 export class SceneEconomy {
