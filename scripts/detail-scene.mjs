@@ -1,5 +1,5 @@
 /** The work behind `npm run detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
-import { existsSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
@@ -36,17 +36,23 @@ function parseOptions(args) {
   if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
   if (values.out === undefined) throw new UsageError('--out is missing');
   const out = resolve(from, values.out);
+  const scene = resolve(from, positionals[0]);
+  if (existsSync(scene) && statSync(scene).isDirectory())
+    throw new UsageError(`${positionals[0]} is a folder, no scene`);
+  if (existsSync(out) && !statSync(out).isDirectory()) throw new UsageError(`--out: ${values.out} is no folder`);
   if (existsSync(out) && readdirSync(out).length > 0) throw new UsageError(`--out: ${values.out} is not empty`);
   const tile = /^([1-9]\d{0,3})x([1-9]\d{0,3})$/.exec(values.tile ?? '1x1');
   if (tile === null) throw new UsageError(`--tile: expected AxB such as 24x24, found "${values.tile}"`);
   const spacing = values.spacing === undefined ? undefined : Number(values.spacing);
-  if (spacing !== undefined && !(spacing > 0))
+  // All coordinates are float32.
+  const farthest = Math.fround(Math.max(tile[1], tile[2]) * (spacing ?? 1));
+  if (spacing !== undefined && !(spacing > 0 && farthest < Infinity))
     throw new UsageError(`--spacing: expected a length, found "${values.spacing}"`);
   if (!/^[0-3]$/.test(values.degree ?? '3'))
     throw new UsageError(`--degree: expected 0 to 3, found "${values.degree}"`);
   const degree = Number(values.degree ?? 3);
   return {
-    scene: resolve(from, positionals[0]),
+    scene,
     out,
     degree,
     columns: Number(tile[1]),
@@ -139,7 +145,7 @@ try {
   else await main(options);
 } catch (error) {
   if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
-  else if (error instanceof GaussianSplatError || error.code === 'ENOENT') console.error(error.message);
+  else if (error instanceof GaussianSplatError || error.syscall !== undefined) console.error(error.message);
   else console.error(error);
   process.exitCode = error instanceof UsageError ? 2 : 1;
 }

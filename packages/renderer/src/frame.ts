@@ -1,8 +1,9 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings, Stages } from './bindings.js';
 import type { DepthOrder } from './depth-order.js';
-import type { Wishes } from './gaussian-scene.js';
+import type { Wishes, WishLevers } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
+import type { Levers } from './levers.js';
 import type { Occlusion } from './occlusion.js';
 import type { Scratch } from './scratch.js';
 
@@ -12,8 +13,7 @@ export interface Frame {
   readonly bindings: FrameBindings;
   readonly scratch: Scratch;
   readonly camera: Camera;
-  /** Bits of the keys. */
-  readonly keyBits: number;
+  readonly levers: WishLevers & Pick<Levers, 'depthKeyBits'>;
   readonly occlusion: Occlusion;
   /** An order of all splats that serves the camera; without it the visible splats are sorted. */
   readonly depthOrder?: DepthOrder;
@@ -59,9 +59,9 @@ function keepWithinBudget(pass: GPUComputePassEncoder, { stages, bindings }: Fra
 }
 
 /** Streamed scenes that want to know now which pages the view asks for. */
-function wishesDue({ bindings, camera }: Frame): Wishes[] {
+function wishesDue({ bindings, camera, levers }: Frame): Wishes[] {
   const all = new Set(bindings.pages.flatMap(({ wishes }) => (wishes ? [wishes.of] : [])));
-  return [...all].filter((wishes) => wishes.isDue(camera));
+  return [...all].filter((wishes) => wishes.isDue(camera, levers));
 }
 
 function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: readonly Wishes[]): void {
@@ -90,8 +90,8 @@ function listInDepthOrder(pass: GPUComputePassEncoder, { stages, bindings }: Fra
 }
 
 /** Orders the projected splats from near to far, equal depths in the file's order. */
-function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, keyBits, timer }: Frame): void {
+function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, levers, timer }: Frame): void {
   const pass = encoder.beginComputePass({ label: 'gs.sort', timestampWrites: timer?.timestampWrites('sort') });
-  stages.sort.record(pass, bindings.sort(keyBits), scratch.plan);
+  stages.sort.record(pass, bindings.sort(levers.depthKeyBits), scratch.plan);
   pass.end();
 }

@@ -1,5 +1,6 @@
 import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
 import type { Resource } from './gpu/kernel.js';
+import type { Levers } from './levers.js';
 import type { ShPrecision } from './pack/sh.js';
 import type { Surroundings } from './sides.js';
 
@@ -21,12 +22,15 @@ export interface GaussianPage {
 /** What {@link Wishes} are noted from: a view, and of a page of the pool what lies there. */
 export type NotedPage = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_shares', Resource>>;
 
+/** Levers that say which pages a view asks for. */
+export type WishLevers = Pick<Levers, 'detail' | 'detailFade' | 'splatBudget'>;
+
 /** Carries the pages that a view asks for from a frame to whoever fetches them. Streamed scenes bring their own, so that no other page loads it. */
 export interface Wishes {
   /** Binds a page of the pool, for {@link Wishes.note}. */
   bind(page: NotedPage): GPUBindGroup;
-  /** Called with the camera of each frame. True for one in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
-  isDue(camera: Camera): boolean;
+  /** Called with the camera and the levers of each frame. True for one in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
+  isDue(camera: Camera, levers: WishLevers): boolean;
   begin(encoder: GPUCommandEncoder): void;
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void;
   copy(encoder: GPUCommandEncoder): void;

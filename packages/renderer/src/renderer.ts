@@ -160,13 +160,14 @@ export class Renderer {
     const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined };
     const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
-    table.look(drawn, { ...levers, ...detail }, isOrdered, this.#occlusion.tiles);
+    const own = { ...levers, ...detail };
+    table.look(drawn, own, isOrdered, this.#occlusion.tiles);
     const wishes = recordProjection(encoder, {
       stages: this.#stages,
       bindings,
       scratch,
       camera: drawn,
-      keyBits: levers.depthKeyBits,
+      levers: own,
       occlusion: this.#occlusion,
       depthOrder: isOrdered ? depthOrder : undefined,
       isBudgeted: detail.splatBudget > 0 && table.hasDetail,

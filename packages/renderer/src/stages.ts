@@ -16,7 +16,7 @@ export { buildLevels } from './detail/build-levels.js';
 export { emptyList, listPages, NONE, putBelow, type PageList } from './detail/page-list.js';
 export * as splatRows from './detail/splat-rows.js';
 export { BRIDGED, DetailTable } from './detail/detail-table.js';
-export { SLOT_CHUNKS } from './detail/manifest.js';
+export { pageLayout, SLOT_CHUNKS } from './detail/manifest.js';
 export { MOST_FETCHES, MOST_UNDER_WAY, PageTraffic } from './detail/page-traffic.js';
 export { PageFiles } from './detail/page-files.js';
 export { folderSource } from './detail/page-source.js';

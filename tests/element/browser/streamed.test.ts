@@ -1,7 +1,8 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
+import { MemoryLedger } from '@gaussian-splat/renderer';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
-import { assert, assertEqual, claimFault, show, until } from './support/harness.js';
+import { assert, assertEqual, claimFault, devices, nextEvent, show, until } from './support/harness.js';
 
 const folder = detailFolder(pebbles(40_000));
 
@@ -94,6 +95,26 @@ describe('a streamed scene', () => {
     assertEqual(broken.error?.reason, 'network/status');
     broken.remove();
     none.stop();
+  });
+
+  it('comes back after a lost device, while pages were coming, within the pixels that it was to be drawn within', async () => {
+    const { requests, stop } = serve('/lost/');
+    const element = show({ src: '/lost/detail.json', 'camera-orbit': '30deg 60deg 3m', detail: '0.3px' });
+    await element.ready;
+    assertEqual(element.stats?.detail.pixels, 0.3, 'pixels');
+    for (let loss = 0; loss < 2; loss++) {
+      await until(() => requests.filter((name) => name !== 'part-0').length > 0, 'pages on their way');
+      const restored = nextEvent(element, 'contextrestored');
+      requests.length = 0;
+      devices[devices.length - 1].destroy();
+      await restored;
+      await until(() => element.stats?.detail.pixels === 0.3, 'as much detail as before');
+    }
+    await until(() => requests.filter((name) => name !== 'part-0').length > 0, 'pages of the new device');
+    assertEqual(new Set(requests).size, requests.length, 'no page twice');
+    await close(element);
+    assertEqual(MemoryLedger.of(devices[devices.length - 1]).bytes, 0, 'bytes held');
+    stop();
   });
 
   it("comes by way of the page's own thread where workers are refused", async () => {

@@ -119,6 +119,7 @@ export class StreamedGaussians implements GaussianScene {
         pages: list.count,
         origin,
         aheadMs: () => aheadMs(this.#traffic.arrivalMs),
+        version: () => this.#version,
         onWishes: (wishes, lacking) => this.#take(wishes, lacking),
         onStale: () => this.#options.onChange?.(),
       });

@@ -1,15 +1,16 @@
 import type { Camera, Vector3 } from '@gaussian-splat/core';
-import type { NotedPage, Wishes } from '../gaussian-scene.js';
+import type { NotedPage, Wishes, WishLevers } from '../gaussian-scene.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { NoteWishesStage } from '../stages/note-wishes.js';
 import { cameraValues } from '../view.js';
 import { CameraMotion } from './camera-motion.js';
+import { MOST_VIEWS, SeenViews } from './seen-views.js';
 
-/** Frames between two looks at what is wished for: of a camera that rests, and of one that moves. */
-const INTERVAL = 6;
+/** Frames between two looks at what is wished for: of a camera that rests, and of one that moves. Both odd, for two views that are drawn in turn. */
+const INTERVAL = 5;
 const MOVING_INTERVAL = 3;
-/** Milliseconds after which a view that nobody has looked at is drawn once more, to look. */
+/** Milliseconds after which views that nobody has looked at are drawn once more, to look; for so long those that have been looked at give way to them. */
 const STALE_MS = 120;
 
 /** Numbers of `ahead` in shaders/note_wishes.wgsl: four columns and the eye. */
@@ -21,6 +22,8 @@ export interface WishReaderOptions {
   readonly origin: Vector3;
   /** Milliseconds that a page takes until it is there: so far ahead of a camera that moves is looked. */
   readonly aheadMs: () => number;
+  /** Grows with all that the scene has more or less of. */
+  readonly version: () => number;
   /** Called with the pixels that doing without each page costs the view, or the one that it will have become; and with the most that the view lacks. */
   readonly onWishes: (wishes: Float32Array, lacking: number) => void;
   /** Called when the last view has not been looked at for want of another frame. */
@@ -37,6 +40,10 @@ export class WishReader implements Wishes {
   readonly #device: GPUDevice;
   readonly #options: WishReaderOptions;
   readonly #motion = new CameraMotion();
+  readonly #views = new SeenViews();
+  /** Views drawn of late that nobody has looked at. */
+  readonly #unseen = new Set<string>();
+  #givesWayUntil = -Infinity;
   #frames = INTERVAL;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isReading = false;
@@ -53,13 +60,17 @@ export class WishReader implements Wishes {
   }
 
   /** True for a frame that must note wishes; then {@link begin}, {@link note}, {@link copy} and, after the submit, {@link read} follow. */
-  isDue(camera: Camera): boolean {
-    clearTimeout(this.#timer);
-    this.#motion.observe(camera, performance.now());
-    const interval = this.#motion.isMoving ? MOVING_INTERVAL : INTERVAL;
-    const isDue = this.#frames >= interval && !this.#isReading;
+  isDue(camera: Camera, levers: WishLevers): boolean {
+    const now = performance.now();
+    this.#motion.observe(camera, now);
+    const { isMoving } = this.#motion;
+    const [view, version] = [nameOf(camera, levers), this.#options.version()];
+    const isSeen = this.#views.draw(view, version);
+    const isEarly = this.#frames < (isMoving ? MOVING_INTERVAL : INTERVAL) || this.#isReading;
+    const isDue = !isEarly && !(isSeen && now < this.#givesWayUntil);
     this.#frames = isDue ? 1 : this.#frames + 1;
-    if (!isDue) this.#timer = setTimeout(() => this.#look(), STALE_MS);
+    if (isDue) this.#views.begin(view, version, !isMoving);
+    this.#wait(view, isDue || isSeen);
     return isDue;
   }
 
@@ -67,8 +78,20 @@ export class WishReader implements Wishes {
     clearTimeout(this.#timer);
   }
 
+  /** Sees to it that no view is left that nobody has looked at, though no other frame be drawn. */
+  #wait(view: string, isSeen: boolean): void {
+    this.#unseen.delete(view);
+    if (!isSeen) this.#unseen.add(view);
+    const [oldest] = this.#unseen;
+    if (this.#unseen.size > MOST_VIEWS) this.#unseen.delete(oldest);
+    clearTimeout(this.#timer);
+    if (this.#unseen.size > 0) this.#timer = setTimeout(() => this.#look(), STALE_MS);
+  }
+
   #look(): void {
     this.#frames = INTERVAL;
+    this.#unseen.clear();
+    this.#givesWayUntil = performance.now() + STALE_MS;
     this.#options.onStale();
   }
 
@@ -83,6 +106,8 @@ export class WishReader implements Wishes {
   }
 
   bind(page: NotedPage): GPUBindGroup {
+    // Another size, or other scenes in the same picture.
+    this.#views.clear();
     return this.#stage.bind({ ...page, ahead: this.#ahead, wishes: this.#wishes });
   }
 
@@ -98,7 +123,7 @@ export class WishReader implements Wishes {
   read(): void {
     this.#staging.mapAsync(0x1).then(
       () => {
-        const wishes = new Float32Array(this.#staging.getMappedRange().slice(0));
+        const wishes = this.#views.end(new Float32Array(this.#staging.getMappedRange().slice(0)));
         this.#staging.unmap();
         this.#isReading = false;
         this.#options.onWishes(wishes, wishes[0]);
@@ -107,4 +132,10 @@ export class WishReader implements Wishes {
       () => undefined,
     );
   }
+}
+
+/** All that a look depends on, but for the content of the scene. */
+function nameOf(camera: Camera, { detail, detailFade, splatBudget }: WishLevers): string {
+  const { width, height, fx, fy, cx, cy, near, far, worldToCamera } = camera;
+  return [...worldToCamera, width, height, fx, fy, cx, cy, near, far, detail, detailFade, splatBudget].join(' ');
 }

@@ -1,0 +1,72 @@
+/** `npm run detail`: what it writes is what readers expect, and what it cannot do it says at once. */
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, test } from 'node:test';
+import { checkManifest } from '@gaussian-splat/renderer';
+import { pageLayout } from '@gaussian-splat/renderer/stages';
+import { writePly } from '../formats/support/ply-writer.js';
+import { inriaColumns, rawSplats } from '../formats/support/splats.js';
+
+const folder = mkdtempSync(join(tmpdir(), 'gs-detail-'));
+after(() => rmSync(folder, { recursive: true }));
+
+/** A scene file of so many splats. */
+function sceneOf(splats: number): string {
+  const path = join(folder, `${splats}.ply`);
+  writeFileSync(path, writePly([{ name: 'vertex', columns: inriaColumns(rawSplats(splats, 1)) }]));
+  return path;
+}
+
+function detail(...args: string[]): { status: number | null; text: string } {
+  const { status, stdout, stderr } = spawnSync(process.execPath, ['scripts/detail-scene.mjs', ...args], {
+    encoding: 'utf8',
+    timeout: 60_000,
+  });
+  return { status, text: stdout + stderr };
+}
+
+for (const [splats, ...options] of [
+  [1],
+  [257],
+  [1500, '--degree', '0'],
+  [1500, '--tile', '2x3', '--spacing', '1e5'],
+] as const) {
+  test(`${splats} splats ${options.join(' ')}: every file is as long as the manifest says`, () => {
+    const out = join(folder, `out-${splats}-${options.length}`);
+    const { status, text } = detail(sceneOf(splats), '--out', out, ...options);
+    assert.equal(status, 0, text);
+    const manifest = checkManifest(JSON.parse(readFileSync(join(out, 'detail.json'), 'utf8')), 'detail.json');
+    assert.equal(manifest.splats, splats * (options.includes('--tile' as never) ? 6 : 1));
+    for (const { file, chunks } of manifest.trees.flatMap(({ pages }) => pages)) {
+      assert.equal(statSync(join(out, file)).size, 4 * pageLayout(manifest, chunks).total, file);
+    }
+  });
+}
+
+test('arguments that make no sense are told of in a line, without a trace of the program, and at once', () => {
+  const scene = sceneOf(300);
+  const out = join(folder, 'never');
+  const cases: [RegExp, ...string[]][] = [
+    [/expected one SCENE/],
+    [/--out is missing/, scene],
+    [/is a folder, no scene/, folder, '--out', out],
+    [/is no folder/, scene, '--out', scene],
+    [/is not empty/, scene, '--out', folder],
+    [/--spacing: expected a length/, scene, '--out', out, '--tile', '2x2', '--spacing', 'Infinity'],
+    [/--spacing: expected a length/, scene, '--out', out, '--tile', '20x2', '--spacing', '1e38'],
+    [/--degree/, scene, '--out', out, '--degree', '4'],
+  ];
+  for (const [expected, ...args] of cases) {
+    const { status, text } = detail(...args);
+    assert.equal(status, 2, `${args.join(' ')}: ${text}`);
+    assert.match(text, expected);
+    assert.doesNotMatch(text, /\n {4}at /);
+  }
+  const { status, text } = detail(join(folder, 'missing.ply'), '--out', out);
+  assert.equal(status, 1);
+  assert.match(text, /missing\.ply/);
+  assert.doesNotMatch(text, /\n {4}at /);
+});
