@@ -58,7 +58,7 @@ export interface PaceOptions {
   /** What the page allows a frame, ms; infinite where the display says. */
   readonly frameBudget: () => number;
   readonly requestFrame: () => void;
-  /** Called for each frame that was timed: whether pictures in motion are drawn whole. */
+  /** Called for each frame of a motion that was timed: whether such are drawn whole. */
   readonly onPace: (isWhole: boolean) => void;
 }
 
@@ -93,8 +93,14 @@ export class PaceController {
   get report(): PaceReport {
     const { level, reason, recent } = this.#pace;
     const frameMs = recent.length > 0 ? quantile(recent, 0.5) : null;
-    const [drawn, moving] = [LADDER[this.#drawn].name, LADDER[level].name];
-    return { drawn, moving, reason, frameMs, lastMs: this.#lastMs || null, targetMs: this.targetMs };
+    return {
+      drawn: LADDER[this.#drawn].name,
+      moving: LADDER[level].name,
+      reason,
+      frameMs,
+      lastMs: this.#lastMs || null,
+      targetMs: this.targetMs,
+    };
   }
 
   /**
@@ -132,7 +138,8 @@ export class PaceController {
     if (level === 0) this.#wholeMs = milliseconds;
     const sample = { now: performance.now(), level, milliseconds };
     this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS.slice(0, this.#rungs) });
-    this.#options.onPace(this.#pace.level === 0);
+    const isWhole = this.#pace.level === 0;
+    if (isWhole || level > 0) this.#options.onPace(isWhole);
   }
 
   /** Another scene, or another way to draw it: nothing is known. */
