@@ -95,7 +95,7 @@ function drivenDisplay(): { picture: () => void; restore: () => void } {
   };
 }
 
-test('an element that draws now and then leaves others all but their whole time; two that both move share it within a second', () => {
+test('an element that draws now and then leaves others all but their whole time; two that both move share it within a second, and one alone has it at once', () => {
   const { picture, restore } = drivenDisplay();
   const scheduler = new FrameScheduler();
   const ignored = (): void => undefined;
@@ -126,6 +126,19 @@ test('an element that draws now and then leaves others all but their whole time;
   }
   assert.ok(Math.abs(pace.targetMs / (0.4 * INTERVAL) - 1) < 0.03, `${pace.targetMs} ms`);
   assert.ok(levels.at(-1)! > 0, 'half of the time is too little for the whole picture');
+  // A window that is resized draws all of its elements, frame after frame; then one is turned.
+  const still = Array.from({ length: 8 }, () => ({ drawFrame: ignored }));
+  for (let k = 0; k < 60; k++) {
+    for (const each of still) scheduler.request(each);
+    picture();
+  }
+  pace.reset();
+  levels.length = 0;
+  for (let k = 0; k < 30; k++) {
+    scheduler.request(moving);
+    picture();
+  }
+  assert.equal(Math.max(...levels), 0, `levels ${levels.join(' ')}`);
   pace.stop();
   restore();
 });

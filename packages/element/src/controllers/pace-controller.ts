@@ -21,8 +21,6 @@ export interface FramePlan {
   readonly levers: Partial<FrameLevers> | undefined;
 }
 
-const WHOLE: FramePlan = { level: 0, levers: undefined };
-
 /** What is known of a frame before it is drawn. */
 export interface FrameOccasion {
   /** requestAnimationFrame's clock, ms. */
@@ -118,11 +116,11 @@ export class PaceController {
     // Between two changes of one motion (a sequence of fewer pictures than the display's) what is drawn for other reasons is a part of it, until rest is due.
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
-    const { level } = this.#pace;
-    this.#drawn = isMotion ? level : 0;
-    if (hasChanged || this.#drawn === 0) this.stop();
-    if (this.#drawn === 0) return WHOLE;
-    this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, this.#options.scheduler().displayInterval));
+    const level = isMotion ? this.#pace.level : 0;
+    this.#drawn = level;
+    if (hasChanged || level === 0) this.stop();
+    const { displayInterval } = this.#options.scheduler();
+    if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, displayInterval));
     return { level, levers: LADDER[level].levers };
   }
 
