@@ -1,9 +1,12 @@
 /** When the true image comes, once a picture rests: the controller itself, with a clock of the test's and a GPU that is a figure. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { DetailController } from '../../packages/element/src/controllers/detail-controller.js';
 import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
+import type { GpuScene } from '../../packages/element/src/gpu/gpu-scene.js';
 import { LADDER } from '../../packages/element/src/pace/ladder.js';
+import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
 import { waitForRest } from '../../packages/element/src/pace/rest.js';
 
 const INTERVAL = 1000 / 60;
@@ -92,7 +95,7 @@ function drivenDisplay(): { picture: () => void; restore: () => void } {
   };
 }
 
-test('an element that draws now and then leaves others all but their whole time; two that both move share it within a second', () => {
+test('an element that draws now and then leaves others all but their whole time; two that both move share it within a second, and one alone has it at once', () => {
   const { picture, restore } = drivenDisplay();
   const scheduler = new FrameScheduler();
   const ignored = (): void => undefined;
@@ -123,6 +126,19 @@ test('an element that draws now and then leaves others all but their whole time;
   }
   assert.ok(Math.abs(pace.targetMs / (0.4 * INTERVAL) - 1) < 0.03, `${pace.targetMs} ms`);
   assert.ok(levels.at(-1)! > 0, 'half of the time is too little for the whole picture');
+  // A window that is resized draws all of its elements, frame after frame; then one is turned.
+  const still = Array.from({ length: 8 }, () => ({ drawFrame: ignored }));
+  for (let k = 0; k < 60; k++) {
+    for (const each of still) scheduler.request(each);
+    picture();
+  }
+  pace.reset();
+  levels.length = 0;
+  for (let k = 0; k < 30; k++) {
+    scheduler.request(moving);
+    picture();
+  }
+  assert.equal(Math.max(...levels), 0, `levels ${levels.join(' ')}`);
   pace.stop();
   restore();
 });
@@ -226,4 +242,42 @@ test('what was measured before the page chose a quality is not told, and not bel
   const { drawn, moving, reason, frameMs, lastMs } = pace.report;
   assert.deepEqual([drawn, moving, reason, frameMs, lastMs], ['whole', 'whole', 'start', null, null]);
   pace.stop();
+});
+
+test('levels of detail are built once pictures have moved slowly for 1.5 s, rests not counted', async (context) => {
+  context.mock.timers.enable({ apis: ['setTimeout'] });
+  let now = 5_000;
+  context.mock.method(performance, 'now', () => now);
+  let builds = 0;
+  const detail = new DetailController({
+    detail: () => 'auto',
+    // Whoever builds asks for it; the scene here cannot be read, and that is said.
+    loader: () => (builds++, {} as SceneLoader),
+    ...{ memoryBudget: () => undefined, onChange: () => undefined, warn: () => undefined },
+  });
+  detail.update({ gaussians: { count: 60_000, pages: [] }, detail: {} } as unknown as GpuScene);
+  const pass = (milliseconds: number): void => {
+    now += milliseconds;
+    context.mock.timers.tick(milliseconds);
+  };
+  const move = async (milliseconds: number, isWhole = false): Promise<number> => {
+    for (let spent = 0; spent < milliseconds; spent += 50) {
+      pass(50);
+      detail.notePace(isWhole);
+    }
+    // They are built by a module of their own.
+    await import('../../packages/element/src/detail/build-levels.js');
+    await new Promise(setImmediate);
+    return builds;
+  };
+  // A GPU that was idle is slow for a moment, at every gesture.
+  for (let gesture = 0; gesture < 4; gesture++) {
+    assert.equal(await move(300), 0, `gesture ${gesture}`);
+    pass(4_000);
+    assert.equal(await move(300, true), 0);
+  }
+  pass(4_000);
+  assert.equal(await move(1_000), 0);
+  pass(4_000);
+  assert.equal(await move(1_000), 1, 'two seconds of slow pictures in two gestures');
 });

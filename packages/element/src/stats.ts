@@ -75,7 +75,7 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPre
       ...whyDropped(dropped),
       ...whySpared(economy),
       ...whyByView(economy),
-      ...whyDetail(detail),
+      ...whyDetail(quality, detail),
       ...whyPace(quality, pace),
     ],
   };
@@ -107,8 +107,9 @@ function figureOf(decibels: number | null): string {
   return decibels === Infinity ? ', without a trace' : `: ${decibels.toFixed(1)} dB to the whole scene`;
 }
 
-function whyDetail({ splats, pixels }: SceneStats['detail']): string[] {
-  if (splats === 0) return [];
+function whyDetail(quality: QualityChoice, { splats, pixels }: SceneStats['detail']): string[] {
+  // With a chosen quality they are drawn only where the page allows for it.
+  if (splats === 0 || (pixels === 0 && quality !== 'auto')) return [];
   const rest = pixels > 0 ? `, by ${pixels} px at most` : ' while they move';
   return [`${splats} merged splats stand for what is too small to see: pictures may be off for it${rest}.`];
 }

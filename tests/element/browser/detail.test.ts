@@ -47,6 +47,11 @@ describe('levels of detail of a plain file', () => {
     element.detail = 'auto';
     await frames(2);
     assert((await pictureOf(element)) === whole, 'the whole picture');
+    assert(/merged splats.*while they move/.test(element.stats!.why.join()), 'moving pictures may have some');
+    element.quality = 'default';
+    await frames(2);
+    assertEqual(element.stats!.why, [], 'with a chosen quality no picture has any');
+    element.quality = null;
     element.detail = 'off';
     await until(() => !hasLevels(element), 'no levels');
     assertEqual(element.stats!.bytes.scene, bytes.scene, 'bytes');

@@ -6,8 +6,10 @@ import type { SceneLoader } from '../loading/scene-loader.js';
 const LEAST_SPLATS = 50_000;
 /** Splats up to which they are built unasked: all of them are read back and merged in the page's memory, some 150 bytes of each. */
 const MOST_SPLATS = 8_000_000;
-/** How long moving pictures must have been less than the whole before levels are built, ms: the first frames of a scene are often slow. */
+/** How long pictures must have moved with less than the whole before levels are built, ms: the first frames of a scene, and those after a rest, are often slow. */
 const PATIENCE_MS = 1_500;
+/** Time between two frames of one motion, ms: what is longer is a rest, and does not count. */
+const LONGEST_GAP_MS = 1_000;
 
 export interface DetailOptions {
   /** The attribute. */
@@ -30,7 +32,10 @@ export class DetailController {
   #running = new AbortController();
   #choice: DetailChoice = 'auto';
   #isPressed = false;
-  #patience: ReturnType<typeof setTimeout> | undefined;
+  /** How long pictures have moved with less than the whole, ms. */
+  #slowMs = 0;
+  /** When the last picture in motion was told of. */
+  #noted = 0;
 
   constructor(options: DetailOptions) {
     this.#options = options;
@@ -47,21 +52,20 @@ export class DetailController {
     void this.#build(scene);
   }
 
-  /** Tells whether pictures in motion are drawn whole. */
+  /** Tells of each picture in motion whether it was drawn whole. */
   notePace(isWhole: boolean): void {
-    if (isWhole) clearTimeout(this.#patience);
-    if (isWhole) this.#patience = undefined;
-    if (isWhole || this.#isPressed) return;
-    this.#patience ??= setTimeout(() => {
-      this.#isPressed = true;
-      if (this.#scene) this.update(this.#scene);
-    }, PATIENCE_MS);
+    const gap = performance.now() - this.#noted;
+    this.#noted += gap;
+    if (isWhole) this.#slowMs = 0;
+    else if (gap < LONGEST_GAP_MS) this.#slowMs += gap;
+    if (this.#isPressed || this.#slowMs < PATIENCE_MS) return;
+    this.#isPressed = true;
+    if (this.#scene) this.update(this.#scene);
   }
 
   #begin(scene: GpuScene | null): void {
     this.#stop();
-    clearTimeout(this.#patience);
-    this.#patience = undefined;
+    this.#slowMs = 0;
     this.#isPressed = false;
     this.#scene = scene;
     this.#own = scene?.detail ?? {};

@@ -21,8 +21,6 @@ export interface FramePlan {
   readonly levers: Partial<FrameLevers> | undefined;
 }
 
-const WHOLE: FramePlan = { level: 0, levers: undefined };
-
 /** What is known of a frame before it is drawn. */
 export interface FrameOccasion {
   /** requestAnimationFrame's clock, ms. */
@@ -58,7 +56,7 @@ export interface PaceOptions {
   /** What the page allows a frame, ms; infinite where the display says. */
   readonly frameBudget: () => number;
   readonly requestFrame: () => void;
-  /** Called for each frame that was timed: whether pictures in motion are drawn whole. */
+  /** Called for each frame of a motion that was timed: whether such are drawn whole. */
   readonly onPace: (isWhole: boolean) => void;
 }
 
@@ -93,8 +91,14 @@ export class PaceController {
   get report(): PaceReport {
     const { level, reason, recent } = this.#pace;
     const frameMs = recent.length > 0 ? quantile(recent, 0.5) : null;
-    const [drawn, moving] = [LADDER[this.#drawn].name, LADDER[level].name];
-    return { drawn, moving, reason, frameMs, lastMs: this.#lastMs || null, targetMs: this.targetMs };
+    return {
+      drawn: LADDER[this.#drawn].name,
+      moving: LADDER[level].name,
+      reason,
+      frameMs,
+      lastMs: this.#lastMs || null,
+      targetMs: this.targetMs,
+    };
   }
 
   /**
@@ -112,11 +116,11 @@ export class PaceController {
     // Between two changes of one motion (a sequence of fewer pictures than the display's) what is drawn for other reasons is a part of it, until rest is due.
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
-    const { level } = this.#pace;
-    this.#drawn = isMotion ? level : 0;
-    if (hasChanged || this.#drawn === 0) this.stop();
-    if (this.#drawn === 0) return WHOLE;
-    this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, this.#options.scheduler().displayInterval));
+    const level = isMotion ? this.#pace.level : 0;
+    this.#drawn = level;
+    if (hasChanged || level === 0) this.stop();
+    const { displayInterval } = this.#options.scheduler();
+    if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, displayInterval));
     return { level, levers: LADDER[level].levers };
   }
 
@@ -132,7 +136,8 @@ export class PaceController {
     if (level === 0) this.#wholeMs = milliseconds;
     const sample = { now: performance.now(), level, milliseconds };
     this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS.slice(0, this.#rungs) });
-    this.#options.onPace(this.#pace.level === 0);
+    const isWhole = this.#pace.level === 0;
+    if (isWhole || level > 0) this.#options.onPace(isWhole);
   }
 
   /** Another scene, or another way to draw it: nothing is known. */

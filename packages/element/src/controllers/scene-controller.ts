@@ -205,7 +205,6 @@ export class SceneController implements ReactiveController {
     await pageVisible(signal);
     if (!signal.aborted) await this.#attempt(request, signal, false, () => undefined);
     if (signal.aborted || this.#scene === null) return;
-    this.#host.requestUpdate();
     this.#tellRestored();
     void this.#refine();
   }

@@ -32,7 +32,7 @@ export interface ViewOptions {
   /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
   readonly onFrame: (scene: GpuScene, camera: Camera, now: number) => void;
   readonly onCameraChange: (source: CameraChangeSource) => void;
-  /** Called for each frame that was timed: whether pictures in motion are drawn whole. */
+  /** Called for each frame of a motion that was timed: whether such are drawn whole. */
   readonly onPace: (isWhole: boolean) => void;
   /** Drawing has failed for good. */
   readonly onError: (error: unknown) => void;

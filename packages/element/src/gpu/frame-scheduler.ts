@@ -6,8 +6,8 @@ export interface FrameClient {
   drawFrame(now: number): void;
 }
 
-/** Frames over which those who draw are counted: who draws now and then takes little of what there is. */
-const MEMORY = 16;
+/** Frames until who draws besides counts in full: who draws now and then takes little of what there is. Who draws no more does not count. */
+const MEMORY = 8;
 
 /** One requestAnimationFrame loop for all elements of a page; it runs only while one of them has asked for a frame. */
 export class FrameScheduler {
@@ -23,7 +23,7 @@ export class FrameScheduler {
     return this.#interval.milliseconds;
   }
 
-  /** Clients that draw at the same time, on the average of the last frames: 1 or more. */
+  /** Clients that draw at the same time, frame after frame: 1 or more. */
   get clients(): number {
     return this.#clients;
   }
@@ -68,7 +68,8 @@ export class FrameScheduler {
 
   #drawAll(now: number): void {
     [this.#due, this.#drawing] = [this.#drawing, this.#due];
-    this.#clients += (this.#drawing.size - this.#clients) / MEMORY;
+    const { size } = this.#drawing;
+    this.#clients = Math.min(size, this.#clients + (size - this.#clients) / MEMORY);
     this.#interval.tick(now);
     for (const client of this.#drawing) {
       try {
