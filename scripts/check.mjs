@@ -3,5 +3,7 @@ import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
 
 ensureDependencies();
 ensureBuilt();
+// npm runs scripts in the repository's root, wherever it was called.
+process.chdir(process.env.INIT_CWD ?? '.');
 const { main } = await import('../packages/check/dist/index.js');
 process.exit(await main(process.argv.slice(2)));

@@ -2,9 +2,10 @@
  * `npm run page -- SCENE FOLDER [--port 8000] [--no-serve]`: a page with a scene of one's own. Builds the element if it is not built, puts it and the scene into
  * FOLDER, writes an index.html unless there is one, and serves the folder. What then lies there is static: any host can have it.
  */
-import { copyFileSync, cpSync, existsSync, mkdirSync, writeFileSync } from 'node:fs';
-import { basename, dirname, extname, join, relative, resolve } from 'node:path';
+import { cpSync, existsSync, mkdirSync, statSync, writeFileSync } from 'node:fs';
+import { basename, dirname, extname, isAbsolute, join, relative, resolve, sep } from 'node:path';
 import { parseArgs } from 'node:util';
+import { filesBeside } from './lib/files-beside.mjs';
 import { ensureDependencies, ensureElement } from './lib/prepare.mjs';
 import { root } from './lib/run.mjs';
 import { serve } from './lib/server.mjs';
@@ -13,25 +14,39 @@ const USAGE = 'npm run page -- SCENE FOLDER [--port 8000] [--no-serve]';
 const CDN = join(root, 'packages/element/cdn');
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-const { values, positionals } = parseArgs({
-  allowPositionals: true,
-  options: { port: { type: 'string', default: '8000' }, 'no-serve': { type: 'boolean', default: false } },
-});
-// npm runs scripts in the repository's root, wherever it was called.
-const [scene, folder] = positionals.map((path) => resolve(process.env.INIT_CWD ?? '.', path));
-if (folder === undefined) stop(`A scene and a folder are needed: ${USAGE}`);
-if (!existsSync(scene)) stop(`There is no file ${scene}. ${USAGE}`);
+const { scene, folder, port, isServed } = parseOptions();
 
 ensureDependencies();
 ensureElement();
 mkdirSync(folder, { recursive: true });
 copyElement(join(folder, 'cdn'));
-const tag = tagOf(copyScene());
+const tag = tagOf(await copyScene());
 const page = join(folder, 'index.html');
 if (existsSync(page)) console.log(`\n${page} is there already and stays as it is. Paste into it:\n\n${SCRIPT}\n${tag}`);
 else writeFileSync(page, htmlOf(tag));
 console.log(`\nThe page is in ${folder}`);
-if (!values['no-serve']) await show();
+if (isServed) await show();
+
+function parseOptions() {
+  const options = { port: { type: 'string', default: '8000' }, 'no-serve': { type: 'boolean', default: false } };
+  let parsed;
+  try {
+    parsed = parseArgs({ allowPositionals: true, options });
+  } catch (error) {
+    stop(`${error.message}. ${USAGE}`);
+  }
+  const { values, positionals } = parsed;
+  if (positionals.length !== 2) stop(`A scene and a folder are needed: ${USAGE}`);
+  // npm runs scripts in the repository's root, wherever it was called.
+  const [scene, folder] = positionals.map((path) => resolve(process.env.INIT_CWD ?? '.', path));
+  if (!existsSync(scene)) stop(`There is no file ${scene}. ${USAGE}`);
+  if (!statSync(scene).isFile()) stop(`${scene} is a folder: name the scene's file in it. ${USAGE}`);
+  if (existsSync(folder) && !statSync(folder).isDirectory()) stop(`${folder} is a file: a folder is needed. ${USAGE}`);
+  const port = Number(values.port);
+  if (!(Number.isInteger(port) && port >= 0 && port < 65536))
+    stop(`--port: expected a number from 0 to 65535, found "${values.port}". ${USAGE}`);
+  return { scene, folder, port, isServed: !values['no-serve'] };
+}
 
 function stop(message) {
   console.error(message);
@@ -47,21 +62,28 @@ function copyElement(target) {
   cpSync(CDN, target, { recursive: true, filter: isNeeded });
 }
 
-/** Where the scene then lies, seen from the page. A scene of several files is told by a JSON among them, and brings its folder. */
-function copyScene() {
-  const name = basename(scene);
+/** Where the scene then lies, seen from the page. A scene of several files is told by a JSON among them, and brings its folder; others bring the files that they name. */
+async function copyScene() {
+  const [name, from] = [basename(scene), dirname(scene)];
+  if (from === folder) return name;
   if (extname(scene) !== '.json') {
-    if (scene !== join(folder, name)) copyFileSync(scene, join(folder, name));
+    for (const file of [name, ...(await filesBeside(scene))]) cpSync(join(from, file), join(folder, file));
     return name;
   }
-  const from = dirname(scene);
   const to = join(folder, basename(from));
+  if (from !== to && isWithin(to, from))
+    stop(`${folder} lies in the scene's folder, which is copied: name another one.`);
   if (from !== to) cpSync(from, to, { recursive: true });
   return `${basename(from)}/${name}`;
 }
 
+function isWithin(path, container) {
+  const way = relative(container, path);
+  return way !== '..' && !way.startsWith(`..${sep}`) && !isAbsolute(way);
+}
+
 function titleOf(source) {
-  const file = extname(source) === '.json' ? dirname(source) : basename(source, extname(source));
+  const file = extname(source) === '.json' ? basename(dirname(scene)) : basename(source, extname(source));
   return file.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
 }
 
@@ -87,7 +109,7 @@ function htmlOf(tag) {
 
 async function show() {
   const mounts = { '/': folder };
-  const server = await serve(mounts, { port: Number(values.port) }).catch((error) => {
+  const server = await serve(mounts, { port }).catch((error) => {
     if (error.code !== 'EADDRINUSE') throw error;
     return serve(mounts);
   });

@@ -1,6 +1,6 @@
 /** The work behind `npm run render`: one scene, one camera, one image, on the same renderer that the element uses. */
 import { readFileSync, writeFileSync } from 'node:fs';
-import { basename, resolve } from 'node:path';
+import { basename, dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { PNG } from 'pngjs';
 import { cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
@@ -81,13 +81,23 @@ function readCamera(path, name) {
   } catch (error) {
     throw new UsageError(`--camera: cannot read ${path} as JSON: ${error.message}`);
   }
-  if (content.views === undefined) return cameraFromCalibration(content, basename(path));
-  const view = content.views.find((v, i) => v.name === name || String(i) === name);
+  const views = content?.views;
+  if (views === undefined) return cameraFromCalibration(content, basename(path));
+  if (!Array.isArray(views))
+    throw new UsageError(`--camera: expected a list of views in ${path}, found ${typeof views}`);
+  const view = views.find((v, i) => v?.name === name || String(i) === name);
   if (view === undefined) {
-    const names = content.views.map((v, i) => v.name ?? i).join(', ');
+    const names = views.map((v, i) => v?.name ?? i).join(', ');
     throw new UsageError(`--view: expected one of ${names} (${path} holds several views), found ${name ?? 'nothing'}`);
   }
   return cameraFromCalibration(view, `${basename(path)}: view ${name}`);
+}
+
+/** Scenes of several files have the others beside the one that is named. */
+function readSceneFile(name) {
+  const path = resolve(from, name);
+  const openPart = async (part) => new Uint8Array(readFileSync(join(dirname(path), part)));
+  return readScene(new Uint8Array(readFileSync(path)), { name, openPart });
 }
 
 /** 8-bit PNG with straight alpha, rounded to nearest. */
@@ -109,8 +119,7 @@ function chooseAccumulation(asked, device) {
 
 async function render(options) {
   const camera = readCamera(options.camera, options.view);
-  const bytes = new Uint8Array(readFileSync(resolve(from, options.scene)));
-  const cloud = await readScene(bytes, { name: options.scene });
+  const cloud = await readSceneFile(options.scene);
   const antialiased = options.mode === undefined ? cloud.antialiased : options.mode === 'antialiased';
 
   const adapter = await requestNodeAdapter();
@@ -142,7 +151,9 @@ try {
   process.exit(0);
 } catch (error) {
   if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
-  else if (error instanceof GaussianSplatError || error.code === 'ENOENT') console.error(error.message);
+  // Errors of the file system name the file, all but reading a folder.
+  else if (error.code === 'EISDIR') console.error(`${error.message}: expected a file, found a folder`);
+  else if (error instanceof GaussianSplatError || error.syscall) console.error(error.message);
   else console.error(error);
   process.exit(error instanceof UsageError ? 2 : 1);
 }

@@ -207,6 +207,16 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#controlObserver?.disconnect();
   }
 
+  /** Style sheets stay behind in the document that made them. */
+  adoptedCallback(): void {
+    const { defaultView } = this.ownerDocument;
+    // A document without a window shows nothing.
+    if (defaultView === null || !this.shadowRoot) return;
+    const sheet = new (defaultView as Window & typeof globalThis).CSSStyleSheet();
+    sheet.replaceSync(styles.cssText);
+    this.shadowRoot.adoptedStyleSheets = [sheet];
+  }
+
   /** `moveBefore()` takes the element elsewhere as it is: its being here lets the browser spare both callbacks above. */
   connectedMoveCallback(): void {
     this.requestUpdate();
@@ -269,7 +279,7 @@ export class GaussianSplatElement extends ViewingMethods {
         touchAction: this.#attributes.touchAction,
       }),
       services: () => this.constructor as typeof GaussianSplatElement,
-      economy: () => this.economy ?? null,
+      economy: () => this.economy || null,
       loops: () => this.loop,
       autoplays: () => this.autoplay,
       startTime: () => (Number.isFinite(this.#startTime) ? this.#startTime : 0),

@@ -7,6 +7,8 @@ import { SceneTimeRanges } from './time-ranges.js';
 const HAVE_NOTHING = 0;
 const HAVE_ENOUGH_DATA = 4;
 
+const isSaid = (value: number | null | undefined): boolean => value !== null && value !== undefined;
+
 /** Time of a scene that moves, in the words of HTMLMediaElement: whatever drives a video drives it. */
 export abstract class MediaProperties extends SplatProperties {
   /** @internal */
@@ -21,7 +23,8 @@ export abstract class MediaProperties extends SplatProperties {
   }
 
   set currentTime(seconds: number) {
-    this.stage.seek(seconds, this);
+    // Frameworks say so of a property that they do not set any more.
+    if (isSaid(seconds)) this.stage.seek(seconds, this);
   }
 
   /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
@@ -50,7 +53,7 @@ export abstract class MediaProperties extends SplatProperties {
   }
 
   set playbackRate(rate: number) {
-    this.stage.playback.playbackRate = rate;
+    this.stage.playback.playbackRate = isSaid(rate) ? rate : 1;
   }
 
   /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is on show. */

@@ -50,6 +50,9 @@ export class SplatProperties extends LitElement {
     disableTap: { type: Boolean, attribute: 'disable-tap' },
     autoplay: { type: Boolean },
     a11y: {},
+    // Accessors of MediaProperties: named here so that what a page sets before the element is defined reaches them.
+    currentTime: { attribute: false, noAccessor: true },
+    playbackRate: { attribute: false, noAccessor: true },
   };
 
   /** URL of the scene file. */

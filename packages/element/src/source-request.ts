@@ -23,9 +23,11 @@ export function requestOf(
   };
 }
 
-/** Addresses with spaces between them. */
+/** Addresses with spaces between them; a property may have been given a list of them. */
 export const addressesOf = (urls: string | null, modifier: UrlModifier): readonly string[] =>
-  (urls ?? '')
+  [urls]
+    .flat()
+    .join(' ')
     .split(/\s+/)
     .filter(Boolean)
     .map((url) => addressOf(url, modifier));

@@ -239,3 +239,66 @@ describe('moves and removals', () => {
     await showLoaded();
   });
 });
+
+describe('properties', () => {
+  it('set before the element is defined, count', async () => {
+    const element = document.createElement('late-splat') as GaussianSplatElement;
+    Object.assign(element, { src: COMPASS, loading: 'eager', cameraControls: true, currentTime: 2, playbackRate: 3 });
+    document.body.append(element);
+    customElements.define('late-splat', class extends GaussianSplatElement {});
+    await element.ready;
+    assertEqual([element.loaded, element.cameraControls], [true, true]);
+    assertEqual([element.currentTime, element.playbackRate], [2, 3]);
+    element.currentTime = 4;
+    assert(!Object.hasOwn(element, 'currentTime'), 'the accessor is hidden by a property of the same name');
+  });
+
+  it('that a framework takes back are as if never set', async () => {
+    const element = await showLoaded();
+    Object.assign(element, { playbackRate: 2, currentTime: 1 });
+    for (const nothing of [undefined, null]) Object.assign(element, { playbackRate: nothing, currentTime: nothing });
+    assertEqual([element.playbackRate, element.currentTime], [1, 1]);
+    let thrown = '';
+    try {
+      element.currentTime = NaN;
+    } catch (error) {
+      thrown = String(error);
+    }
+    assert(thrown.includes('expects a finite number'), thrown);
+  });
+
+  it('of addresses take lists, too, and whatever else they are given names no script error', async () => {
+    const element = await showLoaded();
+    const missing = nextEvent<CustomEvent<{ message: string }>>(element, 'generator-error');
+    Object.assign(element, { chain: [], postprocess: ['/a/missing.onnx'] });
+    assert((await missing).detail.message.includes('/a/missing.onnx'), 'the address is named');
+    Object.assign(element, { chain: null, postprocess: undefined });
+    await element.updateComplete;
+    assert(element.loaded, 'the scene is still there');
+  });
+
+  it('economy without a value is no economy, in silence', async () => {
+    const element = await showLoaded({ economy: '' });
+    await delay(300);
+    // By then it would have been spoken of, and the harness refuses warnings.
+    element.economy = '60%';
+    await until(() => (element.stats?.spared ?? 0) > 0, 'economy');
+    element.economy = '';
+    await until(() => element.stats?.spared === 0, 'the whole scene');
+  });
+});
+
+describe('another document', () => {
+  it('an element that is moved into a frame keeps its looks and its picture', async () => {
+    const element = await showLoaded();
+    const frame = document.createElement('iframe');
+    document.body.append(frame);
+    const inside = frame.contentDocument!;
+    inside.body.append(element);
+    await delay(300);
+    const style = frame.contentWindow!.getComputedStyle(element);
+    assertEqual([style.position, style.contain], ['relative', 'strict']);
+    assert(element.loaded, 'the scene is still there');
+    assertEqual(canvasSize(element), [120, 100]);
+  });
+});
