@@ -76,8 +76,23 @@ test('the index in both dialects: boxes with their runs, the coarsest first, at 
 
 test('any number of boxes may lie side by side', () => {
   const box = '{"bound":{"min":[0,0,0],"max":[1,1,1]},"lods":{"0":{"file":0,"count":1}}}';
-  const text = `{"lodLevels":1,"filenames":["a"],"tree":{"children":[${new Array(300_000).fill(box).join(',')}]}}`;
-  assert.equal(readLodScene(new TextEncoder().encode(text), 'lod-meta.json', INDEX).boxes.length, 300_000);
+  const text = `{"lodLevels":1,"filenames":["a"],"tree":{"children":[${new Array(140_000).fill(box).join(',')}]}}`;
+  assert.equal(readLodScene(new TextEncoder().encode(text), 'lod-meta.json', INDEX).boxes.length, 140_000);
+});
+
+test('any number of runs may lie in one file', async () => {
+  const count = 140_000;
+  const sog = writeSog(smallCloud(count, 0));
+  const bound = { min: [-2, -2, -2], max: [2, 2, 2] };
+  const children = Array.from({ length: count }, (_, offset) => ({
+    bound,
+    lods: { 0: { file: 0, offset, count: 1 } },
+  }));
+  const index = new TextEncoder().encode(
+    JSON.stringify({ lodLevels: 1, filenames: ['meta.json'], tree: { children } }),
+  );
+  const found = await readScene(index, { name: 'lod-meta.json', openPart: async (path) => sog[path] });
+  assert.equal(found.count, count);
 });
 
 test('an index that names more splats than there can be is refused before anything is allocated for them', () => {

@@ -166,7 +166,7 @@ export class GltfDocument {
   }
 }
 
-/** Characters as bytes: by their numbers in a loop, a thirtieth of the time that `Uint8Array.from` takes with a function. */
+/** Characters as bytes: by their numbers in a loop, 25 times as fast as `Uint8Array.from` with a function. */
 function bytesOf(text: string): Uint8Array {
   const bytes = new Uint8Array(text.length);
   for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);

@@ -40,10 +40,15 @@ async function readRuns(
   source: SceneSource,
 ): Promise<NodePart[]> {
   const parts: NodePart[] = [];
-  for (const file of new Set(runs.map((run) => run.file))) {
+  const byFile = new Map<number, NodeRun[]>();
+  for (const run of runs) {
+    const others = byFile.get(run.file);
+    if (others) others.push(run);
+    else byFile.set(run.file, [run]);
+  }
+  for (const [file, own] of byFile) {
     source.signal?.throwIfAborted();
     const cloud = await readPart(files[file], open, source);
-    const own = runs.filter((run) => run.file === file);
     for (const part of partsOf(cloud, own, files[file], source.name)) parts.push(part);
   }
   return parts;
