@@ -39,6 +39,8 @@ export interface SceneStats {
 /** Counts that have to be read back from the GPU. */
 export interface ReadCounts {
   readonly drawn: number;
+  /** Visible, but without room in what the device allows a buffer to hold. */
+  readonly left: number;
   readonly contributed: number;
 }
 
@@ -77,6 +79,7 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPre
       ...whyByView(economy),
       ...whyDetail(quality, detail),
       ...whyPace(quality, pace),
+      ...whyLeft(counts?.left ?? 0),
     ],
   };
 }
@@ -112,6 +115,10 @@ function whyDetail(quality: QualityChoice, { splats, pixels }: SceneStats['detai
   if (splats === 0 || (pixels === 0 && quality !== 'auto')) return [];
   const rest = pixels > 0 ? `, by ${pixels} px at most` : ' while they move';
   return [`${splats} merged splats stand for what is too small to see: pictures may be off for it${rest}.`];
+}
+
+function whyLeft(left: number): string[] {
+  return left > 0 ? [`${left} splats are not drawn: the GPU allows no buffer that holds more of them.`] : [];
 }
 
 function whyPace(quality: QualityChoice, { moving, frameMs, targetMs }: PaceReport): string[] {

@@ -74,6 +74,31 @@ describe('one device', () => {
   });
 });
 
+describe('memory that is not to be had', () => {
+  it('for a larger picture than the first is told of, and the page lives on', async () => {
+    const element = await showLoaded({ src: COMPASS }, 'width: 60px; height: 50px');
+    const { createTexture } = GPUDevice.prototype;
+    let refused = 0;
+    // Whoever asks for a texture gets it, and the device is asked for 200 GB besides.
+    GPUDevice.prototype.createTexture = function (descriptor) {
+      refused++;
+      createTexture.call(this, { size: [8192, 8192, 200], format: 'rgba32float', usage: GPUTextureUsage.COPY_DST });
+      return createTexture.call(this, descriptor);
+    };
+    try {
+      element.style.width = '90px';
+      await nextEvent(element, 'error');
+    } finally {
+      GPUDevice.prototype.createTexture = createTexture;
+    }
+    assert(refused > 0, 'nothing was allocated');
+    assertEqual([element.error?.code, element.error?.reason], ['out-of-memory', 'out-of-memory/allocation'], 'codes');
+    assert(element.error?.message.includes('90 x 50'), element.error?.message ?? 'no message');
+    const other = await showLoaded({ src: COMPASS });
+    assert((await screenOf(other)).middleOf(isRed), 'another element shows its scene');
+  });
+});
+
 describe('the loss of the device', () => {
   it('is recovered from in silence: the same picture, one pair of events', async () => {
     const element = await showLoaded({ 'camera-orbit': '20deg 60deg 80%' });

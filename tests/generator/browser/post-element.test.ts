@@ -58,10 +58,13 @@ describe('a post-processor in the element', () => {
     it(`${name} on ${src.split('/').at(-1)}: darkens what is drawn, leaves the page's ground, and goes again`, async () => {
       const element = await showLoaded({ src }, STYLE);
       const plain = await lightOf(element);
+      const plainBytes = element.stats!.bytes.frames;
       element.setAttribute('control-gain', '0');
       element.setAttribute('postprocess', FIXTURES + name);
       await untilLight(element, (mean) => mean < plain.mean - 2, 'a darker picture');
       const dark = await lightOf(element);
+      // Three pictures of its size, eight bytes a pixel, and the tensor for the model.
+      assert(element.stats!.bytes.frames > plainBytes + 24 * 120 * 100, 'stats count its pictures');
       assert(dark.covered > 0.5 * plain.covered, `${plain.covered} pixels were covered, now ${dark.covered}`);
       assertEqual((await screenOf(element)).at(1, 1), [255, 255, 255], 'the ground of the page');
       element.setAttribute('control-gain', '1');

@@ -56,6 +56,8 @@ export class GpuScene {
   onDestroy: () => void = () => undefined;
   /** Called when the frame just drawn lacked something that the next one will have. */
   onIncomplete: () => void = () => undefined;
+  /** Called with `out-of-memory/allocation` where a later frame than the first needs more memory than there is. */
+  onError: (error: GaussianSplatError) => void = () => undefined;
   #renderer: Renderer;
   #rendering: Rendering = { quality: 'default', shDegree: 3 };
   #filter: FrameFilter | undefined;
@@ -65,6 +67,8 @@ export class GpuScene {
   #detail: DetailLevers;
   #levels: OwnedLevels | undefined;
   #destroyed = false;
+  /** The pixels of the last frame; 0 if the next one may need other buffers. */
+  #pixels = 0;
 
   constructor(
     lease: DeviceLease,
@@ -85,7 +89,7 @@ export class GpuScene {
 
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
   get frameBytes(): number {
-    return this.#renderer.byteLength;
+    return this.#renderer.byteLength + (this.#filter?.byteLength ?? 0);
   }
 
   /** True if it can be told how long frames take. */
@@ -108,6 +112,7 @@ export class GpuScene {
     if (levels === this.#levels) return;
     this.#levels?.destroy();
     this.#levels = levels;
+    this.#pixels = 0;
     this.#filter?.invalidate();
   }
 
@@ -133,6 +138,7 @@ export class GpuScene {
     this.setLevels(undefined);
     if (before === 'freed') this.#gaussians.destroy();
     this.#gaussians = gaussians;
+    this.#pixels = 0;
     this.#filter?.invalidate();
   }
 
@@ -160,6 +166,7 @@ export class GpuScene {
     this.#rendering = rendering;
     this.#renderer.destroy();
     this.#renderer = this.#makeRenderer();
+    this.#pixels = 0;
   }
 
   /** What stands between the renderer and the canvas; undefined for frames as they are drawn. */
@@ -171,10 +178,12 @@ export class GpuScene {
   setFilter(filter: FrameFilter | undefined): void {
     this.#filter?.close();
     this.#filter = filter;
+    this.#pixels = 0;
   }
 
   #makeRenderer(): Renderer {
     const onIncomplete = (): void => {
+      this.#pixels = 0;
       this.#filter?.invalidate();
       this.onIncomplete();
     };
@@ -191,6 +200,18 @@ export class GpuScene {
    * @param onTime gets milliseconds that the frame kept the GPU, some frames later; not every frame is timed
    */
   render(frame: Frame, onTime?: (milliseconds: number) => void): void {
+    const pixels = frame.camera.width * frame.camera.height;
+    if (pixels === this.#pixels) return this.#renderOnce(frame, onTime);
+    this.#pixels = pixels;
+    void this.#withRefusal(() => this.#renderOnce(frame, onTime)).then(
+      (error) =>
+        error &&
+        !this.#destroyed &&
+        this.onError(outOfMemory(`frame of ${frame.camera.width} x ${frame.camera.height} pixels`, error)),
+    );
+  }
+
+  #renderOnce(frame: Frame, onTime: ((milliseconds: number) => void) | undefined): void {
     if (onTime) this.#meter.measure((timer) => this.#draw({ ...frame, timer }), onTime);
     else this.#draw(frame);
   }
@@ -212,18 +233,25 @@ export class GpuScene {
    * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU tells of a failed allocation only through a scope.
    */
   async renderFirst(frame: Frame): Promise<void> {
+    this.#pixels = frame.camera.width * frame.camera.height;
+    const error = await this.#withRefusal(() => this.#draw(frame));
+    if (error !== null) throw outOfMemory('first frame', error);
+    await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
+  }
+
+  /** Fulfils with what the device says if memory was lacking for some work. */
+  #withRefusal(work: () => void): Promise<GPUError | null> {
     const { device } = this;
+    // A lost device closes no scopes; its loss is reported elsewhere.
+    const refusal = (): Promise<GPUError | null> => device.popErrorScope().catch(() => null);
     device.pushErrorScope('out-of-memory');
-    let refusal: Promise<GPUError | null>;
     try {
-      this.render(frame);
-    } finally {
-      // A lost device closes no scopes; its loss is reported elsewhere.
-      refusal = device.popErrorScope().catch(() => null);
+      work();
+    } catch (error) {
+      void refusal();
+      throw error;
     }
-    const error = await refusal;
-    if (error !== null) throw outOfMemory(error);
-    await device.queue.onSubmittedWorkDone().catch(() => undefined);
+    return refusal();
   }
 
   /** Looks into the last frame: see {@link Renderer.probeDepth}. */
@@ -233,11 +261,11 @@ export class GpuScene {
 
   /** Counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
   async readCounts(camera: Camera): Promise<ReadCounts> {
-    const { visible } = await this.#renderer.readStatistics();
+    const { visible, overflow } = await this.#renderer.readStatistics();
     const { countContributing } = await import('./contributions.js');
     const { quality } = this.#rendering;
     const view = { ...this.#detail, gaussians: this.#levels ?? this.gaussians, camera, quality };
-    return { drawn: visible, contributed: await countContributing(this.device, view) };
+    return { drawn: visible, left: overflow, contributed: await countContributing(this.device, view) };
   }
 
   /** Frees the GPU memory and lets go of the device. */
@@ -255,9 +283,9 @@ export class GpuScene {
   }
 }
 
-function outOfMemory(cause: GPUError): GaussianSplatError {
+function outOfMemory(where: string, cause: GPUError): GaussianSplatError {
   return new GaussianSplatError('out-of-memory/allocation', {
-    where: 'first frame',
+    where,
     expected: 'enough free GPU memory',
     found: cause.message || 'an allocation that failed',
     remedy: 'show a smaller scene, or close other pages and elements that use the GPU',

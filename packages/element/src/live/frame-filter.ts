@@ -5,6 +5,8 @@ export type Frame = Omit<FrameRequest, 'gaussians'> & { readonly target: GPUText
 
 /** Something between the renderer and the canvas. Knows no runtime: what does is loaded when first needed. */
 export interface FrameFilter {
+  /** Bytes of GPU memory that its own pictures take. */
+  readonly byteLength: number;
   /**
    * Shows a frame.
    * @param content changes whenever the same camera would give another picture

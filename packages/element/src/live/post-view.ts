@@ -80,6 +80,10 @@ export class PostView implements FrameFilter {
     return (view = new PostView(device, request, post));
   }
 
+  get byteLength(): number {
+    return this.#surface?.byteLength ?? 0;
+  }
+
   render(frame: Frame, content: string, draw: (frame: Frame) => void): void {
     const surface = this.#surfaceFor(frame);
     const key = `${content} ${JSON.stringify(frame.camera)} ${String(frame.background)}`;

@@ -13,7 +13,7 @@ export interface ModelPicture {
   readonly dims: readonly number[];
 }
 
-const FORMAT = 'rgba16float';
+const [FORMAT, PIXEL_BYTES] = ['rgba16float', 8] as const;
 /** Buffers of models whose bindings are kept. */
 const MAX_BINDINGS = 8;
 
@@ -61,6 +61,11 @@ export class FilteredFrame {
       drawn: this.#present.bind({ picture: this.drawn.createView() }),
       filtered: this.#present.bind({ picture: this.#filteredView }),
     };
+  }
+
+  /** Bytes of GPU memory held. */
+  get byteLength(): number {
+    return 3 * PIXEL_BYTES * this.width * this.height + this.#uniform.size + (this.#tensor?.byteLength ?? 0);
   }
 
   /**

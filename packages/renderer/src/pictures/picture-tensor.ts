@@ -56,6 +56,11 @@ export class PictureTensor {
     return this.shape.dtype;
   }
 
+  /** Bytes of GPU memory held. */
+  get byteLength(): number {
+    return this.#memory.byteLength;
+  }
+
   /** Number of pictures taken in so far. */
   get version(): number {
     return this.#version;
