@@ -184,6 +184,23 @@ const away = (camera: Camera): Camera => ({
   worldToCamera: camera.worldToCamera.map((value, k) => (k >= 4 && k < 12 ? -value : value)),
 });
 
+test('where all splats of a file take as many coefficients none loses some for nothing', async () => {
+  const cloud = smallCloud(400, 2);
+  // Every other splat has bands that show, so that all have a place for them.
+  for (let k = 0; k < cloud.sh.length; k++) if (k % 27 >= 3) cloud.sh[k] *= k % 54 < 27 ? 0.02 : 0.4;
+  const dealt = dealtViewsAround(boundsOf(cloud), { ...SIZE, scored: 24 });
+  const own = { ...dealt, searched: dealt.searched.slice(0, 3), heldOut: dealt.heldOut.slice(0, 3) };
+  const smaller = (name: string) =>
+    economise(cloud, { minDecibels: 40, name, evaluator: new PaintedEvaluator(cloud, { views: own }) });
+  const [ply, glb] = [await smaller('a.ply'), await smaller('a.glb')];
+  assert.ok(glb.degrees[2] < glb.splats.after, 'there is something to gain where bands are saved');
+  assert.ok(
+    ply.splats.after <= glb.splats.after && ply.splats.after < 380,
+    `${ply.splats.after} splats, ${glb.splats.after} in a GLB`,
+  );
+  assert.equal(ply.degrees[2], ply.splats.after);
+});
+
 test('views that show nothing have no say in the figure, and the scene is refused where none shows anything', async () => {
   const [first, second, third] = fewer.heldOut;
   const lookedAt = (heldOut: Camera[]) => new PaintedEvaluator(scene, { views: { ...fewer, heldOut } });

@@ -69,15 +69,18 @@ export async function economise(cloud: GaussianCloud, options: EconomiseOptions)
   const { encoding, rounding } = await chooseEncoding(cloud, encodings, target, options);
   watch.lap('encode');
   const budget = target - rounding;
-  const trades = await findTrades(cloud, ranking, evaluator, budget, options);
+  const { hasOneDegree } = encoding;
+  const fitting = { signal, onStep, hasOneDegree };
+  const trades = await findTrades(cloud, ranking, evaluator, budget, fitting);
   watch.lap('search');
-  let plan: Plan = { trades, filling: await scaleToFit(trades, evaluator, budget, options), isRefined: false };
+  let plan: Plan = { trades, filling: await scaleToFit(trades, evaluator, budget, fitting), isRefined: false };
   watch.lap('fit');
   let ready: CutCloud | undefined;
   if (evaluator.refine) {
     ready = await cutCloud(plan, evaluator, budget, signal);
-    const refined = await searchRefined(cloud, ranking, evaluator, budget, options);
-    if (refined && numbersIn(refined.reduced) < numbersIn(ready.reduced)) [plan, ready] = [refined.plan, refined];
+    const refined = await searchRefined(cloud, ranking, evaluator, budget, fitting);
+    const taken = ({ reduced }: CutCloud): number => numbersOf(degreesOf(reduced.degrees), hasOneDegree);
+    if (refined && taken(refined) < taken(ready)) [plan, ready] = [refined.plan, refined];
     watch.lap('refine');
   }
   for (let tries = 1; ; tries++) {
@@ -149,8 +152,6 @@ function summary(
     cut,
   };
 }
-
-const numbersIn = ({ degrees }: ReducedCloud): number => numbersOf(degreesOf(degrees));
 
 const atMost = (error: number): string => `at most ${decibels(error).toFixed(1)} dB, with every splat kept`;
 

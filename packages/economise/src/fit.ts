@@ -29,6 +29,8 @@ export interface Trades {
 export interface FitOptions {
   /** Part of the error of drops and merges that refining leaves; 1, the default, where nothing is refined. What fewer bands cost stays as it is. */
   readonly leftByRefining?: number;
+  /** True if every splat of the file takes as many coefficients as the one with the most: see `Encoding`. */
+  readonly hasOneDegree?: boolean;
   readonly signal?: AbortSignal;
   readonly onStep?: (step: string) => void;
 }
@@ -45,23 +47,30 @@ export async function findTrades(
   ranking: Ranking,
   evaluator: Evaluator,
   budget: number,
-  { leftByRefining: left = 1, signal, onStep = () => undefined }: FitOptions,
+  { leftByRefining: left = 1, hasOneDegree = false, signal, onStep = () => undefined }: FitOptions,
 ): Promise<Trades> {
+  const numbers = (degrees: readonly number[]): number => numbersOf(degrees, hasOneDegree);
   const all = cloud.count * (OTHER_NUMBERS + 3 * (cloud.shDegree + 1) ** 2);
-  const along = (thresholds: readonly number[], cutAt: (threshold: number) => Cut, part: number): Promise<TradeCurve> =>
+  const along = (
+    thresholds: readonly number[],
+    cutAt: (threshold: number) => Cut,
+    part: number,
+    isStepped = false,
+  ): Promise<TradeCurve> =>
     measureTrades(
       thresholds,
       async (threshold) => {
         const { errors, degrees } = await evaluator.cut(cutAt(threshold), 'searched', signal);
-        return { threshold, error: part * errorTogether(errors, 'searched'), saved: all - numbersOf(degrees) };
+        return { threshold, error: part * errorTogether(errors, 'searched'), saved: all - numbers(degrees) };
       },
       budget,
+      isStepped,
     );
   onStep('measuring what dropped splats cost');
   const dropping = await chooseDropping(ranking, evaluator, signal);
   const drop = await along(dropping.thresholds, dropping.cutAt, left);
   onStep('measuring what fewer bands of colour cost');
-  const colour = await along(cloud.shDegree > 0 ? PRICES : [], (colourPrice) => ({ colourPrice }), 1);
+  const colour = await along(cloud.shDegree > 0 ? PRICES : [], (colourPrice) => ({ colourPrice }), 1, hasOneDegree);
   const trades: Trades = {
     cutAt: (error) => {
       const [dropped, coloured] = bestTrades(drop, colour, error);
@@ -74,7 +83,7 @@ export async function findTrades(
   if (mergePrices === undefined) return trades;
   onStep('measuring what merged splats cost');
   const merge = await along(mergePrices, (mergePrice) => ({ mergePrice }), left);
-  const saved = ({ degrees }: CutFigures): number => all - numbersOf(degrees);
+  const saved = ({ degrees }: CutFigures): number => all - numbers(degrees);
   const measure = async (cut: Cut): Promise<MeasuredCut> => {
     const figures = await evaluator.cut(cut, 'searched', signal);
     const error = errorTogether(figures.errors, 'searched');
@@ -85,9 +94,17 @@ export async function findTrades(
   return tradeMerges(trades, merge, budget, measure);
 }
 
-/** Numbers of a file with so many splats of each degree. */
-export function numbersOf(degrees: readonly number[]): number {
+/** Numbers of a file with so many splats of each degree. @param hasOneDegree if all take as many as those of the highest */
+export function numbersOf(degrees: readonly number[], hasOneDegree = false): number {
+  if (hasOneDegree) return numbersOf(atHighest(degrees));
   return degrees.reduce((sum, splats, degree) => sum + splats * (OTHER_NUMBERS + 3 * (degree + 1) ** 2), 0);
+}
+
+/** As many splats, all of the highest degree that one has. */
+function atHighest(degrees: readonly number[]): number[] {
+  const count = degrees.reduce((sum, splats) => sum + splats, 0);
+  const highest = degrees.findLastIndex((splats) => splats > 0);
+  return degrees.map((_, degree) => (degree === highest ? count : 0));
 }
 
 /**

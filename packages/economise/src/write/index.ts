@@ -14,6 +14,8 @@ export interface Encoding {
   readonly title: string;
   /** @param pool does what can be done in parts; the file then lies in its memory */
   readonly write: (reduced: WrittenCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
+  /** True if every splat takes as many coefficients as the one with the most: fewer bands of some save nothing. */
+  readonly hasOneDegree?: boolean;
 }
 
 const spz = (shBits: number): Encoding => ({
@@ -25,7 +27,7 @@ const spz = (shBits: number): Encoding => ({
 const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
   ['.spz', [spz(4), spz(5), spz(6), spz(8)]],
   ['.glb', [{ title: 'GLB, a primitive for each degree', write: writeGlb }]],
-  ['.ply', [{ title: 'PLY, float32', write: ({ cloud }: WrittenCloud) => writePly(cloud) }]],
+  ['.ply', [{ title: 'PLY, float32', write: ({ cloud }: WrittenCloud) => writePly(cloud), hasOneDegree: true }]],
 ]);
 
 /**
