@@ -1,7 +1,7 @@
 /** Pages on their way: how many, in which order, and what becomes of those that nobody wishes for any more. No GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { setImmediate as turn } from 'node:timers/promises';
+import { setImmediate as turn, setTimeout as pause } from 'node:timers/promises';
 import {
   BRIDGED,
   DETAIL_NUMBERS,
@@ -53,6 +53,8 @@ interface Pool {
   readonly traffic: PageTraffic<Uint32Array>;
   readonly server: Server;
   readonly errors: unknown[];
+  /** Pages that were said to wait for their upload. */
+  readonly arrivals: () => number;
   /** Looks with the given shares of the parents' needs; returns the wishes. */
   readonly look: (share: (page: number) => number) => Float32Array;
 }
@@ -63,9 +65,12 @@ function pool(pages: number, slots: number, below = 16, now?: () => number): Poo
   residency.begin(0);
   residency.settle(0);
   const [server, errors] = [new Server(), [] as unknown[]];
+  let arrivals = 0;
   const traffic = new PageTraffic(residency, {
     fetch: server.fetch,
-    onArrival: () => undefined,
+    onArrival: () => {
+      arrivals++;
+    },
     onError: (error) => errors.push(error),
     now,
   });
@@ -75,7 +80,7 @@ function pool(pages: number, slots: number, below = 16, now?: () => number): Poo
     traffic.follow();
     return wishes;
   };
-  return { list, residency, traffic, server, errors, look };
+  return { list, residency, traffic, server, errors, arrivals: () => arrivals, look };
 }
 
 /** Places up to so many pages of those that wait. @returns them, in order */
@@ -160,6 +165,7 @@ test('pages that fail are told of once, make room for others, and nothing comes 
   await turn();
   assert.equal(all.errors.length, MOST_FETCHES);
   assert.equal(all.server.open.length, MOST_FETCHES, 'the next ones are sent for');
+  assert.equal(all.arrivals(), 0, 'there is nothing to draw');
   all.look(() => 0.5);
   const again = all.server.log.slice(MOST_FETCHES).filter((page) => failed.some((fetch) => fetch.page === page));
   assert.deepEqual(again, [], 'not for four seconds');
@@ -170,6 +176,18 @@ test('pages that fail are told of once, make room for others, and nothing comes 
   await turn();
   assert.equal(all.errors.length, MOST_FETCHES);
   assert.equal(all.server.open.length, 0);
+});
+
+test('what had no room beside a page that does not come is sent for without another look', async () => {
+  const all = pool(3, 2);
+  all.look((page) => (page === 1 ? 0.9 : 0.5));
+  assert.deepEqual(all.server.log, [1]);
+  all.server.open.splice(0).forEach(({ fail }) => fail());
+  await pause(500);
+  assert.deepEqual(all.server.log, [1, 2]);
+  await all.server.answer();
+  assert.deepEqual(place(all, 1), [2]);
+  all.traffic.close();
 });
 
 test('a page that fails again and again is asked for after 4 s, then 8 s, and so on', async () => {
@@ -195,6 +213,7 @@ test('a page that fails again and again is asked for after 4 s, then 8 s, and so
     assert.ok(isAskedAt(to));
   }
   await all.server.answer();
+  assert.equal(all.arrivals(), 1);
   assert.deepEqual(place(all, 1), [1]);
   all.traffic.close();
 });

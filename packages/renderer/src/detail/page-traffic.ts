@@ -10,6 +10,8 @@ const MEMORY = 0.95;
 /** Milliseconds before a page that did not come is asked for again; twice as long after each further failure, so many times. */
 const RETRY_MS = 4_000;
 const MOST_DOUBLINGS = 6;
+/** Milliseconds after a failure before those are tried again that had no room beside it: of many failures once. */
+const ANEW_MS = 250;
 
 /** Of pages that have been asked for again, or may be by every look. */
 const MAY_COME = -Infinity;
@@ -29,7 +31,7 @@ export interface FetchedPage<Words> {
 export interface TrafficOptions<Words> {
   /** Rejects for a page that cannot be had. */
   readonly fetch: (page: number, signal: AbortSignal) => Promise<Words>;
-  /** A page waits for its upload, or is known not to come. */
+  /** A page waits for its upload. */
   readonly onArrival: () => void;
   readonly onError: (error: unknown) => void;
   /** Milliseconds since any moment. Default: `performance.now`. */
@@ -49,6 +51,7 @@ export class PageTraffic<Words> {
   #order: number[] | undefined;
   readonly #failures = new Map<number, Failure>();
   #retry: ReturnType<typeof setTimeout> | undefined;
+  #anew: ReturnType<typeof setTimeout> | undefined;
   readonly #sentAt = new Map<number, number>();
   readonly #now: () => number;
   #arrivalMs = 0;
@@ -120,6 +123,7 @@ export class PageTraffic<Words> {
   close(): void {
     this.#isClosed = true;
     clearTimeout(this.#retry);
+    clearTimeout(this.#anew);
     for (const controller of this.#fetching.values()) controller.abort();
     this.#fetching.clear();
     this.#waiting.clear();
@@ -140,6 +144,11 @@ export class PageTraffic<Words> {
     const pause = RETRY_MS * 2 ** Math.min(times - 1, MOST_DOUBLINGS);
     this.#failures.set(page, { times, until: this.#now() + pause });
     this.#retryLater();
+    // The room that was kept for it is for others.
+    this.#anew ??= setTimeout(() => {
+      this.#anew = undefined;
+      this.#askAnew();
+    }, ANEW_MS);
   }
 
   /** A view at rest makes no look: what the last one wished for is asked for again all the same. */
@@ -154,9 +163,14 @@ export class PageTraffic<Words> {
           isNeeded ||= this.#residency.need(page) > 0;
         }
       }
-      if (isNeeded) this.#residency.relist();
-      this.sendForMore();
+      if (isNeeded) this.#askAnew();
     }, RETRY_MS);
+  }
+
+  /** Sends for what the last look wished for, whatever has been tried since. */
+  #askAnew(): void {
+    this.#residency.relist();
+    this.sendForMore();
   }
 
   #noteArrival(page: number): void {
@@ -198,6 +212,7 @@ export class PageTraffic<Words> {
     }
     this.#fetching.delete(page);
     this.sendForMore();
-    this.#options.onArrival();
+    // Of a page that does not come there is nothing to draw.
+    if (this.#waiting.has(page)) this.#options.onArrival();
   }
 }

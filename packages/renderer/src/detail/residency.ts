@@ -123,8 +123,9 @@ export class Residency {
     return NONE;
   }
 
-  /** Lets {@link nextMissing} name again all that the last look wishes for and that is missing. */
+  /** Lets {@link nextMissing} name again all that the last look wishes for and that is missing, whatever has found no room. */
   relist(): void {
+    this.#noRoom = { slots: Infinity, need: 0 };
     this.#listMissing();
   }
 

@@ -1,0 +1,78 @@
+/** Any JSON in place of a `detail.json`: it is refused with a name, or every page of it can come. No GPU. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
+import { listPages, NONE, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
+import { detailFolder } from '../support/detail-folder.js';
+import { randomSource } from '../support/gpu.js';
+import { pebbles } from '../support/scenes/pebbles.js';
+
+const { manifest } = detailFolder(pebbles(6_000), [
+  [0, 0, 0],
+  [1, 2, 3],
+  [4, 5, 6],
+]);
+const ODD = ['null', '-1', '0', '1', '4', '5', '20', '21', '1e9', '1e300', '0.5', '""', '[]', '{}', '[0,0]', '[1e9,0]'];
+
+/** Puts something else in one place of a JSON value, or takes it away, or doubles it. */
+function change(root: object, random: () => number): void {
+  const pick = <T>(values: readonly T[]): T => values[Math.floor(random() * values.length)];
+  let node = root as Record<string, unknown>;
+  for (;;) {
+    const keys = Object.keys(node);
+    if (keys.length === 0) return;
+    const key = pick(keys);
+    const value = node[key];
+    if (typeof value === 'object' && value !== null && random() < 0.8) {
+      node = value as Record<string, unknown>;
+      continue;
+    }
+    const what = random();
+    if (what < 0.6) node[key] = JSON.parse(pick(ODD));
+    else if (what < 0.8) delete node[key];
+    else if (Array.isArray(node)) node.push(structuredClone(value));
+    else if (typeof value === 'number') node[key] = value + pick([-1, 1, 4]);
+    return;
+  }
+}
+
+/** Each page but the first is below a chunk of an earlier one, and each chunk has one page below it at most. */
+function checkPages(found: DetailManifest): void {
+  const list = listPages(found);
+  const above = new Uint32Array(list.count);
+  for (let page = 0; page < list.count; page++) {
+    const { file, first, chunks } = list.place(page);
+    assert.ok(chunks >= 1 && chunks <= SLOT_CHUNKS && first + chunks <= file.chunks);
+    for (let chunk = 0; chunk < chunks; chunk++) {
+      const below = list.children[SLOT_CHUNKS * page + chunk];
+      if (below === NONE) continue;
+      assert.ok(below > page && list.parent[below] === page);
+      above[below]++;
+    }
+  }
+  assert.ok(above.every((times, page) => times === (page === 0 ? 0 : 1)));
+}
+
+test('whatever is changed in a manifest, it is refused with a name, or each of its pages is below one chunk', () => {
+  const random = randomSource(11);
+  const text = JSON.stringify(manifest);
+  checkPages(checkManifest(JSON.parse(text), 'detail.json'));
+  let [taken, refused] = [0, 0];
+  for (let trial = 0; trial < 6000; trial++) {
+    const changed = JSON.parse(text) as object;
+    for (let changes = Math.ceil(3 * random()); changes > 0; changes--) change(changed, random);
+    let found: DetailManifest;
+    try {
+      found = checkManifest(JSON.parse(JSON.stringify(changed)), 'detail.json');
+    } catch (error) {
+      assert.ok(error instanceof GaussianSplatError, `${(error as Error).stack}: ${JSON.stringify(changed)}`);
+      refused++;
+      continue;
+    }
+    checkPages(found);
+    taken++;
+  }
+  console.log(`${taken} taken, ${refused} refused`);
+  assert.ok(taken > 100 && refused > 1000);
+});
