@@ -7,6 +7,7 @@ import { EconomyController } from './controllers/economy-controller.js';
 import { HotspotController } from './controllers/hotspot-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController } from './controllers/playback-controller.js';
+import { PrintController } from './controllers/print-controller.js';
 import { InputController } from './controllers/input-controller.js';
 import { RevealController } from './controllers/reveal-controller.js';
 import { SceneController } from './controllers/scene-controller.js';
@@ -107,6 +108,7 @@ export class Stage {
       probe: async (points) => (await this.scene.scene?.probe(points)) ?? [],
       warn: options.warn,
     });
+    new PrintController(host, () => this.drawNow());
     this.queries = new SceneQueries({
       camera: this.camera,
       scene: () => this.scene.scene,

@@ -162,7 +162,7 @@ export const styles = css`
   }
   .message {
     display: flex;
-    align-items: center;
+    align-items: safe center;
     justify-content: center;
     padding: 1em;
     overflow: auto;

@@ -288,6 +288,27 @@ describe('properties', () => {
   });
 });
 
+describe('paper', () => {
+  it('has the picture, which browsers leave out of WebGPU canvases, and only while it is printed', async () => {
+    const element = await showLoaded();
+    const canvases = (): HTMLCanvasElement[] => [...element.shadowRoot!.querySelectorAll('canvas')];
+    dispatchEvent(new Event('beforeprint'));
+    const [, copy] = canvases();
+    const { data } = copy.getContext('2d')!.getImageData(0, 0, copy.width, copy.height);
+    const image = new Image();
+    image.src = element.toDataURL();
+    await image.decode();
+    const truth = new OffscreenCanvas(copy.width, copy.height).getContext('2d')!;
+    truth.drawImage(image, 0, 0);
+    const wanted = truth.getImageData(0, 0, copy.width, copy.height).data;
+    // Straight alpha and back costs a step or two.
+    const largest = data.reduce((most, value, i) => Math.max(most, Math.abs(value - wanted[i])), 0);
+    assert(largest <= 4 && data.some((value) => value > 0), `differs by ${largest}`);
+    dispatchEvent(new Event('afterprint'));
+    assertEqual(canvases().length, 1, 'canvases');
+  });
+});
+
 describe('another document', () => {
   it('an element that is moved into a frame keeps its looks and its picture', async () => {
     const element = await showLoaded();

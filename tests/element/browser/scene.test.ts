@@ -262,6 +262,15 @@ describe('a bad source', () => {
     await showLoaded({ src: `${origin}/fixtures/compass.ply` });
   });
 
+  it('a message that is taller than the element can be read from its beginning', async () => {
+    const element = show({ src: '/a/missing.ply' }, 'width: 150px; height: 60px');
+    await element.ready;
+    const [message, text] = ['.message', '[part=error]'].map((part) => element.shadowRoot!.querySelector(part)!);
+    assert(message.scrollHeight > message.clientHeight, 'it is taller');
+    const top = text.getBoundingClientRect().top - message.getBoundingClientRect().top;
+    assert(top >= 0, `it begins ${-top} pixels above what can be scrolled to`);
+  });
+
   it('markup in a message stays text', async () => {
     const element = show({ src: '/net/status/404?<img src=x onerror=alert(1)>' });
     await nextEvent(element, 'error');
