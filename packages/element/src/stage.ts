@@ -272,6 +272,7 @@ export class Stage {
       onLoad: (url) => this.#onLoad(url),
       onEmptied: () => {
         this.#source.needNow(false);
+        this.progress = null;
         this.playback.empty();
         this.playback.stopWaits();
         this.#dispatch(new Event('emptied'));

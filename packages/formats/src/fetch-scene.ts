@@ -57,7 +57,8 @@ function parseUrl(url: string | URL): URL {
   const refuse = (shown: string, found: string, cause?: unknown): never => {
     throw new GaussianSplatError('network/url', {
       where: `address ${quote(shown, 200)}`,
-      expected: base ? `an absolute URL or one relative to ${base.slice(0, 200)}` : 'an absolute URL',
+      // In a worker the base is that of the worker's script, which nobody who reads this has written.
+      expected: base ? 'an absolute URL or a relative one' : 'an absolute URL',
       found,
       remedy: 'correct the address of the scene',
       cause,

@@ -92,6 +92,20 @@ describe('a scene', () => {
     for (const type of ['load', 'progress', 'error', 'camera-change']) document.body.removeEventListener(type, onBody);
   });
 
+  it('has made no progress with what is not asked for yet', async () => {
+    const element = await showLoaded();
+    assertEqual(element.progress, 1);
+    element.src = null;
+    await element.updateComplete;
+    assertEqual(element.progress, 0, 'without a scene');
+    const isOut = nextEvent(element, 'model-visibility');
+    element.style.display = 'none';
+    await isOut;
+    element.src = COMPASS;
+    await frames(3);
+    assertEqual([element.progress, element.loaded], [0, false], 'out of sight');
+  });
+
   it('ends its progress also where the server does not tell the length', async () => {
     const element = show({ src: '/net/unsized/compass.ply' });
     const progress: ProgressEvent[] = [];
@@ -243,6 +257,7 @@ describe('a bad source', () => {
       assertEqual([detail.reason, detail.code], [reason, reason.split('/')[0]], 'codes');
       assert(detail === element.error, 'the property holds the same object');
       assert(/expected .*, found .*\..*\[.*\]/.test(detail.message), detail.message);
+      assert(!detail.message.includes('scene-worker'), detail.message);
       await element.ready;
       await element.updateComplete;
       assertEqual([element.loaded, states(element)], [false, ['error']], 'state');
