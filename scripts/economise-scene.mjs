@@ -170,7 +170,7 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const views = readViews(viewsFile, boundsOf(cloud), scored);
   const measuring = isGpu
     ? await GpuEvaluator.create(device, cloud, views, { pool })
-    : new PaintedEvaluator(cloud, { views, studio: new Studio(device) });
+    : new PaintedEvaluator(cloud, { views, studio: new Studio(device, 'default') });
   const mostError = 10 ** (-minDecibels / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
   const merging = { views: views.scored, mostError, pool };
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;

@@ -19,7 +19,7 @@ const RENDER_ATTACHMENT = 16;
 const CHUNK = 256;
 const GEOMETRY_WORDS = 8;
 /** Views that splats are scored in, those that a figure is searched in, and those that it is measured in. */
-const [SCORED, SEARCHED, HELD_OUT] = [32, 4, 4];
+const [SCORED, SEARCHED, HELD_OUT] = [32, 4, 12];
 /** Where looking takes so long, ms, so many views must do: any beginning of them is spread around the scene. */
 const LONG_MS = 8_000;
 const LEAST_VIEWS = 12;
