@@ -2,6 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { deflateSync, strToU8, zipSync } from 'fflate';
+import { encodingsFor } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { assertSameCloud, expectRefusal } from './support/expect.js';
@@ -40,6 +41,26 @@ test('archives with several scenes, and with sizes that deflate cannot reach, ar
   const directory = Buffer.from(bomb).indexOf('PK\x01\x02', 0, 'latin1');
   new DataView(bomb.buffer, bomb.byteOffset).setUint32(directory + 24, 0x7fffffff, true);
   await expectRefusal(bomb, 'decode/corrupt', /a size that deflate can reach.*2,147,483,647/, { name: 'a.zip' });
+});
+
+test('of what a training wrote the splats after most iterations are read, not the points that it began with', async () => {
+  const written = [7, 9].map((seed) => {
+    const cloud = smallCloud(4, 0, seed);
+    const [ply] = encodingsFor('a.ply', cloud);
+    return ply.write({ cloud, degrees: new Uint8Array(4) });
+  });
+  const [early, late] = await Promise.all(written);
+  const points = strToU8('ply\nformat ascii 1.0\nelement vertex 0\nend_header\n');
+  const files = {
+    'garden/input.ply': points,
+    'garden/cfg_args': strToU8('x'),
+    'garden/point_cloud/iteration_30000/point_cloud.ply': late,
+    'garden/point_cloud/iteration_7000/point_cloud.ply': early,
+  };
+  const direct = await readScene(late, { name: 'a.ply' });
+  assertSameCloud(await readScene(zipSync(files), { name: 'a.zip' }), direct);
+  const apart = zipSync({ 'a/iteration_1/point_cloud.ply': early, 'b/iteration_2/point_cloud.ply': late });
+  await expectRefusal(apart, 'decode/unsupported', /2 scenes/, { name: 'a.zip' });
 });
 
 test('what archivers write beside and around files is passed over', async () => {

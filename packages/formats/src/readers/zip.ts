@@ -9,10 +9,13 @@ const DESCRIPTIONS = ['lod-meta.json', 'meta.json'];
 /** What macOS writes beside files, with their names. */
 const NO_CONTENT = /(^|\/)(__MACOSX\/|\._)/;
 const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
+/** The folder that the code of 3DGS writes: the points that training began with, and the splats after some numbers of iterations. */
+const FIRST_POINTS = /(^|\/)input\.ply$/i;
+const ITERATION = /^(.*\/)?iteration_(\d+)\/point_cloud\.ply$/i;
 
 /**
  * Reads a ZIP file with one scene in it: a SOG bundle (`.sog`), a streamed SOG scene, glTF with its buffers, or one file of any
- * other format. The scene that lies least deep counts. Archives within archives are bundles and are read one deep.
+ * other format. The scene that lies least deep counts; of a training's output, the one after most iterations. Archives within archives are bundles and are read one deep.
  */
 export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const { name, bytes } = source;
@@ -38,12 +41,25 @@ function mainFile(archive: Archive, name: string): string {
     // Other programs have a meta.json, too.
     if (found !== undefined && findFormat(archive.open(found), '', '') !== undefined) return found;
   }
-  const scenes = shallowest(paths.filter((path) => SCENE_FILE.test(path)));
+  const files = paths.filter((path) => SCENE_FILE.test(path));
+  const trained = files.filter((path) => !FIRST_POINTS.test(path));
+  const scenes = shallowest(trained.length > 0 ? trained : files);
   if (scenes.length === 1) return scenes[0];
+  const last = lastIteration(scenes);
+  if (last !== undefined) return last;
   // glTF names its other files, scenes among them.
   const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
   if (gltf.length === 1) return gltf[0];
   throw scenes.length === 0 ? noScene(name, paths, undefined) : severalScenes(name, scenes);
+}
+
+/** Of the same scene after some numbers of iterations, the one after most; undefined for others. */
+function lastIteration(paths: readonly string[]): string | undefined {
+  const found = paths.map((path) => ITERATION.exec(path));
+  const [first] = found;
+  if (!first || found.some((match) => match?.[1] !== first[1])) return undefined;
+  const iterations = found.map((match) => Number(match![2]));
+  return paths[iterations.indexOf(Math.max(...iterations))];
 }
 
 function shallowest(paths: readonly string[]): string[] {
