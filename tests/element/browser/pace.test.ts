@@ -93,6 +93,31 @@ describe('the pace of pictures', () => {
     assert(waited <= 300 + 2 * whole, `${waited} ms after rest, a frame takes ${whole}`);
   });
 
+  it('makes no pipeline in motion, after another quality neither', async () => {
+    const element = await showLoaded({ ...SCENE, quality: 'reference' }, SIZE);
+    element.quality = 'auto';
+    await element.updateComplete;
+    await delay(800);
+    await gpuIdle();
+    const made: string[] = [];
+    const names = ['createRenderPipeline', 'createComputePipeline'] as const;
+    const originals = names.map((name) => GPUDevice.prototype[name]);
+    for (const name of names) {
+      const original = GPUDevice.prototype[name] as (descriptor: GPUObjectDescriptorBase) => never;
+      GPUDevice.prototype[name] = function (descriptor: GPUObjectDescriptorBase) {
+        made.push(descriptor.label ?? name);
+        return original.call(this, descriptor);
+      };
+    }
+    try {
+      await findPace(element);
+      await turnFor(element, 1_500);
+    } finally {
+      names.forEach((name, k) => Object.assign(GPUDevice.prototype, { [name]: originals[k] }));
+    }
+    assertEqual(made, [], 'pipelines made in motion');
+  });
+
   it('a picture that is asked for is whole, even in motion', async () => {
     const element = await showLoaded({ ...SCENE, 'interpolation-decay': '0' }, SIZE);
     await findPace(element);

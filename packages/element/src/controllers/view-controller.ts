@@ -60,6 +60,7 @@ export class ViewController implements FrameClient {
   /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
   #first: Settle | undefined;
   #drawnVersion = 0;
+  #preparing: ReturnType<typeof setTimeout> | undefined;
 
   constructor(options: ViewOptions) {
     this.#options = options;
@@ -167,15 +168,26 @@ export class ViewController implements FrameClient {
     // Who has chosen a quality pays for no clock.
     const onTime =
       this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(level, spent) : undefined;
-    if (first === undefined) scene.render({ ...request, levers }, onTime);
-    else scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
+    if (first !== undefined) {
+      scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
+      return;
+    }
+    scene.render({ ...request, levers }, onTime);
+    this.#prepareSoon(scene, request);
   }
 
-  /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture. */
-  #afterFirst(scene: GpuScene, { target: { format } }: Frame, { resolve }: Settle): void {
+  #afterFirst(scene: GpuScene, request: Frame, { resolve }: Settle): void {
     resolve();
-    if (this.#options.rendering().quality !== 'auto' || !scene.isMeasurable) return;
-    setTimeout(() => this.#scene === scene && scene.prepare(MOVING_LEVERS, format), PREPARE_AFTER_MS);
+    this.#prepareSoon(scene, request);
+  }
+
+  /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
+  #prepareSoon(scene: GpuScene, { target: { format } }: Frame): void {
+    if (scene.isPrepared || this.#options.rendering().quality !== 'auto' || !scene.isMeasurable) return;
+    this.#preparing ??= setTimeout(() => {
+      this.#preparing = undefined;
+      if (this.#scene === scene) scene.prepare(MOVING_LEVERS, format);
+    }, PREPARE_AFTER_MS);
   }
 
   #applyRendering(scene: GpuScene): void {

@@ -67,6 +67,7 @@ export class GpuScene {
   #detail: DetailLevers;
   #levels: OwnedLevels | undefined;
   #destroyed = false;
+  #isPrepared = false;
   /** The pixels of the last frame; 0 if the next one may need other buffers. */
   #pixels = 0;
 
@@ -182,6 +183,7 @@ export class GpuScene {
   }
 
   #makeRenderer(): Renderer {
+    this.#isPrepared = false;
     const onIncomplete = (): void => {
       this.#pixels = 0;
       this.#filter?.invalidate();
@@ -190,9 +192,16 @@ export class GpuScene {
     return new Renderer(this.device, { ...this.#rendering, submissions: this.#submissions, onIncomplete });
   }
 
+  /** True if there is what frames with other levers need. */
+  get isPrepared(): boolean {
+    return this.#isPrepared;
+  }
+
   /** Makes what frames with other levers need, so that none of them has to. */
   prepare(levers: readonly Partial<FrameLevers>[], format: GPUTextureFormat): void {
-    if (!this.isLost && !this.#destroyed) this.#renderer.prepare(levers, format);
+    if (this.isLost || this.#destroyed) return;
+    this.#isPrepared = true;
+    this.#renderer.prepare(levers, format);
   }
 
   /**
