@@ -85,7 +85,7 @@ export class ViewController implements FrameClient {
   show(scene: GpuScene): Promise<void> {
     this.#scene = scene;
     scene.onIncomplete = () => this.requestFrame();
-    scene.onError = this.#options.onError;
+    scene.onError = (error) => this.#scene === scene && this.#options.onError(error);
     this.pace.reset();
     return new Promise((resolve, reject) => {
       this.#first = { resolve, reject };

@@ -68,8 +68,8 @@ export class GpuScene {
   #levels: OwnedLevels | undefined;
   #destroyed = false;
   #isPrepared = false;
-  /** The pixels of the last frame; 0 if the next one may need other buffers. */
-  #pixels = 0;
+  /** Size of the last frame; empty if the next one may need other buffers, whatever its size. */
+  #drawnSize = '';
 
   constructor(
     lease: DeviceLease,
@@ -113,7 +113,7 @@ export class GpuScene {
     if (levels === this.#levels) return;
     this.#levels?.destroy();
     this.#levels = levels;
-    this.#pixels = 0;
+    this.#drawnSize = '';
     this.#filter?.invalidate();
   }
 
@@ -139,7 +139,7 @@ export class GpuScene {
     this.setLevels(undefined);
     if (before === 'freed') this.#gaussians.destroy();
     this.#gaussians = gaussians;
-    this.#pixels = 0;
+    this.#drawnSize = '';
     this.#filter?.invalidate();
   }
 
@@ -167,7 +167,7 @@ export class GpuScene {
     this.#rendering = rendering;
     this.#renderer.destroy();
     this.#renderer = this.#makeRenderer();
-    this.#pixels = 0;
+    this.#drawnSize = '';
   }
 
   /** What stands between the renderer and the canvas; undefined for frames as they are drawn. */
@@ -179,13 +179,13 @@ export class GpuScene {
   setFilter(filter: FrameFilter | undefined): void {
     this.#filter?.close();
     this.#filter = filter;
-    this.#pixels = 0;
+    this.#drawnSize = '';
   }
 
   #makeRenderer(): Renderer {
     this.#isPrepared = false;
     const onIncomplete = (): void => {
-      this.#pixels = 0;
+      this.#drawnSize = '';
       this.#filter?.invalidate();
       this.onIncomplete();
     };
@@ -209,15 +209,12 @@ export class GpuScene {
    * @param onTime gets milliseconds that the frame kept the GPU, some frames later; not every frame is timed
    */
   render(frame: Frame, onTime?: (milliseconds: number) => void): void {
-    const pixels = frame.camera.width * frame.camera.height;
-    if (pixels === this.#pixels) return this.#renderOnce(frame, onTime);
-    this.#pixels = pixels;
-    void this.#withRefusal(() => this.#renderOnce(frame, onTime)).then(
-      (error) =>
-        error &&
-        !this.#destroyed &&
-        this.onError(outOfMemory(`frame of ${frame.camera.width} x ${frame.camera.height} pixels`, error)),
-    );
+    const size = sizeOf(frame);
+    if (size === this.#drawnSize) return this.#renderOnce(frame, onTime);
+    this.#drawnSize = size;
+    void this.#withRefusal(() => this.#renderOnce(frame, onTime)).then((error) => {
+      if (error !== null && !this.#destroyed) this.onError(outOfMemory(`frame of ${size} pixels`, error));
+    });
   }
 
   #renderOnce(frame: Frame, onTime: ((milliseconds: number) => void) | undefined): void {
@@ -242,7 +239,7 @@ export class GpuScene {
    * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU tells of a failed allocation only through a scope.
    */
   async renderFirst(frame: Frame): Promise<void> {
-    this.#pixels = frame.camera.width * frame.camera.height;
+    this.#drawnSize = sizeOf(frame);
     const error = await this.#withRefusal(() => this.#draw(frame));
     if (error !== null) throw outOfMemory('first frame', error);
     await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
@@ -291,6 +288,8 @@ export class GpuScene {
     this.#lease.release();
   }
 }
+
+const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
 
 function outOfMemory(where: string, cause: GPUError): GaussianSplatError {
   return new GaussianSplatError('out-of-memory/allocation', {
