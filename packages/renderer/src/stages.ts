@@ -6,6 +6,7 @@ export * from './generated/shaders.js';
 export * from './generated/streamed-shaders.js';
 export { BUFFER_USAGE, dispatchGrid, kernelOf, rareKernelOf, TEXTURE_USAGE, type ComputeKernel } from './gpu/kernel.js';
 export { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+export { BLOCK_BYTES, StagingBelt } from './gpu/staging-belt.js';
 export { writeStruct, type StructLayout, type StructValues } from './gpu/struct.js';
 export { pageCapacity } from './gaussian-buffers.js';
 export { occlusionView } from './occlusion.js';
@@ -17,6 +18,7 @@ export { emptyList, listPages, NONE, putBelow, type PageList } from './detail/pa
 export * as splatRows from './detail/splat-rows.js';
 export { BRIDGED, DetailTable } from './detail/detail-table.js';
 export { pageLayout, SLOT_CHUNKS } from './detail/manifest.js';
+export { PagePool, poolBytes, poolSize } from './detail/page-pool.js';
 export { MOST_FETCHES, MOST_UNDER_WAY, PageTraffic } from './detail/page-traffic.js';
 export { PageFiles } from './detail/page-files.js';
 export { folderSource } from './detail/page-source.js';

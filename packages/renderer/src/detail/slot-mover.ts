@@ -29,18 +29,29 @@ export class SlotMover {
     });
   }
 
-  /** A slot has been filled, with what belongs elsewhere by so much; whatever was in it before is forgotten. */
-  note(slot: number, by: Vector3): void {
-    this.#pending.delete(slot);
-    if (by.every((value) => value === 0)) return;
-    this.#pending.set(slot, by);
-    if (this.#pending.size === MOST_MOVES) this.flush();
+  /** Nothing is to be moved. */
+  get isEmpty(): boolean {
+    return this.#pending.size === 0;
   }
 
-  /** Submits the moves of what has been noted. */
-  flush(): void {
-    if (this.#pending.size === 0) return;
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.pool.move' });
+  /** No other slot must be noted before {@link record}. */
+  get isFull(): boolean {
+    return this.#pending.size === MOST_MOVES;
+  }
+
+  /** What is in a slot is about to be overwritten. */
+  forget(slot: number): void {
+    this.#pending.delete(slot);
+  }
+
+  /** A slot has been filled, with what belongs elsewhere by so much. */
+  note(slot: number, by: Vector3): void {
+    if (by.some((value) => value !== 0)) this.#pending.set(slot, by);
+  }
+
+  /** Records the moves of what has been noted, to be submitted before anything else is noted. */
+  record(encoder: GPUCommandEncoder): void {
+    if (this.isEmpty) return;
     const pass = encoder.beginComputePass({ label: 'gs.pool.move' });
     this.#pages.forEach(({ moves, bindings }, page) => {
       const own = [...this.#pending].filter(([slot]) => Math.floor(slot / this.#slotsPerBuffer) === page);
@@ -49,7 +60,6 @@ export class SlotMover {
       this.#stage.record(pass, bindings, own.length);
     });
     pass.end();
-    this.#device.queue.submit([encoder.finish()]);
     this.#pending.clear();
   }
 

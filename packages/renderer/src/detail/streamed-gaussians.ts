@@ -7,7 +7,7 @@ import type { ShPrecision } from '../pack/sh.js';
 import { ARRIVAL_MS, Arrivals } from './arrivals.js';
 import { SLOT_CHUNKS, type DetailManifest } from './manifest.js';
 import { NONE } from './page-list.js';
-import { PagePool, slotBytes, slotsFor } from './page-pool.js';
+import { PagePool, poolBytes, poolSize, slotBytes } from './page-pool.js';
 import { folderSource, type PageSource } from './page-source.js';
 import { PageTraffic } from './page-traffic.js';
 import { PlacedRows } from './placed-rows.js';
@@ -18,7 +18,7 @@ import { aheadMs } from './camera-motion.js';
 import { WishReader } from './wish-reader.js';
 
 export interface PoolOptions {
-  /** Bytes of GPU memory that resident splats may take, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */
+  /** Bytes of GPU memory for resident splats, up to a 32nd of which uploads pass through, allocated at once. Default 256 MB, or what the whole scene takes if that is less. */
   readonly memoryBudget?: number;
   /**
    * Milliseconds in which a page that has come takes the place of what stood for it, in 16 frames at least; 0 for at once. Default 400.
@@ -109,12 +109,13 @@ export class StreamedGaussians implements GaussianScene {
     this.#source = source;
     this.#options = options;
     requireTime(options.arrivalMs ?? ARRIVAL_MS);
-    const slots = slotsFor(scene, list, options.memoryBudget ?? DEFAULT_BUDGET);
+    const size = poolSize(scene, list, options.memoryBudget ?? DEFAULT_BUDGET);
+    const { slots } = size;
     this.count = slots * SLOT_CHUNKS * constants.CULL_GROUP;
-    this.#reservation = MemoryLedger.of(device).reserve('pages of a streamed scene', slots * slotBytes(scene));
+    this.#reservation = MemoryLedger.of(device).reserve('pages of a streamed scene', poolBytes(scene, size));
     this.#memory = new GpuMemory(device);
     try {
-      this.#pool = new PagePool(device, this.#memory, scene, slots);
+      this.#pool = new PagePool(device, this.#memory, scene, size);
       this.wishes = new WishReader(device, this.#memory, {
         pages: list.count,
         origin,
@@ -303,8 +304,8 @@ export class StreamedGaussians implements GaussianScene {
   }
 
   #finishWrites(): void {
-    this.#pool.flush();
     this.#rows.flush(this.#pool.slotsPerBuffer, (first, rows) => this.#pool.writeDetails(first, rows));
+    this.#pool.flush();
   }
 
   #take(wishes: Float32Array, lacking: number): void {

@@ -141,6 +141,7 @@ export const SHADER_STAGE = { vertex: 1, fragment: 2, compute: 4 } as const;
 /** `GPUBufferUsage` and `GPUTextureUsage`, likewise. */
 export const BUFFER_USAGE = {
   mapRead: 0x1,
+  mapWrite: 0x2,
   copySource: 0x4,
   copyDestination: 0x8,
   index: 0x10,
