@@ -187,7 +187,7 @@ function paced(
 const close = (found: number, expected: number, tolerance = 0.02): void =>
   assert.ok(Math.abs(found / expected - 1) < tolerance, `${found}, expected ${expected}`);
 
-test('a frame uploads what an eighth of its time is enough for at first, and a little more with each that comes in time, up to a quarter, 5 ms and 7 MB', () => {
+test('a frame uploads what an eighth of its time is enough for at first, and a little more with each that comes in time, up to a quarter, 5 ms and 14 MB', () => {
   const interval = 1000 / 60;
   const frames = paced(200, () => interval, 1);
   close(frames[20].bytes, frames[20].share * interval * 1e6, 0.1);

@@ -32,7 +32,7 @@ const options = {
   speed: named('speed', 1),
   latencyMs,
   bandwidth: 8e8,
-  uploadMs: named('upload', 0.46),
+  uploadMs: named('upload', 0.2),
   kept: 64e6,
   isWithoutCopies: !process.argv.includes('--copies'),
 };

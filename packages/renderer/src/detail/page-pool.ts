@@ -17,8 +17,8 @@ import { chunkLayout, movePoints, numbersOf, startOf, type ChunkLayout, type Slo
 const SLOT_SPLATS = SLOT_CHUNKS * constants.CULL_GROUP;
 /** Largest buffer of a pool, in bytes: several of this size are found where one large one is not (iOS). */
 const LARGEST_BUFFER = 1 << 27;
-/** Of what a pool may take, a share for uploads to pass through, and the most bytes that serve: what three frames upload. */
-const STAGING = { share: 1 / 32, most: 48e6 } as const;
+/** Of what a pool may take, a share for uploads to pass through, and the most bytes that serve: with so many one in a hundred found no room where frames upload all they may. */
+const STAGING = { share: 1 / 32, most: 24e6 } as const;
 
 /** Bytes of GPU memory that one slot takes. */
 export function slotBytes(format: PageFormat): number {
