@@ -22,7 +22,7 @@ export type ErrorCode =
   | 'decode/unsupported'
   /** A scene file with no valid splat in it. */
   | 'decode/empty'
-  /** The server could not be reached, or the browser refused the answer (CORS, mixed content, offline). */
+  /** The server could not be reached, or the browser refused the answer (CORS, mixed content, offline): of a scene, or of code that is loaded when it is needed. */
   | 'network/unreachable'
   /** The server answered with an HTTP error status. */
   | 'network/status'

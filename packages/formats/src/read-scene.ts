@@ -1,6 +1,7 @@
 import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-splat/core';
 import { plainBytes, type FileBytes } from './bytes.js';
 import { extensionOf, findFormat } from './detect.js';
+import { loadDiagnosis, loadReader } from './load-parts.js';
 import { noSplats } from './no-splats.js';
 import { previewWanted, samplePreview } from './preview.js';
 import type { OpenPart, SceneSource } from './scene-format.js';
@@ -43,11 +44,11 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   if (bytes.length === 0) throw emptyFile(name);
   const format = findFormat(bytes, name, contentType);
   if (!format) {
-    const { diagnose } = await import('./diagnose.js');
+    const diagnose = await loadDiagnosis();
     signal?.throwIfAborted();
     throw diagnose(bytes, name, extensionOf(name));
   }
-  const read = await format.load();
+  const read = await loadReader(format);
   signal?.throwIfAborted();
   let hasPreview = false;
   const preview = async (part: GaussianCloud): Promise<void> => {
@@ -85,7 +86,7 @@ export async function readPrefix(
   const bytes = plainBytes(beginning, name);
   const format = bytes.length === 0 ? undefined : findFormat(bytes, name, contentType);
   if (!format?.readsPrefix) return undefined;
-  const read = await format.load();
+  const read = await loadReader(format);
   try {
     const cloud = keepUsable(await read({ bytes, name, signal, isPrefix: true }));
     return cloud.count > 0 ? cloud : undefined;

@@ -1,4 +1,4 @@
-import { GaussianSplatError, type Bounds, type Camera, type ShDegree } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, type Bounds, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
   Renderer,
   type FrameRequest,
@@ -268,7 +268,7 @@ export class GpuScene {
   /** Counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
   async readCounts(camera: Camera): Promise<ReadCounts> {
     const { visible, overflow } = await this.#renderer.readStatistics();
-    const { countContributing } = await import('./contributions.js');
+    const { countContributing } = await loadModule('the code that counts splats', () => import('./contributions.js'));
     const { quality } = this.#rendering;
     const view = { ...this.#detail, gaussians: this.#levels ?? this.gaussians, camera, quality };
     return { drawn: visible, left: overflow, contributed: await countContributing(this.device, view) };

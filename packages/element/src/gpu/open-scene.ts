@@ -1,4 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { chooseVariants } from '@gaussian-splat/renderer';
 import type { LiveRequest } from '../live/live-model.js';
 import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
@@ -77,7 +77,10 @@ async function openSequence(
   sequence: LoadedSequence,
   options: OpenOptions,
 ): Promise<GpuScene> {
-  const { SequencePlayer } = await import('../live/sequence-player.js');
+  const { SequencePlayer } = await loadModule(
+    'the code that plays sequences',
+    () => import('../live/sequence-player.js'),
+  );
   const { listeners } = options.live();
   const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners });
   const { gaussians, bounds } = player;
@@ -94,7 +97,7 @@ const WARM_UP = 0.25;
 
 async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
   const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
-  const opening = import('../live/open-live-model.js');
+  const opening = loadModule('the code that runs generators', () => import('../live/open-live-model.js'));
   const acquiring = options.device.acquire();
   opening.catch(ignore);
   const lease = await acquiring;
@@ -127,7 +130,7 @@ export function isStreamed({ url, levels }: SceneRequest): boolean {
 
 async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
   const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
-  const opening = import('./open-streamed.js');
+  const opening = loadModule('the code that streams scenes', () => import('./open-streamed.js'));
   const acquiring = options.device.acquire();
   opening.catch(ignore);
   const lease = await acquiring;

@@ -1,3 +1,4 @@
+import { loadModule } from '@gaussian-splat/core';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import type { PostRequest } from './post-view.js';
 
@@ -50,7 +51,7 @@ export class PostController {
     const { request, requestFrame } = this.#options;
     const options = request();
     try {
-      const { PostView } = await import('./post-view.js');
+      const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
       if (signal.aborted) return;
       const onError = (error: unknown): void => (signal.aborted ? undefined : options.onError(error));
       const view = await PostView.open(

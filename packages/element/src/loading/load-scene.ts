@@ -1,5 +1,5 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
-import { boundsOf, GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { boundsOf, GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import { fetchScene, isSequence, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
 import { PreviewSchedule } from './preview-schedule.js';
@@ -31,7 +31,7 @@ export async function loadScene(
     const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
     const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
     if (isSequence(bytes)) {
-      const { sequenceOf } = await import('./sequence-of.js');
+      const { sequenceOf } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
       return sequenceOf(bytes, name, url);
     }
     // Nothing lies beside what has no place.
@@ -40,7 +40,7 @@ export async function loadScene(
     const cloud = await readScene(bytes, { name, signal, openPart, level, onPreview: previews?.onPreview });
     signal.throwIfAborted();
     if (cloud.levelRuns === undefined) return pack(cloud);
-    const { packLevels } = await import('./pack-levels.js');
+    const { packLevels } = await loadModule('the code that packs levels of detail', () => import('./pack-levels.js'));
     return packLevels(cloud, request.sh);
   } catch (error) {
     signal.throwIfAborted();

@@ -1,4 +1,4 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import type { PackedGaussians, PackedLevels } from '@gaussian-splat/renderer';
 import { buffersOf } from './buffers-of.js';
 import type {
@@ -131,7 +131,7 @@ export class SceneLoader {
     clearTimeout(this.#idleTimer);
     const worker = await (this.#worker ??= this.#start());
     signal.throwIfAborted();
-    if (worker === null) return here(await import('./scene-worker.js'));
+    if (worker === null) return here(await loadWorkerCode());
     return this.#ask<T>(worker, { ...request, id: this.#nextId++ }, signal, listeners);
   }
 
@@ -170,7 +170,7 @@ export class SceneLoader {
     onProgress: ProgressListener,
     onPreview: PreviewListener | undefined,
   ): Promise<LoadedScene | LoadedSequence> {
-    const { loadScene } = await import('./scene-worker.js');
+    const { loadScene } = await loadWorkerCode();
     return loadScene(request, signal, onProgress, onPreview);
   }
 
@@ -233,6 +233,8 @@ export class SceneLoader {
     this.#worker = null;
   }
 }
+
+const loadWorkerCode = (): Promise<Here> => loadModule('the code that reads scenes', () => import('./scene-worker.js'));
 
 function sequenceWithin(url: string): GaussianSplatError {
   return new GaussianSplatError('decode/unsupported', {

@@ -2,9 +2,11 @@
  * The module worker that loads scenes. Where a page refuses workers it imports this same module and calls
  * {@link loadScene} and the others itself; then nothing here listens.
  */
+import { loadModule } from '@gaussian-splat/core';
 import { buffersOf } from './buffers-of.js';
 import { fetchFile } from './fetch-file.js';
 import { loadScene, named } from './load-scene.js';
+import type * as boxes from './lod-boxes.js';
 import type {
   BoxRequest,
   LoadedBoxes,
@@ -17,14 +19,17 @@ import type {
 
 export { fetchFile, loadScene };
 
+const loadBoxCode = (): Promise<typeof boxes> =>
+  loadModule('the code that streams SOG', () => import('./lod-boxes.js'));
+
 export const openBoxes = async (
   request: SceneRequest,
   signal: AbortSignal,
   onProgress: ProgressListener,
-): Promise<LoadedBoxes> => (await import('./lod-boxes.js')).openBoxes(request, signal, onProgress);
+): Promise<LoadedBoxes> => (await loadBoxCode()).openBoxes(request, signal, onProgress);
 
 export const readBox = async (request: BoxRequest, signal: AbortSignal): Promise<ArrayBuffer> =>
-  (await import('./lod-boxes.js')).readBox(request, signal);
+  (await loadBoxCode()).readBox(request, signal);
 
 /** The part of a worker's global scope that is used here; TypeScript's page types do not know it. */
 interface WorkerScope {
@@ -35,7 +40,7 @@ interface WorkerScope {
 function serve(scope: WorkerScope): void {
   const running = new Map<number, AbortController>();
 
-  /** Does what a message asks for, and answers: with an error, too, that nobody has named, such as that of code that cannot be loaded. For what was called off nobody waits. */
+  /** Does what a message asks for, and answers: with an error, too, that nobody has named. For what was called off nobody waits. */
   async function answer(id: number, work: (signal: AbortSignal) => Promise<void>): Promise<void> {
     const abort = new AbortController();
     running.set(id, abort);
@@ -78,7 +83,10 @@ function serve(scope: WorkerScope): void {
 
   const buildLevels = ({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> =>
     answer(id, async (signal) => {
-      const { levelsInTurns } = await import('./levels-in-turns.js');
+      const { levelsInTurns } = await loadModule(
+        'the code that builds levels of detail',
+        () => import('./levels-in-turns.js'),
+      );
       const levels = await levelsInTurns(packed, signal);
       scope.postMessage({ type: 'levels', id, levels }, levels ? buffersOf(levels, levels.coarser) : []);
     });

@@ -1,6 +1,7 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { quote } from '../bytes.js';
 import { findFormat } from '../detect.js';
+import { loadReader } from '../load-parts.js';
 import type { SceneSource } from '../scene-format.js';
 import { Archive } from '../zip/archive.js';
 
@@ -25,7 +26,7 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const inner = archive.open(path);
   const format = findFormat(inner, path, '');
   if (!format || (format.name === 'zip' && source.openPart === WITHIN)) throw noScene(name, archive.paths, path);
-  const read = await format.load();
+  const read = await loadReader(format);
   const openPart =
     format.name === 'zip' ? WITHIN : async (part: string): Promise<Uint8Array> => archive.open(folder + part);
   return read({ ...source, bytes: inner, name: `${name}, ${path}`, openPart });

@@ -13,15 +13,23 @@ const fixtures = fileURLToPath(new URL('../fixtures/', import.meta.url));
 const generators = join(root, 'tests/fixtures/generators');
 const sharedData = join(root, '../shared/data');
 
-/** Answers under /net/; everything else is left to the test runner's own server. */
+/** Answers under /net/; everything else is left to the test runner's own server, unless a test has it be lost. */
 export function hostileServer(otherOrigin) {
   return async (context, next) => {
     const [, net, kind, ...rest] = context.path.split('/');
+    if (lost.some((end) => context.path.endsWith(end))) {
+      // The runner would have browsers keep the answer for a year.
+      context.respond = false;
+      return void context.res.writeHead(404, { 'Cache-Control': 'no-store' }).end();
+    }
     if (net !== 'net' || !(kind in ANSWERS)) return next();
     context.set('Cache-Control', 'no-store');
     return ANSWERS[kind](context, rest.join('/'), otherOrigin);
   };
 }
+
+/** Ends of paths that are not found. */
+let lost = [];
 
 /** By folder: what tests have put there, and what was asked for. */
 const kept = new Map();
@@ -30,6 +38,12 @@ const ANSWERS = {
   status(context, code) {
     context.status = Number(code);
     context.body = 'no';
+  },
+
+  /** From now on these files, by the ends of their paths with commas between them, are not found; nothing for none. */
+  lose(context, ends) {
+    lost = ends ? ends.split(',').map((end) => `/${end}`) : [];
+    context.status = 204;
   },
 
   html(context) {

@@ -1,0 +1,15 @@
+import { loadModule } from '@gaussian-splat/core';
+import type * as diagnosis from './diagnose.js';
+import type { SceneFormat, SceneReader } from './scene-format.js';
+
+/** The parts of this package that are loaded when they are first needed. Both throw GaussianSplatError `network/unreachable`. */
+
+export const loadReader = ({ title, load }: SceneFormat): Promise<SceneReader> =>
+  loadModule(`the code that reads ${title}`, load);
+
+/** What knows files that are no scene. */
+export const loadDiagnosis = (): Promise<typeof diagnosis.diagnose> =>
+  loadModule(
+    'the code that tells what a file is that is no scene',
+    async () => (await import('./diagnose.js')).diagnose,
+  );

@@ -1,0 +1,56 @@
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import { assert, assertEqual, claimFault, COMPASS, FIXTURES, show, showLoaded } from './support/harness.js';
+
+type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
+const original = GaussianSplatElement.sceneLoader;
+const Loader = original.constructor as new (spawn?: () => Worker) => SceneLoader;
+
+/** A loader of a page that refuses its worker. */
+const withoutWorker = (): SceneLoader => new Loader(() => new Worker('/net/status/404', { type: 'module' }));
+
+/** From now on a file, by the end of its path, is not found; without one all are. */
+const lose = (end = ''): Promise<unknown> => fetch(`/net/lose/${end}`);
+
+async function assertLost(src: string, file: string, work: RegExp): Promise<void> {
+  await lose(file);
+  const element = show({ src });
+  await element.ready;
+  const { code, reason, message = 'no error' } = element.error ?? {};
+  assertEqual([code, reason], ['network', 'network/unreachable'], message);
+  assert(work.test(message), `what could not be loaded: ${message}`);
+  assert(message.includes(file), `and its address: ${message}`);
+  assert(/serve/i.test(message) && /Content-Security-Policy/.test(message), `and what to do: ${message}`);
+}
+
+describe('code that cannot be loaded when it is needed', () => {
+  beforeEach(() => {
+    GaussianSplatElement.sceneLoader = new Loader();
+  });
+  afterEach(async () => {
+    GaussianSplatElement.sceneLoader = original;
+    await lose();
+  });
+
+  // What a page has loaded once it has for good: the missing come before those that are there.
+  it('is told as such: all that reads scenes, worker or not', async () => {
+    const script = '/packages/element/dist/loading/scene-worker.js';
+    GaussianSplatElement.sceneLoader = new Loader(() => new Worker(script, { type: 'module' }));
+    await assertLost(COMPASS, 'loading/scene-worker.js', /reads scenes/);
+    claimFault(/this page refuses its worker/);
+  });
+
+  it('in the worker: the reader of a format', () =>
+    assertLost(`${FIXTURES}compass.ply`, 'readers/ply.js', /reads PLY/));
+
+  it('in the worker: what knows files that are no scene', () => assertLost('/net/html', 'diagnose.js', /no scene/));
+
+  it("on the page's thread: the reader of a format, and another format is read", async () => {
+    GaussianSplatElement.sceneLoader = withoutWorker();
+    await assertLost(COMPASS, 'readers/splat.js', /reads \.splat/);
+    claimFault(/this page refuses its worker/);
+    await showLoaded({ src: `${FIXTURES}compass.ply` });
+  });
+
+  it("on the page's thread: what runs generators", () =>
+    assertLost('/tests/fixtures/generators/packed.onnx', 'live/open-live-model.js', /runs generators/));
+});
