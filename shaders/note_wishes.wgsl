@@ -14,8 +14,11 @@
 @group(0) @binding(5) var<uniform> ahead: array<vec4f, 5>;
 
 const WISH_THREADS = 64u;
-// How much less a page out of view is wished for: a camera that turns finds it there.
-const UNSEEN = 0.125;
+// How much less a page out of view is wished for, within a picture that is NEARBY_SIZE times as wide and high and beyond: a camera that turns, or that goes elsewhere than was
+// thought, finds it there.
+const NEARBY = 0.25;
+const NEARBY_SIZE = 2.0;
+const UNSEEN = 0.0625;
 
 // Share of the pixels that are allowed from which on a page is wished for, though nothing of it is drawn yet: the view lacks it soon.
 const SOON = 0.93;
@@ -28,7 +31,16 @@ const KEPT = 0.7;
 fn wish_of(seen: View, chunk: Chunk, d: ChunkDetail, allowed: f32, least: f32) -> f32 {
   let pixels = screen_error(seen, d.sphere, d.full_error);
   if (pixels <= least && refined(pixels, allowed, seen.detail_fade) == 0u) { return 0.0; }
-  return select(UNSEEN * pixels, pixels, may_be_visible(seen, chunk));
+  if (may_be_visible(seen, chunk)) { return pixels; }
+  return select(UNSEEN, NEARBY, may_be_visible(nearby(seen), chunk)) * pixels;
+}
+
+// The view with a wider picture around the same middle.
+fn nearby(seen: View) -> View {
+  var wider = seen;
+  wider.viewport *= NEARBY_SIZE;
+  wider.principal += 0.5 * (NEARBY_SIZE - 1.0) * seen.viewport;
+  return wider;
 }
 
 @compute @workgroup_size(WISH_THREADS)

@@ -7,8 +7,8 @@ type PageList = ReturnType<typeof listPages>;
 
 /** Numbers of a `Chunk`, and the reach among them. */
 const [CHUNK_NUMBERS, REACH] = [8, 3];
-/** As UNSEEN of the shader. */
-const UNSEEN = 1 / 8;
+/** As the constants of the shader. */
+const [NEARBY, NEARBY_SIZE, UNSEEN] = [1 / 4, 2, 1 / 16];
 
 /** The chunk above each page. */
 export class FlightPages {
@@ -48,13 +48,14 @@ export class FlightPages {
   }
 
   /**
-   * Pixels that doing without each page costs a view, those out of view an eighth of it.
+   * Pixels that doing without each page costs a view, those out of view a part of it.
    * @param most gets a page and its pixels, of those that cost more than `allowed`
    */
   wish(camera: Camera, allowed: number, most: (page: number, pixels: number, isVisible: boolean) => void): void {
     const focal = Math.max(camera.fx, camera.fy);
     const [ex, ey, ez] = eyeOf(camera.worldToCamera);
     const sides = sidesOf(camera);
+    const nearby = sidesOf(widened(camera));
     const spheres = this.#spheres;
     for (let page = 1; page < this.list.count; page++) {
       const [dx, dy, dz] = [spheres[4 * page] - ex, spheres[4 * page + 1] - ey, spheres[4 * page + 2] - ez];
@@ -62,7 +63,8 @@ export class FlightPages {
       const pixels = (focal * this.#errors[page]) / distance;
       if (pixels <= allowed) continue;
       const isVisible = this.#mayBeVisible(page, sides);
-      most(page, isVisible ? pixels : UNSEEN * pixels, isVisible);
+      const share = isVisible ? 1 : this.#mayBeVisible(page, nearby) ? NEARBY : UNSEEN;
+      most(page, share * pixels, isVisible);
     }
   }
 
@@ -85,6 +87,17 @@ interface Side {
   readonly normal: Vector3;
   readonly shift: number;
   readonly reach: number;
+}
+
+function widened(camera: Camera): Camera {
+  const [width, height] = [NEARBY_SIZE * camera.width, NEARBY_SIZE * camera.height];
+  return {
+    ...camera,
+    width,
+    height,
+    cx: camera.cx + (width - camera.width) / 2,
+    cy: camera.cy + (height - camera.height) / 2,
+  };
 }
 
 function sidesOf({ fx, fy, cx, cy, width, height, near, worldToCamera: m }: Camera): Side[] {

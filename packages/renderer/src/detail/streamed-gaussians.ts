@@ -191,7 +191,7 @@ export class StreamedGaussians implements GaussianScene {
 
   /**
    * Pages on the GPU, all pages, and pages that are on their way or still taking the place of others. `error` tells by how many pixels places are off at most whose pages are not there, as of
-   * the last look (those out of view count an eighth): at rest, with nothing coming, what a larger `memoryBudget` would mend.
+   * the last look (those out of view count a quarter near it, else a sixteenth): at rest, with nothing coming, what a larger `memoryBudget` would mend.
    */
   get progress(): {
     readonly resident: number;
