@@ -33,6 +33,10 @@ export interface Pace {
   readonly from: number;
   /** What frames took then, or before the first of several climbs to rungs that are no dearer, ms. */
   readonly before: number;
+  /** When the level last changed its direction. */
+  readonly turnedAt: number;
+  /** A rung below which frames were no faster, what they took there, ms, and until when that is believed. */
+  readonly floor: { readonly level: number; readonly milliseconds: number; readonly until: number } | null;
   /** No climb to a rung before this time, and how often one to it was in vain. */
   readonly barred: Readonly<Record<number, { readonly until: number; readonly failures: number }>>;
 }
@@ -66,6 +70,12 @@ const HARMFUL = 1.25;
 const IN_VAIN = 0.95;
 /** A rung up that took frames down to such a share is followed by the next without a hold. */
 const FASTER = 0.9;
+/** Between two changes of direction, ms: a level that goes to and fro is seen. Only a fall to what is known to be faster comes sooner. */
+const QUIET_MS = 5_000;
+/** A climb among rungs that are all too slow is taken back sooner where frames take so much longer. */
+const MUCH_DEARER = 1.5;
+/** How long, ms, it is believed that rungs win nothing. */
+const FLOOR_MS = 20_000;
 /** A climb that ends sooner, ms, was in vain; the rung is then left alone for a while, each time for twice as long. */
 const IN_VAIN_MS = 2_000;
 const FIRST_BAR_MS = 5_000;
@@ -80,6 +90,8 @@ export const INITIAL_PACE: Pace = {
   climbed: false,
   from: 0,
   before: 0,
+  turnedAt: -Infinity,
+  floor: null,
   barred: {},
 };
 
@@ -88,11 +100,21 @@ export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, 
   if (level !== pace.level) return pace;
   const known = { ...pace, recent: [...pace.recent, milliseconds].slice(-MEMORY) };
   const isLowest = level + 1 === rules.costs.length;
-  if (isHarmful(known, now) || (isLowest && isForNothing(known, now))) return change(known, now, known.from, 'trial');
+  if (isHarmful(known, now) || (isLowest && isForNothing(known, now))) return takeBack(known, now);
   const excess = excessOf(known.recent, rules.targetMs);
   if (excess !== null && !isLowest && !isKeptThough(known, now)) return fall(known, now, excess, rules);
   const reason = climbReason(known, now, rules);
   return reason === null ? known : change(known, now, level - 1, reason);
+}
+
+/** It is too soon after the last change of direction for another one. */
+const isTooSoon = ({ turnedAt }: Pace, now: number): boolean => now - turnedAt < QUIET_MS;
+
+/** Back to where the falls began that have won nothing. */
+function takeBack(pace: Pace, now: number): Pace {
+  if (isTooSoon(pace, now)) return pace;
+  const { from, before } = pace;
+  return { ...change(pace, now, from, 'trial'), floor: { level: from, milliseconds: before, until: now + FLOOR_MS } };
 }
 
 /** How long frames take where they take too long, as a share of the target; null where they do not. */
@@ -108,15 +130,29 @@ function excessOf(recent: readonly number[], targetMs: number): number | null {
 function fall(pace: Pace, now: number, excess: number, { costs, targetMs }: PaceRules): Pace {
   const { level, climbed, changedAt, barred, before, from } = pace;
   const affordable = costs[level] / excess;
-  const lower = costs.findIndex((cost, rung) => rung > level && cost <= affordable);
+  const found = costs.findIndex((cost, rung) => rung > level && cost <= affordable);
+  const wished = found === -1 ? costs.length - 1 : found;
+  // Where what is below was too slow as well there is no hurry, unless it was much less so, and nothing to be won further down.
+  const wasTooSlow = climbed && before > TOO_SLOW * targetMs;
+  if (wasTooSlow && isTooSoon(pace, now) && excess * targetMs < MUCH_DEARER * before) return pace;
+  const floor = wasTooSlow ? { level: from, milliseconds: before, until: now + FLOOR_MS } : floorOf(pace, now);
+  const lowest = floor?.level ?? costs.length - 1;
+  if (level >= lowest) return pace;
   // The last frames, not those before the load grew. Falls that win nothing are held against the frames before the first.
-  const isInVain = !climbed && now - changedAt < HARM_MS && excess * targetMs >= before;
+  const isInVain = !climbed && now - changedAt < HARM_MS && excess * targetMs >= IN_VAIN * before;
   const held = isInVain ? { before, from } : { before: excess * targetMs, from: level };
-  const next = { ...change(pace, now, lower === -1 ? costs.length - 1 : lower, 'slow'), ...held };
-  if (!climbed || now - changedAt > IN_VAIN_MS) return next;
+  const next = { ...change(pace, now, Math.min(wished, lowest), 'slow'), ...held, floor };
+  if (!climbed || (now - changedAt > IN_VAIN_MS && !wasTooSlow)) return next;
   const failures = (barred[level]?.failures ?? 0) + 1;
   const until = now + Math.min(LONGEST_BAR_MS, FIRST_BAR_MS * 2 ** (failures - 1));
   return { ...next, barred: { ...barred, [level]: { until, failures } } };
+}
+
+/** Where falling ends for now; null where nothing is known, or the load has grown since. */
+function floorOf({ floor, recent, level }: Pace, now: number): Pace['floor'] {
+  if (floor === null || now >= floor.until) return null;
+  const hasGrown = level >= floor.level && Math.min(...recent.slice(-3)) > HARMFUL * floor.milliseconds;
+  return hasGrown ? null : floor;
 }
 
 /** Additive increase: one rung, after a hold, if its frames would be in time even at the most that it can cost; or to try it. Null: stay. */
@@ -125,6 +161,8 @@ function climbReason(pace: Pace, now: number, { costs, targetMs }: PaceRules): P
   if (level === 0 || now - changedAt < holdOf(pace) || recent.length < ENOUGH_FRAMES) return null;
   if (isBarred(barred, level - 1, now)) return null;
   const usual = quantile(recent, COUNTED);
+  const turns = !pace.climbed && changedAt > -Infinity;
+  if ((turns || usual > TOO_SLOW * targetMs) && isTooSoon(pace, now)) return null;
   if (usual * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs) return 'spare';
   return now - changedAt >= TRIAL_MS || isNoDearer(pace) ? 'trial' : null;
 }
@@ -163,7 +201,8 @@ function change(pace: Pace, now: number, level: number, reason: PaceReason): Pac
   const climbed = level < pace.level;
   // Rungs that are no dearer than one another must not add up to one that is.
   const before = climbed && isNoDearer(pace) ? Math.min(pace.before, usual) : usual;
-  return { ...pace, level, reason, recent: [], changedAt: now, climbed, from: pace.level, before };
+  const turnedAt = climbed !== pace.climbed && pace.changedAt > -Infinity ? now : pace.turnedAt;
+  return { ...pace, level, reason, recent: [], changedAt: now, climbed, from: pace.level, before, turnedAt };
 }
 
 /** The pace where only the first so many rungs serve. */
