@@ -70,10 +70,10 @@ const HARMFUL = 1.25;
 const IN_VAIN = 0.95;
 /** A rung up that took frames down to such a share is followed by the next without a hold. */
 const FASTER = 0.9;
-/** Between two changes of direction, ms: a level that goes to and fro is seen. Only a fall to what is known to be faster comes sooner. */
-const QUIET_MS = 5_000;
-/** A climb among rungs that are all too slow is taken back sooner where frames take so much longer. */
-const MUCH_DEARER = 1.5;
+/** Between two changes of direction, ms, five seconds and what times may be late: a level that goes to and fro is seen. Only a fall to what was in time comes sooner. */
+const QUIET_MS = 5_200;
+/** A change that makes frames so much longer is taken back sooner. */
+const MUCH_DEARER = 1.6;
 /** How long, ms, it is believed that rungs win nothing. */
 const FLOOR_MS = 20_000;
 /** A climb that ends sooner, ms, was in vain; the rung is then left alone for a while, each time for twice as long. */
@@ -110,10 +110,12 @@ export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, 
 /** It is too soon after the last change of direction for another one. */
 const isTooSoon = ({ turnedAt }: Pace, now: number): boolean => now - turnedAt < QUIET_MS;
 
-/** Back to where the falls began that have won nothing. */
+const isMuchDearer = ({ recent, before }: Pace): boolean => Math.min(...recent.slice(-3)) > MUCH_DEARER * before;
+
+/** Back to where the falls began that have won nothing, or have made frames longer. */
 function takeBack(pace: Pace, now: number): Pace {
-  if (isTooSoon(pace, now)) return pace;
   const { from, before } = pace;
+  if (isTooSoon(pace, now) && !isMuchDearer(pace)) return pace;
   return { ...change(pace, now, from, 'trial'), floor: { level: from, milliseconds: before, until: now + FLOOR_MS } };
 }
 
@@ -134,7 +136,7 @@ function fall(pace: Pace, now: number, excess: number, { costs, targetMs }: Pace
   const wished = found === -1 ? costs.length - 1 : found;
   // Where what is below was too slow as well there is no hurry, unless it was much less so, and nothing to be won further down.
   const wasTooSlow = climbed && before > TOO_SLOW * targetMs;
-  if (wasTooSlow && isTooSoon(pace, now) && excess * targetMs < MUCH_DEARER * before) return pace;
+  if (wasTooSlow && isTooSoon(pace, now) && !isMuchDearer(pace)) return pace;
   const floor = wasTooSlow ? { level: from, milliseconds: before, until: now + FLOOR_MS } : floorOf(pace, now);
   const lowest = floor?.level ?? costs.length - 1;
   if (level >= lowest) return pace;
@@ -162,7 +164,7 @@ function climbReason(pace: Pace, now: number, { costs, targetMs }: PaceRules): P
   if (isBarred(barred, level - 1, now)) return null;
   const usual = quantile(recent, COUNTED);
   const turns = !pace.climbed && changedAt > -Infinity;
-  if ((turns || usual > TOO_SLOW * targetMs) && isTooSoon(pace, now)) return null;
+  if (turns && isTooSoon(pace, now)) return null;
   if (usual * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs) return 'spare';
   return now - changedAt >= TRIAL_MS || isNoDearer(pace) ? 'trial' : null;
 }
