@@ -27,7 +27,7 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
   --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
-                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 230 views around the subject, 6 of them held out.
+                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
                   Larger ones are drawn with 1600 pixels a side
   --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
   --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
