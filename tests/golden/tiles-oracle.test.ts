@@ -1,6 +1,7 @@
 /** The compute rasterizer against the oracle. It blends in float32 and stops as the reference does, so it is held tighter. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
+import { setTimeout as pause } from 'node:timers/promises';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { cloudOf, repeat } from '../support/clouds.js';
@@ -137,5 +138,45 @@ test('tiles: over capacity the farthest pairs are left out, the frame says so, a
   const second = await renderer.readStatistics();
   assert.deepEqual([second.pairs, second.pairOverflow], [72_000, 0]);
 });
+
+for (const [what, cameras, pauseMs] of [
+  [
+    'larger',
+    [
+      { width: 64, height: 36 },
+      { width: 640, height: 360 },
+    ],
+    0,
+  ],
+  [
+    'after a pause',
+    [
+      { width: 640, height: 360, far: true },
+      { width: 640, height: 360 },
+    ],
+    300,
+  ],
+] as const) {
+  test(`tiles: a single picture that is ${what} is looked at, and told of where it lacks room`, async () => {
+    const device = await anyDevice();
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(crowd));
+    let told = 0;
+    const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => told++ });
+    const target = device.createTexture({ size: [640, 360], format: 'rgba16float', usage: 0x8 | 0x10 });
+    const [before, after] = cameras.map(({ width, height, ...rest }) =>
+      cameraAt([0, 0, 'far' in rest ? -2000 : -3], [0, 0, 0], { width, height }),
+    );
+    // The third frame of a view is not looked at for its number.
+    for (let frame = 0; frame < 2; frame++) {
+      renderer.render({ gaussians, camera: before, target });
+      assert.equal((await renderer.readStatistics()).pairOverflow, 0);
+    }
+    await pause(pauseMs);
+    renderer.render({ gaussians, camera: after, target });
+    assert.ok((await renderer.readStatistics()).pairOverflow > 0);
+    await pause(50);
+    assert.equal(told, 1);
+  });
+}
 
 after(endNodeDevice);

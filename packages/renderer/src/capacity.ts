@@ -33,6 +33,8 @@ const BYTES_PER_VISIBLE = 48;
 const BYTES_PER_PAIR = 24;
 /** Frames between two looks once the first frames have been looked at. */
 const INTERVAL = 16;
+/** After so long without a look, ms, a frame is looked at whatever its number: it may be the only one of its view. */
+const LONGEST_PAUSE_MS = 250;
 /** Looks at buffers with room to spare before they shrink. */
 const PATIENCE = 4;
 /** So many times as many where they had to grow again: views that come and go, such as an orbit's, soon keep the room that the largest needs. */
@@ -78,6 +80,9 @@ export class CapacityMonitor {
   readonly #patience: Patience;
   #capacity: Capacity;
   #frame = 0;
+  /** Pixels of the last picture that was looked at, and when that was. */
+  #pixels = 0;
+  #lookedAt = -Infinity;
   #isReading = false;
   #isDestroyed = false;
   #idleLooks = 0;
@@ -105,13 +110,20 @@ export class CapacityMonitor {
   /**
    * Counts a frame.
    * @param hasPairs whether its rasterizer makes pairs of splat and bin
+   * @param pixels of its picture: one of another size needs another room, and at rest no other follows
    * @returns whether this frame is one to look at; then {@link record} must be called before the submit and {@link read} after it
    */
-  isDue(hasPairs: boolean): boolean {
+  isDue(hasPairs: boolean, pixels: number): boolean {
     const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !hasPairs;
     this.#frame++;
-    const isDue = this.#frame % INTERVAL === 0 || (this.#frame < INTERVAL && Number.isInteger(Math.log2(this.#frame)));
-    return isDue && !hasRoom && !this.#isReading;
+    const isInTurn =
+      this.#frame % INTERVAL === 0 || (this.#frame < INTERVAL && Number.isInteger(Math.log2(this.#frame)));
+    const now = performance.now();
+    const isDue = isInTurn || pixels !== this.#pixels || now - this.#lookedAt > LONGEST_PAUSE_MS;
+    if (!isDue || hasRoom || this.#isReading) return false;
+    this.#pixels = pixels;
+    this.#lookedAt = now;
+    return true;
   }
 
   /** Records the copy of the counts. */
