@@ -4,80 +4,12 @@ import { test } from 'node:test';
 import fc from 'fast-check';
 import { DisplayInterval } from '../../packages/element/src/pace/display-interval.js';
 import { LADDER } from '../../packages/element/src/pace/ladder.js';
-import { INITIAL_PACE, keepPace, quantile, type Pace } from '../../packages/element/src/pace/pace.js';
-import { randomSource } from '../support/gpu.js';
+import { INITIAL_PACE, keepPace } from '../../packages/element/src/pace/pace.js';
+import { COSTS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
 
-const COSTS = LADDER.map(({ cost }) => cost);
 const LOWEST = COSTS.length - 1;
 /** Where the dead band ends, and the noise of what is in it. */
 const TOLERANCE = 1.1;
-
-interface Gpu {
-  /** Pictures a second of the display. */
-  readonly hertz: number;
-  /** What the true image takes at a time in ms, as a multiple of the target. */
-  readonly load: (now: number) => number;
-  /** Share of a frame that no rung makes cheaper. */
-  readonly fixed: number;
-  /** What each rung takes at a time, as a share of the first; the ladder's costs unless given. */
-  readonly shares?: (now: number) => readonly number[];
-  /** Relative spread of times; and how many frames in a hundred take three times as long. */
-  readonly noise: number;
-  readonly spikes: number;
-  /** Frames until a time is known. */
-  readonly latency: number;
-  readonly seed: number;
-}
-
-interface Frame {
-  readonly at: number;
-  readonly level: number;
-  /** As a share of the target. */
-  readonly share: number;
-}
-
-/** Draws a moving picture for so long: a frame begins with a picture of the display, once the GPU has at most one frame to do. */
-function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Pace; targetMs: number } {
-  const interval = 1000 / gpu.hertz;
-  const targetMs = 0.8 * interval;
-  const random = randomSource(gpu.seed);
-  const frames: Frame[] = [];
-  const waiting: { due: number; at: number; level: number; spent: number }[] = [];
-  let pace = INITIAL_PACE;
-  let free = 0;
-  for (let at = 0; at < milliseconds; at += interval) {
-    while (waiting.length > 0 && waiting[0].due <= at) {
-      const { due, level, spent } = waiting.shift()!;
-      pace = keepPace(pace, { now: due, level, milliseconds: spent }, { targetMs, costs: COSTS });
-    }
-    if (free > at + interval) continue;
-    const { level } = pace;
-    const whole = gpu.load(at) * (gpu.fixed + (1 - gpu.fixed) * (gpu.shares?.(at) ?? COSTS)[level]);
-    const spread = 1 + gpu.noise * (random() + random() + random() - 1.5);
-    const share = whole * spread * (random() < gpu.spikes / 100 ? 3 : 1);
-    const spent = share * targetMs;
-    free = Math.max(at, free) + spent;
-    frames.push({ at, level, share });
-    waiting.push({ due: free + gpu.latency * interval, at, level, spent });
-  }
-  return { frames, pace, targetMs };
-}
-
-/** Changes of direction of the level between two times. */
-function reversals(frames: readonly Frame[], from: number, to: number): number {
-  const levels = frames.filter(({ at }) => at >= from && at < to).map(({ level }) => level);
-  const steps = levels
-    .slice(1)
-    .map((level, i) => Math.sign(level - levels[i]))
-    .filter((step) => step !== 0);
-  return steps.slice(1).filter((step, i) => step !== steps[i]).length;
-}
-
-const p95 = (frames: readonly Frame[], from: number, to: number): number =>
-  quantile(
-    frames.filter(({ at }) => at >= from && at < to).map(({ share }) => share),
-    0.95,
-  );
 
 const STEP_MS = 6_000;
 const anyGpu = {
@@ -187,9 +119,8 @@ test('rungs that are each a little dearer than the one below are not climbed one
   const shares = COSTS.map((_, level) => 1.04 ** (LOWEST - level));
   const gpu = { hertz: 60, fixed: 0, shares: () => shares, load: () => 1.2, noise: 0, spikes: 0, latency: 2, seed: 1 };
   const levels = run(gpu, 30_000).frames.map(({ at, level }) => (at < 1_000 ? LOWEST : level));
-  assert.ok(levels.includes(LOWEST - 1), 'the one above is tried');
   assert.ok(
-    levels.every((level) => level >= LOWEST - 2),
+    levels.every((level) => level >= LOWEST - 3),
     `${Math.min(...levels)}`,
   );
 });
@@ -216,7 +147,7 @@ test('a fast GPU draws the true image, whatever the display, single slow frames 
   }
 });
 
-test('a GPU that is too slow for all comes to the lowest rung within few frames and all but stays: the one above is tried now and then', () => {
+test('a GPU that is too slow for all comes to the lowest rung within few frames and stays', () => {
   const { frames } = run({ hertz: 60, load: () => 60, fixed: 0, noise: 0.1, spikes: 0, latency: 2, seed: 3 }, 60_000);
   const levels = frames.slice(6).map(({ level }) => level);
   assert.ok(levels.filter((level) => level === LOWEST).length > 0.95 * levels.length, levels.join(' '));
@@ -238,19 +169,6 @@ test('a GPU that is far too slow, with much that no rung makes cheaper, turns at
     }
   }
 });
-
-/** Windows of five seconds with more than one change of direction, of those that begin with a frame. */
-function restlessWindows(frames: readonly Frame[]): number {
-  let turned = 0;
-  const turns: number[] = [];
-  frames.forEach(({ at, level }, i) => {
-    const step = i === 0 ? 0 : Math.sign(level - frames[i - 1].level);
-    if (step === 0) return;
-    if (turned !== 0 && step !== turned) turns.push(at);
-    turned = step;
-  });
-  return turns.slice(1).filter((at, i) => at - turns[i] < 5_000).length;
-}
 
 test('where the lowest rungs are no faster and still too slow, the level turns at most once in five seconds', () => {
   // Two steps of an H200 (docs/benchmark.md), and pictures with a part that no rung makes cheaper.
@@ -294,22 +212,21 @@ test('when the load is gone the true image comes back, one rung after the other'
   assert.ok(after.filter(({ at }) => at > 12_000).every(({ level }) => level === 0));
 });
 
-test('a rung that costs more than the ladder says is tried ever more seldom', () => {
+test('a rung that costs more than the ladder says is tried again once in two minutes', () => {
   // The first rung down makes the frame more than twice as fast, though the ladder promises less.
   const targetMs = 13.3;
   let pace = INITIAL_PACE;
   const changes: number[] = [];
-  for (let now = 0; now < 120_000; now += 16.7) {
+  for (let now = 0; now < 600_000; now += 16.7) {
     const { level } = pace;
     const milliseconds = targetMs * (level === 0 ? 1.3 : 0.5);
     pace = keepPace(pace, { now, level, milliseconds }, { targetMs, costs: COSTS });
     if (pace.level === 0 && level > 0) changes.push(now);
   }
-  // After 5, 10, 20, 40 and then every 80 seconds.
-  assert.ok(changes.length >= 3 && changes.length <= 6, changes.join(' '));
+  assert.ok(changes.length >= 3 && changes.length <= 5, changes.join(' '));
   const gaps = changes.slice(1).map((at, i) => at - changes[i]);
   assert.ok(
-    gaps.every((gap, i) => i === 0 || gap > 1.5 * gaps[i - 1]),
+    gaps.every((gap) => gap >= 115_000),
     gaps.join(' '),
   );
 });

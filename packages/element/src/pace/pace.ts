@@ -1,4 +1,5 @@
 /** How much of the true image a moving picture can afford: a pure function of what frames took. */
+import { isBelieved, predict, type Knowledge, type MeasuredRungs } from './rungs.js';
 
 /** What a frame took. */
 export interface FrameSample {
@@ -25,20 +26,22 @@ export interface Pace {
   readonly reason: PaceReason;
   /** Times of the last frames on this level, oldest first. */
   readonly recent: readonly number[];
-  /** When the level last changed. */
+  /** When the last frame was known, and the first after the last rest. */
+  readonly sampledAt: number;
+  readonly wokeAt: number;
+  /** When the level last changed, and when its direction did. */
   readonly changedAt: number;
+  readonly turnedAt: number;
   /** The last change was towards the true image. */
   readonly climbed: boolean;
-  /** Level before the last change, or before the first of several falls that won nothing. */
-  readonly from: number;
-  /** What frames took then, or before the first of several climbs to rungs that are no dearer, ms. */
-  readonly before: number;
-  /** When the level last changed its direction. */
-  readonly turnedAt: number;
-  /** A rung below which frames were no faster, what they took there, ms, and until when that is believed. */
-  readonly floor: { readonly level: number; readonly milliseconds: number; readonly until: number } | null;
-  /** No climb to a rung before this time, and how often one to it was in vain. */
-  readonly barred: Readonly<Record<number, { readonly until: number; readonly failures: number }>>;
+  /** What the rungs were measured to take. */
+  readonly measured: MeasuredRungs;
+  /** What frames took before the last change by the share of their rung, ms; 0 before the first. */
+  readonly load: number;
+  /** The highest load of late, and when. */
+  readonly peak: { readonly load: number; readonly at: number };
+  /** How long a peak of the load is remembered, ms. */
+  readonly patience: number;
 }
 
 /** `start`: nothing is known yet; `slow`: frames took too long; `spare`: there was time to spare; `trial`: more of the picture takes no longer, or it may be so. */
@@ -49,167 +52,208 @@ const MEMORY = 20;
 const COUNTED = 0.8;
 /** Frames are too slow from this share of the target on, and time to spare begins under the other: the dead band lies between. */
 const TOO_SLOW = 1.05;
-const TO_SPARE = 0.9;
+const TO_SPARE = 0.87;
 /** Two or three frames in a row suffice where all are as slow as this. */
 const TWO_FRAMES_SLOW = 4;
 const THREE_FRAMES_SLOW = 1.25;
-/** Frames that are looked at before a small excess counts, and before a climb. */
+/** Frames that are looked at before a small excess counts, and before a climb; a rung is measured by as many. */
 const ENOUGH_FRAMES = 12;
+/** Frames that tell the load where it may just have changed. */
+const LAST_FRAMES = 5;
 /** Between a change and a climb, ms. */
 const HOLD_MS = 500;
-/**
- * After so long without a change, ms, a rung up is tried whatever it can cost: wide GPUs were seen to take longer for few pixels than for many. Where the frames
- * then take no longer, within the tolerance, the pace stays there, and the next rung is tried after a hold.
- */
+/** After so long without a change, ms, a rung up is tried that may be in time without sparing any; at once where the last climb has cost nothing. */
 const TRIAL_MS = 6_000;
-const NO_LONGER = 1.05;
-/** A rung down is taken back where, this soon after it, ms, all of three frames take so much longer than those before: small pictures leave most of a wide GPU idle. */
-const HARM_MS = 1_000;
+/** Rungs that take so little longer than the fastest are as good, and truer. */
+const AS_FAST = 1.05;
+/** Where no rung is fast enough, less of the picture has to bring frames to such a share. */
+const WORTHWHILE = 0.92;
+/** Less of a picture that makes frames so much longer is taken back after three of them, and at any time where they are as long as the second. */
 const HARMFUL = 1.25;
-/** So are all rungs where the lowest has not brought frames below such a share: the picture would be less for nothing. */
-const IN_VAIN = 0.95;
-/** A rung up that took frames down to such a share is followed by the next without a hold. */
-const FASTER = 0.9;
-/** Between two changes of direction, ms, five seconds and what times may be late: a level that goes to and fro is seen. Only a fall to what was in time comes sooner. */
-const QUIET_MS = 5_200;
-/** A change that makes frames so much longer is taken back sooner. */
 const MUCH_DEARER = 1.6;
-/** How long, ms, it is believed that rungs win nothing. */
-const FLOOR_MS = 20_000;
-/** A climb that ends sooner, ms, was in vain; the rung is then left alone for a while, each time for twice as long. */
-const IN_VAIN_MS = 2_000;
-const FIRST_BAR_MS = 5_000;
-const LONGEST_BAR_MS = 80_000;
+/** Between two changes of direction, ms, five seconds and what times may be late: a level that goes to and fro is seen. Only a fall to what is in time, or much faster, comes sooner. */
+const QUIET_MS = 5_200;
+/** How long the highest load is remembered, ms, which a climb must bear: longer each time that a climb is regretted, so that a load which comes and goes is kept to at its highest. */
+const PATIENCE_MS = 2_000;
+const LONGER_PATIENCE = 3;
+const LONGEST_PATIENCE_MS = 60_000;
+/** After such a rest, ms, the first frames say little: the clock of an idle GPU is low. */
+const REST_MS = 250;
+const WAKING_MS = 120;
 
 /** Before the first frame. */
 export const INITIAL_PACE: Pace = {
   level: 0,
   reason: 'start',
   recent: [],
+  sampledAt: -Infinity,
+  wokeAt: -Infinity,
   changedAt: -Infinity,
-  climbed: false,
-  from: 0,
-  before: 0,
   turnedAt: -Infinity,
-  floor: null,
-  barred: {},
+  climbed: false,
+  measured: {},
+  load: 0,
+  peak: { load: 0, at: -Infinity },
+  patience: PATIENCE_MS,
 };
 
 /** The pace after a frame. Frames of another level than the current one are too late to say anything. */
 export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, rules: PaceRules): Pace {
   if (level !== pace.level) return pace;
-  const known = { ...pace, recent: [...pace.recent, milliseconds].slice(-MEMORY) };
-  const isLowest = level + 1 === rules.costs.length;
-  if (isHarmful(known, now) || (isLowest && isForNothing(known, now))) return takeBack(known, now);
-  const excess = excessOf(known.recent, rules.targetMs);
-  if (excess !== null && !isLowest && !isKeptThough(known, now)) return fall(known, now, excess, rules);
-  const reason = climbReason(known, now, rules);
-  return reason === null ? known : change(known, now, level - 1, reason);
+  const hasRested = now - pace.sampledAt - milliseconds > REST_MS;
+  const wokeAt = hasRested ? now - milliseconds : pace.wokeAt;
+  const seen = { ...pace, sampledAt: now, wokeAt };
+  if (now - wokeAt < WAKING_MS && milliseconds <= TWO_FRAMES_SLOW * rules.targetMs) return seen;
+  const next = learn({ ...seen, recent: [...pace.recent, milliseconds].slice(-MEMORY) }, now);
+  const late = lateFrames(next.recent, rules.targetMs);
+  const changed =
+    takeBack(next, now, rules) ?? (late === null ? climb(next, now, rules) : hurry(next, now, late, rules));
+  return changed ?? next;
 }
 
-/** It is too soon after the last change of direction for another one. */
+/** With what the last frame says of its rung, and of the load. */
+function learn(pace: Pace, now: number): Pace {
+  const { level, recent, patience } = pace;
+  let { measured, peak } = pace;
+  if (recent.length <= ENOUGH_FRAMES) {
+    const median = quantile(recent, 0.5);
+    const share = pace.load > 0 ? median / pace.load : (measured[level]?.share ?? 1);
+    // A single frame tells less than what is known.
+    if (recent.length > 1 || !measured[level])
+      measured = { ...measured, [level]: { share, at: now, load: median / share } };
+  }
+  if (recent.length >= ENOUGH_FRAMES) {
+    const load = quantile(recent, COUNTED) / measured[level].share;
+    if (load >= peak.load || now - peak.at > patience) peak = { load, at: now };
+  }
+  return { ...pace, measured, peak };
+}
+
+/** Frames that take too long. */
+interface LateFrames {
+  /** What they usually take, ms. */
+  readonly usual: number;
+  /** The last of them: earlier ones may be of a lower load. */
+  readonly last: readonly number[];
+}
+
+/** Whether the last frames take too long; null where they do not. */
+function lateFrames(recent: readonly number[], targetMs: number): LateFrames | null {
+  const [two, three] = [recent.slice(-2), recent.slice(-3)];
+  // Later, two in a row are a hiccup.
+  const isNew = recent.length < ENOUGH_FRAMES;
+  if (isNew && two.length === 2 && Math.min(...two) > TWO_FRAMES_SLOW * targetMs) {
+    return { usual: Math.min(...two), last: two };
+  }
+  if (three.length === 3 && Math.min(...three) > THREE_FRAMES_SLOW * targetMs) {
+    // Two of them may be hiccups.
+    return { usual: Math.min(quantile(three, 0.5), HARMFUL * Math.min(...three)), last: three };
+  }
+  const usual = recent.length >= ENOUGH_FRAMES ? quantile(recent, COUNTED) : 0;
+  return usual > TOO_SLOW * targetMs ? { usual, last: recent.slice(-LAST_FRAMES) } : null;
+}
+
 const isTooSoon = ({ turnedAt }: Pace, now: number): boolean => now - turnedAt < QUIET_MS;
 
-const isMuchDearer = ({ recent, before }: Pace): boolean => Math.min(...recent.slice(-3)) > MUCH_DEARER * before;
-
-/** Back to where the falls began that have won nothing, or have made frames longer. */
-function takeBack(pace: Pace, now: number): Pace {
-  const { from, before } = pace;
-  if (isTooSoon(pace, now) && !isMuchDearer(pace)) return pace;
-  return { ...change(pace, now, from, 'trial'), floor: { level: from, milliseconds: before, until: now + FLOOR_MS } };
+function knowledge({ measured, level }: Pace, milliseconds: number, now: number, { costs }: PaceRules): Knowledge {
+  return { measured, level, milliseconds, now, costs };
 }
 
-/** How long frames take where they take too long, as a share of the target; null where they do not. */
-function excessOf(recent: readonly number[], targetMs: number): number | null {
-  const [two, three] = [recent.slice(-2), recent.slice(-3)];
-  if (two.length === 2 && Math.min(...two) > TWO_FRAMES_SLOW * targetMs) return Math.min(...two) / targetMs;
-  if (three.length === 3 && Math.min(...three) > THREE_FRAMES_SLOW * targetMs) return quantile(three, 0.5) / targetMs;
-  const usual = recent.length >= ENOUGH_FRAMES ? quantile(recent, COUNTED) / targetMs : 0;
-  return usual > TOO_SLOW ? usual : null;
+/** From less of the picture that takes longer, to the truest of the rungs above that were fastest. */
+function takeBack(pace: Pace, now: number, rules: PaceRules): Pace | null {
+  const three = pace.recent.slice(-3);
+  if (pace.climbed || three.length < 3) return null;
+  const known = knowledge(pace, quantile(three, 0.5), now, rules);
+  const to = fastestKnown(known);
+  const harm = Math.min(...three) / predict(to, known);
+  if (to >= pace.level || harm < HARMFUL || (isTooSoon(pace, now) && harm < MUCH_DEARER)) return null;
+  return change(pace, now, to, 'trial', three);
 }
 
-/** Multiplicative decrease: to the first rung whose cost would do, were all of the cost in what the rungs take away. */
-function fall(pace: Pace, now: number, excess: number, { costs, targetMs }: PaceRules): Pace {
-  const { level, climbed, changedAt, barred, before, from } = pace;
-  const affordable = costs[level] / excess;
-  const found = costs.findIndex((cost, rung) => rung > level && cost <= affordable);
-  const wished = found === -1 ? costs.length - 1 : found;
-  // Where what is below was too slow as well there is no hurry, unless it was much less so, and nothing to be won further down.
-  const wasTooSlow = climbed && before > TOO_SLOW * targetMs;
-  if (wasTooSlow && isTooSoon(pace, now) && !isMuchDearer(pace)) return pace;
-  const floor = wasTooSlow ? { level: from, milliseconds: before, until: now + FLOOR_MS } : floorOf(pace, now);
-  const lowest = floor?.level ?? costs.length - 1;
-  if (level >= lowest) return pace;
-  // The last frames, not those before the load grew. Falls that win nothing are held against the frames before the first.
-  const isInVain = !climbed && now - changedAt < HARM_MS && excess * targetMs >= IN_VAIN * before;
-  const held = isInVain ? { before, from } : { before: excess * targetMs, from: level };
-  const next = { ...change(pace, now, Math.min(wished, lowest), 'slow'), ...held, floor };
-  if (!climbed || (now - changedAt > IN_VAIN_MS && !wasTooSlow)) return next;
-  const failures = (barred[level]?.failures ?? 0) + 1;
-  const until = now + Math.min(LONGEST_BAR_MS, FIRST_BAR_MS * 2 ** (failures - 1));
-  return { ...next, barred: { ...barred, [level]: { until, failures } } };
+/** The truest of the rungs that were measured and are as fast as the fastest of them. */
+function fastestKnown(known: Knowledge): number {
+  const times = known.costs.map((_, rung) => (isBelieved(rung, known) ? predict(rung, known) : Infinity));
+  const best = Math.min(...times);
+  return times.findIndex((time) => time <= AS_FAST * best);
 }
 
-/** Where falling ends for now; null where nothing is known, or the load has grown since. */
-function floorOf({ floor, recent, level }: Pace, now: number): Pace['floor'] {
-  if (floor === null || now >= floor.until) return null;
-  const hasGrown = level >= floor.level && Math.min(...recent.slice(-3)) > HARMFUL * floor.milliseconds;
-  return hasGrown ? null : floor;
+/** Where frames are late: down to the first rung that is in time, else to the truest of the fastest, up or down. */
+function hurry(pace: Pace, now: number, { usual, last }: LateFrames, rules: PaceRules): Pace | null {
+  const { level, recent } = pace;
+  const known = knowledge(pace, usual, now, rules);
+  const times = rules.costs.map((_, rung) => (rung > level ? predict(rung, known) : Infinity));
+  const inTime = times.findIndex((time) => time <= rules.targetMs);
+  const isSoon = pace.climbed && isTooSoon(pace, now);
+  const isSure = inTime !== -1 && isBelieved(inTime, known);
+  const hasGrown = usual > HARMFUL * pace.load * pace.measured[level].share;
+  if (inTime !== -1 && (!isSoon || isSure || hasGrown)) {
+    return change(pace, now, inTime, 'slow', last);
+  }
+  const best = Math.min(...times);
+  if (best < WORTHWHILE * usual) {
+    const truest = times.findIndex((time) => time <= AS_FAST * best);
+    return isSoon && best * MUCH_DEARER > usual ? null : change(pace, now, truest, 'slow', last);
+  }
+  if (recent.length < ENOUGH_FRAMES || (!pace.climbed && isTooSoon(pace, now))) return null;
+  const to = fastestKnown(known);
+  return to < level ? change(pace, now, to, 'trial', last) : null;
 }
 
-/** Additive increase: one rung, after a hold, if its frames would be in time even at the most that it can cost; or to try it. Null: stay. */
-function climbReason(pace: Pace, now: number, { costs, targetMs }: PaceRules): PaceReason | null {
-  const { level, recent, changedAt, barred } = pace;
-  if (level === 0 || now - changedAt < holdOf(pace) || recent.length < ENOUGH_FRAMES) return null;
-  if (isBarred(barred, level - 1, now)) return null;
+/** One rung up, after a hold, if its frames are in time, also under the loads of late. */
+function climb(pace: Pace, now: number, rules: PaceRules): Pace | null {
+  const { level, recent, changedAt, measured, peak, climbed } = pace;
+  if (level === 0 || recent.length < ENOUGH_FRAMES || now - changedAt < HOLD_MS) return null;
+  if (!climbed && isTooSoon(pace, now)) return null;
   const usual = quantile(recent, COUNTED);
-  const turns = !pace.climbed && changedAt > -Infinity;
-  if (turns && isTooSoon(pace, now)) return null;
-  if (usual * (costs[level - 1] / costs[level]) <= TO_SPARE * targetMs) return 'spare';
-  return now - changedAt >= TRIAL_MS || isNoDearer(pace) ? 'trial' : null;
+  const known = knowledge(pace, usual, now, rules);
+  const next = predict(level - 1, known);
+  const peakOf = Math.max(1, (peak.load * measured[level].share) / usual);
+  if (peakOf * next > TOO_SLOW * rules.targetMs && peakOf > TOO_SLOW) return null;
+  if (next <= TO_SPARE * rules.targetMs) return change(pace, now, level - 1, 'spare', recent);
+  const isHopeful = !isBelieved(level - 1, known);
+  const isGuess = !rules.costs.some((_, rung) => rung < level && isBelieved(rung, known));
+  const hoped = isHopeful ? predict(level - 1, { ...known, isHopeful }) / (isGuess ? TOO_SLOW : 1) : next;
+  const isNoDearer = climbed && isHopeful && usual <= rules.targetMs && hasCostNothing(pace);
+  const isTried = isNoDearer || (hoped <= rules.targetMs && now - changedAt >= TRIAL_MS);
+  return isTried ? change(pace, now, level - 1, 'trial', recent) : null;
 }
 
-/** Frames take longer than on the rung above, from which the pace has fallen. */
-function isHarmful({ recent, climbed, changedAt, before }: Pace, now: number): boolean {
-  const three = recent.slice(-3);
-  return !climbed && three.length === 3 && now - changedAt < HARM_MS && Math.min(...three) > HARMFUL * before;
+/** The last climb has cost nothing. */
+function hasCostNothing({ level, measured }: Pace): boolean {
+  const below = measured[level + 1];
+  return below !== undefined && measured[level].share <= AS_FAST * below.share;
 }
 
-/** Frames take as long as before the pace fell: looked at once, when there are enough of them. Not where that was a fall from a climb in vain: what is dearer there is known. */
-function isForNothing({ recent, climbed, before, reason, barred, from }: Pace, now: number): boolean {
-  const isDue = !climbed && reason === 'slow' && recent.length === ENOUGH_FRAMES && !isBarred(barred, from, now);
-  return isDue && quantile(recent, 0.5) >= IN_VAIN * before;
-}
-
-const isBarred = (barred: Pace['barred'], level: number, now: number): boolean =>
-  now < (barred[level]?.until ?? -Infinity);
-
-/** What is too slow stays where the rung below was no faster, until that is long ago. */
-function isKeptThough(pace: Pace, now: number): boolean {
-  return isNoDearer(pace) && now - pace.changedAt < LONGEST_BAR_MS;
-}
-
-function holdOf({ recent, climbed, before }: Pace): number {
-  return climbed && quantile(recent, COUNTED) <= FASTER * before ? 0 : HOLD_MS;
-}
-
-/** Frames take no longer than on the rung below, from which the pace has climbed: there is nothing to be won there. */
-function isNoDearer({ recent, climbed, before }: Pace): boolean {
-  return climbed && quantile(recent, COUNTED) <= NO_LONGER * before;
-}
-
-function change(pace: Pace, now: number, level: number, reason: PaceReason): Pace {
-  const usual = quantile(pace.recent, COUNTED);
+function change(pace: Pace, now: number, level: number, reason: PaceReason, frames: readonly number[]): Pace {
+  const { measured, peak, changedAt } = pace;
+  const load = quantile(frames, 0.5) / measured[pace.level].share;
   const climbed = level < pace.level;
-  // Rungs that are no dearer than one another must not add up to one that is.
-  const before = climbed && isNoDearer(pace) ? Math.min(pace.before, usual) : usual;
-  const turnedAt = climbed !== pace.climbed && pace.changedAt > -Infinity ? now : pace.turnedAt;
-  return { ...pace, level, reason, recent: [], changedAt: now, climbed, from: pace.level, before, turnedAt };
+  const turns = climbed !== pace.climbed && changedAt > -Infinity;
+  return {
+    ...pace,
+    level,
+    reason,
+    recent: [],
+    changedAt: now,
+    turnedAt: turns ? now : pace.turnedAt,
+    climbed,
+    measured: { ...measured, [pace.level]: { ...measured[pace.level], at: now, load } },
+    load,
+    peak: load >= peak.load ? { load, at: now } : peak,
+    patience: turns && !climbed ? patienceAfterFall(pace, now) : pace.patience,
+  };
+}
+
+/** Longer where the climb before the fall is regretted. */
+function patienceAfterFall(pace: Pace, now: number): number {
+  return isTooSoon(pace, now) ? Math.min(LONGEST_PATIENCE_MS, LONGER_PATIENCE * pace.patience) : PATIENCE_MS;
 }
 
 /** The pace where only the first so many rungs serve. */
 export function withinRungs(pace: Pace, rungs: number): Pace {
-  return pace.level < rungs ? pace : { ...pace, level: rungs - 1, recent: [] };
+  if (pace.level < rungs) return pace;
+  const { changedAt, turnedAt, climbed } = pace;
+  return { ...INITIAL_PACE, level: rungs - 1, reason: pace.reason, changedAt, turnedAt, climbed };
 }
 
 /** The smallest of the values that at least this share of them do not exceed. */

@@ -1,0 +1,73 @@
+/** What the rungs of the ladder take: those that were measured, and from them the others. */
+
+/** What a rung was measured to take. */
+export interface Measured {
+  /** As a multiple of the load: what the rung that was measured first would have taken then. */
+  readonly share: number;
+  /** When, ms. */
+  readonly at: number;
+  /** Under which load, ms. */
+  readonly load: number;
+}
+
+/** The rungs that were measured, by number. */
+export type MeasuredRungs = Readonly<Record<number, Measured>>;
+
+/** What is known when a time is predicted. */
+export interface Knowledge {
+  readonly measured: MeasuredRungs;
+  /** The rung that is drawn on, which was measured, and what its frames take, ms. */
+  readonly level: number;
+  readonly milliseconds: number;
+  readonly now: number;
+  /** Whatever was once measured counts, however long ago. */
+  readonly isHopeful?: boolean;
+  /** For each rung the most that a frame on it can take, as a share of the first. Falling. */
+  readonly costs: readonly number[];
+}
+
+/** So long, ms, what was measured is believed whatever the load, and so long where the load is about the same. */
+const BELIEVED_MS = 5_000;
+const BELIEVED_UNDER_LOAD_MS = 120_000;
+const SAME_LOAD = 1.25;
+/** A line through two rungs says something of a third where one costs so much more than the other: between like ones it is noise. */
+const FAR_APART = 1.2;
+
+/** Whether the rung was measured, and that still counts. */
+export function isBelieved(rung: number, { measured, level, milliseconds, now, isHopeful }: Knowledge): boolean {
+  const found = measured[rung];
+  if (found === undefined) return false;
+  if (rung === level || isHopeful) return true;
+  const change = milliseconds / measured[level].share / found.load;
+  const isSame = change < SAME_LOAD && 1 / change < SAME_LOAD;
+  return now - found.at < (isSame ? BELIEVED_UNDER_LOAD_MS : BELIEVED_MS);
+}
+
+/**
+ * What a frame on a rung would take, ms. Between two rungs that were measured, on the line through them, time against cost. Beyond them on the same line, but falls never win more than
+ * the costs say, and climbs with nothing measured above cost all that they can.
+ */
+export function predict(rung: number, known: Knowledge): number {
+  const { measured, level, milliseconds, costs } = known;
+  const timeOf = (other: number): number => (milliseconds * measured[other].share) / measured[level].share;
+  if (isBelieved(rung, known)) return timeOf(rung);
+  const above = nearest(rung - 1, -1, known);
+  const below = nearest(rung + 1, 1, known);
+  const onLine = (a: number, b: number): number =>
+    timeOf(b) + ((timeOf(a) - timeOf(b)) * (costs[rung] - costs[b])) / (costs[a] - costs[b]);
+  const inProportion = (other: number): number => (timeOf(other) * costs[rung]) / costs[other];
+  if (below !== null) return above === null ? inProportion(below) : Math.min(onLine(above, below), inProportion(below));
+  // One of both there is: the level itself.
+  const near = above!;
+  const far = nearest(near - 1, -1, known, FAR_APART * costs[near]);
+  return far === null ? inProportion(near) : Math.max(onLine(far, near), inProportion(near));
+}
+
+/** The next rung from this one on that was measured and costs at least so much; null where there is none. */
+function nearest(from: number, step: 1 | -1, known: Knowledge, least = 0): number | null {
+  const { costs } = known;
+  for (let rung = from; rung >= 0 && rung < costs.length; rung += step) {
+    if (costs[rung] >= least && isBelieved(rung, known)) return rung;
+  }
+  return null;
+}

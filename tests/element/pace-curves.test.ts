@@ -1,0 +1,211 @@
+/**
+ * The pace of moving pictures against many simulated GPUs, whose rungs win as little as on real ones, nothing at all or less than nothing: it comes to the truest rung
+ * that is in time, or to one that is as fast as any, and turns at most once in five seconds.
+ */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { COSTS, p95, restlessWindows, run, type Frame, type Gpu } from '../support/pace-gpu.js';
+import { quantile } from '../../packages/element/src/pace/pace.js';
+import { randomSource } from '../support/gpu.js';
+
+type Random = (from: number, to: number) => number;
+type Curve = readonly number[];
+
+/** What rungs take as multiples of the target, until a time in ms and after it. */
+interface Load {
+  readonly before: Curve;
+  readonly after: Curve;
+  readonly at: number;
+}
+
+/** Two steps of an H200 (docs/benchmark.md), the skull close up on it (docs/decisions/0014), and a picture that leaves most of such a GPU idle. */
+const STEEP = [1, 0.93, 0.92, 0.88, 0.73, 0.58, 0.58, 0.58, 0.58, 0.59];
+const FLAT = [1, 0.99, 0.99, 0.97, 0.96, 0.95, 0.95, 0.96, 0.98, 1.04];
+const WIDE = [1, 0.81, 0.75, 0.74, 0.67, 0.62, 0.59, 0.59, 0.59, 0.64];
+const SMALL = [1, 0.95, 0.93, 1, 1.05, 1.1, 1.2, 1.3, 1.5, 1.9];
+
+const STEP_AT = 6_000;
+const RUN_MS = 30_000;
+const RUNS = 20;
+
+const times = (curve: Curve, load: number): Curve => curve.map((share) => share * load);
+/** What no rung makes faster. */
+const floor = (least: number, load: number): Curve => COSTS.map((cost) => Math.max(least, load * cost));
+const withFixed = (share: number, load: number): Curve => COSTS.map((cost) => load * (share + (1 - share) * cost));
+/** Other work makes whole pictures longer. */
+const disturbed = ([whole, ...others]: Curve): Curve => [whole * 1.33, ...others];
+const always = (curve: Curve): Load => ({ before: curve, after: curve, at: STEP_AT });
+const step = (before: Curve, after: Curve): Load => ({ before, after, at: STEP_AT });
+
+const stepped =
+  (curve: Curve, least: number, most: number) =>
+  (random: Random): Load =>
+    step(times(curve, random(least, most)), times(curve, random(least, most)));
+
+/** Kinds of GPUs and loads; how many runs of all may turn twice in five seconds, once each, and how much longer than on the fastest rung frames may take where none is in time. */
+const kinds: Record<
+  string,
+  { readonly make: (random: Random) => Load; readonly restless?: number; readonly excess?: number }
+> = {
+  'the lowest rungs take as long as one another, all too long': {
+    make: (random) => {
+      const least = random(1.02, 2.5);
+      return always(floor(least, least * random(1, 3)));
+    },
+  },
+  'so they do after a step': {
+    make: (random) => {
+      const least = random(1.02, 2.5);
+      return step(times(COSTS, random(0.2, 2)), floor(least, least * random(1, 3)));
+    },
+  },
+  'and just in time, or just not': {
+    make: (random) => {
+      const least = random(0.8, 1.02);
+      return always(floor(least, least * random(1, 3)));
+    },
+  },
+  'and well in time': {
+    make: (random) => {
+      const least = random(0.3, 0.8);
+      return always(floor(least, least * random(1, 4)));
+    },
+    restless: 2,
+  },
+  'no rung wins anything': {
+    make: (random) =>
+      always(
+        times(
+          COSTS.map(() => 1),
+          random(0.7, 2.5),
+        ),
+      ),
+  },
+  'but for other work beside whole pictures': {
+    make: (random) =>
+      always(
+        disturbed(
+          times(
+            COSTS.map(() => 1),
+            random(0.7, 2.5),
+          ),
+        ),
+      ),
+  },
+  'small pictures take longer': {
+    make: (random) => {
+      const growth = random(1.02, 1.15);
+      const from = Math.floor(random(3, 8));
+      const [least, load] = [random(0.8, 2.5), random(1, 2)];
+      return always(COSTS.map((cost, rung) => least * Math.max(1, load * cost) * growth ** Math.max(0, rung - from)));
+    },
+    excess: 1.35,
+  },
+  'a step of an H200, close up': { make: stepped(STEEP, 0.3, 3), restless: 3 },
+  'a step of an H200, from afar': { make: stepped(FLAT, 0.3, 3) },
+  'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3), excess: 1.12 },
+  'a wide GPU': { make: stepped(WIDE, 0.3, 1.6), restless: 2 },
+  'a wide GPU, too slow': { make: stepped(WIDE, 1.7, 4), excess: 1.12 },
+  'a wide GPU, other work beside whole pictures': {
+    make: (random) => step(disturbed(times(WIDE, random(0.3, 1.6))), disturbed(times(WIDE, random(0.3, 1.6)))),
+    restless: 2,
+  },
+  'a part that no rung makes cheaper': {
+    make: (random) => {
+      const share = random(0, 0.7);
+      return step(withFixed(share, random(0.3, 3)), withFixed(share, random(0.3, 3)));
+    },
+    restless: 2,
+  },
+};
+
+/** Draws numbers within a range. */
+const within =
+  (seed: number): Random =>
+  (from, to) =>
+    from + (to - from) * source(seed)();
+const sources = new Map<number, () => number>();
+function source(seed: number): () => number {
+  if (!sources.has(seed)) sources.set(seed, randomSource(seed));
+  return sources.get(seed)!;
+}
+
+function gpuOf(random: Random, seed: number): Omit<Gpu, 'load' | 'shares'> {
+  const hertz = [60, 90, 120, 144][Math.floor(random(0, 4))];
+  const spikes = [0, 0, 0.5, 1][Math.floor(random(0, 4))];
+  return { hertz, fixed: 0, noise: random(0.03, 0.06), spikes, latency: Math.floor(random(0, 4)), seed };
+}
+
+function draw(kind: (random: Random) => Load, seed: number): { frames: readonly Frame[]; load: Load } {
+  const random = within(seed);
+  const gpu = gpuOf(random, seed);
+  const load = kind(random);
+  const shares = (now: number): Curve => (now < load.at ? load.before : load.after);
+  return { load, frames: run({ ...gpu, load: () => 1, shares }, RUN_MS).frames };
+}
+
+Object.entries(kinds).forEach(([name, { make, restless = 1, excess = 1.08 }], k) => {
+  test(name, () => {
+    let turnedTwice = 0;
+    const over: number[] = [];
+    for (let i = 0; i < RUNS; i++) {
+      const { frames, load } = draw(make, 1000 * (k + 1) + i);
+      const windows = restlessWindows(frames);
+      assert.ok(windows <= 1, `run ${i}: ${windows} times two changes of direction in five seconds`);
+      turnedTwice += windows;
+      for (const [from, to, curve] of [
+        [0, load.at, load.before],
+        [load.at, RUN_MS, load.after],
+      ] as const) {
+        const best = Math.min(...curve);
+        if (best <= 0.9) {
+          const late = p95(frames, from + 1_000, Math.min(to, from + 6_000));
+          assert.ok(late <= 1.12, `run ${i}: p95 is ${late} of the target`);
+        }
+        const last = frames.filter(({ at }) => at >= to - 3_000 && at < to);
+        if (best > 1.05 && to === RUN_MS)
+          over.push(
+            quantile(
+              last.map(({ level }) => curve[level] / best),
+              0.5,
+            ),
+          );
+      }
+    }
+    assert.ok(turnedTwice <= restless, `${turnedTwice} of ${RUNS} runs turn twice in five seconds`);
+    assert.ok(Math.max(1, ...over) <= excess, `${Math.max(...over)} of what the fastest rung takes`);
+    console.log(
+      `${name}: ${turnedTwice} of ${RUNS} runs turn twice in five seconds; at worst ${Math.max(1, ...over).toFixed(2)} of the fastest rung`,
+    );
+  });
+});
+
+test('a load that comes and goes: the pace learns to keep to the highest', () => {
+  let turnedTwice = 0;
+  for (let i = 0; i < RUNS; i++) {
+    const random = within(50_000 + i);
+    const gpu = gpuOf(random, i + 1);
+    const [period, low, high] = [random(1_000, 4_000), random(0.2, 1), random(1, 3)];
+    const load = (now: number): number => ((now / period) % 1 < 0.5 ? low : high);
+    const { frames } = run({ ...gpu, fixed: random(0, 0.4), load }, 60_000);
+    turnedTwice += restlessWindows(frames);
+    const late = restlessWindows(frames.filter(({ at }) => at > 30_000));
+    assert.ok(late <= 2, `run ${i}: ${late} times in the second half of a minute`);
+  }
+  console.log(`${turnedTwice} times two changes of direction in five seconds, in ${RUNS} minutes`);
+  assert.ok(turnedTwice <= 3 * RUNS, `${turnedTwice} in ${RUNS} minutes`);
+});
+
+test('the low clock of an idle GPU at the beginning of a gesture does not make the picture less', () => {
+  for (let i = 0; i < RUNS; i++) {
+    const random = within(60_000 + i);
+    const [length, rest, wake, usual] = [random(1_000, 3_000), random(400, 1_500), random(40, 110), random(0.2, 0.8)];
+    const since = (now: number): number => now % (length + rest);
+    const gpu = { ...gpuOf(random, i + 1), spikes: 0, moves: (now: number) => since(now) < length };
+    const { frames } = run({ ...gpu, load: (now) => (since(now) < wake ? 4 * usual : usual) }, RUN_MS);
+    assert.ok(
+      frames.every(({ level }) => level === 0),
+      `run ${i}: ${Math.max(...frames.map(({ level }) => level))}`,
+    );
+  }
+});

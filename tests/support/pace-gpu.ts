@@ -1,0 +1,88 @@
+/** Simulated GPUs under the pace of moving pictures, and what is asked of the levels that it chose. */
+import { LADDER } from '../../packages/element/src/pace/ladder.js';
+import { INITIAL_PACE, keepPace, quantile, type Pace } from '../../packages/element/src/pace/pace.js';
+import { randomSource } from './gpu.js';
+
+/** Of each rung, as the ladder says. */
+export const COSTS = LADDER.map(({ cost }) => cost);
+export interface Gpu {
+  /** Pictures a second of the display. */
+  readonly hertz: number;
+  /** What the true image takes at a time in ms, as a multiple of the target. */
+  readonly load: (now: number) => number;
+  /** Share of a frame that no rung makes cheaper. */
+  readonly fixed: number;
+  /** What each rung takes at a time, as a share of the first; the ladder's costs unless given. */
+  readonly shares?: (now: number) => readonly number[];
+  /** Relative spread of times; and how many frames in a hundred take three times as long. */
+  readonly noise: number;
+  readonly spikes: number;
+  /** Frames until a time is known. */
+  readonly latency: number;
+  /** Whether the picture moves at a time; always unless given. */
+  readonly moves?: (now: number) => boolean;
+  readonly seed: number;
+}
+
+export interface Frame {
+  readonly at: number;
+  readonly level: number;
+  /** As a share of the target. */
+  readonly share: number;
+}
+
+/** Draws a moving picture for so long: a frame begins with a picture of the display, once the GPU has at most one frame to do. */
+export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Pace; targetMs: number } {
+  const interval = 1000 / gpu.hertz;
+  const targetMs = 0.8 * interval;
+  const random = randomSource(gpu.seed);
+  const frames: Frame[] = [];
+  const waiting: { due: number; at: number; level: number; spent: number }[] = [];
+  let pace = INITIAL_PACE;
+  let free = 0;
+  for (let at = 0; at < milliseconds; at += interval) {
+    while (waiting.length > 0 && waiting[0].due <= at) {
+      const { due, level, spent } = waiting.shift()!;
+      pace = keepPace(pace, { now: due, level, milliseconds: spent }, { targetMs, costs: COSTS });
+    }
+    if (gpu.moves?.(at) === false || free > at + interval) continue;
+    const { level } = pace;
+    const whole = gpu.load(at) * (gpu.fixed + (1 - gpu.fixed) * (gpu.shares?.(at) ?? COSTS)[level]);
+    const spread = 1 + gpu.noise * (random() + random() + random() - 1.5);
+    const share = whole * spread * (random() < gpu.spikes / 100 ? 3 : 1);
+    const spent = share * targetMs;
+    free = Math.max(at, free) + spent;
+    frames.push({ at, level, share });
+    waiting.push({ due: free + gpu.latency * interval, at, level, spent });
+  }
+  return { frames, pace, targetMs };
+}
+
+/** Changes of direction of the level between two times. */
+export function reversals(frames: readonly Frame[], from: number, to: number): number {
+  const levels = frames.filter(({ at }) => at >= from && at < to).map(({ level }) => level);
+  const steps = levels
+    .slice(1)
+    .map((level, i) => Math.sign(level - levels[i]))
+    .filter((step) => step !== 0);
+  return steps.slice(1).filter((step, i) => step !== steps[i]).length;
+}
+
+export const p95 = (frames: readonly Frame[], from: number, to: number): number =>
+  quantile(
+    frames.filter(({ at }) => at >= from && at < to).map(({ share }) => share),
+    0.95,
+  );
+
+/** Windows of five seconds with more than one change of direction, of those that begin with a frame. */
+export function restlessWindows(frames: readonly Frame[]): number {
+  let turned = 0;
+  const turns: number[] = [];
+  frames.forEach(({ at, level }, i) => {
+    const step = i === 0 ? 0 : Math.sign(level - frames[i - 1].level);
+    if (step === 0) return;
+    if (turned !== 0 && step !== turned) turns.push(at);
+    turned = step;
+  });
+  return turns.slice(1).filter((at, i) => at - turns[i] < 5_000).length;
+}
