@@ -236,6 +236,33 @@ test('frames of another level say nothing', () => {
   assert.equal(keepPace(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, costs: COSTS }), pace);
 });
 
+test('what the true image took at rest is what the pace comes back to where less takes longer', () => {
+  const targetMs = 13.3;
+  let [pace, now] = [INITIAL_PACE, 0];
+  const draw = (level: number, milliseconds: number): void => {
+    pace = keepPace(pace, { now: (now += 16.7), level, milliseconds }, { targetMs, costs: COSTS });
+  };
+  const move = (seconds: number, shares: readonly number[], load: number): void => {
+    for (const end = now + 1000 * seconds; now < end;) draw(pace.level, targetMs * load * shares[pace.level]);
+  };
+  move(8, COSTS, 2);
+  assert.ok(pace.level >= 4, `${pace.level}`);
+  // The element becomes small: all rungs are too slow, and the whole picture is the fastest.
+  move(8, SMALL, 5);
+  const { level } = pace;
+  assert.ok(level >= 4, `${level}`);
+  draw(0, targetMs * 5);
+  move(2, SMALL, 5);
+  assert.equal(pace.level, 0);
+  // At rest it took less than in motion: that was measured, and counts.
+  move(8, COSTS, 2);
+  const settled = pace.level;
+  assert.ok(settled >= 4, `${settled}`);
+  draw(0, targetMs * 0.5);
+  move(6, COSTS, 2);
+  assert.equal(pace.level, settled);
+});
+
 test('every rung costs less than the one above, and the last is the smallest picture', () => {
   assert.equal(LADDER[0].levers, undefined);
   COSTS.slice(1).forEach((cost, i) => assert.ok(cost < COSTS[i]));

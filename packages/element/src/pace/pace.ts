@@ -80,6 +80,8 @@ const LONGEST_PATIENCE_MS = 60_000;
 /** After such a rest, ms, the first frames say little: the clock of an idle GPU is low. */
 const REST_MS = 250;
 const WAKING_MS = 120;
+/** Since the last frame of a motion, ms, at most: the picture at rest shows the same. */
+const AT_REST_MS = 500;
 
 /** Before the first frame. */
 export const INITIAL_PACE: Pace = {
@@ -97,9 +99,10 @@ export const INITIAL_PACE: Pace = {
   patience: PATIENCE_MS,
 };
 
-/** The pace after a frame. Frames of another level than the current one are too late to say anything. */
-export function keepPace(pace: Pace, { now, level, milliseconds }: FrameSample, rules: PaceRules): Pace {
-  if (level !== pace.level) return pace;
+/** The pace after a frame. Frames of another level than the current one are too late to say anything, but for the true image at rest. */
+export function keepPace(pace: Pace, sample: FrameSample, rules: PaceRules): Pace {
+  const { now, level, milliseconds } = sample;
+  if (level !== pace.level) return level === 0 ? learnAtRest(pace, sample, rules) : pace;
   const hasRested = now - pace.sampledAt - milliseconds > REST_MS;
   const wokeAt = hasRested ? now - milliseconds : pace.wokeAt;
   const seen = { ...pace, sampledAt: now, wokeAt };
@@ -127,6 +130,19 @@ function learn(pace: Pace, now: number): Pace {
     if (load >= peak.load || now - peak.at > patience) peak = { load, at: now };
   }
   return { ...pace, measured, peak };
+}
+
+/**
+ * With what the true image took at rest, right after a motion, where that is not known of motion: the element may have changed its size. Other work may make
+ * frames in motion longer, so that what was measured in motion counts for more.
+ */
+function learnAtRest(pace: Pace, { now, milliseconds }: FrameSample, rules: PaceRules): Pace {
+  const { level, recent, measured, sampledAt } = pace;
+  if (recent.length < 3 || now - sampledAt > AT_REST_MS + milliseconds) return pace;
+  const usual = quantile(recent, 0.5);
+  if (isBelieved(0, knowledge(pace, usual, now, rules))) return pace;
+  const load = usual / measured[level].share;
+  return { ...pace, measured: { ...measured, 0: { share: milliseconds / load, at: now, load } } };
 }
 
 /** Frames that take too long. */
