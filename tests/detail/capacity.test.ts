@@ -1,7 +1,7 @@
 /** How much room the buffers between the stages get as views change. The counts are made up; no GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { CapacityMonitor, LEAST_CAPACITY, Patience, type Capacity } from '@gaussian-splat/renderer/stages';
+import { CapacityMonitor, LEAST_CAPACITY, CapacityMemory, type Capacity } from '@gaussian-splat/renderer/stages';
 
 const MOST = { visible: 4e6, pairs: 50e6 };
 
@@ -13,7 +13,7 @@ function watch(room: Capacity, least: () => Capacity): { monitor: CapacityMonito
     device,
     room,
     { least, most: MOST },
-    new Patience(),
+    new CapacityMemory(),
     (wished) => (current = wished),
   );
   return { monitor, room: () => current };
@@ -59,4 +59,19 @@ test('views that come and go soon keep the room that the largest of them needs',
     rooms.add(room());
   }
   assert.ok(rooms.size <= 8, `${rooms.size - 1} times other room in 100 turns`);
+});
+
+test('pictures of fewer pixels do not take the room that the whole one at rest needs', () => {
+  const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => LEAST_CAPACITY);
+  const whole = { visible: 3.5e6, pairs: 5e6 };
+  const smaller = { visible: 3e6, pairs: 1e6 };
+  monitor.isDue(true, 4_000_000, 4_000_000);
+  look(monitor, whole);
+  monitor.isDue(true, 250_000, 4_000_000);
+  for (let k = 0; k < 10; k++) look(monitor, smaller);
+  assert.ok(room().pairs >= whole.pairs, `${room().pairs}`);
+  // The element has become smaller: what was needed says nothing.
+  monitor.isDue(true, 62_500, 1_000_000);
+  for (let k = 0; k < 2; k++) look(monitor, smaller);
+  assert.equal(room().pairs, 1.25 * smaller.pairs);
 });

@@ -26,6 +26,7 @@ for (const wholeMs of [20, 100, 200, 214]) {
     });
     // A motion that is drawn whole at first, and soon no longer.
     let now = 1000;
+    context.mock.method(performance, 'now', () => now);
     for (let frame = 0; frame < 20; frame++, now += INTERVAL) {
       const { level } = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
       pace.sample(level, level === 0 ? wholeMs : 10);
@@ -79,7 +80,7 @@ test('what a frame may take is what the page says, else a share of the display t
 });
 
 /** A display that the test drives: a picture every interval. */
-function drivenDisplay(): { picture: () => void; restore: () => void } {
+function drivenDisplay(): { now: () => number; picture: () => void; restore: () => void } {
   const page = globalThis as unknown as Record<string, unknown>;
   const { requestAnimationFrame, document } = page;
   const waiting: ((now: number) => void)[] = [];
@@ -87,6 +88,7 @@ function drivenDisplay(): { picture: () => void; restore: () => void } {
   page.document = { visibilityState: 'visible' };
   let now = 1000;
   return {
+    now: () => now,
     picture: () => {
       now += INTERVAL;
       for (const draw of waiting.splice(0)) draw(now);
@@ -95,8 +97,9 @@ function drivenDisplay(): { picture: () => void; restore: () => void } {
   };
 }
 
-test('an element that draws now and then leaves others all but their whole time; two that both move share it within a second, and one alone has it at once', () => {
-  const { picture, restore } = drivenDisplay();
+test('an element that draws now and then leaves others all but their whole time; two that both move share it within a second, and one alone has it at once', (context) => {
+  const { now, picture, restore } = drivenDisplay();
+  context.mock.method(performance, 'now', now);
   const scheduler = new FrameScheduler();
   const ignored = (): void => undefined;
   const pace = new PaceController({

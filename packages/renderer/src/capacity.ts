@@ -40,6 +40,8 @@ const PATIENCE = 4;
 /** So many times as many where they had to grow again: views that come and go, such as an orbit's, soon keep the room that the largest needs. */
 const PATIENCE_GROWTH = 4;
 
+const NOTHING: Capacity = { visible: 0, pairs: 0 };
+
 /** Room to begin with. */
 export function initialCapacity(splats: number, most: Capacity): Capacity {
   const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
@@ -47,10 +49,11 @@ export function initialCapacity(splats: number, most: Capacity): Capacity {
   return { visible, pairs: Math.min(most.pairs, pairs) };
 }
 
-/** How long room to spare is kept. */
-export class Patience {
+/** What the monitors of a scene learn: how long room to spare is kept, and what the whole picture needs while pictures in motion have fewer pixels. */
+export class CapacityMemory {
   #looks = PATIENCE;
   #hasShrunk = false;
+  #whole = { pixels: 0, need: NOTHING };
 
   /** Looks at the buffers before they shrink. */
   get looks(): number {
@@ -67,6 +70,16 @@ export class Patience {
     if (this.#hasShrunk) this.#looks *= PATIENCE_GROWTH;
     this.#hasShrunk = false;
   }
+
+  /** A picture was looked at that had all of so many pixels. */
+  noteWhole(pixels: number, need: Capacity): void {
+    this.#whole = { pixels, need };
+  }
+
+  /** What the last whole picture needed, if that had so many pixels. */
+  wholeNeed(pixels: number): Capacity {
+    return pixels === this.#whole.pixels ? this.#whole.need : NOTHING;
+  }
 }
 
 /**
@@ -77,11 +90,12 @@ export class CapacityMonitor {
   readonly #staging: GPUBuffer;
   readonly #bounds: CapacityBounds;
   readonly #onWish: (capacity: Capacity, overflowed: boolean) => void;
-  readonly #patience: Patience;
+  readonly #memory: CapacityMemory;
   #capacity: Capacity;
   #frame = 0;
-  /** Pixels of the last picture that was looked at, and when that was. */
+  /** Pixels of the last picture that was looked at, of all of it had it been whole, and when that was. */
   #pixels = 0;
+  #wholePixels = 0;
   #lookedAt = -Infinity;
   #isReading = false;
   #isDestroyed = false;
@@ -89,17 +103,17 @@ export class CapacityMonitor {
   #recent: Capacity = { visible: 0, pairs: 0 };
 
   /**
-   * @param patience what monitors before this one have learnt about the scene
+   * @param memory what monitors before this one have learnt about the scene
    * @param onWish called with the room that the next frame should have
    */
   constructor(
     device: GPUDevice,
     capacity: Capacity,
     bounds: CapacityBounds,
-    patience: Patience,
+    memory: CapacityMemory,
     onWish: (capacity: Capacity, overflowed: boolean) => void,
   ) {
-    this.#patience = patience;
+    this.#memory = memory;
     this.#capacity = capacity;
     this.#bounds = bounds;
     this.#onWish = onWish;
@@ -111,9 +125,10 @@ export class CapacityMonitor {
    * Counts a frame.
    * @param hasPairs whether its rasterizer makes pairs of splat and bin
    * @param pixels of its picture: one of another size needs another room, and at rest no other follows
+   * @param wholePixels of the picture at rest
    * @returns whether this frame is one to look at; then {@link record} must be called before the submit and {@link read} after it
    */
-  isDue(hasPairs: boolean, pixels: number): boolean {
+  isDue(hasPairs: boolean, pixels: number, wholePixels: number): boolean {
     const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !hasPairs;
     this.#frame++;
     const isInTurn =
@@ -122,6 +137,7 @@ export class CapacityMonitor {
     const isDue = isInTurn || pixels !== this.#pixels || now - this.#lookedAt > LONGEST_PAUSE_MS;
     if (!isDue || hasRoom || this.#isReading) return false;
     this.#pixels = pixels;
+    this.#wholePixels = wholePixels;
     this.#lookedAt = now;
     return true;
   }
@@ -157,13 +173,14 @@ export class CapacityMonitor {
 
   /** Takes note of what a frame would have needed. */
   judge(used: Capacity, overflowed: boolean): void {
+    if (this.#pixels === this.#wholePixels) this.#memory.noteWhole(this.#pixels, used);
     const least = this.#bounds.least();
     const grown = {
       visible: Math.max(least.visible, grow(used.visible, this.#capacity.visible, this.#bounds.most.visible)),
       pairs: Math.max(least.pairs, grow(used.pairs, this.#capacity.pairs, this.#bounds.most.pairs)),
     };
     if (grown.visible > this.#capacity.visible || grown.pairs > this.#capacity.pairs) {
-      this.#patience.grow();
+      this.#memory.grow();
       this.#wish(grown, overflowed);
       return;
     }
@@ -171,13 +188,15 @@ export class CapacityMonitor {
       visible: Math.max(this.#recent.visible, used.visible),
       pairs: Math.max(this.#recent.pairs, used.pairs),
     };
-    if (++this.#idleLooks < this.#patience.looks) return;
+    if (++this.#idleLooks < this.#memory.looks) return;
+    // Pictures of fewer pixels do not take the room of the one that follows at rest.
+    const whole = this.#memory.wholeNeed(this.#wholePixels);
     const shrunk = {
-      visible: shrink(this.#recent.visible, this.#capacity.visible, least.visible),
-      pairs: shrink(this.#recent.pairs, this.#capacity.pairs, least.pairs),
+      visible: shrink(Math.max(whole.visible, this.#recent.visible), this.#capacity.visible, least.visible),
+      pairs: shrink(Math.max(whole.pairs, this.#recent.pairs), this.#capacity.pairs, least.pairs),
     };
     if (bytesOf(this.#capacity) - bytesOf(shrunk) >= LEAST_SAVING) {
-      this.#patience.shrink();
+      this.#memory.shrink();
       this.#wish(shrunk, false);
     }
     this.#idleLooks = 0;

@@ -1,6 +1,6 @@
 import type { Camera } from '@gaussian-splat/core';
 import { FrameBindings, type Stages } from './bindings.js';
-import { CapacityMonitor, initialCapacity, LEAST_CAPACITY, Patience, type Capacity } from './capacity.js';
+import { CapacityMonitor, initialCapacity, LEAST_CAPACITY, CapacityMemory, type Capacity } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { Occlusion } from './occlusion.js';
@@ -41,7 +41,7 @@ export class FrameResources {
   readonly #options: ResourceOptions;
   #current: Resources | undefined;
   #capacity: Capacity | undefined;
-  #patience = new Patience();
+  #memory = new CapacityMemory();
   #hasOtherPairs = false;
   #hasQuickPairs = false;
   /** The largest budget of splats that a frame has been given. */
@@ -83,7 +83,7 @@ export class FrameResources {
     this.release();
     const table = new PageTable(this.#device, [...scenes]);
     this.#capacity = initialCapacity(table.splats, this.#mostFor(table));
-    this.#patience = new Patience();
+    this.#memory = new CapacityMemory();
     return this.#rebind(table);
   }
 
@@ -159,7 +159,7 @@ export class FrameResources {
 
   #watch(table: PageTable, capacity: Capacity): CapacityMonitor {
     const bounds = { least: () => this.#leastFor(table), most: this.#mostFor(table) };
-    return new CapacityMonitor(this.#device, capacity, bounds, this.#patience, (wished, overflowed) => {
+    return new CapacityMonitor(this.#device, capacity, bounds, this.#memory, (wished, overflowed) => {
       this.#hasOtherPairs = wished.pairs !== this.#capacity?.pairs;
       this.#capacity = wished;
       if (overflowed) this.#options.onIncomplete();
