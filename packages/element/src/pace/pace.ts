@@ -32,6 +32,8 @@ export interface Pace {
   /** When the level last changed, and when its direction did. */
   readonly changedAt: number;
   readonly turnedAt: number;
+  /** When that last came sooner after another one than it should. */
+  readonly hurriedAt: number;
   /** The last change was towards the true image. */
   readonly climbed: boolean;
   /** What the rungs were measured to take. */
@@ -92,6 +94,7 @@ export const INITIAL_PACE: Pace = {
   wokeAt: -Infinity,
   changedAt: -Infinity,
   turnedAt: -Infinity,
+  hurriedAt: -Infinity,
   climbed: false,
   measured: {},
   load: 0,
@@ -171,6 +174,9 @@ function lateFrames(recent: readonly number[], targetMs: number): LateFrames | n
 
 const isTooSoon = ({ turnedAt }: Pace, now: number): boolean => now - turnedAt < QUIET_MS;
 
+/** One change of direction in five seconds may come too soon. */
+const mayHurry = ({ hurriedAt }: Pace, now: number): boolean => now - hurriedAt >= QUIET_MS;
+
 function knowledge({ measured, level }: Pace, milliseconds: number, now: number, { costs }: PaceRules): Knowledge {
   return { measured, level, milliseconds, now, costs };
 }
@@ -182,7 +188,8 @@ function takeBack(pace: Pace, now: number, rules: PaceRules): Pace | null {
   const known = knowledge(pace, quantile(three, 0.5), now, rules);
   const to = fastestKnown(known);
   const harm = Math.min(...three) / predict(to, known);
-  if (to >= pace.level || harm < HARMFUL || (isTooSoon(pace, now) && harm < MUCH_DEARER)) return null;
+  if (to >= pace.level || harm < HARMFUL || (isTooSoon(pace, now) && !(harm >= MUCH_DEARER && mayHurry(pace, now))))
+    return null;
   return change(pace, now, to, 'trial', three);
 }
 
@@ -198,8 +205,9 @@ function hurry(pace: Pace, now: number, { usual, last }: LateFrames, rules: Pace
   const { level, recent } = pace;
   const known = knowledge(pace, usual, now, rules);
   const times = rules.costs.map((_, rung) => (rung > level ? predict(rung, known) : Infinity));
-  const inTime = times.findIndex((time) => time <= rules.targetMs);
+  const inTime = firstInTime(times, known, rules);
   const isSoon = pace.climbed && isTooSoon(pace, now);
+  if (isSoon && !mayHurry(pace, now)) return null;
   const isSure = inTime !== -1 && isBelieved(inTime, known);
   const hasGrown = usual > HARMFUL * pace.load * pace.measured[level].share;
   if (inTime !== -1 && (!isSoon || isSure || hasGrown)) {
@@ -213,6 +221,18 @@ function hurry(pace: Pace, now: number, { usual, last }: LateFrames, rules: Pace
   if (recent.length < ENOUGH_FRAMES || (!pace.climbed && isTooSoon(pace, now))) return null;
   const to = fastestKnown(known);
   return to < level ? change(pace, now, to, 'trial', last) : null;
+}
+
+/**
+ * The first rung that is predicted in time; where that is a guess, half-way between it and the first that can be if all of the cost is in what rungs take away: a small step that won little
+ * would lead to the last rung. -1 where there is none.
+ */
+function firstInTime(times: readonly number[], known: Knowledge, { costs, targetMs }: PaceRules): number {
+  const predicted = times.findIndex((time) => time <= targetMs);
+  if (predicted === -1 || isBelieved(predicted, known)) return predicted;
+  const affordable = (costs[known.level] * targetMs) / known.milliseconds;
+  const possible = costs.findIndex((cost, rung) => rung > known.level && cost <= affordable);
+  return possible === -1 ? predicted : Math.min(predicted, Math.ceil((predicted + possible) / 2));
 }
 
 /** One rung up, after a hold, if its frames are in time, also under the loads of late. */
@@ -252,6 +272,7 @@ function change(pace: Pace, now: number, level: number, reason: PaceReason, fram
     recent: [],
     changedAt: now,
     turnedAt: turns ? now : pace.turnedAt,
+    hurriedAt: turns && isTooSoon(pace, now) ? now : pace.hurriedAt,
     climbed,
     measured: { ...measured, [pace.level]: { ...measured[pace.level], at: now, load } },
     load,
@@ -268,8 +289,8 @@ function patienceAfterFall(pace: Pace, now: number): number {
 /** The pace where only the first so many rungs serve. */
 export function withinRungs(pace: Pace, rungs: number): Pace {
   if (pace.level < rungs) return pace;
-  const { changedAt, turnedAt, climbed } = pace;
-  return { ...INITIAL_PACE, level: rungs - 1, reason: pace.reason, changedAt, turnedAt, climbed };
+  const { changedAt, turnedAt, hurriedAt, climbed } = pace;
+  return { ...INITIAL_PACE, level: rungs - 1, reason: pace.reason, changedAt, turnedAt, hurriedAt, climbed };
 }
 
 /** The smallest of the values that at least this share of them do not exceed. */
