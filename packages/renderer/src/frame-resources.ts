@@ -1,6 +1,6 @@
 import type { Camera } from '@gaussian-splat/core';
 import { FrameBindings, type Stages } from './bindings.js';
-import { CapacityMonitor, initialCapacity, LEAST_CAPACITY, CapacityMemory, type Capacity } from './capacity.js';
+import { CapacityMemory, CapacityMonitor, initialCapacity, LEAST_CAPACITY, type Capacity } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { Occlusion } from './occlusion.js';

@@ -70,7 +70,7 @@ const TRIAL_MS = 6_000;
 const AS_FAST = 1.05;
 /** Where no rung is fast enough, less of the picture has to bring frames to such a share. */
 const WORTHWHILE = 0.92;
-/** Less of a picture that makes frames so much longer is taken back after three of them, and at any time where they are as long as the second. */
+/** Less of a picture that makes frames so much longer is taken back after three of them, and sooner than quiet allows where they are as long as the second. */
 const HARMFUL = 1.25;
 const MUCH_DEARER = 1.6;
 /** Between two changes of direction, ms, five seconds and what times may be late: a level that goes to and fro is seen. Only a fall to what is in time, or much faster, comes sooner. */
