@@ -1,7 +1,13 @@
 /** How much room the buffers between the stages get as views change. The counts are made up; no GPU. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { CapacityMonitor, LEAST_CAPACITY, CapacityMemory, type Capacity } from '@gaussian-splat/renderer/stages';
+import {
+  CapacityMonitor,
+  LEAST_CAPACITY,
+  CapacityMemory,
+  type Capacity,
+  type LookedAt,
+} from '@gaussian-splat/renderer/stages';
 
 const MOST = { visible: 4e6, pairs: 50e6 };
 
@@ -18,6 +24,12 @@ function watch(room: Capacity, least: () => Capacity): { monitor: CapacityMonito
   );
   return { monitor, room: () => current };
 }
+
+const picture = (pixels: number, wholePixels: number): LookedAt => ({
+  pixels,
+  wholePixels,
+  isWhole: pixels === wholePixels,
+});
 
 /** As many looks as make buffers shrink. */
 function look(monitor: CapacityMonitor, used: Capacity): void {
@@ -65,13 +77,46 @@ test('pictures of fewer pixels do not take the room that the whole one at rest n
   const { monitor, room } = watch({ visible: 4e6, pairs: 6e6 }, () => LEAST_CAPACITY);
   const whole = { visible: 3.5e6, pairs: 5e6 };
   const smaller = { visible: 3e6, pairs: 1e6 };
-  monitor.isDue(true, 4_000_000, 4_000_000);
+  monitor.isDue(true, picture(4_000_000, 4_000_000));
   look(monitor, whole);
-  monitor.isDue(true, 250_000, 4_000_000);
+  monitor.isDue(true, picture(250_000, 4_000_000));
   for (let k = 0; k < 10; k++) look(monitor, smaller);
   assert.ok(room().pairs >= whole.pairs, `${room().pairs}`);
-  // The element has become smaller: what was needed says nothing.
-  monitor.isDue(true, 62_500, 1_000_000);
-  for (let k = 0; k < 2; k++) look(monitor, smaller);
-  assert.equal(room().pairs, 1.25 * smaller.pairs);
+  // The element has become smaller: what its picture at rest needed says nothing, but that it was five times as much as in motion.
+  monitor.isDue(true, picture(62_500, 1_000_000));
+  for (let k = 0; k < 2; k++) look(monitor, { ...smaller, pairs: 2e5 });
+  assert.equal(room().pairs, 1.25 * 5 * 2e5);
+});
+
+/** What a view needs with so many times as many splats as at first; in motion with levels of detail of half as many. */
+function needAt(view: number, { pixels, isWhole }: LookedAt): Capacity {
+  const visible = view * 1e6 * (isWhole ? 1 : 0.5);
+  return { visible, pairs: visible * 2 * (pixels / 4e6) ** 0.3 };
+}
+
+for (const pixels of [4_000_000, 1_960_000, 250_000]) {
+  test(`a camera that comes nearer in pictures of ${pixels} pixels has room for the whole one at any time`, () => {
+    const { monitor, room } = watch({ visible: 2e6, pairs: 2.5e6 }, () => LEAST_CAPACITY);
+    const see = (view: number, picture: LookedAt): void => {
+      monitor.isDue(true, picture);
+      monitor.judge(needAt(view, picture), false);
+    };
+    const whole = { pixels: 4_000_000, wholePixels: 4_000_000, isWhole: true };
+    see(1, whole);
+    for (let k = 0; k <= 60; k++) {
+      const view = 1.02 ** k;
+      see(view, { pixels, wholePixels: 4_000_000, isWhole: false });
+      const needed = needAt(view, whole);
+      assert.ok(room().pairs >= needed.pairs, `${room().pairs} of ${needed.pairs} pairs at ${view}`);
+      assert.ok(room().visible >= needed.visible, `${room().visible} of ${needed.visible} splats at ${view}`);
+    }
+    assert.ok(room().pairs < 2 * needAt(1.02 ** 60, whole).pairs, 'and not for much more');
+  });
+}
+
+test('where no whole picture was seen yet, one of more pixels than those in motion has some room', () => {
+  const { monitor, room } = watch({ visible: 1e6, pairs: 1e6 }, () => LEAST_CAPACITY);
+  monitor.isDue(true, { pixels: 250_000, wholePixels: 4_000_000, isWhole: false });
+  monitor.judge({ visible: 5e5, pairs: 9e5 }, false);
+  assert.ok(room().pairs >= 3.6e6, `${room().pairs}`);
 });

@@ -1,13 +1,6 @@
+import type { Capacity, CapacityMemory, LookedAt } from './capacity-memory.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { copyCounts } from './statistics.js';
-
-/** For how much the buffers between the stages have room. */
-export interface Capacity {
-  /** Splats that are visible at once. */
-  readonly visible: number;
-  /** Pairs of splat and bin of the tiles. */
-  readonly pairs: number;
-}
 
 /** Between which bounds the room stays; the lower one may change, and is asked for at every look. */
 export interface CapacityBounds {
@@ -35,51 +28,12 @@ const BYTES_PER_PAIR = 24;
 const INTERVAL = 16;
 /** After so long without a look, ms, a frame is looked at whatever its number: it may be the only one of its view. */
 const LONGEST_PAUSE_MS = 250;
-/** Looks at buffers with room to spare before they shrink. */
-const PATIENCE = 4;
-/** So many times as many where they had to grow again: views that come and go, such as an orbit's, soon keep the room that the largest needs. */
-const PATIENCE_GROWTH = 4;
-
-const NOTHING: Capacity = { visible: 0, pairs: 0 };
 
 /** Room to begin with. */
 export function initialCapacity(splats: number, most: Capacity): Capacity {
   const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
   const pairs = Math.max(LEAST_PAIRS, Math.min(4 * visible, GENEROUS_PAIRS), Math.ceil(1.5 * visible));
   return { visible, pairs: Math.min(most.pairs, pairs) };
-}
-
-/** What the monitors of a scene learn: how long room to spare is kept, and what the whole picture needs while pictures in motion have fewer pixels. */
-export class CapacityMemory {
-  #looks = PATIENCE;
-  #hasShrunk = false;
-  #whole = { pixels: 0, need: NOTHING };
-
-  /** Looks at the buffers before they shrink. */
-  get looks(): number {
-    return this.#looks;
-  }
-
-  /** Room was given up. */
-  shrink(): void {
-    this.#hasShrunk = true;
-  }
-
-  /** There had to be more room. */
-  grow(): void {
-    if (this.#hasShrunk) this.#looks *= PATIENCE_GROWTH;
-    this.#hasShrunk = false;
-  }
-
-  /** A picture was looked at that had all of so many pixels. */
-  noteWhole(pixels: number, need: Capacity): void {
-    this.#whole = { pixels, need };
-  }
-
-  /** What the last whole picture needed, if that had so many pixels. */
-  wholeNeed(pixels: number): Capacity {
-    return pixels === this.#whole.pixels ? this.#whole.need : NOTHING;
-  }
 }
 
 /**
@@ -93,9 +47,9 @@ export class CapacityMonitor {
   readonly #memory: CapacityMemory;
   #capacity: Capacity;
   #frame = 0;
-  /** Pixels of the last picture that was looked at, of all of it had it been whole, and when that was. */
-  #pixels = 0;
-  #wholePixels = 0;
+  /** The last picture that was drawn, the last that was looked at, and when that was. */
+  #drawn: LookedAt = { pixels: 0, wholePixels: 0, isWhole: true };
+  #picture = this.#drawn;
   #lookedAt = -Infinity;
   #isReading = false;
   #isDestroyed = false;
@@ -124,20 +78,19 @@ export class CapacityMonitor {
   /**
    * Counts a frame.
    * @param hasPairs whether its rasterizer makes pairs of splat and bin
-   * @param pixels of its picture: one of another size needs another room, and at rest no other follows
-   * @param wholePixels of the picture at rest
+   * @param picture which it is: one of another size needs another room, and at rest no other follows
    * @returns whether this frame is one to look at; then {@link record} must be called before the submit and {@link read} after it
    */
-  isDue(hasPairs: boolean, pixels: number, wholePixels: number): boolean {
+  isDue(hasPairs: boolean, picture: LookedAt): boolean {
     const hasRoom = this.#capacity.visible >= this.#bounds.most.visible && !hasPairs;
+    this.#drawn = picture;
     this.#frame++;
     const isInTurn =
       this.#frame % INTERVAL === 0 || (this.#frame < INTERVAL && Number.isInteger(Math.log2(this.#frame)));
     const now = performance.now();
-    const isDue = isInTurn || pixels !== this.#pixels || now - this.#lookedAt > LONGEST_PAUSE_MS;
+    const isDue = isInTurn || !isAlike(picture, this.#picture) || now - this.#lookedAt > LONGEST_PAUSE_MS;
     if (!isDue || hasRoom || this.#isReading) return false;
-    this.#pixels = pixels;
-    this.#wholePixels = wholePixels;
+    this.#picture = picture;
     this.#lookedAt = now;
     return true;
   }
@@ -159,7 +112,8 @@ export class CapacityMonitor {
         const [visible, hidden, pairs, lostPairs] = new Uint32Array(this.#staging.getMappedRange().slice(0));
         this.#staging.unmap();
         this.#isReading = false;
-        this.judge({ visible: visible + hidden, pairs: pairs + lostPairs }, hidden + lostPairs > 0);
+        const used = { visible: visible + hidden, pairs: pairs + lostPairs };
+        this.judge(used, hidden + lostPairs > 0, this.#picture);
         return { visible, pairs };
       },
       () => undefined,
@@ -171,13 +125,18 @@ export class CapacityMonitor {
     this.#staging.destroy();
   }
 
-  /** Takes note of what a frame would have needed. */
-  judge(used: Capacity, overflowed: boolean): void {
-    if (this.#pixels === this.#wholePixels) this.#memory.noteWhole(this.#pixels, used);
+  /**
+   * Takes note of what a frame would have needed.
+   * @param picture which it was
+   */
+  judge(used: Capacity, overflowed: boolean, picture = this.#drawn): void {
+    this.#memory.note({ ...picture, used, at: performance.now() });
+    // The picture at rest has no frame to learn from before it is seen.
+    const need = this.#memory.wholeNeedBy({ ...picture, used });
     const least = this.#bounds.least();
     const grown = {
-      visible: Math.max(least.visible, grow(used.visible, this.#capacity.visible, this.#bounds.most.visible)),
-      pairs: Math.max(least.pairs, grow(used.pairs, this.#capacity.pairs, this.#bounds.most.pairs)),
+      visible: Math.max(least.visible, grow(need.visible, this.#capacity.visible, this.#bounds.most.visible)),
+      pairs: Math.max(least.pairs, grow(need.pairs, this.#capacity.pairs, this.#bounds.most.pairs)),
     };
     if (grown.visible > this.#capacity.visible || grown.pairs > this.#capacity.pairs) {
       this.#memory.grow();
@@ -185,12 +144,12 @@ export class CapacityMonitor {
       return;
     }
     this.#recent = {
-      visible: Math.max(this.#recent.visible, used.visible),
-      pairs: Math.max(this.#recent.pairs, used.pairs),
+      visible: Math.max(this.#recent.visible, need.visible),
+      pairs: Math.max(this.#recent.pairs, need.pairs),
     };
     if (++this.#idleLooks < this.#memory.looks) return;
-    // Pictures of fewer pixels do not take the room of the one that follows at rest.
-    const whole = this.#memory.wholeNeed(this.#wholePixels);
+    // Estimates are low where the view came nearer meanwhile.
+    const whole = this.#memory.wholeNeed(picture.wholePixels);
     const shrunk = {
       visible: shrink(Math.max(whole.visible, this.#recent.visible), this.#capacity.visible, least.visible),
       pairs: shrink(Math.max(whole.pairs, this.#recent.pairs), this.#capacity.pairs, least.pairs),
@@ -208,6 +167,8 @@ export class CapacityMonitor {
     this.#onWish(capacity, overflowed);
   }
 }
+
+const isAlike = (a: LookedAt, b: LookedAt): boolean => a.pixels === b.pixels && a.isWhole === b.isWhole;
 
 const grow = (used: number, room: number, most: number): number =>
   used > FULL * room ? Math.max(room, Math.min(most, Math.ceil(used * HEADROOM))) : room;

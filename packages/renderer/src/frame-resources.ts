@@ -1,6 +1,7 @@
 import type { Camera } from '@gaussian-splat/core';
 import { FrameBindings, type Stages } from './bindings.js';
-import { CapacityMemory, CapacityMonitor, initialCapacity, LEAST_CAPACITY, type Capacity } from './capacity.js';
+import { CapacityMemory, type Capacity } from './capacity-memory.js';
+import { CapacityMonitor, initialCapacity, LEAST_CAPACITY } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { Occlusion } from './occlusion.js';

@@ -174,7 +174,11 @@ export class Renderer {
       timer,
     });
     const { pairPlan } = this.#rasterizer;
-    const isWatched = monitor.isDue(pairPlan !== undefined, drawn.width * drawn.height, camera.width * camera.height);
+    const isWatched = monitor.isDue(pairPlan !== undefined, {
+      pixels: drawn.width * drawn.height,
+      wholePixels: camera.width * camera.height,
+      isWhole: request.levers === undefined,
+    });
     const submissions = this.#submissionsFor(isWatched);
     const order = isOrdered ? 'identity' : sortedOrder(levers.sort, levers.depthKeyBits);
     const how = { order, levers, notes, timer } as const;
