@@ -248,7 +248,7 @@ test('what the true image took at rest is what the pace comes back to where less
   move(8, COSTS, 2);
   assert.ok(pace.level >= 4, `${pace.level}`);
   // The element becomes small: all rungs are too slow, and the whole picture is the fastest.
-  move(8, SMALL, 5);
+  move(4, SMALL, 5);
   const { level } = pace;
   assert.ok(level >= 4, `${level}`);
   draw(0, targetMs * 5);

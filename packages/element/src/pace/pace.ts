@@ -68,8 +68,10 @@ const HOLD_MS = 500;
 const TRIAL_MS = 6_000;
 /** Rungs that take so little longer than the fastest are as good, and truer. */
 const AS_FAST = 1.05;
+/** More of the picture that makes frames so much shorter is a reason to try still more. */
+const FASTER = 1.04;
 /** Where no rung is fast enough, less of the picture has to bring frames to such a share. */
-const WORTHWHILE = 0.92;
+const WORTHWHILE = 0.95;
 /** Less of a picture that makes frames so much longer is taken back after three of them, and sooner than quiet allows where they are as long as the second. */
 const HARMFUL = 1.25;
 const MUCH_DEARER = 1.6;
@@ -200,6 +202,9 @@ function fastestKnown(known: Knowledge): number {
   return times.findIndex((time) => time <= AS_FAST * best);
 }
 
+const isAnyKnownAbove = (known: Knowledge): boolean =>
+  known.costs.some((_, rung) => rung < known.level && isBelieved(rung, known));
+
 /** Where frames are late: down to the first rung that is in time, else to the truest of the fastest, up or down. */
 function hurry(pace: Pace, now: number, { usual, last }: LateFrames, rules: PaceRules): Pace | null {
   const { level, recent } = pace;
@@ -220,7 +225,16 @@ function hurry(pace: Pace, now: number, { usual, last }: LateFrames, rules: Pace
   }
   if (recent.length < ENOUGH_FRAMES || (!pace.climbed && isTooSoon(pace, now))) return null;
   const to = fastestKnown(known);
-  return to < level ? change(pace, now, to, 'trial', last) : null;
+  if (to < level) return change(pace, now, to, 'trial', last);
+  const isTried = level > 0 && now - pace.changedAt >= TRIAL_MS && !isAnyKnownAbove(known);
+  return isTried || isFasterAbove(pace) ? change(pace, now, level - 1, 'trial', last) : null;
+}
+
+/** The last climb has made frames faster, and what is above was last measured before it. */
+function isFasterAbove({ level, measured, climbed, changedAt }: Pace): boolean {
+  const [above, here, below] = [measured[level - 1], measured[level], measured[level + 1]];
+  if (level === 0 || !climbed || below === undefined || (above !== undefined && above.at > below.at)) return false;
+  return below.at >= changedAt && here.share * FASTER <= below.share;
 }
 
 /**
@@ -247,7 +261,7 @@ function climb(pace: Pace, now: number, rules: PaceRules): Pace | null {
   if (peakOf * next > TOO_SLOW * rules.targetMs && peakOf > TOO_SLOW) return null;
   if (next <= TO_SPARE * rules.targetMs) return change(pace, now, level - 1, 'spare', recent);
   const isHopeful = !isBelieved(level - 1, known);
-  const isGuess = !rules.costs.some((_, rung) => rung < level && isBelieved(rung, known));
+  const isGuess = !isAnyKnownAbove(known);
   const hoped = isHopeful ? predict(level - 1, { ...known, isHopeful }) / (isGuess ? TOO_SLOW : 1) : next;
   const isNoDearer = climbed && isHopeful && usual <= rules.targetMs && hasCostNothing(pace);
   const isTried = isNoDearer || (hoped <= rules.targetMs && now - changedAt >= TRIAL_MS);

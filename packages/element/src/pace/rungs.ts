@@ -44,8 +44,8 @@ export function isBelieved(rung: number, { measured, level, milliseconds, now, i
 }
 
 /**
- * What a frame on a rung would take, ms. Between two rungs that were measured, on the line through them, time against cost. Beyond them on the same line, but falls never win more than
- * the costs say, and climbs with nothing measured above cost all that they can.
+ * What a frame on a rung would take, ms. Between two rungs that were measured, on the line through them, time against cost. Below them between that line and what
+ * the costs say; climbs with nothing measured above cost all that they can.
  */
 export function predict(rung: number, known: Knowledge): number {
   const { measured, level, milliseconds, costs } = known;
@@ -60,7 +60,9 @@ export function predict(rung: number, known: Knowledge): number {
   // One of both there is: the level itself.
   const near = above!;
   const far = nearest(near - 1, -1, known, FAR_APART * costs[near]);
-  return far === null ? inProportion(near) : Math.max(onLine(far, near), inProportion(near));
+  if (far === null) return inProportion(near);
+  // Twice what the line says is hoped for: rungs that first win little win more than that further down as often as not.
+  return Math.max(timeOf(near) - 2 * (timeOf(near) - onLine(far, near)), inProportion(near));
 }
 
 /** The next rung from this one on that was measured and costs at least so much; null where there is none. */
