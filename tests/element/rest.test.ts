@@ -172,6 +172,32 @@ test('pictures that are small already are not made smaller, whatever they take',
   );
 });
 
+test('an element of another size is measured anew: that fewer pixels won nothing of a small picture says nothing of a large one', (context) => {
+  let now = 1000;
+  context.mock.method(performance, 'now', () => now);
+  const ignored = (): void => undefined;
+  const pace = new PaceController({
+    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
+    ...{ requestFrame: ignored, onPace: ignored },
+  });
+  const move = (seconds: number, pixels: number, takes: (level: number) => number): number => {
+    let last = 0;
+    for (const end = now + 1000 * seconds; now < end; now += INTERVAL) {
+      const { level } = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
+      last = takes(level);
+      pace.sample(level, last);
+    }
+    return last;
+  };
+  move(20, 2e5, () => 18);
+  assert.equal(pace.plan({ now, pixels: 2e5, hasChanged: true, goesOn: true }).level, 0, 'the small one is whole');
+  assert.ok(
+    move(1, 4e6, (level) => 20 * LADDER[level].cost) <= pace.targetMs,
+    'the large one is in time within a second',
+  );
+  pace.stop();
+});
+
 test('a scene that changes in every other picture of the display is in motion in those between, and rests as a camera does', (context) => {
   context.mock.timers.enable({ apis: ['setTimeout'] });
   const asked: number[] = [];

@@ -1,7 +1,7 @@
 import type { FrameLevers } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
 import { LADDER, rungsFor } from '../pace/ladder.js';
-import { INITIAL_PACE, keepPace, quantile, withinRungs, type Pace, type PaceReason } from '../pace/pace.js';
+import { INITIAL_PACE, keepPace, quantile, resized, type Pace, type PaceReason } from '../pace/pace.js';
 import { waitForRest } from '../pace/rest.js';
 
 /** Share of the display's interval that frames may take on the GPU: the page and its compositor need the rest. */
@@ -11,6 +11,9 @@ const MOTION_MS = 150;
 /** Where frames take longer than that, a change within so many of them still does; at most ms. */
 const FRAMES_OF_MOTION = 2;
 const LONGEST_PAUSE_MS = 2_000;
+
+/** Pictures of so many times the pixels are others: what rungs take is measured anew. */
+const OTHER_SIZE = 1.25;
 
 const COSTS = LADDER.map(({ cost }) => cost);
 
@@ -68,6 +71,8 @@ export class PaceController {
   readonly #options: PaceOptions;
   #pace: Pace = INITIAL_PACE;
   #rungs = LADDER.length;
+  /** Of the pictures that the pace has measured. */
+  #pixels = 0;
   #changedAt = -Infinity;
   #drawn = 0;
   /** What the last frame took, of those that are known. */
@@ -107,8 +112,7 @@ export class PaceController {
   plan({ now, pixels, hasChanged, goesOn }: FrameOccasion): FramePlan {
     // What was found before the page chose a quality says nothing of what is drawn now.
     if (!this.#options.isOn()) this.reset();
-    this.#rungs = rungsFor(pixels);
-    this.#pace = withinRungs(this.#pace, this.#rungs);
+    this.#fit(pixels);
     const pause = Math.max(
       MOTION_MS,
       Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * Math.max(this.#lastMs, this.#wholeMs)),
@@ -122,6 +126,14 @@ export class PaceController {
     const { displayInterval } = this.#options.scheduler();
     if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, displayInterval));
     return { level, levers: LADDER[level].levers };
+  }
+
+  #fit(pixels: number): void {
+    this.#rungs = rungsFor(pixels);
+    const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
+    if (!isOther && this.#pace.level < this.#rungs) return;
+    this.#pixels = pixels;
+    this.#pace = resized(this.#pace, this.#rungs);
   }
 
   readonly #rest = (): void => {

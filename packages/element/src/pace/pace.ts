@@ -300,11 +300,10 @@ function patienceAfterFall(pace: Pace, now: number): number {
   return isTooSoon(pace, now) ? Math.min(LONGEST_PATIENCE_MS, LONGER_PATIENCE * pace.patience) : PATIENCE_MS;
 }
 
-/** The pace where only the first so many rungs serve. */
-export function withinRungs(pace: Pace, rungs: number): Pace {
-  if (pace.level < rungs) return pace;
-  const { changedAt, turnedAt, hurriedAt, climbed } = pace;
-  return { ...INITIAL_PACE, level: rungs - 1, reason: pace.reason, changedAt, turnedAt, hurriedAt, climbed };
+/** The pace where pictures have another size, and only the first so many rungs serve: what was measured says nothing of these. */
+export function resized(pace: Pace, rungs: number): Pace {
+  const { recent, measured, load, peak } = INITIAL_PACE;
+  return { ...pace, level: Math.min(pace.level, rungs - 1), recent, measured, load, peak };
 }
 
 /** The smallest of the values that at least this share of them do not exceed. */
