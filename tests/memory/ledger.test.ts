@@ -73,3 +73,26 @@ test('a scene beyond the budget is refused before the device hears of it', async
 });
 
 after(endNodeDevice);
+
+test('what is soon not needed any more is given back before anybody is refused, and no more of it than there must be', () => {
+  const ledger = new MemoryLedger();
+  ledger.budgetBytes = 100;
+  const kept = ledger.reserve('kept', 20);
+  const given: string[] = [];
+  for (const name of ['first', 'second', 'third']) {
+    const reservation = ledger.reserve(name, 20);
+    const giveBack = (): void => {
+      given.push(name);
+      ledger.spare.delete(giveBack);
+      reservation.release();
+    };
+    ledger.spare.add(giveBack);
+  }
+  ledger.reserve('beside', 20);
+  assert.deepEqual(given, []);
+  ledger.reserve('large', 35);
+  assert.deepEqual(given, ['first', 'second']);
+  assert.throws(() => ledger.reserve('too large', 70), /at most 25 bytes/);
+  assert.deepEqual(given, ['first', 'second', 'third']);
+  assert.equal(kept.bytes, 20);
+});

@@ -107,7 +107,8 @@ export class GaussianSplatElement extends ViewingMethods {
   static releaseDelay = 1_000;
   /**
    * Bytes of GPU memory that one scene may take; a larger one is refused with `out-of-memory/budget` before any of it is allocated. null, the
-   * default: half of the memory that the browser says the device has (`navigator.deviceMemory`), no limit where it does not say.
+   * default: half of the memory that the browser says the device has (`navigator.deviceMemory`); where it does not say, 512 MB on touch screens, else no limit. All
+   * scenes of a page together may take the default, or this if it is more.
    */
   static memoryBudget: number | null = null;
   /** Folder of the files of onnxruntime-web 1.30.0, which generators need; null for `onnxruntime/` beside the bundle. */

@@ -23,6 +23,8 @@ export interface Reservation {
 export class MemoryLedger {
   /** Most bytes that all scenes of the device together may hold. */
   budgetBytes = Infinity;
+  /** Called one after the other where there is no room, before anybody is refused: by each, somebody gives back what will soon not be needed any more. */
+  readonly spare = new Set<() => void>();
   readonly #held = new Set<Reservation>();
 
   /** The ledger of a device; all scenes on it share one. */
@@ -52,6 +54,10 @@ export class MemoryLedger {
    */
   reserve(label: string, bytes: number, most = Infinity): Reservation {
     if (bytes > most) throw overBudget(label, bytes, `${inBytes(most)}, the memoryBudget that was given`);
+    for (const giveBack of this.spare) {
+      if (bytes <= this.budgetBytes - this.bytes) break;
+      giveBack();
+    }
     const left = this.budgetBytes - this.bytes;
     if (bytes > left)
       throw overBudget(

@@ -1,6 +1,7 @@
 /** S12 in the page: a scene over the budget of memory is an error with a code, and the page lives on; see ../default-limits.ts. */
 import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
+import { MemoryLedger } from '@gaussian-splat/renderer';
 import {
   assert,
   assertEqual,
@@ -9,6 +10,7 @@ import {
   nextEvent,
   show,
   showLoaded,
+  until,
 } from '../../element/browser/support/harness.js';
 
 describe('S12: a budget of memory', () => {
@@ -40,6 +42,97 @@ describe('S12: a budget of memory', () => {
     } finally {
       GaussianSplatElement.memoryBudget = before;
       device.createBuffer = create;
+    }
+  });
+});
+
+/** What the browser says of the machine while something is done: gigabytes, or nothing as in Safari. */
+async function onMachineOf(gigabytes: number | undefined, action: () => Promise<void>): Promise<void> {
+  Object.defineProperty(navigator, 'deviceMemory', { configurable: true, value: gigabytes });
+  try {
+    await action();
+  } finally {
+    delete (navigator as { deviceMemory?: number }).deviceMemory;
+  }
+}
+
+/** The machine half of whose memory is so many bytes. */
+const machineFor = (bytes: number): number => bytes / 2 ** 29;
+
+const ledger = (): MemoryLedger => MemoryLedger.of(devices[devices.length - 1]);
+
+describe('S12: all scenes of a page together', () => {
+  let one = 0;
+  // Elements of the test before keep their scenes for a second.
+  beforeEach(() => until(() => ledger().bytes === 0, 'an empty ledger'));
+  before(async () => {
+    await until(() => ledger().bytes === 0, 'an empty ledger');
+    const element = await showLoaded();
+    one = ledger().bytes;
+    element.remove();
+    assert(one > 0, 'a scene takes memory');
+  });
+
+  it('refuses the scene for which the others leave no room, and shows it once one of them is gone', async () => {
+    await onMachineOf(machineFor(1.5 * one), async () => {
+      const first = await showLoaded();
+      const second = show({ src: `${COMPASS}?second` });
+      await nextEvent(second, 'error');
+      assertEqual(second.error?.reason, 'out-of-memory/budget', 'reason');
+      assert(/what is left of a budget of/.test(second.error?.message ?? ''), String(second.error?.message));
+      assert(first.loaded, 'the first is still there');
+      // A removed element keeps its scene for a while, unless others lack the room.
+      first.remove();
+      second.setAttribute('src', `${COMPASS}?third`);
+      await second.ready;
+      assert(second.loaded, String(second.error?.message));
+      assertEqual(ledger().bytes, one, 'bytes');
+    });
+  });
+
+  it('exchanges a scene for another where there is room for one alone', async () => {
+    await onMachineOf(machineFor(1.5 * one), async () => {
+      const element = await showLoaded();
+      for (const src of [`${COMPASS}?a`, `${COMPASS}?b`]) {
+        element.setAttribute('src', src);
+        await element.ready;
+        assert(element.loaded, String(element.error?.message));
+      }
+      assertEqual(ledger().spare.size, 0, 'scenes that may be given back');
+    });
+  });
+
+  it('takes the word of the page for more', async () => {
+    const before = GaussianSplatElement.memoryBudget;
+    GaussianSplatElement.memoryBudget = 3 * one;
+    try {
+      await onMachineOf(machineFor(1.5 * one), async () => {
+        await showLoaded();
+        await showLoaded({ src: `${COMPASS}?second` });
+        assertEqual(ledger().budgetBytes, 3 * one, 'budget');
+      });
+    } finally {
+      GaussianSplatElement.memoryBudget = before;
+    }
+  });
+
+  it('trusts a phone that says nothing of its memory with 512 MB, a computer with whatever it takes', async () => {
+    const real = globalThis.matchMedia;
+    for (const [isCoarse, bytes] of [
+      [true, 2 ** 29],
+      [false, Infinity],
+    ] as const) {
+      globalThis.matchMedia = (query) =>
+        query === '(pointer: coarse)' ? { ...real(query), matches: isCoarse } : real(query);
+      try {
+        await onMachineOf(undefined, async () => {
+          const element = await showLoaded({ src: `${COMPASS}?${isCoarse}` });
+          assertEqual(String(ledger().budgetBytes), String(bytes), 'budget');
+          element.remove();
+        });
+      } finally {
+        globalThis.matchMedia = real;
+      }
     }
   });
 });

@@ -1,4 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
@@ -152,9 +153,12 @@ export class SceneController implements ReactiveController {
 
   hostConnected(): void {
     clearTimeout(this.#releaseTimer);
+    this.#releaseTimer = undefined;
+    this.#spare(false);
   }
 
   hostDisconnected(): void {
+    this.#spare(true);
     this.#releaseTimer = setTimeout(() => this.#clear(), this.#options.releaseDelayMs());
   }
 
@@ -245,6 +249,7 @@ export class SceneController implements ReactiveController {
       // A small preview stays on show meanwhile.
       if (!isSmall) this.#drop(false);
     };
+    this.#spare(true);
     const scene = await openGpuScene(request, {
       ...{ device: device(), loader: loader(), frameUrl, loops },
       ...{
@@ -256,7 +261,7 @@ export class SceneController implements ReactiveController {
         memoryBudget: memoryBudget(),
         submissions: this.#submissions,
       },
-    });
+    }).finally(() => this.#spare(false));
     if (signal.aborted) return scene.destroy();
     const entrance = !isNew ? 'again' : this.#isPreview ? 'whole' : 'new';
     this.#replace(scene, false);
@@ -289,6 +294,7 @@ export class SceneController implements ReactiveController {
     this.#scene = scene;
     this.#shownRequest = this.#request;
     this.#isPreview = isPreview;
+    this.#spare(isPreview);
   }
 
   /** Ends what runs, and leaves the picture alone. */
@@ -306,9 +312,21 @@ export class SceneController implements ReactiveController {
     this.#options.onEmptied();
   }
 
+  /** Whether the scene on show may be dropped where others lack its memory: the element is gone, or another scene is to take its place. */
+  #spare(isSpare: boolean): void {
+    if (this.#scene === null) return;
+    const { spare } = MemoryLedger.of(this.#scene.device);
+    if (isSpare || this.#releaseTimer) spare.add(this.#giveBack);
+    else spare.delete(this.#giveBack);
+  }
+
+  readonly #giveBack = (): void => (this.#releaseTimer ? this.#clear() : this.#drop(false));
+
   #drop(clear: boolean): void {
     if (this.#scene !== null || clear) this.#options.hide(clear);
-    this.#scene?.destroy();
+    if (this.#scene === null) return;
+    MemoryLedger.of(this.#scene.device).spare.delete(this.#giveBack);
+    this.#scene.destroy();
     this.#scene = null;
   }
 

@@ -1,6 +1,27 @@
-/** Bytes of GPU memory that a scene may take unless the page says otherwise; undefined where nothing is known of the device. */
+import { MemoryLedger } from '@gaussian-splat/renderer';
+
+/** Whether the page is on a phone or a tablet. */
+export function isHandheld(): boolean {
+  return globalThis.matchMedia?.('(pointer: coarse)').matches ?? false;
+}
+
+/**
+ * Bytes of GPU memory that a scene, and all of a page together, may take unless the page says otherwise; undefined where nothing is known of the device.
+ */
 export function defaultMemoryBudget(): number | undefined {
-  // The GPU's share of a device is known to nobody; half of the memory is what shared memory can spare. Browsers round it, and end at 8 GB or more.
-  const { deviceMemory } = navigator as { deviceMemory?: number };
+  // The GPU's share of a device is known to nobody; half of the memory is what shared memory can spare. Browsers round it, and end at 8 GB or more. Safari says
+  // nothing, and ends pages on phones that take more than some of what there is.
+  const { deviceMemory = isHandheld() ? 1 : undefined } = navigator as { deviceMemory?: number };
   return deviceMemory === undefined ? undefined : deviceMemory * 2 ** 29;
+}
+
+/** What was set here, by device: another figure is the page's own, and stays. */
+const set = new WeakMap<GPUDevice, number>();
+
+/** Limits all scenes on a device together to what one may take by default, or by the page's word if that is more. */
+export function limitScenes(device: GPUDevice, memoryBudget = 0): void {
+  const ledger = MemoryLedger.of(device);
+  if (ledger.budgetBytes !== (set.get(device) ?? Infinity)) return;
+  ledger.budgetBytes = Math.max(memoryBudget, defaultMemoryBudget() ?? Infinity);
+  set.set(device, ledger.budgetBytes);
 }

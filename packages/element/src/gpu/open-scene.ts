@@ -4,6 +4,7 @@ import type { LiveRequest } from '../live/live-model.js';
 import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { GpuScene } from './gpu-scene.js';
+import { limitScenes } from './memory-budget.js';
 import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
@@ -49,6 +50,7 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
   try {
     const [lease, scene] = await Promise.all([acquiring, loading, choosing.catch(unlessWrong)]);
     options.signal.throwIfAborted();
+    limitScenes(lease.device, options.memoryBudget);
     if ('frames' in scene) return await openSequence(request, lease, scene, options);
     previews?.end();
     options.beforeUpload(byteLengthOf(scene));
@@ -103,6 +105,7 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
   const lease = await acquiring;
   try {
     signal.throwIfAborted();
+    limitScenes(lease.device, memoryBudget);
     const { openLiveModel } = await opening;
     const { url, chain = [], contract, credentials } = request;
     const live = await openLiveModel(
@@ -137,6 +140,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
   let scene: GpuScene | undefined;
   try {
     await chooseVariants(lease.device).catch(unlessWrong);
+    limitScenes(lease.device, memoryBudget);
     const { openStreamed } = await opening;
     const onChange = (): void => scene?.onIncomplete();
     // How much of it fits is decided when its manifest is there.

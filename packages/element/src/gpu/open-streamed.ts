@@ -5,6 +5,7 @@ import { checkManifest, levelSource, StreamedGaussians, type PoolOptions } from 
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { DetailLevers } from './gpu-scene.js';
+import { isHandheld } from './memory-budget.js';
 
 export interface StreamedOptions {
   readonly loader: SceneLoader;
@@ -27,8 +28,6 @@ const DESKTOP: Caps = { splats: 3e6, bytes: 512e6 };
 /** Pixels that what is drawn may be displaced where the caps leave room for more. */
 const DETAIL = 1;
 
-const capsOf = (): Caps => (globalThis.matchMedia?.('(pointer: coarse)').matches ? PHONE : DESKTOP);
-
 /**
  * Opens a folder by its manifest: fetches that and what is coarsest.
  * @throws GaussianSplatError `network/*`, `decode/*`, `out-of-memory/*`, or the signal's reason
@@ -39,7 +38,7 @@ export async function openStreamed(
   options: StreamedOptions,
 ): Promise<{ gaussians: StreamedGaussians; detail: DetailLevers }> {
   const { signal, memoryBudget = Infinity, onChange } = options;
-  const caps = capsOf();
+  const caps = isHandheld() ? PHONE : DESKTOP;
   const pool: PoolOptions = {
     memoryBudget: Math.min(memoryBudget, caps.bytes),
     signal,
