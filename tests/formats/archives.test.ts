@@ -4,6 +4,7 @@ import { test } from 'node:test';
 import { deflateSync, strToU8, zipSync } from 'fflate';
 import { encodingsFor } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
+import { crc32 } from '../../packages/formats/src/zip/crc32.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { assertSameCloud, expectRefusal } from './support/expect.js';
 import { writeKsplat } from './support/ksplat-writer.js';
@@ -114,6 +115,18 @@ test('directories that announce more than they hold are refused at once', async 
     await expectRefusal(inZip64(ksplat, 'scene.ksplat', count), code, /found (1 of|4,000)/, { name: 'a.zip' });
   }
   assert.ok(performance.now() - start < 1_000, `${performance.now() - start} ms`);
+});
+
+test('content that is not what was packed is refused by name', async () => {
+  assert.equal(crc32(strToU8('123456789')), 0xcbf43926);
+  assert.equal(crc32(new Uint8Array(0)), 0);
+  const places = Array.from({ length: 8 }, (_, k) => Math.floor(((k + 1) * ksplat.length) / 9));
+  for (const at of places) {
+    const zip = zipSync({ 'scene.ksplat': ksplat }, { level: 0 });
+    const start = Buffer.from(zip).indexOf(ksplat);
+    zip[start + at] ^= 1;
+    await expectRefusal(zip, 'decode/corrupt', /scene\.ksplat.*CRC-32 [0-9a-f]{8}/, { name: 'a.zip' });
+  }
 });
 
 test('encrypted files and compressions that are not deflate are refused by name', async () => {

@@ -2,6 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { inflateSync } from 'fflate';
 import { grouped, quote, viewOf } from '../bytes.js';
 import { damaged } from '../damaged.js';
+import { crc32 } from './crc32.js';
 import { readDirectory, type ZipEntry } from './directory.js';
 
 /** Deflate cannot compress better than this. */
@@ -49,8 +50,12 @@ export class Archive {
       throw damaged(where, 'a size that deflate can reach', found);
     }
     const content = this.#contentOf(entry, where);
-    if (content.length === entry.bytes) return content;
-    throw damaged(where, `${grouped(entry.bytes)} bytes`, grouped(content.length));
+    if (content.length !== entry.bytes) throw damaged(where, `${grouped(entry.bytes)} bytes`, grouped(content.length));
+    // Programs that do not know it before they write the content leave 0.
+    if (entry.crc === 0) return content;
+    const crc = crc32(content);
+    if (crc === entry.crc) return content;
+    throw damaged(where, `the content that was packed (CRC-32 ${hex(entry.crc)})`, `another (${hex(crc)})`);
   }
 
   #contentOf({ method, headerAt, compressedBytes, bytes }: ZipEntry, where: string): Uint8Array {
@@ -91,6 +96,8 @@ function allocate(bytes: number, where: string): Uint8Array {
     });
   }
 }
+
+const hex = (value: number): string => value.toString(16).padStart(8, '0');
 
 const isFolder = (path: string): boolean => /[\\/]$/.test(path);
 

@@ -10,6 +10,8 @@ export interface ZipEntry {
   readonly isEncrypted: boolean;
   readonly compressedBytes: number;
   readonly bytes: number;
+  /** CRC-32 of the content; 0 where it is not told. */
+  readonly crc: number;
   /** Byte of the file's own header, which its content follows. */
   readonly headerAt: number;
 }
@@ -89,6 +91,7 @@ function readEntry(file: Uint8Array, view: DataView, at: number, nameEnd: number
     isEncrypted: (flags & FLAG_ENCRYPTED) !== 0,
     compressedBytes: compressed64,
     bytes: bytes64,
+    crc: view.getUint32(at + 16, true),
     headerAt: header64,
   };
 }
