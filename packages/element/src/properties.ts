@@ -55,8 +55,8 @@ export class SplatProperties extends LitElement {
     playbackRate: { attribute: false, noAccessor: true },
   };
 
-  /** URL of the scene file. */
-  declare src: string | null;
+  /** URL of the scene file; the property may be a local file itself, which the browser then keeps until the page goes. */
+  declare src: string | Blob | null;
   /** As of `<img>`: `use-credentials` sends cookies to other origins. */
   declare crossorigin: 'anonymous' | 'use-credentials' | '' | null;
   /** URL of an image shown until the scene is. */

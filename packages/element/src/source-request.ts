@@ -32,8 +32,19 @@ export const addressesOf = (urls: string | null, modifier: UrlModifier): readonl
     .filter(Boolean)
     .map((url) => addressOf(url, modifier));
 
+/** Of files that were given in place of addresses. */
+const fileUrls = new WeakMap<Blob, string>();
+
+/** The same for the same file, with its name behind it: a `.splat` is known by nothing else. */
+function fileUrl(file: Blob): string {
+  const url = fileUrls.get(file) ?? `${URL.createObjectURL(file)}#${encodeURIComponent((file as File).name ?? '')}`;
+  fileUrls.set(file, url);
+  return url;
+}
+
 /** The worker has a base URL of its own, so it is given whole ones. What is no URL stays as it is, and fails there. */
-function addressOf(src: string, modifier: UrlModifier): string {
-  const url = URL.canParse(src, document.baseURI) ? new URL(src, document.baseURI).href : src;
+function addressOf(source: string | Blob, modifier: UrlModifier): string {
+  if (source instanceof Blob) return fileUrl(source);
+  const url = URL.canParse(source, document.baseURI) ? new URL(source, document.baseURI).href : source;
   return modifier?.(url) ?? url;
 }

@@ -23,7 +23,7 @@ export interface Services {
 
 /** What is to be shown, as the element's attributes have it. */
 export interface Source {
-  readonly src: string | null;
+  readonly src: string | Blob | null;
   readonly contract: unknown;
   /** URLs with spaces between them. */
   readonly chain: string | null;

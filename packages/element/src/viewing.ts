@@ -91,7 +91,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /**
    * The picture as it is now, drawn anew and read in the same task.
-   * @returns rejects with an `InvalidStateError` where no scene is on show.
+   * @returns rejects with an `InvalidStateError` where no scene is on show, or the element has no size.
    */
   async toBlob({ mimeType = 'image/png', qualityArgument }: PictureOptions = {}): Promise<Blob> {
     const canvas = this.#drawnCanvas();
@@ -100,7 +100,7 @@ export abstract class ViewingMethods extends MediaProperties {
     return blob;
   }
 
-  /** The same as a `data:` URL, at once. Throws an `InvalidStateError` where no scene is on show. */
+  /** The same as a `data:` URL, at once. Throws an `InvalidStateError` where no scene is on show, or the element has no size. */
   toDataURL(mimeType = 'image/png', qualityArgument?: number): string {
     return this.#drawnCanvas().toDataURL(mimeType, qualityArgument);
   }
@@ -108,7 +108,11 @@ export abstract class ViewingMethods extends MediaProperties {
   #drawnCanvas(): HTMLCanvasElement {
     this.applyAttributes();
     const canvas = this.stage.drawNow();
-    if (canvas === null) throw new DOMException('There is no scene on show to take a picture of', 'InvalidStateError');
+    if (canvas === null)
+      throw new DOMException(
+        'There is nothing to take a picture of: expected a scene on show in an element that has a size',
+        'InvalidStateError',
+      );
     return canvas;
   }
 }

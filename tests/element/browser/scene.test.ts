@@ -177,6 +177,26 @@ describe('src', () => {
     assert(isGreen((await screenOf(element)).at(60, 50)), 'the last scene is seen');
   });
 
+  it('is a local file as well as an address, and the same file is the same scene', async () => {
+    const file = new File([await (await fetch(`${FIXTURES}green.splat`)).arrayBuffer()], 'a green#?%.splat');
+    const element = show({});
+    element.src = file;
+    await element.ready;
+    assertEqual(element.statistics?.splats, 1, String(element.error?.message));
+    let loads = 0;
+    element.addEventListener('loadstart', () => loads++);
+    element.src = COMPASS;
+    element.src = file;
+    await element.updateComplete;
+    element.alt = 'Another';
+    await element.updateComplete;
+    assertEqual(loads, 0, 'loads');
+    assertEqual(element.getAttribute('src'), null, 'attribute');
+    element.src = new Blob(['no scene']);
+    const { detail } = await nextEvent<CustomEvent<ElementError>>(element, 'error');
+    assertEqual(detail.reason, 'decode/unknown-format', detail.message);
+  });
+
   it('a flip there and back loads nothing anew', async () => {
     const element = await showLoaded();
     let loads = 0;

@@ -214,7 +214,7 @@ function silence(): string {
   return URL.createObjectURL(new Blob([bytes], { type: 'audio/wav' }));
 }
 
-type Timed = Pick<HTMLMediaElement, 'currentTime' | 'readyState' | 'seeking'> & { src: string | null };
+type Timed = Pick<HTMLMediaElement, 'currentTime' | 'readyState' | 'seeking'> & { src: string | Blob | null };
 
 /** What a page may say of a source and a time within one task, and where the clock is then and in the end. */
 const SCRIPTS: Readonly<Record<string, (media: Timed, a: string, b: string) => void>> = {
