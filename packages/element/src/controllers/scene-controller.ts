@@ -1,7 +1,7 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
 import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
+import { delay, DeviceLostError, isDeviceFailure, pageVisible, unrecoverable } from '../gpu/device-failures.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { SharedDevice } from '../gpu/shared-device.js';
@@ -341,46 +341,8 @@ export class SceneController implements ReactiveController {
   }
 }
 
-/** The device went away before the scene was seen. */
-class DeviceLostError extends Error {}
-
-/** A device that does not come at all is final at first, but after a loss it may only need a moment. */
-function isDeviceFailure(error: unknown, isNew: boolean): boolean {
-  if (error instanceof DeviceLostError) return true;
-  if (!(error instanceof GaussianSplatError)) return false;
-  // A generator may be the first to notice.
-  return error.family === 'device-lost' || (!isNew && error.family === 'unsupported');
-}
-
-function unrecoverable(cause: unknown): GaussianSplatError {
-  return new GaussianSplatError('device-lost/unrecoverable', {
-    where: 'GPU device',
-    expected: 'a device that stays long enough to draw the scene',
-    found: cause instanceof Error ? cause.message || 'a device that was lost' : String(cause),
-    remedy: 'reload the page; if it happens again, use a smaller scene or update the graphics driver',
-    cause,
-  });
-}
-
 const isSame = (a: SceneRequest, b: SceneRequest | null): boolean =>
   a.url === b?.url &&
   a.credentials === b.credentials &&
   isSameContract(a.contract, b.contract) &&
   (a.chain ?? []).join(' ') === (b.chain ?? []).join(' ');
-
-const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
-
-/** Fulfils when the page can be seen, or the wait is aborted: a hidden page would only lose its device again. */
-function pageVisible(signal: AbortSignal): Promise<void> {
-  return new Promise((resolve) => {
-    const check = (): void => {
-      if (document.visibilityState === 'hidden' && !signal.aborted) return;
-      document.removeEventListener('visibilitychange', check);
-      signal.removeEventListener('abort', check);
-      resolve();
-    };
-    document.addEventListener('visibilitychange', check);
-    signal.addEventListener('abort', check);
-    check();
-  });
-}
