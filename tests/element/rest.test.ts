@@ -195,6 +195,12 @@ test('an element of another size is measured anew: that fewer pixels won nothing
     move(1, 4e6, (level) => 20 * LADDER[level].cost) <= pace.targetMs,
     'the large one is in time within a second',
   );
+  // On the lowest rung that a small picture may have, where all of it is faster.
+  move(5, 4e6, (level) => 20 * LADDER[level].cost);
+  move(2, 4e6, (level) => 60 * LADDER[level].cost);
+  const smallMs = [18, 18, 19, 24, 32];
+  assert.ok(move(0.5, 17_000, (level) => smallMs[level]) < 32, 'the small one does not wait to be more of itself');
+  assert.ok(move(2, 17_000, (level) => smallMs[level]) < 20, 'the small one comes back to what is faster');
   pace.stop();
 });
 

@@ -226,7 +226,9 @@ function hurry(pace: Pace, now: number, { usual, last }: LateFrames, rules: Pace
   if (recent.length < ENOUGH_FRAMES || (!pace.climbed && isTooSoon(pace, now))) return null;
   const to = fastestKnown(known);
   if (to < level) return change(pace, now, to, 'trial', last);
-  const isTried = level > 0 && now - pace.changedAt >= TRIAL_MS && !isAnyKnownAbove(known);
+  // Where nothing is left to fall to, at once.
+  const isDue = level === rules.costs.length - 1 || now - pace.changedAt >= TRIAL_MS;
+  const isTried = level > 0 && isDue && !isAnyKnownAbove(known);
   return isTried || isFasterAbove(pace) ? change(pace, now, level - 1, 'trial', last) : null;
 }
 
