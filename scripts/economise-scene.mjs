@@ -165,6 +165,8 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   if (isGpu) GpuEvaluator.prepare(device);
   const opened = seconds();
   const cloud = await reading;
+  // What this format has no place for is told before a picture is drawn.
+  encodingsFor(out, cloud);
   // What is left of it when the device is there.
   const read = seconds() - opened;
   const views = readViews(viewsFile, boundsOf(cloud), scored);
