@@ -131,4 +131,26 @@ describe('a streamed scene', () => {
     GaussianSplatElement.sceneLoader = original;
     claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
   });
+
+  it('beside others makes do with less memory, and has a place', async () => {
+    const { stop } = serve('/beside/');
+    const src = '/beside/detail.json';
+    const first = show({ src, 'camera-orbit': '200deg 80deg 1m' });
+    await first.ready;
+    const ledger = MemoryLedger.of(devices[devices.length - 1]);
+    const one = ledger.bytes;
+    Object.defineProperty(navigator, 'deviceMemory', { configurable: true, value: (2.2 * one) / 2 ** 29 });
+    try {
+      const others = Array.from({ length: 3 }, () => show({ src, 'camera-orbit': '200deg 80deg 1m' }));
+      for (const element of others) {
+        await element.ready;
+        assert(element.loaded, String(element.error?.message));
+      }
+      assert(ledger.bytes > one && ledger.bytes <= ledger.budgetBytes, `${ledger.bytes} of ${ledger.budgetBytes}`);
+      for (const element of [first, ...others]) await close(element);
+    } finally {
+      delete (navigator as { deviceMemory?: number }).deviceMemory;
+      stop();
+    }
+  });
 });

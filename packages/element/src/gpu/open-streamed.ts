@@ -1,7 +1,13 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { fetchScene } from '@gaussian-splat/formats';
-import { checkManifest, levelSource, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
+import {
+  checkManifest,
+  levelSource,
+  MemoryLedger,
+  StreamedGaussians,
+  type PoolOptions,
+} from '@gaussian-splat/renderer';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { DetailLevers } from './gpu-scene.js';
@@ -25,6 +31,8 @@ interface Caps {
 
 const PHONE: Caps = { splats: 1e6, bytes: 160e6 };
 const DESKTOP: Caps = { splats: 3e6, bytes: 512e6 };
+/** Of the memory that all scenes of the page have left: another one may come. */
+const SHARE_OF_REST = 0.5;
 /** Pixels that what is drawn may be displaced where the caps leave room for more. */
 const DETAIL = 1;
 
@@ -40,7 +48,11 @@ export async function openStreamed(
   const { signal, memoryBudget = Infinity, onChange } = options;
   const caps = isHandheld() ? PHONE : DESKTOP;
   const pool: PoolOptions = {
-    memoryBudget: Math.min(memoryBudget, caps.bytes),
+    // As coarse as it must be beside many others, but never without a place: asked for when that is taken.
+    get memoryBudget() {
+      const { budgetBytes, bytes } = MemoryLedger.of(device);
+      return Math.min(memoryBudget, caps.bytes, SHARE_OF_REST * Math.max(0, budgetBytes - bytes));
+    },
     signal,
     onChange,
     // A page that is missing leaves what stands for it on show; the console tells whoever looks.
