@@ -8,7 +8,7 @@ import type { Occlusion } from './occlusion.js';
 import { OrderPolicy } from './order-policy.js';
 import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
-import { maxPairs } from './rasterizers/tiles.js';
+import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
 import type { SortName } from './stages/sort.js';
 

@@ -1,19 +1,8 @@
-import {
-  binCount,
-  binEmit,
-  binIndex,
-  binPlan,
-  constants,
-  layouts,
-  rasterizeTiles,
-  rasterizeTilesNoting,
-  scan,
-} from '../generated/shaders.js';
-import { BUFFER_USAGE, TEXTURE_USAGE, ComputeKernel, kernelOf, perDevice, storingInto } from '../gpu/kernel.js';
+import { constants, layouts, type rasterizeTilesNoting } from '../generated/shaders.js';
+import { BUFFER_USAGE, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { planOffsets } from '../scratch.js';
-import { scanBytes } from '../stages/scan.js';
 import { sortedIn, SortStage, type SortBindings, type SortName } from '../stages/sort.js';
 import type {
   AccumulationFormat,
@@ -27,29 +16,17 @@ import type {
   Slice,
   Surface,
 } from './rasterizer.js';
+import { pairBuffers, type PairBuffers } from './pair-buffers.js';
+import { listingKernels, rasterizeKernel, type ListingKernels, type RasterizeKernel } from './tile-kernels.js';
 import { sliceOfTiles } from './tile-slice.js';
 
-const { BIN_WIDTH, BIN_HEIGHT, TILE, PREFIX_THREADS, PROJECT_GROUP, SORT_BLOCK, DIGITS } = constants;
-/** A slot, and a mask of tiles. */
-const PAIR_BYTES = 8;
+const { BIN_WIDTH, BIN_HEIGHT, TILE } = constants;
 
 /** Bins across and down of an image, and the bits of a bin's number. */
 interface Grid {
   readonly columns: number;
   readonly rows: number;
   readonly bits: number;
-}
-
-/** Buffers whose size follows the scene. */
-interface PairBuffers {
-  /** Until pairs are sorted, the second of {@link bins}: it is first written then. */
-  readonly rects: GPUBuffer;
-  readonly groupPairs: GPUBuffer;
-  readonly plan: GPUBuffer;
-  readonly bins: readonly [GPUBuffer, GPUBuffer];
-  readonly pairs: readonly [GPUBuffer, GPUBuffer];
-  readonly digitCounts: GPUBuffer;
-  readonly digitTotals: GPUBuffer;
 }
 
 /** What is bound for one scene and one number of bins. */
@@ -88,7 +65,7 @@ export class TilesRasterizer implements Rasterizer {
   readonly #accumulation: AccumulationFormat;
   readonly #memory: GpuMemory;
   /** Their bind groups fit those of other levers. */
-  readonly #kernels: ReturnType<typeof makeKernels>;
+  readonly #kernels: ListingKernels;
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
@@ -105,7 +82,7 @@ export class TilesRasterizer implements Rasterizer {
     this.#device = device;
     this.#accumulation = accumulation;
     this.#memory = new GpuMemory(device);
-    this.#kernels = makeKernels(device);
+    this.#kernels = listingKernels(device);
     this.#sort = new SortStage(device, sort, 'pairs');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
@@ -132,7 +109,8 @@ export class TilesRasterizer implements Rasterizer {
   bind(inputs: RasterizerInputs): void {
     this.#release();
     this.#inputs = inputs;
-    this.#buffers = this.#allocate(inputs);
+    this.#buffers = pairBuffers(this.#memory, inputs);
+    this.#device.queue.writeBuffer(this.#scanLength, 0, Uint32Array.of(this.#buffers.groupPairs.size / 4 - 1));
   }
 
   prepare(levers: PaintingLevers, format: GPUTextureFormat): void {
@@ -198,27 +176,6 @@ export class TilesRasterizer implements Rasterizer {
     for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.#memory.free(buffer as GPUBuffer);
     this.#forgetGrids();
     this.#buffers = undefined;
-  }
-
-  #allocate({ capacity, pairCapacity }: RasterizerInputs): PairBuffers {
-    const { storage, copyDestination, copySource, indirect } = BUFFER_USAGE;
-    const groups = Math.ceil(capacity / PREFIX_THREADS);
-    const buffer = (name: string, bytes: number): GPUBuffer =>
-      this.#memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination | indirect);
-    // `bin_index` writes its bits in whole groups.
-    const pairs = PROJECT_GROUP * Math.ceil(pairCapacity / PROJECT_GROUP);
-    const bins: [GPUBuffer, GPUBuffer] = [buffer('bins_a', 4 * pairs), buffer('bins_b', 4 * Math.max(pairs, capacity))];
-    const groupPairs = buffer('group_pairs', scanBytes(groups));
-    this.#device.queue.writeBuffer(this.#scanLength, 0, Uint32Array.of(groupPairs.size / 4 - 1));
-    return {
-      rects: bins[1],
-      groupPairs,
-      plan: buffer('plan', layouts.Plan.size + layouts.PagePlan.size),
-      bins,
-      pairs: [buffer('pairs_a', PAIR_BYTES * pairs), buffer('pairs_b', PAIR_BYTES * pairs)],
-      digitCounts: buffer('digit_counts', 4 * DIGITS * Math.ceil(pairCapacity / SORT_BLOCK)),
-      digitTotals: buffer('digit_totals', 4 * DIGITS),
-    };
   }
 
   #gridFor({ width, height }: Surface, inputs: RasterizerInputs, buffers: PairBuffers): GridBindings {
@@ -335,42 +292,4 @@ export class TilesRasterizer implements Rasterizer {
     writeStruct(layouts.BinView, { ...image, ...ends }, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
-}
-
-/** Most pairs for which the device's buffers can have room. */
-export function maxPairs(device: GPUDevice): number {
-  const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
-  return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / PAIR_BYTES);
-}
-
-function makeKernels(device: GPUDevice) {
-  return {
-    count: kernelOf(device, binCount),
-    scan: kernelOf(device, scan),
-    plan: kernelOf(device, binPlan),
-    emit: kernelOf(device, binEmit),
-    index: kernelOf(device, binIndex),
-  };
-}
-
-type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
-
-/** What one pipeline of `rasterize_tiles` is made for. */
-interface RasterizeVariant {
-  readonly format: GPUTextureFormat;
-  readonly isFinal: boolean;
-  readonly isNoting: boolean;
-  readonly notesDepth: boolean;
-}
-
-function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
-  const { format, isFinal, isNoting, notesDepth } = variant;
-  const shader = isNoting ? (rasterizeTilesNoting as unknown as typeof rasterizeTiles) : rasterizeTiles;
-  const [writesHalf, writesBytes] = [format === 'rgba16float', format.endsWith('8unorm')];
-  const constants = {
-    ...{ notes_depth: +notesDepth, is_final: +isFinal },
-    ...{ writes_half: +writesHalf, writes_bytes: +writesBytes },
-  };
-  const key = `${shader.name} ${format} ${JSON.stringify(constants)}`;
-  return perDevice(device, key, () => new ComputeKernel(device, storingInto(shader, format), constants));
 }

@@ -1,0 +1,54 @@
+/** The pipelines of the rasterizer `tiles`. */
+import {
+  binCount,
+  binEmit,
+  binIndex,
+  binPlan,
+  rasterizeTiles,
+  rasterizeTilesNoting,
+  scan,
+} from '../generated/shaders.js';
+import { ComputeKernel, kernelOf, perDevice, storingInto } from '../gpu/kernel.js';
+
+/** Those that list splats for bins: the same whatever the image. */
+export interface ListingKernels {
+  readonly count: ComputeKernel<typeof binCount>;
+  readonly scan: ComputeKernel<typeof scan>;
+  readonly plan: ComputeKernel<typeof binPlan>;
+  readonly emit: ComputeKernel<typeof binEmit>;
+  readonly index: ComputeKernel<typeof binIndex>;
+}
+
+export function listingKernels(device: GPUDevice): ListingKernels {
+  return {
+    count: kernelOf(device, binCount),
+    scan: kernelOf(device, scan),
+    plan: kernelOf(device, binPlan),
+    emit: kernelOf(device, binEmit),
+    index: kernelOf(device, binIndex),
+  };
+}
+
+/** Paints tiles. The one that notes has more bindings: see `rasterize_tiles_noting`. */
+export type RasterizeKernel = ComputeKernel<typeof rasterizeTiles>;
+
+/** What one pipeline of `rasterize_tiles` is made for. */
+export interface RasterizeVariant {
+  readonly format: GPUTextureFormat;
+  readonly isFinal: boolean;
+  readonly isNoting: boolean;
+  readonly notesDepth: boolean;
+}
+
+/** The pipeline for a variant; made once for each device. */
+export function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
+  const { format, isFinal, isNoting, notesDepth } = variant;
+  const shader = isNoting ? (rasterizeTilesNoting as unknown as typeof rasterizeTiles) : rasterizeTiles;
+  const [writesHalf, writesBytes] = [format === 'rgba16float', format.endsWith('8unorm')];
+  const constants = {
+    ...{ notes_depth: +notesDepth, is_final: +isFinal },
+    ...{ writes_half: +writesHalf, writes_bytes: +writesBytes },
+  };
+  const key = `${shader.name} ${format} ${JSON.stringify(constants)}`;
+  return perDevice(device, key, () => new ComputeKernel(device, storingInto(shader, format), constants));
+}
