@@ -17,7 +17,17 @@ const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
 const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'streamed-shaders': ['move_slots', 'note_wishes'],
+  'quantized-shaders': ['move_quantized_slots'],
 };
+/** Stages that are made a second time, for another way in which Gaussians are stored: what takes the place of which part, and what they are. */
+const VARIANTS = [
+  {
+    suffix: '_quantized',
+    stages: ['cull', 'cull_serial', 'order_keys', 'project'],
+    replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
+  },
+];
+RARE['quantized-shaders'].push(...VARIANTS[0].stages.map((stage) => `${stage}_quantized`));
 /** Those of another package, which takes shared parts from the renderer. */
 const ECONOMISE = 'economise';
 RARE[ECONOMISE] = [
@@ -37,11 +47,13 @@ RARE[ECONOMISE] = [
 const fileOf = (stage) => Object.keys(RARE).find((file) => RARE[file].includes(stage)) ?? 'shaders';
 const IMPORT = /^#import (\S+)$/gm;
 
-/** A shader and all files that it imports, each once, before whoever asks for it. */
-function partsOf(path, seen = new Set()) {
+/** A shader and all files that it imports, each once, before whoever asks for it, with others in place of some. */
+function partsOf(path, replaced, seen = new Set()) {
   if (seen.has(path)) return [];
   seen.add(path);
-  const imported = [...textOf(path).matchAll(IMPORT)].flatMap(([, name]) => partsOf(name, seen));
+  const imported = [...textOf(path).matchAll(IMPORT)].flatMap(([, name]) =>
+    partsOf(replaced[name] ?? name, replaced, seen),
+  );
   return [...imported, path];
 }
 
@@ -118,10 +130,15 @@ function note(named, name, value, file) {
 const camelCase = (name) => name.replace(/_(\w)/g, (_, letter) => letter.toUpperCase());
 const literal = (value) => JSON.stringify(value, null, 2);
 
-const stages = readdirSync(shaderFolder)
+const plainStages = readdirSync(shaderFolder)
   .filter((file) => file.endsWith('.wgsl'))
   .map((file) => file.slice(0, -5))
-  .sort();
+  .sort()
+  .map((path) => ({ stage: path, path, replaced: {} }));
+const variantStages = VARIANTS.flatMap(({ suffix, stages, replaced }) =>
+  stages.map((path) => ({ stage: path + suffix, path, replaced })),
+);
+const stages = [...plainStages, ...variantStages];
 /** By name: the layout or the number, and the files whose stages say it. */
 const structs = new Map();
 const constants = new Map();
@@ -131,9 +148,9 @@ const partName = (path) => `${camelCase(path.replace('/', '_'))}Part`;
 const stageFiles = ['shaders', ...Object.keys(RARE)];
 const partsIn = Object.fromEntries(stageFiles.map((file) => [file, new Set()]));
 const sections = Object.fromEntries(stageFiles.map((file) => [file, []]));
-for (const stage of stages) {
+for (const { stage, path: ownPath, replaced } of stages) {
   const home = fileOf(stage);
-  const paths = partsOf(stage);
+  const paths = partsOf(ownPath, replaced);
   for (const path of paths) parts.set(path, ownCode(path));
   for (const path of paths) partsIn[home].add(path);
   const code = paths.map((path) => parts.get(path)).join('\n');

@@ -6,7 +6,7 @@
 #import shared/gathered
 
 @group(0) @binding(0) var<uniform> view: View;
-@group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
+@group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
 @group(0) @binding(2) var<storage, read> chunk_list: array<u32>;
 @group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
 @group(0) @binding(4) var<storage, read_write> group_counts: array<u32>;
@@ -23,11 +23,11 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let i = chunk * CULL_GROUP + lane;
   let share = chunk_shares[view.first_group + chunk];
   if (i < view.splat_count && !is_turned_away(view, i)) {
-    let packed = gaussians[i];
-    if (!is_usable(packed)) {
+    let found = gaussian_at(i);
+    if (!is_usable(found)) {
       atomicAdd(&gathered[UNUSABLE], 1u);
     } else {
-      let depth = visible_depth(packed, share);
+      let depth = visible_depth(found, share);
       if (depth > 0.0) {
         atomicOr(&bits[lane / 32u], 1u << (lane % 32u));
         atomicMax(&nearest_inverted, ~bitcast<u32>(depth));

@@ -4,7 +4,7 @@
 #import shared/gathered
 
 @group(0) @binding(0) var<uniform> view: View;
-@group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
+@group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
 @group(0) @binding(2) var<storage, read> chunk_list: array<u32>;
 @group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
 // Nothing at first.
@@ -23,12 +23,12 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var farthest = 0u;
   for (var k = 0u; k < 32u && first + k < view.splat_count; k++) {
     if (is_turned_away(view, first + k)) { continue; }
-    let packed = gaussians[first + k];
-    if (!is_usable(packed)) {
+    let found = gaussian_at(first + k);
+    if (!is_usable(found)) {
       atomicAdd(&gathered[UNUSABLE], 1u);
       continue;
     }
-    let depth = visible_depth(packed, share);
+    let depth = visible_depth(found, share);
     if (depth > 0.0) {
       bits |= 1u << k;
       nearest = min(nearest, bitcast<u32>(depth));

@@ -1,5 +1,5 @@
 // Adds what some views saw to the moments of the splats of a part: the products of basis functions in the direction of each view, weighted by the energy there.
-#import shared/gaussian
+#import shared/packed_gaussian
 #import shared/moments
 #import shared/group
 #import shared/score

@@ -1,6 +1,7 @@
 // Adds what a view told of the splats of a part, after the tiles have noted their largest weights in it: the energy of each, which is the sum of the
 // squares of its weights over the pixels of the picture, taken for those of an ellipse of that peak and of its size on the screen.
 #import shared/projection
+#import shared/packed_gaussian
 #import shared/group
 #import shared/score
 

@@ -1,7 +1,7 @@
 // Turns the tensors that one run of a generator wrote into a page of packed Gaussians: one thread for each row, and one
 // workgroup for each chunk, whose bounds it finds. Rows that do not live become splats that paint nothing; rows with a number
 // that cannot be used become zeros, which `cull` counts as unusable.
-#import shared/gaussian
+#import shared/packed_gaussian
 #import shared/sh
 #import shared/falloff
 #import shared/chunk

@@ -1,17 +1,11 @@
 // Moves the splats of slots that were filled from a file which serves several places: of each slot those of one workgroup.
-#import shared/gaussian
+#import shared/packed_gaussian
 #import shared/group
-
-struct SlotMove {
-  by: vec3f,
-  slot: u32,
-}
+#import shared/slot_move
 
 @group(0) @binding(0) var<storage, read> moves: array<SlotMove>;
 @group(0) @binding(1) var<storage, read_write> gaussians: array<PackedGaussian>;
 
-// Chunks that a slot has room for.
-const SLOT_CHUNKS = 4u;
 const SLOT_SPLATS = SLOT_CHUNKS * CULL_GROUP;
 const MOVE_THREADS = 256u;
 

@@ -1,6 +1,7 @@
 // Notes which splats of a page showed from one side of the scene, after a picture from there: those of which some pixel had enough, and those that lie outside of the
 // widest picture, of which nothing is known.
 #import shared/projection
+#import shared/packed_gaussian
 #import shared/group
 #import shared/sides
 

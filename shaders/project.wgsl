@@ -1,5 +1,6 @@
 // Projects the survivors of a page: screen ellipse, colour from spherical harmonics, and the depth key of the sort.
 #import shared/projection
+#import shared/stored_gaussian
 #import shared/sh
 #import shared/splat
 #import shared/gathered
@@ -8,7 +9,7 @@
 #import shared/detail
 
 @group(0) @binding(0) var<uniform> view: View;
-@group(0) @binding(1) var<storage, read> gaussians: array<PackedGaussian>;
+@group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
 // Coefficients as pack/sh.ts of the renderer packs them.
 @group(0) @binding(2) var<storage, read> sh: array<vec2u>;
 @group(0) @binding(3) var<storage, read> survivors: array<u32>;
@@ -123,7 +124,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   // In depth order the survivors of all pages are mixed: those of others wrap around to huge numbers.
   let i = survivors[slot] - view.first_group * CULL_GROUP;
   if (i >= view.splat_count) { return; }
-  var g = unpack_gaussian(gaussians[i]);
+  var g = unpack_gaussian(gaussian_at(i));
   g.opacity = shared_opacity(g.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
   let e = project_ellipse(view, g);
   let color = splat_sh_color(i, normalize(g.position - view.eye));

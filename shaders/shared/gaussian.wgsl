@@ -1,13 +1,4 @@
-// A Gaussian as it lies in memory: 32 bytes. Loaded as integers, because only integer bits can tell a NaN or an infinity:
-// WGSL lets compilers assume that floating-point maths never meets one.
-struct PackedGaussian {
-  // x, y, z (float32, page-local); in the upper 22 bits of the last word the upper 22 of a float32, factor xx, and so on
-  // for yx, yy, zx, zy in `tail`. The lower 10 bits of these five words hold, in turn, the upper 22 bits of factor zz and
-  // the upper 28 of the opacity.
-  head: vec4u,
-  tail: vec4u,
-}
-
+// A Gaussian as the stages reckon with it, in page-local coordinates. How it lies in memory: shared/packed_gaussian, shared/quantized_gaussian.
 struct Gaussian {
   position: vec3f,
   opacity: f32,
@@ -15,48 +6,4 @@ struct Gaussian {
   factor_x: vec3f,
   factor_y: vec2f,
   factor_z: f32,
-}
-
-const EXPONENT_BITS = 0x7f800000u;
-const HIGH_22 = 0xfffffc00u;
-// Longest standard deviation of a splat that can be drawn: MIN_LONGEST_SCALE and MAX_SCALE of core.
-const MIN_LONGEST_SCALE = 1e-12;
-const MAX_SCALE = 1e12;
-
-// The float32 words of factor xx, yx, yy, zx and of factor zy, zz and the opacity.
-fn shape_words(g: PackedGaussian) -> array<vec4u, 2> {
-  let own = vec4u(g.head.w, g.tail.xyz) & vec4u(HIGH_22);
-  let last = (g.head.w << 22u) | ((g.tail.x & 0x3ffu) << 12u) | ((g.tail.y & 0x300u) << 2u);
-  let opacity = (g.tail.y << 24u) | ((g.tail.z & 0x3ffu) << 14u) | ((g.tail.w & 0x3ffu) << 4u);
-  return array<vec4u, 2>(own, vec4u(g.tail.w & HIGH_22, last, opacity, 0u));
-}
-
-fn unpack_gaussian(g: PackedGaussian) -> Gaussian {
-  let words = shape_words(g);
-  let own = bitcast<vec4f>(words[0]);
-  let rest = bitcast<vec4f>(words[1]);
-  return Gaussian(
-    bitcast<vec3f>(g.head.xyz),
-    rest.z,
-    vec3f(own.x, own.y, own.w),
-    vec2f(own.z, rest.x),
-    rest.y,
-  );
-}
-
-// Four float32 with an exponent other than that of NaN and infinity.
-fn has_finite_bits(words: vec4u) -> bool {
-  let exponents = words & vec4u(EXPONENT_BITS);
-  return all(exponents != vec4u(EXPONENT_BITS));
-}
-
-// True if every number is finite and the factor is neither nothing nor beyond all bounds.
-fn is_usable(g: PackedGaussian) -> bool {
-  let words = shape_words(g);
-  let finite = has_finite_bits(vec4u(g.head.xyz, 0u)) && has_finite_bits(words[0]) && has_finite_bits(words[1]);
-  let own = abs(bitcast<vec4f>(words[0]));
-  let rest = abs(bitcast<vec4f>(words[1]));
-  let largest = max(max(max(own.x, own.y), max(own.z, own.w)), max(rest.x, rest.y));
-  // No number of the factor is longer than the longest axis, and the largest is at least 1/√3 of it.
-  return finite && largest >= 0.5 * MIN_LONGEST_SCALE && largest <= 1.001 * MAX_SCALE;
 }

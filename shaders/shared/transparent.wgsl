@@ -1,5 +1,5 @@
 // Splats that are left out of a scene stay where they are.
-#import shared/gaussian
+#import shared/packed_gaussian
 
 // A Gaussian with opacity 0, which is culled: the bits that `shape_words` takes for the opacity are cleared.
 fn transparent(g: PackedGaussian) -> PackedGaussian {

@@ -1,5 +1,6 @@
 // Whether a splat paints anything.
 #import shared/projection
+#import shared/stored_gaussian
 #import shared/occlusion
 #import shared/detail
 #import shared/sides
@@ -53,8 +54,8 @@ fn is_turned_away(view: View, splat: u32) -> bool {
 }
 
 // Camera depth of a splat that paints something when it is drawn to a share, 0 of any other.
-fn visible_depth(packed: PackedGaussian, share: f32) -> f32 {
-  var g = unpack_gaussian(packed);
+fn visible_depth(found: FoundGaussian, share: f32) -> f32 {
+  var g = unpack_gaussian(found);
   g.opacity = shared_opacity(g.opacity, share);
   // The cheap tests first: most splats of a scene fail one of them.
   let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;

@@ -33,12 +33,14 @@ for (const [splats, ...options] of [
   [257],
   [1500, '--degree', '0'],
   [1500, '--tile', '2x3', '--spacing', '1e5'],
+  [1500, '--exact', '--degree', '1'],
 ] as const) {
   test(`${splats} splats ${options.join(' ')}: every file is as long as the manifest says`, () => {
-    const out = join(folder, `out-${splats}-${options.length}`);
+    const out = join(folder, `out-${splats}-${options.join('')}`);
     const { status, text } = detail(sceneOf(splats), '--out', out, ...options);
     assert.equal(status, 0, text);
     const manifest = checkManifest(JSON.parse(readFileSync(join(out, 'detail.json'), 'utf8')), 'detail.json');
+    assert.equal(manifest.geometry, options.includes('--exact' as never) ? undefined : 'quantized');
     assert.equal(manifest.splats, splats * (options.includes('--tile' as never) ? 6 : 1));
     for (const { file, chunks } of manifest.trees.flatMap(({ pages }) => pages)) {
       assert.equal(statSync(join(out, file)).size, 4 * pageLayout(manifest, chunks).total, file);

@@ -8,11 +8,15 @@ import { detailFolder } from '../support/detail-folder.js';
 import { randomSource } from '../support/gpu.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 
-const { manifest } = detailFolder(pebbles(6_000), [
+const PLACES = [
   [0, 0, 0],
   [1, 2, 3],
   [4, 5, 6],
-]);
+] as const;
+/** One of each version. */
+const manifests = [undefined, 'quantized' as const].map(
+  (geometry) => detailFolder(pebbles(6_000), PLACES, { geometry }).manifest,
+);
 const ODD = ['null', '-1', '0', '1', '4', '5', '20', '21', '1e9', '1e300', '0.5', '""', '[]', '{}', '[0,0]', '[1e9,0]'];
 
 /** Puts something else in one place of a JSON value, or takes it away, or doubles it. */
@@ -56,11 +60,11 @@ function checkPages(found: DetailManifest): void {
 
 test('whatever is changed in a manifest, it is refused with a name, or each of its pages is below one chunk', () => {
   const random = randomSource(11);
-  const text = JSON.stringify(manifest);
-  checkPages(checkManifest(JSON.parse(text), 'detail.json'));
+  const texts = manifests.map((manifest) => JSON.stringify(manifest));
+  for (const text of texts) checkPages(checkManifest(JSON.parse(text), 'detail.json'));
   let [taken, refused] = [0, 0];
   for (let trial = 0; trial < 6000; trial++) {
-    const changed = JSON.parse(text) as object;
+    const changed = JSON.parse(texts[trial % 2]) as object;
     for (let changes = Math.ceil(3 * random()); changes > 0; changes--) change(changed, random);
     let found: DetailManifest;
     try {
@@ -75,4 +79,20 @@ test('whatever is changed in a manifest, it is refused with a name, or each of i
   }
   console.log(`${taken} taken, ${refused} refused`);
   assert.ok(taken > 100 && refused > 1000);
+});
+
+test('a manifest tells how geometry is stored by its version, and readers of either take no other', () => {
+  const [exact, quantized] = manifests;
+  assert.deepEqual(
+    [exact.version, exact.geometry, quantized.version, quantized.geometry],
+    [1, undefined, 2, 'quantized'],
+  );
+  const refused = [
+    { ...quantized, version: 1 },
+    { ...quantized, geometry: undefined },
+    { ...quantized, geometry: 'halved' },
+    { ...exact, version: 2 },
+    { ...exact, version: 3 },
+  ];
+  for (const manifest of refused) assert.throws(() => checkManifest(manifest, 'detail.json'), /decode\/unsupported/);
 });

@@ -25,6 +25,8 @@ const format = { shDegree: 1, shPrecision: 'int8' } as const;
 const SLOTS = 24;
 const [chunk, slot] = [pageLayout(format, 1), pageLayout(format, SLOT_CHUNKS)];
 const GEOMETRY = chunk.geometry / constants.CULL_GROUP;
+/** Of which a chunk's first row alone moves. */
+const quantized = { ...format, geometry: 'quantized' } as const;
 const PARTS = ['chunks', 'details', 'geometry', 'sh'] as const;
 
 /** Until blocks whose copies are done are mapped again. */
@@ -33,12 +35,20 @@ async function untilMapped(device: GPUDevice): Promise<void> {
   await pause(20);
 }
 
-for (const blocks of [0, 1, 3, 40]) {
-  test(`slots and rows hold what was written to them last, with ${blocks} blocks of mapped memory`, async () => {
+for (const [blocks, kind] of [
+  [0, format],
+  [1, format],
+  [3, format],
+  [40, format],
+  [3, quantized],
+] as const) {
+  const isQuantized = kind === quantized;
+  test(`slots and rows hold what was written to them last, with ${blocks} blocks of mapped memory${isQuantized ? ', quantized' : ''}`, async () => {
+    const slot = pageLayout(kind, SLOT_CHUNKS);
     const device = await anyDevice();
     const random = randomSource(7);
     const memory = new GpuMemory(device);
-    const pool = new PagePool(device, memory, format, { slots: SLOTS, blocks });
+    const pool = new PagePool(device, memory, kind, { slots: SLOTS, blocks });
     const expected = new Float32Array(slot.total * SLOTS);
     const partOf = (part: (typeof PARTS)[number], at: number): Float32Array => {
       const before = PARTS.slice(0, PARTS.indexOf(part)).reduce((sum, name) => sum + slot[name] * SLOTS, 0);
@@ -56,7 +66,7 @@ for (const blocks of [0, 1, 3, 40]) {
         let from = 0;
         for (const part of PARTS) {
           const own = numbers.slice(from, (from += slot[part]));
-          const stride = part === 'chunks' ? 4 : GEOMETRY;
+          const stride = part === 'chunks' ? 4 : isQuantized ? slot.geometry / SLOT_CHUNKS : GEOMETRY;
           for (let first = 0; (part === 'chunks' || part === 'geometry') && first < own.length; first += stride) {
             by.forEach((shift, axis) => (own[first + axis] += shift));
           }

@@ -7,6 +7,7 @@ import {
   packPage,
   treeOfCopies,
   type DetailManifest,
+  type DetailTreeOptions,
 } from '@gaussian-splat/renderer';
 
 export interface DetailFolder {
@@ -17,8 +18,12 @@ export interface DetailFolder {
 }
 
 /** The folder of a cloud, or of copies of it. */
-export function detailFolder(cloud: GaussianCloud, places?: readonly Vector3[]): DetailFolder {
-  const tree = buildDetailTree(cloud);
+export function detailFolder(
+  cloud: GaussianCloud,
+  places?: readonly Vector3[],
+  options: DetailTreeOptions = {},
+): DetailFolder {
+  const tree = buildDetailTree(cloud, options);
   const pages = cutPages(tree, places === undefined);
   const files = new Map<string, ArrayBuffer>();
   pages.forEach((page, p) => files.set(`part-${p}`, packPage(tree, page).buffer));

@@ -1,6 +1,7 @@
 import type { DepthOrder } from './depth-order.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import type { GeometryReading } from './geometry-reading.js';
 import type { Wishes } from './gaussian-scene.js';
 import type { PageTable } from './page-table.js';
 import type { Scratch } from './scratch.js';
@@ -19,26 +20,35 @@ import { constants } from './generated/shaders.js';
 export interface Stages {
   readonly detailBudget: DetailBudgetStage;
   readonly cullChunks: CullChunksStage;
-  readonly cull: CullStage;
   readonly scan: ScanStage;
   readonly plan: PlanStage;
   readonly compact: CompactStage;
   readonly thin: ThinStage;
-  readonly project: ProjectStage;
   readonly sort: SortStage;
+  /** Those that read geometry of a kind. */
+  readonly reading: (kind?: GeometryReading) => ReadingStages;
+}
+
+interface ReadingStages {
+  readonly cull: CullStage;
+  readonly project: ProjectStage;
 }
 
 export function makeStages(device: GPUDevice, { threads, sort }: Pick<Variants, 'threads' | 'sort'>): Stages {
+  const readingStages = (kind?: GeometryReading): ReadingStages => ({
+    cull: new CullStage(device, threads, kind),
+    project: new ProjectStage(device, kind),
+  });
+  const packed = readingStages();
   return {
     detailBudget: new DetailBudgetStage(device),
     cullChunks: new CullChunksStage(device),
-    cull: new CullStage(device, threads),
     scan: new ScanStage(device, threads),
     plan: new PlanStage(device),
     compact: new CompactStage(device),
     thin: new ThinStage(device, threads),
-    project: new ProjectStage(device),
     sort: new SortStage(device, sort),
+    reading: (kind) => (kind ? readingStages(kind) : packed),
   };
 }
 
@@ -48,6 +58,7 @@ interface PageBindings {
   readonly detailCount: GPUBindGroup;
   /** Of a page of a streamed scene. */
   readonly wishes?: { readonly of: Wishes; readonly note: GPUBindGroup };
+  readonly reading: ReadingStages;
   readonly cullChunks: GPUBindGroup;
   readonly cull: GPUBindGroup;
   readonly compact: GPUBindGroup;
@@ -187,12 +198,14 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
   return table.pages.map((page, i) => {
     const view = table.view(i);
     const gaussians = page.geometry;
+    const reading = stages.reading(page.reading);
     const wishes = table.wishesOf(i);
     // Something must be bound where there are no levels of detail and no visible sets; it is not looked at.
     const details = page.details ?? page.chunks;
     const seenFrom = page.seenFrom ?? page.chunks;
     const chunk = { view, chunk_list: chunkList, visible_bits: visibleBits };
     return {
+      reading,
       splatCount: page.count,
       detailCount: stages.detailBudget.bindCount({ view, chunks: page.chunks, details, detail_counts: detailCounts }),
       wishes: wishes && {
@@ -207,7 +220,7 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
         chunk_shares: chunkShares,
         details,
       }),
-      cull: stages.cull.bind({
+      cull: reading.cull.bind({
         ...chunk,
         gaussians,
         group_counts: groupOffsets,
@@ -217,7 +230,7 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
         seen_from: seenFrom,
       }),
       compact: stages.compact.bind({ ...chunk, group_offsets: groupOffsets, survivors }),
-      project: stages.project.bind({
+      project: reading.project.bind({
         ...{ view, gaussians, sh: page.sh, survivors, plan, gathered, splats },
         keys: keys[0],
         chunk_shares: chunkShares,

@@ -15,7 +15,7 @@ interface Working {
   readonly memory: GpuMemory;
   readonly plan: GPUBuffer;
   /** Of each page. */
-  readonly keys: readonly GPUBindGroup[];
+  readonly keys: readonly { readonly stage: OrderKeysStage; readonly bindings: GPUBindGroup }[];
   readonly sort: ReturnType<SortStage['bind']>;
 }
 
@@ -30,7 +30,6 @@ export class DepthOrder {
   readonly length: number;
   readonly #device: GPUDevice;
   readonly #table: PageTable;
-  readonly #keys: OrderKeysStage;
   readonly #sort: SortStage;
   readonly #memory: GpuMemory;
   #order: GPUBuffer | undefined;
@@ -43,7 +42,6 @@ export class DepthOrder {
   constructor(device: GPUDevice, table: PageTable, sort: SortName) {
     this.#device = device;
     this.#table = table;
-    this.#keys = new OrderKeysStage(device);
     this.#sort = new SortStage(device, sort);
     this.#memory = new GpuMemory(device);
     this.length = CULL_GROUP * table.groups;
@@ -76,7 +74,7 @@ export class DepthOrder {
     const { plan, keys, sort } = (this.#working ??= this.#makeWorking(this.#order));
     this.#writePlan(plan);
     const pass = encoder.beginComputePass({ label: 'gs.order', timestampWrites: timer?.timestampWrites('order') });
-    this.#table.pages.forEach(({ count }, page) => this.#keys.record(pass, keys[page], count));
+    this.#table.pages.forEach(({ count }, page) => keys[page].stage.record(pass, keys[page].bindings, count));
     this.#sort.record(pass, sort, plan);
     pass.end();
     this.#axis = axisOf(camera);
@@ -113,9 +111,11 @@ export class DepthOrder {
     };
     return {
       ...{ memory, plan, sort: this.#sort.bind(buffers, KEY_BITS) },
-      keys: this.#table.pages.map(({ geometry }, page) =>
-        this.#keys.bind({ view: this.#table.view(page), gaussians: geometry, keys: keys[0] }),
-      ),
+      keys: this.#table.pages.map(({ geometry, reading }, page) => {
+        const stage = new OrderKeysStage(this.#device, reading);
+        const view = this.#table.view(page);
+        return { stage, bindings: stage.bind({ view, gaussians: geometry, keys: keys[0] }) };
+      }),
     };
   }
 

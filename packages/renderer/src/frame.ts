@@ -42,7 +42,7 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wish
   cull(pass, frame);
   if (frame.depthOrder) listInDepthOrder(pass, frame, frame.depthOrder);
   else listInFileOrder(pass, frame);
-  bindings.pages.forEach(({ project }, page) => frame.stages.project.record(pass, project, scratch.plan, page));
+  bindings.pages.forEach(({ reading, project }, page) => reading.project.record(pass, project, scratch.plan, page));
   noteWishes(pass, frame, wishes);
   pass.end();
   for (const wish of wishes) wish.copy(encoder);
@@ -73,7 +73,7 @@ function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: reado
 /** Finds the visible splats: whole chunks first, then one by one. */
 function cull(pass: GPUComputePassEncoder, { stages, bindings, scratch }: Frame): void {
   for (const { cullChunks, splatCount } of bindings.pages) stages.cullChunks.record(pass, cullChunks, splatCount);
-  bindings.pages.forEach((page, i) => stages.cull.record(pass, page.cull, scratch.chunkArgs, i));
+  bindings.pages.forEach(({ reading, cull: bound }, i) => reading.cull.record(pass, bound, scratch.chunkArgs, i));
 }
 
 function listInFileOrder(pass: GPUComputePassEncoder, { stages, bindings, scratch }: Frame): void {

@@ -1,4 +1,5 @@
 import type { Camera, ShDegree, Vector3 } from '@gaussian-splat/core';
+import type { GeometryReading } from './geometry-reading.js';
 import type { Resource } from './gpu/kernel.js';
 import type { Levers } from './levers.js';
 import type { ShPrecision } from './pack/sh.js';
@@ -7,8 +8,10 @@ import type { Surroundings } from './sides.js';
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
 export interface GaussianPage {
   readonly count: number;
-  /** array<PackedGaussian> */
+  /** array<PackedGaussian>, unless {@link reading} says otherwise */
   readonly geometry: GPUBuffer;
+  /** Of a page with geometry of another kind. */
+  readonly reading?: GeometryReading;
   /** array<vec2u>: spherical harmonics, see pack/sh.ts */
   readonly sh: GPUBuffer;
   /** array<Chunk>: bounds of each 256 splats */

@@ -19,6 +19,7 @@ export {
   packPage,
   type BuiltPage,
   type DetailTree,
+  type DetailTreeOptions,
 } from './detail/build-pages.js';
 export { treeOfCopies } from './detail/tile-tree.js';
 export { StreamedGaussians, type PoolOptions, type StreamOptions } from './detail/streamed-gaussians.js';

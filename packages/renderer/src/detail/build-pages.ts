@@ -1,5 +1,5 @@
 import { boundsOf, validateCloud, type Bounds, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
-import { constants } from '../generated/shaders.js';
+import { constants, layouts } from '../generated/shaders.js';
 import { packedOrder } from '../pack/pack.js';
 import { recentred } from '../pack/recentre.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
@@ -8,9 +8,13 @@ import { buildLevels } from './build-levels.js';
 import { boundLevel, detailRows, leafErrors, parentErrors, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
 import { pageLayout, type DetailManifest } from './manifest.js';
 import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
+import { packQuantizedChunk, QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
 import { chunksOf, type SplatLevel } from './splat-level.js';
 
 const { CULL_GROUP } = constants;
+/** Where the reach of a `Chunk` lies, and by how much sizes and opacities grow at most when they are quantized. */
+const REACH = layouts.Chunk.fields.reach.offset / 4;
+const QUANTIZED_REACH = 1.02;
 
 /** A page before it has a name. */
 export interface BuiltPage {
@@ -30,22 +34,28 @@ export interface DetailTree {
   readonly chunks: readonly Float32Array[];
   readonly errors: readonly ChunkErrors[];
   readonly shPrecision: ShPrecision;
+  readonly geometry?: 'quantized';
   readonly antialiased: boolean;
   readonly origin: Vector3;
   readonly bounds: Bounds;
+}
+
+export interface DetailTreeOptions {
+  /** Half of the bytes for centres, shapes and opacities. Default: as precise as scenes that are not streamed. */
+  readonly geometry?: 'quantized';
 }
 
 /**
  * The levels of detail of a cloud.
  * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
  */
-export function buildDetailTree(given: GaussianCloud): DetailTree {
+export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOptions = {}): DetailTree {
   validateCloud(given);
   const cloud = recentred(given);
   const kept = packedOrder(cloud);
   const { antialiased, origin } = cloud;
   const shPrecision = choosePrecision(cloud, kept);
-  return { ...treeOf(buildLevels(cloud, kept)), shPrecision, antialiased, origin, bounds: boundsOf(given) };
+  return { ...treeOf(buildLevels(cloud, kept)), shPrecision, geometry, antialiased, origin, bounds: boundsOf(given) };
 }
 
 /** Bounds and errors of levels whose finest may itself stand for something, to `leaves`' errors. */
@@ -95,8 +105,8 @@ export function cutPages({ levels }: Pick<DetailTree, 'levels'>, withTop = true)
 
 /** The words of a page's file: see docs/detail-pages.md. */
 export function packPage(tree: DetailTree, { holds, chunks }: BuiltPage): Uint32Array<ArrayBuffer> {
-  const { levels, shPrecision } = tree;
-  const layout = pageLayout({ shDegree: levels[0].shDegree, shPrecision }, chunks);
+  const { levels, shPrecision, geometry: kind } = tree;
+  const layout = pageLayout({ shDegree: levels[0].shDegree, shPrecision, geometry: kind }, chunks);
   const words = new Uint32Array(layout.total);
   const floats = new Float32Array(words.buffer);
   const geometryAt = layout.chunks + layout.details;
@@ -106,8 +116,13 @@ export function packPage(tree: DetailTree, { holds, chunks }: BuiltPage): Uint32
     const [from, end] = [CULL_GROUP * chunk, Math.min(levels[level].count, CULL_GROUP * (chunk + 1))];
     floats.set(tree.chunks[level].subarray(CHUNK_NUMBERS * chunk, CHUNK_NUMBERS * (chunk + 1)), CHUNK_NUMBERS * k);
     floats.set(rowOf(tree, level, chunk), layout.chunks + DETAIL_NUMBERS * k);
-    packLevelGeometry(levels[level], geometry, CULL_GROUP * k, from, end);
-    packFiller(geometry, CULL_GROUP * k + end - from, CULL_GROUP * (k + 1));
+    if (kind === 'quantized') {
+      packQuantizedChunk(levels[level], geometry, QUANTIZED_CHUNK_WORDS * k, from, end);
+      floats[CHUNK_NUMBERS * k + REACH] *= QUANTIZED_REACH;
+    } else {
+      packLevelGeometry(levels[level], geometry, CULL_GROUP * k, from, end);
+      packFiller(geometry, CULL_GROUP * k + end - from, CULL_GROUP * (k + 1));
+    }
     words.set(
       packLevelSh(levels[level], shPrecision, from, end),
       geometryAt + layout.geometry + stride * CULL_GROUP * k,
@@ -132,10 +147,15 @@ export function manifestOf(
   pages: readonly BuiltPage[],
   fileOf: (page: number) => string,
 ): DetailManifest {
-  const { shPrecision, antialiased, origin, bounds, levels } = tree;
+  const { shPrecision, geometry, antialiased, origin, bounds, levels } = tree;
   return {
-    ...{ format: 'gaussian-splat-detail', version: 1, splats: levels[0].count, shDegree: levels[0].shDegree },
-    ...{ shPrecision, antialiased, origin, bounds },
+    ...{
+      format: 'gaussian-splat-detail',
+      version: geometry ? 2 : 1,
+      splats: levels[0].count,
+      shDegree: levels[0].shDegree,
+    },
+    ...{ shPrecision, ...(geometry && { geometry }), antialiased, origin, bounds },
     trees: [
       {
         pages: pages.map(({ chunks, upper, parent }, p) => ({

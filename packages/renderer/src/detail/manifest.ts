@@ -4,6 +4,7 @@ import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { shWords, type ShPrecision } from '../pack/sh.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
+import { QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
 
 /** Chunks that stand for the same one, at most: those of a page, which fill a slot of the pool. */
 export const { SLOT_CHUNKS } = constants;
@@ -43,11 +44,14 @@ export interface TreeInstance {
  */
 export interface DetailManifest {
   readonly format: 'gaussian-splat-detail';
-  readonly version: 1;
+  /** 2 if {@link geometry} is given. */
+  readonly version: 1 | 2;
   /** Splats of the finest level. */
   readonly splats: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
+  /** How centres, shapes and opacities are stored: {@link packQuantizedChunk}. Default: as `PackedGaussian`, in twice the bytes. */
+  readonly geometry?: 'quantized';
   readonly antialiased: boolean;
   readonly origin: Vector3;
   readonly bounds: Bounds;
@@ -56,18 +60,18 @@ export interface DetailManifest {
 }
 
 /** What the size of a page depends on. */
-export type PageFormat = Pick<DetailManifest, 'shDegree' | 'shPrecision'>;
+export type PageFormat = Pick<DetailManifest, 'shDegree' | 'shPrecision' | 'geometry'>;
 
 /** Words of each part of a file, or of a page, one after the other. */
 export function pageLayout(
-  { shDegree, shPrecision }: PageFormat,
+  { shDegree, shPrecision, geometry }: PageFormat,
   chunks: number,
 ): { chunks: number; details: number; geometry: number; sh: number; total: number } {
   const splats = constants.CULL_GROUP * chunks;
   const parts = {
     chunks: CHUNK_NUMBERS * chunks,
     details: DETAIL_NUMBERS * chunks,
-    geometry: GEOMETRY_WORDS * splats,
+    geometry: geometry === 'quantized' ? QUANTIZED_CHUNK_WORDS * chunks : GEOMETRY_WORDS * splats,
     sh: shWords(shDegree, shPrecision) * splats,
   };
   return { ...parts, total: parts.chunks + parts.details + parts.geometry + parts.sh };
@@ -87,12 +91,15 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
       remedy: 'write the folder again with npm run detail',
     });
   };
-  const { format, version, splats, shDegree, shPrecision, antialiased, origin, bounds, trees, instances } = manifest;
+  const { format, version, splats, shDegree, shPrecision, geometry, antialiased, origin, bounds } = manifest;
+  const { trees, instances } = manifest;
   if (format !== 'gaussian-splat-detail') fail('format', 'gaussian-splat-detail', format, 'decode/unsupported');
-  if (version !== 1) fail('version', '1', version, 'decode/unsupported');
+  if (version !== 1 && version !== 2) fail('version', '1 or 2', version, 'decode/unsupported');
   if (!isCount(splats)) fail('splats', 'a number of splats', splats);
   if (![0, 1, 2, 3].includes(shDegree as number)) fail('shDegree', '0, 1, 2 or 3', shDegree);
   if (shPrecision !== 'int8' && shPrecision !== 'float16') fail('shPrecision', 'int8 or float16', shPrecision);
+  const kind = version === 1 ? undefined : 'quantized';
+  if (geometry !== kind) fail('geometry', kind ?? 'nothing in version 1', geometry, 'decode/unsupported');
   if (typeof antialiased !== 'boolean') fail('antialiased', 'true or false', antialiased);
   if (!isVector(origin)) fail('origin', '3 numbers', origin);
   const hasBounds = isVector(bounds?.min) && isVector(bounds.max) && isVector(bounds.center);

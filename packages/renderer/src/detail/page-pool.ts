@@ -6,11 +6,10 @@ import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
 import { BLOCK_BYTES, StagingBelt } from '../gpu/staging-belt.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { GEOMETRY_WORDS } from '../pack/pack.js';
-import { shWords } from '../pack/sh.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
 import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import type { PageList } from './page-list.js';
+import { QUANTIZED } from './quantized-reading.js';
 import { SlotMover } from './slot-mover.js';
 import { chunkLayout, movePoints, numbersOf, startOf, type ChunkLayout, type SlotWords } from './slot-words.js';
 
@@ -69,8 +68,8 @@ export class PagePool {
   constructor(device: GPUDevice, memory: GpuMemory, format: PageFormat, { slots, blocks }: PoolSize) {
     this.#device = device;
     this.#layout = chunkLayout(format);
-    const stride = shWords(format.shDegree, format.shPrecision);
-    const bytes = 4 * Math.max(GEOMETRY_WORDS, stride);
+    const slot = pageLayout(format, SLOT_CHUNKS);
+    const bytes = (4 * Math.max(slot.geometry, slot.sh)) / SLOT_SPLATS;
     const capacity = Math.min(pageCapacity(device, bytes), Math.floor(LARGEST_BUFFER / bytes));
     this.slotsPerBuffer = Math.max(1, Math.floor(capacity / SLOT_SPLATS));
     const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination | BUFFER_USAGE.copySource;
@@ -79,13 +78,15 @@ export class PagePool {
       const own = Math.min(this.slotsPerBuffer, slots - p * this.slotsPerBuffer);
       return {
         count: SLOT_SPLATS * own,
-        geometry: buffer('geometry', GEOMETRY_WORDS * SLOT_SPLATS * own),
-        sh: buffer('sh', stride * SLOT_SPLATS * own),
-        chunks: buffer('chunks', CHUNK_NUMBERS * SLOT_CHUNKS * own),
-        details: buffer('details', DETAIL_NUMBERS * SLOT_CHUNKS * own),
+        reading: format.geometry && QUANTIZED,
+        geometry: buffer('geometry', slot.geometry * own),
+        sh: buffer('sh', slot.sh * own),
+        chunks: buffer('chunks', slot.chunks * own),
+        details: buffer('details', slot.details * own),
       };
     });
-    this.#mover = new SlotMover(device, memory, this.pages, this.slotsPerBuffer);
+    const { slotsPerBuffer } = this;
+    this.#mover = new SlotMover(device, memory, this.pages, { slotsPerBuffer, geometry: format.geometry });
     this.#belt = new StagingBelt(memory, 'gs.pool.staging', blocks);
   }
 

@@ -18,9 +18,14 @@ export class SlotMover {
   readonly #slotsPerBuffer: number;
   readonly #pending = new Map<number, Vector3>();
 
-  constructor(device: GPUDevice, memory: GpuMemory, pages: readonly GaussianPage[], slotsPerBuffer: number) {
+  constructor(
+    device: GPUDevice,
+    memory: GpuMemory,
+    pages: readonly GaussianPage[],
+    { slotsPerBuffer, geometry }: { readonly slotsPerBuffer: number; readonly geometry?: 'quantized' },
+  ) {
     this.#device = device;
-    this.#stage = new MoveSlotsStage(device);
+    this.#stage = new MoveSlotsStage(device, geometry);
     this.#slotsPerBuffer = slotsPerBuffer;
     const usage = BUFFER_USAGE.storage | BUFFER_USAGE.copyDestination;
     this.#pages = pages.map(({ geometry }) => {

@@ -15,7 +15,7 @@ export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): Deta
   const { radius } = tree.bounds;
   return {
     ...treeOf(levels, errorsOfCopies(tree.errors[top], places)),
-    ...{ shPrecision: tree.shPrecision, antialiased: tree.antialiased, origin: tree.origin },
+    ...{ shPrecision: tree.shPrecision, geometry: tree.geometry, antialiased: tree.antialiased, origin: tree.origin },
     bounds: boundsAround(tree.bounds, places, radius),
   };
 }

@@ -1,4 +1,5 @@
-import { constants, cull, cullChunks, cullSerial } from '../generated/shaders.js';
+import { constants, cullChunks, type cull } from '../generated/shaders.js';
+import { PACKED, type GeometryReading } from '../geometry-reading.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import type { Threads } from './threads.js';
 
@@ -21,10 +22,10 @@ export class CullChunksStage {
 
 /** Which splats of the listed chunks paint anything, and how many of each group of 256. */
 export class CullStage {
-  readonly #kernel: ComputeKernel<typeof cull> | ComputeKernel<typeof cullSerial>;
+  readonly #kernel: ComputeKernel<GeometryReading['cull'] | GeometryReading['cullSerial']>;
 
-  constructor(device: GPUDevice, threads: Threads = 'parallel') {
-    this.#kernel = threads === 'serial' ? kernelOf(device, cullSerial) : kernelOf(device, cull);
+  constructor(device: GPUDevice, threads: Threads = 'parallel', reading = PACKED) {
+    this.#kernel = kernelOf(device, reading[threads === 'serial' ? 'cullSerial' : 'cull']);
   }
 
   bind(resources: Resources<typeof cull>): GPUBindGroup {

@@ -1,13 +1,14 @@
-import { orderKeys } from '../generated/shaders.js';
+import type { orderKeys } from '../generated/shaders.js';
+import { PACKED, type GeometryReading } from '../geometry-reading.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import { cullGroups } from './cull.js';
 
 /** Keys that order all splats of a page by depth. */
 export class OrderKeysStage {
-  readonly #kernel: ComputeKernel<typeof orderKeys>;
+  readonly #kernel: ComputeKernel<GeometryReading['orderKeys']>;
 
-  constructor(device: GPUDevice) {
-    this.#kernel = kernelOf(device, orderKeys);
+  constructor(device: GPUDevice, reading = PACKED) {
+    this.#kernel = kernelOf(device, reading.orderKeys);
   }
 
   bind(resources: Resources<typeof orderKeys>): GPUBindGroup {

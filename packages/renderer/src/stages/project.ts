@@ -1,13 +1,14 @@
-import { project } from '../generated/shaders.js';
+import type { project } from '../generated/shaders.js';
+import { PACKED, type GeometryReading } from '../geometry-reading.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import { planOffsets } from '../scratch.js';
 
 /** Screen ellipse, colour and depth key of the survivors of a page. */
 export class ProjectStage {
-  readonly #kernel: ComputeKernel<typeof project>;
+  readonly #kernel: ComputeKernel<GeometryReading['project']>;
 
-  constructor(device: GPUDevice) {
-    this.#kernel = kernelOf(device, project);
+  constructor(device: GPUDevice, reading = PACKED) {
+    this.#kernel = kernelOf(device, reading.project);
   }
 
   bind(resources: Resources<typeof project>): GPUBindGroup {

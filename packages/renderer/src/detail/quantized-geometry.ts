@@ -1,0 +1,122 @@
+import { constants } from '../generated/shaders.js';
+import { FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
+
+/**
+ * Geometry of a chunk in half of the bytes: 16 a splat and 32 a chunk, as shaders/shared/quantized_gaussian.wgsl reads it. Centres are kept to 1/131,070 of the chunk's box, lengths of the
+ * factor's rows (standard deviations along x, y and z) to 1/2046 of the octaves between the chunk's least and largest, directions of its rows to some 0.0004, opacities to 1/3000.
+ */
+
+const {
+  CULL_GROUP,
+  ALPHA_MIN,
+  QUANTIZED_HEAD_ROWS,
+  QUANTIZED_CHUNK_ROWS,
+  QUANTIZED_SIZES,
+  QUANTIZED_T_ZERO,
+  QUANTIZED_UV_ZERO,
+  QUANTIZED_OPAQUE,
+} = constants;
+
+/** 32-bit words of a chunk. */
+export const QUANTIZED_CHUNK_WORDS = 4 * QUANTIZED_CHUNK_ROWS;
+const CENTER_STEPS = 65535;
+const MOST_OPACITY = 4095;
+/** The first opacity that is drawn. */
+const FIRST_VISIBLE = Math.ceil(ALPHA_MIN * QUANTIZED_OPAQUE);
+/** Octaves below the largest row of a chunk: what is smaller shows nowhere beside it. */
+const MOST_OCTAVES = 24;
+
+const float = new Float32Array(1);
+const bits = new Uint32Array(float.buffer);
+
+/** The least float32 that is not below a number, which is 0 or more. */
+function roundedUp(value: number): number {
+  float[0] = value;
+  if (float[0] < value) bits[0]++;
+  return float[0];
+}
+
+/** The nearest code, 0 for what is below `least`. */
+const codeOf = (value: number, least: number, step: number, most: number): number =>
+  step > 0 ? Math.min(most, Math.max(0, Math.round((value - least) / step))) : 0;
+
+/** Lengths of the rows of a factor (xx, yx, yy, zx, zy, zz) from number `f` on. */
+function rowLengths(factors: Float32Array, f: number, lengths: Float64Array): void {
+  lengths[0] = Math.abs(factors[f]);
+  lengths[1] = Math.hypot(factors[f + 1], factors[f + 2]);
+  lengths[2] = Math.hypot(factors[f + 3], factors[f + 4], factors[f + 5]);
+}
+
+/** Log2 of the least and of the largest row of some splats, at most {@link MOST_OCTAVES} apart. */
+function octavesOf({ factors }: SplatLevel, from: number, end: number): readonly [least: number, largest: number] {
+  const lengths = new Float64Array(3);
+  let [least, largest] = [Infinity, 0];
+  for (let i = from; i < end; i++) {
+    rowLengths(factors, FACTOR_NUMBERS * i, lengths);
+    least = Math.min(least, lengths[0], lengths[1], lengths[2]);
+    largest = Math.max(largest, lengths[0], lengths[1], lengths[2]);
+  }
+  const high = largest > 0 ? Math.log2(largest) : 0;
+  return [Math.max(high - MOST_OCTAVES, Math.min(high, Math.log2(least))), high];
+}
+
+/**
+ * Writes splats `from` to `end` of a level as one chunk, from word `at` on. What fills it up has opacity 0.
+ * @param words all zeros there
+ */
+export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: number, from: number, end: number): void {
+  if (end - from > CULL_GROUP) throw new RangeError(`expected at most ${CULL_GROUP} splats, found ${end - from}`);
+  const floats = new Float32Array(words.buffer, words.byteOffset, words.length);
+  const { positions, factors, opacities } = level;
+  for (let axis = 0; axis < 3; axis++) {
+    let [low, high] = [Infinity, -Infinity];
+    for (let i = from; i < end; i++) {
+      low = Math.min(low, positions[3 * i + axis]);
+      high = Math.max(high, positions[3 * i + axis]);
+    }
+    floats[at + axis] = low;
+    floats[at + 4 + axis] = roundedUp((high - low) / CENTER_STEPS);
+  }
+  const [least, largest] = octavesOf(level, from, end);
+  floats[at + 3] = least;
+  floats[at + 7] = roundedUp((largest - floats[at + 3]) / QUANTIZED_SIZES);
+  const lengths = new Float64Array(3);
+  const code = (k: number, value: number, most: number): number =>
+    codeOf(value, floats[at + k], floats[at + 4 + k], most);
+  for (let i = from; i < end; i++) {
+    const [x, y, z] = [0, 1, 2].map((axis) => code(axis, positions[3 * i + axis], CENTER_STEPS));
+    const f = FACTOR_NUMBERS * i;
+    rowLengths(factors, f, lengths);
+    const size = (row: number): number => code(3, Math.log2(lengths[row]), QUANTIZED_SIZES);
+    // L Lᵀ is the same with a column's sign turned, so no number of the diagonal need be negative.
+    const [first, second] = [factors[f] < 0 ? -1 : 1, factors[f + 2] < 0 ? -1 : 1];
+    const t = directionIn2(first * factors[f + 1], factors[f + 2]);
+    const [u, v] = directionIn3(first * factors[f + 3], second * factors[f + 4], factors[f + 5]);
+    const row = at + 4 * (QUANTIZED_HEAD_ROWS + i - from);
+    words[row] = x | (y << 16);
+    words[row + 1] = z | (u << 16) | (t << 29);
+    words[row + 2] = size(0) | (size(1) << 10) | (size(2) << 20) | ((t >>> 3) << 30);
+    words[row + 3] = v | (opacityCode(opacities[i]) << 13) | ((t >>> 5) << 25);
+  }
+}
+
+/** On the same side of 1/255 as the opacity: splats below it are not drawn. */
+function opacityCode(opacity: number): number {
+  const nearest = Math.min(MOST_OPACITY, Math.max(0, Math.round(opacity * QUANTIZED_OPAQUE)));
+  return opacity >= ALPHA_MIN ? Math.max(nearest, FIRST_VISIBLE) : Math.min(nearest, FIRST_VISIBLE - 1);
+}
+
+/** The direction of (x, |y|): where it meets the line |x| + y = 1. */
+function directionIn2(x: number, y: number): number {
+  const sum = Math.abs(x) + Math.abs(y);
+  if (!(sum > 0)) return QUANTIZED_T_ZERO;
+  return QUANTIZED_T_ZERO + Math.round((QUANTIZED_T_ZERO * x) / sum);
+}
+
+/** The direction of (x, y, |z|): the octahedral map of the half sphere, turned by 45° so that it fills a square (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors"). */
+function directionIn3(x: number, y: number, z: number): readonly [u: number, v: number] {
+  const sum = Math.abs(x) + Math.abs(y) + Math.abs(z);
+  if (!(sum > 0)) return [QUANTIZED_UV_ZERO, QUANTIZED_UV_ZERO];
+  const coded = (value: number): number => QUANTIZED_UV_ZERO + Math.round((QUANTIZED_UV_ZERO * value) / sum);
+  return [coded(x + y), coded(x - y)];
+}

@@ -1,0 +1,276 @@
+/** Streamed scenes with quantized geometry: how near they are to what was quantized, and that shaders read what was written. */
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { after, test } from 'node:test';
+import { boundsOf, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
+import { GaussianBuffers, packGaussians, packWithDetail, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import {
+  BUFFER_USAGE,
+  cameraValues,
+  constants,
+  GpuMemory,
+  layouts,
+  leafLevel,
+  OrderKeysStage,
+  packQuantizedChunk,
+  pageLayout,
+  QUANTIZED,
+  QUANTIZED_CHUNK_WORDS,
+  writeStruct,
+  type SplatLevel,
+} from '@gaussian-splat/renderer/stages';
+import { needsSharedData, sharedFile } from '../support/data.js';
+import { detailFolder } from '../support/detail-folder.js';
+import { drawUntilCalm } from '../support/draw-until-calm.js';
+import { randomSource } from '../support/gpu.js';
+import { psnr } from '../support/metrics.js';
+import { anyDevice, endNodeDevice } from '../support/node-device.js';
+import { readQuantizedChunk } from '../support/quantized-twin.js';
+import { readFrame } from '../support/read-frame.js';
+import { readBuffer } from '../support/read-rows.js';
+import { cameraAt } from '../support/scenes.js';
+import { pebbles } from '../support/scenes/pebbles.js';
+
+after(endNodeDevice);
+
+const { CULL_GROUP } = constants;
+const serial = { threads: 'serial', sort: 'serial' } as const;
+const quantized = { geometry: 'quantized' } as const;
+
+const around = (cloud: GaussianCloud, distance: number, angle = 0.5): Camera => {
+  const { center: c, radius } = boundsOf(cloud);
+  const r = distance * radius;
+  const eye: Vector3 = [c[0] + r * Math.cos(angle), c[1] - 0.3 * r, c[2] + r * Math.sin(angle)];
+  return cameraAt(eye, c, { width: 180, height: 120, fovXDegrees: 60, near: 0.01 });
+};
+
+/** Leaves of a random shape and size, sheets and needles among them. */
+function randomLevel(count: number, seed: number): SplatLevel {
+  const random = randomSource(seed);
+  const factors = Float32Array.from({ length: 6 * count }, (_, n) => {
+    const size = 10 ** (-4 * random()) * (random() < 0.2 ? 1e-3 : 1);
+    return [0, 2, 5].includes(n % 6) ? size * (random() < 0.2 ? -1 : 1) : size * (2 * random() - 1);
+  });
+  const level = leafLevel(
+    pebbles(count),
+    Uint32Array.from({ length: count }, (_, i) => i),
+  );
+  const opacities = Float32Array.from({ length: count }, () => Math.E * random() ** 3);
+  return { ...level, factors, opacities };
+}
+
+const covariance = (l: ArrayLike<number>): number[] => [
+  l[0] * l[0],
+  l[0] * l[1],
+  l[1] * l[1] + l[2] * l[2],
+  l[0] * l[3],
+  l[1] * l[3] + l[2] * l[4],
+  l[3] * l[3] + l[4] * l[4] + l[5] * l[5],
+];
+
+for (const count of [1, 2, 255, 256]) {
+  test(`${count} splats come back as they were, to the stated steps`, () => {
+    const level = randomLevel(300, count);
+    const words = new Uint32Array(10 + QUANTIZED_CHUNK_WORDS);
+    packQuantizedChunk(level, words, 10, 7, 7 + count);
+    const [low, high] = [0, 1, 2]
+      .map((axis) => {
+        const own = Array.from({ length: count }, (_, k) => level.positions[3 * (7 + k) + axis]);
+        return [Math.min(...own), Math.max(...own)];
+      })
+      .reduce(
+        ([lows, highs], [least, most]) => [
+          [...lows, least],
+          [...highs, most],
+        ],
+        [[], []] as number[][],
+      );
+    readQuantizedChunk(words, 10, CULL_GROUP).forEach(({ position, factor, opacity }, k) => {
+      const i = 7 + k;
+      if (k >= count) return assert.equal(opacity, 0, 'what fills up the chunk shows');
+      position.forEach((x, axis) => {
+        const error = Math.abs(x - level.positions[3 * i + axis]);
+        assert.ok(error <= (high[axis] - low[axis]) / 131_000 + 1e-7, `centre of ${k}: ${error}`);
+      });
+      assert.ok(Math.abs(opacity - level.opacities[i]) <= 1 / 2900);
+      assert.equal(opacity >= 1 / 255, level.opacities[i] >= 1 / 255);
+      const asked = covariance(level.factors.subarray(6 * i, 6 * i + 6));
+      const found = covariance(factor);
+      const sizes = [asked[0], asked[2], asked[5]].map(Math.sqrt);
+      [
+        [0, 0],
+        [0, 1],
+        [1, 1],
+        [0, 2],
+        [1, 2],
+        [2, 2],
+      ].forEach(([a, b], n) => {
+        const error = Math.abs(found[n] - asked[n]) / (sizes[a] * sizes[b]);
+        assert.ok(error < 0.022, `covariance ${n} of ${k}: off by ${error}`);
+      });
+      return undefined;
+    });
+  });
+}
+
+test('splats without any size along an axis, and chunks of one size, stay what they are', () => {
+  const level = randomLevel(3, 5);
+  const flat = { ...level, count: 3, factors: Float32Array.of(1, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0, 0) };
+  const ball = { ...flat, factors: Float32Array.from(flat.factors, (_, n) => ([0, 2, 5].includes(n % 6) ? 0.25 : 0)) };
+  const words = new Uint32Array(2 * QUANTIZED_CHUNK_WORDS);
+  packQuantizedChunk(flat, words, 0, 0, 3);
+  packQuantizedChunk(ball, words, QUANTIZED_CHUNK_WORDS, 0, 3);
+  for (const { factor } of readQuantizedChunk(words, 0, 3)) {
+    assert.ok(factor.every(Number.isFinite));
+    [1, 0, 1, 0, 0].forEach((x, n) => assert.ok(Math.abs(factor[n] - x) < 1e-5, `${factor}`));
+    assert.ok(factor[5] < 1e-6);
+  }
+  for (const { factor } of readQuantizedChunk(words, QUANTIZED_CHUNK_WORDS, 3)) {
+    factor.forEach((x, n) => assert.ok(Math.abs(x - ball.factors[n]) < 1e-7, `${factor}`));
+  }
+});
+
+/** dB of a streamed scene, all of whose pages are there, from the scene that was loaded whole. */
+async function closenessOf(cloud: GaussianCloud, distances: readonly number[], options: object): Promise<number[]> {
+  const device = await anyDevice();
+  const folder = detailFolder(cloud, undefined, quantized);
+  const whole = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const scene = await StreamedGaussians.open(device, folder.manifest, { fetchPage: folder.fetchPage, arrivalMs: 0 });
+  const [streaming, loaded] = [new Renderer(device, options), new Renderer(device, options)];
+  const found: number[] = [];
+  for (const distance of distances) {
+    const camera = around(cloud, distance, distance);
+    await drawUntilCalm(scene, streaming, camera, 0);
+    const expected = await readFrame(device, loaded, { gaussians: whole, camera, detail: 0 });
+    const drawn = await readFrame(device, streaming, { gaussians: scene, camera, detail: 0 });
+    found.push(psnr(expected, drawn, { channels: 4 }));
+  }
+  assert.equal(scene.progress.resident, scene.progress.total);
+  [streaming, loaded, scene, whole].forEach((owner) => owner.destroy());
+  return found;
+}
+
+const skull = (): Promise<GaussianCloud> => readScene(readFileSync('demo/scenes/skull.spz'), { name: 'skull.spz' });
+
+test('the scene that ships is 62 dB and more from what was quantized, whatever sorts and culls', async () => {
+  const near = await closenessOf(await skull(), [0.6, 1.6], serial);
+  const parallel = await closenessOf(pebbles(4_000), [1.2], {});
+  console.log(`${[...near, ...parallel].map((db) => db.toFixed(1)).join(', ')} dB`);
+  assert.ok(Math.min(...near, ...parallel) > 62);
+});
+
+test('captured scenes are 62 dB and more from what was quantized', { skip: needsSharedData }, async () => {
+  for (const file of ['formats/playbot3.ply', 'scenes/massa.sog']) {
+    const openPart = async (path: string): Promise<Uint8Array> => sharedFile(path);
+    const cloud = await readScene(sharedFile(file), { name: file, openPart });
+    const found = await closenessOf(cloud, [0.6, 1.6], serial);
+    console.log(`${file}: ${found.map((db) => db.toFixed(1)).join(', ')} dB`);
+    assert.ok(Math.min(...found) > 62);
+  }
+});
+
+test('copies that are moved on the GPU, and coarser levels, are what exact pages show', async () => {
+  const device = await anyDevice();
+  const cloud = pebbles(4_000);
+  const places = [0, 1, 2, 3, 4, 5].map((k) => [14.3 * (k % 3), 0.7 * k, 14 * (k >> 1)] as const);
+  const renderer = new Renderer(device, serial);
+  for (const [distance, detail] of [
+    [1.2, 1],
+    [4, 0.7],
+    [9, 2],
+  ]) {
+    const camera = around(cloud, distance, 0.8);
+    const [exact, small] = await Promise.all(
+      [{}, quantized].map(async (options) => {
+        const { manifest, fetchPage } = detailFolder(cloud, places, options);
+        const scene = await StreamedGaussians.open(device, manifest, { fetchPage, arrivalMs: 0 });
+        await drawUntilCalm(scene, renderer, camera, detail);
+        const image = await readFrame(device, renderer, { gaussians: scene, camera, detail });
+        const { visible } = await renderer.readStatistics();
+        scene.destroy();
+        return { image, visible };
+      }),
+    );
+    const close = psnr(exact.image, small.image, { channels: 4 });
+    console.log(`at ${distance}: ${close.toFixed(1)} dB, ${exact.visible} and ${small.visible} visible`);
+    assert.ok(exact.visible > 500 && Math.abs(exact.visible - small.visible) < 0.01 * exact.visible);
+    assert.ok(close > 60, `${close} dB`);
+  }
+  renderer.destroy();
+});
+
+test('keys of the order that outlasts a movement are of the decoded centres', async () => {
+  const device = await anyDevice();
+  const level = randomLevel(500, 3);
+  const words = new Uint32Array(2 * QUANTIZED_CHUNK_WORDS);
+  packQuantizedChunk(level, words, 0, 0, CULL_GROUP);
+  packQuantizedChunk(level, words, QUANTIZED_CHUNK_WORDS, CULL_GROUP, 500);
+  const camera = around(pebbles(500), 0.1);
+  const bytes = new ArrayBuffer(layouts.View.size);
+  const zeros = Object.fromEntries(Object.keys(layouts.View.fields).map((name) => [name, 0]));
+  const values = { ...zeros, ...cameraValues(camera, [0, 0, 0]), splat_count: 500 } as never;
+  writeStruct(layouts.View, values, bytes);
+  const memory = new GpuMemory(device);
+  const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
+  const view = memory.buffer('view', bytes.byteLength, uniform | copyDestination, new Uint32Array(bytes));
+  const gaussians = memory.buffer('gaussians', words.byteLength, storage | copyDestination, words);
+  const keys = memory.buffer('keys', 4 * 512, storage | copySource);
+  const stage = new OrderKeysStage(device, QUANTIZED);
+  const encoder = device.createCommandEncoder();
+  const pass = encoder.beginComputePass();
+  stage.record(pass, stage.bind({ view, gaussians, keys }), 500);
+  pass.end();
+  device.queue.submit([encoder.finish()]);
+  const found = new Uint32Array(await readBuffer(keys));
+  const m = camera.worldToCamera;
+  const splats = [0, QUANTIZED_CHUNK_WORDS].flatMap((at) => readQuantizedChunk(words, at, CULL_GROUP));
+  const depths = splats.map(({ position: [x, y, z] }) => m[8] * x + m[9] * y + m[10] * z + m[11]);
+  const order = Array.from({ length: 500 }, (_, i) => i).sort((a, b) => found[a] - found[b]);
+  for (let k = 1; k < 500; k++) assert.ok(depths[order[k]] >= depths[order[k - 1]] - 1e-5, `rank ${k}`);
+  assert.ok(depths.some((depth) => depth < 0) && depths.some((depth) => depth > 0));
+  memory.destroy();
+});
+
+test('chunks whose first rows make no sense are not drawn, and spoil nothing else', async () => {
+  const device = await anyDevice();
+  const cloud = pebbles(3_000);
+  const { manifest, files } = detailFolder(cloud, undefined, quantized);
+  const renderer = new Renderer(device, serial);
+  const camera = around(cloud, 1.2);
+  const layout = pageLayout(manifest, 1);
+  const spoilt = manifest.trees[0].pages[1];
+  const at = spoilt.chunks * (layout.chunks + layout.details);
+  for (const [word, value] of [
+    [0, 0x7fc00000],
+    [3, 0x7f800000],
+    [4, 0xff800001],
+    [5, 0x7f7fffff],
+    [7, 0x42c80000],
+    [3, 0xc2c80000],
+  ]) {
+    const fetchPage = async (file: string): Promise<ArrayBuffer> => {
+      const words = new Uint32Array(files.get(file)!.slice(0));
+      // Every other chunk.
+      for (let c = 1; file === spoilt.file && c < spoilt.chunks; c += 2)
+        words[at + c * QUANTIZED_CHUNK_WORDS + word] = value;
+      return words.buffer;
+    };
+    const scene = await StreamedGaussians.open(device, manifest, { fetchPage, arrivalMs: 0 });
+    await drawUntilCalm(scene, renderer, camera, 0);
+    const image = await readFrame(device, renderer, { gaussians: scene, camera, detail: 0 });
+    assert.ok(image.every(Number.isFinite), `word ${word}`);
+    const { unusable, visible } = await renderer.readStatistics();
+    assert.ok(unusable > 500 && visible > 300, `word ${word}: ${unusable} refused, ${visible} visible`);
+    scene.destroy();
+  }
+  renderer.destroy();
+});
+
+test('half of the bytes of geometry, and a whole scene with levels holds what it held', () => {
+  const [exact, small] = [undefined, 'quantized' as const].map((geometry) =>
+    pageLayout({ shDegree: 0, shPrecision: 'int8', geometry }, 4),
+  );
+  assert.ok(small.geometry <= 0.51 * exact.geometry);
+  assert.equal(packWithDetail(pebbles(1_000)).geometry.length % 8, 0);
+});
