@@ -38,7 +38,7 @@ const viewFrom = (distance: number, angle = 0.4, x = 0): Camera =>
 /** Bytes of a slot, by what a page of docs/detail-pages.md has. */
 function slotBytes({ scene }: PageSource): number {
   const words = { int8: [2, 4, 8, 14], float16: [2, 6, 14, 24] }[scene.shPrecision][scene.shDegree];
-  return 4 * SLOT_CHUNKS * (8 + 12 + CULL_GROUP * (8 + words));
+  return 4 * SLOT_CHUNKS * (8 + 12 + 8 + CULL_GROUP * (4 + words));
 }
 
 test('pages of levels: slots by what the index says, errors that grow, one sphere for a box', () => {

@@ -1,5 +1,5 @@
 import { boundsOf, validateCloud, type Bounds, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
-import { constants, layouts } from '../generated/shaders.js';
+import { constants } from '../generated/shaders.js';
 import { packedOrder } from '../pack/pack.js';
 import { recentred } from '../pack/recentre.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
@@ -8,13 +8,10 @@ import { buildLevels } from './build-levels.js';
 import { boundLevel, detailRows, leafErrors, parentErrors, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
 import { pageLayout, type DetailManifest } from './manifest.js';
 import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
-import { packQuantizedChunk, QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
+import { packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
 import { chunksOf, type SplatLevel } from './splat-level.js';
 
 const { CULL_GROUP } = constants;
-/** Where the reach of a `Chunk` lies, and by how much sizes and opacities grow at most when they are quantized. */
-const REACH = layouts.Chunk.fields.reach.offset / 4;
-const QUANTIZED_REACH = 1.02;
 
 /** A page before it has a name. */
 export interface BuiltPage {
@@ -118,7 +115,7 @@ export function packPage(tree: DetailTree, { holds, chunks }: BuiltPage): Uint32
     floats.set(rowOf(tree, level, chunk), layout.chunks + DETAIL_NUMBERS * k);
     if (kind === 'quantized') {
       packQuantizedChunk(levels[level], geometry, QUANTIZED_CHUNK_WORDS * k, from, end);
-      floats[CHUNK_NUMBERS * k + REACH] *= QUANTIZED_REACH;
+      widenReach(floats, CHUNK_NUMBERS * k);
     } else {
       packLevelGeometry(levels[level], geometry, CULL_GROUP * k, from, end);
       packFiller(geometry, CULL_GROUP * k + end - from, CULL_GROUP * (k + 1));

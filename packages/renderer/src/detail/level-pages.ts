@@ -61,6 +61,7 @@ export function layOutLevels(
   const shPrecision = sh === 'auto' ? choosePrecision(cloud, usable) : sh;
   const bounds = boundsWithin(coarsest, boxes.length);
   const kept = keptOfNodes(cloud, usable, boxes.length);
+  const format = { shDegree, shPrecision, geometry: 'quantized' } as const;
   const runs: PackedRun[] = [];
   const pages: LevelPage[] = [];
   boxes.forEach((box, b) => {
@@ -68,7 +69,7 @@ export function layOutLevels(
       min: box.min.map((x, axis) => x - origin[axis]),
       max: box.max.map((x, axis) => x - origin[axis]),
     };
-    const packed = packRun(cloud, kept[b], shPrecision, corners);
+    const packed = packRun(cloud, kept[b], format, corners);
     const sphere = sphereAround(packed.chunks, corners);
     const errors = errorsOf(box.counts, spacingOf(cloud.positions, kept[b]), sphere[3]);
     runs.push({ ...packed, sphere, error: errors[0] });
@@ -78,11 +79,11 @@ export function layOutLevels(
   });
   const around = kept.at(-1)!;
   if (around.length > 0) {
-    const packed = packRun(cloud, around, shPrecision);
+    const packed = packRun(cloud, around, format);
     runs.push({ ...packed, sphere: sphereAround(packed.chunks), error: 0 });
   }
   const splats = boxes.reduce((sum, { counts }) => sum + counts.at(-1)!, around.length);
-  const scene = { splats, shDegree, shPrecision, antialiased, origin, bounds };
+  const scene = { ...format, splats, antialiased, origin, bounds };
   const firstChunks = runs.slice(0, boxes.length).map(({ chunks }) => chunks.length / CHUNK_NUMBERS);
   return { scene, first: joinSlots(runs, scene), firstChunks, pages };
 }

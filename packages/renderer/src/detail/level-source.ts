@@ -29,7 +29,7 @@ export function packLevelPage(
       remedy: 'pass the splats of the run that the index names',
     });
   }
-  const run = packRun(placed, mortonOrder(placed.positions, usable), scene.shPrecision);
+  const run = packRun(placed, mortonOrder(placed.positions, usable), scene);
   return joinSlots([{ ...run, sphere, error }], scene);
 }
 

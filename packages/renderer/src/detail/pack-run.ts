@@ -1,12 +1,13 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
-import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { GEOMETRY_WORDS, packKept } from '../pack/pack.js';
-import { shWords, type ShPrecision } from '../pack/sh.js';
+import { boundChunks, CHUNK_NUMBERS } from '../pack/chunks.js';
+import { packGeometry } from '../pack/pack.js';
+import { packSh } from '../pack/sh.js';
 import { detailRows, DETAIL_NUMBERS } from './chunk-detail.js';
 import { SLOT_CHUNKS, pageLayout, type PageFormat } from './manifest.js';
 import { packFiller } from './pack-level.js';
-import { chunksOf } from './splat-level.js';
+import { packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
+import { chunksOf, leafLevel, type SplatLevel } from './splat-level.js';
 
 const { CULL_GROUP } = constants;
 
@@ -32,22 +33,31 @@ export interface PackedRun extends RunWords {
 export function packRun(
   cloud: GaussianCloud,
   kept: Uint32Array,
-  shPrecision: ShPrecision,
+  { shPrecision, geometry }: Pick<PageFormat, 'shPrecision' | 'geometry'>,
   place?: { readonly min: readonly number[]; readonly max: readonly number[] },
 ): RunWords {
   const count = Math.max(place ? 1 : 0, chunksOf(kept.length));
-  const part = packKept(cloud, kept, shPrecision);
+  const layout = pageLayout({ shDegree: cloud.shDegree, shPrecision, geometry }, count);
   const words: RunWords = {
-    geometry: new Uint32Array(GEOMETRY_WORDS * CULL_GROUP * count),
-    sh: new Uint32Array(shWords(cloud.shDegree, shPrecision) * CULL_GROUP * count),
-    chunks: new Float32Array(CHUNK_NUMBERS * count),
+    geometry: new Uint32Array(layout.geometry),
+    sh: new Uint32Array(layout.sh),
+    chunks: new Float32Array(layout.chunks),
   };
-  words.geometry.set(part.geometry);
-  words.sh.set(part.sh);
-  words.chunks.set(part.chunks);
+  words.sh.set(packSh(cloud, kept, shPrecision));
+  words.chunks.set(boundChunks(cloud, kept));
+  if (geometry === 'quantized') quantizeRun(words, leafLevel(cloud, kept));
+  else words.geometry.set(packGeometry(cloud, kept));
   if (place && kept.length === 0) words.chunks.set([...place.min, 0, ...place.max, 0]);
-  packFiller(words.geometry, kept.length, CULL_GROUP * count);
+  if (geometry !== 'quantized') packFiller(words.geometry, kept.length, CULL_GROUP * count);
   return words;
+}
+
+function quantizeRun({ geometry, chunks }: RunWords, level: SplatLevel): void {
+  for (let c = 0; CULL_GROUP * c < level.count; c++) {
+    const end = Math.min(level.count, CULL_GROUP * (c + 1));
+    packQuantizedChunk(level, geometry, QUANTIZED_CHUNK_WORDS * c, CULL_GROUP * c, end);
+    widenReach(chunks, CHUNK_NUMBERS * c);
+  }
 }
 
 /** Puts runs one behind the other into slots: of each what docs/detail-pages.md describes, all but the last full. Nothing is above any of them. */

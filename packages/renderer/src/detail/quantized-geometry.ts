@@ -1,4 +1,4 @@
-import { constants } from '../generated/shaders.js';
+import { constants, layouts } from '../generated/shaders.js';
 import { FACTOR_NUMBERS, type SplatLevel } from './splat-level.js';
 
 /**
@@ -25,6 +25,10 @@ const MOST_OPACITY = 4095;
 const FIRST_VISIBLE = Math.ceil(ALPHA_MIN * QUANTIZED_OPAQUE);
 /** Octaves below the largest row of a chunk: what is smaller shows nowhere beside it. */
 const MOST_OCTAVES = 24;
+
+/** By how much a splat reaches farther at most: sizes and opacities are rounded. */
+const FARTHER = 1.02;
+const REACH = layouts.Chunk.fields.reach.offset / 4;
 
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
@@ -98,6 +102,11 @@ export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: nu
     words[row + 2] = size(0) | (size(1) << 10) | (size(2) << 20) | ((t >>> 3) << 30);
     words[row + 3] = v | (opacityCode(opacities[i]) << 13) | ((t >>> 5) << 25);
   }
+}
+
+/** Makes the bounds of a chunk, which begin at number `at`, those of its quantized splats. */
+export function widenReach(bounds: Float32Array, at: number): void {
+  bounds[at + REACH] *= FARTHER;
 }
 
 /** On the same side of 1/255 as the opacity: splats below it are not drawn. */

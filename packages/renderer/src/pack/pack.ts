@@ -93,7 +93,8 @@ export function usableIndices(cloud: GaussianCloud): Uint32Array {
   return indices.subarray(0, kept);
 }
 
-function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Array {
+/** Their geometry alone. */
+export function packGeometry(cloud: GaussianCloud, kept: Uint32Array): Uint32Array {
   const words = new Uint32Array(kept.length * GEOMETRY_WORDS);
   const floats = new Float32Array(words.buffer);
   const factor = new Float64Array(6);
