@@ -8,6 +8,7 @@ import {
   GaussianBuffers,
   MemoryLedger,
   packWithDetail,
+  readPacked,
   Renderer,
   StreamedGaussians,
 } from '@gaussian-splat/renderer';
@@ -55,6 +56,12 @@ test('a scene that has room for all its pages becomes the picture of the scene t
   }
   assert.ok(scene.progress.resident > 1);
   [streaming, loaded, scene, whole].forEach((owner) => owner.destroy());
+});
+
+test('a streamed scene is not read back as if it were whole', async () => {
+  const scene = await openAll(folder);
+  await assert.rejects(readPacked(await anyDevice(), scene), { code: 'argument/value' });
+  scene.destroy();
 });
 
 /** Detail rows by page, as they are on the GPU. */

@@ -29,7 +29,7 @@ test('shaders ask bits, not floats, whether a number is one', () => {
     return [...same.map(([found]) => found), ...named].map((found) => `${name}: ${found}`);
   });
   assert.deepEqual(faults, []);
-  const guard = texts.get('shared/gaussian.wgsl') ?? '';
+  const guard = texts.get('shared/packed_gaussian.wgsl') ?? '';
   assert.match(guard, /words & vec4u\(EXPONENT_BITS\)/, 'the guard looks at exponent bits');
   assert.match(guard, /EXPONENT_BITS = 0x7f800000u/);
 });

@@ -61,7 +61,7 @@ function visiblePlaces(words: Uint32Array): Places {
 const float = new Float32Array(1);
 const bits = new Uint32Array(float.buffer);
 
-/** As `unpack_gaussian` of shaders/shared/gaussian.wgsl puts it together. */
+/** As `unpack_gaussian` of shaders/shared/packed_gaussian.wgsl puts it together. */
 function opacityOf(words: Uint32Array, at: number): number {
   bits[0] = (words[at + 5] << 24) | ((words[at + 6] & 0x3ff) << 14) | ((words[at + 7] & 0x3ff) << 4);
   return float[0];

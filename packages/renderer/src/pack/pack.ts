@@ -26,7 +26,7 @@ export interface PackedGaussians {
   readonly antialiased: boolean;
   readonly origin: Vector3;
   readonly droppedCount: number;
-  /** [N, 8] words: `PackedGaussian` of shaders/shared/gaussian.wgsl. */
+  /** [N, 8] words: `PackedGaussian` of shaders/shared/packed_gaussian.wgsl. */
   readonly geometry: Uint32Array;
   /** [N, {@link shWords}] words: see shaders/shared/sh.wgsl. */
   readonly sh: Uint32Array;

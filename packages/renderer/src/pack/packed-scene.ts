@@ -1,3 +1,4 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
 import type { GaussianScene } from '../gaussian-scene.js';
 import { constants } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
@@ -9,12 +10,21 @@ const { CULL_GROUP } = constants;
 /** Place of the reach in a chunk: see `boundChunks`. */
 const REACH = 3;
 
+const notWhole = (): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: 'readPacked',
+    expected: 'a scene that is on the GPU as a whole',
+    found: 'a streamed one, of which pages come and go',
+    remedy: 'read the file that it was made of',
+  });
+
 /**
  * Reads a scene back from the GPU as it was packed: for tools that make another one of it. Scenes that generators write cannot be read.
- * Rejects if the device is lost meanwhile.
+ * Rejects if the device is lost meanwhile, and with GaussianSplatError `argument/value` for a scene that is streamed.
  */
 export async function readPacked(device: GPUDevice, scene: GaussianScene): Promise<PackedGaussians> {
-  const { shDegree, shPrecision, antialiased, origin, pages } = scene;
+  const { shDegree, shPrecision, antialiased, origin, pages, wishes } = scene;
+  if (wishes) throw notWhole();
   const stride = shWords(shDegree, shPrecision);
   const read = (name: 'geometry' | 'sh' | 'chunks', words: (count: number) => number): Promise<Uint32Array> =>
     readPages(
