@@ -18,6 +18,7 @@ const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'streamed-shaders': ['move_slots', 'note_wishes'],
   'quantized-shaders': ['move_quantized_slots'],
+  'probe-shaders': ['probe_depth'],
 };
 /** Stages that are made a second time, for another way in which Gaussians are stored: what takes the place of which part, and what they are. */
 const VARIANTS = [

@@ -18,7 +18,12 @@ const plugins = [
   shortShaders(),
   minifyTemplateLiterals({ include: [path('./dist/styles.js'), path('./dist/template.js')] }),
   // Statements compress better than what they can be joined to with commas.
-  terser({ module: true, ecma: 2022, compress: { passes: 4, sequences: false }, format: { comments: false } }),
+  terser({
+    module: true,
+    ecma: 2022,
+    compress: { passes: 4, sequences: false, inline: 1 },
+    format: { comments: false },
+  }),
 ];
 
 /** Chunks carry a hash in their name, so those of earlier builds would pile up. */

@@ -1,3 +1,4 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import type { Attributes } from './attributes.js';
 import type { CameraAction } from './camera/gestures.js';
@@ -39,7 +40,7 @@ export class Behaviours {
     this.#camera = camera;
     this.#options = options;
     const { attributes, requestFrame, surface } = options;
-    const turnBy = (theta: number): void => camera.turnBy(theta);
+    const turnBy = (theta: number): number => camera.turnBy(theta);
     this.motion = new MotionController(host, {
       ...options,
       rotates: options.autoRotates,
@@ -80,8 +81,9 @@ export class Behaviours {
     this.#movers = [this.#autoRotate, this.prompt, fly];
     host.addController({
       hostUpdated: () => (camera.pivot = this.#flies ? 'eye' : 'target'),
-      hostConnected: () => host.addEventListener('focusout', this.#onBlur),
-      hostDisconnected: () => host.removeEventListener('focusout', this.#onBlur),
+      // From the picture to the button inside counts, too.
+      hostConnected: () => host.shadowRoot?.addEventListener('focusout', this.#onBlur),
+      hostDisconnected: () => host.shadowRoot?.removeEventListener('focusout', this.#onBlur),
     });
   }
 
@@ -108,6 +110,12 @@ export class Behaviours {
     else if (this.#flies) this.#fly(action);
     else if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
     else camera.zoomBy(action.factor);
+  }
+
+  /** A person picks another point to turn around: viewer space. */
+  aimAt(point: Vector3): void {
+    this.#touched();
+    this.#camera.aimAt(point);
   }
 
   /** In flight the scene follows the pointer: a drag across the picture turns the view by the picture's own angle. */

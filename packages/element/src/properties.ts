@@ -3,6 +3,9 @@ import type { SpokenStrings } from './words.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { ControlValues, Numbers } from './live/values.js';
 
+/** On wherever it is written, but for `"false"`: what frameworks write that take it for an attribute with a value. */
+const flag = { fromAttribute: (value: string | null): boolean => value !== null && value !== 'false' };
+
 /** The attributes of `<gaussian-splat>` and their properties, keywords written out for editors. What their text means is in attributes.ts. */
 // The interface below only gives inherited methods their types: nothing in it could be missing at run time.
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
@@ -13,7 +16,7 @@ export class SplatProperties extends LitElement {
     poster: {},
     alt: {},
     loading: {},
-    cameraControls: { type: Boolean, attribute: 'camera-controls' },
+    cameraControls: { type: Boolean, converter: flag, attribute: 'camera-controls' },
     cameraOrbit: { attribute: 'camera-orbit' },
     cameraTarget: { attribute: 'camera-target' },
     fieldOfView: { attribute: 'field-of-view' },
@@ -23,8 +26,8 @@ export class SplatProperties extends LitElement {
     maxFieldOfView: { attribute: 'max-field-of-view' },
     interpolationDecay: { attribute: 'interpolation-decay' },
     touchAction: { attribute: 'touch-action' },
-    disableZoom: { type: Boolean, attribute: 'disable-zoom' },
-    disablePan: { type: Boolean, attribute: 'disable-pan' },
+    disableZoom: { type: Boolean, converter: flag, attribute: 'disable-zoom' },
+    disablePan: { type: Boolean, converter: flag, attribute: 'disable-pan' },
     up: {},
     maxPixelRatio: { attribute: 'max-pixel-ratio' },
     frameBudget: { attribute: 'frame-budget' },
@@ -37,18 +40,18 @@ export class SplatProperties extends LitElement {
     postprocess: {},
     time: {},
     pose: {},
-    loop: { type: Boolean },
+    loop: { type: Boolean, converter: flag },
     controls: { attribute: false },
     reveal: {},
     navigation: {},
-    autoRotate: { type: Boolean, attribute: 'auto-rotate' },
+    autoRotate: { type: Boolean, converter: flag, attribute: 'auto-rotate' },
     autoRotateDelay: { attribute: 'auto-rotate-delay' },
     rotationPerSecond: { attribute: 'rotation-per-second' },
     interactionPrompt: { attribute: 'interaction-prompt' },
     interactionPromptStyle: { attribute: 'interaction-prompt-style' },
     interactionPromptThreshold: { attribute: 'interaction-prompt-threshold' },
-    disableTap: { type: Boolean, attribute: 'disable-tap' },
-    autoplay: { type: Boolean },
+    disableTap: { type: Boolean, converter: flag, attribute: 'disable-tap' },
+    autoplay: { type: Boolean, converter: flag },
     a11y: {},
     // Accessors of MediaProperties: named here so that what a page sets before the element is defined reaches them.
     currentTime: { attribute: false, noAccessor: true },
@@ -108,7 +111,8 @@ export class SplatProperties extends LitElement {
    */
   declare detail: string | null;
   /**
-   * Leaves out what views around the scene need least: a share of the splats to keep such as `60%`, or a figure such as `57db` that the picture keeps to.
+   * Leaves out what views around the scene need least: a share of the splats to keep such as `60%`, or a figure such as `57db` that the picture keeps to;
+   * or of each picture in motion what does not show from its side: `views`.
    * Without it all splats are there.
    */
   declare economy: string | null;
@@ -146,7 +150,7 @@ export class SplatProperties extends LitElement {
   declare disableTap: boolean;
   /** Plays a scene that moves as soon as it is on show; not for people who want less motion. */
   declare autoplay: boolean;
-  /** Words for screen readers in place of the English ones: an object or its JSON, with the keys of {@link SpokenStrings}. */
+  /** Words for screen readers, and of messages, in place of the English ones: an object or its JSON, with the keys of {@link SpokenStrings}. */
   declare a11y: SpokenStrings | string | null;
 
   constructor() {

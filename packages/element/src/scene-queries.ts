@@ -3,6 +3,7 @@ import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';
 import { ScenePoint } from './camera/values.js';
 import type { CameraController } from './controllers/camera-controller.js';
+import { isGone } from './gpu/device-failures.js';
 import type { GpuScene } from './gpu/gpu-scene.js';
 
 /** A box in viewer space, its sides along the axes. */
@@ -61,7 +62,7 @@ export class SceneQueries {
       return new ScenePoint(...toViewer(camera.viewerFrame, point));
     } catch (error) {
       // A device that was lost meanwhile has nothing more to say, and its loss is told elsewhere.
-      if (gpuScene.isLost || gpuScene.isDestroyed) return null;
+      if (await isGone(gpuScene)) return null;
       throw error;
     }
   }

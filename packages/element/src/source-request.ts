@@ -6,31 +6,60 @@ import type { Source } from './stage-options.js';
 /** A page's hand in every address; null or undefined for none. */
 export type UrlModifier = ((url: string) => string) | null | undefined;
 
-/** The scene that is asked for; null for none. */
-export function requestOf(
-  { src, contract, chain }: Source,
-  { credentials, quality, detail }: Pick<Attributes, 'credentials' | 'quality' | 'detail'>,
-  modifier: UrlModifier,
-): SceneRequest | null {
-  if (!src) return null;
-  return {
-    url: addressOf(src, modifier),
-    credentials,
-    sh: quality === 'reference' ? 'float16' : 'auto',
-    levels: typeof detail === 'number' && detail > 0,
-    contract,
-    chain: addressesOf(chain, modifier),
-  };
+/**
+ * Addresses of what an attribute names: found once for each value that it is given, as `<img>` does. The address of the page may change
+ * afterwards, and a page's signatures may be others each time.
+ */
+class Named {
+  #values: readonly (string | Blob)[] = [];
+  #modifier: UrlModifier;
+  #urls: readonly string[] = [];
+
+  of(values: readonly (string | Blob)[], modifier: UrlModifier): readonly string[] {
+    const old = this.#values;
+    const isSame = values.length === old.length && values.every((value, i) => value === old[i]);
+    if (!isSame || modifier !== this.#modifier) {
+      [this.#values, this.#modifier] = [values, modifier];
+      this.#urls = values.map((value) => addressOf(value, modifier));
+    }
+    return this.#urls;
+  }
 }
 
-/** Addresses with spaces between them; a property may have been given a list of them. */
-export const addressesOf = (urls: string | null, modifier: UrlModifier): readonly string[] =>
-  [urls]
-    .flat()
-    .join(' ')
-    .split(/\s+/)
-    .filter(Boolean)
-    .map((url) => addressOf(url, modifier));
+/** What the attributes of one element name. */
+export class Addresses {
+  readonly #src = new Named();
+  readonly #chain = new Named();
+  readonly #postprocess = new Named();
+
+  /** The scene that is asked for; null for none. */
+  request(
+    { src, contract, chain }: Source,
+    { credentials, quality, detail }: Pick<Attributes, 'credentials' | 'quality' | 'detail'>,
+    modifier: UrlModifier,
+  ): SceneRequest | null {
+    const [url] = this.#src.of(src ? [src] : [], modifier);
+    if (url === undefined) return null;
+    return {
+      url,
+      credentials,
+      sh: quality === 'reference' ? 'float16' : 'auto',
+      levels: typeof detail === 'number' && detail > 0,
+      contract,
+      chain: this.#chain.of(listed(chain), modifier),
+    };
+  }
+
+  postprocess(urls: string | null, modifier: UrlModifier): readonly string[] {
+    return this.#postprocess.of(listed(urls), modifier);
+  }
+}
+
+/** A property may have been given a list of them. */
+const listed = (urls: string | null): readonly string[] => [urls].flat().join(' ').split(/\s+/).filter(Boolean);
+
+/** A file of another window, an iframe's for one, is none of this one's `Blob`s. */
+const isFile = (source: unknown): source is Blob => 'arrayBuffer' in Object(source);
 
 /** Of files that were given in place of addresses. */
 const fileUrls = new WeakMap<Blob, string>();
@@ -44,7 +73,7 @@ function fileUrl(file: Blob): string {
 
 /** The worker has a base URL of its own, so it is given whole ones. What is no URL stays as it is, and fails there. */
 function addressOf(source: string | Blob, modifier: UrlModifier): string {
-  if (source instanceof Blob) return fileUrl(source);
+  if (isFile(source)) return fileUrl(source);
   const url = URL.canParse(source, document.baseURI) ? new URL(source, document.baseURI).href : source;
   return modifier?.(url) ?? url;
 }

@@ -15,11 +15,11 @@ import { SourceController } from './controllers/source-controller.js';
 import { SizeController } from './controllers/size-controller.js';
 import { ViewController } from './controllers/view-controller.js';
 import { VisibilityController } from './controllers/visibility-controller.js';
+import { isGone } from './gpu/device-failures.js';
 import type { GaussianSplatEventMap } from './events.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
 import { LiveWiring } from './live/live-wiring.js';
 import { SceneQueries } from './scene-queries.js';
-import { addressesOf } from './source-request.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 import type { Source, StageOptions } from './stage-options.js';
 
@@ -164,15 +164,20 @@ export class Stage {
     const { scene } = this.scene;
     const camera = this.#drawnFrom;
     if (scene === null || camera === undefined) return this.stats;
-    const counts = await scene.readCounts(camera);
-    if (this.scene.scene === scene) this.#counts = counts;
+    try {
+      const counts = await scene.readCounts(camera);
+      if (this.scene.scene === scene) this.#counts = counts;
+    } catch (error) {
+      // What was asked for is gone; what there is now is known without it.
+      if (!(await isGone(scene))) throw error;
+    }
     return this.stats;
   }
 
   /** The scene to show. Called after every update; only changes act. */
   setSource(source: Source): void {
-    this.#live.post.want(addressesOf(source.postprocess, this.#options.services().urlModifier));
     this.#source.set(source);
+    this.#live.post.want(this.#source.postprocess);
     if (!this.isLeavingFor(source)) this.playback.keepScene();
   }
 
@@ -277,7 +282,10 @@ export class Stage {
         this.playback.stopWaits();
         this.#dispatch(new Event('emptied'));
       },
-      onError: (error) => this.#dispatch(new CustomEvent('error', { detail: error })),
+      onError: (error) => {
+        this.progress = null;
+        this.#dispatch(new CustomEvent('error', { detail: error }));
+      },
       onContext: (type) => this.#dispatch(new Event(type)),
     });
   }
@@ -342,7 +350,7 @@ export class Stage {
 
   async #retarget(clientX: number, clientY: number): Promise<void> {
     const point = await this.queries.positionFromPoint(clientX, clientY);
-    if (point !== null && this.#options.retargets()) this.camera.aimAt([point.x, point.y, point.z]);
+    if (point !== null && this.#options.retargets()) this.behaviours.aimAt([point.x, point.y, point.z]);
   }
 
   #onVisibility(): void {
@@ -354,7 +362,8 @@ export class Stage {
   }
 
   #onSize(): void {
-    this.camera.setAspect(this.#size.aspect);
+    // Without a size, in a closed tab for one, there is no shape to follow.
+    if (!this.#size.isEmpty) this.camera.setAspect(this.#size.aspect);
     this.#view.requestFrame();
   }
 

@@ -15,7 +15,7 @@ export interface SceneStats {
   readonly spared: number;
   /** dB to the whole scene in views around it that had no say, Infinity where they show no difference; null unless `economy` asks for a figure or for `views`. */
   readonly decibels: number | null;
-  /** Splats on the GPU, those of levels of detail included. */
+  /** Splats on the GPU, those of levels of detail included; of a streamed scene those for which there is room. */
   readonly inMemory: number;
   /**
    * Levels of detail: splats that were merged for them and are on the GPU besides the scene's own, and pixels by which pictures at rest may be off. Of a streamed

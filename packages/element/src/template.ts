@@ -42,7 +42,8 @@ export function template(model: TemplateModel): TemplateResult {
 }
 
 /** The picture. One canvas for life, whatever the attributes: a context cannot move from one to another. */
-function view({ label, controls, navigation, onReveal, strings }: TemplateModel): TemplateResult {
+function view({ label, controls: isControlled, navigation, onReveal, error, strings }: TemplateModel): TemplateResult {
+  const controls = isControlled && error === null;
   const role = controls ? 'application' : label === '' ? 'presentation' : 'img';
   // Behind a poster that waits for a person there is nothing to see or to do yet.
   const isWaiting = onReveal !== null;

@@ -1,7 +1,7 @@
-import { validateCamera, type Camera } from '@gaussian-splat/core';
+import { loadModule, validateCamera, type Camera } from '@gaussian-splat/core';
 import { AccumulationTexture } from './accumulation.js';
 import { makeStages, type Stages } from './bindings.js';
-import { probe, type ProbeAnswer, type ProbePoint } from './depth-probe.js';
+import type { ProbeAnswer, ProbePoint } from './depth-probe.js';
 import { recordProjection } from './frame.js';
 import type { FrameRequest, RendererOptions } from './frame-request.js';
 import { FrameResources } from './frame-resources.js';
@@ -238,10 +238,12 @@ export class Renderer {
 
   /**
    * Looks into the last frame at single points of it: how opaque it is there, where its surface lies, what hides a given depth. The same
-   * for all rasterizers. Reads back from the GPU: for clicks and labels, not for every frame. Rejects if the device is lost meanwhile.
+   * for all rasterizers. Reads back from the GPU: for clicks and labels, not for every frame. Rejects if the device is lost meanwhile,
+   * and with GaussianSplatError `network/unreachable` if the code for it cannot be loaded.
    * @returns an answer for each point; none before the first frame.
    */
   async probeDepth(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
+    const { probe } = await loadModule('the code that looks into a picture', () => import('./depth-probe.js'));
     if (this.#last === undefined || this.#last.scratch !== this.#resources.current?.scratch) return [];
     const { scale, scratch, alphaMin } = this.#last;
     const { plan, splats, order, keys } = scratch;

@@ -124,15 +124,16 @@ export class OrbitCamera {
     return this.#pivot === 'target' ? pose : withTargetAhead(pose);
   }
 
-  /** Turns camera and goal alike around the {@link pivot}, without any damping: radians. */
-  turnBy(theta: number): void {
+  /** Turns camera and goal alike around the {@link pivot}, without any damping: radians. @returns how far the limits let them */
+  turnBy(theta: number): number {
     const before = this.#goal.theta;
     const isStill = !this.moving;
     if (this.#pivot === 'eye') this.lookBy(theta, 0);
     else this.setGoal({ theta: before + theta });
-    if (isStill) return void (this.#now = this.#goal);
+    const turned = this.#goal.theta - before;
     const from = this.#onCourse(this.#now);
-    this.#now = this.#offCourse({ ...from, theta: from.theta + this.#goal.theta - before });
+    this.#now = isStill ? this.#goal : this.#offCourse({ ...from, theta: from.theta + turned });
+    return turned;
   }
 
   /** Turns the goal's view around its own eye by angles in radians. */

@@ -7,7 +7,8 @@ export interface AutoRotateOptions {
   /** Rest before the camera turns, ms. */
   readonly delayMs: () => number;
   readonly radiansPerSecond: () => number;
-  readonly turnBy: (theta: number) => void;
+  /** Returns how far the limits let it. */
+  readonly turnBy: (theta: number) => number;
   readonly requestFrame: () => void;
 }
 
@@ -17,6 +18,8 @@ export class AutoRotateController implements ReactiveController, Mover {
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isTurning = false;
   #lastStep: number | undefined;
+  /** The scene turns to the right, seen from above against the clock, so the camera goes the other way; and back from where it may go no farther. */
+  #direction = -1;
 
   constructor(host: ReactiveControllerHost, options: AutoRotateOptions) {
     this.#options = options;
@@ -55,9 +58,13 @@ export class AutoRotateController implements ReactiveController, Mover {
     }
     const stepMs = this.#lastStep === undefined ? 0 : Math.min(MAX_MOVER_STEP_MS, now - this.#lastStep);
     this.#lastStep = now;
-    // The scene turns to the right, seen from above against the clock, so the camera goes the other way.
-    this.#options.turnBy((-this.#options.radiansPerSecond() * stepMs) / 1000);
-    return true;
+    const step = (this.#options.radiansPerSecond() * stepMs) / 1000;
+    if (step === 0 || this.#options.turnBy(this.#direction * step) !== 0) return true;
+    this.#direction = -this.#direction;
+    if (this.#options.turnBy(this.#direction * step) !== 0) return true;
+    // It may go nowhere.
+    this.#isTurning = false;
+    return false;
   }
 
   #stop(): void {

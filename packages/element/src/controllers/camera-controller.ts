@@ -27,6 +27,8 @@ export class CameraController {
   #userDistance = false;
   /** A person has moved the camera since a scene was framed. */
   #isTouched = false;
+  /** The element itself has turned it. */
+  #isTurned = false;
   #jumped = false;
   #lastStep: number | undefined;
 
@@ -100,7 +102,7 @@ export class CameraController {
   /** A new scene: the camera stands where the attributes ask, at once. */
   frame(bounds: Bounds): void {
     this.#bounds = bounds;
-    this.#isTouched = false;
+    this.#isTouched = this.#isTurned = false;
     this.#reframe('automatic');
   }
 
@@ -110,7 +112,8 @@ export class CameraController {
     this.#camera.limits = limitsOf(this.#settings, bounds, this.#aspect);
     if (!this.#isTouched) {
       this.#source = 'automatic';
-      this.#camera.setGoal(poseOf(this.#settings, bounds, this.#aspect));
+      const { theta, ...pose } = poseOf(this.#settings, bounds, this.#aspect);
+      this.#camera.setGoal(this.#isTurned ? pose : { theta, ...pose });
     }
     this.#onChange();
   }
@@ -179,12 +182,17 @@ export class CameraController {
     this.#moveByUser();
   }
 
-  /** The element itself turns the camera, radians; nothing is damped. */
-  turnBy(theta: number): void {
-    this.#camera.turnBy(theta);
+  /**
+   * The element itself turns the camera, radians; nothing is damped.
+   * @returns how far the limits let it
+   */
+  turnBy(theta: number): number {
+    const turned = this.#camera.turnBy(theta);
+    if (turned === 0) return 0;
     this.#source = 'automatic';
-    this.#jumped = true;
+    this.#jumped = this.#isTurned = true;
     this.#onChange();
+    return turned;
   }
 
   /**

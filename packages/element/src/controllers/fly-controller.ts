@@ -85,6 +85,8 @@ export class FlyController implements ReactiveController, Mover {
   readonly #onUp = (event: KeyboardEvent): void => {
     this.#isFast = event.shiftKey;
     this.#held.delete(event.code);
+    // macOS tells nothing of keys that are released beside this one.
+    if (event.key === 'Meta') this.#held.clear();
     if (this.#held.size === 0) this.#lastStep = undefined;
   };
 

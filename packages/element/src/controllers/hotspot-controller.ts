@@ -122,7 +122,7 @@ export class HotspotController implements ReactiveController {
   #collect(): void {
     const before = this.#hotspots;
     const children = [...this.#host.children].filter(
-      (child): child is HTMLElement => child instanceof HTMLElement && child.slot.startsWith(PREFIX),
+      (child): child is HTMLElement => 'dataset' in child && child.slot.startsWith(PREFIX),
     );
     this.#hotspots = new Map(
       [...groupBySlot(children)].map(([name, elements]) => [name, this.#read(elements, before.get(name))]),

@@ -49,6 +49,8 @@ export class InputController implements ReactiveController {
   readonly #doubleTap = new DoubleTap();
   /** The last pointer was a finger: whether its second tap is a double click, too, differs from browser to browser, and it counts once. */
   #isTouched = false;
+  /** The space bar meant something when it was pressed. */
+  #toggles = false;
   #surface: HTMLElement | null = null;
   #listening: AbortController | undefined;
   #wheel: AbortController | undefined;
@@ -149,14 +151,19 @@ export class InputController implements ReactiveController {
   readonly #onMove = (event: PointerEvent): void => {
     const from = this.#pointers.get(event.pointerId);
     const height = this.#surface?.clientHeight ?? 0;
-    if (from === undefined || height === 0) return;
+    // Where a dialog or a menu of the browser had it, nobody said that the button was released.
+    if (event.buttons === 0 && event.pointerType === 'mouse') this.#pointers.delete(event.pointerId);
+    else if (from !== undefined && height > 0) this.#follow(event, from, height);
+  };
+
+  #follow(event: PointerEvent, from: Pointer, height: number): void {
     const to = positionOf(event);
     const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
     if (!other && from.owner === 'undecided') return this.#decide(event.pointerId, from, to);
     this.#pointers.set(event.pointerId, { ...from, ...to });
     if (other) this.#movePair([from, other], [to, other], height);
     else if (from.owner === 'camera') this.#perform(from.pans ? panOf(from, to, height) : orbitOf(from, to, height));
-  };
+  }
 
   /** Finds out whose a finger is; its drag counts from here on, so that the camera does not jump. */
   #decide(pointerId: number, from: Pointer, to: Point): void {
@@ -174,7 +181,12 @@ export class InputController implements ReactiveController {
 
   readonly #onKey = (event: KeyboardEvent): void => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (event.key === ' ' && !event.repeat && this.#listener.toggleMotion()) return event.preventDefault();
+    if (event.key === ' ') {
+      // Held down it scrolls no page, either.
+      this.#toggles = event.repeat ? this.#toggles : this.#listener.toggleMotion();
+      if (this.#toggles) event.preventDefault();
+      return;
+    }
     const action = keyOf(event.key, event.shiftKey);
     if (action !== null && this.#perform(action)) event.preventDefault();
   };

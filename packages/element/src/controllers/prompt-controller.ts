@@ -8,7 +8,8 @@ export interface PromptOptions {
   readonly thresholdMs: () => number;
   /** Whether the camera moves to and fro with it. */
   readonly wiggles: () => boolean;
-  readonly turnBy: (theta: number) => void;
+  /** Returns how far the limits let it. */
+  readonly turnBy: (theta: number) => number;
   readonly requestFrame: () => void;
 }
 
@@ -68,8 +69,7 @@ export class PromptController implements ReactiveController, Mover {
     this.#start ??= now;
     const elapsed = now - this.#start;
     const turned = wiggleAt(elapsed);
-    if (turned !== this.#turned) this.#options.turnBy(turned - this.#turned);
-    this.#turned = turned;
+    if (turned !== this.#turned) this.#turned += this.#options.turnBy(turned - this.#turned);
     return elapsed < WIGGLE_MS;
   }
 

@@ -130,6 +130,7 @@ export class SceneController implements ReactiveController {
       this.#abort();
       this.#submissions = 1;
       this.#request = request;
+      this.#error = null;
       this.#setState('waiting');
       if (isSwap) this.#options.onEmptied();
     } else if (request.sh !== this.#request?.sh) {
@@ -159,11 +160,10 @@ export class SceneController implements ReactiveController {
 
   hostDisconnected(): void {
     this.#spare(true);
-    this.#releaseTimer = setTimeout(() => this.#clear(), this.#options.releaseDelayMs());
+    this.#releaseTimer = setTimeout(() => this.want(null, false), this.#options.releaseDelayMs());
   }
 
   async #load(request: SceneRequest): Promise<void> {
-    this.#error = null;
     const { signal } = this.#running;
     this.#setState('loading');
     let loaded = 0;
@@ -245,6 +245,7 @@ export class SceneController implements ReactiveController {
     const { device, loader, show, live, memoryBudget, wantsPreviews, frameUrl, loops } = this.#options;
     const onPreview = isNew && wantsPreviews() ? (preview: GpuScene) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
+      if (signal.aborted) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
       // A small preview stays on show meanwhile.
       if (!isSmall) this.#drop(false);

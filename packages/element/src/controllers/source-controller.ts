@@ -1,6 +1,6 @@
 import type { Attributes } from '../attributes.js';
 import type { SceneRequest } from '../loading/protocol.js';
-import { requestOf } from '../source-request.js';
+import { Addresses } from '../source-request.js';
 import type { Services, Source } from '../stage-options.js';
 
 export interface SourceOptions {
@@ -19,6 +19,7 @@ export interface SourceOptions {
 export class SourceController {
   readonly #options: SourceOptions;
   #source: Source = { src: null, contract: null, chain: null, postprocess: null };
+  readonly #addresses = new Addresses();
   /** A script plays the scene, or waits to: it is loaded wherever it is. */
   #isWanted = false;
 
@@ -49,8 +50,13 @@ export class SourceController {
     return this.#options.isOther(this.#requestOf(source));
   }
 
+  /** Addresses of the post-processors that the last source names. */
+  get postprocess(): readonly string[] {
+    return this.#addresses.postprocess(this.#source.postprocess, this.#options.services().urlModifier);
+  }
+
   #requestOf(source: Source): SceneRequest | null {
     const { attributes, services } = this.#options;
-    return requestOf(source, attributes(), services().urlModifier);
+    return this.#addresses.request(source, attributes(), services().urlModifier);
   }
 }

@@ -9,6 +9,7 @@ import {
 } from '@gaussian-splat/economise';
 import { GaussianBuffers, type SidedGaussians } from '@gaussian-splat/renderer';
 import type { EconomyReport } from '../controllers/economy-controller.js';
+import { isGone } from '../gpu/device-failures.js';
 import type { GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
 
 /** What the element's core knows of this module. */
@@ -58,8 +59,8 @@ export class SceneEconomy {
     try {
       await this.#show(goal, memoryBudget, either);
     } catch (error) {
-      // The buffers of a device that goes fail before it says that it is gone.
-      await Promise.race([this.#scene.lost, new Promise((resolve) => setTimeout(resolve, LOSS_MS))]);
+      // Whoever asked looks at it then.
+      await isGone(this.#scene);
       throw error;
     }
   }
@@ -137,8 +138,6 @@ export class SceneEconomy {
 }
 
 const WHOLE: EconomyReport = { spared: 0, decibels: null, byView: false };
-/** How long it takes at most until a lost device says so, ms. */
-const LOSS_MS = 200;
 /** What `balanced`, the best quality that leaves out what does not show, is held to. */
 const LEAST_DECIBELS = 42;
 

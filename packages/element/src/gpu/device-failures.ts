@@ -1,5 +1,6 @@
 /** What a scene's life knows of devices that are lost. */
 import { GaussianSplatError } from '@gaussian-splat/core';
+import type { GpuScene } from './gpu-scene.js';
 
 /** The device went away before the scene was seen. */
 export class DeviceLostError extends Error {}
@@ -20,6 +21,15 @@ export function unrecoverable(cause: unknown): GaussianSplatError {
     remedy: 'reload the page; if it happens again, use a smaller scene or update the graphics driver',
     cause,
   });
+}
+
+/** How long it takes at most until a lost device says so, ms: its buffers fail before. */
+const LOSS_MS = 200;
+
+/** Whether what failed did so because its scene was given up, or lost its device. */
+export async function isGone(scene: GpuScene): Promise<boolean> {
+  if (!scene.isDestroyed) await Promise.race([scene.lost, delay(LOSS_MS)]);
+  return scene.isDestroyed || scene.isLost;
 }
 
 export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));

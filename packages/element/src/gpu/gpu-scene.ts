@@ -269,6 +269,7 @@ export class GpuScene {
   async readCounts(camera: Camera): Promise<ReadCounts> {
     const { visible, overflow } = await this.#renderer.readStatistics();
     const { countContributing } = await loadModule('the code that counts splats', () => import('./contributions.js'));
+    if (this.#destroyed) throw new Error('the scene is gone');
     const { quality } = this.#rendering;
     const view = { ...this.#detail, gaussians: this.#levels ?? this.gaussians, camera, quality };
     return { drawn: visible, left: overflow, contributed: await countContributing(this.device, view) };

@@ -142,6 +142,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
     await chooseVariants(lease.device).catch(unlessWrong);
     limitScenes(lease.device, memoryBudget);
     const { openStreamed } = await opening;
+    signal.throwIfAborted();
     const onChange = (): void => scene?.onIncomplete();
     // How much of it fits is decided when its manifest is there.
     beforeUpload(memoryBudget ?? 0);

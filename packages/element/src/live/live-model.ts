@@ -29,6 +29,8 @@ export interface Timeline {
   readBounds?(): Promise<Bounds>;
   /** Seconds; Infinity where the contract declares none. */
   readonly duration: number;
+  /** Inputs that `control-NAME` sets; absent where there are none. */
+  readonly settable?: readonly string[];
   /** Asks for the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
   request(state: LiveState, camera: Camera): void;
   close(): void;
@@ -53,7 +55,7 @@ export interface LiveRequest {
   /** Folder of the runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
   readonly state: () => LiveState;
-  /** False where controls may be another model's. */
+  /** False where controls may be another model's, which then reports what neither knows. */
   readonly ownsControls: () => boolean;
   /** A camera before anything is known of the scene but, perhaps, the bounds that the contract declares. */
   readonly camera: (bounds: Bounds | undefined) => Camera;

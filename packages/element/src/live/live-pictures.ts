@@ -87,7 +87,7 @@ export class LivePictures {
       this.#tensorFor(name, pixels).upload(pixels);
       if (pixels !== source && pixels instanceof ImageBitmap) pixels.close();
     } catch (error) {
-      if (!this.#isDestroyed) this.#options.onError(error);
+      if (!this.#isDestroyed && !this.#options.signal.aborted) this.#options.onError(error);
     }
   }
 

@@ -44,6 +44,7 @@ export async function openLiveModel(
     const declared = declaredBounds(model.contract);
     pictures.update(request.state().pictures);
     await pictures.settled();
+    signal.throwIfAborted();
     live.request(request.state(), request.camera(declared));
     await generator.idle;
     signal.throwIfAborted();
@@ -70,12 +71,14 @@ function liveModel(
   const reader = new StateReader(models, listeners.onError);
   return {
     gaussians,
+    settable: reader.settable,
     readBounds: () => gaussians.readBounds(),
     duration: models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity,
     request: (state, camera) => {
       pictures.update(state.pictures);
       // Two pictures and the pose of their cameras are one thing: no run may mix old and new. The last one to arrive asks again.
-      if (!pictures.isLoading) generator.request(reader.read(state, camera, pictures.tensors, ownsControls()));
+      if (!pictures.isLoading)
+        generator.request(reader.read(state, camera, pictures.tensors, ownsControls() ? [] : null));
     },
     close: () => {
       generator.close();

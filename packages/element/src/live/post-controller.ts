@@ -4,7 +4,7 @@ import type { PostRequest } from './post-view.js';
 
 export interface PostOptions {
   /** What a post-processor needs to know beyond its address. */
-  readonly request: () => Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
+  readonly request: () => Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
   readonly requestFrame: () => void;
 }
 
@@ -55,7 +55,14 @@ export class PostController {
       if (signal.aborted) return;
       const onError = (error: unknown): void => (signal.aborted ? undefined : options.onError(error));
       const view = await PostView.open(
-        { ...options, urls: this.#urls, signal, onError, onChange: requestFrame },
+        {
+          ...options,
+          urls: this.#urls,
+          signal,
+          others: () => scene.live?.settable ?? [],
+          onError,
+          onChange: requestFrame,
+        },
         scene.device,
       );
       if (signal.aborted || scene.isDestroyed) return view.close();

@@ -10,6 +10,8 @@ export interface PostRequest extends Pick<LiveRequest, 'credentials' | 'runtimeL
   /** One post-processor, or several one after the other. */
   readonly urls: readonly string[];
   readonly signal: AbortSignal;
+  /** Inputs of the scene that `control-NAME` sets, too. */
+  readonly others: () => readonly string[];
   /** The picture would be another one now. */
   readonly onChange: () => void;
   readonly onError: (error: unknown) => void;
@@ -19,6 +21,8 @@ export interface PostRequest extends Pick<LiveRequest, 'credentials' | 'runtimeL
 /** A processor keeps pace from the first time on, ms, and until the second: a run until the GPU has finished it. */
 const KEEPS_PACE_MS = 34;
 const LOSES_PACE_MS = 50;
+/** After a failure, before anything else is tried. */
+const RETRY_MS = 1_000;
 
 /**
  * Shows frames as a post-processor makes them. A frame at rest is always shown processed, as soon as that is ready. While the picture
@@ -39,6 +43,11 @@ export class PostView implements FrameFilter {
   #drawn = '';
   #handed = '';
   #filtered = '';
+  /** What the page said when the last run began, and when one failed: that is not tried again, and nothing else before a time, ms. */
+  #tried = '';
+  #failed = '';
+  #retryAt = 0;
+  #retry: ReturnType<typeof setTimeout> | undefined;
   #keepsPace = false;
 
   private constructor(device: GPUDevice, request: PostRequest, post: PostProcessor) {
@@ -89,7 +98,7 @@ export class PostView implements FrameFilter {
     const key = `${content} ${JSON.stringify(frame.camera)} ${String(frame.background)}`;
     if (key !== this.#drawn) draw({ ...frame, target: surface.drawn });
     this.#drawn = key;
-    if (!this.#post.isBusy) this.#offer(surface, frame);
+    if (!this.#post.isBusy && this.#mayTry(key)) this.#offer(surface, frame);
     surface.present(this.#shows(key) ? 'filtered' : 'drawn', frame.target);
   }
 
@@ -98,6 +107,7 @@ export class PostView implements FrameFilter {
   }
 
   close(): void {
+    clearTimeout(this.#retry);
     const surface = this.#surface;
     this.#surface = undefined;
     this.#post.close();
@@ -116,6 +126,18 @@ export class PostView implements FrameFilter {
     return this.#surface;
   }
 
+  /** False for what failed, and for a while after it. */
+  #mayTry(key: string): boolean {
+    const { controls, pictures, timeSeconds } = this.#request.state();
+    const said = `${key} ${JSON.stringify([controls, timeSeconds])} ${String(Object.values(pictures))}`;
+    if (said === this.#failed) return false;
+    const waitMs = this.#retryAt - performance.now();
+    clearTimeout(this.#retry);
+    if (waitMs > 0) this.#retry = setTimeout(() => this.#request.onChange(), waitMs);
+    else this.#tried = said;
+    return waitMs <= 0;
+  }
+
   /** Hands the drawn frame over, if it or a control is another one than last time. */
   #offer(surface: FilteredFrame, { camera }: Frame): void {
     const { input } = this.#post;
@@ -128,7 +150,10 @@ export class PostView implements FrameFilter {
     }
     this.#pending = surface;
     try {
-      this.#post.request(this.#tensor, this.#reader.read(state, camera, this.#pictures.tensors, false));
+      this.#post.request(
+        this.#tensor,
+        this.#reader.read(state, camera, this.#pictures.tensors, this.#request.others()),
+      );
     } catch (error) {
       this.#request.onError(error);
     }
@@ -148,6 +173,8 @@ export class PostView implements FrameFilter {
 
   #fail(): void {
     this.#filtered = '';
+    this.#failed = this.#tried;
+    this.#retryAt = performance.now() + RETRY_MS;
   }
 
   #shows(key: string): boolean {

@@ -15,11 +15,12 @@ export class StateReader {
     this.#report = report;
   }
 
+  /** @param others names that another model knows; null where that one reports what neither does */
   read(
     state: LiveState,
     camera: Camera,
     pictures: Readonly<Record<string, GpuTensor>>,
-    ownsControls: boolean,
+    others: readonly string[] | null,
   ): GeneratorState {
     const { timeSeconds, pose } = state;
     const controls: Record<string, number | readonly number[]> = {};
@@ -32,7 +33,7 @@ export class StateReader {
         this.#tell(name, 'numbers', String(state.pictures[name]), 'its default counts');
       if (value !== undefined) controls[name] = this.#inRange(name, binding, value);
     }
-    if (ownsControls) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.pictures)]);
+    if (others) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.pictures)], others);
     return { timeSeconds, camera, pose, controls, shape, pictures };
   }
 
@@ -48,13 +49,17 @@ export class StateReader {
     return inside.length === 1 ? inside[0] : inside;
   }
 
-  #reportUnknown(names: readonly string[]): void {
-    const settable = ['control', 'shape', 'image'];
-    const known = Object.keys(this.#inputs).filter((name) => settable.includes(this.#inputs[name].role));
+  /** Inputs that `control-NAME` sets. */
+  get settable(): readonly string[] {
+    const roles = ['control', 'shape', 'image'];
+    return Object.keys(this.#inputs).filter((name) => roles.includes(this.#inputs[name].role));
+  }
+
+  #reportUnknown(names: readonly string[], others: readonly string[]): void {
+    const known = [...this.settable, ...others];
     for (const name of names) {
       if (known.some((input) => input === name || input.toLowerCase() === name)) continue;
-      const expected =
-        known.length > 0 ? `one of the model's inputs ${known.join(', ')}` : 'no control: the model has none';
+      const expected = known.length > 0 ? `one of the inputs ${known.join(', ')}` : 'no control: the model has none';
       this.#tell(name, expected, 'a name that no input has', 'correct the name, or leave it out');
     }
   }

@@ -47,6 +47,8 @@ export class SequencePlayer implements Timeline {
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
   #shown = 0;
+  /** The frame that was asked for last. */
+  #asked = 0;
   #isGrowing = false;
   #isClosed = false;
 
@@ -91,6 +93,9 @@ export class SequencePlayer implements Timeline {
   /** Shows the frame of a time, if it is there; sees to those that follow. */
   request({ timeSeconds }: LiveState): void {
     const frame = this.#frameAt(timeSeconds);
+    // Once around, or back: what failed may be had now.
+    if (frame < this.#asked) for (const [failed, { isFailed }] of this.#slots) if (isFailed) this.#slots.delete(failed);
+    this.#asked = frame;
     this.#prefetch(frame);
     const slot = this.#slots.get(frame);
     if (frame !== this.#shown && slot?.packed) this.#show(frame, slot.packed);

@@ -81,10 +81,7 @@ export class SceneLoader {
     onProgress: ProgressListener,
     onPreview?: PreviewListener,
   ): Promise<LoadedScene | LoadedSequence> {
-    signal.throwIfAborted();
-    clearTimeout(this.#idleTimer);
-    const worker = await (this.#worker ??= this.#start());
-    signal.throwIfAborted();
+    const worker = await this.#workerFor(signal);
     if (worker === null) return this.#loadHere(request, signal, onProgress, onPreview);
     const id = this.#nextId++;
     const message: PageMessage = { type: 'load', id, request, wantsPreviews: onPreview !== undefined };
@@ -112,9 +109,7 @@ export class SceneLoader {
    * refuses workers: its own thread would stand still for seconds. Rejects with GaussianSplatError `out-of-memory/allocation` or the signal's reason.
    */
   async buildLevels(packed: PackedGaussians, signal: AbortSignal): Promise<PackedLevels | undefined> {
-    clearTimeout(this.#idleTimer);
-    const worker = await (this.#worker ??= this.#start());
-    signal.throwIfAborted();
+    const worker = await this.#workerFor(signal);
     if (worker === null) return undefined;
     const message: PageMessage = { type: 'levels', id: this.#nextId++, packed };
     return this.#ask<PackedLevels | undefined>(worker, message, signal, {}, buffersOf(packed));
@@ -127,12 +122,26 @@ export class SceneLoader {
     here: (worker: Here) => Promise<T>,
     listeners: Listeners = {},
   ): Promise<T> {
+    const worker = await this.#workerFor(signal);
+    if (worker === null) return here(await loadWorkerCode());
+    return this.#ask<T>(worker, { ...request, id: this.#nextId++ }, signal, listeners);
+  }
+
+  /** The worker, or null where this page may have none. Rejects with the signal's reason. */
+  async #workerFor(signal: AbortSignal): Promise<Worker | null> {
     signal.throwIfAborted();
     clearTimeout(this.#idleTimer);
     const worker = await (this.#worker ??= this.#start());
+    if (signal.aborted && worker) this.#rest(worker, IDLE_MS);
     signal.throwIfAborted();
-    if (worker === null) return here(await loadWorkerCode());
-    return this.#ask<T>(worker, { ...request, id: this.#nextId++ }, signal, listeners);
+    return worker;
+  }
+
+  /** With nothing to do for so long the worker ends. */
+  #rest(worker: Worker, idleMs: number): void {
+    if (this.#pending.size > 0) return;
+    clearTimeout(this.#idleTimer);
+    this.#idleTimer = setTimeout(() => this.#end(worker), idleMs);
   }
 
   /** Sends a request to the worker, and waits for its answer. */
@@ -158,8 +167,7 @@ export class SceneLoader {
     } finally {
       signal.removeEventListener('abort', cancel);
       this.#pending.delete(id);
-      const idleMs = /^(file|box)/.test(message.type) ? STREAMING_IDLE_MS : IDLE_MS;
-      if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#end(worker), idleMs);
+      this.#rest(worker, /^(file|box)/.test(message.type) ? STREAMING_IDLE_MS : IDLE_MS);
     }
   }
 

@@ -132,7 +132,8 @@ async function importScript(script: string): Promise<Ort> {
     throw new GaussianSplatError('network/unreachable', {
       where: script.slice(0, 200),
       expected: 'the script of onnxruntime-web 1.30.0',
-      found: (cause as Error)?.message ?? 'nothing',
+      // The same whichever copy it was: what is told twice is told once.
+      found: ((cause as Error)?.message ?? 'nothing').replace(address, script),
       remedy: 'put the files of onnxruntime-web there, or name their folder with setRuntimeLocation',
       cause,
     });

@@ -76,6 +76,8 @@ function requireTime(arrivalMs: number): void {
 export class StreamedGaussians implements GaussianScene {
   /** Splats for which there is room. */
   readonly count: number;
+  /** Splats of the finest level. */
+  readonly leafCount: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
@@ -106,6 +108,7 @@ export class StreamedGaussians implements GaussianScene {
     const { shDegree, shPrecision, antialiased, origin, bounds } = scene;
     [this.shDegree, this.shPrecision, this.antialiased, this.origin] = [shDegree, shPrecision, antialiased, origin];
     this.bounds = bounds;
+    this.leafCount = scene.splats;
     this.#source = source;
     this.#options = options;
     requireTime(options.arrivalMs ?? ARRIVAL_MS);

@@ -1,4 +1,4 @@
-import { probeDepth } from '../generated/shaders.js';
+import { probeDepth } from '../generated/probe-shaders.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 
 /** Opacity and depth under single points of the last frame; a workgroup a point. */

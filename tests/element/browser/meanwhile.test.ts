@@ -1,0 +1,152 @@
+import '@gaussian-splat/element';
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  delay,
+  FIXTURES,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
+
+const eventsOf = (element: GaussianSplatElement): string[] => {
+  const seen: string[] = [];
+  for (const type of ['loadstart', 'load', 'emptied', 'error', 'camera-change'])
+    element.addEventListener(type, () => seen.push(type));
+  return seen;
+};
+
+describe('the address of the page', () => {
+  const here = location.href;
+  afterEach(() => history.replaceState(null, '', here));
+
+  it('may change under a scene, as routers do it: a relative src is resolved once', async () => {
+    history.replaceState(null, '', '/tests/element/browser/page');
+    const element = await showLoaded({ src: 'fixtures/compass.splat' });
+    const seen = eventsOf(element);
+    history.pushState(null, '', '/another/place');
+    element.alt = 'the same';
+    await element.updateComplete;
+    element.style.display = 'none';
+    await delay(100);
+    element.style.display = '';
+    await frames(3);
+    assertEqual(seen.filter((type) => type !== 'camera-change').length, 0, `events ${seen}`);
+    assert(element.loaded, 'it stays');
+    // Asked for again, it is another one.
+    element.src = null;
+    await element.updateComplete;
+    element.src = 'fixtures/compass.splat';
+    await nextEvent(element, 'error');
+    assertEqual(element.error?.code, 'network');
+  });
+
+  it('each load is signed once, whatever urlModifier says the next time', async () => {
+    let calls = 0;
+    GaussianSplatElement.urlModifier = (url) => (url.includes('signed') ? `${url}&sig=${calls++}` : url);
+    try {
+      const element = show({ src: `${COMPASS}?signed` });
+      const seen = eventsOf(element);
+      await element.ready;
+      element.alt = 'the same';
+      await element.updateComplete;
+      await delay(100);
+      assertEqual(seen.filter((type) => type === 'loadstart').length, 1, 'loads');
+      assertEqual(calls, 1, 'calls');
+    } finally {
+      GaussianSplatElement.urlModifier = null;
+    }
+  });
+});
+
+describe('another src', () => {
+  it('that waits to be seen: the error of the last one is gone', async () => {
+    const element = show({ src: `${FIXTURES}missing.ply` });
+    await nextEvent(element, 'error');
+    assertEqual(element.progress, 0, 'progress');
+    await element.updateComplete;
+    const view = element.shadowRoot!.querySelector('#view')!;
+    element.cameraControls = true;
+    await element.updateComplete;
+    assertEqual([view.getAttribute('role'), view.hasAttribute('tabindex')], ['img', false], 'nothing to move');
+    element.style.position = 'absolute';
+    element.style.top = '-9999px';
+    await nextEvent(element, 'model-visibility');
+    element.src = COMPASS;
+    await element.updateComplete;
+    assertEqual(element.error, null, 'error');
+    await until(() => !element.shadowRoot!.querySelector('[part=error]'), 'its message to go');
+    element.style.top = '0';
+    await nextEvent(element, 'load');
+    assertEqual(view.getAttribute('role'), 'application');
+  });
+
+  it('while counts are read back: they are those of now, or none', async () => {
+    const element = await showLoaded();
+    const reading = element.updateStats();
+    element.src = null;
+    assertEqual(await reading, null);
+  });
+});
+
+describe('a hidden element', () => {
+  it('keeps the distance that a person chose', async () => {
+    const element = await showLoaded({ 'camera-controls': '' }, 'width: 60px; height: 200px');
+    const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+    view.focus();
+    for (let k = 0; k < 40; k++) view.dispatchEvent(new KeyboardEvent('keydown', { key: '-', bubbles: true }));
+    element.jumpCameraToGoal();
+    const { radius } = element.getCameraOrbit();
+    element.style.display = 'none';
+    await delay(100);
+    element.style.display = '';
+    await frames(4);
+    assertEqual(element.getCameraOrbit().radius, radius);
+  });
+});
+
+describe('attributes and events', () => {
+  it('"false" is off, for frameworks that write it', async () => {
+    const element = await showLoaded({ 'camera-controls': 'false', 'auto-rotate': 'false' });
+    assertEqual([element.cameraControls, element.autoRotate], [false, false]);
+    element.setAttribute('camera-controls', '');
+    assertEqual(element.cameraControls, true);
+  });
+
+  it('a mouse whose button nobody holds drags nothing; a held space bar scrolls nothing', async () => {
+    const element = await showLoaded({ 'camera-controls': '', 'auto-rotate': '', 'auto-rotate-delay': '100000' });
+    const view = element.shadowRoot!.querySelector<HTMLElement>('#view')!;
+    const pointer = (type: string, clientX: number, buttons: number): boolean =>
+      view.dispatchEvent(
+        new PointerEvent(type, { pointerId: 7, pointerType: 'mouse', button: 0, buttons, clientX, clientY: 50 }),
+      );
+    const { theta } = element.getCameraOrbit();
+    pointer('pointerdown', 20, 1);
+    pointer('pointermove', 60, 0);
+    pointer('pointermove', 90, 1);
+    await frames(3);
+    assertEqual(element.getCameraOrbit().theta, theta);
+    const press = (repeat: boolean): boolean =>
+      view.dispatchEvent(new KeyboardEvent('keydown', { key: ' ', repeat, cancelable: true, bubbles: true }));
+    assertEqual([press(false), press(true), press(true)], [false, false, false], "all are the element's");
+  });
+
+  it('what was made in another window counts', async () => {
+    const frame = document.createElement('iframe');
+    document.body.append(frame);
+    const other = frame.contentWindow as Window & typeof globalThis;
+    const bytes = await (await fetch(COMPASS)).arrayBuffer();
+    const element = show({});
+    const hotspot = frame.contentDocument!.createElement('button');
+    hotspot.slot = 'hotspot-other';
+    hotspot.dataset.position = '0 0 0';
+    element.append(hotspot);
+    element.src = new other.File([bytes], 'compass.splat');
+    await nextEvent(element, 'load');
+    await until(() => element.queryHotspot('hotspot-other') !== null, 'the hotspot');
+  });
+});

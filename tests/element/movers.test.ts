@@ -1,0 +1,93 @@
+/** What moves the camera by itself, at the limits of where it may go and while a scene comes in parts. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import type { Bounds } from '@gaussian-splat/core';
+import type { ReactiveControllerHost } from 'lit';
+import { readAttributes, type RawAttributes } from '../../packages/element/src/attributes.js';
+import type { CameraSettings } from '../../packages/element/src/camera/settings.js';
+import { AutoRotateController } from '../../packages/element/src/controllers/auto-rotate-controller.js';
+import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
+import { PromptController } from '../../packages/element/src/controllers/prompt-controller.js';
+
+const BOUNDS: Bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 2 };
+const host = { addController: () => undefined, requestUpdate: () => undefined } as unknown as ReactiveControllerHost;
+const degrees = Math.PI / 180;
+
+const settings = (changes: Partial<RawAttributes>): CameraSettings => {
+  const raw = new Proxy(changes, { get: (given, name) => Reflect.get(given, name) ?? null }) as RawAttributes;
+  return readAttributes(raw, assert.fail).camera;
+};
+
+function framed(changes: Partial<RawAttributes> = {}): CameraController {
+  const camera = new CameraController(settings(changes), () => undefined);
+  camera.frame(BOUNDS);
+  camera.step(0, 0);
+  return camera;
+}
+
+function rotating(camera: CameraController): AutoRotateController {
+  const controller = new AutoRotateController(host, {
+    mayTurn: () => true,
+    delayMs: () => 0,
+    radiansPerSecond: () => 100 * degrees,
+    turnBy: (theta) => camera.turnBy(theta),
+    requestFrame: () => undefined,
+  });
+  controller.start();
+  return controller;
+}
+
+test('auto-rotation turns back at the limits, and stops where it may go nowhere', () => {
+  const camera = framed({ minCameraOrbit: '-10deg auto auto', maxCameraOrbit: '10deg auto auto' });
+  const controller = rotating(camera);
+  const seen: number[] = [];
+  for (let now = 0; now < 2000; now += 16) {
+    assert.equal(controller.advance(now), true);
+    assert.equal(camera.step(now, 0) !== null || now === 0, true, 'each frame shows something else');
+    seen.push(camera.orbit.theta / degrees);
+  }
+  assert.ok(Math.min(...seen) < -9.9 && Math.max(...seen) > 9.9, 'from limit to limit');
+  assert.ok(Math.min(...seen) >= -10.001 && Math.max(...seen) <= 10.001);
+
+  const fixed = framed({ minCameraOrbit: '5deg auto auto', maxCameraOrbit: '5deg auto auto' });
+  const stuck = rotating(fixed);
+  stuck.advance(0);
+  assert.equal(stuck.advance(16), false, 'it goes on though nothing moves');
+  assert.equal(fixed.step(16, 0), null);
+});
+
+test('the prompt leaves the camera where it was, at a limit too', (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  for (const limits of [{}, { maxCameraOrbit: '2deg auto auto' }, { minCameraOrbit: '-1deg auto auto' }]) {
+    const camera = framed(limits);
+    const prompt = new PromptController(host, {
+      mayShow: () => true,
+      thresholdMs: () => 10,
+      wiggles: () => true,
+      turnBy: (theta) => camera.turnBy(theta),
+      requestFrame: () => undefined,
+    });
+    prompt.hostUpdated();
+    t.mock.timers.tick(20);
+    let farthest = 0;
+    for (let now = 0; prompt.advance(now); now += 16) {
+      camera.step(now, 0);
+      farthest = Math.max(farthest, Math.abs(camera.orbit.theta));
+    }
+    assert.ok(farthest > 5 * degrees, 'it wiggles');
+    assert.ok(Math.abs(camera.orbit.theta) < 1e-9, `${JSON.stringify(limits)}: ${camera.orbit.theta}`);
+  }
+});
+
+test('more of a scene changes the distance, not what has been turned meanwhile', () => {
+  const camera = framed();
+  camera.turnBy(-0.7);
+  camera.step(16, 0);
+  const { radius } = camera.orbit;
+  camera.refine({ ...BOUNDS, radius: 4 });
+  camera.jumpToGoal();
+  assert.ok(camera.orbit.radius > 1.5 * radius);
+  assert.ok(Math.abs(camera.orbit.theta + 0.7) < 1e-9, `${camera.orbit.theta}`);
+  camera.frame(BOUNDS);
+  assert.ok(Math.abs(camera.orbit.theta) < 1e-9, 'another scene is seen from where the attributes say');
+});
