@@ -111,6 +111,19 @@ describe('a post-processor in the element', () => {
     await untilLight(element, (mean) => mean < 250, `the processed picture again (${settled.mean})`);
   });
 
+  it('tells of a control that neither it nor the scene has, and of no other', async () => {
+    const told: ElementError[] = [];
+    const element = await showLoaded(
+      { src: BALL, postprocess: `${FIXTURES}post.onnx`, 'control-gain': '0', 'control-gaim': '1' },
+      STYLE,
+    );
+    element.addEventListener('generator-error', ({ detail }) => told.push(detail));
+    await until(() => told.length > 0, 'a report');
+    await delay(500);
+    assertEqual(told.length, 1, told.map(({ message }) => message).join('; '));
+    assert(/control gaim: expected one of the inputs .*gain/.test(told[0].message), told[0].message);
+  });
+
   it('is that of the new size after the element has got one', async () => {
     const element = await showLoaded({ src: COMPASS, 'control-gain': '0' }, STYLE);
     const plain = await lightOf(element);
