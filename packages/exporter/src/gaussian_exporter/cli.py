@@ -78,7 +78,7 @@ def add_common(family: Command) -> None:
     facts.add_argument("--duration", type=float, help="seconds that time 0 to 1 plays")
     facts.add_argument("--fps", type=float)
     written = family.add_argument_group("output")
-    written.add_argument("--layout", choices=get_args(Layout), help="default: packed, or split with float16")
+    written.add_argument("--layout", choices=get_args(Layout), help="default: split; of classic packed, but for float16")
     written.add_argument("--weights", choices=get_args(Weights), default="float32", help="compact: in 16 bits")
     written.add_argument(
         "--instances", type=positive, help="most instances in one run: gives the file an axis for them"
