@@ -10,7 +10,7 @@ const USAGE = `usage: npm run detail -- SCENE --out FOLDER [options]
 
   --out FOLDER    an empty folder, or one that does not exist yet: detail.json and pages/, docs/detail-pages.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
-  --exact         centres, shapes and opacities as float32 keeps them; default: quantized, in half of the bytes, some 67 dB from that
+  --exact         centres, shapes and opacities as float32 keeps them; default: quantized, in half of the bytes, 66 dB and more from that
   --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
   --spacing LEN   world units between copies; default: 2.5 times the radius of the scene
 `;
