@@ -1,10 +1,11 @@
 /** The work behind `npm run detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
-import { existsSync, mkdirSync, readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readdirSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { buildDetailTree, cutPages, manifestOf, packPage, treeOfCopies } from '@gaussian-splat/renderer';
+import { readWhole } from './lib/read-whole.mjs';
 
 const USAGE = `usage: npm run detail -- SCENE --out FOLDER [options]
 
@@ -129,14 +130,14 @@ function writeCopies(out, tree, places) {
 }
 
 async function main({ scene, out, degree, geometry, columns, rows, spacing }) {
-  const openPart = async (path) => new Uint8Array(readFileSync(join(dirname(scene), path)));
-  const cloud = upTo(degree, await readScene(new Uint8Array(readFileSync(scene)), { name: scene, openPart }));
+  const openPart = (path) => readWhole(join(dirname(scene), path));
+  const cloud = upTo(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
   const built = performance.now();
-  mkdirSync(join(out, 'pages'), { recursive: true });
   const isTiled = columns * rows > 1;
   if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
+  mkdirSync(join(out, 'pages'), { recursive: true });
   const places = isTiled ? placesOf(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : [];
   const { manifest, bytes } = isTiled ? writeCopies(out, tree, places) : writeTree(out, 'scene', tree, cutPages(tree));
   writeFileSync(join(out, 'detail.json'), JSON.stringify(manifest));

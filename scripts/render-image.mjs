@@ -1,5 +1,5 @@
 /** The work behind `npm run render`: one scene, one camera, one image, on the same renderer that the element uses. */
-import { readFileSync, writeFileSync } from 'node:fs';
+import { readFileSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { PNG } from 'pngjs';
@@ -7,6 +7,8 @@ import { cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core'
 import { readScene } from '@gaussian-splat/formats';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
+import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
+import { readWhole } from './lib/read-whole.mjs';
 
 const USAGE = `usage: npm run render -- SCENE --camera CAMERA.json --out IMAGE.png [options]
 
@@ -94,10 +96,10 @@ function readCamera(path, name) {
 }
 
 /** Scenes of several files have the others beside the one that is named. */
-function readSceneFile(name) {
+async function readSceneFile(name) {
   const path = resolve(from, name);
-  const openPart = async (part) => new Uint8Array(readFileSync(join(dirname(path), part)));
-  return readScene(new Uint8Array(readFileSync(path)), { name, openPart });
+  const openPart = (part) => readWhole(join(dirname(path), part));
+  return readScene(await readWhole(path), { name, openPart });
 }
 
 /** 8-bit PNG with straight alpha, rounded to nearest. */
@@ -117,7 +119,21 @@ function chooseAccumulation(asked, device) {
   return device.features.has('float32-blendable') ? 'rgba32float' : 'rgba16float';
 }
 
+/** All that can be said of files before the work. */
+function checkFiles({ scene, camera, out, float }) {
+  for (const [option, path] of Object.entries({ out, float })) {
+    if (!path) continue;
+    const file = resolve(from, path);
+    for (const read of [scene, camera])
+      if (isSameFile(file, resolve(from, read)))
+        throw new UsageError(`--${option}: expected another file than ${read}, which is never changed`);
+    const obstacle = obstacleTo(file);
+    if (obstacle) throw new UsageError(`--${option}: ${obstacle}`);
+  }
+}
+
 async function render(options) {
+  checkFiles(options);
   const camera = readCamera(options.camera, options.view);
   const cloud = await readSceneFile(options.scene);
   const antialiased = options.mode === undefined ? cloud.antialiased : options.mode === 'antialiased';
@@ -133,8 +149,8 @@ async function render(options) {
   const statistics = await renderer.readStatistics();
   if (validationErrors.length > 0) throw new Error(`WebGPU: ${validationErrors.join('\n')}`);
 
-  if (options.out) writeFileSync(resolve(from, options.out), encodePng(pixels, camera.width, camera.height));
-  if (options.float) writeFileSync(resolve(from, options.float), new Uint8Array(pixels.buffer));
+  if (options.out) writeWhole(resolve(from, options.out), encodePng(pixels, camera.width, camera.height));
+  if (options.float) writeWhole(resolve(from, options.float), new Uint8Array(pixels.buffer));
   const { width, height } = camera;
   console.log(
     `${options.scene}: ${cloud.count} splats, SH degree ${cloud.shDegree}, ${antialiased ? 'antialiased' : 'classic'}; ` +

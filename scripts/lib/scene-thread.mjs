@@ -1,5 +1,4 @@
 /** Reads a scene file in a thread of its own: see {@link readInThread}. */
-import { readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { isMainThread, parentPort, Worker, workerData } from 'node:worker_threads';
 import { readScene } from '@gaussian-splat/formats';
@@ -19,7 +18,7 @@ export function readInThread(path) {
 }
 
 async function answer(path) {
-  const openPart = async (part) => new Uint8Array(readFileSync(join(dirname(path), part)));
+  const openPart = (part) => readWhole(join(dirname(path), part));
   try {
     const cloud = await readScene(await readWhole(path), { name: path, openPart });
     parentPort.postMessage({ cloud: shared(cloud) });

@@ -2,6 +2,7 @@
 import { createReadStream, statSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { extname, join, normalize, sep } from 'node:path';
+import { pipeline } from 'node:stream';
 
 const TYPES = {
   '.html': 'text/html; charset=utf-8',
@@ -79,5 +80,6 @@ function sendFile(request, response, { path, size }, extraHeaders) {
   if (range) headers['content-range'] = `bytes ${start}-${end}/${size}`;
   response.writeHead(range ? 206 : 200, { ...headers, 'content-length': end - start + 1 });
   if (request.method === 'HEAD' || size === 0) response.end();
-  else createReadStream(path, { start, end }).pipe(response);
+  // A request that is given up closes its file.
+  else pipeline(createReadStream(path, { start, end }), response, () => {});
 }

@@ -38,6 +38,25 @@ const ROUTES: Readonly<Record<string, RequestListener>> = {
     if (requests++ > 0) return void response.end(CONTENT);
     response.write(CONTENT.subarray(0, 100_000), () => setTimeout(() => response.destroy(), 20));
   },
+  // Breaks before the first byte of its body, once.
+  '/bodiless': (_, response) => {
+    response.writeHead(200, { 'Content-Length': CONTENT.length }).flushHeaders();
+    if (requests++ > 0) return void response.end(CONTENT);
+    setTimeout(() => response.destroy(), 20);
+  },
+  // Breaks in a transfer of unknown length, once.
+  '/unknown': (_, response) => {
+    response.writeHead(200).write(CONTENT.subarray(0, 100_000));
+    if (requests++ > 0) return void response.end(CONTENT.subarray(100_000));
+    setTimeout(() => response.destroy(), 20);
+  },
+  // Breaks, and has no time for two requests.
+  '/busy': (request, response) => {
+    if (requests === 1 || requests === 2)
+      return void (requests++, response.writeHead(requests === 2 ? 503 : 429).end());
+    requests++;
+    ranged('"b"')(request, response);
+  },
   // Changes between two requests.
   '/changing': ranged(() => `"${requests++}"`),
   '/private': (_, response) => response.writeHead(403).end('no'),
@@ -147,7 +166,66 @@ test('a connection that breaks is taken up where it stopped', async () => {
     seen.every((length, k) => length > (seen[k - 1] ?? 0)),
     'bytes only ever become more',
   );
-  await assert.rejects(fetchScene(`${base}/resumable`, { retries: 2 }), /network\/interrupted/);
+  // Four breaks: what gets farther each time is not given up.
+  assertSameNumbers(await fetchScene(`${base}/resumable`, { retries: 1 }), CONTENT);
+  await assert.rejects(fetchScene(`${base}/resumable`, { retries: 0 }), /network\/interrupted/);
+});
+
+for (const [route, what] of [
+  ['bodiless', 'before the first byte'],
+  ['unknown', 'in a transfer of unknown length'],
+  ['busy', 'to a server that then has no time for a while'],
+]) {
+  test(`a connection that breaks ${what} is taken up again`, async () => {
+    requests = 0;
+    assertSameNumbers(await fetchScene(`${base}/${route}`), CONTENT);
+    requests = 0;
+    await assert.rejects(fetchScene(`${base}/${route}`, { retries: 0 }), /network\/interrupted/);
+  });
+}
+
+test('an outage of a second, and one that does not end', async (context) => {
+  const { fetch } = globalThis;
+  let downUntil = Infinity;
+  context.mock.method(globalThis, 'fetch', async (...given: Parameters<typeof fetch>) => {
+    if (requests++ > 0 && performance.now() < downUntil) throw new TypeError('fetch failed');
+    return fetch(...given);
+  });
+  requests = 0;
+  downUntil = performance.now() + 1000;
+  assertSameNumbers(await fetchScene(`${base}/resumable`), CONTENT);
+  requests = 0;
+  downUntil = Infinity;
+  await expectFailure(`${base}/resumable`, 'network/interrupted', /byte 70,000: expected 300,000 bytes/);
+  assert.equal(requests, 4, 'the first, and three that nobody answered');
+});
+
+test('a connection on which nothing comes for half a minute counts as broken', async (context) => {
+  context.mock.timers.enable({ apis: ['setTimeout'] });
+  let pulls = 0;
+  context.mock.method(globalThis, 'fetch', async (_: URL, { headers = {} }: RequestInit = {}) => {
+    const from = Number(/=(\d+)-/.exec((headers as Record<string, string>).Range ?? '')?.[1] ?? 0);
+    const body = new ReadableStream({
+      pull: (stream) => {
+        pulls++;
+        if (from > 0) stream.enqueue(CONTENT.slice(from));
+        if (from > 0) return stream.close();
+        if (pulls === 1) stream.enqueue(CONTENT.slice(0, 10));
+        return new Promise(() => undefined);
+      },
+    });
+    const range = { 'Content-Range': `bytes ${from}-${CONTENT.length - 1}/${CONTENT.length}` };
+    const length = { 'Content-Length': String(CONTENT.length - from) };
+    return new Response(body, { status: from > 0 ? 206 : 200, headers: { ...length, ...(from > 0 && range) } });
+  });
+  const fetched = fetchScene('http://host/a.ply');
+  for (const ms of [29_000, 1_000, 250]) {
+    await new Promise((resolve) => setImmediate(resolve));
+    context.mock.timers.tick(ms);
+  }
+  for (let k = 0; k < 20; k++) await new Promise((resolve) => setImmediate(resolve));
+  context.mock.timers.tick(250);
+  assertSameNumbers(await fetched, CONTENT);
 });
 
 test('a connection that breaks to a server that knows no ranges is begun again, as long as that gets farther', async () => {

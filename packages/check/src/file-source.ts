@@ -18,7 +18,10 @@ export class FileSource implements ByteSource {
   /** @throws the error of `node:fs` if the file cannot be opened. */
   static async open(path: string): Promise<FileSource> {
     const handle = await open(path);
-    return new FileSource(path, (await handle.stat()).size, handle);
+    const status = await handle.stat();
+    if (status.isFile()) return new FileSource(path, status.size, handle);
+    await handle.close();
+    throw Object.assign(new Error(`EISDIR: ${path} is no file`), { code: 'EISDIR', syscall: 'open' });
   }
 
   async read(offset: number, length: number): Promise<Uint8Array> {

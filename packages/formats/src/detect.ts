@@ -18,7 +18,10 @@ export function detectFormat(bytes: Uint8Array, name = '', contentType = ''): Sc
 /** The format's entry in the registry; see {@link detectFormat}. */
 export function findFormat(bytes: Uint8Array, name: string, contentType: string): SceneFormat | undefined {
   const signed = sceneFormats.find(({ hasSignature }) => hasSignature?.(bytes));
-  if (signed || bytes.length === 0 || foreignName(bytes)) return signed;
+  if (signed || bytes.length === 0) return signed;
+  // The first bytes of a `.splat` may be any, those of a text too.
+  const isSplat = extensionOf(name) === '.splat' && looksLikeSplats(bytes, 'all');
+  if (!isSplat && foreignName(bytes)) return undefined;
   const unsigned = sceneFormats.filter(({ hasSignature, isSignatureWeak }) => !hasSignature || isSignatureWeak);
   const extension = extensionOf(name);
   const mimeType = contentType.split(';')[0].trim().toLowerCase();

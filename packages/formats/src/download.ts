@@ -11,8 +11,6 @@ export class Download {
   #total: number | undefined;
   /** What tells one state of the file from another; undefined where the server or CORS keeps it hidden. */
   #tag: string | undefined;
-  /** Bytes that were there when the connection before this one broke. */
-  #resumedAt = -1;
 
   constructor(address: URL, options: FetchSceneOptions) {
     this.#address = address;
@@ -22,13 +20,6 @@ export class Download {
   /** All bytes so far. */
   get bytes(): Uint8Array {
     return this.#body.view();
-  }
-
-  /** True if the rest can be asked for: some of the file is there, its length is known, and the last try was not in vain. */
-  get canResume(): boolean {
-    const { length } = this.#body;
-    const isWithin = this.#total !== undefined && length > 0 && length < this.#total;
-    return isWithin && length > this.#resumedAt && this.#options.signal?.aborted !== true;
   }
 
   /** Asks for the whole file. */
@@ -48,25 +39,28 @@ export class Download {
     this.#body = new GrowingBytes(this.#total ?? 65_536);
   }
 
-  /** Asks for what is missing; of a server that sends the whole file again, that is taken. False if the server sends something else, or the file has changed. */
-  async resume(): Promise<boolean> {
+  /**
+   * Asks for what is missing, or for all of it where nothing has come or the length is not known; of a server that sends the whole file again, that is taken. `later`: nobody
+   * answers, or the server has no time now. `changed`: it sends something else, or the file has changed.
+   */
+  async resume(): Promise<'begun' | 'later' | 'changed'> {
     const from = this.#body.length;
-    this.#resumedAt = from;
-    const response = await this.#request({ Range: `bytes=${from}-` }).catch(() => undefined);
+    const isPart = from > 0 && this.#total !== undefined;
+    const response = await this.#request(isPart ? { Range: `bytes=${from}-` } : {}).catch(() => undefined);
     this.#options.signal?.throwIfAborted();
-    if (response === undefined) return false;
+    if (response === undefined) return 'later';
     if (response.status === 200) {
       this.#begin(response);
-      return true;
+      return 'begun';
     }
     const tag = tagOf(response);
     const isSame = this.#tag === undefined || tag === undefined || tag === this.#tag;
     if (response.status === 206 && isSame && this.#isRest(response, from)) {
       this.#response = response;
-      return true;
+      return 'begun';
     }
     await discard(response);
-    return false;
+    return response.status === 429 || response.status >= 500 ? 'later' : 'changed';
   }
 
   /** True if a partial answer begins where we stopped and ends where the file ends. */
@@ -84,7 +78,7 @@ export class Download {
     const reader = this.#response?.body?.getReader();
     const broken = (cause: unknown): Error => interrupted(this.#address, body.length, this.#total, cause);
     for (;;) {
-      const chunk = await reader?.read().catch((cause: unknown) => {
+      const chunk = await (reader ? withinPatience(reader) : undefined)?.catch((cause: unknown) => {
         signal?.throwIfAborted();
         throw broken(cause);
       });
@@ -121,6 +115,21 @@ async function answersUnread(address: URL, signal: AbortSignal | undefined): Pro
   } catch {
     return false;
   }
+}
+
+/** A connection on which nothing comes for so long has broken without a word, ms. */
+const PATIENCE_MS = 30_000;
+
+/** The next piece of a body, or a rejection where none comes. */
+async function withinPatience<T>(reader: ReadableStreamDefaultReader<T>): Promise<ReadableStreamReadResult<T>> {
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const stalled = new Promise<never>((_, reject) => {
+    timer = setTimeout(() => {
+      reject(new Error(`nothing came for ${PATIENCE_MS / 1000} s`));
+      void reader.cancel().catch(() => {});
+    }, PATIENCE_MS);
+  });
+  return Promise.race([reader.read(), stalled]).finally(() => clearTimeout(timer));
 }
 
 function discard({ body }: Response): Promise<void> {

@@ -19,7 +19,7 @@ export interface FetchSceneOptions {
    * promise fulfils. A server that cannot go on where a connection broke begins again, and so do these bytes.
    */
   readonly onArrival?: (bytes: Uint8Array, totalBytes: number | undefined) => void | Promise<void>;
-  /** How often a download that broke off is taken up again, where it stopped if the server can do that; default 3. */
+  /** How often in a row, without getting farther, a download that broke off is taken up again, where it stopped if the server can do that; default 3. */
   readonly retries?: number;
 }
 
@@ -27,8 +27,8 @@ export interface FetchSceneOptions {
 const RETRY_DELAY_MS = 250;
 
 /**
- * Downloads a file with true progress. A connection that breaks off is taken up again where it stopped, by a range request, if the file is still the same; a server that
- * knows no ranges begins again. Both as long as each try gets farther than the one before.
+ * Downloads a file with true progress. A connection that breaks off, or on which nothing comes for 30 s, is taken up again where it stopped, by a range request, if the file is still the
+ * same; a server that knows no ranges, or does not say how long the file is, begins again. One that nobody answers, or that has no time (429, 5xx), is asked again after a while.
  *
  * @param url absolute, or relative to the page or worker script (which in a worker made from a blob has no address:
  * resolve the URL before).
@@ -39,15 +39,23 @@ export async function fetchScene(url: string | URL, options: FetchSceneOptions =
   const address = parseUrl(url);
   const download = new Download(address, options);
   await download.start();
-  for (let retries = options.retries ?? 3; ; retries--) {
+  const { retries = 3, signal } = options;
+  let [tries, farthest] = [0, 0];
+  for (;;) {
     try {
       await download.read();
       return download.bytes;
     } catch (error) {
-      if (retries <= 0 || !download.canResume) throw error;
-      await delay(RETRY_DELAY_MS * 2 ** ((options.retries ?? 3) - retries), options.signal);
-      // Whatever goes wrong now, what is to be told is that the connection broke.
-      if (!(await download.resume())) throw error;
+      signal?.throwIfAborted();
+      const { length } = download.bytes;
+      if (length > farthest) [tries, farthest] = [0, length];
+      for (let answer = 'later'; answer === 'later';) {
+        // Whatever goes wrong now, what is to be told is that the connection broke.
+        if (tries >= retries) throw error;
+        await delay(RETRY_DELAY_MS * 2 ** tries++, signal);
+        answer = await download.resume();
+        if (answer === 'changed') throw error;
+      }
     }
   }
 }

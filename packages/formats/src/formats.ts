@@ -5,11 +5,17 @@ import type { SceneFormat } from './scene-format.js';
 /** Text that tells a compressed PLY from a plain one; it stands within the first lines of every such header. */
 const COMPRESSED_PLY_MARK = /[\r\n]property[ \t]+\S+[ \t]+packed_position\s/;
 const HEADER_SAMPLE = 16_384;
+/** Comments may make a header longer. */
+const MAX_HEADER_BYTES = 262_144;
 
 const isPly = (bytes: Uint8Array): boolean => /^ply[ \t]*[\r\n]/.test(asciiOf(bytes, 0, 16));
-const isCompressedPly = (bytes: Uint8Array): boolean =>
-  isPly(bytes) && COMPRESSED_PLY_MARK.test(asciiOf(bytes, 0, HEADER_SAMPLE));
-const isGzip = (bytes: Uint8Array): boolean => startsWith(bytes, [0x1f, 0x8b]);
+const isCompressedPly = (bytes: Uint8Array): boolean => {
+  if (!isPly(bytes)) return false;
+  const [header, isWhole] = [asciiOf(bytes, 0, HEADER_SAMPLE), /[\r\n]end_header\s/];
+  return COMPRESSED_PLY_MARK.test(isWhole.test(header) ? header : asciiOf(bytes, 0, MAX_HEADER_BYTES));
+};
+/** With the only method there is, and no flag that has no meaning: a `.splat` may begin with the first two bytes. */
+const isGzip = (bytes: Uint8Array): boolean => startsWith(bytes, [0x1f, 0x8b, 8]) && (bytes[3] & 0xe0) === 0;
 /** A description in JSON with a key that no other has. Keys come in any order, and one may have megabytes (buffers of glTF), so the samples are long and of both ends. */
 const isJsonWith =
   (key: RegExp) =>

@@ -57,7 +57,7 @@ export function parseLodMeta(bytes: Uint8Array, name: string): LodMeta {
   return {
     levels: lodLevels as number,
     files: filenames,
-    environment: (environment as string | null) ?? undefined,
+    environment: (environment as string | null) || undefined,
     leaves,
   };
 }

@@ -14,6 +14,8 @@ export interface GaussianLayout {
   /** False for 2D Gaussians (2DGS): discs without a third axis. */
   readonly hasThirdScale: boolean;
   readonly antialiased: boolean;
+  /** Mip-Splatting: sizes and opacities are those before its filter, whose width each splat has. */
+  readonly hasFilter: boolean;
 }
 
 const REQUIRED = ['x', 'y', 'z', 'scale_0', 'scale_1', 'rot_0', 'rot_1', 'rot_2', 'rot_3', 'opacity'];
@@ -44,8 +46,22 @@ export function findGaussians(source: SceneSource, header: PlyHeader): GaussianL
     colour,
     colourIsSh,
     hasThirdScale: scalar('scale_2') !== undefined,
-    antialiased: isAntialiased(header.comments),
+    antialiased: isAntialiased(header.comments) || scalar('filter_3D') !== undefined,
+    hasFilter: scalar('filter_3D') !== undefined,
   };
+}
+
+/** A header with the names that splats have: CloudCompare writes `scalar_opacity` for `opacity`. */
+export function withPlainNames(header: PlyHeader): PlyHeader {
+  const plain = ({ properties, ...element }: PlyElement): PlyElement => {
+    const names = new Set(properties.map(({ name }) => name));
+    const rename = (property: PlyProperty): PlyProperty => {
+      const name = property.name.replace(/^scalar_/, '');
+      return names.has(name) ? property : { ...property, name };
+    };
+    return { ...element, properties: properties.map(rename) };
+  };
+  return { ...header, elements: header.elements.map(plain) };
 }
 
 /**

@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, sigmoidInPlace, type DraftCloud } from '../cloud.js';
-import { findGaussians, type GaussianLayout } from '../ply/gaussian-layout.js';
+import { findGaussians, withPlainNames, type GaussianLayout } from '../ply/gaussian-layout.js';
 import { harmonicTargets } from '../ply/harmonics.js';
 import { parsePlyHeader, type PlyProperty } from '../ply/header.js';
 import { relativePositions } from '../ply/positions.js';
@@ -13,22 +13,24 @@ import type { SceneSource } from '../scene-format.js';
  * harmonics, then all green, then all blue.
  */
 export function readPly(source: SceneSource): GaussianCloud {
-  const header = parsePlyHeader(source);
+  const header = withPlainNames(parsePlyHeader(source));
   const layout = findGaussians(source, header);
   const data = openElement(source, header, 'vertex');
   const cloud = allocateCloud(data.element.count, keptDegree(layout.degree), source.name);
   cloud.antialiased = layout.antialiased;
   source.signal?.throwIfAborted();
-  readAttributes(data, layout, cloud);
+  const filter = new Float32Array(layout.hasFilter ? cloud.count : 0);
+  readAttributes(data, layout, cloud, filter);
   source.signal?.throwIfAborted();
   expInPlace(cloud.scales);
   if (!layout.hasThirdScale) flatten(cloud);
   sigmoidInPlace(cloud.opacities);
+  if (layout.hasFilter) fuseFilter(cloud, filter);
   if (!layout.colourIsSh) convertPlainColours(cloud, layout.colour);
   return cloud;
 }
 
-function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftCloud): void {
+function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftCloud, filter: Float32Array): void {
   const scales = ['scale_0', 'scale_1', 'scale_2'].slice(0, layout.hasThirdScale ? 3 : 2);
   const targets = [
     ...interleaved(scales, cloud.scales, 3),
@@ -40,6 +42,7 @@ function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftC
       3 * shCoefficientCount(cloud.shDegree),
     ),
     ...harmonicTargets(layout.degree, cloud),
+    ...(layout.hasFilter ? interleaved(['filter_3D'], filter, 1) : []),
   ];
   const coordinates = ['x', 'y', 'z'];
   if (layout.vertex.properties.some(({ name, type }) => coordinates.includes(name) && needsFloat64(type))) {
@@ -58,6 +61,22 @@ function needsFloat64(type: PlyProperty['type']): boolean {
 /** Targets of properties that stand side by side in every row of an array. */
 function interleaved(names: readonly string[], array: ColumnTarget['array'], stride: number): ColumnTarget[] {
   return names.map((property, offset) => ({ property, array, stride, offset }));
+}
+
+/**
+ * What Mip-Splatting draws: Gaussians that its 3D smoothing filter has widened, as pale as they are wider (Yu et al. 2024, section 4.1; `create_fused_ply` of its code does
+ * the same). Its training keeps them apart from the filter.
+ */
+function fuseFilter({ count, scales, opacities }: DraftCloud, filter: Float32Array): void {
+  for (let i = 0; i < count; i++) {
+    let share = 1;
+    for (let k = 3 * i; k < 3 * i + 3; k++) {
+      const wide = Math.hypot(scales[k], filter[i]);
+      share *= wide > 0 ? scales[k] / wide : 1;
+      scales[k] = wide;
+    }
+    opacities[i] *= share;
+  }
 }
 
 /** A 2D Gaussian has no extent along its third axis. */

@@ -11,12 +11,15 @@ import type { SceneSource } from '../scene-format.js';
 export function readSplat(source: SceneSource): GaussianCloud {
   const { name } = source;
   const count = Math.floor(source.bytes.length / SPLAT_BYTES);
-  const bytes = source.isPrefix ? source.bytes.subarray(0, SPLAT_BYTES * count) : source.bytes;
-  if (bytes.length % SPLAT_BYTES !== 0) {
+  const rest = source.bytes.length % SPLAT_BYTES;
+  const bytes = source.bytes.subarray(0, SPLAT_BYTES * count);
+  // The end of a line behind the last splat does no harm.
+  const isLineEnd = source.bytes.subarray(bytes.length).every((byte) => byte === 10 || byte === 13);
+  if (!source.isPrefix && !isLineEnd) {
     throw new GaussianSplatError('decode/truncated', {
-      where: `${name}, byte ${grouped(bytes.length)} (end of the file)`,
+      where: `${name}, byte ${grouped(source.bytes.length)} (end of the file)`,
       expected: 'a multiple of 32 bytes, as .splat files have',
-      found: `${grouped(count)} whole splats and ${bytes.length % SPLAT_BYTES} bytes of another`,
+      found: `${grouped(count)} whole splats and ${rest} bytes of another`,
       remedy: 'download or export the file again; it is incomplete, or no .splat file',
     });
   }

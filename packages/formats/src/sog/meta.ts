@@ -92,9 +92,10 @@ export function parseSogMeta(bytes: Uint8Array, name: string): SogMeta {
       const values = ramp(min as number, max as number);
       return { degree: undefined, paletteSize: MAX_PALETTE, values, files: files('shN', 2) };
     }
-    const { bands, count: paletteSize } = shN;
+    // The width of the texture tells the degree where the file does not, as PlayCanvas has it.
+    const { bands, count: paletteSize = MAX_PALETTE } = shN;
     if (bands === 0) return undefined;
-    if (bands !== 1 && bands !== 2 && bands !== 3) return fail('shN.bands', '1, 2 or 3', bands);
+    if (bands !== undefined && bands !== 1 && bands !== 2 && bands !== 3) return fail('shN.bands', '1, 2 or 3', bands);
     if (!Number.isInteger(paletteSize) || (paletteSize as number) < 1 || (paletteSize as number) > MAX_PALETTE) {
       fail('shN.count', `1 to ${grouped(MAX_PALETTE)} entries of the palette`, paletteSize);
     }
