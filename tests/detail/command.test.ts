@@ -1,7 +1,7 @@
 /** `npm run detail`: what it writes is what readers expect, and what it cannot do it says at once. */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
@@ -67,6 +67,9 @@ test('arguments that make no sense are told of in a line, without a trace of the
     assert.match(text, expected);
     assert.doesNotMatch(text, /\n {4}at /);
   }
+  const tiny = join(folder, 'tiny');
+  assert.match(detail(sceneOf(200), '--out', tiny, '--tile', '2x2').text, /more than 256 splats/);
+  assert.equal(existsSync(tiny), false, 'a folder that is in the way of the next try');
   const { status, text } = detail(join(folder, 'missing.ply'), '--out', out);
   assert.equal(status, 1);
   assert.match(text, /missing\.ply/);

@@ -60,6 +60,9 @@ test('of what a training wrote the splats after most iterations are read, not th
   };
   const direct = await readScene(late, { name: 'a.ply' });
   assertSameCloud(await readScene(zipSync(files), { name: 'a.zip' }), direct);
+  // Points and cameras beside or above the splats, as COLMAP, nerfstudio and others name them.
+  for (const beside of ['sparse.ply', 'garden/point_cloud/x/points3D.ply', 'sparse_pc.ply', 'garden/cameras.ply'])
+    assertSameCloud(await readScene(zipSync({ ...files, [beside]: points }), { name: 'a.zip' }), direct);
   const apart = zipSync({ 'a/iteration_1/point_cloud.ply': early, 'b/iteration_2/point_cloud.ply': late });
   await expectRefusal(apart, 'decode/unsupported', /2 scenes/, { name: 'a.zip' });
 });

@@ -66,6 +66,8 @@ test('the index in both dialects: boxes with their runs, the coarsest first, at 
   assert.equal(scene.environment?.url, 'https://lod.test/a%20b/env/meta.json');
   const old = readLodScene(lodFolder(cloud, { levels: 3, boxes: 4, isOld: true }).index, 'lod-meta.json', INDEX);
   assert.deepEqual(old, { ...scene, environment: undefined });
+  const none = { ...JSON.parse(new TextDecoder().decode(folder.index)), environment: '' };
+  assert.deepEqual(readLodScene(new TextEncoder().encode(JSON.stringify(none)), 'lod-meta.json', INDEX), old);
   const astray = JSON.stringify({
     ...JSON.parse(new TextDecoder().decode(folder.index)),
     environment: 'https://x.test/m',

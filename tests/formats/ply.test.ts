@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
+import { encodingsFor } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { assertAtMost, expectRefusal, largestDifference } from './support/expect.js';
 import { writePly, type PlyColumn, type PlyEncoding, type PlyType } from './support/ply-writer.js';
@@ -247,4 +248,56 @@ test('an empty scene is refused', async () => {
   await expectRefusal(writePly([{ name: 'vertex', columns }]), 'decode/empty', /found 0 splats/);
   const dead = inriaColumns(rawSplats(3, 0)).map((c) => (c.name === 'x' ? { ...c, values: [NaN, NaN, NaN] } : c));
   await expectRefusal(writePly([{ name: 'vertex', columns: dead }]), 'decode/empty', /3 splats, all with values/);
+});
+
+test("Mip-Splatting's filter is part of what is drawn", async () => {
+  const raw = rawSplats(5, 0);
+  const values = [0, 0.01, 0.2, 1, 5];
+  const columns = inriaColumns(raw);
+  const plain = await readScene(writePly([{ name: 'vertex', columns }]), { name: 'a.ply' });
+  const filtered = [...columns, { name: 'filter_3D', type: 'float' as const, values }];
+  const cloud = await readScene(writePly([{ name: 'vertex', columns: filtered }]), { name: 'a.ply' });
+  assert.equal(cloud.antialiased, true);
+  values.forEach((filter, i) => {
+    const before = [...plain.scales.subarray(3 * i, 3 * i + 3)];
+    const wide = before.map((s) => Math.sqrt(s * s + filter * filter));
+    const share = before.reduce((product, s, k) => (product * s) / wide[k], 1);
+    wide.forEach((s, k) => assert.ok(Math.abs(cloud.scales[3 * i + k] - s) < 1e-6 * s));
+    assert.ok(Math.abs(cloud.opacities[i] - plain.opacities[i] * share) < 1e-6);
+  });
+});
+
+test('fields that CloudCompare has renamed are those they were', async () => {
+  const columns = inriaColumns(rawSplats(5, 1));
+  const plain = await readScene(writePly([{ name: 'vertex', columns }]), { name: 'a.ply' });
+  const renamed = columns.map((column) =>
+    'xyz'.includes(column.name) ? column : { ...column, name: `scalar_${column.name}` },
+  );
+  assert.deepEqual(await readScene(writePly([{ name: 'vertex', columns: renamed }]), { name: 'a.ply' }), plain);
+});
+
+test('a scene far from (0, 0, 0) is written as exactly as it was read', async () => {
+  const raw = rawSplats(60, 1);
+  const world = [448_123, 5_411_887, 312];
+  const columns = inriaColumns(raw).map((column) => {
+    const axis = 'xyz'.indexOf(column.name);
+    if (axis < 0) return column;
+    return {
+      ...column,
+      type: 'double' as const,
+      values: column.values.map((value) => (value as number) + world[axis]),
+    };
+  });
+  const cloud = await readScene(writePly([{ name: 'vertex', columns }]), { name: 'far.ply' });
+  assert.ok(cloud.origin.every((x, axis) => Math.abs(x - world[axis]) < 10));
+  for (const name of ['a.ply', 'a.glb']) {
+    const [encoding] = encodingsFor(name, cloud);
+    const file = await encoding.write({ cloud, degrees: new Uint8Array(60).fill(1) });
+    const again = await readScene(file, { name });
+    for (let k = 0; k < 180; k++) {
+      const axis = k % 3;
+      const error = again.positions[k] + again.origin[axis] - (cloud.positions[k] + cloud.origin[axis]);
+      assert.ok(Math.abs(error) < 1e-5, `${name}: off by ${error}`);
+    }
+  }
 });

@@ -109,3 +109,14 @@ function huge(): Uint8Array {
     Buffer.from('RIFF\x20\0\0\0WEBPVP8L\x10\0\0\0\x2f\xff\xff\xff\x1f\0\0\0\0\0\0\0\0\0\0\0', 'latin1'),
   );
 }
+
+test('where version 2 does not say how many bands it has, the width of their texture tells, as PlayCanvas reads it', async () => {
+  const files = writeSog(cloud);
+  const read = async (changed: SogFiles) =>
+    readScene(changed['meta.json'], { name: 'meta.json', openPart: folder(changed) });
+  const meta = JSON.parse(new TextDecoder().decode(files['meta.json']));
+  delete meta.shN.bands;
+  delete meta.shN.count;
+  const silent = { ...files, 'meta.json': new TextEncoder().encode(JSON.stringify(meta)) };
+  assert.deepEqual(await read(silent), await read(files));
+});

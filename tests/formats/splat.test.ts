@@ -72,3 +72,25 @@ test('a record without a rotation is dropped', async () => {
   const cloud = await readScene(file, { name: 'x.splat' });
   assert.deepEqual([cloud.count, cloud.droppedCount], [2, 1]);
 });
+
+test('its first bytes may be those of a text, of gzip or of anything else', async () => {
+  const file = writeSplat(rawSplats(20, 0));
+  for (const first of ['[0', '{"', '[-', '<a ', '\x1f\x8b', 'GIF8', '%PDF', '<htm']) {
+    const one = file.slice();
+    for (let k = 0; k < first.length; k++) one[k] = first.charCodeAt(k);
+    // A number that a centre may be.
+    one[3] = 0x3f;
+    assert.equal(detectFormat(one, 'a.splat'), 'splat', JSON.stringify(first));
+    assert.equal((await readScene(one, { name: 'a.splat' })).count, 20);
+  }
+  await expectRefusal(new TextEncoder().encode('<!doctype html><p>not here</p>'), 'decode/html', /web page/, {
+    name: 'a.splat',
+  });
+});
+
+test('the end of a line behind the last splat does no harm, a part of another splat is missing the rest', async () => {
+  const file = writeSplat(rawSplats(20, 0));
+  const longer = (...bytes: number[]): Uint8Array => Uint8Array.of(...file, ...bytes);
+  assertSameCloud(await readScene(longer(13, 10), { name: 'a.splat' }), await readScene(file, { name: 'a.splat' }));
+  await expectRefusal(longer(13, 10, 1), 'decode/truncated', /20 whole splats and 3 bytes/, { name: 'a.splat' });
+});

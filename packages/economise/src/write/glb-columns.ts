@@ -27,14 +27,8 @@ export interface GlbColumn {
   readonly put: (out: Numbers, splats: Uint32Array) => void;
 }
 
-/** A cloud, and where it is. */
-export interface Placed {
-  readonly columns: Columns;
-  readonly origin: Vector3;
-}
-
 /** The attributes of splats that keep one degree. */
-export function glbColumns({ columns, origin }: Placed, degree: number): GlbColumn[] {
+export function glbColumns(columns: Columns, degree: number): GlbColumn[] {
   const { positions, rotations, opacities, scales, sh, shDegree } = columns;
   /** Some numbers of the splats' rows, each times a sign. */
   const plain = (name: string, values: Float32Array, stride: number, at: number, width: number, sign = 1) => ({
@@ -55,7 +49,7 @@ export function glbColumns({ columns, origin }: Placed, degree: number): GlbColu
     }),
   );
   return [
-    { name: 'POSITION', width: 3, put: (out, splats) => putPlaces(positions, origin, out, splats) },
+    { name: 'POSITION', width: 3, put: (out, splats) => putPlaces(positions, out, splats) },
     {
       ...{ name: `${EXTENSION}:ROTATION`, width: 4, isShort: true },
       put: (out, splats) => putRotations(rotations, out, splats),
@@ -66,23 +60,25 @@ export function glbColumns({ columns, origin }: Placed, degree: number): GlbColu
   ];
 }
 
-/** Positions in the world and in glTF's axes. */
-function putPlaces(positions: Float32Array, origin: Vector3, out: Numbers, splats: Uint32Array): void {
+/** A point in glTF's axes. */
+export const placeOf = (point: Vector3): number[] => point.map((x, axis) => PLACE_SIGNS[axis] * x);
+
+/** Positions relative to the cloud's origin, in glTF's axes. */
+function putPlaces(positions: Float32Array, out: Numbers, splats: Uint32Array): void {
   for (let n = 0; n < splats.length; n++) {
     for (let axis = 0; axis < 3; axis++) {
-      out[3 * n + axis] = PLACE_SIGNS[axis] * (positions[3 * splats[n] + axis] + origin[axis]);
+      out[3 * n + axis] = PLACE_SIGNS[axis] * positions[3 * splats[n] + axis];
     }
   }
 }
 
 /** The bounds of positions that glTF asks for: of what {@link glbColumns} writes. */
-export function placeBounds({ columns: { positions }, origin }: Placed, splats: Uint32Array): object {
+export function placeBounds({ positions }: Columns, splats: Uint32Array): object {
   const [min, max] = [new Array<number>(3), new Array<number>(3)];
   for (let axis = 0; axis < 3; axis++) {
-    const [sign, shift] = [PLACE_SIGNS[axis], origin[axis]];
     let [least, most] = [Infinity, -Infinity];
     for (let n = 0; n < splats.length; n++) {
-      const place = Math.fround(sign * (positions[3 * splats[n] + axis] + shift));
+      const place = PLACE_SIGNS[axis] * positions[3 * splats[n] + axis];
       if (place < least) least = place;
       if (place > most) most = place;
     }
@@ -103,7 +99,8 @@ function putRotations(rotations: Float32Array, out: Numbers, splats: Uint32Array
 }
 
 /** Some splats of a primitive, and where in the file they go. */
-export interface ColumnsToPut extends Placed {
+export interface ColumnsToPut {
+  readonly columns: Columns;
   readonly degree: number;
   readonly splats: Uint32Array;
   /** Place of the first of them in the primitive. */
@@ -114,8 +111,8 @@ export interface ColumnsToPut extends Placed {
 }
 
 /** Writes all attributes of some splats of a primitive. */
-export function putColumns({ degree, splats, at, bytes, starts, ...placed }: ColumnsToPut): void {
-  const outputs = glbColumns(placed, degree).map(({ width, isShort, put }, k) => {
+export function putColumns({ degree, splats, at, bytes, starts, columns }: ColumnsToPut): void {
+  const outputs = glbColumns(columns, degree).map(({ width, isShort, put }, k) => {
     const start = bytes.byteOffset + starts[k] + (isShort ? 2 : 4) * width * at;
     const length = width * splats.length;
     const out = isShort ? new Int16Array(bytes.buffer, start, length) : new Float32Array(bytes.buffer, start, length);

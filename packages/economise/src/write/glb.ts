@@ -1,7 +1,8 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import type { WrittenCloud } from './index.js';
-import { arraysOf, columnsOf } from '../parts/cloud-memory.js';
+import { arraysOf, columnsOf, type Columns } from '../parts/cloud-memory.js';
 import { inline, partsOf, poolFor, type TaskPool } from '../parts/task-pool.js';
-import { EXTENSION, glbColumns, placeBounds, type GlbColumn, type Placed } from './glb-columns.js';
+import { EXTENSION, glbColumns, placeBounds, placeOf, type GlbColumn } from './glb-columns.js';
 
 const [FLOAT, SHORT] = [5126, 5122];
 
@@ -28,14 +29,14 @@ interface Primitive {
  * @returns the file, in memory that the pool's tasks share
  */
 export async function writeGlb({ cloud, degrees }: WrittenCloud, pool: TaskPool = inline): Promise<Uint8Array> {
-  const placed = { columns: columnsOf(cloud), origin: cloud.origin };
-  const primitives = [0, 1, 2, 3].flatMap((degree) => primitiveOf(placed, splatsOf(degrees, degree), degree));
-  const { json, byteLength, starts } = describe(primitives);
+  const columns = columnsOf(cloud);
+  const primitives = [0, 1, 2, 3].flatMap((degree) => primitiveOf(columns, splatsOf(degrees, degree), degree));
+  const { json, byteLength, starts } = describe(primitives, cloud.origin);
   const { bytes, start } = containerOf(json, byteLength, pool);
-  const workers = poolFor(pool, cloud.count, arraysOf(placed.columns));
+  const workers = poolFor(pool, cloud.count, arraysOf(columns));
   const inputs = primitives.flatMap(({ degree, splats }, k) =>
     partsOf(splats.length, workers).map(({ first, end }) => ({
-      ...{ ...placed, bytes, degree, at: first, splats: splats.slice(first, end) },
+      ...{ columns, bytes, degree, at: first, splats: splats.slice(first, end) },
       starts: starts[k].map((byte) => start + byte),
     })),
   );
@@ -51,13 +52,16 @@ function splatsOf(degrees: Uint8Array, degree: number): Uint32Array {
   return members.subarray(0, count);
 }
 
-function primitiveOf(placed: Placed, splats: Uint32Array, degree: number): Primitive[] {
+function primitiveOf(columns: Columns, splats: Uint32Array, degree: number): Primitive[] {
   if (splats.length === 0) return [];
-  return [{ degree, splats, columns: glbColumns(placed, degree), bounds: placeBounds(placed, splats) }];
+  return [{ degree, splats, columns: glbColumns(columns, degree), bounds: placeBounds(columns, splats) }];
 }
 
 /** The file but for its numbers, how many bytes these take, and where among them the attributes of each primitive begin. */
-function describe(primitives: readonly Primitive[]): { json: object; byteLength: number; starts: number[][] } {
+function describe(
+  primitives: readonly Primitive[],
+  origin: Vector3,
+): { json: object; byteLength: number; starts: number[][] } {
   const bufferViews: object[] = [];
   const accessors: object[] = [];
   let byteLength = 0;
@@ -88,7 +92,8 @@ function describe(primitives: readonly Primitive[]): { json: object; byteLength:
     extensionsUsed: [EXTENSION],
     scene: 0,
     scenes: [{ nodes: [0] }],
-    nodes: [{ mesh: 0 }],
+    // Far from (0, 0, 0) float32 would lose what lies close together.
+    nodes: [{ mesh: 0, ...(origin.some((x) => x !== 0) && { translation: placeOf(origin) }) }],
     meshes: [{ primitives: meshPrimitives }],
     accessors,
     bufferViews,

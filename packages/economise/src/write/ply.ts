@@ -1,9 +1,10 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 
-/** Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals. */
+/** Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals; places in float64 where the cloud lies so far from (0, 0, 0) that float32 does not hold them. */
 export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
   const { count, shDegree, positions, origin, sh, opacities, scales, rotations, antialiased } = cloud;
   const coefficients = shCoefficientCount(shDegree);
+  const isFar = origin.some((x) => x !== 0);
   const names = [
     ...['x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2'],
     ...Array.from({ length: 3 * (coefficients - 1) }, (_, k) => `f_rest_${k}`),
@@ -14,11 +15,11 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     'format binary_little_endian 1.0',
     ...(antialiased ? ['comment SplatRenderMode: mip'] : []),
     `element vertex ${count}`,
-    ...names.map((name) => `property float ${name}`),
+    ...names.map((name, k) => `property ${isFar && k < 3 ? 'double' : 'float'} ${name}`),
     'end_header',
   ];
   const header = new TextEncoder().encode(`${lines.join('\n')}\n`);
-  const bytes = new Uint8Array(header.length + 4 * names.length * count);
+  const bytes = new Uint8Array(header.length + 4 * (names.length + (isFar ? 3 : 0)) * count);
   bytes.set(header);
   const view = new DataView(bytes.buffer, header.length);
   let at = 0;
@@ -27,7 +28,11 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     at += 4;
   };
   for (let i = 0; i < count; i++) {
-    for (let k = 0; k < 3; k++) put(positions[3 * i + k] + origin[k]);
+    for (let k = 0; k < 3; k++) {
+      if (isFar) view.setFloat64(at, positions[3 * i + k] + origin[k], true);
+      else put(positions[3 * i + k]);
+      if (isFar) at += 8;
+    }
     for (let k = 0; k < 3; k++) put(sh[3 * coefficients * i + k]);
     for (let channel = 0; channel < 3; channel++) {
       for (let k = 1; k < coefficients; k++) put(sh[3 * (coefficients * i + k) + channel]);

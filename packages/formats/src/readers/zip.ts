@@ -10,8 +10,9 @@ const DESCRIPTIONS = ['lod-meta.json', 'meta.json'];
 /** What macOS writes beside files, with their names. */
 const NO_CONTENT = /(^|\/)(__MACOSX\/|\._)/;
 const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
-/** The folder that the code of 3DGS writes: the points that training began with, and the splats after some numbers of iterations. */
-const FIRST_POINTS = /(^|\/)input\.ply$/i;
+/** Points that training began with, as the code of 3DGS, COLMAP and nerfstudio name them, and cameras; */
+const FIRST_POINTS = /(^|\/)(input|sparse(_pc)?|points?(3d)?|cameras?)\.ply$/i;
+/** the splats after some numbers of iterations, as the first of these writes them. */
 const ITERATION = /^(.*\/)?iteration_(\d+)\/point_cloud\.ply$/i;
 
 /**
