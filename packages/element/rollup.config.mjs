@@ -21,7 +21,7 @@ const plugins = [
   terser({
     module: true,
     ecma: 2022,
-    compress: { passes: 4, sequences: false, inline: 1 },
+    compress: { passes: 4, sequences: false, inline: 1, keep_fargs: false, pure_getters: true },
     format: { comments: false },
   }),
 ];

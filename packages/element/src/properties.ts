@@ -10,11 +10,6 @@ const flag = { fromAttribute: (value: string | null): boolean => value !== null 
 // The interface below only gives inherited methods their types: nothing in it could be missing at run time.
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class SplatProperties extends LitElement {
-  static {
-    // What an update asks for, another scene for one, may ask for another update. Lit's development build only.
-    (this as { disableWarning?: (kind: 'change-in-update') => void }).disableWarning?.('change-in-update');
-  }
-
   static override properties: PropertyDeclarations = {
     src: {},
     crossorigin: {},
