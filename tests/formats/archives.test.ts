@@ -42,6 +42,9 @@ test('archives with several scenes, and with sizes that deflate cannot reach, ar
   const directory = Buffer.from(bomb).indexOf('PK\x01\x02', 0, 'latin1');
   new DataView(bomb.buffer, bomb.byteOffset).setUint32(directory + 24, 0x7fffffff, true);
   await expectRefusal(bomb, 'decode/corrupt', /a size that deflate can reach.*2,147,483,647/, { name: 'a.zip' });
+  // Nor out of bytes that the file does not have.
+  new DataView(bomb.buffer, bomb.byteOffset).setUint32(directory + 20, 0x7fffffff, true);
+  await expectRefusal(bomb, 'decode/corrupt', /a size that deflate can reach.*2,147,483,647/, { name: 'a.zip' });
 });
 
 test('of what a training wrote the splats after most iterations are read, not the points that it began with', async () => {
