@@ -99,7 +99,13 @@ test('npm run render says in a sentence what it was asked wrongly', () => {
     [/null\.json\.K: expected a 3x3 array/, 'gltf/scene.gltf', 'null.json', 'a.png'],
     [/expected a list of views in views\.json, found number/, 'gltf/scene.gltf', 'views.json', 'a.png'],
     [/expected a file, found a folder/, 'gltf', 'camera.json', 'a.png'],
-    [/expected a file, found a folder/, 'gltf/scene.gltf', 'camera.json', 'gltf'],
+    [/--out: .*gltf is a folder/, 'gltf/scene.gltf', 'camera.json', 'gltf'],
+    [
+      /--out: expected another file than gltf\/scene\.gltf, which is never changed/,
+      'gltf/scene.gltf',
+      'camera.json',
+      'gltf/scene.gltf',
+    ],
     [/no such file .*none\.ply/, 'none.ply', 'camera.json', 'a.png'],
   ];
   for (const [sentence, scene, camera, out] of wrong) {
