@@ -113,10 +113,8 @@ describe('a post-processor in the element', () => {
 
   it('tells of a control that neither it nor the scene has, and of no other', async () => {
     const told: ElementError[] = [];
-    const element = await showLoaded(
-      { src: BALL, postprocess: `${FIXTURES}post.onnx`, 'control-gain': '0', 'control-gaim': '1' },
-      STYLE,
-    );
+    const attributes = { postprocess: `${FIXTURES}post.onnx`, 'control-gain': '0', 'control-gaim': '1' };
+    const element = show({ src: BALL, ...attributes }, STYLE);
     element.addEventListener('generator-error', ({ detail }) => told.push(detail));
     await until(() => told.length > 0, 'a report');
     await delay(500);

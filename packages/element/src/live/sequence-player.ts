@@ -93,6 +93,7 @@ export class SequencePlayer implements Timeline {
   /** Shows the frame of a time, if it is there; sees to those that follow. */
   request({ timeSeconds }: LiveState): void {
     const frame = this.#frameAt(timeSeconds);
+    this.#showLate(frame);
     // Once around, or back: what failed may be had now.
     if (frame < this.#asked) for (const [failed, { isFailed }] of this.#slots) if (isFailed) this.#slots.delete(failed);
     this.#asked = frame;
@@ -101,6 +102,14 @@ export class SequencePlayer implements Timeline {
     if (frame !== this.#shown && slot?.packed) this.#show(frame, slot.packed);
     // A frame that cannot be had is passed over, so that a seek to it ends.
     if (frame === this.#shown || slot?.isFailed) this.#tell(timeSeconds);
+  }
+
+  /** The newest of those that came after their time: where every frame comes late, pictures follow the clock at a distance. */
+  #showLate(frame: number): void {
+    if (this.#slots.get(frame)?.packed) return;
+    const late = [...this.#slots].filter(([held, { packed }]) => packed && held > this.#shown && held < frame);
+    const newest = late.sort(([a], [b]) => a - b).at(-1);
+    if (newest) this.#show(newest[0], newest[1].packed!);
   }
 
   close(): void {
@@ -146,8 +155,10 @@ export class SequencePlayer implements Timeline {
   /** Fetches what is ahead, the nearest first, and forgets what is not. */
   #prefetch(frame: number): void {
     const wanted = this.#wantedFrom(frame);
-    for (const [held, { abort }] of this.#slots) {
-      if (wanted.includes(held)) continue;
+    for (const [held, { abort, packed, isFailed }] of this.#slots) {
+      // What the clock has just passed on its way here is let come: on a slow line all are passed.
+      const isLate = held < frame && frame - held <= this.#room.frames && !packed && !isFailed;
+      if (wanted.includes(held) || isLate) continue;
       abort.abort();
       this.#slots.delete(held);
     }

@@ -43,6 +43,8 @@ export class LiveSession {
   readonly #buffers: SessionBuffers;
   readonly #feeds: Record<string, Tensor> = {};
   #hasFailed = false;
+  /** What a captured session writes to. */
+  #written: readonly GPUBuffer[] = [];
 
   private constructor(
     kind: SessionKind,
@@ -110,10 +112,13 @@ export class LiveSession {
   async release(): Promise<void> {
     await this.#runtime.exclusive(() => this.#session.release()).catch(() => undefined);
     this.#buffers.destroy();
+    // The runtime leaves alone what a captured session has written to all the time.
+    for (const buffer of this.#written) buffer.destroy();
   }
 
   async #run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     const results = await this.#infer(inputs);
+    if (this.kind === 'captured') this.#written = this.#names.flatMap((name) => gpuBufferOf(results[name]));
     try {
       const dims = Object.fromEntries(this.#names.map((name) => [name, results[name].dims]));
       use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(results, this.#outputs, this.#rowAxis) });
@@ -193,6 +198,9 @@ function fixedDimensions({ contract, instances }: GeneratorModel): Record<string
 
 const wholeWords = (bytes: number): number => Math.ceil(bytes / 4) * 4;
 const bytesOf = ({ dtype, dims }: GpuTensor | InputNumbers): number => elementsOf(dims) * (dtype === 'float16' ? 2 : 4);
+
+const gpuBufferOf = (tensor: Tensor): GPUBuffer[] =>
+  tensor.location === 'gpu-buffer' ? [tensor.gpuBuffer as GPUBuffer] : [];
 
 function disposeGpu(tensor: Tensor): void {
   if (tensor.location === 'gpu-buffer') tensor.dispose();
