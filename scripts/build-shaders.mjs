@@ -17,18 +17,20 @@ const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
 const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'streamed-shaders': ['move_slots', 'note_wishes'],
-  'quantized-shaders': ['move_quantized_slots'],
+  'quantized-shaders': [
+    'cull_quantized',
+    'cull_serial_quantized',
+    'order_keys_quantized',
+    'project_quantized',
+    'move_quantized_slots',
+  ],
   'probe-shaders': ['probe_depth'],
 };
-/** Stages that are made a second time, for another way in which Gaussians are stored: what takes the place of which part, and what they are. */
-const VARIANTS = [
-  {
-    suffix: '_quantized',
-    stages: ['cull', 'cull_serial', 'order_keys', 'project'],
-    replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
-  },
-];
-RARE['quantized-shaders'].push(...VARIANTS[0].stages.map((stage) => `${stage}_quantized`));
+/** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
+const QUANTIZED = {
+  stages: ['cull', 'cull_serial', 'order_keys', 'project'],
+  replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
+};
 /** Those of another package, which takes shared parts from the renderer. */
 const ECONOMISE = 'economise';
 RARE[ECONOMISE] = [
@@ -136,10 +138,12 @@ const plainStages = readdirSync(shaderFolder)
   .map((file) => file.slice(0, -5))
   .sort()
   .map((path) => ({ stage: path, path, replaced: {} }));
-const variantStages = VARIANTS.flatMap(({ suffix, stages, replaced }) =>
-  stages.map((path) => ({ stage: path + suffix, path, replaced })),
-);
-const stages = [...plainStages, ...variantStages];
+const quantizedStages = QUANTIZED.stages.map((path) => ({
+  stage: `${path}_quantized`,
+  path,
+  replaced: QUANTIZED.replaced,
+}));
+const stages = [...plainStages, ...quantizedStages];
 /** By name: the layout or the number, and the files whose stages say it. */
 const structs = new Map();
 const constants = new Map();

@@ -17,7 +17,7 @@ const plugins = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
   minifyTemplateLiterals({ include: [path('./dist/styles.js'), path('./dist/template.js')] }),
-  // Statements compress better than what they can be joined to with commas.
+  // Statements compress better than what they can be joined to with commas. No property is read here for what its getter does.
   terser({
     module: true,
     ecma: 2022,

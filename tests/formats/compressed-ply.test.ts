@@ -190,3 +190,10 @@ test('the 2,730 opacities of 255 in a captured file are 1', { skip: needsSharedD
   assert.deepEqual([cloud.count, cloud.droppedCount], [71_377, 0]);
   assert.equal(cloud.opacities.filter((opacity) => opacity === 1).length, 2730);
 });
+
+test('any length of comments before the properties leaves it what it is', async () => {
+  const splats = [{ position: 5, rotation: 7, scale: 9, color: 0x80808080 }];
+  const headerLines = new Array<string>(400).fill(`comment ${'x'.repeat(100)}`);
+  const plain = await readScene(writePly(compressed(splats)), { name: 'a.ply' });
+  assertSameCloud(await readScene(writePly(compressed(splats), { headerLines }), { name: 'a.ply' }), plain);
+});

@@ -267,6 +267,16 @@ test("Mip-Splatting's filter is part of what is drawn", async () => {
   });
 });
 
+test('discs have no third size for a filter to widen', async () => {
+  const columns = inriaColumns(rawSplats(5, 0)).filter(({ name }) => name !== 'scale_2');
+  const filter = { name: 'filter_3D', type: 'float' as const, values: [1, 1, 1, 1, 1] };
+  const plain = await readScene(writePly([{ name: 'vertex', columns }]), { name: 'a.ply' });
+  assert.deepEqual(
+    await readScene(writePly([{ name: 'vertex', columns: [...columns, filter] }]), { name: 'a.ply' }),
+    plain,
+  );
+});
+
 test('fields that CloudCompare has renamed are those they were', async () => {
   const columns = inriaColumns(rawSplats(5, 1));
   const plain = await readScene(writePly([{ name: 'vertex', columns }]), { name: 'a.ply' });

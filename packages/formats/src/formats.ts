@@ -1,17 +1,15 @@
 import { asciiOf, isJsonObject, startsWith } from './bytes.js';
+import { MAX_HEADER_BYTES, USUAL_HEADER_BYTES } from './ply/header-bytes.js';
 import { looksLikeKsplat } from './ksplat/signature.js';
 import type { SceneFormat } from './scene-format.js';
 
 /** Text that tells a compressed PLY from a plain one; it stands within the first lines of every such header. */
 const COMPRESSED_PLY_MARK = /[\r\n]property[ \t]+\S+[ \t]+packed_position\s/;
-const HEADER_SAMPLE = 16_384;
-/** Comments may make a header longer. */
-const MAX_HEADER_BYTES = 262_144;
 
 const isPly = (bytes: Uint8Array): boolean => /^ply[ \t]*[\r\n]/.test(asciiOf(bytes, 0, 16));
 const isCompressedPly = (bytes: Uint8Array): boolean => {
   if (!isPly(bytes)) return false;
-  const [header, isWhole] = [asciiOf(bytes, 0, HEADER_SAMPLE), /[\r\n]end_header\s/];
+  const [header, isWhole] = [asciiOf(bytes, 0, USUAL_HEADER_BYTES), /[\r\n]end_header\s/];
   return COMPRESSED_PLY_MARK.test(isWhole.test(header) ? header : asciiOf(bytes, 0, MAX_HEADER_BYTES));
 };
 /** With the only method there is, and no flag that has no meaning: a `.splat` may begin with the first two bytes. */
@@ -20,7 +18,7 @@ const isGzip = (bytes: Uint8Array): boolean => startsWith(bytes, [0x1f, 0x8b, 8]
 const isJsonWith =
   (key: RegExp) =>
   (bytes: Uint8Array): boolean =>
-    isJsonObject(bytes) && key.test(asciiOf(bytes, 0, HEADER_SAMPLE) + asciiOf(bytes, -HEADER_SAMPLE));
+    isJsonObject(bytes) && key.test(asciiOf(bytes, 0, USUAL_HEADER_BYTES) + asciiOf(bytes, -USUAL_HEADER_BYTES));
 const isLodMeta = isJsonWith(/"lodLevels"\s*:/);
 const isSogMeta = isJsonWith(/"means"\s*:/);
 const isGltf = isJsonWith(/"(asset|bufferViews)"\s*:\s*[[{]/);

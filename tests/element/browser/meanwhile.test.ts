@@ -85,6 +85,17 @@ describe('another src', () => {
     assertEqual(view.getAttribute('role'), 'application');
   });
 
+  it('while the code that streams the last one is on its way: what has come stays', async () => {
+    await fetch('/net/hold/gpu/open-streamed.js?ms=2500');
+    const element = show({ src: '/net/nowhere/detail.json' });
+    await nextEvent(element, 'loadstart');
+    element.src = COMPASS;
+    await nextEvent(element, 'load');
+    await delay(3500);
+    assert(element.loaded && element.statistics !== null, 'it is gone');
+    assert(element.toDataURL().startsWith('data:image/png'), 'its picture');
+  });
+
   it('while counts are read back: they are those of now, or none', async () => {
     const element = await showLoaded();
     const reading = element.updateStats();

@@ -76,6 +76,26 @@ describe('a sequence of files', () => {
     await frames(5);
   });
 
+  it('where every frame is late, in a second round too, pictures follow the clock at a distance', async () => {
+    // A second of 48 frames, each of which takes longer than eight of them.
+    const element = await showLoaded({ src: `${MOVIE}?count=48&fps=24&ms=350`, loop: '' });
+    const seen = [new Set<number>(), new Set<number>()];
+    let [round, last] = [0, 0];
+    await element.play();
+    await until(() => {
+      const { currentTime } = element;
+      if (currentTime < last) round++;
+      last = currentTime;
+      seen[round]?.add(element.statistics?.splats ?? 0);
+      return round >= 2;
+    }, 'two rounds');
+    element.pause();
+    assert(
+      seen.every(({ size }) => size >= 3),
+      `pictures in each round: ${seen.map((one) => [...one].join(' ')).join('; ')}`,
+    );
+  });
+
   it('a late frame leaves the last one on show, and is shown when it is there', async () => {
     const element = await showLoaded({ src: `${MOVIE}?ms=1200` });
     element.currentTime = 0.15;

@@ -316,4 +316,37 @@ describe('generators', () => {
     await delay(50);
     assertEqual(sink.runs.length, 0, 'runs');
   });
+  it('closed, give back all memory of the GPU, that of a captured session too', async () => {
+    const alive = new Set<GPUBuffer>();
+    const { createBuffer } = GPUDevice.prototype;
+    const { destroy } = GPUBuffer.prototype;
+    GPUDevice.prototype.createBuffer = function noting(this: GPUDevice, descriptor) {
+      const buffer = createBuffer.call(this, descriptor);
+      alive.add(buffer);
+      return buffer;
+    };
+    GPUBuffer.prototype.destroy = function noting(this: GPUBuffer) {
+      alive.delete(this);
+      return destroy.call(this);
+    };
+    try {
+      const left: number[] = [];
+      for (let round = 0; round < 3; round++) {
+        const generator = await open('canonical.onnx');
+        generator.sink = new ReadingSink(device);
+        for (const timeSeconds of [0, 0.3]) {
+          generator.request({ timeSeconds, camera: CAMERA });
+          await generator.idle;
+        }
+        assertEqual(generator.kind, 'captured', 'kind');
+        generator.close();
+        await delay(500);
+        left.push(alive.size);
+      }
+      assertEqual(left[2], left[1], `buffers after each round: ${left}`);
+    } finally {
+      GPUDevice.prototype.createBuffer = createBuffer;
+      GPUBuffer.prototype.destroy = destroy;
+    }
+  });
 });

@@ -27,12 +27,13 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
     view.setFloat32(at, value, true);
     at += 4;
   };
+  const putFar = (value: number): void => {
+    view.setFloat64(at, value, true);
+    at += 8;
+  };
+  const putPlace = isFar ? putFar : put;
   for (let i = 0; i < count; i++) {
-    for (let k = 0; k < 3; k++) {
-      if (isFar) view.setFloat64(at, positions[3 * i + k] + origin[k], true);
-      else put(positions[3 * i + k]);
-      if (isFar) at += 8;
-    }
+    for (let k = 0; k < 3; k++) putPlace(positions[3 * i + k] + origin[k]);
     for (let k = 0; k < 3; k++) put(sh[3 * coefficients * i + k]);
     for (let channel = 0; channel < 3; channel++) {
       for (let k = 1; k < coefficients; k++) put(sh[3 * (coefficients * i + k) + channel]);

@@ -98,7 +98,7 @@ export class PostView implements FrameFilter {
     const key = `${content} ${JSON.stringify(frame.camera)} ${String(frame.background)}`;
     if (key !== this.#drawn) draw({ ...frame, target: surface.drawn });
     this.#drawn = key;
-    if (!this.#post.isBusy && this.#mayTry(key)) this.#offer(surface, frame);
+    if (!this.#post.isBusy && this.#isDue(key)) this.#offer(surface, frame, key);
     surface.present(this.#shows(key) ? 'filtered' : 'drawn', frame.target);
   }
 
@@ -126,20 +126,24 @@ export class PostView implements FrameFilter {
     return this.#surface;
   }
 
-  /** False for what failed, and for a while after it. */
-  #mayTry(key: string): boolean {
+  /** All that a run of a picture goes by. */
+  #said(key: string): string {
     const { controls, pictures, timeSeconds } = this.#request.state();
-    const said = `${key} ${JSON.stringify([controls, timeSeconds])} ${String(Object.values(pictures))}`;
-    if (said === this.#failed) return false;
+    return `${key} ${JSON.stringify([controls, timeSeconds])} ${String(Object.values(pictures))}`;
+  }
+
+  /** False for what failed, and for a while after it; then a frame is asked for. */
+  #isDue(key: string): boolean {
     const waitMs = this.#retryAt - performance.now();
+    if (this.#said(key) === this.#failed) return false;
     clearTimeout(this.#retry);
     if (waitMs > 0) this.#retry = setTimeout(() => this.#request.onChange(), waitMs);
-    else this.#tried = said;
     return waitMs <= 0;
   }
 
   /** Hands the drawn frame over, if it or a control is another one than last time. */
-  #offer(surface: FilteredFrame, { camera }: Frame): void {
+  #offer(surface: FilteredFrame, { camera }: Frame, key: string): void {
+    this.#tried = this.#said(key);
     const { input } = this.#post;
     const state = this.#request.state();
     this.#pictures.update(state.pictures);

@@ -107,9 +107,14 @@ export class SequencePlayer implements Timeline {
   /** The newest of those that came after their time: where every frame comes late, pictures follow the clock at a distance. */
   #showLate(frame: number): void {
     if (this.#slots.get(frame)?.packed) return;
-    const late = [...this.#slots].filter(([held, { packed }]) => packed && held > this.#shown && held < frame);
-    const newest = late.sort(([a], [b]) => a - b).at(-1);
-    if (newest) this.#show(newest[0], newest[1].packed!);
+    // What is on show may be of the round before.
+    const before = this.#shown < frame ? this.#shown : -1;
+    const late = [...this.#slots.keys()].filter(
+      (held) => held > before && held < frame && this.#slots.get(held)!.packed,
+    );
+    if (late.length === 0) return;
+    const newest = Math.max(...late);
+    this.#show(newest, this.#slots.get(newest)!.packed!);
   }
 
   close(): void {

@@ -40,14 +40,16 @@ export function findGaussians(source: SceneSource, header: PlyHeader): GaussianL
       `${describeElements(header)}; vertex lacks ${missing.join(', ')} and has ${clip(present)}`,
     );
   }
+  const hasThirdScale = scalar('scale_2') !== undefined;
+  const hasFilter = hasThirdScale && scalar('filter_3D') !== undefined;
   return {
     vertex,
     degree: shDegreeOf(source, vertex),
     colour,
     colourIsSh,
-    hasThirdScale: scalar('scale_2') !== undefined,
-    antialiased: isAntialiased(header.comments) || scalar('filter_3D') !== undefined,
-    hasFilter: scalar('filter_3D') !== undefined,
+    hasThirdScale,
+    antialiased: isAntialiased(header.comments) || hasFilter,
+    hasFilter,
   };
 }
 

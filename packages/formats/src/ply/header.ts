@@ -1,3 +1,4 @@
+import { MAX_HEADER_BYTES, USUAL_HEADER_BYTES } from './header-bytes.js';
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { asciiOf, grouped, quote } from '../bytes.js';
 import type { SceneSource } from '../scene-format.js';
@@ -48,11 +49,6 @@ const ENCODINGS: ReadonlyMap<string, PlyHeader['encoding']> = new Map([
   ['binary_little_endian', 'little-endian'],
   ['binary_big_endian', 'big-endian'],
 ]);
-
-/** Headers of splat files have 1 to 5 KB; a longer one than this is not searched for its end. */
-const MAX_HEADER_BYTES = 262_144;
-/** So many are looked at first: a quarter of a megabyte of numbers as text takes longer than reading some thousand splats. */
-const USUAL_HEADER_BYTES = 16_384;
 
 /** Size in bytes of one binary value. */
 export function sizeOf(type: ScalarType): number {

@@ -26,7 +26,7 @@ const FIRST_VISIBLE = Math.ceil(ALPHA_MIN * QUANTIZED_OPAQUE);
 /** Octaves below the largest row of a chunk: what is smaller shows nowhere beside it. */
 const MOST_OCTAVES = 24;
 
-/** By how much a splat reaches farther at most: sizes and opacities are rounded. */
+/** By how much a splat reaches farther at most, its size being rounded; so is its opacity, where that is too little to be seen. */
 const FARTHER = 1.02;
 const REACH = layouts.Chunk.fields.reach.offset / 4;
 

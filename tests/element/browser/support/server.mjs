@@ -22,6 +22,7 @@ export function hostileServer(otherOrigin) {
       context.respond = false;
       return void context.res.writeHead(404, { 'Cache-Control': 'no-store' }).end();
     }
+    if (held.file && net !== 'net' && context.path.endsWith(held.file)) await delay(held.ms);
     if (net !== 'net' || !(kind in ANSWERS)) return next();
     context.set('Cache-Control', 'no-store');
     return ANSWERS[kind](context, rest.join('/'), otherOrigin);
@@ -30,6 +31,8 @@ export function hostileServer(otherOrigin) {
 
 /** Ends of paths that are not found. */
 let lost = [];
+/** The end of a path whose answer waits. */
+let held = { file: '', ms: 0 };
 
 /** By folder: what tests have put there, and what was asked for. */
 const kept = new Map();
@@ -43,6 +46,12 @@ const ANSWERS = {
   /** From now on these files, by the ends of their paths with commas between them, are not found; nothing for none. */
   lose(context, ends) {
     lost = ends ? ends.split(',').map((end) => `/${end}`) : [];
+    context.status = 204;
+  },
+
+  /** From now on a file, by the end of its path, comes `ms` later. */
+  hold(context, file) {
+    held = { file, ms: Number(context.query.ms) };
     context.status = 204;
   },
 
