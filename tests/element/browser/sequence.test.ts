@@ -77,8 +77,8 @@ describe('a sequence of files', () => {
   });
 
   it('where every frame is late, in a second round too, pictures follow the clock at a distance', async () => {
-    // A second of 48 frames, each of which takes longer than eight of them.
-    const element = await showLoaded({ src: `${MOVIE}?count=48&fps=24&ms=350`, loop: '' });
+    // Three seconds, of which two are looked ahead, and each frame takes longer than eight of them.
+    const element = await showLoaded({ src: `${MOVIE}?count=72&fps=24&ms=350`, loop: '' });
     const seen = [new Set<number>(), new Set<number>()];
     let [round, last] = [0, 0];
     await element.play();
