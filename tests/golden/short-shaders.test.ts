@@ -12,6 +12,7 @@ import { endNodeDevice } from '../support/node-device.js';
 /** What this test needs of the plugin's own module and the others. */
 interface Plugin {
   readonly piecesIn: (text: string) => Map<string, string>;
+  readonly joinedIn: (text: string) => string[][];
   readonly REPLACED: Replaced;
   readonly SHADER_FILES: readonly string[];
   readonly shortShaders: () => {
@@ -33,9 +34,15 @@ interface Reflect {
   readonly WgslReflect: new (code: string) => Readonly<Record<'uniforms' | 'storage' | 'textures', Placed>>;
 }
 const scripts = '../../packages/element/scripts/';
-const { piecesIn, REPLACED, SHADER_FILES, shortShaders } = (await import(`${scripts}shader-plugin.mjs`)) as Plugin;
+const { piecesIn, joinedIn, REPLACED, SHADER_FILES, shortShaders } = (await import(
+  `${scripts}shader-plugin.mjs`
+)) as Plugin;
 const { shortened } = (await import(`${scripts}short-wgsl.mjs`)) as {
-  shortened: (pieces: Map<string, string>, options: Replaced) => Map<string, string>;
+  shortened: (
+    pieces: Map<string, string>,
+    joined: readonly (readonly string[])[],
+    options: Replaced,
+  ) => Map<string, string>;
 };
 const reflection: string = 'wgsl_reflect/wgsl_reflect.module.js';
 const { WgslReflect, WgslScanner } = (await import(reflection)) as Reflect;
@@ -78,29 +85,54 @@ const forms = await bothForms();
 
 const scan = (code: string): Token[] => new WgslScanner(code).scanTokens();
 
-test('token by token they are the same but for names, and each name has one other', () => {
+/** Words in attributes are the language's: what is behind `@`, and behind `@builtin(`. */
+function isOfAttribute(tokens: readonly Token[], at: number): boolean {
+  const [word, bracket, before] = [3, 2, 1].map((back) => tokens[at - back]?.lexeme);
+  return before === '@' || (before === '(' && ['builtin', 'interpolate'].includes(bracket) && word === '@');
+}
+
+/** Fields are told from other names by their place: `.near` is not `near`. */
+function isField(tokens: readonly Token[], at: number, isInStruct: boolean): boolean {
+  return tokens[at - 1].lexeme === '.' || (isInStruct && tokens[at + 1].lexeme === ':');
+}
+
+test('token by token they are the same but for names, each has one other, and two in a declaration stay two', () => {
   assert.equal(forms.short.length, forms.readable.length);
   assert.ok(forms.readable.length > 45, `${forms.readable.length} stages`);
-  const [shortOf, nameOf] = [new Map<string, string>(), new Map<string, string>()];
+  const shortOf = new Map<string, string>();
   let [before, now] = [0, 0];
   forms.readable.forEach(({ name, code }, k) => {
     const [was, is] = [scan(code), scan(forms.short[k].code)];
     assert.equal(is.length, was.length, name);
+    // Of the function, struct, constant or variable that a token is in.
+    let nameOf = new Map<string, string>();
+    let isInStruct = false;
+    let depth = 0;
     was.forEach(({ lexeme, type }, at) => {
       const short = is[at].lexeme;
-      if (type.name !== 'ident' || is[at].type.name !== 'ident')
-        return assert.equal(short, lexeme, `${name}: token ${at}`);
-      assert.equal(shortOf.get(lexeme) ?? short, short, `${name}: ${lexeme}`);
-      assert.equal(nameOf.get(short) ?? lexeme, lexeme, `${name}: ${short}`);
-      shortOf.set(lexeme, short);
-      nameOf.set(short, lexeme);
+      if (type.name !== 'ident' || is[at].type.name !== 'ident' || isOfAttribute(was, at)) {
+        assert.equal(short, lexeme, `${name}: token ${at}`);
+        if (lexeme === 'struct') isInStruct = true;
+        if (lexeme === '{') depth++;
+        if (lexeme === '}') depth--;
+        if (depth > 0 || !/[;}]/.test(lexeme)) return;
+        nameOf = new Map();
+        isInStruct = false;
+        return;
+      }
+      const kind = isField(was, at, isInStruct) ? '.' : '';
+      const [long, own] = [kind + lexeme, kind + short];
+      assert.equal(shortOf.get(long) ?? own, own, `${name}: ${long}`);
+      assert.equal(nameOf.get(own) ?? long, long, `${name}: ${own}`);
+      shortOf.set(long, own);
+      nameOf.set(own, long);
     });
     before += code.length;
     now += forms.short[k].code.length;
   });
   for (const name of REPLACED.keptNames) assert.equal(shortOf.get(name) ?? name, name);
   console.log(`${shortOf.size} names; ${before} characters, ${now} short`);
-  assert.ok(now < 0.75 * before);
+  assert.ok(shortOf.size > 900 && now < 0.6 * before);
 });
 
 test('bindings are where they were', () => {
@@ -176,11 +208,12 @@ return vec4f(shade(far, 0.5e-3), f32(position[index]) , 0.0, 1.0);
 }`;
 
 test('words of the language, overridable constants and shadowed functions stay', () => {
-  const short = shortened(new Map([['hard', HARD]]), { keptNames: ['taken'], keptLines: /^let far/ }).get('hard')!;
+  const replaced = { keptNames: ['taken'], keptLines: /^let far/ };
+  const short = shortened(new Map([['hard', HARD]]), [['hard']], replaced).get('hard')!;
   for (const word of [
     'is_final',
     '@builtin(position)',
-    'vertex_index',
+    '@builtin(vertex_index)',
     'distance(',
     '.fract',
     '.zyx',
@@ -195,4 +228,46 @@ test('words of the language, overridable constants and shadowed functions stay',
   assert.match(short, /let \w+ = distance\(/);
   assert.doesNotMatch(short, /shade|view|near/i);
   assert.equal(piecesIn('export const aPart = "fn \\"x\\"\\n";\n').get('aPart'), 'fn "x"\n');
+  assert.deepEqual(joinedIn("  code: aPart + '\\n' + bPart,\n  code: bPart,\n"), [['aPart', 'bPart'], ['bPart']]);
+});
+
+/** Two shaders share `both`: what only one of them has may be called as what only the other has. */
+const PIECES = {
+  both: `struct Side {
+left: f32,
+far: f32,
+}
+fn twice(value: f32) -> f32 {
+return value + value;
+}`,
+  one: `var<private> first: f32;
+fn main() -> f32 {
+let side = Side(first, 1.0);
+return twice(side.far);
+}`,
+  other: `var<private> second: f32;
+fn main() -> f32 {
+var sum = 0.0;
+for (var far = 0.0; far < second; far += 1.0) { sum += twice(far); }
+return sum;
+}`,
+};
+
+test('names that never meet may become one, and others do not', () => {
+  const joined = [
+    ['both', 'one'],
+    ['both', 'other'],
+  ];
+  const short = shortened(new Map(Object.entries(PIECES)), joined, { keptNames: [], keptLines: /^ / });
+  const found = (key: string, pattern: RegExp): string => pattern.exec(short.get(key)!)![1];
+  const [first, second] = [found('one', /var<private>(\w+):/), found('other', /var<private>(\w+):/)];
+  const twice = found('both', /fn (\w+)\(/);
+  const far = found('both', /,\n(\w+):f32,\n}/);
+  assert.notEqual(first, twice);
+  assert.equal(found('one', new RegExp(`return ${twice}\\(\\w+\\.(\\w+)\\)`)), far);
+  const [, sum, counter] = /var (\w+)=0\.0;\nfor\(var (\w+)=/.exec(short.get('other')!)!;
+  assert.equal(new Set([sum, counter, second, twice]).size, 4);
+  const side = found('one', /let (\w+)=/);
+  assert.ok(new Set([first, side, second, sum, counter]).size < 5, 'of two shaders');
+  assert.ok(short.get('other')!.includes(`{${sum}+=${twice}(${counter});}`));
 });

@@ -13,10 +13,8 @@ export const SHADER_FILES = [
 ];
 
 /** What variants of shaders find by its text and replace: see `specialise` in packages/renderer/src/gpu/kernel.ts. */
-export const REPLACED = {
-  keptNames: 'DIGIT_BITS DIGITS SUBGROUPS VOTE_WORDS Value VALUE_WORDS value bits word'.split(' '),
-  keptLines: /^(const|alias) /,
-};
+const keptNames = 'DIGIT_BITS DIGITS SUBGROUPS VOTE_WORDS Value VALUE_WORDS value bits word'.split(' ');
+export const REPLACED = { keptNames, keptLines: new RegExp(`^(const|alias) (${keptNames.join('|')})\\b`) };
 
 const PIECE = /^(export const (\w+Part) = )("(?:[^"\\]|\\.)*");$/gm;
 
@@ -24,14 +22,20 @@ const PIECE = /^(export const (\w+Part) = )("(?:[^"\\]|\\.)*");$/gm;
 export const piecesIn = (text) =>
   new Map([...text.matchAll(PIECE)].map(([, , name, code]) => [name, JSON.parse(code)]));
 
+const JOINED = /^ *code: (\w+Part(?: \+ '\\n' \+ \w+Part)*),?$/gm;
+
+/** The names of the pieces that each shader in the text of such a file is joined of. */
+export const joinedIn = (text) => [...text.matchAll(JOINED)].map(([, pieces]) => pieces.match(/\w+Part/g));
+
 /** A plugin for Rollup. */
 export function shortShaders() {
   let short;
   return {
     name: 'short-shaders',
     buildStart() {
-      const pieces = SHADER_FILES.flatMap((file) => [...piecesIn(readFileSync(file, 'utf8'))]);
-      short = shortened(new Map(pieces), REPLACED);
+      const texts = SHADER_FILES.map((file) => readFileSync(file, 'utf8'));
+      const pieces = new Map(texts.flatMap((text) => [...piecesIn(text)]));
+      short = shortened(pieces, texts.flatMap(joinedIn), REPLACED);
     },
     transform(code, id) {
       if (!SHADER_FILES.includes(id)) return null;
