@@ -10,12 +10,14 @@ import { nodeResolve } from '@rollup/plugin-node-resolve';
 import terser from '@rollup/plugin-terser';
 import { minifyTemplateLiterals } from 'rollup-plugin-minify-template-literals';
 import { shortShaders } from './scripts/shader-plugin.mjs';
+import { shortPrivates } from './scripts/short-privates.mjs';
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 
 const plugins = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
+  shortPrivates(),
   minifyTemplateLiterals({ include: [path('./dist/styles.js'), path('./dist/template.js')] }),
   // Statements compress better than what they can be joined to with commas. No property is read here for what its getter does.
   terser({
