@@ -96,3 +96,14 @@ test('what is soon not needed any more is given back before anybody is refused, 
   assert.deepEqual(given, ['first', 'second', 'third']);
   assert.equal(kept.bytes, 20);
 });
+
+test('what is no number of bytes is refused by name, and the sum stays one', async () => {
+  const ledger = MemoryLedger.of(await serialDevice());
+  const before = ledger.bytes;
+  for (const bytes of [NaN, -1])
+    assert.throws(
+      () => ledger.reserve('a scene', bytes),
+      (error: unknown) => error instanceof GaussianSplatError && error.code === 'argument/value',
+    );
+  assert.equal(ledger.bytes, before);
+});

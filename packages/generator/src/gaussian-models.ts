@@ -1,5 +1,5 @@
 import { ContractError, GaussianSplatError, type Contract, type GaussianLayout } from '@gaussian-splat/core';
-import { Generator, type GaussianSink, type GeneratedFrame } from './generator.js';
+import { Generator, type GaussianSink, type GeneratedFrame, type GeneratorOptions } from './generator.js';
 import type { ModelSource } from './runtime/open-model.js';
 import type { GeneratorState } from './state.js';
 
@@ -29,8 +29,10 @@ export class GaussianModels {
   readonly #models = new Set<GaussianModel>();
   readonly #listeners = new Set<(model: GaussianModel, frame: GeneratedFrame) => void>();
   readonly #failures = new Set<(model: GaussianModel | undefined, error: unknown) => void>();
-  #loaded = new Map<string, Generator>();
+  /** Generators by name, on their way or there. */
+  readonly #loaded = new Map<string, Promise<Generator>>();
   #device: GPUDevice | undefined;
+  #cleared = new AbortController();
 
   /**
    * Gives a generator a name. Nothing is fetched yet.
@@ -41,33 +43,51 @@ export class GaussianModels {
   }
 
   /**
-   * Fetches and checks all registered generators, for a device.
+   * Fetches and checks all registered generators, for a device. Those that are there, or on their way, are not fetched again.
    * @throws what `Generator.open` throws for the first that fails; ContractError `contract/chain` for generators that follow one another in
-   * a circle, GaussianSplatError `argument/value` for one that follows an unknown name.
+   * a circle, GaussianSplatError `argument/value` for one that follows an unknown name; an `AbortError` if {@link clear} is called meanwhile.
    */
   async loadAllGenerators(device: GPUDevice): Promise<void> {
     this.#device = device;
-    const names = [...this.#sources.keys()].filter((name) => !this.#loaded.has(name));
+    const { signal } = this.#cleared;
     await Promise.all(
-      names.map(async (name) => this.#loaded.set(name, await Generator.open(this.#chainOf(name), device))),
+      [...this.#sources.keys()].map((name) => {
+        const known = this.#loaded.get(name);
+        if (known) return known;
+        const opening = this.#open(name, device, { signal });
+        this.#loaded.set(name, opening);
+        // The next call tries again.
+        opening.catch(() => this.#loaded.get(name) === opening && this.#loaded.delete(name));
+        return opening;
+      }),
     );
   }
 
   /**
    * Puts a model into the scene. Models of one generator share its session.
-   * @throws GaussianSplatError `argument/value` for a name that is not registered, or before {@link loadAllGenerators}.
+   * @throws GaussianSplatError `argument/value` for a name that is not registered, or before {@link loadAllGenerators}; what `makeSink` throws;
+   * an `AbortError` if {@link clear} is called meanwhile: a sink that `makeSink` has made then stays with whoever made it.
    */
   async addGaussianModelToScene<S extends GaussianSink>(
     name: string,
     makeSink: MakeSink<S>,
   ): Promise<GaussianModel<S>> {
     if (this.#device === undefined) throw unknownGenerator(name, [...this.#sources.keys()]);
-    const generator = await Generator.open(this.#chainOf(name), this.#device, {
+    const { signal } = this.#cleared;
+    const generator = await this.#open(name, this.#device, {
+      signal,
       onFrame: (frame) => this.#listeners.forEach((listener) => listener(model, frame)),
       onError: (error) => this.#failures.forEach((listener) => listener(model, error)),
     });
     const { layout, contract } = generator.model;
-    const gaussians = await makeSink(layout, contract);
+    let gaussians: S;
+    try {
+      gaussians = await makeSink(layout, contract);
+      signal.throwIfAborted();
+    } catch (error) {
+      generator.close();
+      throw error;
+    }
     generator.sink = gaussians;
     const remove = (): void => {
       this.#models.delete(model);
@@ -102,10 +122,28 @@ export class GaussianModels {
   /** Takes all models out and forgets all names. */
   clear(): void {
     for (const model of [...this.#models]) model.remove();
-    for (const generator of this.#loaded.values()) generator.close();
-    this.#loaded = new Map();
+    this.#cleared.abort();
+    this.#cleared = new AbortController();
+    for (const opening of this.#loaded.values())
+      opening.then(
+        (generator) => generator.close(),
+        () => undefined,
+      );
+    this.#loaded.clear();
     this.#sources.clear();
     this.#device = undefined;
+  }
+
+  /** Rejects, too, where it is there but has been cleared meanwhile. */
+  async #open(
+    name: string,
+    device: GPUDevice,
+    options: GeneratorOptions & { signal: AbortSignal },
+  ): Promise<Generator> {
+    const generator = await Generator.open(this.#chainOf(name), device, options);
+    if (!options.signal.aborted) return generator;
+    generator.close();
+    throw options.signal.reason;
   }
 
   /** Sources from the first of the chain that ends with a name. */

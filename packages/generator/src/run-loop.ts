@@ -48,7 +48,7 @@ export class RunLoop<Wish> {
   request(wish: Wish): void {
     if (this.#isClosed) return;
     this.#wish = wish;
-    this.#running ??= this.#work().finally(() => (this.#running = undefined));
+    this.#running ??= this.#work();
   }
 
   close(): void {
@@ -59,12 +59,17 @@ export class RunLoop<Wish> {
   async #work(): Promise<void> {
     // So that requests of the same task are one.
     await Promise.resolve();
-    for (let wish = this.#take(); wish !== undefined; wish = this.#take()) {
-      try {
-        await this.#run(wish);
-      } catch (error) {
-        if (!this.#isClosed) this.#options.onError(error);
+    try {
+      for (let wish = this.#take(); wish !== undefined; wish = this.#take()) {
+        try {
+          await this.#run(wish);
+        } catch (error) {
+          if (!this.#isClosed) this.#options.onError(error);
+        }
       }
+    } finally {
+      // At once: what is asked for a microtask later needs work of its own.
+      this.#running = undefined;
     }
   }
 

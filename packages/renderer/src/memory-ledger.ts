@@ -53,6 +53,13 @@ export class MemoryLedger {
    * @throws GaussianSplatError `out-of-memory/budget` if it is more than that, or more than the budget leaves.
    */
   reserve(label: string, bytes: number, most = Infinity): Reservation {
+    if (!(bytes >= 0))
+      throw new GaussianSplatError('argument/value', {
+        where: label,
+        expected: 'a number of bytes, 0 or more',
+        found: String(bytes),
+        remedy: 'hand over the bytes that will be allocated',
+      });
     if (bytes > most) throw overBudget(label, bytes, `${inBytes(most)}, the memoryBudget that was given`);
     for (const giveBack of this.spare) {
       if (bytes <= this.budgetBytes - this.bytes) break;

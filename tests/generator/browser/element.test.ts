@@ -137,14 +137,18 @@ describe('a generator in the element', () => {
     assertEqual(events.slice(4), ['ratechange', 'seeking', 'play', 'playing', 'pause']);
   });
 
-  it('a scene that does not move cannot play', async () => {
-    const element = await showLoaded({ src: COMPASS });
-    const refusal = await element.play().then(
-      () => 'none',
-      (error: Error) => error.name,
-    );
-    assertEqual([refusal, Number.isNaN(element.duration), element.paused], ['NotSupportedError', true, true]);
-  });
+  for (const [what, src] of [
+    ['a scene that does not move', COMPASS],
+    ['a generator that takes no time', '/tests/fixtures/families/avatar-instances.onnx'],
+  ])
+    it(`${what} cannot play`, async () => {
+      const element = await showLoaded({ src });
+      const refusal = await element.play().then(
+        () => 'none',
+        (error: Error) => error.name,
+      );
+      assertEqual([refusal, Number.isNaN(element.duration), element.paused], ['NotSupportedError', true, true]);
+    });
 
   it('takes pose and controls from attributes and properties', async () => {
     const element = await showLoaded(

@@ -3,7 +3,7 @@ import '@gaussian-splat/element';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
 import { Generator, type GaussianSink, type GeneratorState } from '@gaussian-splat/generator';
-import { assert, assertEqual, nextEvent, showLoaded } from '../../element/browser/support/harness.js';
+import { assert, assertEqual, delay, nextEvent, showLoaded, until } from '../../element/browser/support/harness.js';
 import {
   calls,
   CAMERA,
@@ -208,6 +208,25 @@ describe('instances of one generator', () => {
     await askAll(1);
     here.forEach(({ generator }) => generator.close());
     assertEqual(errors, []);
+  });
+
+  it('are ready each by itself, though another never rests', async () => {
+    const [player, other] = [await open('avatar-instances'), await open('avatar-instances')];
+    let plays = true;
+    let number = 0;
+    player.sink = { ingest: () => plays && queueMicrotask(() => player.request(stateAt(number++))) };
+    player.request(stateAt(number++));
+    await until(() => player.runs > 0, 'the first run');
+    other.sink = new NumberSink(device);
+    other.request(stateAt(3));
+    const isReady = await Promise.race([other.idle.then(() => true), delay(10_000).then(() => false)]);
+    const { runs: meanwhile } = player;
+    assert(isReady && other.runs === 1, 'the run of the other');
+    await until(() => player.runs > meanwhile, 'another run of what plays');
+    plays = false;
+    await player.idle;
+    for (const generator of [player, other]) generator.close();
+    await Promise.all([player.idle, other.idle]);
   });
 
   it('do not share faults', async () => {

@@ -1,7 +1,7 @@
 /** The papers' names over the typed core, and the build that a page loads from a CDN. */
-import { GaussianModels } from '@gaussian-splat/generator';
+import { GaussianModels, Generator } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
-import { assert, assertEqual, nextEvent, until } from '../../element/browser/support/harness.js';
+import { assert, assertEqual, delay, nextEvent, until } from '../../element/browser/support/harness.js';
 import { FIXTURES, makeDevice } from './support.js';
 
 describe('models of a page', () => {
@@ -42,6 +42,58 @@ describe('models of a page', () => {
     models.clear();
     for (const { gaussians } of [a, b]) gaussians.destroy();
     device.destroy();
+  });
+});
+
+describe('generators of a page that are not wanted any more', () => {
+  it('are closed: of a sink that cannot be made, of two loads at once, and cleared while they load', async () => {
+    const device = await makeDevice();
+    const models = new GaussianModels();
+    const { open } = Generator;
+    const opened: Generator[] = [];
+    let closed = 0;
+    Generator.open = async (...rest) => {
+      const generator = await open.apply(Generator, rest);
+      const { close } = generator;
+      generator.close = () => (closed++, close.call(generator));
+      opened.push(generator);
+      return generator;
+    };
+    const failure = (work: Promise<unknown>): Promise<string> =>
+      work.then(
+        () => 'none',
+        (error: Error) => error.message,
+      );
+    try {
+      models.registerGaussianGenerator('ball', { url: `${FIXTURES}packed.onnx` });
+      await Promise.all([models.loadAllGenerators(device), models.loadAllGenerators(device)]);
+      assertEqual(opened.length, 1, 'two loads at once');
+      const noSink = models.addGaussianModelToScene('ball', () => Promise.reject(new Error('no sink')));
+      assertEqual(await failure(noSink), 'no sink');
+      assertEqual([opened.length, closed], [2, 1], 'without a sink');
+      let sinkWanted = (): void => undefined;
+      const wanted = new Promise<void>((resolve) => (sinkWanted = resolve));
+      const late = failure(
+        models.addGaussianModelToScene('ball', async () => {
+          sinkWanted();
+          await delay(50);
+          return { ingest: () => undefined };
+        }),
+      );
+      await wanted;
+      models.clear();
+      assert(/abort/i.test(await late), 'the model that was on its way');
+      assertEqual([opened.length, closed], [3, 3], 'cleared');
+      models.registerGaussianGenerator('ball', { url: `${FIXTURES}packed.onnx` });
+      const loading = failure(models.loadAllGenerators(device));
+      models.clear();
+      assert(/abort/i.test(await loading), 'the load');
+      await delay(300);
+      assertEqual(opened.length, closed, 'cleared while it loads');
+    } finally {
+      Generator.open = open;
+      device.destroy();
+    }
   });
 });
 

@@ -133,6 +133,45 @@ describe('a post-processor in the element', () => {
     await untilLight(element, (mean) => Math.abs(mean - before.mean) < 12, 'the processed picture, larger');
   });
 
+  it('that is slow keeps no picture of the sizes that pass meanwhile', async () => {
+    const element = await showLoaded(
+      { src: COMPASS, postprocess: `${FIXTURES}post-slow.onnx`, 'control-gain': '0' },
+      STYLE,
+    );
+    await untilLight(element, (mean) => mean < 250, 'the processed picture');
+    const live = new Set<GPUTexture>();
+    const { createTexture } = GPUDevice.prototype;
+    const { destroy } = GPUTexture.prototype;
+    GPUDevice.prototype.createTexture = function (descriptor) {
+      const texture = createTexture.call(this, descriptor);
+      live.add(texture);
+      return texture;
+    };
+    GPUTexture.prototype.destroy = function () {
+      live.delete(this);
+      return destroy.call(this);
+    };
+    // A GPU that is at one run all the time.
+    const { onSubmittedWorkDone } = GPUQueue.prototype;
+    let finish = (): void => undefined;
+    const finished = new Promise<undefined>((resolve) => (finish = () => resolve(undefined)));
+    GPUQueue.prototype.onSubmittedWorkDone = () => finished;
+    try {
+      const most: number[] = [];
+      for (let width = 121; width <= 150; width++) {
+        element.style.width = `${width}px`;
+        await frames(2);
+        most.push(live.size);
+      }
+      assert(Math.max(...most) <= 20, `textures: ${most.join(' ')}`);
+    } finally {
+      finish();
+      Object.assign(GPUQueue.prototype, { onSubmittedWorkDone });
+      Object.assign(GPUDevice.prototype, { createTexture });
+      Object.assign(GPUTexture.prototype, { destroy });
+    }
+  });
+
   it('that makes no numbers leaves the frame as it is drawn', async () => {
     const element = await showLoaded({ src: COMPASS }, STYLE);
     const plain = await lightOf(element);

@@ -113,6 +113,8 @@ export class PlaybackController {
   set playbackRate(rate: number) {
     if (!Number.isFinite(rate)) throw new TypeError(`playbackRate expects a finite number, found ${rate}`);
     if (rate === this.#rate) return;
+    // While it stood there were no ticks.
+    if (this.#rate === 0) this.suspend();
     this.#rate = rate;
     this.#options.dispatch('ratechange');
     this.#options.requestFrame();
@@ -121,7 +123,10 @@ export class PlaybackController {
   play(): void {
     if (!this.#isPaused) return;
     this.#isPaused = false;
-    if (this.#hasEnded) this.currentTime = 0;
+    const isReverse = this.#rate < 0;
+    // From the other end, as browsers have it for video.
+    if (this.#hasEnded || (!this.#options.loops() && this.#time === (isReverse ? 0 : this.#duration)))
+      this.currentTime = isReverse && Number.isFinite(this.#duration) ? this.#duration : 0;
     this.#options.dispatch('play');
     this.#lastTick = undefined;
     this.#options.requestFrame();
@@ -178,11 +183,12 @@ export class PlaybackController {
     const elapsed = this.#lastTick === undefined ? 0 : (now - this.#lastTick) / 1000;
     this.#lastTick = now;
     this.#advance(elapsed * this.#rate);
+    if (this.#isPaused) return;
     if (now - this.#lastUpdate >= UPDATE_INTERVAL_MS) {
       this.#lastUpdate = now;
       this.#options.dispatch('timeupdate');
     }
-    if (!this.#isPaused) this.#options.requestFrame();
+    if (this.#rate !== 0) this.#options.requestFrame();
   }
 
   /** A pause of the picture is not time that passes: nothing is drawn until the next tick. */
@@ -213,12 +219,13 @@ export class PlaybackController {
     const next = this.#time + seconds;
     // While it plays a seek is over as soon as the clock has gone on.
     if (this.#seekTarget !== undefined && seconds !== 0) this.frameShown(this.#seekTarget);
-    if (next >= 0 && next < this.#duration) {
+    const isWithin = this.#rate < 0 ? next > 0 && next <= this.#duration : next >= 0 && next < this.#duration;
+    if (isWithin) {
       this.#time = next;
     } else if (this.#options.loops() && Number.isFinite(this.#duration) && this.#duration > 0) {
       this.#time = next - this.#duration * Math.floor(next / this.#duration);
     } else {
-      this.#end(next < 0 ? 0 : this.#duration);
+      this.#end(this.#rate < 0 ? 0 : this.#duration);
     }
   }
 

@@ -1,6 +1,6 @@
 /** Loaded only when a generator is shown: what knows `@gaussian-splat/generator` is behind this module and post-view.ts. */
 import type { Bounds, Contract } from '@gaussian-splat/core';
-import { Generator, setRuntimeLocation, type ModelSource } from '@gaussian-splat/generator';
+import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener } from '../loading/protocol.js';
 import { fetchBeside } from './fetch-beside.js';
@@ -73,7 +73,9 @@ function liveModel(
     gaussians,
     settable: reader.settable,
     readBounds: () => gaussians.readBounds(),
-    duration: models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity,
+    duration: models.some(takesTime)
+      ? (models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity)
+      : NaN,
     request: (state, camera) => {
       pictures.update(state.pictures);
       // Two pictures and the pose of their cameras are one thing: no run may mix old and new. The last one to arrive asks again.
@@ -105,6 +107,10 @@ async function contractOf({ contract, credentials }: LiveRequest, signal: AbortS
   );
   return response.text();
 }
+
+/** False for what the clock changes nothing of: it has nothing to play. */
+const takesTime = ({ contract }: GeneratorModel): boolean =>
+  Object.values(contract.inputs).some(({ role }) => role === 'time' || role === 'frame');
 
 /** Bounds of the centres are those of the subject, too. */
 function declaredBounds({ bounds }: Contract): Bounds | undefined {

@@ -112,14 +112,18 @@ export class PostView implements FrameFilter {
     this.#surface = undefined;
     this.#post.close();
     this.#pictures.destroy();
-    void this.#post.idle.then(() => surface?.destroy());
+    this.#retire(surface);
+  }
+
+  /** A run on its way may still read what was handed over. Others go at once: many sizes may pass while one run is on its way. */
+  #retire(surface: FilteredFrame | undefined): void {
+    if (surface !== this.#pending || !this.#post.isBusy) surface?.destroy();
+    else void this.#post.idle.then(() => surface?.destroy());
   }
 
   #surfaceFor({ camera: { width, height } }: Frame): FilteredFrame {
     if (this.#surface?.width === width && this.#surface.height === height) return this.#surface;
-    const old = this.#surface;
-    // A run on its way may still read what was handed over.
-    void this.#post.idle.then(() => old?.destroy());
+    this.#retire(this.#surface);
     this.#surface = new FilteredFrame(this.#device, width, height);
     this.#tensor = undefined;
     this.#drawn = this.#handed = this.#filtered = '';

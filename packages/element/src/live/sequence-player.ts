@@ -99,7 +99,7 @@ export class SequencePlayer implements Timeline {
     this.#asked = frame;
     this.#prefetch(frame);
     const slot = this.#slots.get(frame);
-    if (frame !== this.#shown && slot?.packed) this.#show(frame, slot.packed);
+    if (frame !== this.#shown && slot?.packed) this.#show(frame);
     // A frame that cannot be had is passed over, so that a seek to it ends.
     if (frame === this.#shown || slot?.isFailed) this.#tell(timeSeconds);
   }
@@ -114,7 +114,7 @@ export class SequencePlayer implements Timeline {
     );
     if (late.length === 0) return;
     const newest = Math.max(...late);
-    this.#show(newest, this.#slots.get(newest)!.packed!);
+    this.#show(newest);
   }
 
   close(): void {
@@ -127,8 +127,9 @@ export class SequencePlayer implements Timeline {
     return frameAt(this.#sequence, timeSeconds, false);
   }
 
-  #show(frame: number, packed: PackedGaussians): void {
-    if (!this.#gaussians.fits(packed)) return void this.#grow(packed);
+  #show(frame: number): void {
+    const packed = this.#slots.get(frame)!.packed!;
+    if (!this.#gaussians.fits(packed)) return void this.#grow(frame, packed);
     this.#gaussians.write(packed);
     this.#shown = frame;
   }
@@ -139,7 +140,7 @@ export class SequencePlayer implements Timeline {
   }
 
   /** A frame with more splats than any before gets other buffers; the last one stays on show meanwhile. */
-  async #grow(packed: PackedGaussians): Promise<void> {
+  async #grow(frame: number, packed: PackedGaussians): Promise<void> {
     if (this.#isGrowing) return;
     this.#isGrowing = true;
     const { device, memoryBudget, listeners } = this.#options;
@@ -151,6 +152,9 @@ export class SequencePlayer implements Timeline {
       this.#shown = -1;
       listeners.onInput();
     } catch (error) {
+      // Passed over like one that cannot be had: there is no room for it, and each frame would ask again.
+      const slot = this.#slots.get(frame);
+      if (slot?.packed === packed) Object.assign(slot, { packed: undefined, isFailed: true });
       if (!this.#isClosed) listeners.onError(error);
     } finally {
       this.#isGrowing = false;

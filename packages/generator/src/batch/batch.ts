@@ -60,11 +60,6 @@ export class Batch {
     return this.#steps.kind;
   }
 
-  /** Fulfils, and never rejects, when no run is on its way. */
-  get idle(): Promise<void> {
-    return this.#loop.idle;
-  }
-
   /** Adds an instance. */
   join<W extends Wish>(member: BatchMember<W>): Seat<W> {
     const seat = new Seat(this, member, {
@@ -91,7 +86,11 @@ export class Batch {
   async #run(): Promise<void> {
     await endOfTask();
     const asked = this.#due().map((seat) => ({ seat, wish: seat.takeWish()!, inputs: seat.inputs }));
-    for (const group of groupInstances(asked, this.#varying, this.#steps.most)) await this.#runGroup(group);
+    try {
+      for (const group of groupInstances(asked, this.#varying, this.#steps.most)) await this.#runGroup(group);
+    } finally {
+      for (const { seat } of asked) seat.settle();
+    }
   }
 
   async #runGroup(group: readonly { seat: Seat<Wish>; wish: Wish; inputs: Inputs }[]): Promise<void> {
@@ -133,7 +132,10 @@ export class Seat<W extends Wish> {
   readonly #calls: { readonly ask: () => void; readonly leave: () => void };
   #wish: W | undefined;
   #taken: W | undefined;
+  #isRunning = false;
   #isClosed = false;
+  /** Told when nothing is on its way. */
+  #waiting: (() => void)[] = [];
 
   constructor(batch: Batch, member: BatchMember<W>, calls: { readonly ask: () => void; readonly leave: () => void }) {
     this.#batch = batch;
@@ -150,8 +152,9 @@ export class Seat<W extends Wish> {
     return this.#batch.kind;
   }
 
+  /** Fulfils, and never rejects, when no run for this instance is on its way; the others of its batch may go on for ever. */
   get idle(): Promise<void> {
-    return this.#batch.idle;
+    return this.#isBusy ? new Promise((resolve) => this.#waiting.push(resolve)) : Promise.resolve();
   }
 
   /** True if there is a wish, and anything to do for it. */
@@ -171,16 +174,30 @@ export class Seat<W extends Wish> {
     this.#calls.ask();
   }
 
+  /** The run of what it returns is on its way until {@link settle}. */
   takeWish(): W | undefined {
     this.#taken = this.#wish;
     this.#wish = undefined;
+    this.#isRunning = true;
     return this.#taken;
+  }
+
+  /** The run for the wish that was taken has ended. */
+  settle(): void {
+    this.#isRunning = false;
+    if (this.#isBusy) return;
+    for (const resolve of this.#waiting.splice(0)) resolve();
   }
 
   close(): void {
     if (this.#isClosed) return;
     this.#isClosed = true;
     this.#wish = undefined;
+    if (!this.#isRunning) this.settle();
     this.#calls.leave();
+  }
+
+  get #isBusy(): boolean {
+    return this.#isRunning || this.isDue;
   }
 }

@@ -1,0 +1,51 @@
+/** The clock of scenes that move, against what HTML has for video. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { PlaybackController, type PlaybackEvent } from '../../packages/element/src/controllers/playback-controller.js';
+
+/** A clock of a scene of four seconds, with the frames that it asked for and its events. */
+function clock(loops = false): { playback: PlaybackController; events: PlaybackEvent[]; frames: () => number } {
+  const events: PlaybackEvent[] = [];
+  let frames = 0;
+  const playback = new PlaybackController({
+    loops: () => loops,
+    startTime: () => 0,
+    requestFrame: () => frames++,
+    dispatch: (type) => events.push(type),
+  });
+  playback.setDuration(4);
+  return { playback, events, frames: () => frames };
+}
+
+test('play() begins anew where the time was set to the end', () => {
+  const { playback } = clock();
+  playback.currentTime = 4;
+  playback.play();
+  assert.equal(playback.currentTime, 0);
+  for (const now of [0, 1000]) playback.tick(now);
+  assert.deepEqual([playback.currentTime, playback.paused], [1, false]);
+});
+
+test('in reverse, play() begins at the end', () => {
+  const { playback, events } = clock();
+  playback.playbackRate = -1;
+  playback.play();
+  assert.equal(playback.currentTime, 4);
+  for (const now of [0, 1000, 5000]) playback.tick(now);
+  assert.deepEqual([playback.currentTime, playback.paused, events.at(-1)], [0, true, 'ended']);
+  playback.play();
+  assert.equal(playback.currentTime, 4);
+});
+
+test('a rate of 0 stands: no frame is asked for, and no time has passed when it goes on', () => {
+  const { playback, frames } = clock();
+  playback.play();
+  for (const now of [0, 1000]) playback.tick(now);
+  playback.playbackRate = 0;
+  const before = frames();
+  playback.tick(2000);
+  assert.deepEqual([playback.currentTime, playback.paused, frames() - before], [1, false, 0]);
+  playback.playbackRate = 2;
+  for (const now of [9000, 9500]) playback.tick(now);
+  assert.equal(playback.currentTime, 2);
+});
