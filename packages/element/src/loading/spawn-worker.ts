@@ -22,8 +22,12 @@ function spawnFromElsewhere(script: URL): Worker {
   return worker;
 }
 
-/** False where a bundler has put this module into a file of its own: then only its own expression finds the worker. */
-const isOwnModule = ({ pathname }: URL): boolean => /\/(spawn-worker|gaussian-splat\.min)\.js$/.test(pathname);
+/**
+ * False where a bundler has put this module into a file of its own, or its address on the disk in place of `import.meta.url`: then only its own
+ * expression finds the worker.
+ */
+const isOwnModule = ({ protocol, pathname }: URL): boolean =>
+  protocol !== 'file:' && /\/(spawn-worker|gaussian-splat\.min)\.js$/.test(pathname);
 
 /** Trusted Types, which TypeScript's types of the page do not know yet. */
 interface TrustedTypes {

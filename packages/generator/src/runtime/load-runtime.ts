@@ -106,7 +106,7 @@ export async function loadRuntime(): Promise<Runtime> {
 }
 
 async function load(): Promise<Runtime> {
-  const folder = location ?? new URL('./onnxruntime/', import.meta.url).href;
+  const folder = location ?? folderBeside(import.meta.url);
   const build = wasmBuild();
   const script = `${folder}ort.${build === 'jspi' ? 'jspi' : 'webgpu'}.bundle.min.mjs`;
   const [ort, wasmBinary] = await Promise.all([importScript(script), fetchWasm(folder, build)]).catch(
@@ -121,6 +121,21 @@ async function load(): Promise<Runtime> {
   ort.env.wasm.numThreads = 1;
   ort.env.wasm.wasmBinary = wasmBinary.buffer;
   return new Runtime(ort);
+}
+
+/**
+ * The folder `onnxruntime/` beside a module. Not by `new URL(…, import.meta.url)`, which bundlers take for a file that they are to copy.
+ * @throws GaussianSplatError `network/unreachable` where the address says nothing: bundlers leave none, or that of a file on the disk they ran on.
+ */
+export function folderBeside(module: string | undefined): string {
+  const isHidden = !module || (module.startsWith('file:') && globalThis.location?.protocol.startsWith('http'));
+  if (!isHidden) return module.replace(/[^/]*$/, 'onnxruntime/');
+  throw new GaussianSplatError('network/unreachable', {
+    where: 'onnxruntime/',
+    expected: 'the folder of the files of onnxruntime-web 1.30.0',
+    found: 'no address of this code, which a bundler has rewritten',
+    remedy: 'name their folder: GaussianSplatElement.runtimeLocation, or setRuntimeLocation',
+  });
 }
 
 /** A module is evaluated once for each address: another copy needs another address. */
