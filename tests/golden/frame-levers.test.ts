@@ -130,6 +130,26 @@ test('a lever out of range is refused', async () => {
   renderer.destroy();
 });
 
+test('values that a lever does not know are refused', async () => {
+  const device = await serialDevice();
+  const renderer = new Renderer(device);
+  const refused = (levers: object) => [
+    () => new Renderer(device, levers),
+    () => renderer.prepare([levers], 'rgba8unorm'),
+  ];
+  const ofFrames = [0, 8, 20, 40, -8, 'x'].map((depthKeyBits) => ({ depthKeyBits }));
+  const degrees = [-1, 0.5, 1.5, 4, NaN].map((shDegree) => ({ shDegree }));
+  for (const levers of [...ofFrames, ...degrees, { visibleSets: 'yes' }]) {
+    for (const use of refused(levers)) assert.throws(use, { code: 'argument/value' }, JSON.stringify(levers));
+  }
+  const names = { rasterizer: 'tile', sort: 'quick', threads: 'many', accumulation: 'rgba8unorm' };
+  for (const [name, found] of Object.entries(names)) {
+    assert.throws(() => new Renderer(device, { [name]: found }), { code: 'argument/value', found });
+  }
+  assert.throws(() => packGaussians(cloud, { sh: 'int4' as 'int8' }), { code: 'argument/value', found: 'int4' });
+  renderer.destroy();
+});
+
 test('the span of every frame comes back, beside the frames', async (t) => {
   const adapter = await requestNodeAdapter();
   if (!adapter.features.has('timestamp-query')) return t.skip('no timestamps here');

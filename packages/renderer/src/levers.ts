@@ -1,6 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
-import type { SortName } from './stages/sort.js';
+import { SORT_NAMES, type SortName } from './stages/sort.js';
 import type { Threads } from './stages/threads.js';
 
 /**
@@ -150,16 +150,26 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
   occludedBelow: [0, 1],
   alphaMin: [1 / 255, 1],
   minContribution: [0, Infinity],
-  shDegree: [0, 3],
   detail: [0, 64],
   detailFade: [0, 2],
   splatBudget: [0, 2 ** 31],
   resolutionScale: [1 / 64, 1],
 };
 
+/** The values of levers that are no range. */
+const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
+  rasterizer: ['auto', 'quads', 'tiles'],
+  threads: ['auto', 'parallel', 'serial'],
+  sort: ['auto', ...SORT_NAMES],
+  accumulation: ['auto', 'rgba16float', 'rgba32float'],
+  depthKeyBits: [16, 24, 32],
+  visibleSets: [false, true],
+  shDegree: [0, 1, 2, 3],
+};
+
 /**
  * The levers of a quality, with those that differ from it.
- * @throws GaussianSplatError `argument/value` for a number out of range or an unknown quality.
+ * @throws GaussianSplatError `argument/value` for a number out of range, a name that its lever does not know or an unknown quality.
  */
 export function leversOf(options: Partial<Levers> & { readonly quality?: Quality }): Levers {
   const quality = options.quality ?? 'default';
@@ -167,13 +177,13 @@ export function leversOf(options: Partial<Levers> & { readonly quality?: Quality
   const base = QUALITIES[quality];
   const names = Object.keys(base) as (keyof Levers)[];
   const levers = Object.fromEntries(names.map((name) => [name, options[name] ?? base[name]])) as unknown as Levers;
-  for (const name of Object.keys(RANGES) as (keyof Levers)[]) requireInRange(name, levers[name]);
+  for (const name of names) requireInRange(name, levers[name]);
   return levers;
 }
 
 /**
  * A renderer's levers with those that a frame sets otherwise.
- * @throws GaussianSplatError `argument/value` for a number out of range.
+ * @throws GaussianSplatError `argument/value` for a value out of its lever's range.
  */
 export function leversOfFrame<L extends Levers>(levers: L, changes: Partial<FrameLevers>): L {
   const set = FRAME_LEVERS.filter((name) => changes[name] !== undefined);
@@ -181,11 +191,16 @@ export function leversOfFrame<L extends Levers>(levers: L, changes: Partial<Fram
   return { ...levers, ...Object.fromEntries(set.map((name) => [name, changes[name]])) };
 }
 
-/** @throws GaussianSplatError `argument/value` for a number out of its lever's range. */
+/** @throws GaussianSplatError `argument/value` for a value that is not in its lever's range or none of its choices. */
 export function requireInRange(name: keyof Levers, found: unknown, where = 'RendererOptions'): void {
-  const [least, most] = RANGES[name] ?? [-Infinity, Infinity];
+  const choices = CHOICES[name];
+  if (choices && !choices.includes(found)) throw invalid(name, choices.join(', '), found, where);
+  const range = RANGES[name];
+  if (range === undefined) return;
   const value = Number(found);
-  if (!(value >= least && value <= most)) throw invalid(name, `a number from ${least} to ${most}`, found, where);
+  if (!(value >= range[0] && value <= range[1])) {
+    throw invalid(name, `a number from ${range[0]} to ${range[1]}`, found, where);
+  }
 }
 
 function invalid(name: string, expected: string, found: unknown, where = 'RendererOptions'): GaussianSplatError {
@@ -193,6 +208,6 @@ function invalid(name: string, expected: string, found: unknown, where = 'Render
     where: `${where}.${name}`,
     expected,
     found: String(found),
-    remedy: 'leave the option out for the default, or choose a value in the range',
+    remedy: 'leave the option out for the default, or choose one of the values expected',
   });
 }

@@ -1,10 +1,17 @@
-import { isUsable, validateCloud, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import {
+  GaussianSplatError,
+  isUsable,
+  validateCloud,
+  type GaussianCloud,
+  type ShDegree,
+  type Vector3,
+} from '@gaussian-splat/core';
 import { constants, layouts } from '../generated/shaders.js';
 import { boundChunks } from './chunks.js';
 import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
 import { recentred } from './recentre.js';
-import { choosePrecision, packSh, type ShPrecision } from './sh.js';
+import { choosePrecision, packSh, SH_PRECISION, type ShPrecision } from './sh.js';
 
 /** How {@link packGaussians} lays out a cloud. */
 export interface PackOptions {
@@ -53,7 +60,7 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
  * Packs a cloud for {@link GaussianBuffers.upload}: neighbours in space become neighbours in memory, 32 bytes of geometry a
  * splat (positions in float32, the covariance's root to 14 significant bits, opacities to 20) and its spherical
  * harmonics. Splats that core's `isUsable` refuses are left out and added to `droppedCount`. Of a cloud with `levelRuns` all splats are drawn; `packLevelRuns` chooses.
- * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`.
+ * @throws GaussianSplatError `argument/cloud` if the arrays do not match `count` and `shDegree`; `argument/value` for an unknown precision.
  */
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
   validateCloud(given);
@@ -62,9 +69,19 @@ export function packGaussians(given: GaussianCloud, options: PackOptions = {}): 
   const kept = packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
+  if (asked !== 'auto' && !Object.hasOwn(SH_PRECISION, asked)) throw unknownPrecision(asked);
   const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
   const facts = { count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount };
   return { ...facts, ...packKept(cloud, kept, shPrecision) };
+}
+
+function unknownPrecision(found: unknown): GaussianSplatError {
+  return new GaussianSplatError('argument/value', {
+    where: 'PackOptions.sh',
+    expected: ['auto', ...Object.keys(SH_PRECISION)].join(', '),
+    found: String(found),
+    remedy: 'leave the option out for the default, or choose one of the values expected',
+  });
 }
 
 /** The bytes of some splats of a cloud, in that order. */
