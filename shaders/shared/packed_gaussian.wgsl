@@ -16,6 +16,8 @@ const HIGH_22 = 0xfffffc00u;
 // Longest standard deviation of a splat that can be drawn: MIN_LONGEST_SCALE and MAX_SCALE of core.
 const MIN_LONGEST_SCALE = 1e-12;
 const MAX_SCALE = 1e12;
+// Bits of the largest coordinate of one, MAX_POSITION of core: integers, because bounds of chunks must never see a NaN or an infinity.
+const MAX_POSITION_BITS = 0x5d5e0b6bu;
 
 // The float32 words of factor xx, yx, yy, zx and of factor zy, zz and the opacity.
 fn shape_words(g: PackedGaussian) -> array<vec4u, 2> {
@@ -48,10 +50,11 @@ fn has_finite_bits(words: vec4u) -> bool {
   return all(exponents != vec4u(EXPONENT_BITS));
 }
 
-// True if every number is finite and the factor is neither nothing nor beyond all bounds.
+// True if every number is finite, and neither position nor factor beyond all bounds nor the latter nothing.
 fn is_usable(g: PackedGaussian) -> bool {
   let words = shape_words(g);
-  let finite = has_finite_bits(vec4u(g.head.xyz, 0u)) && has_finite_bits(words[0]) && has_finite_bits(words[1]);
+  let is_near = all((g.head.xyz & vec3u(0x7fffffffu)) <= vec3u(MAX_POSITION_BITS));
+  let finite = is_near && has_finite_bits(words[0]) && has_finite_bits(words[1]);
   let own = abs(bitcast<vec4f>(words[0]));
   let rest = abs(bitcast<vec4f>(words[1]));
   let largest = max(max(max(own.x, own.y), max(own.z, own.w)), max(rest.x, rest.y));

@@ -4,10 +4,12 @@ import { after, test } from 'node:test';
 import type { Camera } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer, type RendererOptions } from '@gaussian-splat/renderer';
 import { renderOracle } from '../oracle/oracle.js';
+import { cloudOf, repeat } from '../support/clouds.js';
 import { closeness, describeCloseness } from '../support/compare.js';
 import { endNodeDevice, anyDevice } from '../support/node-device.js';
 import { notePasses } from '../support/passes.js';
-import { offCentre, resized, room } from '../support/scenes.js';
+import { seededRandom } from '../support/random.js';
+import { cameraAt, offCentre, resized, room } from '../support/scenes.js';
 
 /** The camera moved along its own axes (right, down, forward) and then turned to the right by an angle in radians. */
 function moved({ worldToCamera: m, ...camera }: Camera, [x, y, z]: readonly number[], angle = 0): Camera {
@@ -104,6 +106,64 @@ test('several scenes keep their common order while the camera moves', async () =
   for (let i = 0; i < found.length; i++) worst = Math.max(worst, Math.abs(found[i] - expected[i]));
   assert.ok(worst < 0.01, `worst difference ${worst}`);
   assert.ok((await moving.readStatistics()).visible > 1000);
+});
+
+for (const rasterizer of ['quads', 'tiles'] as const) {
+  test(`${rasterizer}: a camera that comes near from far away draws what a fresh renderer does`, async () => {
+    const device = await anyDevice();
+    const random = seededRandom(5);
+    const around = (): number => random.uniform(-1, 1);
+    const color = (): number => random.uniform(0, 1);
+    const splats = repeat(1400, () => ({
+      position: [around(), around(), around()],
+      scale: 0.1,
+      opacity: 0.9,
+      color: [color(), color(), color()],
+    }));
+    const clouds = [cloudOf(splats.slice(0, 700)), cloudOf(splats.slice(700))];
+    // The second scene fills the same room, from another origin.
+    const positions = clouds[1].positions.map((x, i) => x - (i % 3 === 2 ? 4 : 0));
+    const scenes = await Promise.all(
+      [clouds[0], { ...clouds[1], origin: [0, 0, 4] as const, positions }].map((cloud) =>
+        GaussianBuffers.upload(device, packGaussians(cloud)),
+      ),
+    );
+    const near = cameraAt([0, 0, -4], [0, 0, 0], { width: 96, height: 96 });
+    for (const gaussians of [scenes, scenes.slice(1)]) {
+      const [coming, fresh] = [new Renderer(device, { rasterizer }), new Renderer(device, { rasterizer })];
+      await capture(device, coming, { gaussians, camera: moved(near, [0, 0, -1e6]) });
+      const found = await capture(device, coming, { gaussians, camera: near });
+      assert.deepEqual(found, await capture(device, fresh, { gaussians, camera: near }));
+      const content = gaussians.length > 1 ? cloudOf(splats) : clouds[1];
+      const close = closeness(found, renderOracle(content, near, { rules: 'gsplat', mode: 'classic' }));
+      assert.ok(close.psnr >= 59, `${close.psnr} dB`);
+      for (const renderer of [coming, fresh]) renderer.destroy();
+    }
+    for (const scene of scenes) scene.destroy();
+  });
+}
+
+test('the least turn that swaps splats of a plane is drawn', async () => {
+  const device = await anyDevice();
+  const random = seededRandom(5);
+  const splats = repeat(800, () => ({
+    position: [random.uniform(-3, 3), random.uniform(-3, 3), 5],
+    scale: [0.2, 0.2, 0.001],
+    opacity: 0.7,
+    color: [random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)],
+  }));
+  const cloud = cloudOf(splats);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const faceOn = cameraAt([0, 0, 0], [0, 0, 5], { width: 96, height: 96 });
+  const renderer = new Renderer(device, { rasterizer: 'quads' });
+  for (const angle of [0, 5e-6]) {
+    const camera = moved(faceOn, [0, 0, 0], angle);
+    const found = await capture(device, renderer, { gaussians, camera });
+    const close = closeness(found, renderOracle(cloud, camera, { rules: 'gsplat', mode: 'classic' }));
+    assert.ok(close.psnr >= 59, `turned by ${angle}: ${close.psnr} dB`);
+  }
+  renderer.destroy();
+  gaussians.destroy();
 });
 
 after(endNodeDevice);

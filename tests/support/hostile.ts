@@ -54,6 +54,8 @@ function faultsOf(cloud: GaussianCloud): Fault[] {
     { name: 'scale 1e-30', attribute: 'scales', first: 0, values: [1e-30, 1e-30, 1e-30] },
     { name: 'scale 1e30', attribute: 'scales', first: 0, values: [1e30, 1e30, 1e30] },
     { name: 'scale Infinity', attribute: 'scales', first: 0, values: [Infinity, Infinity, Infinity] },
+    { name: 'position 1e37', attribute: 'positions', first: 0, values: [1e37] },
+    { name: 'position -2e18', attribute: 'positions', first: 2, values: [-2e18] },
     { name: 'scale -1', attribute: 'scales', first: 1, values: [-1] },
   ];
   for (const [attribute, size] of Object.entries(sizeOf(cloud)) as [Attribute, number][]) {

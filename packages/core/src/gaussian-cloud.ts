@@ -55,6 +55,8 @@ export interface GaussianCloud {
  * fit float32. Below the smallest a splat has no extent.
  */
 export const MAX_SCALE = 1e12;
+/** Largest coordinate of a splat that can be drawn, in world units: products of two are far from the end of float32, in which chunks are bounded. */
+export const MAX_POSITION = 1e18;
 export const MIN_LONGEST_SCALE = 1e-12;
 
 /** Throws `argument/cloud` unless the arrays of a cloud have the lengths that `count` and `shDegree` ask for. */
@@ -86,8 +88,8 @@ export function validateCloud(cloud: GaussianCloud): void {
 }
 
 /**
- * Tells whether splat `i` can be drawn: all numbers finite, a rotation that is not zero, the longest standard deviation
- * within {@link MIN_LONGEST_SCALE}..{@link MAX_SCALE} and none negative. Single axes may be 0: flat discs and needles
+ * Tells whether splat `i` can be drawn: all numbers finite, no coordinate beyond {@link MAX_POSITION}, a rotation that is not zero, the longest
+ * standard deviation within {@link MIN_LONGEST_SCALE}..{@link MAX_SCALE} and none negative. Single axes may be 0: flat discs and needles
  * are fine. The shader `cull.wgsl` applies the same rule to buffers that no CPU has seen.
  */
 export function isUsable(cloud: GaussianCloud, i: number): boolean {
@@ -95,15 +97,16 @@ export function isUsable(cloud: GaussianCloud, i: number): boolean {
   const shLength = 3 * shCoefficientCount(shDegree);
   // A sum is finite only if every term is: infinities of both signs add up to NaN. sh is the longest array, so this is the inner loop of loading, and one
   // sum alone would wait for each of its additions.
-  let red = positions[3 * i];
-  let green = positions[3 * i + 1];
-  let blue = positions[3 * i + 2];
+  let red = 0;
+  let green = 0;
+  let blue = 0;
   for (let k = shLength * i; k < shLength * (i + 1); k += 3) {
     red += sh[k];
     green += sh[k + 1];
     blue += sh[k + 2];
   }
   if (!Number.isFinite(opacities[i] + red + green + blue)) return false;
+  for (let k = 3 * i; k < 3 * i + 3; k++) if (!(Math.abs(positions[k]) <= MAX_POSITION)) return false;
   const norm = squaredNorm(rotations, 4 * i);
   if (!(norm > 0 && Number.isFinite(norm))) return false;
   const a = scales[3 * i];

@@ -21,7 +21,8 @@ interface Working {
 
 /**
  * All splats of a page table from near to far. Depth along the camera's axis changes by the same amount for all splats when the
- * camera moves without turning, so the order stays right: such frames only thin it to the visible splats.
+ * camera moves without turning, so the order stays right: such frames only thin it to the visible splats. Keys do not depend on where the camera is, either, for
+ * from far away float32 has few digits left for what lies between splats.
  *
  * A splat's number counts pages as whole chunks; what fills up a page's last chunk stands at the end of the order.
  */

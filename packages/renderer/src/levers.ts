@@ -78,7 +78,7 @@ const EXACT: Levers = {
   accumulation: 'auto',
   depthKeyBits: 24,
   submissions: 1,
-  sortAngle: 2e-5,
+  sortAngle: 1e-7,
   occludedBelow: 0,
   transmittanceMin: 1e-4,
   alphaMin: 1 / 255,

@@ -5,7 +5,7 @@ import type { FrameTimer } from './gpu/pass-timer.js';
 import type { PageTable } from './page-table.js';
 
 /** Radians under which a camera counts as not having turned. */
-const STILL = 2e-5;
+const STILL = 1e-7;
 /** Most splats whose order is kept while the camera turns: beyond, the frames that sort all of them would take several times as long as the others. */
 const MOST_KEPT = 1 << 20;
 /** Turns that an order must last to be made while the camera turns: sorting all splats costs more than sorting the visible ones. */

@@ -107,7 +107,7 @@ export class PageTable {
     };
     let page = 0;
     for (const scene of this.#scenes) {
-      const values = cameraValues(camera, scene.origin);
+      const values = cameraValues(camera, scene.origin, this.#scenes[0].origin);
       const own = {
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],
