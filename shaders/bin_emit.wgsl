@@ -1,22 +1,20 @@
 // Writes the pairs of splat and bin, in depth order. The threads of a group share its pairs evenly, so that one huge splat
 // does not hold up the others.
 #import shared/bins
-#import shared/coverage
 #import shared/plan
 #import shared/group
 #import shared/prefix
 
 @group(0) @binding(0) var<uniform> view: BinView;
 @group(0) @binding(1) var<storage, read> plan: Plan;
-@group(0) @binding(2) var<storage, read> splats: array<ProjectedSplat>;
-@group(0) @binding(3) var<storage, read> order: array<u32>;
-@group(0) @binding(4) var<storage, read> rects: array<u32>;
+@group(0) @binding(2) var<storage, read> order: array<u32>;
+@group(0) @binding(3) var<storage, read> rects: array<u32>;
 // Exclusive prefix sums over the groups.
-@group(0) @binding(5) var<storage, read> group_pairs: array<u32>;
+@group(0) @binding(4) var<storage, read> group_pairs: array<u32>;
 // Bin of each pair: the key of the sort.
-@group(0) @binding(6) var<storage, read_write> bins: array<u32>;
-// Slot, and the tiles of the bin that the splat touches.
-@group(0) @binding(7) var<storage, read_write> pairs: array<vec2u>;
+@group(0) @binding(5) var<storage, read_write> bins: array<u32>;
+// Slot of each pair.
+@group(0) @binding(6) var<storage, read_write> pairs: array<u32>;
 
 // Inclusive prefix sums of the pairs of each splat of the group.
 var<workgroup> ends: array<u32, PREFIX_THREADS>;
@@ -28,31 +26,6 @@ fn owner_of(p: u32) -> u32 {
     if (ends[low + step - 1u] <= p) { low += step; }
   }
   return low;
-}
-
-// The tiles of a bin that a splat touches, a bit each, rows of eight.
-fn touched_tiles(c: Coverage, bin: vec2u) -> u32 {
-  let corner = vec2f(f32(bin.x * BIN_WIDTH), f32(bin.y * BIN_HEIGHT));
-  let tile = f32(TILE);
-  // Row k holds the pixel centres k·16 + 0.5 ... k·16 + 15.5. Only the rows at hand: threads side by side have others.
-  let low = c.center.y - c.extent.y - corner.y - RIM;
-  let high = c.center.y + c.extent.y - corner.y + RIM;
-  let first_row = clamp(ceil((low - (tile - 0.5)) / tile), 0.0, f32(BIN_ROWS));
-  let end_row = clamp(floor((high - 0.5) / tile) + 1.0, 0.0, f32(BIN_ROWS));
-  var mask = 0u;
-  for (var row = u32(first_row); row < u32(end_row); row++) {
-    let top = corner.y + f32(row) * tile + 0.5;
-    let range = band_range(c, top - RIM, top + tile - 1.0 + RIM) + vec2f(-RIM, RIM);
-    if (range.x > range.y) { continue; }
-    // Columns likewise.
-    let first = max(ceil((range.x - corner.x - (tile - 0.5)) / tile), 0.0);
-    let last = min(floor((range.y - corner.x - 0.5) / tile), f32(BIN_COLUMNS) - 1.0);
-    if (first > last) { continue; }
-    let upto = (2u << u32(last)) - 1u;
-    let below = (1u << u32(first)) - 1u;
-    mask |= (upto & ~below) << (row * BIN_COLUMNS);
-  }
-  return mask;
 }
 
 @compute @workgroup_size(PREFIX_THREADS)
@@ -75,8 +48,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     let columns = (rect >> 16u) & 255u;
     let nth = p - select(ends[max(owner, 1u) - 1u], 0u, owner == 0u);
     let bin = vec2u((rect & 255u) + nth % columns, ((rect >> 8u) & 255u) + nth / columns);
-    let slot = order[first_rank + owner];
     bins[base + p] = bin.y * view.bins.x + bin.x;
-    pairs[base + p] = vec2u(slot, touched_tiles(coverage_of(splats[slot], view.alpha_min), bin));
+    pairs[base + p] = order[first_rank + owner];
   }
 }

@@ -1,21 +1,49 @@
 // Where each bin begins and ends among the pairs, once they are sorted by bin; and for each tile of a bin a bit for each pair, so that
 // a tile finds the few that touch it without reading the others.
 #import shared/bins
+#import shared/coverage
 #import shared/plan
 #import shared/group
 
 @group(0) @binding(0) var<storage, read> pair_plan: Plan;
 // Bins of the sorted pairs.
 @group(0) @binding(1) var<storage, read> bins: array<u32>;
-@group(0) @binding(2) var<storage, read> pairs: array<vec2u>;
+@group(0) @binding(2) var<storage, read> pairs: array<u32>;
 // First pair of each bin and the one behind the last; equal where a bin is empty.
 @group(0) @binding(3) var<storage, read_write> ranges: array<vec2u>;
 // See tile_word.
 @group(0) @binding(4) var<storage, read_write> tile_bits: array<u32>;
+@group(0) @binding(5) var<uniform> view: BinView;
+@group(0) @binding(6) var<storage, read> splats: array<ProjectedSplat>;
 
 // Rows of 32 masks, one word apart, so that threads that read a column each meet other banks of the memory.
 const MASK_ROW = 33u;
 var<workgroup> masks: array<u32, MASK_ROW * PAIR_WORDS>;
+
+// The tiles of a bin that a splat touches, a bit each, rows of eight.
+fn touched_tiles(c: Coverage, bin: vec2u) -> u32 {
+  let corner = vec2f(f32(bin.x * BIN_WIDTH), f32(bin.y * BIN_HEIGHT));
+  let tile = f32(TILE);
+  // Row k holds the pixel centres k·16 + 0.5 ... k·16 + 15.5. Only the rows at hand: threads side by side have others.
+  let low = c.center.y - c.extent.y - corner.y - RIM;
+  let high = c.center.y + c.extent.y - corner.y + RIM;
+  let first_row = clamp(ceil((low - (tile - 0.5)) / tile), 0.0, f32(BIN_ROWS));
+  let end_row = clamp(floor((high - 0.5) / tile) + 1.0, 0.0, f32(BIN_ROWS));
+  var mask = 0u;
+  for (var row = u32(first_row); row < u32(end_row); row++) {
+    let top = corner.y + f32(row) * tile + 0.5;
+    let range = band_range(c, top - RIM, top + tile - 1.0 + RIM) + vec2f(-RIM, RIM);
+    if (range.x > range.y) { continue; }
+    // Columns likewise.
+    let first = max(ceil((range.x - corner.x - (tile - 0.5)) / tile), 0.0);
+    let last = min(floor((range.y - corner.x - 0.5) / tile), f32(BIN_COLUMNS) - 1.0);
+    if (first > last) { continue; }
+    let upto = (2u << u32(last)) - 1u;
+    let below = (1u << u32(first)) - 1u;
+    mask |= (upto & ~below) << (row * BIN_COLUMNS);
+  }
+  return mask;
+}
 
 @compute @workgroup_size(PROJECT_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -23,8 +51,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let i = first + lane;
   var mask = 0u;
   if (i < pair_plan.visible) {
-    mask = pairs[i].y;
     let bin = bins[i];
+    mask = touched_tiles(coverage_of(splats[pairs[i]], view.alpha_min), vec2u(bin % view.bins.x, bin / view.bins.x));
     if (i == 0u || bins[i - 1u] != bin) { ranges[bin].x = i; }
     if (i == pair_plan.visible - 1u || bins[i + 1u] != bin) { ranges[bin].y = i + 1u; }
   }

@@ -9,8 +9,8 @@
 
 @group(0) @binding(0) var<uniform> view: BinView;
 @group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
-// Slot, and the tiles of the bin that the splat touches: bin by bin, in depth order.
-@group(0) @binding(2) var<storage, read> pairs: array<vec2u>;
+// Slots: bin by bin, in depth order.
+@group(0) @binding(2) var<storage, read> pairs: array<u32>;
 @group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
 // Numbers of the splats by slot.
 @group(0) @binding(4) var<storage, read> survivors: array<u32>;
@@ -19,6 +19,8 @@
 @group(0) @binding(6) var reference: texture_2d<f32>;
 // SCREEN_NUMBERS of each splat, two words each: see `of_fixed`.
 @group(0) @binding(7) var<storage, read_write> screen: array<atomic<i32>>;
+// Which pairs touch which tile: see tile_word.
+@group(0) @binding(8) var<storage, read> tile_bits: array<u32>;
 
 const TILE_THREADS = TILE * TILE;
 // Pairs that are looked at together.
@@ -102,7 +104,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let position = tile * TILE + vec2u(lane % TILE, lane / TILE);
   let bin = tile / vec2u(BIN_COLUMNS, BIN_ROWS);
   let in_bin = tile % vec2u(BIN_COLUMNS, BIN_ROWS);
-  let tile_bit = 1u << (in_bin.y * BIN_COLUMNS + in_bin.x);
+  let tile_in_bin = in_bin.y * BIN_COLUMNS + in_bin.x;
   let range = ranges[bin.y * view.bins.x + bin.x];
 
   var pixel = Pixel(vec2f(position) + 0.5, vec3f(0.0), vec3f(0.0), 1.0, true);
@@ -119,10 +121,12 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     for (var k = lane; k < PAIR_BATCH * SCREEN_NUMBERS; k += TILE_THREADS) { atomicStore(&sums[k], 0); }
     workgroupBarrier();
     if (lane < PAIR_BATCH && first + lane < range.y) {
-      let pair = pairs[first + lane];
-      if ((pair.y & tile_bit) != 0u) {
-        let s = splats[pair.x];
-        slots[lane] = pair.x;
+      let pair = first + lane;
+      let touching = tile_bits[tile_word(pair / 32u, tile_in_bin)];
+      if (((touching >> (pair % 32u)) & 1u) != 0u) {
+        let slot = pairs[pair];
+        let s = splats[slot];
+        slots[lane] = slot;
         shapes[lane] = s.shape;
         paints[lane] = s.paint;
         atomicOr(&hits[lane / 32u], 1u << (lane % 32u));

@@ -8,8 +8,8 @@
 
 @group(0) @binding(0) var<uniform> view: BinView;
 @group(0) @binding(1) var<storage, read> splats: array<ProjectedSplat>;
-// Slot, and the tiles of the bin that the splat touches: bin by bin, in depth order.
-@group(0) @binding(2) var<storage, read> pairs: array<vec2u>;
+// Slots: bin by bin, in depth order.
+@group(0) @binding(2) var<storage, read> pairs: array<u32>;
 @group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
 // Which pairs touch which tile: see tile_word.
 @group(0) @binding(4) var<storage, read> tile_bits: array<u32>;
@@ -278,7 +278,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
       let taken = min(in_window - painted, TILE_THREADS - count);
       if (lane < taken) {
         let pair = 32u * first_word + found_pair(painted + lane);
-        load_splat(count + lane, pairs[pair].x, vec2f(corner));
+        load_splat(count + lane, pairs[pair], vec2f(corner));
       }
       painted += taken;
       count += taken;

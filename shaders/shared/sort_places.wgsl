@@ -45,24 +45,14 @@ fn write_items(block_id: u32, lane: u32, first: u32, step: u32, keys: ptr<functi
     goals[r] = to_all[digit_of(key, digit_pass.shift)] + place;
     if (goals[r] < plan.visible) { keys_out[goals[r]] = key; }
   }
-  var own: array<Value, ITEMS>;
+  workgroupBarrier();
   for (var r = 0u; r < ITEMS; r++) {
     let i = first + r * step;
-    if (i < plan.visible) { own[r] = value_of(i); }
+    if (i < plan.visible) { atomicStore(&exchange[(*places)[r]], value_of(i)); }
   }
-  var moved: array<Value, ITEMS>;
-  for (var word = 0u; word < VALUE_WORDS; word++) {
-    workgroupBarrier();
-    for (var r = 0u; r < ITEMS; r++) {
-      if (first + r * step < plan.visible) { atomicStore(&exchange[(*places)[r]], word_of(own[r], word)); }
-    }
-    workgroupBarrier();
-    for (var r = 0u; r < ITEMS; r++) {
-      moved[r] = with_word(moved[r], word, atomicLoad(&exchange[r * SORT_THREADS + lane]));
-    }
-  }
+  workgroupBarrier();
   for (var r = 0u; r < ITEMS; r++) {
-    if (goals[r] < plan.visible) { values_out[goals[r]] = moved[r]; }
+    if (goals[r] < plan.visible) { values_out[goals[r]] = atomicLoad(&exchange[r * SORT_THREADS + lane]); }
   }
 }
 

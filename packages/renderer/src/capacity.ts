@@ -13,7 +13,7 @@ const SMALL_SCENE = 1_300_000;
 const LEAST_PAIRS = 1 << 16;
 /** What buffers that are nearly empty may shrink to. */
 export const LEAST_CAPACITY: Capacity = { visible: 1, pairs: LEAST_PAIRS };
-/** Room for pairs that small scenes get without asking, so that a first frame from near by has it: 48 MB. */
+/** Room for pairs that small scenes get without asking, so that a first frame from near by has it: 32 MB. */
 const GENEROUS_PAIRS = 1 << 21;
 /** More room than was needed. */
 const HEADROOM = 1.25;
@@ -22,8 +22,8 @@ const FULL = 0.92;
 const SLACK = 0.7;
 /** Bytes that giving up room must free. */
 const LEAST_SAVING = 32 << 20;
-const BYTES_PER_VISIBLE = 48;
-const BYTES_PER_PAIR = 24;
+const BYTES_PER_VISIBLE = 44;
+const BYTES_PER_PAIR = 16;
 /** Frames between two looks once the first frames have been looked at. */
 const INTERVAL = 16;
 /** After so long without a look, ms, a frame is looked at whatever its number: it may be the only one of its view. */

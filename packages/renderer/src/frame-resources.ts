@@ -136,7 +136,10 @@ export class FrameResources {
     this.#current?.monitor.destroy();
     if (table.hasDetail) stages.detailBudget.prepare();
     const pages = table.pages.length;
-    const scratch = kept ?? new Scratch(this.#device, { visible: capacity.visible, groups: table.groups, pages });
+    const { visible, pairs } = capacity;
+    const spareBytes = this.#options.rasterizer.spareBytes({ capacity: visible, pairCapacity: pairs });
+    kept?.fitSpare(spareBytes);
+    const scratch = kept ?? new Scratch(this.#device, { visible, groups: table.groups, pages }, spareBytes);
     this.#bindRasterizer(scratch, capacity);
     this.#hasOtherPairs = false;
     const bindings = new FrameBindings(this.#device, stages, { table, scratch, occlusion: occlusion.depths });
@@ -145,12 +148,13 @@ export class FrameResources {
     return this.#current;
   }
 
-  #bindRasterizer({ plan, splats, order, keys }: Scratch, { visible, pairs }: Capacity): void {
+  #bindRasterizer({ plan, splats, order, keys, spare }: Scratch, { visible, pairs }: Capacity): void {
     const { rasterizer, occlusion } = this.#options;
     rasterizer.bind({
       plan,
       splats,
       occlusion,
+      spare,
       survivors: order[0],
       orders: { first: order[0], second: order[1], identity: keys[0] },
       capacity: visible,

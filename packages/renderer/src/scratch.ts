@@ -45,8 +45,9 @@ export class Scratch {
   readonly plan: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
-  /** Depth keys; the sort goes back and forth between the two. */
-  readonly keys: readonly [GPUBuffer, GPUBuffer];
+  /** Depth keys. */
+  readonly #keys: GPUBuffer;
+  #spare: GPUBuffer;
   /** Slots in the order of their keys, likewise. Before the sort the first lists the survivors. */
   readonly order: readonly [GPUBuffer, GPUBuffer];
   /** [block][digit] */
@@ -54,7 +55,8 @@ export class Scratch {
   readonly digitTotals: GPUBuffer;
   readonly #memory: GpuMemory;
 
-  constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize) {
+  /** @param spareBytes least size of {@link spare} */
+  constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
     const memory = new GpuMemory(device);
     this.#memory = memory;
     const { storage, copyDestination, copySource, indirect } = BUFFER_USAGE;
@@ -73,7 +75,8 @@ export class Scratch {
       this.gathered = buffer('cull.gathered', 4 * constants.GATHERED_WORDS);
       this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages), planUsage);
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
-      this.keys = [perSplat('sort.keys_a'), perSplat('sort.keys_b')];
+      this.#keys = perSplat('sort.keys');
+      this.#spare = this.#makeSpare(spareBytes);
       this.order = [perSplat('sort.order_a'), perSplat('sort.order_b')];
       this.digitCounts = buffer(
         'sort.digit_counts',
@@ -86,12 +89,38 @@ export class Scratch {
     }
   }
 
+  /** Depth keys; the sort goes back and forth between the two. The second is {@link spare}. */
+  get keys(): readonly [GPUBuffer, GPUBuffer] {
+    return [this.#keys, this.#spare];
+  }
+
+  /** Free once splats are in order: the rasterizer's then. */
+  get spare(): GPUBuffer {
+    return this.#spare;
+  }
+
+  /** Makes {@link spare} as large as a rasterizer needs it; whatever was bound to it must be bound again. */
+  fitSpare(bytes: number): void {
+    if (this.#spare.size === this.#spareSize(bytes)) return;
+    this.#memory.free(this.#spare);
+    this.#spare = this.#makeSpare(bytes);
+  }
+
   get byteLength(): number {
     return this.#memory.byteLength;
   }
 
   destroy(): void {
     this.#memory.destroy();
+  }
+
+  #spareSize(bytes: number): number {
+    return 4 * Math.max(1, this.capacity, Math.ceil(bytes / 4));
+  }
+
+  #makeSpare(bytes: number): GPUBuffer {
+    const { storage, copyDestination, copySource } = BUFFER_USAGE;
+    return this.#memory.buffer('gs.sort.spare', this.#spareSize(bytes), storage | copySource | copyDestination);
   }
 }
 

@@ -127,8 +127,8 @@ export class SceneFitter {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.refine.look' });
     const pass = encoder.beginComputePass({ label: 'gs.refine.look' });
     const backward = rareKernelOf(this.#device, refineBackward);
-    const { view: tiles, splats, pairs, ranges, survivors } = noted;
-    const painted = { view: tiles, splats, pairs, ranges, survivors };
+    const { view: tiles, splats, pairs, tile_bits, ranges, survivors } = noted;
+    const painted = { view: tiles, splats, pairs, tile_bits, ranges, survivors };
     const pictures = { image: image.createView(), reference: reference.createView() };
     const bindings = backward.bind({ ...painted, ...pictures, screen: this.#scene.screen });
     backward.dispatchGrid(pass, bindings, Math.ceil(camera.width / TILE), Math.ceil(camera.height / TILE));

@@ -46,6 +46,10 @@ export class QuadsRasterizer implements Rasterizer {
     return false;
   }
 
+  spareBytes(): number {
+    return 0;
+  }
+
   bind({ plan, splats, orders }: RasterizerInputs): void {
     this.#plan = plan;
     const bindTo = (order: GPUBuffer): GPUBindGroup =>

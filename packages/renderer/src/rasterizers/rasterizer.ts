@@ -25,11 +25,16 @@ export interface RasterizerInputs {
   readonly occlusion: { readonly depths: GPUBuffer; readonly lastDepths: GPUBuffer };
   /** Numbers of the visible splats by slot, for frames whose order is `identity`. */
   readonly survivors: GPUBuffer;
+  /** At least {@link Rasterizer.spareBytes}: nobody else's once splats are in order, until the next frame. */
+  readonly spare: GPUBuffer;
   /** Most splats that can be visible. */
   readonly capacity: number;
   /** Pairs of splat and bin for which there shall be room. */
   readonly pairCapacity: number;
 }
+
+/** For how much there shall be room. */
+export type Room = Pick<RasterizerInputs, 'capacity' | 'pairCapacity'>;
 
 /** Where a rasterizer draws. */
 export interface Surface {
@@ -61,8 +66,10 @@ export interface NotedFrame {
   readonly view: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
-  /** array<vec2u>: a slot and the tiles of the bin that it touches, bin by bin and in depth order. */
+  /** array<u32>: slots, bin by bin and in depth order. */
   readonly pairs: GPUBuffer;
+  /** Which pairs touch which tile: `tile_word` of shaders/shared/bins.wgsl. */
+  readonly tile_bits: GPUBuffer;
   /** array<vec2u>: of each bin the first pair, and the one behind the last. */
   readonly ranges: GPUBuffer;
   /** Numbers of the splats by slot, as {@link FrameNotes.contributions} counts them. */
@@ -108,6 +115,8 @@ export interface Rasterizer {
   readonly noted?: NotedFrame;
   /** True if the rasterizer can write a final image of this format by itself. */
   finishes(format: GPUTextureFormat): boolean;
+  /** Bytes of {@link RasterizerInputs.spare} that it needs. */
+  spareBytes(room: Room): number;
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Makes the pipelines for other levers, so that no frame has to. @param format of the targets */

@@ -13,10 +13,11 @@ import type {
   PaintingLevers,
   Rasterizer,
   RasterizerInputs,
+  Room,
   Slice,
   Surface,
 } from './rasterizer.js';
-import { pairBuffers, type PairBuffers } from './pair-buffers.js';
+import { pairBuffers, spareBytesOf, type PairBuffers } from './pair-buffers.js';
 import { listingKernels, rasterizeKernel, type ListingKernels, type RasterizeKernel } from './tile-kernels.js';
 import { sliceOfTiles } from './tile-slice.js';
 
@@ -83,7 +84,7 @@ export class TilesRasterizer implements Rasterizer {
     this.#accumulation = accumulation;
     this.#memory = new GpuMemory(device);
     this.#kernels = listingKernels(device);
-    this.#sort = new SortStage(device, sort, 'pairs');
+    this.#sort = new SortStage(device, sort, 'given');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
     this.#scanLength = this.#memory.buffer('gs.rasterize.scan_length', 16, usage);
@@ -104,6 +105,10 @@ export class TilesRasterizer implements Rasterizer {
   finishes(format: GPUTextureFormat): boolean {
     const needsFeature = format === STORABLE_WITH_FEATURE;
     return STORABLE.includes(format) || (needsFeature && this.#device.features.has('bgra8unorm-storage'));
+  }
+
+  spareBytes(room: Room): number {
+    return spareBytesOf(room);
   }
 
   bind(inputs: RasterizerInputs): void {
@@ -173,6 +178,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #release(): void {
+    // The spare one is not of this memory, and stays.
     for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.#memory.free(buffer as GPUBuffer);
     this.#forgetGrids();
     this.#buffers = undefined;
@@ -208,8 +214,11 @@ export class TilesRasterizer implements Rasterizer {
     const sorted = sortedIn(this.#sort.name, bits);
     const { count, scan: scanKernel, plan: planKernel, emit, index } = this.#kernels;
     const listing = (order: GPUBuffer): GridBindings['listing'][OrderKind] => {
-      const shared = { view, plan, splats, order, rects, group_pairs: groupPairs };
-      return { count: count.bind(shared), emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }) };
+      const shared = { view, plan, order, rects, group_pairs: groupPairs };
+      return {
+        count: count.bind({ ...shared, splats }),
+        emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }),
+      };
     };
     return {
       listing: {
@@ -221,7 +230,7 @@ export class TilesRasterizer implements Rasterizer {
       plan: planKernel.bind({ view, group_pairs: groupPairs, pair_plan: pairPlan }),
       sort: this.#sort.bind({ plan: pairPlan, keys: bins, values: pairs, digitCounts, digitTotals }, bits),
       index: index.bind({
-        pair_plan: pairPlan,
+        ...{ view, splats, pair_plan: pairPlan },
         bins: bins[sorted],
         pairs: pairs[sorted],
         ranges,

@@ -72,8 +72,8 @@ export function canSort(device: GPUDevice, name: SortName): boolean {
   return device.features.has('subgroups') && 2 ** digitBits(name) * subgroupsOf(device) <= SORT_BLOCK;
 }
 
-/** What moves along with a key: its index, or two words of the caller's. */
-export type SortValues = 'indices' | 'pairs';
+/** What moves along with a key: its index, or a word of the caller's. */
+export type SortValues = 'indices' | 'given';
 
 /** Which of the two key and value buffers holds the result for keys of so many bits: the first (0) or the second (1). */
 export const sortedIn = (name: SortName, keyBits: number): 0 | 1 => (passCount(name, keyBits) % 2 === 0 ? 0 : 1);
@@ -101,7 +101,7 @@ export class SortStage {
     this.#count = isSerial ? kernelOf(device, sortCountSerial) : kernelOf(device, withDigits(sortCount, bits));
     this.#scan = isSerial ? kernelOf(device, sortScanSerial) : kernelOf(device, withDigits(sortScan, bits));
     this.#scanGroups = Math.ceil(2 ** bits / (isSerial ? DIGITS_PER_SERIAL_GROUP : DIGITS_PER_GROUP));
-    this.#scatter = kernelOf(device, movingShader(scatterShader(device, name), moving)) as ComputeKernel<
+    this.#scatter = kernelOf(device, scatterShader(device, name)) as ComputeKernel<
       typeof sortScatter
     >;
     this.#passUniforms = perDevice(device, `sort passes ${moving} ${bits}`, () =>
@@ -158,23 +158,6 @@ function withDigits<S extends ShaderDescription>(shader: S, bits: 4 | 8): S {
   if (bits === 8) return shader;
   const narrower = specialise(shader, '4 bits', 'const DIGIT_BITS = 8u', `const DIGIT_BITS = ${bits}u`);
   return specialise(narrower, 'digits', 'const DIGITS = 256u', `const DIGITS = ${2 ** bits}u`);
-}
-
-/** What is replaced in `shared/sort_scatter` where two words move along with a key. */
-const PAIRS = [
-  ['alias Value = u32', 'alias Value = vec2u'],
-  ['const VALUE_WORDS = 1u', 'const VALUE_WORDS = 2u'],
-  ['return value;', 'return value[word];'],
-  ['return bits;', 'return select(value, vec2u(bits), vec2u(word) == vec2u(0u, 1u));'],
-] as const;
-
-function movingShader(shader: ShaderDescription, moving: SortValues): ShaderDescription {
-  if (moving === 'indices') return shader;
-  const code = PAIRS.reduce(
-    (text, [from, to]) => specialise({ ...shader, code: text }, '', from, to).code,
-    shader.code,
-  );
-  return { ...shader, name: `${shader.name}.pairs`, code };
 }
 
 function makePassUniforms(device: GPUDevice, moving: SortValues, bits: number): GPUBuffer[] {
