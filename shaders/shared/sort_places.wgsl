@@ -45,10 +45,15 @@ fn write_items(block_id: u32, lane: u32, first: u32, step: u32, keys: ptr<functi
     goals[r] = to_all[digit_of(key, digit_pass.shift)] + place;
     if (goals[r] < plan.visible) { keys_out[goals[r]] = key; }
   }
-  workgroupBarrier();
+  // Asked for before the barrier: they are on their way while others get there.
+  var own: Items;
   for (var r = 0u; r < ITEMS; r++) {
     let i = first + r * step;
-    if (i < plan.visible) { atomicStore(&exchange[(*places)[r]], value_of(i)); }
+    if (i < plan.visible) { own[r] = value_of(i); }
+  }
+  workgroupBarrier();
+  for (var r = 0u; r < ITEMS; r++) {
+    if (first + r * step < plan.visible) { atomicStore(&exchange[(*places)[r]], own[r]); }
   }
   workgroupBarrier();
   for (var r = 0u; r < ITEMS; r++) {

@@ -58,6 +58,7 @@ export class Second {
   #passes = [];
   #looks = [];
   #errors = [];
+  #bytes = 0;
   /** Degrees a second. */
   #turning = [];
   #camera;
@@ -80,6 +81,7 @@ export class Second {
     const begun = performance.now();
     renderer.render({ gaussians: scene, camera, target, ...levers, timer: this.#timer });
     this.#encoding.push(performance.now() - begun);
+    this.#bytes = Math.max(this.#bytes, scene.byteLength + renderer.byteLength);
     if (this.#camera) {
       const seconds = Math.max(1e-3, begun - this.#begun.at(-1)) / 1000;
       this.#turning.push(degreesBetween(this.#camera, camera) / seconds);
@@ -110,7 +112,9 @@ export class Second {
       ...{ wall: summary(this.#walls), overFrame: shareOver(this.#walls, FRAME_MS) },
       ...{ interval: summary(intervals), late: shareOver(intervals, LATE_MS), encoding: summary(this.#encoding) },
       ...{ gpu: summary(frames.map(spanOf)), stages: stagesOf(frames) },
+      bytes: this.#bytes,
       visible: Math.max(...looks.map((look) => look.visible)),
+      pairs: Math.max(...looks.map((look) => look.pairs)),
       ...{ overflow, pairOverflow, budgetError: rounded(budgetError) },
       lacking: { looks: looks.length, lacked: looks.filter((look) => look.overflow + look.pairOverflow > 0).length },
       ...now,

@@ -29,10 +29,16 @@ const INTERVAL = 16;
 /** After so long without a look, ms, a frame is looked at whatever its number: it may be the only one of its view. */
 const LONGEST_PAUSE_MS = 250;
 
+/** Pairs for each visible splat of a large scene. */
+const PAIRS_PER_SPLAT = 1.5;
+/** Pairs for each splat of the budget, where a scene with levels of detail keeps to one: a fifth of them is never visible, and those that use it up are small. 0.93 were needed of 10 and of 16 million. */
+const PAIRS_PER_BUDGETED = 1.1;
+
 /** Room to begin with. */
-export function initialCapacity(splats: number, most: Capacity): Capacity {
+export function initialCapacity(splats: number, most: Capacity, isBudgeted = false): Capacity {
   const visible = Math.min(most.visible, splats <= SMALL_SCENE ? splats : Math.ceil(splats / 2));
-  const pairs = Math.max(LEAST_PAIRS, Math.min(4 * visible, GENEROUS_PAIRS), Math.ceil(1.5 * visible));
+  const usual = Math.ceil((isBudgeted ? PAIRS_PER_BUDGETED : PAIRS_PER_SPLAT) * visible);
+  const pairs = Math.max(LEAST_PAIRS, Math.min(4 * visible, GENEROUS_PAIRS), usual);
   return { visible, pairs: Math.min(most.pairs, pairs) };
 }
 

@@ -14,6 +14,8 @@ import type { SortName } from './stages/sort.js';
 
 /** Room for pairs that the pacer learns from what one costs. */
 const TELLING_ROOM = 1 << 18;
+/** Submissions that painting a frame may always be divided into: each takes the page's thread some tenths of a millisecond. */
+const FEW_SUBMISSIONS = 4;
 
 /** What a set of scenes needs on the GPU between the stages. */
 export interface Resources {
@@ -83,7 +85,7 @@ export class FrameResources {
     }
     this.release();
     const table = new PageTable(this.#device, [...scenes]);
-    this.#capacity = initialCapacity(table.splats, this.#mostFor(table));
+    this.#capacity = this.#firstFor(table);
     this.#memory = new CapacityMemory();
     return this.#rebind(table);
   }
@@ -112,15 +114,23 @@ export class FrameResources {
     return { visible: Math.min(table.splats, budget, maxVisible(this.#device)), pairs: maxPairs(this.#device) };
   }
 
+  #firstFor(table: PageTable): Capacity {
+    return initialCapacity(table.splats, this.#mostFor(table), this.#isBudgeted(table));
+  }
+
+  #isBudgeted(table: PageTable): boolean {
+    return table.isStreamed && Number.isFinite(this.#mostSplats);
+  }
+
   /**
    * A streamed scene within a budget keeps the room that it is given at first: flights turn from a near wall to everything within a frame. That for pairs, by which the painting
-   * is divided, it keeps as soon as one submission is known to paint them all.
+   * is divided, it keeps as soon as a few submissions are known to paint them all.
    */
   #leastFor(table: PageTable): Capacity {
-    if (!table.isStreamed || !Number.isFinite(this.#mostSplats)) return LEAST_CAPACITY;
-    const { visible, pairs } = initialCapacity(table.splats, this.#mostFor(table));
+    if (!this.#isBudgeted(table)) return LEAST_CAPACITY;
+    const { visible, pairs } = this.#firstFor(table);
     // Never taken back: room that comes and goes would be allocated each time.
-    this.#hasQuickPairs ||= this.#options.pairsAtOnce() >= pairs;
+    this.#hasQuickPairs ||= FEW_SUBMISSIONS * this.#options.pairsAtOnce() >= pairs;
     return { visible, pairs: this.#hasQuickPairs ? pairs : Math.min(pairs, TELLING_ROOM) };
   }
 

@@ -101,9 +101,7 @@ export class SortStage {
     this.#count = isSerial ? kernelOf(device, sortCountSerial) : kernelOf(device, withDigits(sortCount, bits));
     this.#scan = isSerial ? kernelOf(device, sortScanSerial) : kernelOf(device, withDigits(sortScan, bits));
     this.#scanGroups = Math.ceil(2 ** bits / (isSerial ? DIGITS_PER_SERIAL_GROUP : DIGITS_PER_GROUP));
-    this.#scatter = kernelOf(device, scatterShader(device, name)) as ComputeKernel<
-      typeof sortScatter
-    >;
+    this.#scatter = kernelOf(device, scatterShader(device, name)) as ComputeKernel<typeof sortScatter>;
     this.#passUniforms = perDevice(device, `sort passes ${moving} ${bits}`, () =>
       makePassUniforms(device, moving, bits),
     );
