@@ -22,7 +22,7 @@ const FULL = 0.92;
 const SLACK = 0.7;
 /** Bytes that giving up room must free. */
 const LEAST_SAVING = 32 << 20;
-const BYTES_PER_VISIBLE = 44;
+const BYTES_PER_VISIBLE = 40;
 const BYTES_PER_PAIR = 16;
 /** Frames between two looks once the first frames have been looked at. */
 const INTERVAL = 16;

@@ -166,7 +166,7 @@ export class FrameResources {
       occlusion,
       spare,
       survivors: order[0],
-      orders: { first: order[0], second: order[1], identity: keys[0] },
+      orders: { sorted: order[0], identity: keys[0] },
       capacity: visible,
       pairCapacity: pairs,
     });

@@ -17,7 +17,6 @@ import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surfa
 import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
-import { sortedOrder } from './stages/sort.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { copyCounts, readStatistics, type FrameStatistics } from './statistics.js';
 import { chooseVariants } from './choice/choose.js';
@@ -180,7 +179,7 @@ export class Renderer {
       isWhole: request.levers === undefined,
     });
     const submissions = this.#submissionsFor(isWatched);
-    const order = isOrdered ? 'identity' : sortedOrder(levers.sort, levers.depthKeyBits);
+    const order = isOrdered ? 'identity' : 'sorted';
     const how = { order, levers, notes, timer } as const;
     const last = this.#paint(encoder, target, drawn, how, background, submissions);
     timer?.endFrame?.(last);
@@ -247,7 +246,7 @@ export class Renderer {
     if (this.#last === undefined || this.#last.scratch !== this.#resources.current?.scratch) return [];
     const { scale, scratch, alphaMin } = this.#last;
     const { plan, splats, order, keys } = scratch;
-    const nearToFar = { first: order[0], second: order[1], identity: keys[0] }[this.#last.order];
+    const nearToFar = { sorted: order[0], identity: keys[0] }[this.#last.order];
     const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
     return probe(this.#device, { plan, splats, order: nearToFar }, drawn, alphaMin);
   }

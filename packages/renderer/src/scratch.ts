@@ -47,9 +47,9 @@ export class Scratch {
   readonly splats: GPUBuffer;
   /** Depth keys. */
   readonly #keys: GPUBuffer;
-  #spare: GPUBuffer;
-  /** Slots in the order of their keys, likewise. Before the sort the first lists the survivors. */
-  readonly order: readonly [GPUBuffer, GPUBuffer];
+  /** Slots in the order of their keys. Before the sort it lists the survivors. */
+  readonly #order: GPUBuffer;
+  #spare: readonly [GPUBuffer, GPUBuffer];
   /** [block][digit] */
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
@@ -76,8 +76,8 @@ export class Scratch {
       this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages), planUsage);
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
       this.#keys = perSplat('sort.keys');
+      this.#order = perSplat('sort.order');
       this.#spare = this.#makeSpare(spareBytes);
-      this.order = [perSplat('sort.order_a'), perSplat('sort.order_b')];
       this.digitCounts = buffer(
         'sort.digit_counts',
         4 * constants.DIGITS * Math.ceil(this.capacity / constants.SORT_BLOCK),
@@ -89,20 +89,25 @@ export class Scratch {
     }
   }
 
-  /** Depth keys; the sort goes back and forth between the two. The second is {@link spare}. */
+  /** Depth keys; the sort goes back and forth between the two. The second is one of {@link spare}. */
   get keys(): readonly [GPUBuffer, GPUBuffer] {
-    return [this.#keys, this.#spare];
+    return [this.#keys, this.#spare[0]];
+  }
+
+  /** Slots in the order of their keys, which end in the first. Before the sort that lists the survivors. The second is the other of {@link spare}. */
+  get order(): readonly [GPUBuffer, GPUBuffer] {
+    return [this.#order, this.#spare[1]];
   }
 
   /** Free once splats are in order: the rasterizer's then. */
-  get spare(): GPUBuffer {
+  get spare(): readonly [GPUBuffer, GPUBuffer] {
     return this.#spare;
   }
 
   /** Makes {@link spare} as large as a rasterizer needs it; whatever was bound to it must be bound again. */
   fitSpare(bytes: number): void {
-    if (this.#spare.size === this.#spareSize(bytes)) return;
-    this.#memory.free(this.#spare);
+    if (this.#spare[0].size === this.#spareSize(bytes)) return;
+    for (const buffer of this.#spare) this.#memory.free(buffer);
     this.#spare = this.#makeSpare(bytes);
   }
 
@@ -118,9 +123,11 @@ export class Scratch {
     return 4 * Math.max(1, this.capacity, Math.ceil(bytes / 4));
   }
 
-  #makeSpare(bytes: number): GPUBuffer {
+  #makeSpare(bytes: number): readonly [GPUBuffer, GPUBuffer] {
     const { storage, copyDestination, copySource } = BUFFER_USAGE;
-    return this.#memory.buffer('gs.sort.spare', this.#spareSize(bytes), storage | copySource | copyDestination);
+    const buffer = (name: string): GPUBuffer =>
+      this.#memory.buffer(`gs.sort.${name}`, this.#spareSize(bytes), storage | copySource | copyDestination);
+    return [buffer('spare_keys'), buffer('spare_order')];
   }
 }
 

@@ -57,7 +57,7 @@ async function sortOnGpu(
   const bindings = stage.bind(buffers, keyBits);
   bench.compute((pass) => stage.record(pass, bindings, plan));
   const side = sortedIn(name, keyBits);
-  const result = { keys: await bench.read(keyBuffers[side]), order: await bench.read(order[side]) };
+  const result = { keys: await bench.read(keyBuffers[side]), order: await bench.read(order[0]) };
   const rest = result.order.subarray(keys.length);
   check(
     rest.every((word) => word === 0xdeadbeef),

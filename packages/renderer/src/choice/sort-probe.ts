@@ -2,7 +2,7 @@ import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE, dispatchGrid } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import type { PassTimer } from '../gpu/pass-timer.js';
-import { sortedIn, SortStage, type SortBindings, type SortName } from '../stages/sort.js';
+import { SortStage, type SortBindings, type SortName } from '../stages/sort.js';
 import type { FrameClock } from './frame-clock.js';
 
 /** Keys whose order is checked: several blocks, the last one not full. */
@@ -71,7 +71,7 @@ class ProbedSort {
     const digitCounts = buffer(4 * constants.DIGITS * blocks);
     const digitTotals = buffer(4 * constants.DIGITS);
     this.#unsorted = keyBuffers[0];
-    this.#sorted = values[sortedIn(name, KEY_BITS)];
+    this.#sorted = values[0];
     this.#stage = new SortStage(device, name);
     this.#bindings = this.#stage.bind(
       { plan: this.#plan, keys: keyBuffers, values, digitCounts, digitTotals },

@@ -15,8 +15,9 @@ export interface PairBuffers {
   readonly rects: GPUBuffer;
   readonly groupPairs: GPUBuffer;
   readonly plan: GPUBuffer;
-  /** The second is the spare one of {@link RasterizerInputs}. */
+  /** The second is a spare one of {@link RasterizerInputs}. */
   readonly bins: readonly [GPUBuffer, GPUBuffer];
+  /** The first is the other spare one. */
   readonly pairs: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
@@ -25,7 +26,7 @@ export interface PairBuffers {
 /** `bin_index` writes its bits in whole groups. */
 const wholeGroups = (pairs: number): number => PROJECT_GROUP * Math.ceil(pairs / PROJECT_GROUP);
 
-/** Bytes of the second buffer of bins. */
+/** Bytes of either spare buffer. */
 export const spareBytesOf = ({ capacity, pairCapacity }: Room): number =>
   WORD_BYTES * Math.max(wholeGroups(pairCapacity), capacity);
 
@@ -38,11 +39,11 @@ export function pairBuffers(
     memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination | indirect);
   const pairs = wholeGroups(pairCapacity);
   return {
-    rects: spare,
+    rects: spare[0],
     groupPairs: buffer('group_pairs', scanBytes(Math.ceil(capacity / PREFIX_THREADS))),
     plan: buffer('plan', layouts.Plan.size + layouts.PagePlan.size),
-    bins: [buffer('bins', WORD_BYTES * pairs), spare],
-    pairs: [buffer('pairs_a', WORD_BYTES * pairs), buffer('pairs_b', WORD_BYTES * pairs)],
+    bins: [buffer('bins', WORD_BYTES * pairs), spare[0]],
+    pairs: [spare[1], buffer('pairs', WORD_BYTES * pairs)],
     digitCounts: buffer('digit_counts', 4 * DIGITS * Math.ceil(pairCapacity / SORT_BLOCK)),
     digitTotals: buffer('digit_totals', 4 * DIGITS),
   };

@@ -55,8 +55,7 @@ export class QuadsRasterizer implements Rasterizer {
     const bindTo = (order: GPUBuffer): GPUBindGroup =>
       this.#program.bind({ raster: this.#uniform, plan, splats, order });
     this.#bindings = {
-      first: bindTo(orders.first),
-      second: bindTo(orders.second),
+      sorted: bindTo(orders.sorted),
       identity: bindTo(orders.identity),
     };
   }

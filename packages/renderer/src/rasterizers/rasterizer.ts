@@ -7,11 +7,8 @@ export type RasterizerName = 'quads' | 'tiles';
 /** Formats of the accumulation texture. Quads blend into `rgba32float` only with the feature `float32-blendable`. */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
 
-/**
- * Buffers that list slots from near to far: the two between which a sort goes back and forth (see `sortedIn`), and the one for slots that
- * are in that order themselves.
- */
-export type OrderKind = 'first' | 'second' | 'identity';
+/** Buffers that list slots from near to far: the one that a sort leaves, and the one for slots that are in that order themselves. */
+export type OrderKind = 'sorted' | 'identity';
 
 /** What every rasterizer reads. */
 export interface RasterizerInputs {
@@ -25,8 +22,8 @@ export interface RasterizerInputs {
   readonly occlusion: { readonly depths: GPUBuffer; readonly lastDepths: GPUBuffer };
   /** Numbers of the visible splats by slot, for frames whose order is `identity`. */
   readonly survivors: GPUBuffer;
-  /** At least {@link Rasterizer.spareBytes}: nobody else's once splats are in order, until the next frame. */
-  readonly spare: GPUBuffer;
+  /** Of at least {@link Rasterizer.spareBytes} each: nobody else's once splats are in order, until the next frame. */
+  readonly spare: readonly [GPUBuffer, GPUBuffer];
   /** Most splats that can be visible. */
   readonly capacity: number;
   /** Pairs of splat and bin for which there shall be room. */
@@ -115,7 +112,7 @@ export interface Rasterizer {
   readonly noted?: NotedFrame;
   /** True if the rasterizer can write a final image of this format by itself. */
   finishes(format: GPUTextureFormat): boolean;
-  /** Bytes of {@link RasterizerInputs.spare} that it needs. */
+  /** Bytes of each buffer of {@link RasterizerInputs.spare} that it needs. */
   spareBytes(room: Room): number;
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;

@@ -178,7 +178,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #release(): void {
-    // The spare one is not of this memory, and stays.
+    // The spare ones are not of this memory, and stay.
     for (const buffer of Object.values(this.#buffers ?? {}).flat()) this.#memory.free(buffer as GPUBuffer);
     this.#forgetGrids();
     this.#buffers = undefined;
@@ -222,8 +222,7 @@ export class TilesRasterizer implements Rasterizer {
     };
     return {
       listing: {
-        first: listing(orders.first),
-        second: listing(orders.second),
+        sorted: listing(orders.sorted),
         identity: listing(orders.identity),
       },
       scan: scanKernel.bind({ values: groupPairs, scan: this.#scanLength }),

@@ -26,7 +26,7 @@ export interface SortBuffers {
   readonly plan: GPUBuffer;
   /** The keys lie in the first. Passes go back and forth between the two: see {@link sortedIn}. */
   readonly keys: readonly [GPUBuffer, GPUBuffer];
-  /** What moves along with the keys, likewise. Indices need not be there at first: the first pass makes them. */
+  /** What moves along with the keys: given words likewise. Indices are made by the first pass, and end in the first buffer. */
   readonly values: readonly [GPUBuffer, GPUBuffer];
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
@@ -75,12 +75,8 @@ export function canSort(device: GPUDevice, name: SortName): boolean {
 /** What moves along with a key: its index, or a word of the caller's. */
 export type SortValues = 'indices' | 'given';
 
-/** Which of the two key and value buffers holds the result for keys of so many bits: the first (0) or the second (1). */
+/** Which of the two buffers of keys, and of given words, holds the result for keys of so many bits: the first (0) or the second (1). */
 export const sortedIn = (name: SortName, keyBits: number): 0 | 1 => (passCount(name, keyBits) % 2 === 0 ? 0 : 1);
-
-/** The same by the name of a list of slots. */
-export const sortedOrder = (name: SortName, keyBits: number): 'first' | 'second' =>
-  sortedIn(name, keyBits) === 0 ? 'first' : 'second';
 
 /**
  * Stable least-significant-digit radix sort of keys of up to 32 bits: for each digit a pass of count, scan, scatter.
@@ -88,6 +84,7 @@ export const sortedOrder = (name: SortName, keyBits: number): 'first' | 'second'
  */
 export class SortStage {
   readonly name: SortName;
+  readonly #moving: SortValues;
   readonly #count: ComputeKernel<typeof sortCount> | ComputeKernel<typeof sortCountSerial>;
   readonly #scan: ComputeKernel<typeof sortScan> | ComputeKernel<typeof sortScanSerial>;
   readonly #scanGroups: number;
@@ -96,6 +93,7 @@ export class SortStage {
 
   constructor(device: GPUDevice, name: SortName = 'shared8', moving: SortValues = 'indices') {
     this.name = name;
+    this.#moving = moving;
     const isSerial = name === 'serial';
     const bits = digitBits(name);
     this.#count = isSerial ? kernelOf(device, sortCountSerial) : kernelOf(device, withDigits(sortCount, bits));
@@ -109,8 +107,10 @@ export class SortStage {
 
   /** @param keyBits how many of the lowest bits of a key count; the others must be 0 or are ignored. */
   bind({ plan, keys, values, digitCounts, digitTotals }: SortBuffers, keyBits = MAX_KEY_BITS): readonly SortPass[] {
-    return this.#passUniforms.slice(0, passCount(this.name, keyBits)).map((uniform, index) => {
+    const passes = passCount(this.name, keyBits);
+    return this.#passUniforms.slice(0, passes).map((uniform, index) => {
       const [from, to] = index % 2 === 0 ? [0, 1] : [1, 0];
+      const valuesTo = this.#moving === 'given' ? to : (passes - 1 - index) % 2;
       return {
         count: this.#count.bind({ digit_pass: uniform, plan, keys: keys[from], counts: digitCounts }),
         scan: this.#scan.bind({ plan, counts: digitCounts, digit_totals: digitTotals }),
@@ -118,11 +118,11 @@ export class SortStage {
           digit_pass: uniform,
           plan,
           keys_in: keys[from],
-          values_in: values[from],
+          values_in: values[1 - valuesTo],
           block_offsets: digitCounts,
           digit_totals: digitTotals,
           keys_out: keys[to],
-          values_out: values[to],
+          values_out: values[valuesTo],
         }),
       };
     });
