@@ -22,7 +22,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let peak = peaks[i];
   peaks[i] = 0.0;
   let g = unpack_gaussian(gaussians[i]);
-  let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
+  let depth = in_camera(view, g.position).z;
   let e = project_ellipse(view, g);
   var energy = 0.0;
   if (peak > 0.0) {

@@ -31,7 +31,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let weight = weights[i];
   weights[i] = 0.0;
   let g = unpack_gaussian(gaussians[i]);
-  let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
+  let depth = in_camera(view, g.position).z;
   let e = project_ellipse(view, g);
   let is_in_picture = depth >= view.near && all(e.center >= vec2f(0.0)) && all(e.center < view.viewport);
   // A splat smaller than a pixel is paler here than from nearby: where the scene is antialiased, its opacity makes up for its area.

@@ -62,7 +62,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let s = n + SCALE_AT;
   let r = n + ROTATION_AT;
   let own = turned(vec4f(numbers[r], numbers[r + 1u], numbers[r + 2u], numbers[r + 3u]), vec3f(numbers[s], numbers[s + 1u], numbers[s + 2u]));
-  var p = (view.local_to_camera * vec4f(position, 1.0)).xyz;
+  var p = in_camera(view, position);
   let reach = NEAR_SIZES * max(own.scales.x, max(own.scales.y, own.scales.z));
   if (dot(p, p) < reach * reach) { bends[i][BEND_POSITION] = NO_MOVE; }
   var seen: array<f32, SCREEN_NUMBERS>;

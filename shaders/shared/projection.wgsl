@@ -15,7 +15,7 @@ fn is_in_depth_range(view: View, depth: f32) -> bool {
 }
 
 fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
-  var p = (view.local_to_camera * vec4f(g.position, 1.0)).xyz;
+  var p = in_camera(view, g.position);
   // What `cull` found at the near plane, `project` may find a rounding nearer, and with a plane that is very near at the camera's centre or behind it.
   p.z = max(p.z, view.near);
   let xy = p.xy / p.z;

@@ -12,6 +12,8 @@ struct View {
   // Limits of x/z and y/z in the Jacobian: 1.3 tan(fov/2) on either side, asymmetric for an off-centre principal point.
   jacobian_min: vec2f,
   jacobian_max: vec2f,
+  // What float32 leaves of the eye's coordinates.
+  eye_rest: vec3f,
   near: f32,
   far: f32,
   // Place of this page among the pages of the frame, and of its first cull group among all groups.
@@ -46,4 +48,11 @@ struct View {
   min_contribution: f32,
   // Directions near the camera's, of those that splats were looked at from, a bit each (shared/sides); none draws all splats.
   sides: vec4u,
+}
+
+// From page-local coordinates to the camera's axes. What lies near the eye is subtracted from it first, which is exact: far from the page's origin both are
+// large numbers, and rounded when they are turned.
+fn in_camera(view: View, position: vec3f) -> vec3f {
+  let to_camera = mat3x3f(view.local_to_camera[0].xyz, view.local_to_camera[1].xyz, view.local_to_camera[2].xyz);
+  return to_camera * ((position - view.eye) - view.eye_rest);
 }

@@ -58,7 +58,7 @@ fn visible_depth(found: FoundGaussian, share: f32) -> f32 {
   var g = unpack_gaussian(found);
   g.opacity = shared_opacity(g.opacity, share);
   // The cheap tests first: most splats of a scene fail one of them.
-  let depth = (view.local_to_camera * vec4f(g.position, 1.0)).z;
+  let depth = in_camera(view, g.position).z;
   if (g.opacity < view.alpha_min || !is_in_depth_range(view, depth)) { return 0.0; }
   let e = project_ellipse(view, g);
   let contributes = e.opacity * TWO_PI * e.sigma_x * e.sigma_v >= view.min_contribution;

@@ -74,7 +74,7 @@ fullTest('a choice that was kept from an earlier visit is tried again, and dropp
 
 test('matrices transposed in every variant: an error, not a wrong picture', async () => {
   const { device, befallen } = await faultyDevice([
-    { shader: /gs\./, from: 'view.local_to_camera * vec4f', to: 'transpose(view.local_to_camera) * vec4f' },
+    { shader: /gs\./, from: 'return to_camera * (', to: 'return transpose(to_camera) * (' },
   ]);
   await assert.rejects(chooseVariants(device, { store: null }), { code: 'unsupported/wrong-image' });
   await assert.rejects(

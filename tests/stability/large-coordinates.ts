@@ -7,13 +7,15 @@
  * Recipe: asked for an offset of 1e6 and 100 frames that pan by a pixel. Run so with both rasterizers, at distances from 10 to 1e8 besides.
  *
  * Passes: 59 dB or more to the picture of the same scene at the origin, a million units away, while the camera pans by a pixel a frame; also for files
- * whose float32 coordinates are that large.
+ * whose float32 coordinates are that large, and to the oracle close by, 5,000 units from the middle of a scene.
  */
 import { test } from 'node:test';
-import type { Camera, GaussianCloud, Vector3 } from '@gaussian-splat/core';
+import { lookAt, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import { toRgba } from '../oracle/oracle.js';
+import { cloudOf, repeat } from '../support/clouds.js';
 import { psnr } from '../support/metrics.js';
 import { nodeDevice } from '../support/node-device.js';
+import { seededRandom } from '../support/random.js';
 import { movedBy, offCentre, type Scene } from '../support/scenes.js';
 import { draw, RASTERIZERS, resized, truth } from './support/pictures.js';
 import { chart, holds, note, sized } from './support/row.js';
@@ -44,6 +46,42 @@ for (const rasterizer of RASTERIZERS) {
       worst = Math.min(worst, psnr(here, there, { channels: 4 }));
     }
     holds('S7', `origin 1e6 away, ${frames} panned frames, ${rasterizer}, worst`, worst, { atLeast: 59, unit: 'dB' });
+  });
+}
+
+const triple = (of: (axis: number) => number): Vector3 => [of(0), of(1), of(2)];
+
+/** Splats a few pixels large around a place far from the middle of a scene that reaches as far on all sides, and a camera close by. */
+function farCorner(distance: number): { cloud: GaussianCloud; camera: Camera } {
+  const random = seededRandom(2);
+  const place: Vector3 = [distance, 0.7 * distance, -0.4 * distance];
+  const within = (most: number): number => random.uniform(-most, most);
+  const near = repeat(600, () => ({
+    position: triple((axis) => Math.fround(place[axis] + within(1))),
+    scale: triple(() => random.uniform(0.003, 0.02)),
+    opacity: 0.9,
+    color: triple(() => random.uniform(0, 1)),
+  }));
+  const others = repeat(2400, () => ({
+    position: triple(() => within(distance)),
+    scale: 0.05,
+    opacity: 0.9,
+    color: [0.5, 0.5, 0.5] as const,
+  }));
+  const eye: Vector3 = [place[0] + 0.4, place[1] + 0.3, place[2] - 2.2];
+  const size = { width: 128, height: 128, fx: 1660, fy: 1660, cx: 64, cy: 64 };
+  const camera = { ...size, worldToCamera: lookAt(eye, place, [0, -1, 0]), near: 0.2, far: 1e10 };
+  return { cloud: cloudOf([...near, ...others]), camera };
+}
+
+for (const rasterizer of RASTERIZERS) {
+  test(`close by, thousands of units from the middle of a scene, ${rasterizer}`, async () => {
+    const device = await nodeDevice();
+    const { cloud, camera } = farCorner(5000);
+    const found = psnr(await draw(device, cloud, camera, { rasterizer }), toRgba(truth(cloud, camera)), {
+      channels: 4,
+    });
+    holds('S7', `close by, 5,000 units from the middle of a scene, ${rasterizer}`, found, { atLeast: 59, unit: 'dB' });
   });
 }
 

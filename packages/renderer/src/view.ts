@@ -44,9 +44,11 @@ export function cameraValues(camera: Camera, origin: Vector3, orderOrigin = orig
   // gsplat's form of the clamp: asymmetric for an off-centre principal point, INRIA's ±1.3 tan(fov/2) for a centred one.
   const marginX = (CLAMP_MARGIN * 0.5 * width) / fx;
   const marginY = (CLAMP_MARGIN * 0.5 * height) / fy;
+  const eye = subtract(eyeOf(worldToCamera), origin);
   return {
     local_to_camera: columns,
-    eye: subtract(eyeOf(worldToCamera), origin),
+    eye,
+    eye_rest: subtract(eye, [Math.fround(eye[0]), Math.fround(eye[1]), Math.fround(eye[2])]),
     focal: [fx, fy],
     principal: [cx, cy],
     viewport: [width, height],

@@ -24,8 +24,8 @@ const camera = cameraAt([0, 0, 0], [0, 0, 1], { width: 64, height: 48, near: NEA
 /** A depth that comes out smaller by some share of the near plane's distance: a rounding, where coordinates are 2^23 times as large. */
 const nearer = (share: number): Miscompilation => ({
   shader: /gs\.project/,
-  from: '(view.local_to_camera * vec4f(g.position, 1.0)).xyz;',
-  to: `(view.local_to_camera * vec4f(g.position, 1.0)).xyz - vec3f(0.0, 0.0, ${share} * view.near);`,
+  from: 'in_camera(view, g.position);',
+  to: `in_camera(view, g.position) - vec3f(0.0, 0.0, ${share} * view.near);`,
 });
 
 async function checkInFront(bench: Bench, share: number): Promise<void> {
