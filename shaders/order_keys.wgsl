@@ -1,5 +1,4 @@
-// Keys that order all splats of a page by depth, those behind the camera included: the depth's bits, made to grow with it. Depth is measured from the
-// first scene's origin and not from the camera: from far away it would be rounded to steps that show when the camera comes near.
+// Keys that order all splats of a page by depth, those behind the camera included: the depth's bits, made to grow with it.
 #import shared/view
 #import shared/stored_gaussian
 #import shared/group
@@ -16,8 +15,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var key = 0xffffffffu;
   if (i < view.splat_count) {
     let position = position_of(gaussian_at(i));
-    let axis = vec3f(view.local_to_camera[0].z, view.local_to_camera[1].z, view.local_to_camera[2].z);
-    let depth_bits = bitcast<u32>(dot(axis, position) + view.order_offset);
+    let depth_bits = bitcast<u32>(in_camera(view, position).z);
     key = select(depth_bits | 0x80000000u, ~depth_bits, depth_bits >= 0x80000000u);
   }
   keys[view.first_group * CULL_GROUP + i] = key;

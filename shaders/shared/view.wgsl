@@ -40,8 +40,6 @@ struct View {
   detail_fade: f32,
   // Splats that the frame may look at.
   splat_budget: u32,
-  // What the order of all splats adds to depths from the page's origin: how much deeper that lies than the first scene's.
-  order_offset: f32,
   // Least alpha that paints: ALPHA_MIN, or more as a lever.
   alpha_min: f32,
   // Splats with less than this opacity times their area in px² are left out. A lever: 0 leaves out none.

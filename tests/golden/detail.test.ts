@@ -49,7 +49,8 @@ test('levels that are added to a scene on the GPU draw what the same levels in o
   const { device, plain, detailed } = await uploaded(cloud);
   const beside = await added(cloud, plain);
   assert.equal(beside.count, plain.count + detailed.count - 256 * Math.ceil(plain.count / 256));
-  const renderers = [0, 1, 2].map(() => new Renderer(device, serial));
+  // The last two have drawn nothing before: an order that was made from elsewhere may have splats of nearly one depth the other way round.
+  const renderers = [0, 1, 2, 3].map(() => new Renderer(device, serial));
   for (const [camera, detail] of [[viewFrom(30), 1] as const, [viewFrom(12), 0] as const]) {
     const request = { camera, detail };
     const expected = await readFrame(device, renderers[0], { ...request, gaussians: detailed });
@@ -57,8 +58,8 @@ test('levels that are added to a scene on the GPU draw what the same levels in o
   }
   beside.destroy();
   const camera = viewFrom(12);
-  const exact = await readFrame(device, renderers[0], { gaussians: detailed, camera, detail: 0 });
-  assert.deepEqual(await readFrame(device, renderers[2], { gaussians: plain, camera }), exact);
+  const exact = await readFrame(device, renderers[2], { gaussians: detailed, camera, detail: 0 });
+  assert.deepEqual(await readFrame(device, renderers[3], { gaussians: plain, camera }), exact);
   renderers.forEach((renderer) => renderer.destroy());
 });
 

@@ -8,6 +8,8 @@ import { OrderKeysStage } from './stages/order-keys.js';
 import { SortStage, type SortName } from './stages/sort.js';
 
 const KEY_BITS = 32;
+/** Times as far from a scene's origin, in depth, as a camera may have been for which an order was made that serves it: four bits of a depth's 24. */
+const MOST_FARTHER = 16;
 const { SORT_BLOCK, DIGITS, CULL_GROUP } = constants;
 
 /** What a sort needs besides the order that it makes. */
@@ -21,8 +23,8 @@ interface Working {
 
 /**
  * All splats of a page table from near to far. Depth along the camera's axis changes by the same amount for all splats when the
- * camera moves without turning, so the order stays right: such frames only thin it to the visible splats. Keys do not depend on where the camera is, either, for
- * from far away float32 has few digits left for what lies between splats.
+ * camera moves without turning, so the order stays right: such frames only thin it to the visible splats. One that was made from
+ * far away has too few of float32's digits for a camera that is near.
  *
  * A splat's number counts pages as whole chunks; what fills up a page's last chunk stands at the end of the order.
  */
@@ -35,6 +37,8 @@ export class DepthOrder {
   readonly #memory: GpuMemory;
   #order: GPUBuffer | undefined;
   #axis: Vector3 | undefined;
+  /** Of the scenes' origins, when the order was made. */
+  #depths: readonly number[] = [];
   /** Of the content that was ordered. */
   #version = 0;
   /** Needed while sorting only. */
@@ -66,6 +70,8 @@ export class DepthOrder {
   /** True if the order serves the content at hand and a camera, whose axis may have turned by an angle in radians. */
   serves(camera: Camera, angle: number): boolean {
     if (this.#version !== this.#table.version) return false;
+    const depths = depthsOf(this.#table.origins, camera);
+    if (this.#depths.some((depth, k) => depth > MOST_FARTHER * depths[k])) return false;
     return this.#axis !== undefined && angleBetween(this.#axis, axisOf(camera)) <= angle;
   }
 
@@ -79,6 +85,7 @@ export class DepthOrder {
     this.#sort.record(pass, sort, plan);
     pass.end();
     this.#axis = axisOf(camera);
+    this.#depths = depthsOf(this.#table.origins, camera);
     this.#version = this.#table.version;
   }
 
@@ -136,6 +143,11 @@ export class DepthOrder {
     words[sort_z.offset / 4] = 1;
     this.#device.queue.writeBuffer(plan, 0, words);
   }
+}
+
+/** How deep points lie, before or behind a camera. */
+function depthsOf(points: readonly Vector3[], { worldToCamera: m }: Camera): number[] {
+  return points.map(([x, y, z]) => Math.abs(m[8] * x + m[9] * y + m[10] * z + m[11]));
 }
 
 /** Unit vector along which a camera measures depth, in world coordinates. */

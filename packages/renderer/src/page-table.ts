@@ -1,4 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
+import type { Camera, Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
@@ -73,6 +73,11 @@ export class PageTable {
     return this.#scenes.reduce((sum, { version }) => sum + version, 0);
   }
 
+  /** World positions of the scenes' origins. */
+  get origins(): readonly Vector3[] {
+    return this.#scenes.map(({ origin }) => origin);
+  }
+
   get byteLength(): number {
     return this.#memory.byteLength;
   }
@@ -107,7 +112,7 @@ export class PageTable {
     };
     let page = 0;
     for (const scene of this.#scenes) {
-      const values = cameraValues(camera, scene.origin, this.#scenes[0].origin);
+      const values = cameraValues(camera, scene.origin);
       const own = {
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],

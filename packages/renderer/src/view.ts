@@ -1,4 +1,4 @@
-import { dot, eyeOf, multiply, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { eyeOf, multiply, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
 import type { layouts } from './generated/shaders.js';
 import type { StructValues } from './gpu/struct.js';
 
@@ -34,9 +34,9 @@ export type CameraValues = Omit<
 
 /**
  * A camera as the shaders want it. The origin is folded into the matrix in float64, so that scenes a million units from
- * the world's origin keep their float32 digits. `orderOrigin` is where the order of all splats measures depth from, the same for all scenes of a frame.
+ * the world's origin keep their float32 digits.
  */
-export function cameraValues(camera: Camera, origin: Vector3, orderOrigin = origin): CameraValues {
+export function cameraValues(camera: Camera, origin: Vector3): CameraValues {
   const { width, height, fx, fy, cx, cy, near, far, worldToCamera } = camera;
   const toOrigin = [1, 0, 0, origin[0], 0, 1, 0, origin[1], 0, 0, 1, origin[2], 0, 0, 0, 1];
   const rows = multiply(worldToCamera, toOrigin);
@@ -57,17 +57,16 @@ export function cameraValues(camera: Camera, origin: Vector3, orderOrigin = orig
     near,
     far: Math.min(far, MAX_FLOAT32),
     stretch: stretchOf(worldToCamera),
-    order_offset: dot([worldToCamera[8], worldToCamera[9], worldToCamera[10]], subtract(origin, orderOrigin)),
   };
 }
 
 /** A bound of how much longer the matrix can make a vector: the square root of the largest row sum of |W Wᵀ|. */
 function stretchOf(worldToCamera: ArrayLike<number>): number {
-  const product = (a: number, b: number): number =>
+  const dot = (a: number, b: number): number =>
     worldToCamera[4 * a] * worldToCamera[4 * b] +
     worldToCamera[4 * a + 1] * worldToCamera[4 * b + 1] +
     worldToCamera[4 * a + 2] * worldToCamera[4 * b + 2];
-  const rowSum = (a: number): number => Math.abs(product(a, 0)) + Math.abs(product(a, 1)) + Math.abs(product(a, 2));
+  const rowSum = (a: number): number => Math.abs(dot(a, 0)) + Math.abs(dot(a, 1)) + Math.abs(dot(a, 2));
   return Math.sqrt(Math.max(rowSum(0), rowSum(1), rowSum(2)));
 }
 
