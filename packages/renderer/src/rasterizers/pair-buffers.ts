@@ -49,8 +49,9 @@ export function pairBuffers(
   };
 }
 
-/** Most pairs for which the device's buffers can have room. */
+/** Most pairs for which the device's buffers can have room: whole groups. */
 export function maxPairs(device: GPUDevice): number {
   const { maxBufferSize, maxStorageBufferBindingSize } = device.limits;
-  return Math.floor(Math.min(maxBufferSize, maxStorageBufferBindingSize) / WORD_BYTES);
+  const bytes = Math.min(maxBufferSize, maxStorageBufferBindingSize);
+  return PROJECT_GROUP * Math.floor(bytes / (PROJECT_GROUP * WORD_BYTES));
 }
