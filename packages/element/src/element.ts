@@ -1,7 +1,7 @@
 import { isServer, type PropertyValues, type TemplateResult } from 'lit';
+import { adoptStyles } from './adopt-styles.js';
 import { readAttributes, type Attributes } from './attributes.js';
 import { visitorMessage, type ElementError } from './errors.js';
-import { FrameScheduler } from './gpu/frame-scheduler.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
 import type { LiveState } from './live/live-model.js';
@@ -101,8 +101,6 @@ export class GaussianSplatElement extends ViewingMethods {
   static sharedDevice = new SharedDevice();
   /** Loads the scenes of all elements. */
   static sceneLoader = new SceneLoader();
-  /** Draws the frames of all elements. */
-  static frameScheduler = new FrameScheduler();
   /** How long a removed element keeps its scene, in milliseconds: moving it within the page costs nothing. */
   static releaseDelay = 1_000;
   /**
@@ -208,14 +206,10 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#controlObserver?.disconnect();
   }
 
-  /** Style sheets stay behind in the document that made them. */
-  adoptedCallback(): void {
-    const { defaultView } = this.ownerDocument;
-    // A document without a window shows nothing.
-    if (defaultView === null || !this.shadowRoot) return;
-    const sheet = new (defaultView as Window & typeof globalThis).CSSStyleSheet();
-    sheet.replaceSync(styles.cssText);
-    this.shadowRoot.adoptedStyleSheets = [sheet];
+  /** Style sheets stay behind in the document that made them, and so does the picture where that has lost its window. */
+  adoptedCallback(from: Document): void {
+    if (this.shadowRoot) adoptStyles(this.shadowRoot, styles);
+    if (from.defaultView === null) this.stage.leaveWindowless();
   }
 
   /** `moveBefore()` takes the element elsewhere as it is: its being here lets the browser spare both callbacks above. */
@@ -226,7 +220,11 @@ export class GaussianSplatElement extends ViewingMethods {
   protected override createRenderRoot(): HTMLElement | DocumentFragment {
     // What a server put into a declarative shadow root gives way, in the same task, to the element's own first rendering.
     if (!isServer) this.shadowRoot?.replaceChildren();
-    return super.createRenderRoot();
+    if (isServer || this.ownerDocument === document) return super.createRenderRoot();
+    // Lit's style sheets are of the document that this code runs in: others refuse them.
+    const root = this.shadowRoot ?? this.attachShadow(GaussianSplatElement.shadowRootOptions);
+    adoptStyles(root, styles);
+    return root;
   }
 
   protected override willUpdate(changed: PropertyValues<this>): void {

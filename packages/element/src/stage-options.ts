@@ -1,7 +1,6 @@
 import type { Attributes } from './attributes.js';
 import type { SpokenStrings } from './words.js';
 import type { InputOptions } from './controllers/input-controller.js';
-import type { FrameScheduler } from './gpu/frame-scheduler.js';
 import type { SharedDevice } from './gpu/shared-device.js';
 import type { LiveState } from './live/live-model.js';
 import type { SceneLoader } from './loading/scene-loader.js';
@@ -10,7 +9,6 @@ import type { SceneLoader } from './loading/scene-loader.js';
 export interface Services {
   readonly sharedDevice: SharedDevice;
   readonly sceneLoader: SceneLoader;
-  readonly frameScheduler: FrameScheduler;
   /** How long a removed element keeps its scene, ms. */
   readonly releaseDelay: number;
   /** Bytes of GPU memory that one scene may take; null for what suits the device. */

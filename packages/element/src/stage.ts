@@ -16,12 +16,14 @@ import { SizeController } from './controllers/size-controller.js';
 import { ViewController } from './controllers/view-controller.js';
 import { VisibilityController } from './controllers/visibility-controller.js';
 import { isGone } from './gpu/device-failures.js';
+import { FrameScheduler } from './gpu/frame-scheduler.js';
 import type { GaussianSplatEventMap } from './events.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
 import { LiveWiring } from './live/live-wiring.js';
 import { SceneQueries } from './scene-queries.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 import type { Source, StageOptions } from './stage-options.js';
+import { windowOf } from './window-of.js';
 
 /**
  * All that goes on behind the element's attributes and markup: scene, camera, size, sight and input, and who of them
@@ -204,10 +206,15 @@ export class Stage {
     this.#view.requestFrame();
   }
 
+  /** The document that the element comes from has no window any more. */
+  leaveWindowless(): void {
+    this.#view.renewCanvas();
+  }
+
   #createView(): ViewController {
-    const { services, attributes, canvas } = this.#options;
+    const { attributes, canvas } = this.#options;
     return new ViewController({
-      scheduler: () => services().frameScheduler,
+      scheduler: () => FrameScheduler.of(windowOf(this.#host)),
       camera: this.camera,
       size: this.#size,
       canvasOf: canvas,

@@ -308,18 +308,3 @@ describe('paper', () => {
     assertEqual(canvases().length, 1, 'canvases');
   });
 });
-
-describe('another document', () => {
-  it('an element that is moved into a frame keeps its looks and its picture', async () => {
-    const element = await showLoaded();
-    const frame = document.createElement('iframe');
-    document.body.append(frame);
-    const inside = frame.contentDocument!;
-    inside.body.append(element);
-    await delay(300);
-    const style = frame.contentWindow!.getComputedStyle(element);
-    assertEqual([style.position, style.contain], ['relative', 'strict']);
-    assert(element.loaded, 'the scene is still there');
-    assertEqual(canvasSize(element), [120, 100]);
-  });
-});

@@ -1,4 +1,5 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import { windowOf } from '../window-of.js';
 
 /** A size in whole device pixels. */
 export interface PixelSize {
@@ -30,7 +31,7 @@ export class SizeController implements ReactiveController {
   pixelSize(maxPixelRatio: number, maxSide: number): PixelSize | null {
     const { width, height } = this.#deviceSize ?? { width: 0, height: 0 };
     if (width === 0 || height === 0) return null;
-    const shrink = Math.min(1, maxPixelRatio / devicePixelRatio, maxSide / Math.max(width, height));
+    const shrink = Math.min(1, maxPixelRatio / this.#pixelRatio, maxSide / Math.max(width, height));
     return { width: Math.max(1, Math.round(width * shrink)), height: Math.max(1, Math.round(height * shrink)) };
   }
 
@@ -48,6 +49,11 @@ export class SizeController implements ReactiveController {
       height: this.#canvas.clientHeight,
     };
     return width === 0 || height === 0;
+  }
+
+  /** Device pixels for one CSS pixel. */
+  get #pixelRatio(): number {
+    return this.#canvas ? windowOf(this.#canvas).devicePixelRatio : devicePixelRatio;
   }
 
   hostConnected(): void {
@@ -68,6 +74,7 @@ export class SizeController implements ReactiveController {
   #observe(): void {
     this.#canvas = this.#canvasOf();
     if (this.#canvas === null || this.#observer !== undefined) return;
+    const { ResizeObserver } = windowOf(this.#canvas);
     this.#observer = new ResizeObserver((entries) => this.#update(entries[entries.length - 1]));
     try {
       // Exact device pixels, also where the element's edges lie between them.
@@ -86,7 +93,7 @@ export class SizeController implements ReactiveController {
   }
 
   #setFromCss(width: number, height: number): void {
-    this.#set({ width: Math.round(width * devicePixelRatio), height: Math.round(height * devicePixelRatio) });
+    this.#set({ width: Math.round(width * this.#pixelRatio), height: Math.round(height * this.#pixelRatio) });
   }
 
   #set(size: PixelSize): void {
@@ -96,7 +103,8 @@ export class SizeController implements ReactiveController {
   }
 
   #watchResolution(): void {
-    this.#resolution = matchMedia(`(resolution: ${devicePixelRatio}dppx)`);
+    const view = this.#canvas ? windowOf(this.#canvas) : window;
+    this.#resolution = view.matchMedia(`(resolution: ${this.#pixelRatio}dppx)`);
     this.#resolution.addEventListener('change', this.#onResolution, { once: true });
   }
 

@@ -108,6 +108,14 @@ export class ViewController implements FrameClient {
     this.#configured = null;
   }
 
+  /** Puts another canvas in the place of one whose document has lost its window: that one never shows a picture again. */
+  renewCanvas(): void {
+    const canvas = this.#options.canvasOf();
+    canvas?.replaceWith(canvas.cloneNode());
+    this.#context = null;
+    this.#configured = null;
+  }
+
   drawFrame(now: number): void {
     const scene = this.#scene;
     // It may have left the viewport since it asked.
@@ -145,9 +153,11 @@ export class ViewController implements FrameClient {
     return canvas;
   }
 
-  /** There is a scene, and somebody sees it or waits for its first frame. */
+  /** There is a scene, and somebody sees it or waits for its first frame. A document without a window, as of a frame that was taken away, shows none. */
   get #isDrawable(): boolean {
-    return this.#scene?.isLost === false && (this.#first !== undefined || this.#options.isVisible());
+    const { canvasOf, isVisible } = this.#options;
+    if (this.#scene?.isLost !== false || canvasOf()?.ownerDocument.defaultView === null) return false;
+    return this.#first !== undefined || isVisible();
   }
 
   /** null where there is no size. */

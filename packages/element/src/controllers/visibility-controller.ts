@@ -1,4 +1,5 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import { windowOf } from '../window-of.js';
 
 /**
  * More than nothing must be visible: with a threshold of 0 an element that only touches the viewport's edge would
@@ -24,6 +25,7 @@ export class VisibilityController implements ReactiveController {
   }
 
   hostConnected(): void {
+    const { IntersectionObserver } = windowOf(this.#element);
     this.#observer = new IntersectionObserver((entries) => this.#set(entries[entries.length - 1].isIntersecting), {
       threshold: THRESHOLD,
     });

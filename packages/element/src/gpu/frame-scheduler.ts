@@ -9,14 +9,30 @@ export interface FrameClient {
 /** Frames until who draws besides counts in full: who draws now and then takes little of what there is. Who draws no more does not count. */
 const MEMORY = 8;
 
-/** One requestAnimationFrame loop for all elements of a page; it runs only while one of them has asked for a frame. */
+/** Of each window that elements are in. */
+const KNOWN = new WeakMap<Window, FrameScheduler>();
+
+/** One requestAnimationFrame loop for all elements of a window; it runs only while one of them has asked for a frame. */
 export class FrameScheduler {
+  readonly #window: Window;
   #due = new Set<FrameClient>();
   #drawing = new Set<FrameClient>();
   #handle = 0;
   #waitsForPage = false;
   readonly #interval = new DisplayInterval();
   #clients = 1;
+
+  /** @param view the window whose pictures are drawn; default the page's own */
+  constructor(view: Window = globalThis as unknown as Window) {
+    this.#window = view;
+  }
+
+  /** The one of a window. */
+  static of(view: Window): FrameScheduler {
+    const known = KNOWN.get(view) ?? new FrameScheduler(view);
+    KNOWN.set(view, known);
+    return known;
+  }
 
   /** Milliseconds between two pictures of the display. */
   get displayInterval(): number {
@@ -39,14 +55,14 @@ export class FrameScheduler {
     this.#due.delete(client);
     this.#drawing.delete(client);
     if (this.#due.size > 0 || this.#handle === 0) return;
-    cancelAnimationFrame(this.#handle);
+    this.#window.cancelAnimationFrame(this.#handle);
     this.#handle = 0;
   }
 
   #schedule(): void {
     if (this.#handle !== 0 || this.#due.size === 0) return;
-    if (document.visibilityState === 'hidden') this.#waitForPage();
-    else this.#handle = requestAnimationFrame(this.#tick);
+    if (this.#window.document.visibilityState === 'hidden') this.#waitForPage();
+    else this.#handle = this.#window.requestAnimationFrame(this.#tick);
   }
 
   #waitForPage(): void {
@@ -56,12 +72,17 @@ export class FrameScheduler {
       this.#waitsForPage = false;
       this.#schedule();
     };
-    document.addEventListener('visibilitychange', resume, { once: true });
+    this.#window.document.addEventListener('visibilitychange', resume, { once: true });
   }
 
-  readonly #tick = (now: number): void => {
+  readonly #tick = (time: number): void => {
     this.#handle = 0;
-    if (document.visibilityState !== 'hidden') this.#drawAll(now);
+    // Clocks of windows begin when they are opened.
+    const now =
+      this.#window === (globalThis as unknown as Window)
+        ? time
+        : time + this.#window.performance.timeOrigin - performance.timeOrigin;
+    if (this.#window.document.visibilityState !== 'hidden') this.#drawAll(now);
     this.#schedule();
     if (this.#handle === 0) this.#interval.pause();
   };
