@@ -66,6 +66,9 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
   return camera;
 }
 
+/** How far the last row of a matrix may be from 0, 0, 0, 1. */
+const AFFINE_ROUNDING = 1e-6;
+
 /** Throws `argument/camera` if a field of the camera is out of its documented range. */
 export function validateCamera(camera: Camera, where = 'camera'): void {
   const { width, height, fx, fy, cx, cy, worldToCamera, near, far } = camera;
@@ -83,6 +86,10 @@ export function validateCamera(camera: Camera, where = 'camera'): void {
   if (!(near > 0 && near < far)) fail(`${where}.near`, 'a distance above 0 and below far', `near ${near}, far ${far}`);
   if (worldToCamera?.length !== 16 || !Array.prototype.every.call(worldToCamera, Number.isFinite)) {
     fail(`${where}.worldToCamera`, '16 finite numbers, row-major', describe(worldToCamera));
+  }
+  const [x, y, z, w] = [12, 13, 14, 15].map((k) => worldToCamera[k]);
+  if (Math.max(Math.abs(x), Math.abs(y), Math.abs(z), Math.abs(w - 1)) > AFFINE_ROUNDING) {
+    fail(`${where}.worldToCamera`, 'a last row of 0, 0, 0, 1: row-major, not column-major', describe([x, y, z, w]));
   }
 }
 

@@ -111,6 +111,13 @@ export class GaussianSplatElement extends ViewingMethods {
   static memoryBudget: number | null = null;
   /** Folder of the files of onnxruntime-web 1.30.0, which generators need; null for `onnxruntime/` beside the bundle. */
   static runtimeLocation: string | null = null;
+  /** Address of `scene-worker.js`, where a bundler or a server has put it elsewhere; null for the one beside the bundle. Set it before the first scene is loaded. */
+  static get workerLocation(): string | null {
+    return this.sceneLoader.workerLocation;
+  }
+  static set workerLocation(location: string | null) {
+    this.sceneLoader.workerLocation = location;
+  }
   /** Rewrites the absolute addresses of all scenes before they are fetched: for signed URLs and mirrors. */
   static urlModifier: ((url: string) => string) | null = null;
 

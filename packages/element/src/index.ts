@@ -34,7 +34,9 @@ export { SceneTimeRanges } from './time-ranges.js';
 export type { ControlValues, Numbers, Picture } from './live/values.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 
-const CONFIGURABLE = ['runtimeLocation', 'urlModifier', 'releaseDelay', 'sharedDevice', 'memoryBudget'] as const;
+const CONFIGURABLE = [
+  ...(['runtimeLocation', 'workerLocation', 'urlModifier', 'releaseDelay', 'sharedDevice', 'memoryBudget'] as const),
+] as const;
 
 /** What a page may put into `globalThis.GaussianSplatElement` before this module runs: statics of the class. */
 export type GaussianSplatConfiguration = Partial<Pick<typeof GaussianSplatElement, (typeof CONFIGURABLE)[number]>>;

@@ -1,6 +1,8 @@
+import { validateCamera } from '@gaussian-splat/core';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import type { FrameRequest } from './frame-request.js';
 import type { Renderer } from './renderer.js';
+import { requireRequest, requireTextureSize } from './requirements.js';
 
 /** Rows of a texture copy start at multiples of this many bytes. */
 const ROW_ALIGNMENT = 256;
@@ -12,6 +14,7 @@ const MOST_TRIES = 4;
 /**
  * Draws one image and reads it back in float32, before any rounding to 8 bits. Drawn again where the renderer's buffers had no
  * room for all of it.
+ * @throws GaussianSplatError as {@link Renderer.render} does, before anything is allocated.
  * @returns [height, width, 4] premultiplied red, green, blue and alpha, row by row from the top.
  */
 export async function capture(
@@ -19,6 +22,9 @@ export async function capture(
   renderer: Renderer,
   request: Omit<FrameRequest, 'target' | 'targetFormat'>,
 ): Promise<Float32Array> {
+  requireRequest(request);
+  validateCamera(request.camera);
+  requireTextureSize(device, request.camera);
   const { width, height } = request.camera;
   const bytesPerRow = Math.ceil((width * BYTES_PER_PIXEL) / ROW_ALIGNMENT) * ROW_ALIGNMENT;
   const texture = device.createTexture({

@@ -20,7 +20,7 @@ export interface FrameRequest {
   readonly gaussians: GaussianScene | readonly GaussianScene[];
   /** Its width and height must be those of the target. */
   readonly camera: Camera;
-  /** A texture with the usage STORAGE_BINDING saves `tiles` a pass. */
+  /** A texture with the usage STORAGE_BINDING saves `tiles` a pass. Of one with several levels or layers the first is drawn into. */
   readonly target: GPUTexture | GPUTextureView;
   /** Format of a target that is a view: any colour format that WebGPU can render to. */
   readonly targetFormat?: GPUTextureFormat;

@@ -14,7 +14,7 @@ import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers 
 import { Occlusion } from './occlusion.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
-import { missingFormat, requireNotes, requireTextureSize } from './requirements.js';
+import { missingFormat, requireNotes, requireRequest, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -41,6 +41,9 @@ interface Target extends Surface {
 }
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
+/** Of a target: a view of more than that is none to draw into. */
+const ONE_PICTURE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
+
 /**
  * Draws Gaussians into a texture, on a device of yours.
  *
@@ -138,11 +141,12 @@ export class Renderer {
 
   /**
    * Encodes and submits one frame.
-   * @throws GaussianSplatError `argument/camera` for a camera out of range; `out-of-memory/buffer-limit` if the scenes
+   * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for another argument; `out-of-memory/buffer-limit` if the scenes
    * need a larger buffer than the device allows.
    */
   render(request: FrameRequest): void {
     const { camera, background = TRANSPARENT, notes, timer } = request;
+    requireRequest(request);
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
     if (notes) requireNotes(this.#rasterizer);
@@ -334,7 +338,7 @@ export class Renderer {
       return { view: target, format: targetFormat, isStorable: false, width, height };
     }
     let view = this.#views.get(target);
-    if (view === undefined) this.#views.set(target, (view = target.createView()));
+    if (view === undefined) this.#views.set(target, (view = target.createView(ONE_PICTURE)));
     const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;
     return { view, format: target.format, isStorable, width, height };
   }

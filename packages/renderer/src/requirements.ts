@@ -1,5 +1,6 @@
 /** What a renderer asks of its device and of those who call it, and the errors that say so. */
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
+import type { FrameRequest } from './frame-request.js';
 import type { AccumulationFormat, Rasterizer } from './rasterizers/rasterizer.js';
 
 export function missingFormat(): GaussianSplatError {
@@ -39,5 +40,26 @@ export function requireBlendable(device: GPUDevice, format: AccumulationFormat):
     expected: 'a device with the feature float32-blendable',
     found: 'a device without it',
     remedy: 'ask for the feature with deviceDescriptor(adapter), or use rgba16float',
+  });
+}
+
+/** Of a request what types alone would say. @throws GaussianSplatError `argument/value` */
+export function requireRequest({ gaussians, levers, background }: Partial<FrameRequest>): void {
+  const scenes = Array.isArray(gaussians) ? (gaussians as readonly unknown[]) : [gaussians];
+  if (!scenes.every(isObject)) throw missing('gaussians', 'a scene, or a list of scenes', gaussians);
+  if (levers !== undefined && !isObject(levers)) throw missing('levers', 'an object of levers, or undefined', levers);
+  if (background === undefined) return;
+  if (background?.length !== 4 || !Array.prototype.every.call(background, Number.isFinite))
+    throw missing('background', 'four finite numbers: premultiplied red, green, blue and alpha', background);
+}
+
+const isObject = (value: unknown): boolean => typeof value === 'object' && value !== null;
+
+function missing(name: keyof FrameRequest, expected: string, found: unknown): GaussianSplatError {
+  return new GaussianSplatError('argument/value', {
+    where: `FrameRequest.${name}`,
+    expected,
+    found: Array.isArray(found) ? `[${found.map(String).join(', ')}]` : String(found),
+    remedy: `see FrameRequest.${name}`,
   });
 }

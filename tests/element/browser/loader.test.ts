@@ -73,4 +73,30 @@ describe('the scene worker', () => {
     }
     claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
   });
+
+  it('lies where workerLocation says, and is named in the warning if it does not', async () => {
+    const original = GaussianSplatElement.sceneLoader;
+    const Loader = original.constructor as new () => typeof original;
+    const Original = globalThis.Worker;
+    const asked: string[] = [];
+    globalThis.Worker = class extends Original {
+      constructor(url: string | URL, options?: WorkerOptions) {
+        asked.push(new URL(url, location.href).pathname);
+        super(url, options);
+      }
+    };
+    const place = '/packages/element/dist/loading/scene-worker.js';
+    try {
+      for (const address of [place, '/net/status/404']) {
+        GaussianSplatElement.sceneLoader = new Loader();
+        GaussianSplatElement.workerLocation = address;
+        await showLoaded();
+      }
+    } finally {
+      GaussianSplatElement.sceneLoader = original;
+      globalThis.Worker = Original;
+    }
+    assertEqual(asked, [place, '/net/status/404'], 'scripts');
+    claimFault(/refuses its worker .*\/net\/status\/404.* GaussianSplatElement.workerLocation/);
+  });
 });

@@ -52,9 +52,12 @@ export class SceneLoader {
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
   #refused = false;
 
+  /** Address of the worker's script; null for the one beside the code. */
+  workerLocation: string | null = null;
+
   /** @param spawn starts the worker; tests pass their own. */
-  constructor(spawn: () => Worker = spawnSceneWorker) {
-    this.#spawn = spawn;
+  constructor(spawn?: () => Worker) {
+    this.#spawn = spawn ?? (() => spawnSceneWorker(this.workerLocation));
   }
 
   /**
@@ -197,7 +200,7 @@ export class SceneLoader {
       const reason = error instanceof Error ? error.message : String(error);
       console.warn(
         `<gaussian-splat>: this page refuses its worker (${reason}), so scenes are read on the main thread. ` +
-          `Allow it with the Content-Security-Policy directive worker-src.`,
+          `Allow it with the Content-Security-Policy directive worker-src, or name its script (${this.workerLocation ?? 'scene-worker.js beside the code'}) with GaussianSplatElement.workerLocation.`,
       );
       return null;
     }

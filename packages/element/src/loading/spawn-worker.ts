@@ -1,11 +1,17 @@
 /**
  * Starts the scene worker. A worker script must have the page's origin; where the element itself came from elsewhere
  * (a CDN) a one-line module of the page's origin imports it.
+ * @param location address of `scene-worker.js`, where a bundler has put it out of reach; null for the one beside this code
  */
-export function spawnSceneWorker(): Worker {
+export function spawnSceneWorker(location: string | null = null): Worker {
+  if (location !== null) {
+    const named = new URL(location, document.baseURI);
+    if (named.origin !== globalThis.location.origin) return spawnFromElsewhere(named);
+    return new Worker(trustedUrl(named.href) ?? named, { type: 'module' });
+  }
   const here = new URL(import.meta.url);
   const script = new URL('./scene-worker.js', here);
-  if (isOwnModule(here) && script.origin !== location.origin) return spawnFromElsewhere(script);
+  if (isOwnModule(here) && script.origin !== globalThis.location.origin) return spawnFromElsewhere(script);
   const trusted = isOwnModule(here) ? trustedUrl(script.href) : null;
   if (trusted !== null) return new Worker(trusted, { type: 'module' });
   // Written out in full, and nowhere else, since bundlers look for exactly this expression.
