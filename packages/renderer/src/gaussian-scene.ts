@@ -55,7 +55,7 @@ export interface GaussianScene {
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
   /** Of a scene with visible sets: what it was looked at from. */
-  readonly around?: Surroundings;
+  readonly around?: Surroundings | undefined;
   /** Of a scene that is streamed: where views say which pages they wish for. */
   readonly wishes?: Wishes;
   /** Called before each frame: a streamed scene uploads what has come. */

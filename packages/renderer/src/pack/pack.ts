@@ -17,8 +17,8 @@ import { choosePrecision, packSh, SH_PRECISION, type ShPrecision } from './sh.js
 export interface PackOptions {
   /**
    * Precision of the spherical harmonics. `int8` keeps eight bits and a scale for each band of each splat, and float16 for the
-   * mean colour; `float16` takes nearly twice the memory. `auto`, the default, is `int8` wherever its rounding, over all splats, stays
-   * 62 dB below white a splat, 75 dB and more in images. docs/decisions/0007 has the figures.
+   * mean colour; `float16` takes nearly twice the memory. `auto`, the default, is `int8` wherever its rounding stays
+   * 62 dB below white a splat over all of them, 75 dB and more in images, and 50 dB in each 256 neighbours. docs/decisions/0008 has the figures.
    */
   readonly sh?: ShPrecision | 'auto';
 }

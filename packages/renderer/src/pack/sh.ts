@@ -19,19 +19,36 @@ const MAX_CODE = 255;
 
 /** PSNR of a single splat, rounded as `int8`, that {@link choosePrecision} asks for on average: images then lose no more than 75 dB of noise. */
 const INT8_NOISE_DB = 62;
-/** Splats that are looked at for that. */
-const SAMPLE = 20_000;
+/** The same in every part of a scene: a picture of that part alone then has some 63 dB. */
+const INT8_PART_DB = 50;
+/** Splats of a part, neighbours where they are in packed order, and how many of them are looked at. */
+const PART = 256;
+const PART_SAMPLES = 8;
 
 /**
- * `int8` where it is precise enough: coefficients are rounded to within s / 254, s the scale of their band, evenly spread; seen from a
+ * `int8` where it is precise enough, in the scene as a whole and in each of its parts: coefficients are rounded to within s / 254, s the scale of their band, evenly spread; seen from a
  * random direction, band b adds up to a variance of (s / 127)² / 12 · (2b + 1) / 4π.
  */
-export function choosePrecision({ sh, shDegree }: GaussianCloud, kept: Uint32Array): ShPrecision {
+export function choosePrecision(cloud: GaussianCloud, kept: Uint32Array): ShPrecision {
+  const parts = Math.max(1, Math.round(kept.length / PART));
+  let sum = 0;
+  let worst = 0;
+  for (let part = 0; part < parts; part++) {
+    const [first, end] = [part, part + 1].map((k) => Math.floor((k * kept.length) / parts));
+    const variance = meanVariance(cloud, kept, first, end);
+    sum += variance;
+    worst = Math.max(worst, variance);
+  }
+  return sum / parts <= 10 ** (-INT8_NOISE_DB / 10) && worst <= 10 ** (-INT8_PART_DB / 10) ? 'int8' : 'float16';
+}
+
+/** What rounding to `int8` does to the colour of a splat of a part, in the mean of some. */
+function meanVariance({ sh, shDegree }: GaussianCloud, kept: Uint32Array, first: number, end: number): number {
   const numbers = 3 * shCoefficientCount(shDegree);
-  const step = Math.max(1, Math.floor(kept.length / SAMPLE));
+  const step = Math.max(1, Math.floor((end - first) / PART_SAMPLES));
   let variance = 0;
   let samples = 0;
-  for (let k = 0; k < kept.length; k += step, samples++) {
+  for (let k = first; k < end; k += step, samples++) {
     let at = kept[k] * numbers + 3;
     for (let band = 1; band <= shDegree; band++) {
       const scale = 2 ** (Math.ceil(SCALE_STEPS * Math.log2(largestOf(sh, at, 3 * (2 * band + 1)))) / SCALE_STEPS);
@@ -39,7 +56,7 @@ export function choosePrecision({ sh, shDegree }: GaussianCloud, kept: Uint32Arr
       at += 3 * (2 * band + 1);
     }
   }
-  return variance / Math.max(1, samples) <= 10 ** (-INT8_NOISE_DB / 10) ? 'int8' : 'float16';
+  return variance / Math.max(1, samples);
 }
 
 function largestOf(sh: Float32Array, first: number, count: number): number {
