@@ -100,7 +100,7 @@ export class GaussianSplatElement extends ViewingMethods {
   /** The GPU device of all elements. A page with a device of its own may put `new SharedDevice(...)` here beforehand. */
   static sharedDevice = new SharedDevice();
   /** Loads the scenes of all elements. */
-  static sceneLoader = new SceneLoader();
+  static sceneLoader = new SceneLoader(undefined, () => GaussianSplatElement.workerLocation);
   /** How long a removed element keeps its scene, in milliseconds: moving it within the page costs nothing. */
   static releaseDelay = 1_000;
   /**
@@ -112,12 +112,7 @@ export class GaussianSplatElement extends ViewingMethods {
   /** Folder of the files of onnxruntime-web 1.30.0, which generators need; null for `onnxruntime/` beside the bundle. */
   static runtimeLocation: string | null = null;
   /** Address of `scene-worker.js`, where a bundler or a server has put it elsewhere; null for the one beside the bundle. Set it before the first scene is loaded. */
-  static get workerLocation(): string | null {
-    return this.sceneLoader.workerLocation;
-  }
-  static set workerLocation(location: string | null) {
-    this.sceneLoader.workerLocation = location;
-  }
+  static workerLocation: string | null = null;
   /** Rewrites the absolute addresses of all scenes before they are fetched: for signed URLs and mirrors. */
   static urlModifier: ((url: string) => string) | null = null;
 

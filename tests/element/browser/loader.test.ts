@@ -76,7 +76,7 @@ describe('the scene worker', () => {
 
   it('lies where workerLocation says, and is named in the warning if it does not', async () => {
     const original = GaussianSplatElement.sceneLoader;
-    const Loader = original.constructor as new () => typeof original;
+    const Loader = original.constructor as new (spawn: undefined, locationOf: () => string | null) => typeof original;
     const Original = globalThis.Worker;
     const asked: string[] = [];
     globalThis.Worker = class extends Original {
@@ -88,12 +88,13 @@ describe('the scene worker', () => {
     const place = '/packages/element/dist/loading/scene-worker.js';
     try {
       for (const address of [place, '/net/status/404']) {
-        GaussianSplatElement.sceneLoader = new Loader();
+        GaussianSplatElement.sceneLoader = new Loader(undefined, () => GaussianSplatElement.workerLocation);
         GaussianSplatElement.workerLocation = address;
         await showLoaded();
       }
     } finally {
       GaussianSplatElement.sceneLoader = original;
+      GaussianSplatElement.workerLocation = null;
       globalThis.Worker = Original;
     }
     assertEqual(asked, [place, '/net/status/404'], 'scripts');

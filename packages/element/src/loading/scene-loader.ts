@@ -52,12 +52,15 @@ export class SceneLoader {
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
   #refused = false;
 
-  /** Address of the worker's script; null for the one beside the code. */
-  workerLocation: string | null = null;
+  readonly #locationOf: () => string | null;
 
-  /** @param spawn starts the worker; tests pass their own. */
-  constructor(spawn?: () => Worker) {
-    this.#spawn = spawn ?? (() => spawnSceneWorker(this.workerLocation));
+  /**
+   * @param spawn starts the worker; tests pass their own
+   * @param locationOf address of the worker's script; null for the one beside the code
+   */
+  constructor(spawn?: () => Worker, locationOf: () => string | null = () => null) {
+    this.#locationOf = locationOf;
+    this.#spawn = spawn ?? (() => spawnSceneWorker(locationOf()));
   }
 
   /**
@@ -200,7 +203,7 @@ export class SceneLoader {
       const reason = error instanceof Error ? error.message : String(error);
       console.warn(
         `<gaussian-splat>: this page refuses its worker (${reason}), so scenes are read on the main thread. ` +
-          `Allow it with the Content-Security-Policy directive worker-src, or name its script (${this.workerLocation ?? 'scene-worker.js beside the code'}) with GaussianSplatElement.workerLocation.`,
+          `Allow it with the Content-Security-Policy directive worker-src, or name its script (${this.#locationOf() ?? 'scene-worker.js beside the code'}) with GaussianSplatElement.workerLocation.`,
       );
       return null;
     }
