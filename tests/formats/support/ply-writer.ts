@@ -1,6 +1,8 @@
 /** Writes PLY files of any layout, so that readers can be held against files whose values are known. */
 
-export type PlyType = 'char' | 'uchar' | 'short' | 'ushort' | 'int' | 'uint' | 'float' | 'double';
+export type PlyType = 'char' | 'uchar' | 'short' | 'ushort' | 'int' | 'uint' | LongType | 'float' | 'double';
+/** In no specification, but in files. */
+export type LongType = 'int64' | 'uint64' | 'longlong' | 'ulonglong';
 export type PlyEncoding = 'ascii' | 'binary_little_endian' | 'binary_big_endian';
 
 export interface PlyColumn {
@@ -66,8 +68,8 @@ function binaryBody(elements: readonly PlyWriterElement[], encoding: PlyEncoding
 }
 
 function scalar(type: PlyType, value: number, little: boolean): Uint8Array {
-  const sizes = { char: 1, uchar: 1, short: 2, ushort: 2, int: 4, uint: 4, float: 4, double: 8 };
-  const view = new DataView(new ArrayBuffer(sizes[type]));
+  const sizes: Partial<Record<PlyType, number>> = { char: 1, uchar: 1, short: 2, ushort: 2, int: 4, uint: 4, float: 4 };
+  const view = new DataView(new ArrayBuffer(sizes[type] ?? 8));
   if (type === 'char') view.setInt8(0, value);
   else if (type === 'uchar') view.setUint8(0, value);
   else if (type === 'short') view.setInt16(0, value, little);
@@ -75,6 +77,8 @@ function scalar(type: PlyType, value: number, little: boolean): Uint8Array {
   else if (type === 'int') view.setInt32(0, value, little);
   else if (type === 'uint') view.setUint32(0, value, little);
   else if (type === 'float') view.setFloat32(0, value, little);
+  else if (type === 'int64' || type === 'longlong') view.setBigInt64(0, BigInt(value), little);
+  else if (type === 'uint64' || type === 'ulonglong') view.setBigUint64(0, BigInt(value), little);
   else view.setFloat64(0, value, little);
   return new Uint8Array(view.buffer);
 }

@@ -30,6 +30,11 @@ export function scalarGetter(type: ScalarType, littleEndian: boolean): (view: Da
       return (view, at) => view.getInt32(at, littleEndian);
     case 'uint32':
       return (view, at) => view.getUint32(at, littleEndian);
+    // Beyond 2⁵³ rounded, as float64 is.
+    case 'int64':
+      return (view, at) => Number(view.getBigInt64(at, littleEndian));
+    case 'uint64':
+      return (view, at) => Number(view.getBigUint64(at, littleEndian));
     case 'float32':
       return (view, at) => view.getFloat32(at, littleEndian);
     case 'float64':

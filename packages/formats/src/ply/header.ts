@@ -3,7 +3,11 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { asciiOf, grouped, quote } from '../bytes.js';
 import type { SceneSource } from '../scene-format.js';
 
-export type ScalarType = 'int8' | 'uint8' | 'int16' | 'uint16' | 'int32' | 'uint32' | 'float32' | 'float64';
+const SCALARS = [
+  ...(['int8', 'uint8', 'int16', 'uint16', 'int32', 'uint32', 'int64', 'uint64'] as const),
+  ...(['float32', 'float64'] as const),
+] as const;
+export type ScalarType = (typeof SCALARS)[number];
 
 export interface PlyProperty {
   readonly name: string;
@@ -29,17 +33,17 @@ export interface PlyHeader {
   readonly dataStart: number;
 }
 
-/** Both spellings of every type: that of the PLY specification and the one with sizes. */
+/** Both spellings of every type: that of the PLY specification and the one with sizes. Integers of 64 bits are in no specification, but in files. */
 const TYPES: ReadonlyMap<string, ScalarType> = new Map([
-  ...(['int8', 'uint8', 'int16', 'uint16', 'int32', 'uint32', 'float32', 'float64'] as const).map(
-    (type): [string, ScalarType] => [type, type],
-  ),
+  ...SCALARS.map((type): [string, ScalarType] => [type, type]),
   ['char', 'int8'],
   ['uchar', 'uint8'],
   ['short', 'int16'],
   ['ushort', 'uint16'],
   ['int', 'int32'],
   ['uint', 'uint32'],
+  ['longlong', 'int64'],
+  ['ulonglong', 'uint64'],
   ['float', 'float32'],
   ['double', 'float64'],
 ]);
@@ -53,6 +57,11 @@ const ENCODINGS: ReadonlyMap<string, PlyHeader['encoding']> = new Map([
 /** Size in bytes of one binary value. */
 export function sizeOf(type: ScalarType): number {
   return Number(/\d+/.exec(type)) / 8;
+}
+
+/** True of types with numbers that float32 rounds: coordinates of these have an origin, which all splats together decide. */
+export function exceedsFloat32(type: ScalarType): boolean {
+  return type !== 'float32' && sizeOf(type) >= 4;
 }
 
 /** Reads the header of a PLY file; line ends may be LF, CRLF or CR. Throws `decode/header` or `decode/truncated`. */

@@ -4,18 +4,15 @@ import { readPly } from '../readers/ply.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
 import { HEADER_BYTES, type SplatRanges } from '../splat-ranges.js';
 import { findGaussians } from './gaussian-layout.js';
-import { parsePlyHeader } from './header.js';
+import { exceedsFloat32, parsePlyHeader } from './header.js';
 import { openElement } from './rows.js';
-
-/** Coordinates of these types have an origin that all splats together decide. */
-const COARSE_TYPES = ['float64', 'int32', 'uint32'];
 
 /** Where the splats of a PLY lie, or undefined if its rows differ in size or depend on one another. */
 export function plyRanges(source: SceneSource): SplatRanges | undefined {
   const header = parsePlyHeader(source);
   const { vertex, degree } = findGaussians(source, header);
   const { start, rowBytes } = openElement({ ...source, isPrefix: true }, header, 'vertex');
-  const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && COARSE_TYPES.includes(type));
+  const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && exceedsFloat32(type));
   if (rowBytes === undefined || rowBytes === 0 || isCoarse || start > HEADER_BYTES) return undefined;
   return { count: vertex.count, shDegree: keptDegree(degree), rows: { start, byteLength: rowBytes } };
 }

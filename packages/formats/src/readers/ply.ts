@@ -2,7 +2,7 @@ import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, sigmoidInPlace, type DraftCloud } from '../cloud.js';
 import { findGaussians, withPlainNames, type GaussianLayout } from '../ply/gaussian-layout.js';
 import { harmonicTargets } from '../ply/harmonics.js';
-import { parsePlyHeader, type PlyProperty } from '../ply/header.js';
+import { exceedsFloat32, parsePlyHeader, type PlyProperty } from '../ply/header.js';
 import { relativePositions } from '../ply/positions.js';
 import { openElement, readColumns, type ColumnTarget, type ElementData } from '../ply/rows.js';
 import type { SceneSource } from '../scene-format.js';
@@ -45,17 +45,13 @@ function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftC
     ...(layout.hasFilter ? interleaved(['filter_3D'], filter, 1) : []),
   ];
   const coordinates = ['x', 'y', 'z'];
-  if (layout.vertex.properties.some(({ name, type }) => coordinates.includes(name) && needsFloat64(type))) {
+  if (layout.vertex.properties.some(({ name, type }) => coordinates.includes(name) && exceedsFloat32(type))) {
     const world = new Float64Array(3 * cloud.count);
     readColumns(data, [...targets, ...interleaved(coordinates, world, 3)]);
     Object.assign(cloud, relativePositions(world));
   } else {
     readColumns(data, [...targets, ...interleaved(coordinates, cloud.positions, 3)]);
   }
-}
-
-function needsFloat64(type: PlyProperty['type']): boolean {
-  return type === 'float64' || type === 'int32' || type === 'uint32';
 }
 
 /** Targets of properties that stand side by side in every row of an array. */
