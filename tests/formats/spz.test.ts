@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { gzipSync } from 'node:zlib';
 import { test } from 'node:test';
+import { encodingsFor } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import type { GaussianCloud, ShDegree } from '@gaussian-splat/core';
 import { assertAtMost, expectRefusal, largestDifference } from './support/expect.js';
@@ -91,22 +92,69 @@ test('a header that names another version than the body has is refused', async (
   }
 });
 
-test('bodies that are too long or too short by a byte are refused', async () => {
+test('bodies that are too short by a byte are refused', async () => {
   for (const [version, size] of [
     [1, 800],
     [2, 950],
     [3, 1000],
   ] as const) {
-    const body = spzBody(rawSplats(50, 0), { version });
-    const longer = new Uint8Array(body.length + 1);
-    longer.set(body);
-    const shorter = body.subarray(0, -1);
-    const expected = `expected ${size === 1000 ? '1,000' : size} bytes.*found`;
-    for (const pack of [(bytes: Uint8Array) => bytes, (bytes: Uint8Array) => new Uint8Array(gzipSync(bytes))]) {
-      const tooLong = new RegExp(`${expected} (more|${size + 1})`);
-      await expectRefusal(pack(longer), 'decode/corrupt', tooLong);
-      await expectRefusal(pack(shorter), 'decode/truncated', new RegExp(`${expected} ${size - 1}`));
+    const body = spzBody(rawSplats(50, 0), { version }).subarray(0, -1);
+    for (const file of [body, new Uint8Array(gzipSync(body))]) {
+      const message = new RegExp(`expected ${size === 1000 ? '1,000' : size} bytes.*found ${size - 1}`);
+      await expectRefusal(file, 'decode/truncated', message);
     }
+  }
+});
+
+test('what stands behind the splats is left alone, unless the header may name the wrong version', async () => {
+  const splats = rawSplats(50, 1);
+  const behind = (version: 1 | 2 | 3, tail: Uint8Array): Uint8Array[] => {
+    const body = Buffer.concat([spzBody(splats, { version }), tail]);
+    return [new Uint8Array(body), new Uint8Array(gzipSync(body))];
+  };
+  for (const version of [1, 2, 3] as const) {
+    for (const tail of [new Uint8Array(1), Uint8Array.of(10, 20, 30), new Uint8Array(1000), new Uint8Array(65_536)]) {
+      for (const file of behind(version, tail)) assertHolds(await readScene(file), splats, version);
+    }
+    // Nobody pads with so much; it is inflated no further.
+    for (const file of behind(version, new Uint8Array(65_537)))
+      await expectRefusal(file, 'decode/corrupt', /found more/);
+  }
+  for (const file of behind(3, new Uint8Array(3000).fill(7))) assertHolds(await readScene(file), splats, 3);
+  for (const file of behind(2, new Uint8Array(49).fill(7))) assertHolds(await readScene(file), splats, 2);
+  for (const bytes of [50, 51, 3000]) {
+    for (const file of behind(2, new Uint8Array(bytes).fill(7))) {
+      await expectRefusal(file, 'decode/corrupt', /1,400 bytes for 50 splats of version 2, found/);
+    }
+  }
+  // Version 4 tells how long its streams are.
+  const streams = Buffer.concat([writeSpz(splats, { version: 4 }), Buffer.alloc(99, 7)]);
+  assertHolds(await readScene(new Uint8Array(streams)), splats, 4);
+});
+
+test('a scene far from (0, 0, 0) is written with the digits that 24 bits leave, or refused', async () => {
+  const at = (far: number): GaussianCloud => {
+    const positions = Float32Array.of(0, 1, 2, -3, 0.5, 0.25);
+    return {
+      ...{ count: 2, origin: [far, -far, 0], positions, scales: new Float32Array(6).fill(0.1) },
+      ...{ rotations: Float32Array.of(1, 0, 0, 0, 1, 0, 0, 0), opacities: Float32Array.of(1, 1) },
+      ...{ sh: new Float32Array(6), shDegree: 0, antialiased: false, droppedCount: 0 },
+    };
+  };
+  const write = (cloud: GaussianCloud) =>
+    encodingsFor('a.spz')[0].write({ cloud, degrees: new Uint8Array(cloud.count) });
+  for (const far of [0, 1000, 100_000, 8_388_600]) {
+    const cloud = at(far);
+    const { positions } = await readScene(await write(cloud));
+    const world = Array.from(cloud.positions, (value, k) => value + cloud.origin[k % 3]);
+    assertAtMost(largestDifference(positions, world), Math.max(2 ** -21, far * 2 ** -23), `${far} away`);
+  }
+  for (const far of [8_388_608, -8_388_620, 1e9]) {
+    const cloud = at(far);
+    const refused = { code: 'argument/value', message: /coordinates of at most 8,388,607, .*\.ply/ };
+    await assert.rejects(async () => write(cloud), refused);
+    assert.throws(() => encodingsFor('a.spz', cloud), refused);
+    assert.ok(encodingsFor('a.ply', cloud));
   }
 });
 
@@ -174,7 +222,9 @@ test('a gzip stream is read to its checksum even where the body ends with a bloc
   damaged[damaged.length - 6] ^= 1;
   await expectRefusal(damaged, 'decode/corrupt', /gzip stream.*damaged/);
   const longer = new Uint8Array(gzipSync(Buffer.concat([body, Buffer.alloc(1)])));
-  await expectRefusal(longer, 'decode/corrupt', /65,520 bytes.*found more/);
+  assert.equal((await readScene(longer)).count, 3276);
+  longer[longer.length - 6] ^= 1;
+  await expectRefusal(longer, 'decode/corrupt', /gzip stream.*damaged/);
 });
 
 test('an aborted signal rejects with its reason', async () => {

@@ -3,7 +3,7 @@ import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
 import { writePly } from './ply.js';
-import { writeSpz } from './spz.js';
+import { fractionalBitsOf, writeSpz } from './spz.js';
 
 /** What is written of a reduced cloud. */
 export type WrittenCloud = Pick<ReducedCloud, 'cloud' | 'degrees'>;
@@ -32,11 +32,13 @@ const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
 
 /**
  * The ways to write a file of this name.
- * @throws GaussianSplatError `argument/value` for a name whose extension is none of ours, and for a scene trained with antialiasing where the format cannot say so.
+ * @param cloud what is to be written, as far as it is known
+ * @throws GaussianSplatError `argument/value` for a name whose extension is none of ours, for a scene trained with antialiasing where the format cannot say so, and for one
+ * that lies farther from (0, 0, 0) than the format has digits.
  */
 export function encodingsFor(
   name: string,
-  { antialiased }: Pick<GaussianCloud, 'antialiased'> = { antialiased: false },
+  cloud: Partial<Pick<GaussianCloud, 'antialiased' | 'positions' | 'origin'>> = {},
 ): readonly Encoding[] {
   const extension = /\.[a-z]+$/i.exec(name)?.[0].toLowerCase() ?? '';
   const found = ENCODINGS.get(extension);
@@ -48,7 +50,7 @@ export function encodingsFor(
       remedy: 'choose .glb for accuracy, .spz for size, .ply for tools that know nothing else',
     });
   }
-  if (antialiased && extension === '.glb') {
+  if (cloud.antialiased && extension === '.glb') {
     throw new GaussianSplatError('argument/value', {
       where: name,
       expected: 'a format that tells of scenes trained with antialiasing: .ply or .spz',
@@ -56,5 +58,7 @@ export function encodingsFor(
       remedy: 'choose .ply for accuracy, .spz for size',
     });
   }
+  const { positions, origin } = cloud;
+  if (positions && origin && extension === '.spz') fractionalBitsOf({ positions, origin });
   return found;
 }

@@ -1,4 +1,4 @@
-import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 
 /** How precisely an SPZ is written. */
 export interface SpzOptions {
@@ -8,6 +8,8 @@ export interface SpzOptions {
 
 const COLOUR_SCALE = 0.15;
 const MAX_FRACTIONAL_BITS = 20;
+/** The largest coordinate of 24 bits, in steps. */
+const MOST_STEPS = 2 ** 23 - 1;
 
 /** Signs on the way to right, up, back; for quaternions (x, y, z), and for coefficients of degrees 1 to 3. */
 const AXIS_SIGNS = [1, -1, -1];
@@ -35,10 +37,20 @@ export async function writeSpz(cloud: GaussianCloud, options: SpzOptions): Promi
 
 const byte = (value: number): number => Math.min(255, Math.max(0, Math.round(value)));
 
-function fractionalBitsOf({ positions, origin }: GaussianCloud): number {
+/**
+ * Bits after the point that leave room for the farthest coordinate.
+ * @throws GaussianSplatError `argument/value` where there is none without any.
+ */
+export function fractionalBitsOf({ positions, origin }: Pick<GaussianCloud, 'positions' | 'origin'>): number {
   let largest = 1e-9;
   positions.forEach((value, k) => (largest = Math.max(largest, Math.abs(value + origin[k % 3]))));
-  return Math.min(MAX_FRACTIONAL_BITS, Math.max(0, Math.floor(Math.log2((2 ** 23 - 1) / largest))));
+  if (largest <= MOST_STEPS) return Math.min(MAX_FRACTIONAL_BITS, Math.floor(Math.log2(MOST_STEPS / largest)));
+  throw new GaussianSplatError('argument/value', {
+    where: 'positions of a scene that is written as SPZ',
+    expected: 'coordinates of at most 8,388,607, which is what 24 bits hold',
+    found: String(Math.round(largest)),
+    remedy: 'choose .ply or .glb, which keep scenes far from (0, 0, 0), or move the scene',
+  });
 }
 
 function packPositions({ positions, origin }: GaussianCloud, unit: number, out: Uint8Array, at: number): number {

@@ -11,31 +11,30 @@ import {
 } from './header.js';
 import type { PackedScene } from './streams.js';
 
-/** Extension records after the splats are read up to this size; the known ones have 12 to 20 bytes. */
-export const MAX_EXTENSION_BYTES = 65_536;
+/** Extension records, which have 12 to 20 bytes each, and padding after the splats are read up to this size. */
+const MAX_TRAILING_BYTES = 65_536;
 
 const VERSIONS = [1, 2, 3];
 
 /**
- * Most bytes that a body can have under this header in any version, extensions and one byte too many included: what
+ * Most bytes that a body can have under this header in any version, what follows it and one byte too many included: what
  * must be inflated to tell a wrong version from a wrong length.
  */
 export function longestBody(header: SpzHeader): number {
-  const longest = Math.max(...VERSIONS.map((version) => bodyBytes(header, version)));
-  return longest + (header.hasExtensions ? MAX_EXTENSION_BYTES : 1);
+  return Math.max(...VERSIONS.map((version) => bodyBytes(header, version))) + MAX_TRAILING_BYTES + 1;
 }
 
 /**
- * Reads the body of versions 1 to 3: the attributes of all splats, one after another, then extension records. Its
- * length must be exactly what the header announces; files whose header names another version than the body has would
- * otherwise show garbage.
+ * Reads the body of versions 1 to 3: the attributes of all splats, one after another, then extension records. What else
+ * follows is left alone where it cannot be the rest of a body of another version than the header names, which would show garbage.
  *
  * @param file the inflated file, or as much as {@link longestBody} asks for.
  */
 export function readLegacyBody(file: Uint8Array, header: SpzHeader, name: string): PackedScene {
   const expected = bodyBytes(header, header.version);
   const present = file.length - SPZ_HEADER_BYTES;
-  if (present < expected || (present > expected && !header.hasExtensions)) throw wrongLength(header, present, name);
+  if (present < expected || (!header.hasExtensions && !isTrailing(file.subarray(SPZ_HEADER_BYTES + expected), header)))
+    throw wrongLength(header, present, name);
   const sizes = bytesPerSplat(header.version, header.degree);
   const attributes = {} as Record<SpzAttribute, Uint8Array>;
   let at = SPZ_HEADER_BYTES;
@@ -45,6 +44,17 @@ export function readLegacyBody(file: Uint8Array, header: SpzHeader, name: string
     at = end;
   }
   return { attributes, axes: axesOfExtensions(header.hasExtensions ? file.subarray(at) : new Uint8Array(0), name) };
+}
+
+/** True of what may stand behind a body: zeros, or fewer bytes than another version would have there. */
+function isTrailing(rest: Uint8Array, header: SpzHeader): boolean {
+  const own = bodyBytes(header, header.version);
+  const others = VERSIONS.map((version) => bodyBytes(header, version) - own).filter((bytes) => bytes > 0);
+  const isZero = rest.every((byte) => byte === 0);
+  return (
+    rest.length <= MAX_TRAILING_BYTES &&
+    others.every((bytes) => rest.length < bytes || (isZero && rest.length !== bytes))
+  );
 }
 
 function wrongLength(header: SpzHeader, present: number, name: string): GaussianSplatError {
