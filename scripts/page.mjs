@@ -3,7 +3,7 @@
  * FOLDER, writes an index.html unless there is one, and serves the folder. What then lies there is static: any host can have it.
  */
 import { cpSync, existsSync, mkdirSync, statSync, writeFileSync } from 'node:fs';
-import { basename, dirname, extname, isAbsolute, join, relative, resolve, sep } from 'node:path';
+import { basename, dirname, extname, join, relative, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { filesBeside } from './lib/files-beside.mjs';
 import { ensureDependencies, ensureElement } from './lib/prepare.mjs';
@@ -62,28 +62,27 @@ function copyElement(target) {
   cpSync(CDN, target, { recursive: true, filter: isNeeded });
 }
 
-/** Where the scene then lies, seen from the page. A scene of several files is told by a JSON among them, and brings its folder; others bring the files that they name. */
+/**
+ * Where the scene then lies, seen from the page, with the files that it names and no others. One that a JSON describes keeps its folder's name, for its files are called alike in
+ * every scene.
+ */
 async function copyScene() {
   const [name, from] = [basename(scene), dirname(scene)];
-  if (from === folder) return name;
-  if (extname(scene) !== '.json') {
-    for (const file of [name, ...(await filesBeside(scene))]) cpSync(join(from, file), join(folder, file));
-    return name;
-  }
-  const to = join(folder, basename(from));
-  if (from !== to && isWithin(to, from))
-    stop(`${folder} lies in the scene's folder, which is copied: name another one.`);
-  if (from !== to) cpSync(from, to, { recursive: true });
-  return `${basename(from)}/${name}`;
+  const { found, missing } = await filesBeside(scene);
+  if (missing.length > 0) console.warn(`${name} names files that were not copied: ${missing.join(', ')}`);
+  const own = isJson(scene) && from !== folder ? basename(from) : '';
+  const to = join(folder, own);
+  // Links would lead out of the folder.
+  if (from !== to) for (const file of [name, ...found]) cpSync(join(from, file), join(to, file), { dereference: true });
+  return own === '' ? name : `${own}/${name}`;
 }
 
-function isWithin(path, container) {
-  const way = relative(container, path);
-  return way !== '..' && !way.startsWith(`..${sep}`) && !isAbsolute(way);
+function isJson(path) {
+  return extname(path).toLowerCase() === '.json';
 }
 
 function titleOf(source) {
-  const file = extname(source) === '.json' ? basename(dirname(scene)) : basename(source, extname(source));
+  const file = isJson(source) ? basename(dirname(scene)) : basename(source, extname(source));
   return file.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
 }
 

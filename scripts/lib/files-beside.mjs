@@ -1,25 +1,74 @@
 import { existsSync, readFileSync } from 'node:fs';
-import { basename, dirname, extname, join } from 'node:path';
+import { basename, dirname, extname, join, posix } from 'node:path';
+
+/** Where descriptions in JSON name files: SOG, streamed SOG, pages of detail, sequences. */
+const KEYS = new Set(['files', 'filenames', 'environment', 'file', 'frames']);
 
 /**
- * Files that a scene or a model needs beside it, as paths from its folder: buffers of a glTF, weights and contract of a model. Those that are not there, lie outside of
- * the folder or are named by a damaged file are left out: the page says what is wrong. Needs built packages.
+ * Files that a scene or a model needs beside it, as paths from its folder: buffers of a glTF, weights and contract of a model, what a description in JSON names and what that
+ * names. `missing`: those that are not there or lie outside of the folder, and why. A file that is damaged names none: the page says what is wrong. Needs built packages.
  */
 export async function filesBeside(scene) {
-  const named = { '.gltf': buffersOf, '.onnx': partsOfModel }[extname(scene).toLowerCase()];
-  const paths = named === undefined ? [] : await named(scene).catch(() => []);
   const { isInside } = await import('@gaussian-splat/core');
-  return paths.filter((path) => isInside(path) && existsSync(join(dirname(scene), path)));
+  const [found, missing] = [new Set(), new Map()];
+  const visit = async (path) => {
+    const folder = posix.dirname(path);
+    for (const name of await namedBy(join(dirname(scene), path)).catch(() => [])) {
+      const file = posix.join(folder, name);
+      if (!isInside(file)) missing.set(file, 'outside of its folder');
+      else if (!existsSync(join(dirname(scene), file))) missing.set(file, 'not there');
+      else if (!found.has(file)) {
+        found.add(file);
+        if (isJson(file)) await visit(file);
+      }
+    }
+  };
+  await visit(basename(scene));
+  const contract = sidecarOf(scene, await import('@gaussian-splat/core'));
+  if (contract && existsSync(join(dirname(scene), contract))) found.add(contract);
+  return { found: [...found], missing: [...missing].map(([file, why]) => `${file} (${why})`) };
 }
 
-async function buffersOf(scene) {
-  const { buffers = [] } = JSON.parse(readFileSync(scene, 'utf8'));
-  return buffers.flatMap(({ uri }) => (uri === undefined || /^[a-z]+:/i.test(uri) ? [] : [decodeURIComponent(uri)]));
+const isJson = (path) => extname(path).toLowerCase() === '.json';
+
+/** A model may have none: it is no name that is missing. */
+const sidecarOf = (scene, { sidecarName }) =>
+  extname(scene).toLowerCase() === '.onnx' ? sidecarName(basename(scene)) : undefined;
+
+async function namedBy(file) {
+  const read = { '.gltf': buffersOf, '.onnx': weightsOf, '.json': partsOf }[extname(file).toLowerCase()];
+  return read === undefined ? [] : read(file);
 }
 
-async function partsOfModel(scene) {
-  const { bytesSource, readOnnxHeader, sidecarName } = await import('@gaussian-splat/core');
-  const beside = [sidecarName(basename(scene))];
-  const header = await readOnnxHeader(bytesSource(readFileSync(scene), scene)).catch(() => undefined);
-  return [...beside, ...(header?.externalFiles ?? []).map(({ location }) => location)];
+async function buffersOf(file) {
+  const { buffers = [] } = JSON.parse(readFileSync(file, 'utf8'));
+  return buffers.flatMap(({ uri }) =>
+    // What follows the path is for servers.
+    uri === undefined || /^[a-z]+:/i.test(uri) ? [] : [decodeURIComponent(uri.replace(/[?#].*$/, ''))],
+  );
+}
+
+async function weightsOf(file) {
+  const { bytesSource, readOnnxHeader } = await import('@gaussian-splat/core');
+  const header = await readOnnxHeader(bytesSource(readFileSync(file), file));
+  return header.externalFiles.map(({ location }) => location);
+}
+
+async function partsOf(file) {
+  const bytes = readFileSync(file);
+  const json = JSON.parse(bytes.toString('utf8').replace(/^\ufeff/, ''));
+  if (json.gaussianSplatSequence !== undefined) {
+    const { parseSequence } = await import('@gaussian-splat/formats');
+    return parseSequence(bytes, file).frames;
+  }
+  const names = [];
+  const open = [json];
+  while (open.length > 0) {
+    for (const [key, value] of Object.entries(open.pop())) {
+      if (KEYS.has(key))
+        for (const name of [value].flat()) if (typeof name === 'string' && name !== '') names.push(name);
+      if (typeof value === 'object' && value !== null) open.push(value);
+    }
+  }
+  return names;
 }
