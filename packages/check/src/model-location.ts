@@ -3,6 +3,7 @@ import { dirname, join } from 'node:path';
 import {
   GaussianSplatError,
   openUrl,
+  partUrl,
   sidecarName,
   type ByteSource,
   type ExternalFile,
@@ -51,7 +52,7 @@ async function openRemote(url: string): Promise<ModelLocation> {
     sidecar: () => fetchTextIfThere(sidecarName(url)),
     externalSizes: () => Promise.resolve(undefined),
     bytes: async () => source.whole ?? whole(await openUrl(url, { maxRequests: 1, chunk: source.size })),
-    external: async (location) => whole(await openUrl(new URL(location, url), { maxRequests: 1 })),
+    external: async (location) => whole(await openUrl(partUrl(location, url), { maxRequests: 1 })),
     close: () => Promise.resolve(),
   };
 }

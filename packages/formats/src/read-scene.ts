@@ -57,7 +57,7 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
     if (drawable.count > 0) await onPreview?.(drawable);
     signal?.throwIfAborted();
   };
-  const openPlain = openPart && (async (path: string): Promise<Uint8Array> => plainBytes(await openPart(path), path));
+  const openPlain = openPart && (async (path: string, query?: string) => plainBytes(await openPart(path, query), path));
   const source: SceneSource = { bytes, name, signal, openPart: openPlain, level, onPreview: onPreview && preview };
   const whole = await read(source);
   signal?.throwIfAborted();

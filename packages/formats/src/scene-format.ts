@@ -30,9 +30,10 @@ export interface SceneSource {
  * Opens another file of the same scene.
  *
  * @param path as the scene writes it: relative to the scene's own file, `/` between folders, not URL-encoded.
+ * @param query what the scene appends for the server, from its `?` on; absent for nothing.
  * @returns the whole file.
  */
-export type OpenPart = (path: string) => Promise<Uint8Array>;
+export type OpenPart = (path: string, query?: string) => Promise<Uint8Array>;
 
 /**
  * Reads one file format into a cloud. A reader checks every size against the bytes present before it allocates, throws

@@ -56,6 +56,17 @@ describe('a sequence of files', () => {
     }
   });
 
+  it('asks for frames with the query of its manifest, and leaves alone what urlModifier makes of them', async () => {
+    const src = '/net/signed/movie.json?token=a';
+    assert(await shows(await showLoaded({ src }), isRed), 'a frame with the token');
+    GaussianSplatElement.urlModifier = (url) => (url.endsWith('.splat') ? `${url}?signed=b` : url);
+    try {
+      assert(await shows(await showLoaded({ src }), isBlue), 'a frame with a signature of its own');
+    } finally {
+      GaussianSplatElement.urlModifier = null;
+    }
+  });
+
   it('plays to its end, and over and over with loop', async () => {
     const element = await showLoaded({ src: MOVIE });
     const ended = nextEvent(element, 'ended');

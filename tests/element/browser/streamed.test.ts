@@ -56,6 +56,27 @@ async function close(element: GaussianSplatElement): Promise<void> {
 }
 
 describe('a streamed scene', () => {
+  it('asks for its files with the query of its manifest', async () => {
+    const [fetchOriginal, loader] = [window.fetch, GaussianSplatElement.sceneLoader];
+    const asked: string[] = [];
+    window.fetch = async () => new Response(JSON.stringify(folder.manifest));
+    loader.fetchFile = async ({ url }) => {
+      const { pathname, search } = new URL(url);
+      asked.push(search);
+      return folder.files.get(pathname.replace('/signed/', ''))!.slice(0);
+    };
+    try {
+      const element = show({ src: '/signed/detail.json?token=a' });
+      await element.ready;
+      assert(element.loaded, `loaded: ${element.error?.message}`);
+      assert(asked.length > 0 && asked.every((search) => search === '?token=a'), asked.join());
+      await close(element);
+    } finally {
+      window.fetch = fetchOriginal;
+      Reflect.deleteProperty(loader, 'fetchFile');
+    }
+  });
+
   it('loads its coarsest page, shows it, and then fetches what the camera asks for, once each', async () => {
     const { requests, own, bytes, stop } = serve('/streamed/');
     const element = show({ src: '/streamed/detail.json', 'camera-orbit': '30deg 60deg 30m' });

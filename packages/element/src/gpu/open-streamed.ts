@@ -1,5 +1,5 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
 import { fetchScene } from '@gaussian-splat/formats';
 import {
   checkManifest,
@@ -77,7 +77,7 @@ const openPages: Open = async ({ url, credentials }, device, { loader, signal, o
   const manifest = checkManifest(parsed(bytes, url), url);
   return StreamedGaussians.open(device, manifest, {
     ...pool,
-    fetchPage: (file, aborted) => loader.fetchFile({ url: new URL(file, url).href, credentials }, aborted),
+    fetchPage: (file, aborted) => loader.fetchFile({ url: partUrl(file, url).href, credentials }, aborted),
   });
 };
 

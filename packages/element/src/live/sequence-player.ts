@@ -1,5 +1,5 @@
 /** Loaded only when a sequence is shown. */
-import type { Bounds } from '@gaussian-splat/core';
+import { partUrl, type Bounds } from '@gaussian-splat/core';
 import { frameAt, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import type { GpuScene } from '../gpu/gpu-scene.js';
@@ -214,8 +214,14 @@ function load(
   onProgress: ProgressListener,
 ): Promise<LoadedScene> {
   const { credentials } = request;
+  const asked = frameUrl(url);
   return loader.load(
-    { url: frameUrl(url), credentials, sh: request.sh === 'auto' ? sh : request.sh },
+    // What the page has made of an address is not changed.
+    {
+      url: asked === url ? partUrl(url, request.url).href : asked,
+      credentials,
+      sh: request.sh === 'auto' ? sh : request.sh,
+    },
     signal,
     onProgress,
   );

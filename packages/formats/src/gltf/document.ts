@@ -151,8 +151,9 @@ export class GltfDocument {
     if (typeof uri !== 'string') return this.fail(`buffers[${index}].uri`, 'an address', uri);
     if (uri.startsWith('data:')) return this.#decodeDataUri(uri, index);
     // What follows the path is for servers; the file that lies beside the scene is found without.
-    const path = decodeSafely(uri.replace(/[?#][^]*$/, ''));
-    return checkedPart(await this.#open(path), `${this.name}, ${path}`);
+    const [, file, query] = /^([^?#]*)(\?[^#]*)?/.exec(uri)!;
+    const path = decodeSafely(file);
+    return checkedPart(await this.#open(path, query), `${this.name}, ${path}`);
   }
 
   #decodeDataUri(uri: string, index: number): Uint8Array {

@@ -7,6 +7,7 @@ import {
   openUrl,
   readOnnxHeader,
   resolveContract,
+  partUrl,
   sidecarName,
   type ByteSource,
   type Contract,
@@ -106,7 +107,7 @@ async function fetchExternal(
 ): Promise<GeneratorModel['externalData']> {
   const files = await Promise.all(
     header.externalFiles.map(async ({ location: path, byteLength: expected }, i) => {
-      const address = new URL(path, new URL(source.url, globalThis.location?.href)).href;
+      const address = partUrl(path, new URL(source.url, globalThis.location?.href)).href;
       const options = { ...request, expected, onProgress: reports[i], mayBeMissing: true } as const;
       return { path, data: await fetchBytes(address, options) };
     }),

@@ -107,6 +107,14 @@ const ANSWERS = {
     context.body = ball(200 + 20 * (frame % 12), COLOURS[frame % 3]);
   },
 
+  /** A sequence of two frames for whoever has a token, red, or a signature, blue; for nobody else. */
+  signed(context, name) {
+    const colour = { 'token=a': COLOURS[0], 'signed=b': COLOURS[2] }[context.querystring];
+    if (colour === undefined) return void (context.status = 403);
+    const manifest = { gaussianSplatSequence: 1, framesPerSecond: 10, frames: '{0}.splat', count: 2 };
+    context.body = name.endsWith('.json') ? JSON.stringify(manifest) : ball(200, colour);
+  },
+
   /** Half of the file, then the connection breaks. */
   cut(context, name) {
     const bytes = readFileSync(join(fixtures, name));
