@@ -11,7 +11,7 @@ export interface SogRun extends SogAddress {
 
 /** A SOG file of a streamed scene. */
 export interface SogAddress {
-  /** Absolute address of its `meta.json`. */
+  /** Absolute address of its `meta.json`, or of a bundle. */
   readonly url: string;
   /** What error messages call it. */
   readonly name: string;

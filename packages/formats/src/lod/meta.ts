@@ -22,7 +22,7 @@ export interface LodLeaf {
 export interface LodMeta {
   /** Number of levels. */
   readonly levels: number;
-  /** Paths of the `meta.json` of each SOG, relative to the index. */
+  /** Paths of the `meta.json` of each SOG, or of a bundle, relative to the index. */
   readonly files: readonly string[];
   /** Splats that every level shows, or undefined. */
   readonly environment: string | undefined;

@@ -3,8 +3,7 @@ import { grouped } from '../bytes.js';
 import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
 import { partAddress } from '../open-part.js';
-import { parseSogMeta } from '../sog/meta.js';
-import { readSogImages } from '../sog/read-sog.js';
+import { readSogPart } from '../sog/read-part.js';
 import type { SogAddress, SogRun } from './boxes.js';
 import { Gate } from './gate.js';
 
@@ -100,7 +99,7 @@ export class SogFiles {
       signal.throwIfAborted();
       const bytes = await checkedPart(await fetch(url, signal), name);
       const open = (path: string): Promise<Uint8Array> => fetch(partAddress(url, path).href, signal);
-      const cloud = await readSogImages(parseSogMeta(bytes, name), open, { bytes, name, signal });
+      const cloud = await readSogPart(bytes, name, open, signal);
       this.#keep(url, cloud);
       return cloud;
     } finally {

@@ -7,8 +7,7 @@ import { levelRunsOf, type NodePart } from '../lod/node-parts.js';
 import { mergeClouds } from '../merge-clouds.js';
 import { previewWanted } from '../preview.js';
 import type { OpenPart, SceneSource } from '../scene-format.js';
-import { parseSogMeta } from '../sog/meta.js';
-import { readSogImages } from '../sog/read-sog.js';
+import { readSogPart } from '../sog/read-part.js';
 import { noParts } from './sog.js';
 
 /**
@@ -70,8 +69,7 @@ async function readPart(path: string, open: OpenPart, { name, signal }: SceneSou
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const own = `${name}, ${path}`;
   const bytes = await checkedPart(await open(path), own);
-  const source: SceneSource = { bytes, name: own, signal };
-  return readSogImages(parseSogMeta(bytes, own), (part) => open(folder + part), source);
+  return readSogPart(bytes, own, (part) => open(folder + part), signal);
 }
 
 /** The runs must lie within the file and apart from one another: together they never hold more splats than the file. */

@@ -1,14 +1,12 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
-import { quote } from '../bytes.js';
 import { findFormat } from '../detect.js';
 import { loadReader } from '../load-parts.js';
 import type { SceneSource } from '../scene-format.js';
 import { Archive } from '../zip/archive.js';
+import { listed, namedLike, relevant, shallowest } from '../zip/paths.js';
 
 /** Main files of scenes of several files, in the order in which they are looked for: an index names descriptions. */
 const DESCRIPTIONS = ['lod-meta.json', 'meta.json'];
-/** What macOS writes beside files, with their names. */
-const NO_CONTENT = /(^|\/)(__MACOSX\/|\._)/;
 const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
 /** Points that training began with, as the code of 3DGS, COLMAP and nerfstudio name them, and cameras; */
 const FIRST_POINTS = /(^|\/)(input|sparse(_pc)?|points?(3d)?|cameras?)\.ply$/i;
@@ -37,9 +35,9 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
 const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 
 function mainFile(archive: Archive, name: string): string {
-  const paths = archive.paths.filter((path) => !NO_CONTENT.test(path));
+  const paths = relevant(archive.paths);
   for (const description of DESCRIPTIONS) {
-    const [found] = shallowest(paths.filter((path) => path.split('/').pop() === description));
+    const [found] = namedLike(description, paths);
     // Other programs have a meta.json, too.
     if (found !== undefined && findFormat(archive.open(found), '', '') !== undefined) return found;
   }
@@ -64,13 +62,6 @@ function lastIteration(paths: readonly string[]): string | undefined {
   return paths[iterations.indexOf(Math.max(...iterations))];
 }
 
-function shallowest(paths: readonly string[]): string[] {
-  const depth = paths.reduce((least, path) => Math.min(least, depthOf(path)), Infinity);
-  return paths.filter((path) => depthOf(path) === depth);
-}
-
-const depthOf = (path: string): number => path.split('/').length;
-
 function noScene(name: string, paths: readonly string[], path: string | undefined): GaussianSplatError {
   return new GaussianSplatError('decode/unknown-format', {
     where: path === undefined ? name : `${name}, ${path}`,
@@ -87,9 +78,4 @@ function severalScenes(name: string, scenes: readonly string[]): GaussianSplatEr
     found: `${scenes.length} scenes: ${listed(scenes)}`,
     remedy: 'pack each scene by itself; for scenes that follow one another in time, serve the files and a manifest',
   });
-}
-
-function listed(paths: readonly string[]): string {
-  const shown = paths.slice(0, 4).map((path) => quote(path, 40));
-  return paths.length === 0 ? 'no files' : shown.join(', ') + (paths.length > 4 ? ` and ${paths.length - 4} more` : '');
 }

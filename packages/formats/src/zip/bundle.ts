@@ -1,0 +1,23 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { OpenPart } from '../scene-format.js';
+import { Archive } from './archive.js';
+import { listed, namedLike, relevant } from './paths.js';
+
+/**
+ * The description in a SOG bundle, and a way to its images.
+ * @throws GaussianSplatError `decode/unknown-format` if there is none; what is wrong with the archive
+ */
+export function openBundle(file: Uint8Array, name: string): { bytes: Uint8Array; open: OpenPart } {
+  const archive = new Archive(file, name);
+  const [path] = namedLike('meta.json', relevant(archive.paths));
+  if (path === undefined) {
+    throw new GaussianSplatError('decode/unknown-format', {
+      where: name,
+      expected: 'a SOG bundle, with a meta.json in it',
+      found: `a ZIP archive with ${listed(archive.paths)}`,
+      remedy: 'export the scene again; its index names another file than a SOG',
+    });
+  }
+  const folder = path.slice(0, path.lastIndexOf('/') + 1);
+  return { bytes: archive.open(path), open: async (part) => archive.open(folder + part) };
+}

@@ -1,0 +1,24 @@
+import { quote } from '../bytes.js';
+
+/** What macOS writes beside files, with their names. */
+const NO_CONTENT = /(^|\/)(__MACOSX\/|\._)/;
+
+/** Paths of files that somebody meant to pack. */
+export const relevant = (paths: readonly string[]): string[] => paths.filter((path) => !NO_CONTENT.test(path));
+
+/** Files of this name that lie least deep. */
+export const namedLike = (name: string, paths: readonly string[]): string[] =>
+  shallowest(paths.filter((path) => path.split('/').pop() === name));
+
+export function shallowest(paths: readonly string[]): string[] {
+  const depth = paths.reduce((least, path) => Math.min(least, depthOf(path)), Infinity);
+  return paths.filter((path) => depthOf(path) === depth);
+}
+
+const depthOf = (path: string): number => path.split('/').length;
+
+/** The first paths, for error messages. */
+export function listed(paths: readonly string[]): string {
+  const shown = paths.slice(0, 4).map((path) => quote(path, 40));
+  return paths.length === 0 ? 'no files' : shown.join(', ') + (paths.length > 4 ? ` and ${paths.length - 4} more` : '');
+}
