@@ -6,7 +6,7 @@ import type { SceneFormat } from './scene-format.js';
 /** Text that tells a compressed PLY from a plain one; it stands within the first lines of every such header. */
 const COMPRESSED_PLY_MARK = /[\r\n]property[ \t]+\S+[ \t]+packed_position\s/;
 
-const isPly = (bytes: Uint8Array): boolean => /^ply[ \t]*[\r\n]/.test(asciiOf(bytes, 0, 16));
+const isPly = (bytes: Uint8Array): boolean => /^(\u00ef\u00bb\u00bf)?ply[ \t]*[\r\n]/.test(asciiOf(bytes, 0, 16));
 const isCompressedPly = (bytes: Uint8Array): boolean => {
   if (!isPly(bytes)) return false;
   const [header, isWhole] = [asciiOf(bytes, 0, USUAL_HEADER_BYTES), /[\r\n]end_header\s/];
@@ -19,9 +19,11 @@ const isJsonWith =
   (key: RegExp) =>
   (bytes: Uint8Array): boolean =>
     isJsonObject(bytes) && key.test(asciiOf(bytes, 0, USUAL_HEADER_BYTES) + asciiOf(bytes, -USUAL_HEADER_BYTES));
-const isLodMeta = isJsonWith(/"lodLevels"\s*:/);
+const isLodMeta = isJsonWith(/"(lodLevels|filenames)"\s*:/);
 const isSogMeta = isJsonWith(/"means"\s*:/);
 const isGltf = isJsonWith(/"(asset|bufferViews)"\s*:\s*[[{]/);
+/** A file; none; and volumes of which this is the only one. */
+const ZIP_STARTS = ['PK\x03\x04', 'PK\x05\x06', 'PK00PK\x03\x04', 'PK\x07\x08PK\x03\x04'];
 const isNgsp = (bytes: Uint8Array): boolean => startsWith(bytes, 'NGSP');
 
 /** All formats that `readScene` reads; the first whose signature fits wins. */
@@ -59,7 +61,7 @@ export const sceneFormats: readonly SceneFormat[] = [
     title: 'ZIP archive of a scene (.sog bundles too)',
     extensions: ['.sog', '.zip'],
     mimeTypes: ['application/zip', 'application/x-zip-compressed'],
-    hasSignature: (bytes) => startsWith(bytes, 'PK\x03\x04'),
+    hasSignature: (bytes) => ZIP_STARTS.some((start) => startsWith(bytes, start)),
     load: async () => (await import('./readers/zip.js')).readZip,
   },
   {

@@ -63,8 +63,11 @@ function openGlb(bytes: Uint8Array, name: string): GltfFile {
   const jsonEnd = HEADER_BYTES + 8 + view.getUint32(HEADER_BYTES, true);
   if (asciiOf(bytes, 16, 20) !== 'JSON') throw damaged(where(16), 'a chunk of JSON', 'another', 'decode/header');
   need(jsonEnd);
-  const json = parseJson(bytes.subarray(HEADER_BYTES + 8, jsonEnd), `${name}, JSON of the GLB`, MAX_JSON_BYTES);
-  if (jsonEnd + 8 > bytes.length) return { json, binary: undefined };
+  let textEnd = jsonEnd;
+  // Some writers pad with zeros in place of spaces.
+  while (bytes[textEnd - 1] === 0) textEnd--;
+  const json = parseJson(bytes.subarray(HEADER_BYTES + 8, textEnd), `${name}, JSON of the GLB`, MAX_JSON_BYTES);
+  if (!startsWith(bytes, 'BIN\0', jsonEnd + 4)) return { json, binary: undefined };
   const binaryEnd = jsonEnd + 8 + view.getUint32(jsonEnd, true);
   need(binaryEnd);
   return { json, binary: bytes.subarray(jsonEnd + 8, binaryEnd) };

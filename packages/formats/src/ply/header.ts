@@ -119,7 +119,7 @@ function splitHeader(source: SceneSource, length = USUAL_HEADER_BYTES): { lines:
   const text = asciiOf(bytes, 0, length);
   // With lone CRs a first data byte of 10 belongs to the data; otherwise LF ends every line and a CR before it is part
   // of the line end.
-  const usesLoneCr = /^ply[ \t]*\r(?!\n)/.test(text);
+  const usesLoneCr = /^[^\r\n]*\r(?!\n)/.test(text);
   const end = (usesLoneCr ? /\rend_header[ \t]*(\r|$)/ : /\nend_header[ \t]*\r?(\n|$)/).exec(text);
   const isWithin = end !== null && end.index + end[0].length < length;
   if (!isWithin && length < Math.min(bytes.length, MAX_HEADER_BYTES)) return splitHeader(source, MAX_HEADER_BYTES);

@@ -3,13 +3,13 @@ import { keptDegree } from '../cloud.js';
 import { readPly } from '../readers/ply.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
 import { HEADER_BYTES, type SplatRanges } from '../splat-ranges.js';
-import { findGaussians } from './gaussian-layout.js';
+import { findGaussians, withPlainNames } from './gaussian-layout.js';
 import { exceedsFloat32, parsePlyHeader } from './header.js';
 import { openElement } from './rows.js';
 
 /** Where the splats of a PLY lie, or undefined if its rows differ in size or depend on one another. */
 export function plyRanges(source: SceneSource): SplatRanges | undefined {
-  const header = parsePlyHeader(source);
+  const header = withPlainNames(parsePlyHeader(source));
   const { vertex, degree } = findGaussians(source, header);
   const { start, rowBytes } = openElement({ ...source, isPrefix: true }, header, 'vertex');
   const isCoarse = vertex.properties.some(({ name, type }) => /^[xyz]$/.test(name) && exceedsFloat32(type));

@@ -7,6 +7,8 @@ import { listed, namedLike, relevant, shallowest } from '../zip/paths.js';
 
 /** Main files of scenes of several files, in the order in which they are looked for: an index names descriptions. */
 const DESCRIPTIONS = ['lod-meta.json', 'meta.json'];
+/** So many files with these names are opened at most to find a scene. */
+const MAX_DESCRIPTIONS = 16;
 const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
 /** Points that training began with, as the code of 3DGS, COLMAP and nerfstudio name them, and cameras; */
 const FIRST_POINTS = /(^|\/)(input|sparse(_pc)?|points?(3d)?|cameras?)\.ply$/i;
@@ -37,9 +39,11 @@ const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 function mainFile(archive: Archive, name: string): string {
   const paths = relevant(archive.paths);
   for (const description of DESCRIPTIONS) {
-    const [found] = namedLike(description, paths);
     // Other programs have a meta.json, too.
-    if (found !== undefined && findFormat(archive.open(found), '', '') !== undefined) return found;
+    const named = namedLike(description, paths).slice(0, MAX_DESCRIPTIONS);
+    const found = shallowest(named.filter((path) => findFormat(archive.open(path), '', '') !== undefined));
+    if (found.length > 1) throw severalScenes(name, found);
+    if (found.length === 1) return found[0];
   }
   const files = paths.filter((path) => SCENE_FILE.test(path));
   const trained = files.filter((path) => !FIRST_POINTS.test(path));

@@ -6,10 +6,11 @@ const NO_CONTENT = /(^|\/)(__MACOSX\/|\._)/;
 /** Paths of files that somebody meant to pack. */
 export const relevant = (paths: readonly string[]): string[] => paths.filter((path) => !NO_CONTENT.test(path));
 
-/** Files of this name that lie least deep. */
+/** Files of this name, those that lie least deep first. */
 export const namedLike = (name: string, paths: readonly string[]): string[] =>
-  shallowest(paths.filter((path) => path.split('/').pop() === name));
+  paths.filter((path) => path.split('/').pop() === name).sort((a, b) => depthOf(a) - depthOf(b));
 
+/** Those that lie least deep. */
 export function shallowest(paths: readonly string[]): string[] {
   const depth = paths.reduce((least, path) => Math.min(least, depthOf(path)), Infinity);
   return paths.filter((path) => depthOf(path) === depth);
