@@ -103,3 +103,11 @@ test('a GLB may be padded with zeros, and what stands behind its end is not part
     assertSameCloud(await read(glb({ ...json, buffers: [beside] }, undefined, pad, behind)), direct);
   }
 });
+
+test('an ASCII PLY that is cut within a number is incomplete, not damaged', async () => {
+  const file = writePly([{ name: 'vertex', columns }], { encoding: 'ascii' });
+  const at = Buffer.from(file).lastIndexOf('-');
+  await expectRefusal(file.subarray(0, at + 1), 'decode/truncated', /byte [\d,]+: expected a number, found "-"/);
+  file[at + 1] = 45;
+  await expectRefusal(file, 'decode/corrupt', /expected a number, found "--/);
+});

@@ -32,5 +32,6 @@ export function isObject(value: unknown): value is Json {
 
 /** A JSON value for error messages. */
 export function show(value: unknown): string {
-  return value === undefined ? 'nothing' : quote(JSON.stringify(value) ?? String(value), 80);
+  if (value === undefined) return 'nothing';
+  return quote(typeof value === 'string' ? value : (JSON.stringify(value) ?? String(value)), 80);
 }

@@ -1,3 +1,4 @@
+import { loadModule } from '@gaussian-splat/core';
 import { alignedTo4, grouped, hostIsLittleEndian } from '../bytes.js';
 import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
@@ -5,16 +6,22 @@ import type { OpenPart, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';
 
+/** A type of numbers: bytes of one, the largest, and how to read it. */
+interface Component {
+  readonly bytes: number;
+  readonly max: number;
+  readonly get: (view: DataView, at: number) => number;
+}
+
 /** Reads components of the types that glTF has. */
-const COMPONENTS: ReadonlyMap<unknown, { bytes: number; max: number; get: (view: DataView, at: number) => number }> =
-  new Map([
-    [5120, { bytes: 1, max: 127, get: (view: DataView, at: number) => view.getInt8(at) }],
-    [5121, { bytes: 1, max: 255, get: (view: DataView, at: number) => view.getUint8(at) }],
-    [5122, { bytes: 2, max: 32_767, get: (view: DataView, at: number) => view.getInt16(at, true) }],
-    [5123, { bytes: 2, max: 65_535, get: (view: DataView, at: number) => view.getUint16(at, true) }],
-    [5125, { bytes: 4, max: 4_294_967_295, get: (view: DataView, at: number) => view.getUint32(at, true) }],
-    [5126, { bytes: 4, max: 1, get: (view: DataView, at: number) => view.getFloat32(at, true) }],
-  ]);
+export const COMPONENTS: ReadonlyMap<unknown, Component> = new Map([
+  [5120, { bytes: 1, max: 127, get: (view: DataView, at: number) => view.getInt8(at) }],
+  [5121, { bytes: 1, max: 255, get: (view: DataView, at: number) => view.getUint8(at) }],
+  [5122, { bytes: 2, max: 32_767, get: (view: DataView, at: number) => view.getInt16(at, true) }],
+  [5123, { bytes: 2, max: 65_535, get: (view: DataView, at: number) => view.getUint16(at, true) }],
+  [5125, { bytes: 4, max: 4_294_967_295, get: (view: DataView, at: number) => view.getUint32(at, true) }],
+  [5126, { bytes: 4, max: 1, get: (view: DataView, at: number) => view.getFloat32(at, true) }],
+]);
 const FLOAT = 5126;
 const WIDTHS: ReadonlyMap<unknown, number> = new Map([
   ['SCALAR', 1],
@@ -60,6 +67,12 @@ export class GltfDocument {
     return isObject(found) ? found : this.fail(`${list}[${String(index)}]`, 'an object', found);
   }
 
+  /** True if a buffer is another file. */
+  get hasFilesBeside(): boolean {
+    const { buffers } = this.json;
+    return Array.isArray(buffers) && buffers.some((buffer: unknown) => isObject(buffer) && isFile(buffer.uri));
+  }
+
   isIndex(value: unknown): value is number {
     return Number.isSafeInteger(value) && (value as number) >= 0;
   }
@@ -70,25 +83,54 @@ export class GltfDocument {
     return this.isIndex(count) ? count : this.fail(`accessors[${String(index)}].count`, 'a whole number', count);
   }
 
-  /** @param range elements that are read; default all */
-  async readAccessor(index: unknown, range?: SplatRange): Promise<AccessorData> {
+  /**
+   * @param range elements that are read; default all
+   * @param mostZeros elements that a sparse accessor may have that no buffer holds: they are zeros
+   */
+  async readAccessor(index: unknown, range?: SplatRange, mostZeros = 0): Promise<AccessorData> {
     const accessor = this.item('accessors', index);
     const path = `accessors[${String(index)}]`;
     const component =
       COMPONENTS.get(accessor.componentType) ??
       this.fail(`${path}.componentType`, '5120 to 5126', accessor.componentType);
     const width = WIDTHS.get(accessor.type) ?? this.fail(`${path}.type`, 'SCALAR to VEC4', accessor.type);
-    // Without a view it is all zeros, or would be without "sparse".
-    if (accessor.sparse !== undefined || accessor.bufferView === undefined) {
-      const found = accessor.sparse === undefined ? 'one without "bufferView"' : 'one with "sparse"';
-      throw damaged(
-        `${this.name}, ${path}`,
-        'an accessor whose numbers all lie in a buffer',
-        found,
-        'decode/unsupported',
-      );
-    }
     const count = this.accessorCount(index);
+    const { first, end } = range ?? { first: 0, end: count };
+    const own = { first, end: Math.max(first, Math.min(count, end)) };
+    const { sparse, componentType, normalized } = accessor;
+    const isSparse = sparse !== undefined;
+    const values =
+      accessor.bufferView === undefined
+        ? this.#zeros(path, isSparse && count <= mostZeros ? width * (own.end - own.first) : undefined)
+        : await this.#readDense(accessor, path, count, width, component, own);
+    let whole = values;
+    if (isSparse) {
+      // They may be the file's own memory.
+      whole = values.slice();
+      const { putSparse } = await loadModule('the code that reads sparse accessors', () => import('./sparse.js'));
+      await putSparse(this, sparse, { path, componentType, count, range: own, width, values: whole });
+    }
+    // The lowest signed integer stands for -1 as well as the one above it.
+    if (normalized === true && componentType !== FLOAT) normalise(whole, component.max);
+    return { count, width, values: whole };
+  }
+
+  /** Where it has no view and is not sparse either, numbers come by some extension. */
+  #zeros(path: string, length: number | undefined): Float32Array {
+    if (length !== undefined) return new Float32Array(length);
+    const expected = 'an accessor whose numbers lie in a buffer';
+    throw damaged(`${this.name}, ${path}`, expected, 'one without "bufferView"', 'decode/unsupported');
+  }
+
+  /** Numbers as they are stored. */
+  async #readDense(
+    accessor: Json,
+    path: string,
+    count: number,
+    width: number,
+    component: Component,
+    { first, end: last }: SplatRange,
+  ): Promise<Float32Array> {
     const view = this.item('bufferViews', accessor.bufferView);
     const bytes = await this.readView(accessor.bufferView);
     const { byteOffset = 0 } = accessor;
@@ -101,13 +143,12 @@ export class GltfDocument {
     if (end > bytes.length) {
       throw damaged(`${this.name}, ${path}`, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/corrupt');
     }
-    const { first, end: last } = range ?? { first: 0, end: count };
-    const elements = Math.max(0, Math.min(count, last) - first);
+    const elements = last - first;
     const start = byteOffset + first * byteStride;
     if (accessor.componentType === FLOAT && byteStride === 4 * width && hostIsLittleEndian) {
       // Numbers that lie as they are wanted are the file's own. A view's beginning need not be a multiple of 4.
       const own = alignedTo4(bytes.subarray(start, start + 4 * elements * width));
-      return { count, width, values: new Float32Array(own.buffer, own.byteOffset, elements * width) };
+      return new Float32Array(own.buffer, own.byteOffset, elements * width);
     }
     const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
     const values = new Float32Array(elements * width);
@@ -115,9 +156,7 @@ export class GltfDocument {
       const at = start + i * byteStride;
       for (let k = 0; k < width; k++) values[i * width + k] = component.get(data, at + k * component.bytes);
     }
-    // The lowest signed integer stands for -1 as well as the one above it.
-    if (accessor.normalized === true) normalise(values, component.max);
-    return { count, width, values };
+    return values;
   }
 
   /** The bytes of a buffer view. */
@@ -149,7 +188,7 @@ export class GltfDocument {
       return this.fail(`buffers[${index}]`, 'an address, or the binary chunk of a GLB', uri);
     }
     if (typeof uri !== 'string') return this.fail(`buffers[${index}].uri`, 'an address', uri);
-    if (uri.startsWith('data:')) return this.#decodeDataUri(uri, index);
+    if (/^data:/i.test(uri)) return this.#decodeDataUri(uri, index);
     // What follows the path is for servers; the file that lies beside the scene is found without.
     const [, file, query] = /^([^?#]*)(\?[^#]*)?/.exec(uri)!;
     const path = decodeSafely(file);
@@ -157,7 +196,7 @@ export class GltfDocument {
   }
 
   #decodeDataUri(uri: string, index: number): Uint8Array {
-    const match = /^data:[^,]*;base64,/.exec(uri.slice(0, 200));
+    const match = /^data:[^,]*;base64,/i.exec(uri.slice(0, 200));
     try {
       if (match) return bytesOf(atob(uri.slice(match[0].length)));
     } catch {
@@ -177,6 +216,8 @@ function bytesOf(text: string): Uint8Array {
 function normalise(values: Float32Array, max: number): void {
   for (let i = 0; i < values.length; i++) values[i] = Math.max(-1, values[i] / max);
 }
+
+const isFile = (uri: unknown): boolean => typeof uri === 'string' && !/^data:/i.test(uri);
 
 function decodeSafely(uri: string): string {
   try {

@@ -38,8 +38,13 @@ export function sourceOf(primitive: Json): string {
 }
 
 /** Splats of a primitive whose numbers lie open, and the degree of their spherical harmonics. */
-export function splatsIn(document: GltfDocument, { attributes }: Json): { count: number; shDegree: ShDegree } {
+export function splatsIn(
+  document: GltfDocument,
+  { attributes }: Json,
+  path: string,
+): { count: number; shDegree: ShDegree } {
   const own = isObject(attributes) ? attributes : {};
+  if (own.POSITION === undefined) document.fail(`${path}, attributes`, 'an attribute POSITION', Object.keys(own));
   return { count: document.accessorCount(own.POSITION), shDegree: degreeOf((name) => own[`${EXTENSION}:${name}`]) };
 }
 
@@ -108,7 +113,7 @@ async function readAttributes(
   const read = async (name: string, index: unknown, width: number): Promise<Float32Array> => {
     if (index === undefined)
       return document.fail(`${path}, attributes`, `an attribute ${name}`, Object.keys(attributes));
-    const data = await document.readAccessor(index, range);
+    const data = await document.readAccessor(index, range, index === attributes.POSITION ? 0 : all);
     if (data.count !== all || data.width !== width) {
       const found = `${grouped(data.count)} of ${data.width} numbers`;
       return document.fail(`${path}, ${name}`, `${grouped(all)} of ${width} numbers`, found);

@@ -115,11 +115,12 @@ export class AsciiCursor implements ValueCursor {
   }
 
   #fail(token: string): never {
-    throw new GaussianSplatError('decode/corrupt', {
+    const isCut = this.position === this.#source.bytes.length;
+    throw new GaussianSplatError(isCut ? 'decode/truncated' : 'decode/corrupt', {
       where: `${this.#source.name}, byte ${grouped(this.position - token.length)}`,
       expected: 'a number',
       found: quote(token, 24),
-      remedy: 'export the file again; its text is damaged',
+      remedy: `export the file again; its text is ${isCut ? 'incomplete' : 'damaged'}`,
     });
   }
 }

@@ -29,12 +29,12 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   if (placed.length === 0) throw noSplats(document.json, name, others);
   const clouds: GaussianCloud[] = [];
   const copies = new Copies(document);
-  for (const { primitive } of range ? [] : placed)
-    if (isUncompressed(primitive)) copies.count(primitive, splatsIn(document, primitive));
+  for (const { primitive, path } of range ? [] : placed)
+    if (isUncompressed(primitive)) copies.count(primitive, splatsIn(document, primitive, path));
   let splats = 0;
   for (const { primitive, path, toScene } of placed) {
     signal?.throwIfAborted();
-    const own = range && within(range, splats, splatsIn(document, primitive).count);
+    const own = range && within(range, splats, splatsIn(document, primitive, path).count);
     if (own && own.end <= own.first) {
       splats += own.count;
       continue;
@@ -90,11 +90,15 @@ function moved(cloud: GaussianCloud, map: Affine): GaussianCloud {
   return { ...cloud, origin };
 }
 
-/** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time: because they are compressed, or lie so far that they have an origin of their own. */
+/** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time: because they are compressed, stand in another file, or lie so far that they have an origin of their own. */
 export function gltfSplats(source: SceneSource): { count: number; shDegree: ShDegree } | undefined {
   const { document, placed } = open(source);
-  if (!placed.every(({ primitive, toScene }) => isUncompressed(primitive) && !isFar(toScene))) return undefined;
-  const found = placed.map(({ primitive }) => splatsIn(document, primitive));
+  if (
+    document.hasFilesBeside ||
+    !placed.every(({ primitive, toScene }) => isUncompressed(primitive) && !isFar(toScene))
+  )
+    return undefined;
+  const found = placed.map(({ primitive, path }) => splatsIn(document, primitive, path));
   const count = found.reduce((sum, own) => sum + own.count, 0);
   const shDegree = found.reduce<ShDegree>((most, own) => (own.shDegree > most ? own.shDegree : most), 0);
   return { count, shDegree };
