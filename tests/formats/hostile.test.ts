@@ -193,3 +193,17 @@ test('real compressed files with damaged bytes are read or refused by name', { s
     assert.ok(name.includes('v3') ? refused === 20 : refused > 0, `${refused} of 20 refused`);
   }
 });
+
+test('lists within lists within lists, where a description has something else, are refused by name', async () => {
+  const deep = '['.repeat(200_000) + ']'.repeat(200_000);
+  const descriptions: Readonly<Record<string, string>> = {
+    'lod-meta.json': `{"lodLevels":1,"filenames":["a"],"tree":${deep}}`,
+    'meta.json': `{"means":${deep}}`,
+    'a.gltf': `{"asset":{"version":${deep}}}`,
+  };
+  for (const [name, text] of Object.entries(descriptions)) {
+    const error = await refusalOf(new TextEncoder().encode(text), { name });
+    assert.ok(error);
+    assertHelpful(error, name);
+  }
+});

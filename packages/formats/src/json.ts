@@ -33,5 +33,10 @@ export function isObject(value: unknown): value is Json {
 /** A JSON value for error messages. */
 export function show(value: unknown): string {
   if (value === undefined) return 'nothing';
-  return quote(typeof value === 'string' ? value : (JSON.stringify(value) ?? String(value)), 80);
+  try {
+    return quote(typeof value === 'string' ? value : (JSON.stringify(value) ?? String(value)), 80);
+  } catch {
+    // Lists within lists, more than calls can be within calls.
+    return Array.isArray(value) ? 'a deep list' : 'a deep object';
+  }
 }
