@@ -122,6 +122,12 @@ test('hostile contracts give short messages', () => {
   assert.ok(message.length < 20_000 && message.endsWith('- and 49981 more'), `${message.length}`);
 });
 
+test('lists within lists, where a contract has something else, are faults with a name', () => {
+  const deep: unknown = JSON.parse('['.repeat(100_000) + ']'.repeat(100_000));
+  for (const contract of [deep, { version: deep }, { ...PACKED, inputs: deep }])
+    assert.throws(() => parseContract(contract), ContractError);
+});
+
 test('matrices, controls and pictures may be several', () => {
   const control = { role: 'control', range: [0, 1], default: 0 };
   const matrices = { a: { role: 'view' }, b: { role: 'view', axes: 'RUB' } };

@@ -96,3 +96,9 @@ test('a manifest tells how geometry is stored by its version, and readers of eit
   ];
   for (const manifest of refused) assert.throws(() => checkManifest(manifest, 'detail.json'), /decode\/unsupported/);
 });
+
+test('lists within lists, where a manifest has something else, are refused with a name', () => {
+  const deep: unknown = JSON.parse('['.repeat(100_000) + ']'.repeat(100_000));
+  assert.throws(() => checkManifest({ ...manifests[0], bounds: deep }, 'detail.json'), { code: 'decode/header' });
+  assert.throws(() => checkManifest({ format: deep }, 'detail.json'), { code: 'decode/unsupported' });
+});

@@ -161,6 +161,12 @@ const isObject = (value: unknown): value is Record<string, unknown> =>
 
 /** A value for messages, cut short. */
 export function describe(value: unknown): string {
-  const json = JSON.stringify(value);
+  let json: string | undefined;
+  try {
+    json = JSON.stringify(value);
+  } catch {
+    // Lists within lists, more than calls can be within calls.
+    return 'a value that is too deep to be shown';
+  }
   return json === undefined ? 'nothing' : json.length > 60 ? `${json.slice(0, 57)}...` : json;
 }

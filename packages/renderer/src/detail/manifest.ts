@@ -77,6 +77,15 @@ export function pageLayout(
   return { ...parts, total: parts.chunks + parts.details + parts.geometry + parts.sh };
 }
 
+function shown(value: unknown): string {
+  try {
+    return String(JSON.stringify(value)).slice(0, 80);
+  } catch {
+    // Lists within lists, more than calls can be within calls.
+    return 'a value that is too deep to be shown';
+  }
+}
+
 /**
  * Checks what was read from a `detail.json`.
  * @throws GaussianSplatError `decode/unsupported` for another format or version, `decode/header` for anything else that is wrong.
@@ -87,7 +96,7 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
     throw new GaussianSplatError(code as 'decode/header', {
       where: `${where}, ${path}`,
       expected,
-      found: String(JSON.stringify(found)).slice(0, 80),
+      found: shown(found),
       remedy: 'write the folder again with npm run detail',
     });
   };
