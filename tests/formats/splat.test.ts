@@ -48,6 +48,9 @@ test('the format is told by the extension, the media type or plausible numbers',
   assert.equal(detectFormat(file), 'splat');
   assert.equal(detectFormat(odd), undefined, 'one record that is none speaks against it');
   assert.equal(detectFormat(odd, 'https://host/a/scene.SPLAT?v=2#x'), 'splat');
+  for (const name of ['scene #3.splat', 'what?.splat', 'https://host/get?file=scene.splat'])
+    assert.equal(detectFormat(odd, name), 'splat', name);
+  assert.equal(detectFormat(odd, 'https://host/scene.txt?like=a.splat'), undefined);
   assert.equal(detectFormat(odd, 'scene', 'application/x-splat; charset=binary'), 'splat');
   assert.equal(detectFormat(odd, 'scene.splat.txt'), undefined);
   assert.equal(detectFormat(file.subarray(0, -1)), undefined);

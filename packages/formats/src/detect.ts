@@ -32,8 +32,7 @@ export function findFormat(bytes: Uint8Array, name: string, contentType: string)
   );
 }
 
-/** Extension of a file name or URL in lower case, with its dot; empty if there is none. */
+/** Extension of a file name or URL in lower case, with its dot; empty if there is none. Files may be called `scene #3.splat`, and addresses end in a name. */
 export function extensionOf(name: string): string {
-  const path = name.split(/[?#]/)[0];
-  return /\.[a-z0-9]+$/i.exec(path)?.[0].toLowerCase() ?? '';
+  return /\.[a-z0-9]+(?=[?#]|$)/i.exec(name)?.[0].toLowerCase() ?? '';
 }
