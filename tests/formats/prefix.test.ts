@@ -6,6 +6,8 @@ import { shCoefficientCount } from '@gaussian-splat/core';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { assertAtMost, assertSameNumbers } from './support/expect.js';
+import { writePly } from './support/ply-writer.js';
+import { inriaColumns, rawSplats } from './support/splats.js';
 
 const HALF = 0.5;
 const FILES: readonly [file: string, share: number, splats: [number, number], degree: number][] = [
@@ -75,4 +77,14 @@ test('a large scene is previewed before it is whole', { skip: needsSharedData },
   });
   assert.deepEqual([cloud.count, cloud.shDegree], [250_000, 2]);
   assert.deepEqual(previews, [[15_625, 0]]);
+});
+
+test('a number that is still arriving is no number yet', async () => {
+  const columns = inriaColumns(rawSplats(3, 0));
+  const file = writePly([{ name: 'vertex', columns }], { encoding: 'ascii' });
+  assert.equal((await readPrefix(file, { name: 'a.ply' }))?.count, 3);
+  for (let missing = 1; missing < 30; missing++) {
+    const part = await readPrefix(file.subarray(0, -missing), { name: 'a.ply' });
+    assert.equal(part, undefined, `${missing} bytes before the end`);
+  }
 });

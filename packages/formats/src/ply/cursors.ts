@@ -101,7 +101,7 @@ export class AsciiCursor implements ValueCursor {
 
   /** The next run of characters above the space; empty at the end of the file. */
   #token(): string {
-    const { bytes } = this.#source;
+    const { bytes, isPrefix } = this.#source;
     let start = this.position;
     while (start < bytes.length && bytes[start] <= SPACE) start++;
     let end = start;
@@ -110,7 +110,8 @@ export class AsciiCursor implements ValueCursor {
       token += String.fromCharCode(bytes[end++]);
     }
     this.position = end;
-    this.ended = token === '';
+    // Of a file that is still arriving the last one may have more digits.
+    this.ended = token === '' || (isPrefix === true && end === bytes.length);
     return token.length > MAX_TOKEN ? this.#fail(token) : token;
   }
 
