@@ -33,6 +33,34 @@ function streamed(): FuzzScene {
   return { name: 'lod-meta.json', files: { 'lod-meta.json': Buffer.from(JSON.stringify(meta)), ...parts } };
 }
 
+/** The same with bundles. */
+function bundled(): FuzzScene {
+  const { name, files } = streamed();
+  const index = Buffer.from(Buffer.from(files[name]).toString().replaceAll('/meta.json', '.sog'));
+  const bundles = { 'a.sog': zipSync(writeSog(cloud), { level: 0 }), 'b.sog': zipSync(writeSog(smallCloud(5, 0))) };
+  return { name, files: { [name]: index, ...bundles } };
+}
+
+/** A glTF some of whose numbers are sparse, in a buffer of their own. */
+function sparseGltf(json: Record<string, unknown>, buffer: Buffer): FuzzScene {
+  const views = json.bufferViews as object[];
+  const sparse = {
+    count: 2,
+    indices: { bufferView: views.length, componentType: 5121 },
+    values: { bufferView: views.length, byteOffset: 4 },
+  };
+  const accessors = (json.accessors as object[]).map((accessor, k) => (k === 4 ? { ...accessor, sparse } : accessor));
+  const bufferViews = [...views, { buffer: 1, byteOffset: 0, byteLength: 28 }];
+  const buffers = [
+    { uri: 'a.bin', byteLength: buffer.length },
+    { uri: 'b.bin', byteLength: 28 },
+  ];
+  const own = Buffer.alloc(28, 1);
+  own.set([3, 7]);
+  const text = Buffer.from(JSON.stringify({ ...json, accessors, bufferViews, buffers }));
+  return { name: 'a.gltf', files: { 'a.gltf': text, 'a.bin': buffer, 'b.bin': own } };
+}
+
 function compressedPly(): Uint8Array {
   const bounds = ['min_', 'max_', 'min_scale_', 'max_scale_'].flatMap((bound) =>
     ['x', 'y', 'z'].map((axis) => bound + axis),
@@ -69,10 +97,12 @@ export function fuzzScenes(): Readonly<Record<string, readonly FuzzScene[]>> {
     [0, 1],
   );
   const columns = inriaColumns(raw);
+  const longs = [{ name: 'id', type: 'int64' as const, listCountType: 'uint64' as const, values: [[1, 2], [], [3]] }];
   return {
     ply: [
       one('a.ply', writePly([{ name: 'vertex', columns }])),
       one('a.ply', writePly([{ name: 'vertex', columns }], { encoding: 'ascii' })),
+      one('a.ply', writePly([{ name: 'ids', columns: longs }, { name: 'vertex', columns }])), // prettier-ignore
     ],
     'compressed-ply': [one('a.compressed.ply', compressedPly())],
     spz: [
@@ -86,9 +116,10 @@ export function fuzzScenes(): Readonly<Record<string, readonly FuzzScene[]>> {
       { name: 'meta.json', files: writeSog(cloud) },
       { name: 'meta.json', files: writeSogV1(cloud) },
     ],
-    lod: [streamed()],
+    lod: [streamed(), bundled()],
     gltf: [
       one('a.glb', writeGlb(json, buffer)),
+      sparseGltf(json, buffer),
       {
         name: 'a.gltf',
         files: {
