@@ -146,7 +146,9 @@ test('files that are no models', async () => {
 
 test('a model on a server, with its sidecar and its weights', async () => {
   const server = createServer((request, response) => {
-    const name = basename(new URL(request.url ?? '', 'http://x').pathname);
+    const { pathname, search } = new URL(request.url ?? '', 'http://x');
+    const name = basename(pathname);
+    if (pathname.startsWith('/signed/') && search !== '?token=a') return void response.writeHead(403).end();
     // Every unknown path gets a page with status 200, as many servers do it.
     const known = ['split.onnx', 'split.contract.json', 'external.onnx', 'external.weights'].includes(name);
     response.end(known ? readFileSync(fixturePath(name)) : '<!doctype html><p>Welcome');
@@ -160,6 +162,8 @@ test('a model on a server, with its sidecar and its weights', async () => {
     const external = await checkModel(`${base}/external.onnx`, { run: true });
     assert.deepEqual([codes(external), external.warnings.length > 0], [[], true]);
     assert.deepEqual(codes(await checkModel(`${base}/other.onnx`)), ['decode/html']);
+    for (const name of ['split', 'external'])
+      assert.deepEqual(codes(await checkModel(`${base}/signed/${name}.onnx?token=a`, { run: true })), [], name);
   } finally {
     server.closeAllConnections();
     server.close();
