@@ -152,6 +152,15 @@ test('a scene whose numbers lie in another file cannot be read in parts', async 
   assert.equal((await splatRanges(file({}, buffer, { uri }), 'a.gltf'))?.count, COUNT);
 });
 
+test('splats of scenes that are not the default one are not shown, and where there are no others that is said', async () => {
+  const scenes = [{ nodes: [] }, { nodes: [0] }];
+  assertSameCloud(await read({ scenes, scene: 1 }, buffer), direct);
+  for (const scene of [0, undefined]) {
+    const message = /1 primitive of splats that the scene does not show.*"scene"/;
+    await expectRefusal(file({ scenes, scene }, buffer), 'decode/not-splats', message, options(buffer));
+  }
+});
+
 test('data: in capitals is an address of that kind, and what a primitive lacks is named', async () => {
   const uri = `DATA:application/octet-stream;BASE64,${buffer.toString('base64')}`;
   assertSameCloud(await readScene(file({}, buffer, { uri }), { name: 'a.gltf' }), direct);

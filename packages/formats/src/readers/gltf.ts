@@ -4,6 +4,7 @@ import { openContainer, type Json } from '../gltf/container.js';
 import { GltfDocument } from '../gltf/document.js';
 import { multiply, placedMeshes, type Affine } from '../gltf/nodes.js';
 import { isSplats, isUncompressed, readPrimitive, sourceOf, splatsIn } from '../gltf/primitive.js';
+import { isObject } from '../json.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
 import { transformCloud } from '../transform/transform-cloud.js';
@@ -153,11 +154,18 @@ function within({ first, end }: SplatRange, at: number, count: number): SplatRan
 }
 
 function noSplats({ meshes }: Json, name: string, others: number): GaussianSplatError {
-  const count = Array.isArray(meshes) ? meshes.length : 0;
+  const all: unknown[] = Array.isArray(meshes) ? meshes : [];
+  const hidden = all.flatMap((mesh) => (isObject(mesh) ? mesh.primitives : [])).filter(isSplats).length;
   return new GaussianSplatError('decode/not-splats', {
     where: name,
     expected: 'glTF with splats (the extension KHR_gaussian_splatting) in its scene',
-    found: `${count} meshes, and ${others} primitives of other kinds in the scene`,
-    remedy: 'show meshes with <model-viewer>, or export the scene with KHR_gaussian_splatting',
+    found:
+      hidden > 0
+        ? `${hidden} primitive${hidden > 1 ? 's' : ''} of splats that the scene does not show`
+        : `${all.length} meshes, and ${others} primitives of other kinds in the scene`,
+    remedy:
+      hidden > 0
+        ? 'name the scene that shows them in "scene", or put their node into the one that is named'
+        : 'show meshes with <model-viewer>, or export the scene with KHR_gaussian_splatting',
   });
 }

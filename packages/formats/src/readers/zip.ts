@@ -26,7 +26,9 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const inner = archive.open(path);
   const format = findFormat(inner, path, '');
-  if (!format || (format.name === 'zip' && source.openPart === WITHIN)) throw noScene(name, archive.paths, path);
+  if (!format) throw noScene(name, path, 'a file that is none');
+  if (format.name === 'zip' && source.openPart === WITHIN)
+    throw noScene(name, path, 'an archive within an archive within an archive');
   const read = await loadReader(format);
   const openPart =
     format.name === 'zip' ? WITHIN : async (part: string): Promise<Uint8Array> => archive.open(folder + part);
@@ -54,7 +56,9 @@ function mainFile(archive: Archive, name: string): string {
   // glTF names its other files, scenes among them.
   const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
   if (gltf.length === 1) return gltf[0];
-  throw scenes.length === 0 ? noScene(name, paths, undefined) : severalScenes(name, scenes);
+  throw scenes.length === 0
+    ? noScene(name, undefined, `a ZIP archive with ${listed(paths)}`)
+    : severalScenes(name, scenes);
 }
 
 /** Of the same scene after some numbers of iterations, the one after most; undefined for others. */
@@ -66,11 +70,11 @@ function lastIteration(paths: readonly string[]): string | undefined {
   return paths[iterations.indexOf(Math.max(...iterations))];
 }
 
-function noScene(name: string, paths: readonly string[], path: string | undefined): GaussianSplatError {
+function noScene(name: string, path: string | undefined, found: string): GaussianSplatError {
   return new GaussianSplatError('decode/unknown-format', {
     where: path === undefined ? name : `${name}, ${path}`,
     expected: 'a ZIP archive with a Gaussian splat scene in it',
-    found: path === undefined ? `a ZIP archive with ${listed(paths)}` : 'a file that is none',
+    found,
     remedy: 'give the address of a scene file, or of an archive of one: .ply, .spz, .splat, .ksplat, .sog, .glb',
   });
 }
