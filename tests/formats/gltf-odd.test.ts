@@ -161,6 +161,18 @@ test('splats of scenes that are not the default one are not shown, and where the
   }
 });
 
+test('a buffer on another server is refused by name, not looked for beside the scene', async () => {
+  for (const uri of ['https://x.test/a.bin', '//x.test/a.bin', 'blob:https://x.test/1-2', 'C:\\\\a.bin']) {
+    const elsewhere = file({}, buffer, { uri });
+    await expectRefusal(
+      elsewhere,
+      'decode/unsupported',
+      /buffers\[0\]\.uri: expected .*beside the scene/,
+      options(buffer),
+    );
+  }
+});
+
 test('data: in capitals is an address of that kind, and what a primitive lacks is named', async () => {
   const uri = `DATA:application/octet-stream;BASE64,${buffer.toString('base64')}`;
   assertSameCloud(await readScene(file({}, buffer, { uri }), { name: 'a.gltf' }), direct);

@@ -86,3 +86,24 @@ test('a query goes to no other server, and changes none that is there', () => {
   for (const [path, address] of cases) assert.equal(partUrl(path, scene).href, address, path);
   assert.equal(partUrl('b.webp', 'https://x.test/a/scene.json').href, 'https://x.test/a/b.webp');
 });
+
+test('what a scene names is on its own server, whatever it is called', () => {
+  const bound = { min: [0, 0, 0], max: [1, 1, 1] };
+  const addressOf = (path: string): string => {
+    const index = { lodLevels: 1, filenames: [path], tree: { bound, lods: { 0: { file: 0, count: 1 } } } };
+    const bytes = new TextEncoder().encode(JSON.stringify(index));
+    return readLodScene(bytes, 'lod-meta.json', `https://x.test/a/lod-meta.json${QUERY}`).boxes[0].runs[0].url;
+  };
+  const paths = [
+    '//y.test/meta.json',
+    '///y.test/b',
+    '/\\\\y.test/b',
+    '\\\\y.test/b',
+    'https://y.test/b',
+    'https:y.test',
+    '/b',
+    '../..//y.test/b',
+  ];
+  for (const path of paths) assert.equal(new URL(addressOf(path)).origin, 'https://x.test', path);
+  assert.equal(addressOf('/b/meta.json'), `https://x.test/b/meta.json${QUERY}`);
+});

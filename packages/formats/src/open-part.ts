@@ -15,6 +15,10 @@ export function openPartAt(url: string | URL, optionsOf: (path: string) => Fetch
 
 /** Address of another file of the scene at an address. Every part of the path is encoded, so that it can be no address of another server. */
 export function partAddress(url: string | URL, path: string, query = ''): URL {
-  const encoded = path.split('/').map((part) => (part === '..' || part === '.' ? part : encodeURIComponent(part)));
+  // Two slashes would begin the name of a server.
+  const encoded = path
+    .replace(/^\/+/, '/')
+    .split('/')
+    .map((part) => (part === '..' || part === '.' ? part : encodeURIComponent(part)));
   return partUrl(encoded.join('/') + query, url);
 }

@@ -189,6 +189,10 @@ export class GltfDocument {
     }
     if (typeof uri !== 'string') return this.fail(`buffers[${index}].uri`, 'an address', uri);
     if (/^data:/i.test(uri)) return this.#decodeDataUri(uri, index);
+    if (/^([a-z][a-z0-9+.-]*:|\/\/)/i.test(uri)) {
+      const expected = 'a relative address: a file beside the scene, or "data:"';
+      throw damaged(`${this.name}, buffers[${index}].uri`, expected, show(uri), 'decode/unsupported');
+    }
     // What follows the path is for servers; the file that lies beside the scene is found without.
     const [, file, query] = /^([^?#]*)(\?[^#]*)?/.exec(uri)!;
     const path = decodeSafely(file);
