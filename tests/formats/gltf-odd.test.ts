@@ -4,7 +4,7 @@ import { test } from 'node:test';
 import { strToU8 } from 'fflate';
 import { readScene, splatRanges } from '@gaussian-splat/formats';
 import { assertAtMost, assertSameCloud, expectRefusal, largestDifference } from './support/expect.js';
-import { buildGltf } from './support/gltf-writer.js';
+import { buildGltf, writeGlb } from './support/gltf-writer.js';
 import { smallCloud } from './support/small-cloud.js';
 
 type Json = Record<string, unknown>;
@@ -190,4 +190,33 @@ test('data: in capitals is an address of that kind, and what a primitive lacks i
     /expected glTF 2\.x, found "x"\./,
     options(buffer),
   );
+});
+
+/** World positions of the splats that are left, as a viewer finds them. */
+const worldOf = ({ positions, origin }: { positions: Float32Array; origin: readonly number[] }): number[] =>
+  Array.from(positions, (value, k) => value + origin[k % 3]);
+
+test('far away, a splat that cannot be drawn takes no other along, and what there is most of keeps its digits', async () => {
+  const translation = [4_000_000, 5_000_000, 300];
+  const local = smallCloud(9, 0);
+  // From left, up and forward to right, down and forward.
+  const world = Array.from(local.positions, (value, k) => (k % 3 === 2 ? 1 : -1) * (value + translation[k % 3]));
+  const readAt = (clouds: (typeof local)[], nodes: { mesh: number; translation?: number[] }[]) => {
+    const built = buildGltf(
+      clouds.map((own) => [{ cloud: own }]),
+      nodes,
+      nodes.map((_, k) => k),
+    );
+    return readScene(writeGlb(built.json, built.buffer), { name: 'a.glb' });
+  };
+  for (const value of [1e19, 1e30, -1e17, Infinity, NaN]) {
+    const broken = { ...local, positions: local.positions.slice() };
+    broken.positions[1] = value;
+    const found = await readAt([broken], [{ mesh: 0, translation }]);
+    assert.equal(found.count, value === -1e17 ? 9 : 8, String(value));
+    assertAtMost(largestDifference(worldOf(found).slice(-24), world.slice(3)), 1e-6, String(value));
+  }
+  const near = { ...smallCloud(1, 0) };
+  const both = await readAt([near, local], [{ mesh: 0 }, { mesh: 1, translation }]);
+  assertAtMost(largestDifference(worldOf(both).slice(3), world), 1e-6, 'with one that is near');
 });

@@ -8,12 +8,16 @@ export interface CloudPart {
   readonly count: number;
 }
 
-/** One cloud of parts of several, of the highest degree of them; lower degrees get zeros. All have the origin of the first. */
+/** One cloud of parts of several, of the highest degree of them; lower degrees get zeros. All have the origin of the largest. */
 export function mergeClouds(parts: readonly CloudPart[], name: string): DraftCloud {
   const count = parts.reduce((sum, part) => sum + part.count, 0);
   const degree = parts.reduce<ShDegree>((most, { cloud }) => (cloud.shDegree > most ? cloud.shDegree : most), 0);
   const merged = allocateCloud(count, degree, name);
-  merged.origin = parts[0]?.cloud.origin ?? [0, 0, 0];
+  const largest = parts.reduce<CloudPart | undefined>(
+    (most, part) => (part.count > (most?.count ?? -1) ? part : most),
+    undefined,
+  );
+  merged.origin = largest?.cloud.origin ?? [0, 0, 0];
   merged.antialiased = parts.some(({ cloud }) => cloud.antialiased);
   let at = 0;
   for (const part of parts) {

@@ -16,7 +16,10 @@ const AXIS_SIGNS = [1, -1, -1];
 const QUATERNION_SIGNS = [1, -1, -1];
 const HARMONIC_SIGNS = [-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1];
 
-/** Writes SPZ version 3 (Niantic), with as many bits after the point of the coordinates as 24 bits allow. */
+/**
+ * Writes SPZ version 3 (Niantic), with as many bits after the point of the coordinates as 24 bits allow.
+ * @throws GaussianSplatError `argument/value` for coordinates beyond 8,388,607
+ */
 export async function writeSpz(cloud: GaussianCloud, options: SpzOptions): Promise<Uint8Array<ArrayBuffer>> {
   const { count, shDegree, antialiased } = cloud;
   const coefficients = shCoefficientCount(shDegree) - 1;

@@ -19,6 +19,9 @@ const MAX_PRIMITIVES = 100_000;
 /** The same mesh in many places is copied for each, and copies take no bytes of the file: these, 9 million splats of degree 3, are all that copies may take. */
 const MAX_COPIED_BYTES = 2 ** 31;
 
+/** Splats by which the middle of a primitive is found. */
+const SAMPLES = 4096;
+
 /**
  * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives of the default scene that hold splats, each moved by its nodes
  * (spherical harmonics turn along), uncompressed or as SPZ. Degrees may differ. Meshes and points without the extension,
@@ -75,13 +78,13 @@ class Copies {
 /** True if a node moves so far, as georeferenced ones do, that float32 would round what it moves by more than a few hundredths of a millimetre. */
 const isFar = (map: Affine): boolean => [3, 7, 11].some((k) => Math.abs(map[k]) >= 1_000);
 
-/** The cloud in the scene. Far from (0, 0, 0) the place of one of its splats becomes the origin, so that the others keep their digits. */
+/** The cloud in the scene. Far from (0, 0, 0) the middle of its splats becomes the origin, so that they keep their digits. */
 function moved(cloud: GaussianCloud, map: Affine): GaussianCloud {
   if (!isFar(map) || cloud.count === 0) {
     transformCloud(cloud, map);
     return cloud;
   }
-  const [x, y, z] = cloud.positions.subarray(0, 3).map((value) => (Number.isFinite(value) ? value : 0));
+  const [x, y, z] = [0, 1, 2].map((axis) => middleOf(cloud, axis));
   const at = (row: number): number => map[row] * x + map[row + 1] * y + map[row + 2] * z + map[row + 3];
   const origin = [at(0), at(4), at(8)] as const;
   transformCloud(
@@ -89,6 +92,14 @@ function moved(cloud: GaussianCloud, map: Affine): GaussianCloud {
     map.map((value, k) => (k % 4 === 3 ? value - origin[k >> 2] : value)),
   );
   return { ...cloud, origin };
+}
+
+/** Median of some of the coordinates along an axis: one that cannot be drawn may be anywhere. */
+function middleOf({ positions, count }: GaussianCloud, axis: number): number {
+  const step = 3 * Math.ceil(count / SAMPLES);
+  const sample: number[] = [];
+  for (let k = axis; k < positions.length; k += step) if (Number.isFinite(positions[k])) sample.push(positions[k]);
+  return sample.sort((a, b) => a - b)[sample.length >> 1] ?? 0;
 }
 
 /** How many splats a glTF holds, and of which degree; undefined where they cannot be read a few at a time: because they are compressed, stand in another file, or lie so far that they have an origin of their own. */
