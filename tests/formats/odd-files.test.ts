@@ -3,9 +3,9 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { strToU8, zipSync } from 'fflate';
 import { detectFormat, readScene, readSplats, splatRanges } from '@gaussian-splat/formats';
-import { assertSameCloud, expectRefusal } from './support/expect.js';
+import { assertSameCloud, expectRefusal, largestDifference } from './support/expect.js';
 import { buildGltf } from './support/gltf-writer.js';
-import { writePly } from './support/ply-writer.js';
+import { writePly, type PlyColumn } from './support/ply-writer.js';
 import { smallCloud } from './support/small-cloud.js';
 import { writeSog, type SogFiles } from './support/sog-writer.js';
 import { inriaColumns, rawSplats } from './support/splats.js';
@@ -23,6 +23,38 @@ test('fields that CloudCompare has renamed are found in parts, too', async () =>
   assert.deepEqual((await splatRanges(file, 'a.ply'))?.count, 5);
   const range = { first: 1, end: 4 };
   assertSameCloud(await readSplats(file, range, 'a.ply'), await readSplats(plain, range, 'a.ply'));
+});
+
+test('integers of 64 bits in a PLY are skipped, and read where they are coordinates', async () => {
+  const splats = rawSplats(3, 1);
+  const own = inriaColumns(splats);
+  const places = splats.positions.map((p) => p.map((value) => 6_000_000_000_000 + Math.round(value)));
+  for (const encoding of ['ascii', 'binary_little_endian', 'binary_big_endian'] as const) {
+    const plain = await readScene(writePly([{ name: 'vertex', columns: own }], { encoding }));
+    for (const [signed, unsigned] of [['int64', 'uint64'] as const, ['longlong', 'ulonglong'] as const]) {
+      const face = { name: 'ids', type: unsigned, listCountType: unsigned, values: [[1, 2 ** 50], []] };
+      const time = { name: 'time', type: signed, values: [-1, 2 ** 40, 7] };
+      const id = { name: 'id', type: unsigned, values: [5, 6] };
+      const read = (vertex: readonly PlyColumn[]) => {
+        const elements = [
+          { name: 'face', columns: [face, id] },
+          { name: 'vertex', columns: [time, ...vertex] },
+        ];
+        return readScene(writePly(elements, { encoding }));
+      };
+      assertSameCloud(await read(own), plain);
+      const moved = own.map((column) => {
+        const axis = 'xyz'.indexOf(column.name);
+        return axis < 0 ? column : { ...column, type: signed, values: places.map((p) => p[axis]) };
+      });
+      const { positions, origin } = await read(moved);
+      const world = Array.from(positions, (value, i) => value + origin[i % 3]);
+      assert.equal(largestDifference(world, places.flat()), 0, `${encoding} ${signed}`);
+    }
+  }
+  const one = own.map((c) => (c.name === 'y' ? { ...c, type: 'int64' as const, values: [1, 2, 3] } : c));
+  const file = writePly([{ name: 'vertex', columns: one }]);
+  assert.equal(await splatRanges(file, 'a.ply'), undefined, 'an origin that all splats decide');
 });
 
 test('a PLY may begin with the byte-order mark that text editors write', async () => {

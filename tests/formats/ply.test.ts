@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import fc from 'fast-check';
 import { encodingsFor } from '@gaussian-splat/economise';
-import { readScene, splatRanges } from '@gaussian-splat/formats';
+import { readScene } from '@gaussian-splat/formats';
 import { assertAtMost, expectRefusal, largestDifference } from './support/expect.js';
 import { writePly, type PlyColumn, type PlyEncoding, type PlyType } from './support/ply-writer.js';
 import { activated, inriaColumns, rawSplats, type RawSplats } from './support/splats.js';
@@ -112,43 +112,6 @@ test('float64 coordinates far from the origin keep their detail', async () => {
     const world = Array.from(cloud.positions, (value, i) => value + cloud.origin[i % 3]);
     assertAtMost(largestDifference(world, far.flat()), 1e-8, 'better than float32 alone, which keeps 0.25 here');
   }
-});
-
-test('integers of 64 bits are skipped, and read where they are coordinates', async () => {
-  const splats = rawSplats(3, 1);
-  const places = splats.positions.map(([x, y, z]) => [x, y, z].map((value) => 6_000_000_000_000 + Math.round(value)));
-  for (const encoding of ENCODINGS) {
-    for (const [signed, unsigned] of [['int64', 'uint64'] as const, ['longlong', 'ulonglong'] as const]) {
-      const time: PlyColumn = { name: 'time', type: signed, values: [-1, 2 ** 40, 7] };
-      const face: PlyColumn = { name: 'ids', type: unsigned, listCountType: unsigned, values: [[1, 2 ** 50], []] };
-      const id: PlyColumn = { name: 'id', type: unsigned, values: [5, 6] };
-      const read = (columns: readonly PlyColumn[]) =>
-        readScene(
-          writePly(
-            [
-              { name: 'face', columns: [face, id] },
-              { name: 'vertex', columns: [time, ...columns] },
-            ],
-            { encoding },
-          ),
-        );
-      assertHolds(await read(inriaColumns(splats)), splats);
-      const columns = inriaColumns(splats).map((column) => {
-        const axis = 'xyz'.indexOf(column.name);
-        return axis < 0 ? column : { ...column, type: signed, values: places.map((p) => p[axis]) };
-      });
-      const cloud = await read(columns);
-      const world = Array.from(cloud.positions, (value, i) => value + cloud.origin[i % 3]);
-      assert.equal(largestDifference(world, places.flat()), 0, `${encoding} ${signed}`);
-    }
-  }
-  const ranged = writePly([
-    {
-      name: 'vertex',
-      columns: inriaColumns(splats).map((c) => (c.name === 'y' ? { ...c, type: 'int64', values: [1, 2, 3] } : c)),
-    },
-  ]);
-  assert.equal(await splatRanges(ranged, 'a.ply'), undefined, 'an origin that all splats decide');
 });
 
 test('tags of trainers set antialiased', async () => {
