@@ -187,6 +187,10 @@ describe('the loss of the device', () => {
       devices[devices.length - 1].destroy();
       await nextEvent(element, 'error');
       assertEqual([element.error?.code, element.error?.reason], ['device-lost', 'device-lost/unrecoverable'], 'codes');
+      const { message } = element.error!;
+      const said =
+        /lost \(reason "destroyed": Device was destroyed\), and no other in its place \(.*: the GPU process does not answer\)\. /;
+      assert(said.test(message), message);
       assertEqual(requests, 3, 'requests for a device');
       assertEqual(element.loaded, false, 'loaded');
     } finally {
@@ -208,6 +212,10 @@ describe('the loss of the device', () => {
       const element = show({ src: COMPASS });
       await nextEvent(element, 'error');
       assertEqual([element.error?.reason, requests], ['device-lost/unrecoverable', 2], 'reason and requests');
+      assert(
+        /lost \(reason "destroyed": .*\)\. A script of this page/.test(element.error!.message),
+        element.error!.message,
+      );
     } finally {
       GaussianSplatElement.sharedDevice = original;
     }
