@@ -103,7 +103,8 @@ export function parsePoint(text: string): readonly [x: number, y: number, z: num
   return isPoint ? [x, y, z] : null;
 }
 
-const ORBIT_FORM = '"theta phi radius" with deg or rad, deg or rad, m, cm, mm or %; "auto" for each, or left out from the end';
+const ORBIT_FORM =
+  '"theta phi radius" with deg or rad, deg or rad, m, cm, mm or %; "auto" for each, or left out from the end';
 const FIELD_OF_VIEW_FORM = 'an angle above 0deg and below 180deg with deg or rad, or "auto"';
 
 /** `camera-orbit`, `min-camera-orbit` and `max-camera-orbit`. */
