@@ -186,6 +186,15 @@ test('properties may hold numbers where attributes hold text', () => {
   assert.equal(read.maxShDegree, 1);
 });
 
+test('times are at most what timers can wait: longer ones would be over at once', () => {
+  const read = readAttributes(
+    { ...ABSENT, autoRotateDelay: Infinity, interactionPromptThreshold: '3e9', interpolationDecay: 7 },
+    assert.fail,
+  );
+  const { autoRotateDelay, interactionPromptThreshold, interpolationDecay } = read;
+  assert.deepEqual([autoRotateDelay, interactionPromptThreshold, interpolationDecay], [2 ** 31 - 1, 2 ** 31 - 1, 7]);
+});
+
 test('crossorigin as of <img>', () => {
   assert.equal(readAttributes({ ...ABSENT, crossorigin: '' }, assert.fail).credentials, 'same-origin');
   assert.equal(readAttributes({ ...ABSENT, crossorigin: 'use-credentials' }, assert.fail).credentials, 'include');

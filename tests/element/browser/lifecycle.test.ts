@@ -186,6 +186,20 @@ describe('moves and removals', () => {
     }
   });
 
+  it('a removed element keeps its scene for as long as releaseDelay says, for ever if that is Infinity', async () => {
+    const delayBefore = GaussianSplatElement.releaseDelay;
+    GaussianSplatElement.releaseDelay = Infinity;
+    try {
+      const element = await showLoaded();
+      element.remove();
+      await delay(300);
+      assertEqual(element.loaded, true, 'loaded');
+      document.body.append(element);
+    } finally {
+      GaussianSplatElement.releaseDelay = delayBefore;
+    }
+  });
+
   it('an eager element off screen loads anew as well', async () => {
     const delayBefore = GaussianSplatElement.releaseDelay;
     GaussianSplatElement.releaseDelay = 0;

@@ -8,6 +8,7 @@ import type { SharedDevice } from '../gpu/shared-device.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { isSameContract } from '../loading/same-contract.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
+import { timerMs } from '../timer-ms.js';
 
 /** `waiting`: there is a scene to load, but the element is not in sight yet. */
 export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';
@@ -160,7 +161,7 @@ export class SceneController implements ReactiveController {
 
   hostDisconnected(): void {
     this.#spare(true);
-    this.#releaseTimer = setTimeout(() => this.want(null, false), this.#options.releaseDelayMs());
+    this.#releaseTimer = setTimeout(() => this.want(null, false), timerMs(this.#options.releaseDelayMs()));
   }
 
   async #load(request: SceneRequest): Promise<void> {
