@@ -27,7 +27,8 @@ export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): Gaussia
   const lost = `a device that was lost${said ?? ''}`;
   const why = cause instanceof GaussianSplatError ? `${cause.where}: ${cause.found}` : String(cause);
   const isLoss = isDeviceFailure(cause, true);
-  const reload = isLoss ? 'reload the page' : 'restart the browser, which may refuse the GPU after it has failed';
+  // Chromium refuses a page that has lost two devices within a short time any other, until it is loaded again.
+  const reload = isLoss ? 'reload the page' : 'reload the page, to which the browser may refuse the GPU until then';
   return new GaussianSplatError('device-lost/unrecoverable', {
     where: 'GPU device',
     expected: 'a device that stays long enough to draw the scene',
