@@ -13,7 +13,10 @@ test('a lost device is told of in the words of the browser, and what to do about
   const said = (cause: unknown, loss?: GPUDeviceLostInfo): string => unrecoverable(cause, loss).message;
   const has = (message: string, part: string): void => assert.ok(message.includes(part), message);
   has(said(new DeviceLostError(info), info), `${lost}. Reload the page; `);
-  has(said(none, info), `${lost}, and no other in its place (this browser: none). Reload the page, to which the browser may refuse the GPU`);
+  has(
+    said(none, info),
+    `${lost}, and no other in its place (this browser: none). Reload the page, to which the browser may refuse the GPU`,
+  );
   has(said(none), 'found a device that was lost, and no other in its place (this browser: none). Reload');
   has(said(new DeviceLostError(info), { ...info, reason: 'destroyed' }), '. A script of this page called');
   has(said(new DeviceLostError(info), { ...info, message: '' }), '(reason "unknown": nothing more is known)');
