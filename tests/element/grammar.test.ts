@@ -56,13 +56,16 @@ test('orbits', () => {
   assert.deepEqual(orbit.parse('  -10.5deg\t0   150cm '), { theta: -10.5 * DEGREE, phi: 0, radius: { metres: 1.5 } });
   assert.deepEqual(orbit.parse('auto auto 105%'), { theta: 'auto', phi: 'auto', radius: { framings: 1.05 } });
   assert.deepEqual(orbit.parse('auto'), { theta: 'auto', phi: 'auto', radius: 'auto' });
+  // As in <model-viewer>, what is left out at the end is automatic.
+  assert.deepEqual(orbit.parse('45deg'), { theta: 45 * DEGREE, phi: 'auto', radius: 'auto' });
+  assert.deepEqual(orbit.parse('45deg 1rad'), { theta: 45 * DEGREE, phi: 1, radius: 'auto' });
   assert.deepEqual(orbit.parse('1E1DEG .5rad 20MM'), { theta: 10 * DEGREE, phi: 0.5, radius: { metres: 0.02 } });
 });
 
 test('malformed orbits', () => {
   const malformed = [
-    '1deg',
-    '1deg 2deg',
+    '1m',
+    '1deg 2m',
     '1deg 2deg 3m 4m',
     '1 2 3',
     '1deg 2deg 3deg',
@@ -83,7 +86,8 @@ test('targets, fields of view, axes and numbers', () => {
   assert.deepEqual(targetGrammar.parse('1 -2 3cm'), [1, -2, 0.03]);
   assert.deepEqual(targetGrammar.parse('auto 0 auto'), ['auto', 0, 'auto']);
   assert.deepEqual(targetGrammar.parse('auto'), ['auto', 'auto', 'auto']);
-  for (const text of ['1 2', '1deg 2 3', '1 2 3 4', 'x']) assert.equal(targetGrammar.parse(text), null, text);
+  assert.deepEqual(targetGrammar.parse('1 2'), [1, 2, 'auto']);
+  for (const text of ['1deg 2 3', '1 2 3 4', 'x']) assert.equal(targetGrammar.parse(text), null, text);
   assert.equal(fieldOfViewGrammar.parse('45deg'), 45 * DEGREE);
   assert.equal(fieldOfViewGrammar.parse('auto'), 'auto');
   for (const text of ['0deg', '180deg', '-5deg', '45', '45m', ''])
@@ -180,6 +184,15 @@ test('properties may hold numbers where attributes hold text', () => {
   assert.equal(read.interpolationDecay, 120);
   assert.equal(read.maxPixelRatio, 1.5);
   assert.equal(read.maxShDegree, 1);
+});
+
+test('times are at most what timers can wait: longer ones would be over at once', () => {
+  const read = readAttributes(
+    { ...ABSENT, autoRotateDelay: Infinity, interactionPromptThreshold: '3e9', interpolationDecay: 7 },
+    assert.fail,
+  );
+  const { autoRotateDelay, interactionPromptThreshold, interpolationDecay } = read;
+  assert.deepEqual([autoRotateDelay, interactionPromptThreshold, interpolationDecay], [2 ** 31 - 1, 2 ** 31 - 1, 7]);
 });
 
 test('crossorigin as of <img>', () => {

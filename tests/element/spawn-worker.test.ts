@@ -11,7 +11,7 @@ test(
   async () => {
     const asked: string[] = [];
     const stand = {
-      location: { origin: 'https://page.example' },
+      origin: 'https://page.example',
       Worker: class {
         constructor(url: URL | string) {
           asked.push(String(url));

@@ -104,15 +104,33 @@ describe('what documents tell people to write', { skip }, () => {
     assert.deepEqual(found, []);
   });
 
-  it('Vue compiles what the first page says', () => {
-    const [{ code }] = snippets('vue');
-    const { descriptor, errors } = parse(code);
-    assert.deepEqual(errors, []);
-    const { errors: inTemplate } = compileTemplate({
-      ...{ source: descriptor.template!.content, filename: 'App.vue', id: 'app' },
-      compilerOptions: { isCustomElement: (tag) => tag === 'gaussian-splat' },
+  it('Vue compiles its components, and its checker finds the types that they need', () => {
+    const folder = join(root, '.cache/snippets-vue');
+    rmSync(folder, { recursive: true, force: true });
+    mkdirSync(folder, { recursive: true });
+    const all = snippets('vue');
+    assert.ok(all.length >= 2, `${all.length} snippets`);
+    for (const [i, { code, place }] of all.entries()) {
+      const { descriptor, errors } = parse(code);
+      assert.deepEqual(errors, [], place);
+      const { errors: inTemplate } = compileTemplate({
+        ...{ source: descriptor.template!.content, filename: 'App.vue', id: 'app' },
+        compilerOptions: {
+          isCustomElement: (tag) => tag === 'gaussian-splat',
+          expressionPlugins: ['typescript'],
+        },
+      });
+      assert.deepEqual(inTemplate, [], place);
+      // Whoever writes no TypeScript has no types to be wrong.
+      if (descriptor.scriptSetup?.lang === 'ts') writeFileSync(join(folder, `${i}.vue`), code);
+    }
+    const config = { extends: '../../demo/vue/tsconfig.json', include: ['*.vue', '../../demo/vue/env.d.ts'] };
+    writeFileSync(join(folder, 'tsconfig.json'), JSON.stringify(config));
+    const checker = join(root, 'node_modules/vue-tsc/bin/vue-tsc.js');
+    const { status, stdout } = spawnSync(process.execPath, [checker, '--noEmit', '--project', folder], {
+      encoding: 'utf8',
     });
-    assert.deepEqual(inTemplate, []);
+    assert.equal(status, 0, stdout);
   });
 
   it('commands are scripts of this repository, and the tarballs to install are all that the element asks for', () => {

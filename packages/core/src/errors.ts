@@ -127,7 +127,10 @@ export class GaussianSplatError extends Error implements ErrorDetails {
 
   constructor(code: ErrorCode, details: ErrorDetails) {
     const { expected, found, where, remedy, cause } = details;
-    super(`${where}: expected ${expected}, found ${found}. ${capitalise(remedy)}. [${code}]`, { cause });
+    // Messages of browsers, which may be what was found, bring their own full stop.
+    super(`${where}: expected ${expected}, found ${found.replace(/\.$/, '')}. ${capitalise(remedy)}. [${code}]`, {
+      cause,
+    });
     this.code = code;
     this.expected = expected;
     this.found = found;

@@ -12,6 +12,7 @@ import {
 } from './camera/grammar.js';
 import { QUALITIES, type Quality } from '@gaussian-splat/renderer';
 import type { ShDegree } from '@gaussian-splat/core';
+import { timerMs } from './timer-ms.js';
 import type { CameraSettings } from './camera/settings.js';
 
 /** When loading starts: once the element is in sight, or as soon as it is in the page. */
@@ -124,8 +125,16 @@ const reveal = keywordGrammar<Reveal>(['auto', 'manual']);
 const navigation = keywordGrammar<Navigation>(['orbit', 'fly']);
 const interactionPrompt = keywordGrammar<InteractionPrompt>(['auto', 'none']);
 const interactionPromptStyle = keywordGrammar<InteractionPromptStyle>(['basic', 'wiggle']);
-const milliseconds = (fallback: number): AttributeGrammar<number> =>
-  numberGrammar(fallback, 0, 'milliseconds, 0 or more');
+const milliseconds = (fallback: number): AttributeGrammar<number> => {
+  const grammar = numberGrammar(fallback, 0, 'milliseconds, 0 or more');
+  return {
+    ...grammar,
+    parse: (text) => {
+      const value = grammar.parse(text);
+      return value === null ? null : timerMs(value);
+    },
+  };
+};
 const interpolationDecay = milliseconds(50);
 const threeSeconds = milliseconds(3_000);
 const rotationPerSecond = angleGrammar('5.625deg');

@@ -9,7 +9,7 @@ import { AutoRotateController } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import { FlyController } from './controllers/fly-controller.js';
 import { MotionController, type MotionOptions } from './controllers/motion-controller.js';
-import { prefersReducedMotion, type Mover } from './controllers/mover.js';
+import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/mover.js';
 import { PromptController } from './controllers/prompt-controller.js';
 
 /** What the behaviours ask of their element. */
@@ -79,11 +79,20 @@ export class Behaviours {
       isFocused: () => !this.#flies && (surface()?.matches(':focus') ?? false),
     });
     this.#movers = [this.#autoRotate, this.prompt, fly];
+    let motion: MediaQueryList | undefined;
+    const onMotion = (): void => host.requestUpdate();
     host.addController({
       hostUpdated: () => (camera.pivot = this.#flies ? 'eye' : 'target'),
-      // From the picture to the button inside counts, too.
-      hostConnected: () => host.shadowRoot?.addEventListener('focusout', this.#onBlur),
-      hostDisconnected: () => host.shadowRoot?.removeEventListener('focusout', this.#onBlur),
+      hostConnected: () => {
+        // From the picture to the button inside counts, too.
+        host.shadowRoot?.addEventListener('focusout', this.#onBlur);
+        motion = reducedMotion();
+        motion.addEventListener('change', onMotion);
+      },
+      hostDisconnected: () => {
+        host.shadowRoot?.removeEventListener('focusout', this.#onBlur);
+        motion?.removeEventListener('change', onMotion);
+      },
     });
   }
 

@@ -72,8 +72,18 @@ function fileUrl(file: Blob): string {
 }
 
 /** The worker has a base URL of its own, so it is given whole ones. What is no URL stays as it is, and fails there. */
+const absolute = (url: string): string =>
+  URL.canParse(url, document.baseURI) ? new URL(url, document.baseURI).href : url;
+
 function addressOf(source: string | Blob, modifier: UrlModifier): string {
   if (isFile(source)) return fileUrl(source);
-  const url = URL.canParse(source, document.baseURI) ? new URL(source, document.baseURI).href : source;
-  return modifier?.(url) ?? url;
+  const url = absolute(source);
+  try {
+    // Whatever it gives: an element that asks for a promise says so.
+    return absolute(String(modifier?.(url) ?? url));
+  } catch (error) {
+    // The page's own fault must not end the element's life, as that of a listener does not.
+    reportError(error);
+    return url;
+  }
 }

@@ -1,6 +1,9 @@
 import { css } from 'lit';
 
-/** Size and containment as an image has them; everything that a page may want to change is a custom property or a part. */
+/**
+ * Size and containment as an image has them; everything that a page may want to change is a custom property or a part. `hidden` counts whatever
+ * `display` a page gives the tag for the time before the script.
+ */
 export const styles = css`
   :host {
     display: block;
@@ -9,8 +12,8 @@ export const styles = css`
     height: 150px;
     contain: strict;
   }
-  :host([hidden]) {
-    display: none;
+  :host([hidden]:not([hidden='until-found'])) {
+    display: none !important;
   }
   .view,
   .layer {

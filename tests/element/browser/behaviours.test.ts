@@ -198,6 +198,21 @@ describe('auto-rotate', () => {
   });
 });
 
+describe('the wish for less motion', () => {
+  it('counts when it comes and when it goes', async () => {
+    const element = await showLoaded({ 'auto-rotate': '', 'auto-rotate-delay': '100', 'rotation-per-second': '60deg' });
+    const button = (): HTMLElement | null => partOf(element, '[part=pause-button]');
+    await until(() => theta(element) < -2, 'the camera to turn');
+    await emulateMedia({ reducedMotion: 'reduce' });
+    await until(() => button() === null, 'the button to go', 2_000);
+    const still = theta(element);
+    await delay(300);
+    assertEqual(theta(element), still, 'while it lasts');
+    await emulateMedia({ reducedMotion: 'no-preference' });
+    await until(() => theta(element) < still - 2 && button() !== null, 'the camera to turn again', 3_000);
+  });
+});
+
 describe('what moves by itself', () => {
   const rotating = { 'auto-rotate': '', 'auto-rotate-delay': '60', 'rotation-per-second': '60deg' };
   const MOVIE = '/net/sequence/movie.json?count=600&fps=2';

@@ -74,6 +74,32 @@ describe('one device', () => {
   });
 });
 
+describe('a function that gives devices', () => {
+  const shown = async (request: () => GPUDevice): Promise<GaussianSplatElement> => {
+    const original = GaussianSplatElement.sharedDevice;
+    GaussianSplatElement.sharedDevice = new SharedDevice(request, { keepDevice: true });
+    try {
+      const element = show({ src: COMPASS });
+      await element.ready;
+      return element;
+    } finally {
+      GaussianSplatElement.sharedDevice = original;
+    }
+  };
+
+  it('may have one at hand, and what it throws is no fault of the file', async () => {
+    const own = await (await navigator.gpu.requestAdapter())!.requestDevice();
+    const element = await shown(() => own);
+    assertEqual([element.loaded, element.error], [true, null], 'loaded');
+    element.remove();
+    devices.splice(devices.indexOf(own), 1);
+    const { error } = await shown(() => {
+      throw new Error('none is left');
+    });
+    assertEqual([error?.reason, error?.message.includes('none is left')], ['unsupported/no-adapter', true], 'error');
+  });
+});
+
 describe('memory that is not to be had', () => {
   it('for a larger picture than the first is told of, and the page lives on', async () => {
     const element = await showLoaded({ src: COMPASS }, 'width: 60px; height: 50px');
@@ -187,6 +213,10 @@ describe('the loss of the device', () => {
       devices[devices.length - 1].destroy();
       await nextEvent(element, 'error');
       assertEqual([element.error?.code, element.error?.reason], ['device-lost', 'device-lost/unrecoverable'], 'codes');
+      const { message } = element.error!;
+      const said =
+        /lost \(reason "destroyed": Device was destroyed\), and no other in its place \(.*: the GPU process does not answer\)\. /;
+      assert(said.test(message), message);
       assertEqual(requests, 3, 'requests for a device');
       assertEqual(element.loaded, false, 'loaded');
     } finally {
@@ -208,6 +238,10 @@ describe('the loss of the device', () => {
       const element = show({ src: COMPASS });
       await nextEvent(element, 'error');
       assertEqual([element.error?.reason, requests], ['device-lost/unrecoverable', 2], 'reason and requests');
+      assert(
+        /lost \(reason "destroyed": .*\)\. A script of this page/.test(element.error!.message),
+        element.error!.message,
+      );
     } finally {
       GaussianSplatElement.sharedDevice = original;
     }

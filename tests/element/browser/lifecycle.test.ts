@@ -136,6 +136,20 @@ describe('size', () => {
     await until(() => canvasOf(element).width === 120, 'the old size');
   });
 
+  it('is none with the attribute hidden, also on a page that says display: block as guides do', async () => {
+    const style = document.createElement('style');
+    style.textContent = 'gaussian-splat { display: block }';
+    document.body.append(style);
+    const element = await showLoaded();
+    const displays = ['', 'until-found'].map((hidden) => {
+      element.setAttribute('hidden', hidden);
+      const { display, contentVisibility } = getComputedStyle(element);
+      return [display, contentVisibility];
+    });
+    // What the browser may find and show is not gone.
+    assertEqual([displays[0][0], displays[1]], ['none', ['block', 'hidden']], 'display, and content-visibility');
+  });
+
   it('is 300 x 150 without a style, as other embedded content', async () => {
     const element = show({}, '');
     assertEqual([element.clientWidth, element.clientHeight], [300, 150]);
@@ -181,6 +195,20 @@ describe('moves and removals', () => {
       document.body.append(element);
       await nextEvent(element, 'load');
       assert(isGreen((await screenOf(element)).at(60, 50)), 'seen again');
+    } finally {
+      GaussianSplatElement.releaseDelay = delayBefore;
+    }
+  });
+
+  it('a removed element keeps its scene for as long as releaseDelay says, for ever if that is Infinity', async () => {
+    const delayBefore = GaussianSplatElement.releaseDelay;
+    GaussianSplatElement.releaseDelay = Infinity;
+    try {
+      const element = await showLoaded();
+      element.remove();
+      await delay(300);
+      assertEqual(element.loaded, true, 'loaded');
+      document.body.append(element);
     } finally {
       GaussianSplatElement.releaseDelay = delayBefore;
     }

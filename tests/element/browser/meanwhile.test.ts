@@ -63,6 +63,47 @@ describe('the address of the page', () => {
   });
 });
 
+describe('a urlModifier', () => {
+  const shown = async (modifier: (url: string) => string): Promise<GaussianSplatElement> => {
+    GaussianSplatElement.urlModifier = modifier;
+    try {
+      const element = show({ src: COMPASS });
+      await element.ready;
+      return element;
+    } finally {
+      GaussianSplatElement.urlModifier = null;
+    }
+  };
+
+  it('that throws is reported as any listener, and the address counts as it is', async () => {
+    const { reportError } = window;
+    const told: string[] = [];
+    window.reportError = (error) => told.push(String(error));
+    try {
+      const element = await shown(() => {
+        throw new Error('no token yet');
+      });
+      // Elements of tests before may still be about to go.
+      assertEqual([element.loaded, element.error], [true, null], 'loaded');
+      assert(told.length > 0 && told.every((sentence) => sentence === 'Error: no token yet'), told.join());
+    } finally {
+      window.reportError = reportError;
+    }
+  });
+
+  it('that gives no address, a promise for one, is told of by the element, and the next scene comes', async () => {
+    const element = await shown((async (url: string) => url) as unknown as (url: string) => string);
+    assert(element.error?.message.includes('[object%20Promise]'), element.error?.message ?? 'no error');
+    element.src = `${COMPASS}?next`;
+    await element.ready;
+    assertEqual([element.loaded, element.error], [true, null], 'loaded');
+  });
+
+  it('may give a relative address', async () => {
+    assert((await shown(() => COMPASS)).loaded, 'loaded');
+  });
+});
+
 describe('another src', () => {
   it('that waits to be seen: the error of the last one is gone', async () => {
     const element = show({ src: `${FIXTURES}missing.ply` });

@@ -199,6 +199,19 @@ describe('hotspots', () => {
     await until(() => Math.abs(opacity(front) - 0.6) < 0.01, 'the custom property');
   });
 
+  it('that come, or go elsewhere, while nothing moves are looked at, too', async () => {
+    const element = await compass();
+    const sees = (name: string, expected: boolean, what: string): Promise<void> =>
+      until(() => element.queryHotspot(`hotspot-${name}`)?.visible === expected, what, 3_000);
+    await delay(800);
+    const moved = label(element, 'moved', '0m 0m -1m');
+    await sees('moved', false, 'a label that came behind the white ball to be hidden');
+    moved.dataset.position = '0m 0m 1m';
+    await sees('moved', true, 'the label before it to be seen');
+    moved.dataset.position = '0m 0m -1m';
+    await sees('moved', false, 'the label behind it again to be hidden');
+  });
+
   it('with a normal that points away count as hidden, and those behind the camera are gone', async () => {
     const element = await compass();
     label(element, 'away', '0m 0m 1m', { normal: '0m 0m -1m' });

@@ -1,6 +1,6 @@
 /**
  * Grammar of the camera attributes: tuples of numbers with CSS-like units, as `<model-viewer>` has them, without
- * `calc()` and `env()`. An attribute that is absent takes its default; a malformed one takes it too, with a warning.
+ * `calc()` and `env()`; what is left out at the end is `auto`, as there. An attribute that is absent takes its default; a malformed one takes it too, with a warning.
  */
 
 /** A length in metres (one world unit is one metre) or a multiple of the radius that frames the scene. */
@@ -75,18 +75,14 @@ function parseRadius(term: string): RadiusSetting | null {
 const terms = (text: string): string[] => text.trim().toLowerCase().split(/\s+/);
 
 function parseOrbit(text: string): OrbitSetting | null {
-  const parts = terms(text);
-  if (parts.length === 1 && parts[0] === 'auto') return { theta: 'auto', phi: 'auto', radius: 'auto' };
-  if (parts.length !== 3) return null;
-  const [theta, phi, radius] = [parseAngle(parts[0]), parseAngle(parts[1]), parseRadius(parts[2])];
-  return theta === null || phi === null || radius === null ? null : { theta, phi, radius };
+  const [first, second = 'auto', third = 'auto', ...rest] = terms(text);
+  const [theta, phi, radius] = [parseAngle(first), parseAngle(second), parseRadius(third)];
+  return theta === null || phi === null || radius === null || rest.length > 0 ? null : { theta, phi, radius };
 }
 
 function parseTarget(text: string): TargetSetting | null {
-  const parts = terms(text);
-  if (parts.length === 1 && parts[0] === 'auto') return ['auto', 'auto', 'auto'];
-  const [x, y, z] = parts.map(parseLength);
-  return parts.length !== 3 || x === null || y === null || z === null ? null : [x, y, z];
+  const [x, y = 'auto', z = 'auto', ...rest] = terms(text).map(parseLength);
+  return x === null || y === null || z === null || rest.length > 0 ? null : [x, y, z];
 }
 
 function parseFieldOfView(text: string): AngleSetting | null {
@@ -107,7 +103,8 @@ export function parsePoint(text: string): readonly [x: number, y: number, z: num
   return isPoint ? [x, y, z] : null;
 }
 
-const ORBIT_FORM = '"theta phi radius" with deg or rad, deg or rad, m, cm, mm or %, each or all "auto"';
+const ORBIT_FORM =
+  '"theta phi radius" with deg or rad, deg or rad, m, cm, mm or %; "auto" for each, or left out from the end';
 const FIELD_OF_VIEW_FORM = 'an angle above 0deg and below 180deg with deg or rad, or "auto"';
 
 /** `camera-orbit`, `min-camera-orbit` and `max-camera-orbit`. */
@@ -133,7 +130,7 @@ export const angleGrammar = (fallback: string): AttributeGrammar<number> => ({
 
 /** `camera-target`. */
 export const targetGrammar: AttributeGrammar<TargetSetting> = {
-  expected: '"x y z" in metres (or with m, cm or mm), each or all "auto"',
+  expected: '"x y z" in metres (or with m, cm or mm); "auto" for each, or left out from the end',
   fallback: 'auto',
   parse: parseTarget,
 };

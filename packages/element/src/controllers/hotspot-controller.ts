@@ -127,8 +127,10 @@ export class HotspotController implements ReactiveController {
     this.#hotspots = new Map(
       [...groupBySlot(children)].map(([name, elements]) => [name, this.#read(elements, before.get(name))]),
     );
-    if (before.size > 0 || this.#hotspots.size > 0) this.#host.requestUpdate();
-    void this.#look();
+    if (before.size + this.#hotspots.size === 0) return;
+    this.#host.requestUpdate();
+    // Where they are now is known once their boxes are.
+    void this.#host.updateComplete.then(() => this.#look());
   }
 
   #read(elements: readonly HTMLElement[], before: Hotspot | undefined): Hotspot {

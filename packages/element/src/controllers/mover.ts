@@ -12,4 +12,7 @@ export interface Mover {
 export const MAX_MOVER_STEP_MS = 100;
 
 /** True for people who have asked their system for less motion. */
-export const prefersReducedMotion = (): boolean => matchMedia('(prefers-reduced-motion: reduce)').matches;
+export const prefersReducedMotion = (): boolean => reducedMotion().matches;
+
+/** The system's wish for less motion, for those who want to know when it comes or goes. */
+export const reducedMotion = (): MediaQueryList => matchMedia('(prefers-reduced-motion: reduce)');

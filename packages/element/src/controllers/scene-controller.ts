@@ -8,6 +8,7 @@ import type { SharedDevice } from '../gpu/shared-device.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { isSameContract } from '../loading/same-contract.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
+import { timerMs } from '../timer-ms.js';
 
 /** `waiting`: there is a scene to load, but the element is not in sight yet. */
 export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';
@@ -160,7 +161,7 @@ export class SceneController implements ReactiveController {
 
   hostDisconnected(): void {
     this.#spare(true);
-    this.#releaseTimer = setTimeout(() => this.want(null, false), this.#options.releaseDelayMs());
+    this.#releaseTimer = setTimeout(() => this.want(null, false), timerMs(this.#options.releaseDelayMs()));
   }
 
   async #load(request: SceneRequest): Promise<void> {
@@ -199,7 +200,7 @@ export class SceneController implements ReactiveController {
   }
 
   /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
-  async #restore(request: SceneRequest): Promise<void> {
+  async #restore(request: SceneRequest, loss: GPUDeviceLostInfo): Promise<void> {
     this.#abort();
     this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
     const { signal } = this.#running;
@@ -207,7 +208,7 @@ export class SceneController implements ReactiveController {
     if (!this.#isContextLost) this.#options.onContext('contextlost');
     this.#isContextLost = true;
     await pageVisible(signal);
-    if (!signal.aborted) await this.#attempt(request, signal, false, () => undefined);
+    if (!signal.aborted) await this.#attempt(request, signal, false, () => undefined, loss);
     if (signal.aborted || this.#scene === null) return;
     this.#tellRestored();
     void this.#refine();
@@ -225,6 +226,7 @@ export class SceneController implements ReactiveController {
     signal: AbortSignal,
     isNew: boolean,
     onProgress: ProgressListener,
+    loss?: GPUDeviceLostInfo,
   ): Promise<void> {
     for (let failures = 0; ;) {
       try {
@@ -232,9 +234,10 @@ export class SceneController implements ReactiveController {
       } catch (error) {
         if (signal.aborted) return;
         if (!isDeviceFailure(error, isNew)) return this.fail(error);
+        if (error instanceof DeviceLostError) loss = error.info;
         this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
-        if (++failures >= MAX_FAILURES) return this.fail(unrecoverable(error));
+        if (++failures >= MAX_FAILURES) return this.fail(unrecoverable(error, loss));
         await delay(RETRY_DELAY_MS);
         if (signal.aborted) return;
       }
@@ -268,13 +271,13 @@ export class SceneController implements ReactiveController {
     this.#replace(scene, false);
     await Promise.race([show(scene, entrance), scene.lost]);
     if (signal.aborted) return;
-    if (scene.isLost) throw new DeviceLostError((await scene.lost).message);
+    if (scene.isLost) throw new DeviceLostError(await scene.lost);
     this.#host.requestUpdate();
-    void scene.lost.then(() => {
+    void scene.lost.then((loss) => {
       if (this.#scene !== scene) return;
       // What will take its place has its own way back.
       if (this.isOutgoing) this.#drop(false);
-      else void this.#restore(this.#request ?? request);
+      else void this.#restore(this.#request ?? request, loss);
     });
   }
 

@@ -3,7 +3,15 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import type { GpuScene } from './gpu-scene.js';
 
 /** The device went away before the scene was seen. */
-export class DeviceLostError extends Error {}
+export class DeviceLostError extends Error {
+  /** What the browser says of it. */
+  readonly info: GPUDeviceLostInfo;
+
+  constructor(info: GPUDeviceLostInfo) {
+    super(info.message);
+    this.info = info;
+  }
+}
 
 /** A device that does not come at all is final at first, but after a loss it may only need a moment. */
 export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
@@ -13,12 +21,22 @@ export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
   return error.family === 'device-lost' || (!isNew && error.family === 'unsupported');
 }
 
-export function unrecoverable(cause: unknown): GaussianSplatError {
+/** @param loss what the browser said of the device that was lost, where it has. */
+export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): GaussianSplatError {
+  const said = loss && ` (reason "${loss.reason}": ${loss.message.replace(/\.$/, '') || 'nothing more is known'})`;
+  const lost = `a device that was lost${said ?? ''}`;
+  const why = cause instanceof GaussianSplatError ? `${cause.where}: ${cause.found}` : String(cause);
+  const isLoss = isDeviceFailure(cause, true);
+  // Chromium refuses a page that has lost two devices within a short time any other, until it is loaded again.
+  const reload = isLoss ? 'reload the page' : 'reload the page, to which the browser may refuse the GPU until then';
   return new GaussianSplatError('device-lost/unrecoverable', {
     where: 'GPU device',
     expected: 'a device that stays long enough to draw the scene',
-    found: cause instanceof Error ? cause.message || 'a device that was lost' : String(cause),
-    remedy: 'reload the page; if it happens again, use a smaller scene or update the graphics driver',
+    found: isLoss ? lost : `${lost}, and no other in its place (${why})`,
+    remedy:
+      loss?.reason === 'destroyed'
+        ? "a script of this page called the device's destroy(): leave that, or let SharedDevice's function request a new device each time"
+        : `${reload}; if it happens again, use a smaller scene or update the graphics driver`,
     cause,
   });
 }

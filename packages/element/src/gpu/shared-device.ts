@@ -70,7 +70,7 @@ class DeviceSession {
  * let go, requested anew after a loss.
  */
 export class SharedDevice {
-  readonly #request: () => Promise<GPUDevice>;
+  readonly #request: () => GPUDevice | Promise<GPUDevice>;
   readonly #keepDevice: boolean;
   #session: Promise<DeviceSession> | null = null;
 
@@ -78,7 +78,10 @@ export class SharedDevice {
    * @param request where devices come from; asked again after a loss.
    * @param options.keepDevice leaves the device alone when the last user has let go: for a page that has its own.
    */
-  constructor(request: () => Promise<GPUDevice> = requestGpuDevice, options: { readonly keepDevice?: boolean } = {}) {
+  constructor(
+    request: () => GPUDevice | Promise<GPUDevice> = requestGpuDevice,
+    options: { readonly keepDevice?: boolean } = {},
+  ) {
     this.#request = request;
     this.#keepDevice = options.keepDevice ?? false;
   }
@@ -101,10 +104,14 @@ export class SharedDevice {
   }
 
   #open(): Promise<DeviceSession> {
-    const opening = this.#request().then((device) => new DeviceSession(device, this.#keepDevice));
+    const opening = this.#start();
     const forget = (): void => this.#forget(opening);
     opening.then((session) => session.device.lost.then(forget), forget);
     return opening;
+  }
+
+  async #start(): Promise<DeviceSession> {
+    return new DeviceSession(await this.#request(), this.#keepDevice);
   }
 
   #forget(opening: Promise<DeviceSession>): void {

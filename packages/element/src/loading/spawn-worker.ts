@@ -1,17 +1,17 @@
 /**
  * Starts the scene worker. A worker script must have the page's origin; where the element itself came from elsewhere
- * (a CDN) a one-line module of the page's origin imports it.
+ * (a CDN), or the page has no origin as in a sandboxed frame, a one-line script of the page's own imports it.
  * @param location address of `scene-worker.js`, where a bundler has put it out of reach; null for the one beside this code
  */
 export function spawnSceneWorker(location: string | null = null): Worker {
   if (location !== null) {
     const named = new URL(location, document.baseURI);
-    if (named.origin !== globalThis.location.origin) return spawnFromElsewhere(named);
+    if (named.origin !== globalThis.origin) return spawnFromElsewhere(named);
     return new Worker(trustedUrl(named.href) ?? named, { type: 'module' });
   }
   const here = new URL(import.meta.url);
   const script = new URL('./scene-worker.js', here);
-  if (isOwnModule(here) && script.origin !== globalThis.location.origin) return spawnFromElsewhere(script);
+  if (isOwnModule(here) && script.origin !== globalThis.origin) return spawnFromElsewhere(script);
   const trusted = isOwnModule(here) ? trustedUrl(script.href) : null;
   if (trusted !== null) return new Worker(trusted, { type: 'module' });
   // Written out in full, and nowhere else, since bundlers look for exactly this expression.
@@ -19,8 +19,10 @@ export function spawnSceneWorker(location: string | null = null): Worker {
 }
 
 function spawnFromElsewhere(script: URL): Worker {
-  const url = URL.createObjectURL(new Blob([`import ${JSON.stringify(script.href)};`], { type: 'text/javascript' }));
-  const worker = new Worker(trustedUrl(url) ?? url, { type: 'module' });
+  // No module itself: sandboxed frames start none of a blob. What fails is thrown where the worker's owner hears of it.
+  const code = `import(${JSON.stringify(script.href)}).catch((e)=>setTimeout(()=>{throw e}))`;
+  const url = URL.createObjectURL(new Blob([code], { type: 'text/javascript' }));
+  const worker = new Worker(trustedUrl(url) ?? url);
   // The URL is only needed until the script has been fetched, which its first message or its failure tells.
   const revoke = (): void => URL.revokeObjectURL(url);
   worker.addEventListener('message', revoke, { once: true });

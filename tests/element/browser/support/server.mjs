@@ -307,6 +307,7 @@ function answerRaw(context, name, make) {
 }
 
 const TYPES = {
+  '.html': 'text/html',
   '.js': 'text/javascript',
   '.mjs': 'text/javascript',
   '.wasm': 'application/wasm',

@@ -1,0 +1,27 @@
+/** What servers write of the element, and that they need nothing of a browser for it: the documents of React and Vue promise it. */
+import assert from 'node:assert/strict';
+import { existsSync } from 'node:fs';
+import { test } from 'node:test';
+import { createElement } from 'react';
+import { renderToString as renderReact } from 'react-dom/server';
+import { createSSRApp, h } from 'vue';
+import { renderToString as renderVue } from 'vue/server-renderer';
+
+const skip = existsSync(new URL('../../packages/react/dist', import.meta.url)) ? false : 'not built: npm run build';
+
+test('React: the component with its children, style and aria-label; the rest is for hydration', { skip }, async () => {
+  const { GaussianSplat } = await import('@gaussian-splat/react');
+  const poster = createElement('p', { slot: 'poster' }, 'A garden');
+  const properties = { src: '/garden.ply', cameraControls: true, pose: [1], onLoad: () => undefined };
+  const html = renderReact(
+    createElement(GaussianSplat, { ...properties, 'aria-label': 'A garden', style: { width: 3 } }, poster),
+  );
+  assert.equal(html, '<gaussian-splat aria-label="A garden" style="width:3px"><p slot="poster">A garden</p></gaussian-splat>'); // prettier-ignore
+});
+
+test('Vue: the tag with its attributes', { skip }, async () => {
+  await import('@gaussian-splat/element');
+  const onLoad = (): void => undefined;
+  const app = createSSRApp(() => h('gaussian-splat', { src: '/garden.ply', 'camera-controls': '', pose: [1], onLoad }));
+  assert.equal(await renderVue(app), '<gaussian-splat src="/garden.ply" camera-controls></gaussian-splat>');
+});
