@@ -7,7 +7,7 @@ import { root } from '../../scripts/lib/run.mjs';
 const SECTIONS = [
   ['Guide', [/^docs\/guide\/start/, /^docs\/guide\//, /^packages\/(element|react)\/README/]],
   ['Generators', [/^docs\/contract/, /^packages\/(generator|check|exporter)\//, /^demo\/generators\/README/]],
-  ['How true, how fast', [/^docs\/benchmark/, /^docs\/stability/, /^packages\/economise\//]],
+  ['How true, how fast', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/economise\//]],
   ['For contributors', [/^CONTRIBUTING/, /^docs\/architecture/, /^packages\//, /^scripts\//, /^README/]],
   ['Decisions', [/^docs\/decisions\//]],
   ['About', [/^CHANGELOG/, /^SECURITY/, /^LICENSE/, /ATTRIBUTION/, /^docs\//]],
