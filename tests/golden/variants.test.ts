@@ -7,6 +7,7 @@ import {
   GaussianBuffers,
   packGaussians,
   Renderer,
+  startVariants,
   type Variants,
 } from '@gaussian-splat/renderer';
 import { givesKnownAnswer, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
@@ -56,10 +57,7 @@ test('the spheres that variants are judged by are packed as files are', () => {
 test('the choice is made once, kept for the adapter, and made anew from a damaged store', async () => {
   const adapter = await requestNodeAdapter();
   const entries = new Map<string, string>();
-  const store = {
-    getItem: (key: string) => entries.get(key) ?? null,
-    setItem: (key: string, value: string) => void entries.set(key, value),
-  };
+  const store = storeOf(entries);
   const first = await adapter.requestDevice();
   const chosen = await chooseVariants(first, { store });
   await assertSuits(first, chosen);
@@ -88,10 +86,7 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
 
 test('a device that is lost while variants are tried leaves the choice for its adapter as it was', async () => {
   const entries = new Map<string, string>();
-  const store = {
-    getItem: (key: string) => entries.get(key) ?? null,
-    setItem: (key: string, value: string) => void entries.set(key, value),
-  };
+  const store = storeOf(entries);
   const chosen = await chooseVariants(await newDevice(), { store });
   const [[key, kept]] = entries;
   for (const [moment, isKnown, milliseconds] of [
@@ -101,9 +96,8 @@ test('a device that is lost while variants are tried leaves the choice for its a
   ] as const) {
     entries.clear();
     if (isKnown) entries.set(key, kept);
-    const device = await newDevice();
     // All ways to sort are tried where the adapter does not call itself a fallback.
-    Object.defineProperty(device, 'adapterInfo', { value: { ...chosenBy(device), isFallbackAdapter: false } });
+    const device = await deviceLikeAny();
     const choosing = chooseVariants(device, { store });
     if (milliseconds > 0) await new Promise((resolve) => setTimeout(resolve, milliseconds));
     device.destroy();
@@ -113,6 +107,71 @@ test('a device that is lost while variants are tried leaves the choice for its a
   // Trials that are made anew may end otherwise on a GPU that has other things to do; what was kept counts.
   entries.set(key, kept);
   assert.deepEqual(await chooseVariants(await newDevice(), { store }), chosen);
+});
+
+/** A device whose adapter does not say that it is a processor. */
+async function deviceLikeAny(): Promise<GPUDevice> {
+  const device = await newDevice();
+  Object.defineProperty(device, 'adapterInfo', { value: { ...chosenBy(device), isFallbackAdapter: false } });
+  return device;
+}
+
+function storeOf(entries: Map<string, string>) {
+  return {
+    getItem: (key: string) => entries.get(key) ?? null,
+    setItem: (key: string, value: string) => void entries.set(key, value),
+  };
+}
+
+test('a first picture is drawn with what is likely, if it is right and quick; what is best is looked for in pauses', async () => {
+  const entries = new Map<string, string>();
+  const store = storeOf(entries);
+  const device = await deviceLikeAny();
+  let pipelines = 0;
+  const make = device.createComputePipeline.bind(device);
+  device.createComputePipeline = (descriptor) => (pipelines++, make(descriptor));
+  const begun = await startVariants(device, { store, quickMs: Infinity });
+  assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel', sort: 'shared8' });
+  assert.equal(new Renderer(device).levers.rasterizer, 'tiles');
+  assert.equal(entries.size, 0, 'nothing that was not measured is kept');
+  const atFirst = pipelines;
+  const pauses: (() => void)[] = [];
+  const choosing = chooseVariants(device, { store, pause: () => new Promise((resolve) => pauses.push(resolve)) });
+  await new Promise((resolve) => setTimeout(resolve, 200));
+  assert.equal(pauses.length, 1);
+  assert.equal(pipelines, atFirst, 'nothing goes on before the pause');
+  const letGo = setInterval(() => pauses.pop()?.(), 1);
+  const chosen = await choosing;
+  clearInterval(letGo);
+  await assertSuits(device, chosen);
+  assert.deepEqual(JSON.parse([...entries.values()][0]), chosen);
+  assert.equal(new Renderer(device).levers.rasterizer, chosen.rasterizer);
+  assert.ok(pipelines > atFirst);
+  device.destroy();
+
+  const later = await deviceLikeAny();
+  const pause = () => assert.fail('nothing is looked for');
+  assert.deepEqual(await startVariants(later, { store, quickMs: 0, pause }), chosen, 'what an earlier visit found');
+  assert.deepEqual(await chooseVariants(later, { store, pause }), chosen);
+  later.destroy();
+});
+
+test('what is likely is not drawn with where it is slow, or the adapter says that it is a processor', async () => {
+  const device = await deviceLikeAny();
+  const isLookedFor = new Promise<void>((resolve) => {
+    const pause = () => new Promise<void>(() => resolve());
+    void startVariants(device, { store: null, quickMs: 0, pause });
+  });
+  await isLookedFor;
+  assert.equal(new Renderer(device).levers.rasterizer, 'quads', 'what works everywhere, until that is found');
+  device.destroy();
+  const processor = await newDevice();
+  if (!isSwiftShader(processor)) return;
+  const entries = new Map<string, string>();
+  const begun = await startVariants(processor, { store: storeOf(entries), quickMs: Infinity });
+  await assertSuits(processor, begun);
+  assert.deepEqual(JSON.parse([...entries.values()][0]), begun);
+  processor.destroy();
 });
 
 /** What a choice is kept under. */

@@ -1,5 +1,6 @@
 export { capture } from './capture.js';
-export { chooseVariants, type ChoiceOptions, type ChoiceStore } from './choice/choose.js';
+export { chooseVariants, startVariants, type ChoiceOptions, type StartOptions } from './choice/choose.js';
+export type { ChoiceStore } from './choice/kept-choice.js';
 export type { ProbeAnswer, ProbePoint } from './depth-probe.js';
 export { deviceDescriptor } from './device.js';
 export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussians.js';

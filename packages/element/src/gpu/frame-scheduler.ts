@@ -9,6 +9,12 @@ export interface FrameClient {
 /** Frames until who draws besides counts in full: who draws now and then takes little of what there is. Who draws no more does not count. */
 const MEMORY = 8;
 
+/** When a picture was last drawn in any window, by the page's clock. */
+let lastDrawn = -Infinity;
+
+/** Milliseconds since a picture was last drawn in any window. */
+export const sinceLastPicture = (): number => performance.now() - lastDrawn;
+
 /** Of each window that elements are in. */
 const KNOWN = new WeakMap<Window, FrameScheduler>();
 
@@ -88,6 +94,7 @@ export class FrameScheduler {
   };
 
   #drawAll(now: number): void {
+    lastDrawn = performance.now();
     [this.#due, this.#drawing] = [this.#drawing, this.#due];
     const { size } = this.#drawing;
     this.#clients = Math.min(size, this.#clients + (size - this.#clients) / MEMORY);

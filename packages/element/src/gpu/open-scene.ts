@@ -1,8 +1,9 @@
 import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
-import { chooseVariants } from '@gaussian-splat/renderer';
-import type { LiveRequest } from '../live/live-model.js';
+import { startVariants } from '@gaussian-splat/renderer';
+import type { LiveModel, LiveRequest } from '../live/live-model.js';
 import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
+import { chooseAtRest } from './choose-at-rest.js';
 import { GpuScene } from './gpu-scene.js';
 import { limitScenes } from './memory-budget.js';
 import { PreviewUploads } from './preview-uploads.js';
@@ -31,19 +32,25 @@ export interface OpenOptions {
   readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }
 
-/** Device and file at the same time, then the upload. Rejects with GaussianSplatError or the signal's reason. */
+/** Opens what is asked for; what its device is served best with is looked for later. Rejects with GaussianSplatError or the signal's reason. */
 export async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
   // Known at once, and then not a byte is fetched.
   assertWebGpu();
-  if (isGenerator(request)) return openLiveScene(request, options);
-  if (isStreamed(request)) return openStreamedScene(request, options);
+  const open = isGenerator(request) ? openLiveScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
+  const scene = await open(request, options);
+  chooseAtRest(scene.device);
+  return scene;
+}
+
+/** Device and file at the same time, then the upload. */
+async function openLoadedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
   // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
   options.signal.addEventListener('abort', giveUp, { once: true });
   const acquiring = options.device.acquire();
-  // While the bytes are on their way there is time to find out what suits the device.
-  const choosing = acquiring.then(({ device }) => chooseVariants(device));
+  // While the bytes are on their way there is time to find out what a first picture can be drawn with.
+  const choosing = acquiring.then(({ device }) => startVariants(device, pictures()));
   const previews =
     options.onPreview && new PreviewUploads({ ...options, onPreview: options.onPreview, ready: choosing });
   const loading = options.loader.open(request, abort.signal, options.onProgress, previews?.show);
@@ -103,20 +110,26 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
   const acquiring = options.device.acquire();
   opening.catch(ignore);
   const lease = await acquiring;
+  let live: LiveModel | undefined;
   try {
     signal.throwIfAborted();
     limitScenes(lease.device, memoryBudget);
+    const starting = startVariants(lease.device, pictures()).catch(unlessWrong);
+    starting.catch(ignore);
     const { openLiveModel } = await opening;
     const { url, chain = [], contract, credentials } = request;
-    const live = await openLiveModel(
+    live = await openLiveModel(
       { ...options.live(), url, chain, contract, credentials, memoryBudget },
       lease.device,
       signal,
       (loaded, total) => onProgress(loaded, total, total && ((1 - WARM_UP) * loaded) / total),
     );
+    await starting;
     beforeUpload(live.gaussians.byteLength);
     return new GpuScene(lease, live.gaussians, live.bounds, submissions, { live });
   } catch (error) {
+    live?.close();
+    live?.gaussians.destroy();
     lease.release();
     throw error;
   }
@@ -139,7 +152,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
   const lease = await acquiring;
   let scene: GpuScene | undefined;
   try {
-    await chooseVariants(lease.device).catch(unlessWrong);
+    await startVariants(lease.device, pictures()).catch(unlessWrong);
     limitScenes(lease.device, memoryBudget);
     const { openStreamed } = await opening;
     signal.throwIfAborted();
@@ -156,6 +169,9 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
     throw error;
   }
 }
+
+/** What the canvas is made of. */
+const pictures = (): { format: GPUTextureFormat } => ({ format: navigator.gpu.getPreferredCanvasFormat() });
 
 /** That no variant draws the right image ends the loading; that none could be timed does not. */
 function unlessWrong(error: unknown): void {

@@ -1,32 +1,39 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { GaussianBuffers } from '../gaussian-buffers.js';
-import { FrameClock } from './frame-clock.js';
-import { BUFFER_USAGE, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
-import { Renderer } from '../renderer.js';
-import { remember, SAFE, type Variants } from '../variants.js';
-import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud } from './known-answer.js';
+import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import { canSort, SORT_NAMES, type SortName } from '../stages/sort.js';
+import { remember, SAFE, type Variants } from '../variants.js';
+import { FrameClock } from './frame-clock.js';
+import { keyFor, pageStore, readChoice, writeChoice, type ChoiceStore } from './kept-choice.js';
 import { sortsRight, timeSort } from './sort-probe.js';
-
-/** Where a choice is kept between visits: `localStorage`, or anything like it. */
-export interface ChoiceStore {
-  getItem(key: string): string | null;
-  setItem(key: string, value: string): void;
-}
+import { ANSWER_TARGET, FRAMES, isRight, isValid, timeFrames, type Trial } from './trials.js';
 
 export interface ChoiceOptions {
   /** Default: the page's `localStorage` where there is one. null: nothing is kept. */
   readonly store?: ChoiceStore | null;
+  /** Awaited before each piece of the work, for pages that have something better to do at times. */
+  readonly pause?: () => Promise<void>;
+  /** Of the pictures to come: what they need is made at the same time. */
+  readonly format?: GPUTextureFormat;
 }
+
+export interface StartOptions extends ChoiceOptions {
+  /** Milliseconds that a small frame of what is likely to suit a GPU may take there; default 8. */
+  readonly quickMs?: number;
+}
+
+/** What is under way for a device, or done. */
+interface Choice {
+  started?: Promise<Variants>;
+  chosen?: Promise<Variants>;
+}
+
+const choiceOf = (device: GPUDevice): Choice => perDevice(device, 'choice', () => ({}));
 
 /** GPUMapMode.READ, which Node has only where Dawn was loaded. */
 const MAP_READ = 1;
 
-/** Changes whenever a variant does, so that old choices are made anew. */
-const VERSION = 3;
-
-/** Scenes of the probe: until one candidate is left, or the time is up. */
-const ROUNDS = [
+/** Scenes of the trials: until one candidate is left, or the time is up. */
+const ROUNDS: readonly Trial[] = [
   { splats: 4_000, width: 320, height: 180 },
   { splats: 32_000, width: 960, height: 540 },
   { splats: 256_000, width: 1920, height: 1080 },
@@ -34,37 +41,77 @@ const ROUNDS = [
 /** Milliseconds that all rounds may take, and how much longer than the last one the next is expected to be. */
 const BUDGET = 800;
 const GROWTH = 8;
-const FRAMES = 4;
 /** A candidate so much slower than the fastest, in a round that takes as long as is worth measuring, is out. */
 const HOPELESS = 1.5;
 const MEASURABLE = 1.5;
 
+/** What is likely to suit a GPU. */
+const LIKELY: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel', sort: 'shared8' };
+const QUICK_MS = 8;
+
+/**
+ * Finds variants with which a first picture can be drawn soon, once for each device: those that an earlier visit chose; else what is likely to suit a
+ * GPU, if it gives the known answer and is quick enough; else what {@link chooseVariants} takes seconds to find, which a page with a likely one
+ * may ask for later, when it is at rest.
+ * @throws GaussianSplatError as {@link chooseVariants}
+ */
+export function startVariants(device: GPUDevice, options: StartOptions = {}): Promise<Variants> {
+  const choice = choiceOf(device);
+  return (choice.started ??= choice.chosen ?? start(device, options, choice));
+}
+
+async function start(device: GPUDevice, options: StartOptions, choice: Choice): Promise<Variants> {
+  const { store = pageStore(), quickMs = QUICK_MS, format } = options;
+  const isOpen = !device.adapterInfo?.isFallbackAdapter && readChoice(store, device) === undefined;
+  if (!isOpen || !(await isRight(device, LIKELY, format)) || !((await likelyMs(device)) <= quickMs))
+    return chooseVariants(device, options);
+  if (!choice.chosen) remember(device, LIKELY);
+  return LIKELY;
+}
+
+async function likelyMs(device: GPUDevice): Promise<number> {
+  const clock = await FrameClock.on(device);
+  // Nothing is compiled for this trial alone.
+  const time = await timeFrames(device, LIKELY, ROUNDS[0], clock, ANSWER_TARGET);
+  clock.destroy();
+  return time;
+}
+
 /**
  * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a known answer are out, the
- * others are timed on small scenes. Takes a few tenths of a second the first time on an adapter; then the choice is kept in `store`, and
+ * others are timed on small scenes. Takes two to five seconds the first time on an adapter, most of them to compile what is not chosen in the end; then the choice is kept in `store`, and
  * only its answer is checked again.
  * @throws GaussianSplatError `unsupported/wrong-image` if no variant gives the known answer.
  */
 export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): Promise<Variants> {
-  return perDevice(device, 'choice', async () => {
-    const store = options.store === undefined ? pageStore() : options.store;
-    const kept = readChoice(store, device);
-    const variants = kept !== undefined && (await isRight(device, kept)) ? kept : await probe(device);
-    // What a device answered while it was lost says nothing about the adapter, whose other devices would go by it.
-    if (!(await isAlive(device))) return SAFE;
-    remember(device, variants);
-    writeChoice(store, keyFor(device), variants);
-    return variants;
-  });
+  return (choiceOf(device).chosen ??= choose(device, options));
 }
 
-async function probe(device: GPUDevice): Promise<Variants> {
-  const sort = await chooseSort(device);
+async function choose(device: GPUDevice, options: ChoiceOptions): Promise<Variants> {
+  const { store = pageStore(), pause = noPause, format } = options;
+  const kept = readChoice(store, device);
+  const variants = kept !== undefined && (await isRight(device, kept, format)) ? kept : await probe(device, pause);
+  // What a device answered while it was lost says nothing about the adapter, whose other devices would go by it.
+  if (!(await isAlive(device))) return SAFE;
+  remember(device, variants);
+  writeChoice(store, keyFor(device), variants);
+  return variants;
+}
+
+async function noPause(): Promise<void> {
+  // Nothing else is to be done.
+}
+
+type Pause = () => Promise<void>;
+
+async function probe(device: GPUDevice, pause: Pause): Promise<Variants> {
+  const sort = await chooseSort(device, pause);
   const candidates: Variants[] = [];
   for (const candidate of candidatesFor(device, sort)) {
+    await pause();
     if (await isRight(device, candidate)) candidates.push(candidate);
   }
-  if (candidates.length > 0) return chooseFastest(device, candidates);
+  if (candidates.length > 0) return chooseFastest(device, candidates, pause);
   for (const candidate of lastResorts(sort)) if (await isRight(device, candidate)) return candidate;
   return giveUp(device);
 }
@@ -101,23 +148,28 @@ const FEW_KEYS = 2 ** 17;
 const MANY_KEYS = 2 ** 21;
 /** Milliseconds for few keys up to which many are timed, too. */
 const FEW_KEYS_MS = 1;
+/** Milliseconds that no GPU takes for few keys. */
+const SLOW_SORT_MS = 20;
+/** Ways of threads that share a block of keys. */
+const SHARED_SORTS = SORT_NAMES.filter((name) => name !== 'serial');
 /** Times the fastest that a way to sort may take for few keys to be tried with many. */
 const HOPELESS_SORT = 1.5;
 
 /** The fastest way to sort, of those that sort rightly. */
-async function chooseSort(device: GPUDevice): Promise<SortName> {
+async function chooseSort(device: GPUDevice, pause: Pause): Promise<SortName> {
   // A processor in disguise, by its own account.
   if (device.adapterInfo?.isFallbackAdapter && (await sortsRight(device, 'serial'))) return 'serial';
-  const right: SortName[] = [];
-  for (const name of SORT_NAMES) {
-    if (canSort(device, name) && (await isValid(device, () => sortsRight(device, name)))) right.push(name);
-  }
   const clock = await FrameClock.on(device);
-  let times = await timeSorts(device, right, FEW_KEYS, clock);
+  const trials: SortTrials = { device, pause, clock };
+  let times = await timeSorts(trials, await rightSorts(trials, SHARED_SORTS), FEW_KEYS);
+  // One that does not say so. What it is best at takes a GPU half a second to compile.
+  if (!(Math.min(...times.values()) <= SLOW_SORT_MS))
+    for (const [name, time] of await timeSorts(trials, await rightSorts(trials, ['serial']), FEW_KEYS))
+      times.set(name, time);
   const least = Math.min(...times.values());
   if (least <= FEW_KEYS_MS) {
-    const left = right.filter((name) => times.get(name)! <= HOPELESS_SORT * least);
-    times = await timeSorts(device, left, MANY_KEYS, clock);
+    const left = [...times.keys()].filter((name) => times.get(name)! <= HOPELESS_SORT * least);
+    times = await timeSorts(trials, left, MANY_KEYS);
   }
   clock.destroy();
   let best = SAFE.sort;
@@ -125,14 +177,32 @@ async function chooseSort(device: GPUDevice): Promise<SortName> {
   return best;
 }
 
+interface SortTrials {
+  readonly device: GPUDevice;
+  readonly pause: Pause;
+  readonly clock: FrameClock;
+}
+
+async function rightSorts({ device, pause }: SortTrials, names: readonly SortName[]): Promise<SortName[]> {
+  const right: SortName[] = [];
+  for (const name of names) {
+    if (!canSort(device, name)) continue;
+    await pause();
+    if (await isValid(device, () => sortsRight(device, name))) right.push(name);
+  }
+  return right;
+}
+
 async function timeSorts(
-  device: GPUDevice,
+  { device, pause, clock }: SortTrials,
   names: readonly SortName[],
   keys: number,
-  clock: FrameClock,
 ): Promise<Map<SortName, number>> {
   const times = new Map<SortName, number>();
-  for (const name of names) times.set(name, await timeSort(device, name, keys, clock));
+  for (const name of names) {
+    await pause();
+    times.set(name, await timeSort(device, name, keys, clock));
+  }
   return times;
 }
 
@@ -158,17 +228,7 @@ function lastResorts(sort: SortName): Variants[] {
   return [variants('tiles', sort), variants('quads', other), variants('tiles', other)];
 }
 
-const isRight = (device: GPUDevice, variants: Variants): Promise<boolean> =>
-  isValid(device, () => givesKnownAnswer(device, variants));
-
-/** Whether an answer is right, and WebGPU had nothing to say against the way to it. */
-async function isValid(device: GPUDevice, answer: () => Promise<boolean>): Promise<boolean> {
-  device.pushErrorScope('validation');
-  const isAnswer = await answer().catch(() => false);
-  return (await device.popErrorScope().catch(() => undefined)) === null && isAnswer;
-}
-
-async function chooseFastest(device: GPUDevice, candidates: readonly Variants[]): Promise<Variants> {
+async function chooseFastest(device: GPUDevice, candidates: readonly Variants[], pause: Pause): Promise<Variants> {
   let left = candidates.map((variants) => ({ variants, time: 0 }));
   let spent = 0;
   const clock = await FrameClock.on(device);
@@ -176,7 +236,10 @@ async function chooseFastest(device: GPUDevice, candidates: readonly Variants[])
     // Only what the GPU did counts: pipelines that had to be made first are of use later.
     const last = FRAMES * left.reduce((sum, { time }) => sum + time, 0);
     if (left.length === 1 || spent + GROWTH * last > BUDGET) break;
-    for (const candidate of left) candidate.time = await timeFrames(device, candidate.variants, round, clock);
+    for (const candidate of left) {
+      await pause();
+      candidate.time = await timeFrames(device, candidate.variants, round, clock);
+    }
     spent += FRAMES * left.reduce((sum, { time }) => sum + time, 0);
     left.sort((a, b) => a.time - b.time);
     const best = left[0].time;
@@ -184,70 +247,4 @@ async function chooseFastest(device: GPUDevice, candidates: readonly Variants[])
   }
   clock.destroy();
   return left[0].variants;
-}
-
-/** Milliseconds of the fastest of a few frames of a turning camera. */
-async function timeFrames(
-  device: GPUDevice,
-  variants: Variants,
-  { splats, width, height }: (typeof ROUNDS)[number],
-  clock: FrameClock,
-): Promise<number> {
-  const size = Math.cbrt(400 / splats);
-  const gaussians = await GaussianBuffers.upload(device, packSpheres(sphereCloud(splats, size), 'int8'));
-  const renderer = new Renderer(device, variants);
-  const usage = TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.storageBinding;
-  const target = device.createTexture({ label: 'gs.probe', size: [width, height], format: 'rgba8unorm', usage });
-  const camera = probeCamera(width, height);
-  let best = Infinity;
-  for (let frame = 0; frame < FRAMES; frame++) {
-    const time = await clock.time((timer) => renderer.render({ gaussians, camera, target, timer }));
-    // The first frame also makes pipelines and orders everything.
-    if (frame > 0) best = Math.min(best, time);
-  }
-  target.destroy();
-  renderer.destroy();
-  gaussians.destroy();
-  return best;
-}
-
-function keyFor(device: GPUDevice): string {
-  const { vendor = '', architecture = '', device: model = '', description = '' } = device.adapterInfo ?? {};
-  const features = [...device.features].sort().join(' ');
-  return `gaussian-splat ${VERSION} ${[vendor, architecture, model, description].join(' ')} ${features}`;
-}
-
-function pageStore(): ChoiceStore | null {
-  try {
-    return (globalThis as { localStorage?: ChoiceStore }).localStorage ?? null;
-  } catch {
-    // A page may be denied its storage.
-    return null;
-  }
-}
-
-function readChoice(store: ChoiceStore | null, device: GPUDevice): Variants | undefined {
-  try {
-    const { rasterizer, accumulation, threads, sort } = JSON.parse(
-      store?.getItem(keyFor(device)) ?? '{}',
-    ) as Partial<Variants>;
-    const isKnown =
-      (rasterizer === 'quads' || rasterizer === 'tiles') &&
-      (accumulation === 'rgba16float' || accumulation === 'rgba32float') &&
-      (threads === 'parallel' || threads === 'serial') &&
-      sort !== undefined &&
-      SORT_NAMES.includes(sort) &&
-      canSort(device, sort);
-    return isKnown ? { rasterizer, accumulation, threads, sort } : undefined;
-  } catch {
-    return undefined;
-  }
-}
-
-function writeChoice(store: ChoiceStore | null, key: string, variants: Variants): void {
-  try {
-    store?.setItem(key, JSON.stringify(variants));
-  } catch {
-    // A full or forbidden store costs the next visit a few tenths of a second.
-  }
 }

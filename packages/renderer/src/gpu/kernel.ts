@@ -79,6 +79,7 @@ export class ComputeKernel<S extends ShaderDescription> {
   readonly #overrides: Overrides;
   readonly #program: ShaderProgram<S>;
   #made: GPUComputePipeline | undefined;
+  #making: Promise<void> | undefined;
 
   constructor(device: GPUDevice, shader: S, overrides: Overrides = {}) {
     this.#device = device;
@@ -87,14 +88,26 @@ export class ComputeKernel<S extends ShaderDescription> {
     this.#program = new ShaderProgram(device, shader, SHADER_STAGE.compute);
   }
 
-  /** Makes the pipeline, by far the dearest part, so that no frame has to. */
+  /** Makes the pipeline, by far the dearest part, so that no frame has to; within {@link madeTogether} beside others. */
   prepare(): this {
-    this.#made ??= this.#device.createComputePipeline({
+    const { together } = makingOn(this.#device);
+    if (together && !this.#made) together.push((this.#making ??= this.#makeBeside()));
+    else this.#made ??= this.#device.createComputePipeline(this.#descriptor);
+    return this;
+  }
+
+  async #makeBeside(): Promise<void> {
+    // What fails here fails again where it is used, and is told of there.
+    const made = await this.#device.createComputePipelineAsync(this.#descriptor).catch(() => undefined);
+    this.#made ??= made;
+  }
+
+  get #descriptor(): GPUComputePipelineDescriptor {
+    return {
       label: `gs.${this.#name}`,
       layout: this.#program.pipelineLayout,
       compute: { module: this.#program.module, entryPoint: 'main', constants: this.#overrides },
-    });
-    return this;
+    };
   }
 
   bind(resources: Resources<S>): GPUBindGroup {
@@ -102,7 +115,8 @@ export class ComputeKernel<S extends ShaderDescription> {
   }
 
   get #pipeline(): GPUComputePipeline {
-    return this.prepare().#made!;
+    // A frame cannot wait.
+    return (this.#made ??= this.#device.createComputePipeline(this.#descriptor));
   }
 
   /** Dispatches a grid of workgroups, each side at most 65,535. */
@@ -125,6 +139,25 @@ export class ComputeKernel<S extends ShaderDescription> {
     pass.setBindGroup(0, bindGroup);
     pass.dispatchWorkgroupsIndirect(buffer, offset);
   }
+}
+
+/** Pipelines that are being made beside one another. */
+const makingOn = (device: GPUDevice): { together?: Promise<void>[] } => perDevice(device, 'making', () => ({}));
+
+/**
+ * Waits for the compute pipelines that `prepare` asks for, which the browser makes beside one another: one after the other they take a GPU's driver a second, in which the
+ * browser shows nothing new of any page.
+ */
+export async function madeTogether(device: GPUDevice, prepare: () => void): Promise<void> {
+  const making = makingOn(device);
+  const together: Promise<void>[] = [];
+  making.together = together;
+  try {
+    prepare();
+  } finally {
+    making.together = undefined;
+  }
+  await Promise.all(together);
 }
 
 /** WebGPU's default limit of workgroups in one dimension (`MAX_GROUPS_X` in the shaders). */

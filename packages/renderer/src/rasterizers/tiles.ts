@@ -120,8 +120,8 @@ export class TilesRasterizer implements Rasterizer {
 
   prepare(levers: PaintingLevers, format: GPUTextureFormat): void {
     const variant = { notesDepth: levers.occludedBelow > 0, isNoting: false };
-    if (this.finishes(format)) rasterizeKernel(this.#device, { ...variant, format, isFinal: true });
-    rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false });
+    if (this.finishes(format)) rasterizeKernel(this.#device, { ...variant, format, isFinal: true }).prepare();
+    rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false }).prepare();
   }
 
   /** Lists the splats for the bins. */

@@ -1,0 +1,77 @@
+/** What a device is asked before it draws for anybody: whether a variant is right, and how fast. */
+import { GaussianBuffers } from '../gaussian-buffers.js';
+import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
+import { Renderer } from '../renderer.js';
+import { OrderKeysStage } from '../stages/order-keys.js';
+import type { Variants } from '../variants.js';
+import type { FrameClock } from './frame-clock.js';
+import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud } from './known-answer.js';
+
+/** Frames of a trial. */
+export const FRAMES = 4;
+
+/** A scene of spheres, and pixels of its pictures. */
+export interface Trial {
+  readonly splats: number;
+  readonly width: number;
+  readonly height: number;
+}
+
+/**
+ * Whether a variant draws the known answer; found out once for each device.
+ * @param format of the pictures to come: what they need is made meanwhile
+ */
+export const isRight = (device: GPUDevice, variants: Variants, format?: GPUTextureFormat): Promise<boolean> =>
+  perDevice(device, `right ${JSON.stringify(variants)}`, async () => {
+    await madeTogether(device, () => prepare(device, variants, format ?? ANSWER_TARGET.format));
+    return isValid(device, () => givesKnownAnswer(device, variants));
+  });
+
+/** Asks for the pipelines of a first picture. */
+function prepare(device: GPUDevice, variants: Variants, format: GPUTextureFormat): void {
+  const renderer = new Renderer(device, variants);
+  renderer.prepare([{}], format);
+  renderer.destroy();
+  new OrderKeysStage(device);
+}
+
+/** Whether an answer is right, and WebGPU had nothing to say against the way to it. */
+export async function isValid(device: GPUDevice, answer: () => Promise<boolean>): Promise<boolean> {
+  device.pushErrorScope('validation');
+  const isAnswer = await answer().catch(() => false);
+  return (await device.popErrorScope().catch(() => undefined)) === null && isAnswer;
+}
+
+/** What the known answer is drawn into. */
+export const ANSWER_TARGET = { format: 'rgba32float', usage: TEXTURE_USAGE.renderAttachment } as const;
+
+/** What a canvas is like. */
+const PAGE_TARGET = {
+  format: 'rgba8unorm',
+  usage: TEXTURE_USAGE.renderAttachment | TEXTURE_USAGE.storageBinding,
+} as const;
+
+/** Milliseconds of the fastest of a few frames. */
+export async function timeFrames(
+  device: GPUDevice,
+  variants: Variants,
+  { splats, width, height }: Trial,
+  clock: FrameClock,
+  target: { readonly format: GPUTextureFormat; readonly usage: number } = PAGE_TARGET,
+): Promise<number> {
+  const size = Math.cbrt(400 / splats);
+  const gaussians = await GaussianBuffers.upload(device, packSpheres(sphereCloud(splats, size), 'int8'));
+  const renderer = new Renderer(device, variants);
+  const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
+  const camera = probeCamera(width, height);
+  let best = Infinity;
+  for (let frame = 0; frame < FRAMES; frame++) {
+    const time = await clock.time((timer) => renderer.render({ gaussians, camera, target: texture, timer }));
+    // The first frame also makes pipelines and orders everything.
+    if (frame > 0) best = Math.min(best, time);
+  }
+  texture.destroy();
+  renderer.destroy();
+  gaussians.destroy();
+  return best;
+}
