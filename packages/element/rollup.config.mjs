@@ -63,7 +63,13 @@ export default [
     // What generators need is a chunk of its own, loaded when the first is shown; it finds the runtime beside itself.
     preserveEntrySignatures: 'allow-extension',
     plugins: [emptyFirst, ...plugins, copyRuntime],
-    output: { ...output, chunkFileNames: 'generator-[hash].js', paths: () => './scene-worker.js' },
+    // What two chunks share and is smaller than a request for it goes where the page has it already.
+    output: {
+      ...output,
+      chunkFileNames: 'generator-[hash].js',
+      paths: () => './scene-worker.js',
+      experimentalMinChunkSize: 500,
+    },
   },
   {
     input: { 'scene-worker': path('./dist/loading/scene-worker.js') },

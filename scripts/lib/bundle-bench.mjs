@@ -13,6 +13,7 @@ const ENTRIES = [
   'pace',
   'run/fetch-worker',
   'stability',
+  'start',
   'quality/oracle-worker',
   'peers/playcanvas',
   'peers/spark',

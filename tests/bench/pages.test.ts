@@ -62,6 +62,21 @@ test('the frontier page compares with the oracle', { timeout: 180_000 }, async (
 });
 
 test(
+  'the page of first pictures: a first visit, what is chosen after it, and a later one',
+  { timeout: 180_000 },
+  async () => {
+    const report = await runPage('bench/start.html', { visits: '2', width: '64', height: '48' });
+    assert.equal(report.error, undefined);
+    const [first, later] = report.visits;
+    for (const { shownMs } of report.visits) assert.ok(shownMs > 0 && shownMs < 60_000, `${shownMs} ms`);
+    assert.ok(first.chosenMs >= 0, 'the choice is made while the page is open');
+    assert.equal(later.chosenMs, undefined);
+    assert.equal(report.chosen.length, 1, 'what an earlier visit found is kept');
+    await assert.rejects(runPage('bench/start.html', { visits: '0' }), /visits: expected a whole number/);
+  },
+);
+
+test(
   'the page of pictures in motion: real elements, a step, figures of it and the true image',
   { timeout: 180_000 },
   async () => {
