@@ -73,10 +73,11 @@ fn int8_color(first: u32, degree: u32, d: vec3f) -> vec3f {
   let middle = sh_basis(1u, d);
   let a = sh[first + 1u];
   if (degree == 1u) {
-    // Nine codes, the last of them where other degrees have the scale of band 2.
     let rest = unpack4x8snorm(a.y);
     let p = unpack4x8snorm(a.x);
-    let last = unpack4x8snorm(head.y).w;
+    // The ninth code is the first behind these eight; splats that have no more than degree 1 have it where others have the scale of band 2.
+    var last = unpack4x8snorm(head.y).w;
+    if (view.sh_degree > 1u) { last = unpack4x8snorm(sh[first + 2u].x).x; }
     return color + scale_1 * (low.y * p.xyz + low.z * vec3f(p.w, rest.xy) + low.w * vec3f(rest.zw, last));
   }
   let b = sh[first + 2u];

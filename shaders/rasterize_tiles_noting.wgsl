@@ -20,7 +20,7 @@ fn clear_notes(lane: u32) {
 
 fn note_blend(k: u32, weight: f32, before: f32, after: f32, blue_depth: u32) {
   atomicMax(&weights[k], bitcast<u32>(weight));
-  if (before > 0.5 && after <= 0.5) { half_depth = unpack2x16float(blue_depth).y; }
+  if (before > 0.5 && after <= 0.5) { half_depth = depth_in(blue_depth); }
 }
 
 fn keep_notes(k: u32, slot: u32) {

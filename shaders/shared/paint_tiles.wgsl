@@ -53,7 +53,7 @@ struct Brush {
   power: f32,
   // float16
   red_green: u32,
-  // float32; where depths are noted blue and depth, float16
+  // float32; where depths are noted blue and depth, as in ProjectedSplat
   blue: u32,
 }
 
@@ -210,18 +210,17 @@ fn blend(pixel: ptr<function, Pixel>, k: u32, brush: Brush, place: vec2f, least_
   (*pixel).transmittance = after;
 }
 
-// Least float16 with all its digits: depths below it, or above the greatest, are not known well enough.
-const HALF_MIN = 6.104e-5;
-
 // Notes how far one sees through a pixel, and the first thread how far one saw in the tile. One that is transparent, or became opaque
 // only beyond the depth up to which its splats are complete, is opened. Has barriers.
 fn note_depth(tile: u32, lane: u32, is_seen_through: bool, last_seen: u32) {
-  atomicMax(&seen_depth, bitcast<u32>(unpack2x16float(last_seen).y));
+  atomicMax(&seen_depth, bitcast<u32>(depth_in(last_seen)));
   if (is_seen_through) { atomicStore(&is_transparent, 1u); }
   workgroupBarrier();
   if (lane != 0u) { return; }
   let depth = bitcast<f32>(atomicLoad(&seen_depth));
-  let is_known = depth > HALF_MIN && depth < HALF_MAX && depth <= bitcast<f32>(occlusion[tile]);
+  // The least and the greatest stand for all beyond them.
+  let is_code = depth > depth_in(0u) && depth < depth_in((DEPTH_LAST + NO_HALVES) << 16u);
+  let is_known = is_code && depth <= bitcast<f32>(occlusion[tile]);
   last_depths[tile] = select(OPEN, bitcast<u32>(depth), is_known && atomicLoad(&is_transparent) == 0u);
 }
 

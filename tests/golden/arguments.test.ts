@@ -1,6 +1,7 @@
 /** Requests that types alone would refuse: errors with a name, before the device hears of anything. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
+import { cameraFromCalibration, type CalibratedView } from '@gaussian-splat/core';
 import { capture, GaussianBuffers, packGaussians, Renderer, type FrameRequest } from '@gaussian-splat/renderer';
 import { cloudOf } from '../support/clouds.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
@@ -8,6 +9,8 @@ import { cameraAt } from '../support/scenes.js';
 
 const camera = cameraAt([0, 0, -4], [0, 0, 0], { width: 32, height: 24 });
 const columnMajor = Array.from({ length: 16 }, (_, k) => camera.worldToCamera[4 * (k % 4) + Math.floor(k / 4)]);
+/** Right and down are the same. */
+const flat = Array.from(camera.worldToCamera, (x, k) => (k >= 4 && k < 8 ? camera.worldToCamera[k - 4] : x));
 
 const FAULTY: readonly (readonly [name: string, changes: object, code: string])[] = [
   ['no scene', { gaussians: undefined }, 'argument/value'],
@@ -16,6 +19,12 @@ const FAULTY: readonly (readonly [name: string, changes: object, code: string])[
   ['a background of three numbers', { background: [0, 0, 0] }, 'argument/value'],
   ['a background that is not a number', { background: [0, 0, NaN, 1] }, 'argument/value'],
   ['a matrix of columns', { camera: { ...camera, worldToCamera: columnMajor } }, 'argument/camera'],
+  [
+    'a matrix of zeros',
+    { camera: { ...camera, worldToCamera: flat.map((_, k) => Number(k === 15)) } },
+    'argument/camera',
+  ],
+  ['a matrix that makes space flat', { camera: { ...camera, worldToCamera: flat } }, 'argument/camera'],
   ['no width', { camera: { ...camera, width: 0 } }, 'argument/camera'],
   ['more pixels than textures have', { camera: { ...camera, width: 1 << 20 } }, 'argument/camera'],
 ];
@@ -39,6 +48,26 @@ for (const [name, changes, code] of FAULTY) {
     [target, renderer, gaussians].forEach((thing) => thing.destroy());
   });
 }
+
+test('a calibration whose K is no such matrix is refused by the number that is not', () => {
+  const rows = [0, 4, 8, 12].map((k) => Array.from(camera.worldToCamera.slice(k, k + 4)));
+  const K = [
+    [30, 0, 16],
+    [0, 30, 12],
+    [0, 0, 1],
+  ];
+  const view: CalibratedView = { width: 32, height: 24, K, worldToCamera: rows };
+  assert.equal(cameraFromCalibration(view).cx, 16);
+  const columns = K.map((_, i) => K.map((row) => row[i]));
+  const scaled = K.map((row) => row.map((x) => 2 * x));
+  const sheared = K.map((row, i) => (i === 1 ? [5, 30, 12] : row));
+  for (const [wrong, where] of [
+    [columns, 'view.K[2][0]'],
+    [scaled, 'view.K[2][2]'],
+    [sheared, 'view.K[1][0]'],
+  ] as const)
+    assert.throws(() => cameraFromCalibration({ ...view, K: wrong }, 'view'), { code: 'argument/camera', where });
+});
 
 test('a target with levels and layers: the first is drawn into', async () => {
   const device = await anyDevice();

@@ -82,4 +82,22 @@ test('a wall behind a veil: the depth is that of the wall, and only what is behi
   gaussians.destroy();
 });
 
+for (const unit of [1e-8, 1e-5, 1e5, 1e9]) {
+  test(`a wall ${5 * unit} units away is found there, and hides what is behind it alone`, async () => {
+    const device = await serialDevice();
+    const wall = { position: [0, 0, 5 * unit], scale: [unit, unit, 0], opacity: 0.9, color: [1, 1, 1] } as const;
+    const gaussians = await GaussianBuffers.upload(device, packGaussians(cloudOf([wall])));
+    const renderer = new Renderer(device);
+    const camera = { ...cameraAt([0, 0, 0], [0, 0, 1], { width: 32, height: 32 }), near: 0.1 * unit };
+    await capture(device, renderer, { gaussians, camera });
+    const depths = [4.9, 5.1].map((depth) => ({ x: 16, y: 16, depth: depth * unit }));
+    const [before, behind] = await renderer.probeDepth(depths);
+    assert.ok(Math.abs((behind.depth ?? 0) / unit - 5) < 5 / 1024, `depth ${behind.depth}`);
+    assert.equal(before.transmittance, 1);
+    assert.ok(behind.transmittance < 0.2, `behind it ${behind.transmittance}`);
+    renderer.destroy();
+    gaussians.destroy();
+  });
+}
+
 after(endNodeDevice);

@@ -1,5 +1,5 @@
 import { GaussianSplatError } from './errors.js';
-import { cross, dot, normalize, subtract, type Matrix4, type Vector3 } from './vector.js';
+import { cross, dot, eyeOf, normalize, subtract, type Matrix4, type Vector3 } from './vector.js';
 
 /**
  * A pinhole camera in OpenCV's convention: x right, y down, z forward; pixel centres at +0.5.
@@ -63,6 +63,17 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
   };
   validateCamera(camera, where);
   if (K[0][1] !== 0) fail(`${where}.K[0][1]`, '0 (no skew)', describe(K[0][1]));
+  // A matrix of columns, or a scaled one, would be taken for one with another middle or other focal lengths.
+  for (const [row, column, value] of [
+    [2, 0, 0],
+    [2, 1, 0],
+    [2, 2, 1],
+    [1, 0, 0],
+  ]) {
+    const found = K[row][column];
+    if (!(Math.abs(found - value) <= AFFINE_ROUNDING))
+      fail(`${where}.K[${row}][${column}]`, `${value}`, describe(found));
+  }
   return camera;
 }
 
@@ -91,6 +102,9 @@ export function validateCamera(camera: Camera, where = 'camera'): void {
   if (Math.max(Math.abs(x), Math.abs(y), Math.abs(z), Math.abs(w - 1)) > AFFINE_ROUNDING) {
     fail(`${where}.worldToCamera`, 'a last row of 0, 0, 0, 1: row-major, not column-major', describe([x, y, z, w]));
   }
+  // A camera that makes space flat is nowhere.
+  if (!eyeOf(worldToCamera).every(Number.isFinite))
+    fail(`${where}.worldToCamera`, 'a matrix that can be inverted', describe([...worldToCamera]));
 }
 
 /**

@@ -96,7 +96,8 @@ export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
 
 /**
  * What each quality means. The figures are the least PSNR against the float64 reference image that each is held to:
- * `reference` 75 dB, `default` 59 dB (no error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB.
+ * `reference` 75 dB, `default` 59 dB (no error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB. The last two can fall below
+ * theirs from within a captured subject, where what an old order puts the wrong way round fills the picture.
  */
 export const QUALITIES: Readonly<Record<Quality, Levers>> = {
   reference: {

@@ -1,6 +1,5 @@
 /** Probing points of a frame, against a walk over the same splats one by one. */
-import { halfToNumber } from '@gaussian-splat/core';
-import { halfBits, layouts, ProbeDepthStage } from '@gaussian-splat/renderer/stages';
+import { layouts, ProbeDepthStage } from '@gaussian-splat/renderer/stages';
 import { check, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
 
 const ALPHA_MIN = 1 / 255;
@@ -31,8 +30,19 @@ function randomSplats(count: number, seed: number, maxOpacity: number): Splat[] 
     slope: Math.fround(4 * (random() - 0.5)),
     inverseSigmaV: Math.fround(1 / (0.5 + 20 * random())),
     opacity: Math.fround(maxOpacity * random()),
-    depth: halfToNumber(halfBits(0.5 + 30 * random())),
+    depth: tenDigits(0.5 + 30 * random()),
   }));
+}
+
+const floatBits = (x: number): number => new Uint32Array(Float32Array.of(x).buffer)[0];
+
+/** A number of ten binary digits behind the first. */
+const tenDigits = (x: number): number => new Float32Array(Uint32Array.of(floatBits(x) & ~0x1fff).buffer)[0];
+
+/** As shaders/shared/splat.wgsl writes it: the upper bits of a float32 from 2⁻²⁸ on, but for codes that are no finite float16. */
+function depthCode(depth: number): number {
+  const steps = (floatBits(depth) - floatBits(2 ** -28)) >>> 13;
+  return steps < 0x7c00 ? steps : steps + 0x400;
 }
 
 function pack(splats: readonly Splat[]): Uint32Array {
@@ -40,7 +50,7 @@ function pack(splats: readonly Splat[]): Uint32Array {
   const floats = new Float32Array(words.buffer);
   splats.forEach((splat, i) => {
     floats.set([splat.x, splat.y, splat.inverseSigmaX, splat.slope, splat.inverseSigmaV], 8 * i);
-    words[8 * i + 6] = halfBits(splat.depth) << 16;
+    words[8 * i + 6] = depthCode(splat.depth) << 16;
     floats[8 * i + 7] = splat.opacity;
   });
   return words;
