@@ -12,6 +12,7 @@ import {
 } from '@gaussian-splat/renderer';
 import { givesKnownAnswer, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { onlyInFull } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
@@ -156,7 +157,7 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
   later.destroy();
 });
 
-test('what is likely is not drawn with where it is slow, or the adapter says that it is a processor', async () => {
+test('what is likely is not drawn with where it is slow', { skip: onlyInFull }, async () => {
   const device = await deviceLikeAny();
   const isLookedFor = new Promise<void>((resolve) => {
     const pause = () => new Promise<void>(() => resolve());
@@ -165,8 +166,11 @@ test('what is likely is not drawn with where it is slow, or the adapter says tha
   await isLookedFor;
   assert.equal(new Renderer(device).levers.rasterizer, 'quads', 'what works everywhere, until that is found');
   device.destroy();
+});
+
+test('nor where the adapter says that it is a processor', async (t) => {
   const processor = await newDevice();
-  if (!isSwiftShader(processor)) return;
+  if (!processor.adapterInfo.isFallbackAdapter) return t.skip('this adapter is a GPU');
   const entries = new Map<string, string>();
   const begun = await startVariants(processor, { store: storeOf(entries), quickMs: Infinity });
   await assertSuits(processor, begun);
