@@ -81,7 +81,8 @@ for (const rasterizer of ['quads', 'tiles'] as RasterizerName[]) {
     const target = device.createTexture({ size: [size.width, size.height], format, usage: 0x18 });
     const made: string[] = [];
     renderer.prepare(mixes, format);
-    for (const name of ['createComputePipeline', 'createRenderPipeline', 'createShaderModule'] as const) {
+    const makers = ['createComputePipeline', 'createComputePipelineAsync', 'createRenderPipeline'] as const;
+    for (const name of [...makers, 'createShaderModule'] as const) {
       const original = device[name].bind(device) as (descriptor: never) => never;
       Object.assign(device, { [name]: (descriptor: never) => (made.push(name), original(descriptor)) });
     }

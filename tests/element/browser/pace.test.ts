@@ -104,7 +104,7 @@ describe('the pace of pictures', () => {
     await delay(800);
     await gpuIdle();
     const made: string[] = [];
-    const names = ['createRenderPipeline', 'createComputePipeline'] as const;
+    const names = ['createRenderPipeline', 'createComputePipeline', 'createComputePipelineAsync'] as const;
     const originals = names.map((name) => GPUDevice.prototype[name]);
     for (const name of names) {
       const original = GPUDevice.prototype[name] as (descriptor: GPUObjectDescriptorBase) => never;

@@ -204,11 +204,11 @@ describe('a generator in the element', () => {
     const time = element.currentTime;
     await delay(1000);
     assert(element.currentTime !== time, 'it does not play');
-    const { createBuffer, mapAsync, createComputePipeline } = calls;
-    assertEqual(
-      [createBuffer, mapAsync, createComputePipeline],
-      [before.createBuffer, before.mapAsync, before.createComputePipeline],
-    );
+    const madeOf = ({ createBuffer, mapAsync, createComputePipeline, createComputePipelineAsync }: typeof calls) => [
+      ...[createBuffer, mapAsync],
+      ...[createComputePipeline, createComputePipelineAsync],
+    ];
+    assertEqual(madeOf(calls), madeOf(before));
     element.pause();
   });
 

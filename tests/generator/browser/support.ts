@@ -142,9 +142,13 @@ export function relativeError(found: readonly number[], expected: readonly numbe
 }
 
 /** Calls since the page was opened, for tests of what a frame does not do. */
-export const calls = { createBuffer: 0, mapAsync: 0, createBindGroup: 0, createComputePipeline: 0 };
+export const calls = {
+  ...{ createBuffer: 0, mapAsync: 0, createBindGroup: 0 },
+  ...{ createComputePipeline: 0, createComputePipelineAsync: 0 },
+};
 
-for (const name of ['createBuffer', 'createBindGroup', 'createComputePipeline'] as const) {
+const COUNTED = ['createBuffer', 'createBindGroup', 'createComputePipeline', 'createComputePipelineAsync'] as const;
+for (const name of COUNTED) {
   const original = GPUDevice.prototype[name] as (this: GPUDevice, argument: never) => unknown;
   Object.assign(GPUDevice.prototype, {
     [name](this: GPUDevice, argument: never) {
