@@ -204,6 +204,35 @@ test('an element of another size is measured anew: that fewer pixels won nothing
   pace.stop();
 });
 
+test('an element that becomes smaller in motion shows as many pixels as before at once, not the few that the large one could afford', (context) => {
+  let now = 1000;
+  context.mock.method(performance, 'now', () => now);
+  const ignored = (): void => undefined;
+  const pace = new PaceController({
+    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
+    ...{ requestFrame: ignored, onPace: ignored },
+  });
+  const move = (seconds: number, pixels: number, share: (level: number) => number): number[] => {
+    const levels: number[] = [];
+    for (const end = now + 1000 * seconds; now < end; now += INTERVAL) {
+      const { level } = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
+      levels.push(level);
+      pace.sample(level, pace.targetMs * share(level));
+    }
+    return levels;
+  };
+  const [large, small] = [3072 * 1728, 1344 * 756];
+  const before = move(3, large, (level) => 8 * LADDER[level].cost).at(-1)!;
+  assert.ok(LADDER[before].cost <= 1 / 8, LADDER[before].name);
+  // What an H200 took: a picture so small leaves it idle when it is made smaller still, and no rung spares enough for a climb.
+  const taken = [0.76, 0.72, 0.7, 0.66, 0.62, 0.66, 0.8, 0.9, 0.96, 1.04];
+  const [first, ...after] = move(4, small, (level) => taken[level]);
+  assert.ok(LADDER[first].cost * small <= LADDER[before].cost * large, `${LADDER[first].name}: more than before`);
+  assert.ok(LADDER[first - 1].cost * small > LADDER[before].cost * large, `${LADDER[first].name}: fewer than before`);
+  assert.equal(after.at(-1), 0, after.join(' '));
+  pace.stop();
+});
+
 test('a scene that changes in every other picture of the display is in motion in those between, and rests as a camera does', (context) => {
   context.mock.timers.enable({ apis: ['setTimeout'] });
   const asked: number[] = [];

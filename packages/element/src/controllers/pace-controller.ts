@@ -132,8 +132,8 @@ export class PaceController {
     this.#rungs = rungsFor(pixels);
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
     if (!isOther && this.#pace.level < this.#rungs) return;
+    this.#pace = resized(this.#pace, pixels / this.#pixels, this.#rungs, COSTS);
     this.#pixels = pixels;
-    this.#pace = resized(this.#pace, this.#rungs);
   }
 
   readonly #rest = (): void => {

@@ -302,10 +302,16 @@ function patienceAfterFall(pace: Pace, now: number): number {
   return isTooSoon(pace, now) ? Math.min(LONGEST_PATIENCE_MS, LONGER_PATIENCE * pace.patience) : PATIENCE_MS;
 }
 
-/** The pace where pictures have another size, and only the first so many rungs serve: what was measured says nothing of these. */
-export function resized(pace: Pace, rungs: number): Pace {
+/**
+ * The pace where pictures have so many times the pixels, and only the first so many rungs serve: what was measured says nothing of these. Fewer pixels are drawn with as
+ * many of them as before, for they take no longer: the rung was chosen for what the larger picture took.
+ * @param costs of all rungs, as in {@link PaceRules}
+ */
+export function resized(pace: Pace, growth: number, rungs: number, costs: readonly number[]): Pace {
   const { recent, measured, load, peak } = INITIAL_PACE;
-  return { ...pace, level: Math.min(pace.level, rungs - 1), recent, measured, load, peak };
+  const asMany = costs.findIndex((cost) => growth * cost <= costs[pace.level]);
+  const level = Math.min(pace.level, rungs - 1, asMany === -1 ? Infinity : asMany);
+  return { ...pace, level, recent, measured, load, peak };
 }
 
 /** The smallest of the values that at least this share of them do not exceed. */

@@ -32,6 +32,8 @@ const BELIEVED_UNDER_LOAD_MS = 120_000;
 const SAME_LOAD = 1.25;
 /** A line through two rungs says something of a third where one costs so much more than the other: between like ones it is noise. */
 const FAR_APART = 1.2;
+/** As many times what a line says beyond its ends is reckoned with: rungs that first win, or cost, little win or cost more than that further on as often as not. */
+const TWICE = 2;
 
 /** Whether the rung was measured, and that still counts. */
 export function isBelieved(rung: number, { measured, level, milliseconds, now, isHopeful }: Knowledge): boolean {
@@ -45,7 +47,7 @@ export function isBelieved(rung: number, { measured, level, milliseconds, now, i
 
 /**
  * What a frame on a rung would take, ms. Between two rungs that were measured, on the line through them, time against cost. Below them between that line and what
- * the costs say; climbs with nothing measured above cost all that they can.
+ * the costs say; climbs with nothing measured above cost all that they can, or twice what the line through two rungs below says.
  */
 export function predict(rung: number, known: Knowledge): number {
   const { measured, level, milliseconds, costs } = known;
@@ -56,20 +58,30 @@ export function predict(rung: number, known: Knowledge): number {
   const onLine = (a: number, b: number): number =>
     timeOf(b) + ((timeOf(a) - timeOf(b)) * (costs[rung] - costs[b])) / (costs[a] - costs[b]);
   const inProportion = (other: number): number => (timeOf(other) * costs[rung]) / costs[other];
-  if (below !== null) return above === null ? inProportion(below) : Math.min(onLine(above, below), inProportion(below));
+  if (below !== null) {
+    if (above !== null) return Math.min(onLine(above, below), inProportion(below));
+    const far = nearest(below + 1, 1, known, (cost) => FAR_APART * cost <= costs[below]);
+    if (far === null) return inProportion(below);
+    const dearer = Math.max(0, onLine(below, far) - timeOf(below));
+    return Math.min(timeOf(below) + TWICE * dearer, inProportion(below));
+  }
   // One of both there is: the level itself.
   const near = above!;
-  const far = nearest(near - 1, -1, known, FAR_APART * costs[near]);
+  const far = nearest(near - 1, -1, known, (cost) => cost >= FAR_APART * costs[near]);
   if (far === null) return inProportion(near);
-  // Twice what the line says is hoped for: rungs that first win little win more than that further down as often as not.
-  return Math.max(timeOf(near) - 2 * (timeOf(near) - onLine(far, near)), inProportion(near));
+  return Math.max(timeOf(near) - TWICE * (timeOf(near) - onLine(far, near)), inProportion(near));
 }
 
-/** The next rung from this one on that was measured and costs at least so much; null where there is none. */
-function nearest(from: number, step: 1 | -1, known: Knowledge, least = 0): number | null {
+/** The next rung from this one on that was measured and is of such a cost; null where there is none. */
+function nearest(
+  from: number,
+  step: 1 | -1,
+  known: Knowledge,
+  isOfCost: (cost: number) => boolean = () => true,
+): number | null {
   const { costs } = known;
   for (let rung = from; rung >= 0 && rung < costs.length; rung += step) {
-    if (costs[rung] >= least && isBelieved(rung, known)) return rung;
+    if (isOfCost(costs[rung]) && isBelieved(rung, known)) return rung;
   }
   return null;
 }
