@@ -3,20 +3,15 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import type { Bounds } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
-import { readAttributes, type RawAttributes } from '../../packages/element/src/attributes.js';
-import type { CameraSettings } from '../../packages/element/src/camera/settings.js';
+import type { RawAttributes } from '../../packages/element/src/attributes.js';
 import { AutoRotateController } from '../../packages/element/src/controllers/auto-rotate-controller.js';
 import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
 import { PromptController } from '../../packages/element/src/controllers/prompt-controller.js';
+import { settings } from '../support/camera-settings.js';
 
 const BOUNDS: Bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 2 };
 const host = { addController: () => undefined, requestUpdate: () => undefined } as unknown as ReactiveControllerHost;
 const degrees = Math.PI / 180;
-
-const settings = (changes: Partial<RawAttributes>): CameraSettings => {
-  const raw = new Proxy(changes, { get: (given, name) => Reflect.get(given, name) ?? null }) as RawAttributes;
-  return readAttributes(raw, assert.fail).camera;
-};
 
 function framed(changes: Partial<RawAttributes> = {}): CameraController {
   const camera = new CameraController(settings(changes), () => undefined);

@@ -2,7 +2,6 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { cross, dot, eyeOf, lookAt, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import fc from 'fast-check';
-import { readAttributes } from '../../packages/element/src/attributes.js';
 import { keyOf, orbitOf, panOf, pinchOf, wheelOf } from '../../packages/element/src/camera/gestures.js';
 import type { UpAxis } from '../../packages/element/src/camera/grammar.js';
 import {
@@ -16,8 +15,9 @@ import {
   type Pose,
 } from '../../packages/element/src/camera/orbit.js';
 import { OrbitCamera } from '../../packages/element/src/camera/orbit-camera.js';
-import { limitsOf, poseOf, type CameraSettings } from '../../packages/element/src/camera/settings.js';
+import { limitsOf, poseOf } from '../../packages/element/src/camera/settings.js';
 import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
+import { settings } from '../support/camera-settings.js';
 
 const UPS: readonly UpAxis[] = ['x', '-x', 'y', '-y', 'z', '-z'];
 const AXES: Readonly<Record<UpAxis, Vector3>> = {
@@ -45,38 +45,6 @@ const pixelOf = (
   const [x, y, z] = [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]);
   return [(camera.fx * x) / z + camera.cx, (camera.fy * y) / z + camera.cy, z];
 };
-
-const settings = (changes: Record<string, string> = {}): CameraSettings =>
-  readAttributes(
-    {
-      crossorigin: null,
-      loading: null,
-      cameraOrbit: null,
-      cameraTarget: null,
-      fieldOfView: null,
-      minCameraOrbit: null,
-      maxCameraOrbit: null,
-      minFieldOfView: null,
-      maxFieldOfView: null,
-      interpolationDecay: null,
-      touchAction: null,
-      up: null,
-      maxPixelRatio: null,
-      frameBudget: null,
-      quality: null,
-      maxShDegree: null,
-      detail: null,
-      reveal: null,
-      navigation: null,
-      autoRotateDelay: null,
-      rotationPerSecond: null,
-      interactionPrompt: null,
-      interactionPromptStyle: null,
-      interactionPromptThreshold: null,
-      ...changes,
-    },
-    assert.fail,
-  ).camera;
 
 test('viewer frames are rotations that bring the up axis to +y', () => {
   for (const up of UPS) {

@@ -1,6 +1,12 @@
 import type { GaussianCloud } from './gaussian-cloud.js';
 import type { Vector3 } from './vector.js';
 
+/** A ball, in world units. */
+export interface Ball {
+  readonly center: Vector3;
+  readonly radius: number;
+}
+
 /** Where the splats of a cloud are, in world units. */
 export interface Bounds {
   /** Axis-aligned box of the centres. */
@@ -10,39 +16,75 @@ export interface Bounds {
   readonly center: Vector3;
   /** Distance from {@link center} within which 90 % of the opaque centres lie. */
   readonly radius: number;
+  /**
+   * All of a subject that stands alone, as captures do whose background was cut off, and avatars: a ball around all opaque centres but one in a thousand. Left out where
+   * surroundings thin out around a subject.
+   */
+  readonly subject?: Ball;
 }
 
 /** Centres at most this many are sampled for medians: sorting millions would stall loading for no visible gain. */
 const SAMPLE_LIMIT = 65_536;
+/** Share of the opaque centres that a subject has: others are specks that cutting has left. */
+const OF_SUBJECT = 0.999;
+/**
+ * A subject that stands alone ends so many times as far from its middle as 99 % of its centres, at most: 1 to 1.3 in six such captures. Surroundings go on: 2.9 in
+ * a capture as it was trained.
+ */
+const ENDS_WITHIN = 1.5;
 
 /** Bounds of a cloud; of an empty one, a unit ball at its origin. */
 export function boundsOf(cloud: Pick<GaussianCloud, 'count' | 'positions' | 'opacities' | 'origin'>): Bounds {
   const { count, positions, opacities, origin } = cloud;
   if (count === 0) return { min: origin, max: origin, center: origin, radius: 1 };
-  const min = [Infinity, Infinity, Infinity];
-  const max = [-Infinity, -Infinity, -Infinity];
+  const toWorld = (p: readonly number[]): Vector3 => [p[0] + origin[0], p[1] + origin[1], p[2] + origin[2]];
+  const [min, max] = boxOf(positions.subarray(0, 3 * count));
+  const places = sampleOpaque(opacities, count).map((i) => positions.subarray(3 * i, 3 * i + 3));
+  const center = [0, 1, 2].map((axis) => quantile(ascending(places.map((place) => place[axis])), 0.5));
+  const distances = places.map((place) => distance(place, center));
+  const sorted = ascending(distances);
+  const end = quantile(sorted, OF_SUBJECT);
+  const bounds = {
+    ...{ min: toWorld(min), max: toWorld(max), center: toWorld(center) },
+    radius: quantile(sorted, 0.9) || 1,
+  };
+  if (!(end > 0 && end <= ENDS_WITHIN * quantile(sorted, 0.99))) return bounds;
+  const subject = ballAround(places.filter((_, k) => distances[k] <= end));
+  return { ...bounds, subject: { ...subject, center: toWorld(subject.center) } };
+}
+
+const distance = (a: ArrayLike<number>, b: ArrayLike<number>): number =>
+  Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+
+/** Least and largest coordinates of rows of three. */
+function boxOf(positions: Float32Array): [number[], number[]] {
+  const [min, max] = [
+    [Infinity, Infinity, Infinity],
+    [-Infinity, -Infinity, -Infinity],
+  ];
   for (let axis = 0; axis < 3; axis++) {
     let least = Infinity;
     let most = -Infinity;
-    for (let i = axis; i < 3 * count; i += 3) {
+    for (let i = axis; i < positions.length; i += 3) {
       const place = positions[i];
       if (place < least) least = place;
       if (place > most) most = place;
     }
     [min[axis], max[axis]] = [least, most];
   }
-  const indices = sampleOpaque(opacities, count);
-  const center = [0, 1, 2].map((axis) =>
-    quantile(
-      indices.map((i) => positions[3 * i + axis]),
-      0.5,
-    ),
-  );
-  const distances = indices.map((i) =>
-    Math.hypot(positions[3 * i] - center[0], positions[3 * i + 1] - center[1], positions[3 * i + 2] - center[2]),
-  );
-  const toWorld = (p: number[]): Vector3 => [p[0] + origin[0], p[1] + origin[1], p[2] + origin[2]];
-  return { min: toWorld(min), max: toWorld(max), center: toWorld(center), radius: quantile(distances, 0.9) || 1 };
+  return [min, max];
+}
+
+/** A ball around the middle of the places' box. */
+function ballAround(places: readonly Float32Array[]): { center: number[]; radius: number } {
+  const center = [0, 1, 2].map((axis) => {
+    const [least, most] = places.reduce(
+      ([least, most], place) => [Math.min(least, place[axis]), Math.max(most, place[axis])],
+      [Infinity, -Infinity],
+    );
+    return (least + most) / 2;
+  });
+  return { center, radius: places.reduce((most, place) => Math.max(most, distance(place, center)), 0) };
 }
 
 /** Evenly spaced splats of opacity 0.1 or more; all splats if none is that opaque. */
@@ -53,7 +95,7 @@ function sampleOpaque(opacities: Float32Array, count: number): number[] {
   return opaque.length > 0 ? opaque : all;
 }
 
-function quantile(values: number[], fraction: number): number {
-  const sorted = Float64Array.from(values).sort();
-  return sorted[Math.min(sorted.length - 1, Math.floor(fraction * sorted.length))];
-}
+const ascending = (values: number[]): Float64Array => Float64Array.from(values).sort();
+
+const quantile = (sorted: Float64Array, share: number): number =>
+  sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];

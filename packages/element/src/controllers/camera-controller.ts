@@ -5,6 +5,9 @@ import { limitsOf, poseOf, type CameraSettings } from '../camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
 import type { CameraChangeSource } from '../events.js';
 
+/** All of a subject that stands alone is shown, of other scenes their middle. */
+const framed = (bounds: Bounds): Bounds => ({ ...bounds, ...bounds.subject });
+
 /** What is framed before any scene is known. */
 const UNKNOWN_BOUNDS: Bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
 /** Longest step of the damped motion, ms: after a pause the camera goes on from where it was. */
@@ -59,7 +62,7 @@ export class CameraController {
     return viewerFrame(this.#settings.up);
   }
 
-  /** Bounds of the scene that was framed last, in the scene's own frame. */
+  /** What was framed last, in the scene's own frame: of a subject that stands alone, `center` and `radius` are of all of it. */
   get bounds(): Bounds {
     return this.#bounds;
   }
@@ -101,18 +104,18 @@ export class CameraController {
 
   /** A new scene: the camera stands where the attributes ask, at once. */
   frame(bounds: Bounds): void {
-    this.#bounds = bounds;
+    this.#bounds = framed(bounds);
     this.#isTouched = this.#isTurned = false;
     this.#reframe('automatic');
   }
 
   /** More of the scene is known: the camera goes where it would have stood, unless a person has moved it. */
   refine(bounds: Bounds): void {
-    this.#bounds = bounds;
-    this.#camera.limits = limitsOf(this.#settings, bounds, this.#aspect);
+    this.#bounds = framed(bounds);
+    this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect);
     if (!this.#isTouched) {
       this.#source = 'automatic';
-      const { theta, ...pose } = poseOf(this.#settings, bounds, this.#aspect);
+      const { theta, ...pose } = poseOf(this.#settings, this.#bounds, this.#aspect);
       this.#camera.setGoal(this.#isTurned ? pose : { theta, ...pose });
     }
     this.#onChange();

@@ -1,8 +1,8 @@
 /** Loaded only when a generator is shown: what knows `@gaussian-splat/generator` is behind this module and post-view.ts. */
-import type { Bounds, Contract } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener } from '../loading/protocol.js';
+import { declaredBounds } from './declared-bounds.js';
 import { fetchBeside } from './fetch-beside.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
@@ -111,15 +111,5 @@ async function contractOf({ contract, credentials }: LiveRequest, signal: AbortS
 /** False for what the clock changes nothing of: it has nothing to play. */
 const takesTime = ({ contract }: GeneratorModel): boolean =>
   Object.values(contract.inputs).some(({ role }) => role === 'time' || role === 'frame');
-
-/** Bounds of the centres are those of the subject, too. */
-function declaredBounds({ bounds }: Contract): Bounds | undefined {
-  if (bounds === undefined) return undefined;
-  const { min, max } = bounds;
-  const center = [0, 1, 2].map((axis) => (min[axis] + max[axis]) / 2) as [number, number, number];
-  const radius = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2 || 1;
-  // Centres fill a box's corners seldom: the ball that 90 % of them are in is smaller than the one around the box.
-  return { min, max, center, radius: radius * 0.7 };
-}
 
 const asError = (error: unknown): Error => (error instanceof Error ? error : new Error(String(error)));

@@ -113,6 +113,9 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
   if (!isVector(origin)) fail('origin', '3 numbers', origin);
   const hasBounds = isVector(bounds?.min) && isVector(bounds.max) && isVector(bounds.center);
   if (!hasBounds || !Number.isFinite(bounds?.radius)) fail('bounds', 'min, max, center and radius', bounds);
+  const subject = bounds!.subject;
+  const isBall = subject === undefined || (isVector(subject?.center) && Number.isFinite(subject.radius));
+  if (!isBall) fail('bounds.subject', 'center and radius, or nothing', subject);
   if (!Array.isArray(trees) || trees.length === 0) fail('trees', 'one tree or more', trees);
   trees!.forEach((tree, t) => checkTree(tree, (path, ...rest) => fail(`trees[${t}].${path}`, ...rest)));
   if (!Array.isArray(instances) || instances.length === 0) fail('instances', 'one instance or more', instances);

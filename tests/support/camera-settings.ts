@@ -1,0 +1,10 @@
+/** Settings of the element's camera, by its attributes. */
+import assert from 'node:assert/strict';
+import { readAttributes, type RawAttributes } from '../../packages/element/src/attributes.js';
+import type { CameraSettings } from '../../packages/element/src/camera/settings.js';
+
+/** What attributes say of the camera: these, and no others. */
+export function settings(given: Partial<RawAttributes> = {}): CameraSettings {
+  const raw = new Proxy(given, { get: (some, name) => Reflect.get(some, name) ?? null }) as RawAttributes;
+  return readAttributes(raw, assert.fail).camera;
+}
