@@ -102,7 +102,7 @@ const kinds: Record<
   },
   'a step of an H200, close up': { make: stepped(STEEP, 0.3, 3), restless: 1 },
   'a step of an H200, from afar': { make: stepped(FLAT, 0.3, 3) },
-  'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3) },
+  'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3), restless: 1 },
   'a wide GPU': { make: stepped(WIDE, 0.3, 1.6) },
   'a wide GPU, too slow': { make: stepped(WIDE, 1.7, 4) },
   'a wide GPU, other work beside whole pictures': {

@@ -98,6 +98,21 @@ test('a rung down that makes frames longer is taken back at once, and the pace d
   }
 });
 
+test('where the first rungs win next to nothing and those far below much, these are found within a second', () => {
+  for (const won of [0, 0.02, 0.04]) {
+    const first = [1, 1 - won, 1 - won, 1 - won];
+    const shares = [...first, 0.87, 0.73, 0.63, 0.55, 0.52, 0.52];
+    for (let seed = 1; seed <= 20; seed++) {
+      const gpu = { hertz: 60, fixed: 0, shares: () => shares, noise: 0.06, spikes: 0, latency: seed % 4, seed };
+      const { frames } = run({ ...gpu, load: (now) => (now < STEP_MS ? 0.6 : 1.85) }, 2 * STEP_MS);
+      const found = p95(frames, STEP_MS + 1_000, 2 * STEP_MS);
+      assert.ok(found <= TOLERANCE, `${won}, seed ${seed}: p95 is ${found} of the target`);
+      const turns = reversals(frames, STEP_MS, STEP_MS + 5_000);
+      assert.ok(turns <= 1, `${won}, seed ${seed}: ${turns} reversals`);
+    }
+  }
+});
+
 test('where no rung wins anything the picture stays whole, or comes back to it at once and stays', () => {
   for (const [load, latency] of [
     [1.3, 0],

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { DetailController } from '../../packages/element/src/controllers/detail-controller.js';
-import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
+import { PaceController, type FramePlan } from '../../packages/element/src/controllers/pace-controller.js';
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import type { GpuScene } from '../../packages/element/src/gpu/gpu-scene.js';
 import { LADDER } from '../../packages/element/src/pace/ladder.js';
@@ -28,10 +28,12 @@ for (const wholeMs of [20, 100, 200, 214]) {
     let now = 1000;
     context.mock.method(performance, 'now', () => now);
     for (let frame = 0; frame < 20; frame++, now += INTERVAL) {
-      const { level } = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
-      pace.sample(level, level === 0 ? wholeMs : 10);
+      const plan = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
+      const { level } = plan;
+      pace.sample(plan, level === 0 ? wholeMs : 10);
     }
-    const { level } = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: false });
+    const plan = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: false });
+    const { level } = plan;
     assert.ok(level > 0, 'in motion with less');
     assert.equal(asked, false);
     let waited = 0;
@@ -73,7 +75,7 @@ test('what a frame may take is what the page says, else a share of the display t
       [5, true],
     ] as const) {
       pace.reset();
-      for (let frame = 0; frame < 4; frame++) pace.sample(0, share * budget);
+      for (let frame = 0; frame < 4; frame++) pace.sample({ level: 0, size: 0 }, share * budget);
       assert.equal(pace.report.moving !== 'whole', falls, `${share} of ${budget} ms`);
     }
   }
@@ -110,9 +112,10 @@ test('an element that draws now and then leaves others all but their whole time;
   // Its frames take 0.7 of what it may.
   const moving = {
     drawFrame: (now: number) => {
-      const { level } = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
+      const plan = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
+      const { level } = plan;
       levels.push(level);
-      pace.sample(level, 0.7 * 0.8 * INTERVAL * LADDER[level].cost);
+      pace.sample(plan, 0.7 * 0.8 * INTERVAL * LADDER[level].cost);
     },
   };
   const other = { drawFrame: ignored };
@@ -154,8 +157,9 @@ test('pictures that are small already are not made smaller, whatever they take',
   });
   const levelOf = (pixels: number): number => {
     for (let now = 1000; now < 3000; now += INTERVAL) {
-      const { level } = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
-      pace.sample(level, 1000 * LADDER[level].cost);
+      const plan = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
+      const { level } = plan;
+      pace.sample(plan, 1000 * LADDER[level].cost);
     }
     return pace.plan({ now: 3000, pixels, hasChanged: true, goesOn: true }).level;
   };
@@ -183,9 +187,10 @@ test('an element of another size is measured anew: that fewer pixels won nothing
   const move = (seconds: number, pixels: number, takes: (level: number) => number): number => {
     let last = 0;
     for (const end = now + 1000 * seconds; now < end; now += INTERVAL) {
-      const { level } = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
+      const plan = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
+      const { level } = plan;
       last = takes(level);
-      pace.sample(level, last);
+      pace.sample(plan, last);
     }
     return last;
   };
@@ -215,9 +220,10 @@ test('an element that becomes smaller in motion shows as many pixels as before a
   const move = (seconds: number, pixels: number, share: (level: number) => number): number[] => {
     const levels: number[] = [];
     for (const end = now + 1000 * seconds; now < end; now += INTERVAL) {
-      const { level } = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
+      const plan = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
+      const { level } = plan;
       levels.push(level);
-      pace.sample(level, pace.targetMs * share(level));
+      pace.sample(plan, pace.targetMs * share(level));
     }
     return levels;
   };
@@ -242,8 +248,9 @@ test('a scene that changes in every other picture of the display is in motion in
     ...{ requestFrame: () => void asked.push(now), onPace: () => undefined },
   });
   const frame = (hasChanged: boolean): number => {
-    const { level } = pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false });
-    pace.sample(level, 100 * LADDER[level].cost);
+    const plan = pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false });
+    const { level } = plan;
+    pace.sample(plan, 100 * LADDER[level].cost);
     return level;
   };
   const levels: number[] = [];
@@ -272,17 +279,17 @@ test('a change that comes while the true image of a pause is drawn belongs to th
     ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
     ...{ requestFrame: () => undefined, onPace: () => undefined },
   });
-  const plan = (now: number, hasChanged: boolean): number =>
-    pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false }).level;
+  const plan = (now: number, hasChanged: boolean): FramePlan =>
+    pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false });
   let now = 1000;
   for (let k = 0; k < 30; k++, now += 50) {
-    const level = plan(now, true);
-    pace.sample(level, level === 0 ? 300 : 60);
+    const frame = plan(now, true);
+    pace.sample(frame, frame.level === 0 ? 300 : 60);
   }
   context.mock.timers.tick(200);
-  assert.equal(plan(now, false), 0, 'the true image is begun');
+  assert.equal(plan(now, false).level, 0, 'the true image is begun');
   // It takes 300 ms, and that is not known yet.
-  assert.ok(plan(now + 310, true) > 0, 'the hand goes on');
+  assert.ok(plan(now + 310, true).level > 0, 'the hand goes on');
   pace.stop();
 });
 
@@ -295,16 +302,34 @@ test('what was measured before the page chose a quality is not told, and not bel
   });
   const frame = { pixels: PIXELS, hasChanged: true, goesOn: true };
   for (let now = 1000; now < 2000; now += INTERVAL) {
-    const { level } = pace.plan({ now, ...frame });
-    pace.sample(level, 80 * LADDER[level].cost);
+    const plan = pace.plan({ now, ...frame });
+    const { level } = plan;
+    pace.sample(plan, 80 * LADDER[level].cost);
   }
   assert.ok(pace.report.moving !== 'whole' && pace.report.lastMs !== null);
+  const late = pace.plan({ now: 1990, ...frame });
   isOn = false;
   assert.equal(pace.plan({ now: 2000, ...frame }).level, 0);
   // A frame of before is known only now.
-  pace.sample(0, 80);
+  pace.sample(late, 80);
   const { drawn, moving, reason, frameMs, lastMs } = pace.report;
   assert.deepEqual([drawn, moving, reason, frameMs, lastMs], ['whole', 'whole', 'start', null, null]);
+  pace.stop();
+});
+
+test('what a frame took that was drawn in another size says nothing', () => {
+  const ignored = (): void => undefined;
+  const pace = new PaceController({
+    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
+    ...{ requestFrame: ignored, onPace: ignored },
+  });
+  const plan = (pixels: number): FramePlan => pace.plan({ now: 1000, pixels, hasChanged: true, goesOn: true });
+  const before = plan(PIXELS);
+  const after = plan(4 * PIXELS);
+  for (let frame = 0; frame < 4; frame++) pace.sample(before, 1000);
+  assert.deepEqual([pace.report.moving, pace.report.lastMs], ['whole', null]);
+  for (let frame = 0; frame < 4; frame++) pace.sample(after, 1000);
+  assert.notEqual(pace.report.moving, 'whole');
   pace.stop();
 });
 

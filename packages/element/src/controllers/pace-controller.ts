@@ -22,6 +22,8 @@ export interface FramePlan {
   /** Rung of the ladder; 0 is the true image. */
   readonly level: number;
   readonly levers: Partial<FrameLevers> | undefined;
+  /** Number of the size that pictures have. */
+  readonly size: number;
 }
 
 /** What is known of a frame before it is drawn. */
@@ -73,6 +75,8 @@ export class PaceController {
   #rungs = LADDER.length;
   /** Of the pictures that the pace has measured. */
   #pixels = 0;
+  /** How many sizes pictures have had: frames of another one come late. */
+  #size = 0;
   #changedAt = -Infinity;
   #drawn = 0;
   /** What the last frame took, of those that are known. */
@@ -125,7 +129,7 @@ export class PaceController {
     if (hasChanged || level === 0) this.stop();
     const { displayInterval } = this.#options.scheduler();
     if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, displayInterval));
-    return { level, levers: LADDER[level].levers };
+    return { level, levers: LADDER[level].levers, size: this.#size };
   }
 
   #fit(pixels: number): void {
@@ -134,6 +138,7 @@ export class PaceController {
     if (!isOther && this.#pace.level < this.#rungs) return;
     this.#pace = resized(this.#pace, pixels / this.#pixels, this.#rungs, COSTS);
     this.#pixels = pixels;
+    this.#size++;
   }
 
   readonly #rest = (): void => {
@@ -141,9 +146,9 @@ export class PaceController {
     this.#options.requestFrame();
   };
 
-  /** What a frame took. */
-  sample(level: number, milliseconds: number): void {
-    if (!this.#options.isOn()) return;
+  /** What a frame took that was drawn by a plan. */
+  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, milliseconds: number): void {
+    if (!this.#options.isOn() || size !== this.#size) return;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
     const sample = { now: performance.now(), level, milliseconds };

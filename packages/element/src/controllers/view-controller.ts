@@ -174,10 +174,11 @@ export class ViewController implements FrameClient {
     this.#drawnVersion = version;
     const pixels = request.camera.width * request.camera.height;
     const goesOn = this.#options.camera.isMoving;
-    const { level, levers } = this.pace.plan({ now, pixels, hasChanged, goesOn });
+    const plan = this.pace.plan({ now, pixels, hasChanged, goesOn });
+    const { levers } = plan;
     // Who has chosen a quality pays for no clock.
     const onTime =
-      this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(level, spent) : undefined;
+      this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(plan, spent) : undefined;
     if (first !== undefined) {
       scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
       return;

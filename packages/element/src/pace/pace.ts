@@ -202,6 +202,16 @@ function fastestKnown(known: Knowledge): number {
   return times.findIndex((time) => time <= AS_FAST * best);
 }
 
+/**
+ * Before less of the picture is given up: the truest rung of a fourth of the cost, if nothing is known of those of half of it. The first rungs say little of these where fewer pixels are dear at first,
+ * since they must be made a larger picture again, or where what they won is within the noise. -1 where there is none.
+ */
+function firstFarBelow(known: Knowledge): number {
+  const { costs, level } = known;
+  const isKnown = costs.some((cost, rung) => 2 * cost <= costs[level] && isBelieved(rung, known));
+  return level === 0 || isKnown ? -1 : costs.findIndex((cost) => 4 * cost <= costs[level]);
+}
+
 const isAnyKnownAbove = (known: Knowledge): boolean =>
   known.costs.some((_, rung) => rung < known.level && isBelieved(rung, known));
 
@@ -224,6 +234,8 @@ function hurry(pace: Pace, now: number, { usual, last }: LateFrames, rules: Pace
     return isSoon && best * MUCH_DEARER > usual ? null : change(pace, now, truest, 'slow', last);
   }
   if (recent.length < ENOUGH_FRAMES || (!pace.climbed && isTooSoon(pace, now))) return null;
+  const deeper = firstFarBelow(known);
+  if (deeper !== -1 && !isSoon) return { ...change(pace, now, deeper, 'slow', last), hurriedAt: now };
   const to = fastestKnown(known);
   if (to < level) return change(pace, now, to, 'trial', last);
   // Where nothing is left to fall to, at once.
