@@ -19,7 +19,7 @@ import { inline } from '@gaussian-splat/economise/parts';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
-import { readInThreads } from './lib/scene-in-parts.mjs';
+import { startReading } from './lib/scene-in-parts.mjs';
 import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 
 const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options]
@@ -159,7 +159,7 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const seconds = () => (performance.now() - begun) / 1000;
   // The file and the driver take their time at the same time.
   const pool = threads > 1 ? new ThreadPool(threads) : inline;
-  const reading = readInThreads(scene, pool);
+  const { cloud: reading } = await startReading(scene, pool);
   reading.catch(() => undefined);
   const { device, isGpu } = await openDevice(scorer);
   if (isGpu) GpuEvaluator.prepare(device);

@@ -8,9 +8,18 @@ import { readInThread } from './scene-thread.mjs';
  * Rejects as `readScene` does, or with the error of the file system.
  */
 export async function readInThreads(path, pool) {
+  return (await startReading(path, pool)).cloud;
+}
+
+/**
+ * Starts that: once threads have their work, it goes on whatever keeps this one busy.
+ * @returns {Promise<{cloud: Promise<GaussianCloud>}>}
+ */
+export async function startReading(path, pool) {
   const found = pool.size > 1 ? await rangesOf(path) : undefined;
-  const cloud = found && (await gatherParts(found.ranges, pool, (parts, to) => readRows(path, found, parts, to, pool)));
-  return cloud ?? readInThread(path);
+  const readAll = (parts, to) => readRows(path, found, parts, to, pool);
+  const inParts = found && gatherParts(found.ranges, pool, readAll);
+  return { cloud: inParts ? inParts.then((cloud) => cloud ?? readInThread(path)) : readInThread(path) };
 }
 
 function readRows(path, { head, ranges }, parts, to, pool) {
