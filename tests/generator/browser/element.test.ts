@@ -137,12 +137,14 @@ describe('a generator in the element', () => {
     assertEqual(events.slice(4), ['ratechange', 'seeking', 'play', 'playing', 'pause']);
   });
 
-  for (const [what, src] of [
+  const withoutRate = contractWith({ inputs: { frame: { role: 'frame' } }, duration: 9 });
+  for (const [what, src, contract = ''] of [
     ['a scene that does not move', COMPASS],
     ['a generator that takes no time', '/tests/fixtures/families/avatar-instances.onnx'],
+    ['a generator of frames without a number of frames to a second', `${FIXTURES}frames.onnx`, withoutRate],
   ])
     it(`${what} cannot play`, async () => {
-      const element = await showLoaded({ src });
+      const element = await showLoaded({ src, contract });
       const refusal = await element.play().then(
         () => 'none',
         (error: Error) => error.name,

@@ -164,6 +164,18 @@ describe('generators', () => {
     assertEqual(generator.kind, 'webgpu', 'kind');
   });
 
+  it('driven by whole numbers alone are not either: each frame is its own, and the last stays at the end', async () => {
+    const generator = await open('frames.onnx');
+    const sink = (generator.sink = new ReadingSink(device));
+    for (const [i, timeSeconds] of [0, 0.3, 0.5, 1].entries()) {
+      generator.request({ timeSeconds });
+      await generator.idle;
+      const { values } = (await runOnCpu(`${FIXTURES}frames.onnx`, { frame: i })).gaussians;
+      const found = numbersOf(await sink.runs[i].tensors.gaussians, 'float32');
+      assert(relativeError(found, values) < 1e-6, `frame ${i} at ${timeSeconds} s`);
+    }
+  });
+
   it('draw what the CPU would have drawn: 55 dB and more', async () => {
     const generator = await open('packed.onnx');
     const gaussians = await DynamicGaussians.create(device, generator.model.layout);

@@ -96,8 +96,11 @@ async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<Mod
   return [{ url, credentials, contract }, ...chain.map((next) => ({ url: next, credentials }))];
 }
 
-async function contractOf({ contract, credentials }: LiveRequest, signal: AbortSignal): Promise<unknown> {
-  if (typeof contract !== 'string' || contract.trim().startsWith('{')) return contract || undefined;
+async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<unknown> {
+  const { credentials } = request;
+  // Templates write attributes that hold nothing; an empty address would be that of the page.
+  const contract = typeof request.contract === 'string' ? request.contract.trim() : request.contract;
+  if (typeof contract !== 'string' || contract === '' || contract.startsWith('{')) return contract || undefined;
   const remedy = 'check the address in the attribute contract, or leave it out';
   const response = await fetchBeside(
     contract,
@@ -108,9 +111,9 @@ async function contractOf({ contract, credentials }: LiveRequest, signal: AbortS
   return response.text();
 }
 
-/** False for what the clock changes nothing of: it has nothing to play. */
-const takesTime = ({ contract }: GeneratorModel): boolean =>
-  Object.values(contract.inputs).some(({ role }) => role === 'time' || role === 'frame');
+/** False for what the clock changes nothing of: it has nothing to play. Without `fps` no time tells a frame. */
+const takesTime = ({ contract: { inputs, fps } }: GeneratorModel): boolean =>
+  Object.values(inputs).some(({ role }) => role === 'time' || (role === 'frame' && fps !== undefined));
 
 /** Bounds of the centres are those of the subject, too. */
 function declaredBounds({ bounds }: Contract): Bounds | undefined {

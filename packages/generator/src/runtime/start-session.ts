@@ -1,9 +1,10 @@
 import { ContractError, miscomputedConvolutions, type ContractFault } from '@gaussian-splat/core';
-import { elementsOf, isOnGpu, type Inputs } from '../input-value.js';
+import { elementsOf, isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
 import { LiveSession, type RunOutputs, type SessionKind } from './live-session.js';
 import { loadRuntime } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { readTensors, type TensorPart } from './read-tensors.js';
+import { TENSOR_USAGE } from './tensor-bytes.js';
 
 /** Bytes of each output in which runs are compared. */
 const COMPARED_BYTES = 65_536;
@@ -50,7 +51,21 @@ export async function startSession(options: StartOptions): Promise<LiveSession> 
 async function startOnGpu(options: StartOptions, refusals: string[]): Promise<LiveSession | undefined> {
   const plain = await start('webgpu', options, refusals);
   if (plain === undefined || !canBeRecorded(options.model)) return plain?.session;
-  const changed = { ...options, inputs: otherInputs(options.inputs) };
+  const others = otherInputs(options);
+  try {
+    return await startRecorded(options, plain, { ...options, inputs: others.inputs }, refusals);
+  } finally {
+    for (const buffer of others.buffers) buffer.destroy();
+  }
+}
+
+/** @param changed the same with other inputs */
+async function startRecorded(
+  options: StartOptions,
+  plain: Started,
+  changed: StartOptions,
+  refusals: string[],
+): Promise<LiveSession | undefined> {
   const expected = await attempt(plain.session, changed, []);
   if (expected === undefined) {
     await plain.session.release();
@@ -96,13 +111,42 @@ function canBeRecorded({ header }: GeneratorModel): boolean {
   return isFixed && header.inputs.every(({ dtype }) => dtype !== 'int64');
 }
 
-/** Numbers that are not those given; what lies on the GPU stays. Whether a model likes them does not matter: two runs are compared. */
-function otherInputs(inputs: Inputs): Inputs {
-  const changed = Object.entries(inputs).map(([name, value]) => {
-    if (isOnGpu(value) || value.dtype !== 'float32') return [name, value] as const;
-    return [name, { ...value, data: Float32Array.from(value.data as Float32Array, (x) => 0.75 * x + 0.125) }] as const;
+/** What {@link otherInputs} gives. */
+interface OtherInputs {
+  readonly inputs: Inputs;
+  /** To be destroyed once nothing runs with them any more. */
+  readonly buffers: readonly GPUBuffer[];
+}
+
+/** Inputs that are not those given, pictures and Gaussians on the GPU included. Whether a model likes them does not matter: two runs are compared. */
+function otherInputs({ device, inputs }: StartOptions): OtherInputs {
+  const buffers: GPUBuffer[] = [];
+  const changed = Object.entries(inputs).map(([name, value]): [string, InputValue] => {
+    if (isOnGpu(value)) {
+      const buffer = filled(device, value);
+      buffers.push(buffer);
+      return [name, { ...value, buffer }];
+    }
+    if (value.dtype === 'float32') return [name, { ...value, data: numbers(value.data).map((x) => 0.75 * x + 0.125) }];
+    // Indices: of all others these are most likely to be within what they point into.
+    if (value.dtype === 'int32') return [name, { ...value, data: numbers(value.data).map((x) => (x === 0 ? 1 : 0)) }];
+    return [name, value];
   });
-  return Object.fromEntries(changed);
+  return { inputs: Object.fromEntries(changed), buffers };
+}
+
+const numbers = (data: unknown): Float32Array | Int32Array => data as Float32Array | Int32Array;
+
+/** What no picture and no Gaussians hold in every place: 0.25 as float32, and twice as float16. A count of rows is none. */
+const QUARTERS = { float32: 0x3e80_0000, float16: 0x3400_3400, int32: 0 } as const;
+
+/** A buffer as that of a tensor, with one number in every place. */
+function filled(device: GPUDevice, { buffer, dtype }: GpuTensor): GPUBuffer {
+  const size = Math.ceil(buffer.size / 4) * 4;
+  const other = device.createBuffer({ label: 'gs.generator.other', size, usage: TENSOR_USAGE, mappedAtCreation: true });
+  new Uint32Array(other.getMappedRange()).fill(QUARTERS[dtype]);
+  other.unmap();
+  return other;
 }
 
 interface Started {
@@ -149,11 +193,11 @@ async function attempt(
 
 const messageOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
-/** What a run has written of each buffer, or the beginning of it; what lies behind is anybody's. */
+/** What a run has written of each buffer, or the beginning of it; what lies behind is anybody's. More rows than declared are not there, and refused later. */
 function writtenParts({ outputs }: GeneratorModel, { tensors, dims }: RunOutputs): TensorPart[] {
   return outputs.map(({ name, dtype }) => {
     const size = elementsOf(dims[name]) * (dtype === 'float16' ? 2 : 4);
-    return { buffer: tensors[name], size: Math.min(COMPARED_BYTES, size - (size % 4)) };
+    return { buffer: tensors[name], size: Math.min(COMPARED_BYTES, size - (size % 4), tensors[name].size) };
   });
 }
 
