@@ -26,6 +26,8 @@ export async function openLiveModel(
     onError: (error) => (isOpen ? listeners.onError(error) : (firstFailure = error)),
     onFallback: listeners.onFallback,
   });
+  // What nobody waits for any more need not run to its end.
+  signal.addEventListener('abort', () => !isOpen && generator.close(), { once: true });
   let gaussians: DynamicGaussians | undefined;
   let pictures: LivePictures | undefined;
   try {

@@ -1,7 +1,7 @@
 import { ContractError, miscomputedConvolutions, type ContractFault } from '@gaussian-splat/core';
 import { elementsOf, isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
 import { LiveSession, type RunOutputs, type SessionKind } from './live-session.js';
-import { loadRuntime } from './load-runtime.js';
+import { loadRuntime, RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { readTensors, type TensorPart } from './read-tensors.js';
 import { TENSOR_USAGE } from './tensor-bytes.js';
@@ -14,8 +14,10 @@ export interface StartOptions {
   readonly device: GPUDevice;
   /** Inputs of the warm-up. */
   readonly inputs: Inputs;
-  /** True once the device is lost: then there is nothing left to try. */
-  readonly isLost: () => boolean;
+  /** Throws once nobody wants the session any more, or the device is lost: then there is nothing left to try. */
+  readonly requireLife: () => void;
+  /** The model has broken a copy of the runtime. */
+  readonly onBreakage: () => void;
   /** The model runs, but on the CPU; the reason is for people. */
   readonly onFallback: (reason: string) => void;
 }
@@ -23,10 +25,11 @@ export interface StartOptions {
 /**
  * A session that has run, so that everything is compiled: with its GPU commands recorded where model and runtime allow, else with
  * commands made for every run, else on the CPU.
- * @throws ContractError `contract/run` if the model runs nowhere; GaussianSplatError `network/*` if the runtime cannot be had.
+ * @throws ContractError `contract/run` if the model runs nowhere; GaussianSplatError `network/*` if the runtime cannot be had; RuntimeGone if
+ * another model has broken the runtime meanwhile; what `requireLife` throws.
  */
 export async function startSession(options: StartOptions): Promise<LiveSession> {
-  const { model, device, isLost, onFallback } = options;
+  const { model, device, onFallback } = options;
   const refusals: string[] = [];
   if (isHalfWithoutFeature(model, device)) {
     refusals.push('webgpu: its float16 tensors need the device feature shader-f16, which this device does not have');
@@ -36,12 +39,11 @@ export async function startSession(options: StartOptions): Promise<LiveSession> 
     const session = await startOnGpu(options, refusals);
     if (session) return session;
   }
-  if (!isLost()) {
-    onFallback(refusals.join('; '));
-    const started = await start('wasm', options, refusals);
-    if (started) return started.session;
-  }
-  throw new ContractError([runFault(model, refusals.join('; ') || 'a lost device')]);
+  const reason = refusals.join('; ');
+  const started = await start('wasm', options, refusals);
+  if (started === undefined) throw new ContractError([runFault(model, refusals.join('; '))]);
+  onFallback(reason);
+  return started.session;
 }
 
 /**
@@ -156,12 +158,14 @@ interface Started {
 }
 
 async function start(kind: SessionKind, options: StartOptions, refusals: string[]): Promise<Started | undefined> {
-  const { model, device } = options;
+  const { model, device, requireLife } = options;
+  requireLife();
   const runtime = await loadRuntime();
   let session: LiveSession;
   try {
     session = await LiveSession.create(kind, runtime, model, device);
   } catch (error) {
+    if (error instanceof RuntimeGone) throw error;
     refusals.push(`${kind}: ${messageOf(error)}`);
     return undefined;
   }
@@ -169,11 +173,14 @@ async function start(kind: SessionKind, options: StartOptions, refusals: string[
   if (written) return { session, written };
   await session.release();
   // Whatever broke the runtime would do so again: on the CPU, for one, what does not end would stop the page.
-  if (runtime.isBroken) throw new ContractError([runFault(model, refusals.join('; '))]);
+  if (runtime.isBroken) {
+    options.onBreakage();
+    throw new ContractError([runFault(model, refusals.join('; '))]);
+  }
   return undefined;
 }
 
-/** One run, and the first bytes of what it wrote; undefined if it fails. */
+/** One run, and the first bytes of what it wrote; undefined if it fails. @throws RuntimeGone, and then the session is released. */
 async function attempt(
   session: LiveSession,
   { device, inputs, model }: StartOptions,
@@ -186,6 +193,10 @@ async function attempt(
     });
     return await reading;
   } catch (error) {
+    if (error instanceof RuntimeGone) {
+      await session.release();
+      throw error;
+    }
     refusals.push(`${session.kind}: ${messageOf(error)}`);
     return undefined;
   }
