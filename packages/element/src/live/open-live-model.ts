@@ -80,6 +80,7 @@ function liveModel(
       : NaN,
     request: (state, camera) => {
       pictures.update(state.pictures);
+      reader.checkPose(state);
       // Two pictures and the pose of their cameras are one thing: no run may mix old and new. The last one to arrive asks again.
       if (!pictures.isLoading)
         generator.request(reader.read(state, camera, pictures.tensors, ownsControls() ? [] : null));
