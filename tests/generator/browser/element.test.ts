@@ -182,6 +182,40 @@ describe('a generator in the element', () => {
     assert(shrunk.count < 0.97 * before.count, `property: ${before.count} pixels, then ${shrunk.count}`);
   });
 
+  it('stands on the axis that its contract declares, unless the attribute names one', async () => {
+    const bounds = { min: [-1.2, -1.2, -1.2], max: [1.4, 1.6, 1.8] };
+    const contract = contractWith({ bounds, coordinates: { up: '+z' } });
+    const element = await showLoaded({ src: BALL, contract });
+    const target = (): number[] => {
+      const { x, y, z } = element.getCameraTarget();
+      return [x, y, z].map((value) => Number(value.toFixed(5)));
+    };
+    assertEqual(target(), [0.1, 0.3, -0.2], 'z up');
+    element.up = 'y';
+    await element.updateComplete;
+    assertEqual(target(), [0.1, 0.2, 0.3], 'y up, by the attribute');
+    element.up = null;
+    await element.updateComplete;
+    assertEqual(target(), [0.1, 0.3, -0.2], 'z up again');
+    const loaded = nextEvent(element, 'load');
+    element.removeAttribute('contract');
+    element.src = COMPASS;
+    await loaded;
+    const { y } = element.getCameraTarget();
+    element.up = '-y';
+    await element.updateComplete;
+    assertEqual(element.getCameraTarget().y, y, 'a file is none that declares one');
+    const free = await showLoaded({ src: BALL, contract: contractWith({ coordinates: { up: '+z' } }) });
+    const [before, orbit] = [free.getCameraTarget().toString(), free.getCameraOrbit().toString()];
+    free.up = 'z';
+    await free.updateComplete;
+    assertEqual([free.getCameraTarget().toString(), free.getCameraOrbit().toString()], [before, orbit], 'measured');
+    await free.updateFraming();
+    free.up = null;
+    await free.updateComplete;
+    assertEqual(free.getCameraTarget().toString(), before, 'framed anew');
+  });
+
   it('a pose that does not fit is told once, and the last good frame stays', async () => {
     const element = await showLoaded({ src: `${FIXTURES}split.onnx` });
     const before = await pictureOf(element);

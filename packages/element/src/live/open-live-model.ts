@@ -1,7 +1,8 @@
 /** Loaded only when a generator is shown: what knows `@gaussian-splat/generator` is behind this module and post-view.ts. */
-import type { Bounds, Contract } from '@gaussian-splat/core';
+import type { Contract } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
+import type { SceneBounds } from '../camera/settings.js';
 import type { ProgressListener } from '../loading/protocol.js';
 import { fetchBeside } from './fetch-beside.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
@@ -51,7 +52,7 @@ export async function openLiveModel(
     await generator.idle;
     signal.throwIfAborted();
     if (firstFailure !== undefined) throw asError(firstFailure);
-    const bounds = declared ?? (await gaussians.readBounds());
+    const bounds = declared ?? (await live.readBounds!());
     signal.throwIfAborted();
     isOpen = true;
     return { ...live, bounds };
@@ -69,12 +70,13 @@ function liveModel(
   pictures: LivePictures,
   { listeners, ownsControls }: LiveRequest,
 ): Omit<LiveModel, 'bounds'> {
-  const { models } = generator;
+  const { models, model } = generator;
+  const up = upOf(model.contract);
   const reader = new StateReader(models, listeners.onError);
   return {
     gaussians,
     settable: reader.settable,
-    readBounds: () => gaussians.readBounds(),
+    readBounds: async () => ({ ...(await gaussians.readBounds()), up }),
     duration: models.some(takesTime)
       ? (models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity)
       : NaN,
@@ -119,13 +121,17 @@ const takesTime = ({ contract: { inputs, fps } }: GeneratorModel): boolean =>
   Object.values(inputs).some(({ role }) => role === 'time' || (role === 'frame' && fps !== undefined));
 
 /** Bounds of the centres are those of the subject, too. */
-function declaredBounds({ bounds }: Contract): Bounds | undefined {
+function declaredBounds(contract: Contract): SceneBounds | undefined {
+  const { bounds } = contract;
   if (bounds === undefined) return undefined;
   const { min, max } = bounds;
   const center = [0, 1, 2].map((axis) => (min[axis] + max[axis]) / 2) as [number, number, number];
   const radius = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2 || 1;
   // Centres fill a box's corners seldom: the ball that 90 % of them are in is smaller than the one around the box.
-  return { min, max, center, radius: radius * 0.7 };
+  return { min, max, center, radius: radius * 0.7, up: upOf(contract) };
 }
+
+/** The element's word for the axis that a contract declares. */
+const upOf = ({ coordinates }: Contract): SceneBounds['up'] => coordinates?.up?.replace('+', '') as SceneBounds['up'];
 
 const asError = (error: unknown): Error => (error instanceof Error ? error : new Error(String(error)));
