@@ -38,6 +38,7 @@ const FAULTS: Readonly<Record<string, readonly string[]>> = {
   'faulty-random.onnx': ['contract/not-deterministic'],
   'faulty-cast.onnx': ['contract/operator'],
   'faulty-instances.onnx': ['contract/instances'],
+  'faulty-rows.onnx': ['contract/rows'],
   'faulty-run.onnx': ['contract/run'],
   // From its first second on, which the sample of the last time reaches.
   'faulty-later.onnx': ['contract/run'],

@@ -84,12 +84,31 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
   ['a shape with other names', fed([2]), withInput({ role: 'shape', names: ['a'] }), ['shape x']],
   ['a control', fed([2, 3], 'int32'), withInput({ role: 'control', range: [0, 9], default: 3 }), []],
   ['a control with other defaults', fed([2]), withInput({ role: 'control', range: [0, 9], default: [3] }), ['shape x']],
+  [
+    'a control of whole numbers with others',
+    fed([2], 'int64'),
+    withInput({ role: 'control', range: [0.2, 0.8], default: [0.5, 0.2] }),
+    ['conflict x', 'conflict x'],
+  ],
+  [
+    'a control of more than int32',
+    fed([1], 'int32'),
+    withInput({ role: 'control', range: [0, 2 ** 31], default: 1 }),
+    ['conflict x'],
+  ],
+  [
+    'a control of int64 of more than int32',
+    fed([1], 'int64'),
+    withInput({ role: 'control', range: [-1, 2 ** 31], default: 1 }),
+    [],
+  ],
   ['a symbolic control', fed(['k']), withInput({ role: 'control', range: [0, 9], default: 3 }), ['shape x']],
   ['a control of text', fed([1], 'string'), withInput({ role: 'control', range: [0, 9], default: 3 }), ['dtype x']],
   ['a picture of open size', fed([1, 3, 'h', 'w']), withInput({ role: 'image' }), []],
   ['a grey picture', fed([1, 1, 8, 8]), withInput({ role: 'image' }), ['shape x']],
   ['a newer opset', { ...ready, opsets: new Map([['ai.onnx', 27]]) }, PACKED, ['opset opset of ai.onnx']],
   ['an old opset', { ...ready, opsets: new Map([['ai.onnx', 6]]) }, PACKED, ['opset opset of ai.onnx']],
+  ['no opset', { ...ready, opsets: new Map(), operators: new Map([['Add', 1]]) }, PACKED, ['opset opset of ai.onnx']],
   ['a newer IR version', { ...ready, irVersion: 14 }, PACKED, ['opset IR version']],
   [
     'a foreign operator',
@@ -111,6 +130,14 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
     [],
   ],
 ];
+
+test('an input with a default in the file has no role: why is said', () => {
+  const header = { ...headerWith([], [GAUSSIANS]), optionalInputs: ['time'] };
+  const faults = checkContract(header, PACKED);
+  assertHelpful(faults);
+  assert.deepEqual(brief(faults), ['missing-tensor time']);
+  assert.match(faults[0].found, /initializer/);
+});
 
 for (const [what, header, contract, expected] of CASES) {
   test(`checkContract: ${what}`, () => {

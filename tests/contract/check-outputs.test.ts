@@ -171,6 +171,24 @@ test('declared bounds hold the centres', () => {
   assert.equal(faults[0].tensor, 'gaussians');
 });
 
+test('declared bounds of one Gaussian are its centre, rounded', () => {
+  const bounds = { min: [0.1, 200.2, -0.3], max: [0.1, 200.2, -0.3] } as const;
+  const one = packed(1, [
+    [0, 0, 0.1],
+    [0, 1, 200.2],
+    [0, 2, -0.3],
+  ]);
+  assert.deepEqual(checkBounds({ ...PACKED, bounds }, checkOutputs(PACKED, { gaussians: one })), []);
+  const half: Contract = { ...PACKED, bounds, dtype: 'float16' };
+  assert.deepEqual(checkBounds(half, checkOutputs(half, { gaussians: asHalf(one) })), []);
+  const moved = packed(1, [
+    [0, 0, 0.101],
+    [0, 1, 200.2],
+    [0, 2, -0.3],
+  ]);
+  assert.deepEqual(codes(checkBounds({ ...PACKED, bounds }, checkOutputs(PACKED, { gaussians: moved }))), ['conflict']);
+});
+
 test('pictures are finite', () => {
   const contract: Contract = { version: 1, inputs: {}, outputs: { layout: 'image', image: 'out' } };
   const out = (value: number): OutputTensor => ({

@@ -62,6 +62,7 @@ export function headerWith(
     opsets: new Map([['ai.onnx', 17]]),
     metadata: new Map(),
     inputs,
+    optionalInputs: [],
     outputs,
     operators: new Map(),
     functions: new Set(),

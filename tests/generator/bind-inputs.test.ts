@@ -114,6 +114,24 @@ test('camera_position and viewport', () => {
   assert.deepEqual(numbers(bind({ role: 'viewport' }, [2], { camera })), [640, 400]);
 });
 
+test('frame: that which a time falls into, rounding aside, and at the end the last one', () => {
+  const at = (timeSeconds: number, facts: Partial<Contract>): number =>
+    numbers(bind({ role: 'frame' }, [1], { timeSeconds }, { dtype: 'int32', facts }))[0];
+  for (const fps of [12, 24, 25, 29.97, 30, 50, 60]) {
+    for (let frame = 0; frame < 2000; frame++) {
+      assert.equal(at(frame / fps, { fps }), frame, `the beginning of frame ${frame} at ${fps}`);
+      assert.equal(at((frame + 0.999) / fps, { fps }), frame, `the end of frame ${frame} at ${fps}`);
+      assert.equal(at((frame + 1) / fps, { fps, duration: (frame + 1) / fps }), frame, `the last of ${frame + 1}`);
+    }
+  }
+  assert.deepEqual(
+    [at(9, { fps: 4, duration: 1 }), at(1, { fps: 3, duration: 0.9 }), at(-1, { fps: 4 })],
+    [3, 2, 0],
+    'beyond the ends',
+  );
+  assert.deepEqual([at(9, {}), at(9, { duration: 10 })], [0, 0], 'without fps');
+});
+
 test('time, frame, seed', () => {
   const at = (seconds: number): GeneratorState => ({ timeSeconds: seconds });
   assert.deepEqual(bind({ role: 'time', unit: 'seconds' }, [1], at(1.5)), {

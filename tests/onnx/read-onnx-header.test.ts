@@ -54,6 +54,11 @@ for (const name of fixtureNames()) {
   });
 }
 
+test('inputs with a default are told apart', async () => {
+  const { inputs, optionalInputs } = await fixtureHeader('subgraphs.onnx');
+  assert.deepEqual([inputs.map(({ name }) => name), optionalInputs], [['flag', 'x', 'list'], ['weight']]);
+});
+
 test('external data: the length that the file must have', async () => {
   const { externalFiles, initializerBytes } = await readOnnxHeader(bytesSource(fixtureBytes('external.onnx')));
   assert.deepEqual(externalFiles, [{ location: 'external.weights', byteLength: 6656 }]);

@@ -92,7 +92,7 @@ export class SplatProperties extends LitElement {
   declare disableZoom: boolean;
   /** Keeps the camera's target where it is. */
   declare disablePan: boolean;
-  /** Axis of the scene's frame that points up; default `-y`, as trainers write it. */
+  /** Axis of the scene's frame that points up; default what a generator's contract declares, else `-y`, as trainers write it. */
   declare up: 'x' | '-x' | 'y' | '-y' | 'z' | '-z' | null;
   /** Most drawn pixels for one CSS pixel; default no limit. */
   declare maxPixelRatio: number | string | null;

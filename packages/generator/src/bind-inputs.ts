@@ -55,7 +55,7 @@ function numbersOf(
     case 'time':
       return [binding.unit === 'seconds' ? timeSeconds : timeSeconds / contract.duration!];
     case 'frame':
-      return [state.frame ?? Math.floor(timeSeconds * (contract.fps ?? 0))];
+      return [state.frame ?? frameAt(timeSeconds, contract)];
     case 'seed':
       return [state.seed ?? 0];
     case 'pose':
@@ -65,6 +65,15 @@ function numbersOf(
     case 'control':
       return filled(input, state.controls?.[input.name] ?? binding.default);
   }
+}
+
+/** A share of a frame that is rounding, such as that of 29/25 s, which times 25 is less than 29. */
+const FRAME_ROUNDING = 1e-6;
+
+/** The frame that a time falls into. The end of the duration is within the last one: none begins there. */
+function frameAt(timeSeconds: number, { fps = 0, duration = Infinity }: Contract): number {
+  const last = Math.ceil(duration * fps - FRAME_ROUNDING) - 1;
+  return Math.max(0, Math.min(Math.floor(timeSeconds * fps + FRAME_ROUNDING), fps > 0 ? last : 0));
 }
 
 /** Zeros, or for quaternions the identity. */

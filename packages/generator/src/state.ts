@@ -7,7 +7,7 @@ export interface GeneratorState {
   readonly camera?: Camera;
   /** Seconds since the beginning; default 0. Beyond the contract's duration it is the page's to wrap or to stop. */
   readonly timeSeconds?: number;
-  /** Index of a frame; default: the one that `timeSeconds` falls into by the contract's fps, else 0. */
+  /** Index of a frame; default: the one that `timeSeconds` falls into by the contract's fps, and the last of its duration from there on; without fps 0. */
   readonly frame?: number;
   /** Default 0. */
   readonly seed?: number;

@@ -137,12 +137,14 @@ describe('a generator in the element', () => {
     assertEqual(events.slice(4), ['ratechange', 'seeking', 'play', 'playing', 'pause']);
   });
 
-  for (const [what, src] of [
+  const withoutRate = contractWith({ inputs: { frame: { role: 'frame' } }, duration: 9 });
+  for (const [what, src, contract = ''] of [
     ['a scene that does not move', COMPASS],
     ['a generator that takes no time', '/tests/fixtures/families/avatar-instances.onnx'],
+    ['a generator of frames without a number of frames to a second', `${FIXTURES}frames.onnx`, withoutRate],
   ])
     it(`${what} cannot play`, async () => {
-      const element = await showLoaded({ src });
+      const element = await showLoaded({ src, contract });
       const refusal = await element.play().then(
         () => 'none',
         (error: Error) => error.name,
@@ -178,6 +180,40 @@ describe('a generator in the element', () => {
     await delay(600);
     const shrunk = await pictureOf(slider);
     assert(shrunk.count < 0.97 * before.count, `property: ${before.count} pixels, then ${shrunk.count}`);
+  });
+
+  it('stands on the axis that its contract declares, unless the attribute names one', async () => {
+    const bounds = { min: [-1.2, -1.2, -1.2], max: [1.4, 1.6, 1.8] };
+    const contract = contractWith({ bounds, coordinates: { up: '+z' } });
+    const element = await showLoaded({ src: BALL, contract });
+    const target = (): number[] => {
+      const { x, y, z } = element.getCameraTarget();
+      return [x, y, z].map((value) => Number(value.toFixed(5)));
+    };
+    assertEqual(target(), [0.1, 0.3, -0.2], 'z up');
+    element.up = 'y';
+    await element.updateComplete;
+    assertEqual(target(), [0.1, 0.2, 0.3], 'y up, by the attribute');
+    element.up = null;
+    await element.updateComplete;
+    assertEqual(target(), [0.1, 0.3, -0.2], 'z up again');
+    const loaded = nextEvent(element, 'load');
+    element.removeAttribute('contract');
+    element.src = COMPASS;
+    await loaded;
+    const { y } = element.getCameraTarget();
+    element.up = '-y';
+    await element.updateComplete;
+    assertEqual(element.getCameraTarget().y, y, 'a file is none that declares one');
+    const free = await showLoaded({ src: BALL, contract: contractWith({ coordinates: { up: '+z' } }) });
+    const [before, orbit] = [free.getCameraTarget().toString(), free.getCameraOrbit().toString()];
+    free.up = 'z';
+    await free.updateComplete;
+    assertEqual([free.getCameraTarget().toString(), free.getCameraOrbit().toString()], [before, orbit], 'measured');
+    await free.updateFraming();
+    free.up = null;
+    await free.updateComplete;
+    assertEqual(free.getCameraTarget().toString(), before, 'framed anew');
   });
 
   it('a pose that does not fit is told once, and the last good frame stays', async () => {

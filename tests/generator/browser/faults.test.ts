@@ -284,6 +284,44 @@ describe('faults of pages that use the generator by itself', () => {
     );
     endless.close();
     warm.close();
+    await Promise.all(sink.runs.map(({ tensors }) => tensors.gaussians));
+    other.destroy();
+  });
+
+  it('a model that waits behind one that never ends is not blamed for it, and runs on the GPU', async () => {
+    setRuntimeLocation(RUNTIME);
+    const [own, other] = [await makeDevice(), await makeDevice()];
+    const told: string[] = [];
+    const onError = (error: unknown): void => void told.push((error as { message: string }).message);
+    const onFallback = (reason: string): void => void told.push(reason);
+    const endless = await Generator.open({ url: `${FIXTURES}endless.onnx?behind` }, own);
+    const waiting = await Promise.all(
+      ['first', 'second', 'third'].map(async (name) => {
+        // The last two share a session.
+        const url = `${BALL}?behind=${name === 'first'}`;
+        const generator = await Generator.open({ url }, other, { onError, onFallback });
+        generator.sink = { ingest: () => undefined };
+        return generator;
+      }),
+    );
+    waiting[0].request({ timeSeconds: 0 });
+    await waiting[0].idle;
+    setRunLimit(1500);
+    endless.sink = new ReadingSink(own);
+    endless.request({ timeSeconds: 1 });
+    await delay(300);
+    setRunLimit(120_000);
+    for (const [i, generator] of waiting.entries()) generator.request({ timeSeconds: 1 + i });
+    await endless.idle;
+    // Ends what still runs.
+    own.destroy();
+    await Promise.all(waiting.map(({ idle }) => idle));
+    assertEqual([told, waiting.map(({ runs }) => runs)], [[], [2, 1, 1]], 'errors and fallbacks, runs');
+    assert(
+      waiting.every(({ kind }) => kind !== 'wasm'),
+      'on the GPU',
+    );
+    for (const generator of [endless, ...waiting]) generator.close();
     other.destroy();
   });
 });

@@ -65,6 +65,18 @@ async function tensorOf(width: number, height: number, shape: PictureTensor['sha
   return { tensor, pixels };
 }
 
+/** 8 x 8 pixels of one grey. */
+const plainPicture = (grey: number): Promise<ImageBitmap> =>
+  createImageBitmap(
+    new ImageData(
+      colourful(8, 8)
+        .fill(grey)
+        .map((x, i) => (i % 4 === 3 ? 255 : x)),
+      8,
+      8,
+    ),
+  );
+
 before(async () => {
   device = await makeDevice();
 });
@@ -137,6 +149,24 @@ describe('a post-processor', () => {
       tensor.destroy();
     });
   }
+
+  it('is not recorded where a recording would show the first picture for ever', async () => {
+    const reading: Promise<Uint8Array>[] = [];
+    const post = await PostProcessor.open({ url: `${FIXTURES}filter-copied.onnx` }, device, {
+      onError: reportError,
+      onPicture: ({ buffer }) => reading.push(readBuffer(device, buffer)),
+    });
+    const tensor = new PictureTensor(device, { width: 8, height: 8, dtype: 'float32' });
+    for (const grey of [255, 51, 0]) {
+      tensor.upload(await plainPicture(grey));
+      post.request(tensor);
+      await post.idle;
+    }
+    const found = (await Promise.all(reading)).map((bytes) => Math.round(510 * numbersOf(bytes, 'float32')[100]));
+    assertEqual(found, [255, 51, 0], 'half of each picture');
+    post.close();
+    tensor.destroy();
+  });
 
   it('makes no buffer and reads nothing back once it is warm', async () => {
     const frame = new FilteredFrame(device, 48, 32);
@@ -222,6 +252,22 @@ describe('Gaussians made of a picture', () => {
     generator.close();
     tensor.destroy();
   });
+
+  it('are made anew where their rows get their shape last of all', async () => {
+    const generator = await Generator.open({ url: `${FIXTURES}picture-copied.onnx` }, device, { onError: reportError });
+    const sink = (generator.sink = new ReadingSink(device));
+    const tensor = new PictureTensor(device, { width: 8, height: 8, dtype: 'float32' });
+    for (const grey of [255, 51, 0]) {
+      tensor.upload(await plainPicture(grey));
+      generator.request({ pictures: { image: tensor } });
+      await generator.idle;
+    }
+    const rows = await Promise.all(sink.runs.map(({ tensors }) => tensors.gaussians));
+    const found = rows.map((bytes) => Math.round(255 * numbersOf(bytes, 'float32')[10]));
+    assertEqual(found, [255, 51, 0], 'colours of each picture');
+    generator.close();
+    tensor.destroy();
+  });
 });
 
 describe('a chain', () => {
@@ -269,6 +315,26 @@ describe('a chain', () => {
     assertEqual([generator.runs, { ...calls }], [23, earlier], 'runs and calls');
     generator.close();
     gaussians.destroy();
+  });
+
+  it('whose first model writes more rows than it declares: contract/rows, and nothing is handed on', async () => {
+    const errors: unknown[] = [];
+    const urls = ['faulty-rows.onnx', 'link.onnx'].map((name) => ({ url: FIXTURES + name }));
+    const generator = await Generator.open(urls, device, { onError: (error) => errors.push(error) });
+    const sink = (generator.sink = new ReadingSink(device));
+    device.pushErrorScope('validation');
+    for (const timeSeconds of [0, 1]) {
+      generator.request({ timeSeconds });
+      await generator.idle;
+    }
+    assertEqual(await device.popErrorScope(), null, 'errors of the GPU');
+    assertEqual(sink.runs.length, 0, 'runs');
+    assertEqual(
+      errors.map((error) => (error as { code: string }).code),
+      ['contract/rows', 'contract/rows'],
+    );
+    assert(/at most 10 rows.*64/.test(String(errors[0])), String(errors[0]));
+    generator.close();
   });
 
   it('whose models do not fit is refused before the runtime is asked', async () => {

@@ -164,6 +164,18 @@ describe('generators', () => {
     assertEqual(generator.kind, 'webgpu', 'kind');
   });
 
+  it('driven by whole numbers alone are not either: each frame is its own, and the last stays at the end', async () => {
+    const generator = await open('frames.onnx');
+    const sink = (generator.sink = new ReadingSink(device));
+    for (const [i, timeSeconds] of [0, 0.3, 0.5, 1].entries()) {
+      generator.request({ timeSeconds });
+      await generator.idle;
+      const { values } = (await runOnCpu(`${FIXTURES}frames.onnx`, { frame: i })).gaussians;
+      const found = numbersOf(await sink.runs[i].tensors.gaussians, 'float32');
+      assert(relativeError(found, values) < 1e-6, `frame ${i} at ${timeSeconds} s`);
+    }
+  });
+
   it('draw what the CPU would have drawn: 55 dB and more', async () => {
     const generator = await open('packed.onnx');
     const gaussians = await DynamicGaussians.create(device, generator.model.layout);
@@ -262,6 +274,40 @@ describe('generators', () => {
     assertEqual(sink.runs.length, 3, 'runs of the other');
   });
 
+  it('whose runs fail again and again are back with values that they can take, and were never on the CPU', async () => {
+    const [errors, reasons]: [string[], string[]] = [[], []];
+    const options: GeneratorOptions = {
+      onError: (error) => errors.push((error as { code: string }).code),
+      onFallback: (reason) => reasons.push(reason),
+    };
+    const generator = await open('faulty-later.onnx', options);
+    const sink = (generator.sink = new ReadingSink(device));
+    for (const timeSeconds of [0.1, 2, 3, 4, 0.5]) {
+      generator.request({ timeSeconds });
+      await generator.idle;
+    }
+    assertEqual([errors, sink.runs.length], [['contract/run', 'contract/run', 'contract/run'], 2], 'errors, runs');
+    const later = await open('faulty-later.onnx', options);
+    const other = (later.sink = new ReadingSink(device));
+    later.request({ timeSeconds: 0.7 });
+    await later.idle;
+    assertEqual([errors.length, other.runs.length, reasons], [3, 1, []], 'errors, runs of the other, fallbacks');
+  });
+
+  it('that run nowhere say why to each who asks, and how often', async () => {
+    const errors: unknown[] = [];
+    for (let i = 0; i < 2; i++) {
+      const bad = await open('faulty-run.onnx', { onError: (error) => errors.push(error) });
+      bad.sink = new ReadingSink(device);
+      for (const timeSeconds of [i, i + 0.5]) {
+        bad.request({ timeSeconds });
+        await bad.idle;
+      }
+    }
+    assertEqual(errors.length, 4, 'errors');
+    for (const error of errors) assert(/Reshape node/.test(String(error)), String(error));
+  });
+
   it('with NaN, infinity and a count above N draw the rest', async () => {
     const generator = await open('faulty-values.onnx');
     const gaussians = await DynamicGaussians.create(device, generator.model.layout);
@@ -316,6 +362,23 @@ describe('generators', () => {
     await delay(50);
     assertEqual(sink.runs.length, 0, 'runs');
   });
+  it('that are closed while they start are not started to the end', async () => {
+    // A start reads back what each of its runs wrote.
+    const runsOf = async (query: string, closesEarly: boolean): Promise<number> => {
+      const generator = await open(`packed.onnx?${query}`);
+      generator.sink = new ReadingSink(device);
+      const before = calls.mapAsync;
+      generator.request({ timeSeconds: 9 });
+      while (calls.mapAsync === before) await delay(1);
+      if (closesEarly) generator.close();
+      await generator.idle;
+      return calls.mapAsync - before;
+    };
+    const whole = await runsOf('whole', false);
+    const early = await runsOf('early', true);
+    assert(early < whole - 2, `${early} runs read back, of ${whole}`);
+  });
+
   it('closed, give back all memory of the GPU, that of a captured session too', async () => {
     const alive = new Set<GPUBuffer>();
     const { createBuffer } = GPUDevice.prototype;

@@ -37,7 +37,9 @@ function checkInput(input: OnnxTensor, { inputs }: Contract): ContractFault[] {
   const where = `input ${input.name} (${binding.role})`;
   const rule = inputRule(binding);
   const faults = rule ? checkTensor(input, rule, where) : checkControl(input, where);
-  return faults.length > 0 ? faults : checkDefault(input, binding, where);
+  if (faults.length > 0) return faults;
+  const lengths = checkDefault(input, binding, where);
+  return binding.role === 'control' ? [...lengths, ...checkWhole(input, binding, where)] : lengths;
 }
 
 function unboundInput({ name, ...tensor }: OnnxTensor): ContractFault {
@@ -54,8 +56,22 @@ function unboundInput({ name, ...tensor }: OnnxTensor): ContractFault {
 function missingInputs(header: OnnxHeader, { inputs }: Contract): ContractFault[] {
   return Object.keys(inputs)
     .filter((name) => !findTensor(header.inputs, name))
-    .map((name) => missingTensor('input', name, inputs[name].role, header.inputs));
+    .map((name) =>
+      header.optionalInputs.includes(name)
+        ? optionalInput(name, inputs[name].role)
+        : missingTensor('input', name, inputs[name].role, header.inputs),
+    );
 }
+
+/** ONNX lets whoever runs a model replace such a default; onnxruntime-web refuses to. */
+const optionalInput = (name: string, role: string): ContractFault => ({
+  code: 'contract/missing-tensor',
+  tensor: name,
+  where: `input ${name} (${role})`,
+  expected: 'an input without a value in the file',
+  found: 'one whose value is an initializer of the file, which ONNX Runtime in a page does not replace',
+  remedy: 'export it without a default, or leave it out of the contract',
+});
 
 function missingTensor(
   kind: 'input' | 'output',
@@ -106,6 +122,26 @@ function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): Contr
 }
 
 const CONTROL_DTYPES: TensorRule['dtypes'] = ['float32', 'int32', 'int64'];
+
+/** The default and both ends of the range of whole numbers are some, and int32 holds them. */
+function checkWhole(
+  { name, dtype }: OnnxTensor,
+  { range, default: initial }: ControlInput,
+  where: string,
+): ContractFault[] {
+  if (dtype !== 'int32' && dtype !== 'int64') return [];
+  const fits = dtype === 'int32' ? (x: number): boolean => x === (x | 0) : Number.isSafeInteger;
+  const numbers = { range, default: [initial].flat() };
+  return (['range', 'default'] as const).flatMap((field) => {
+    const wrong = numbers[field].find((value) => !fits(value));
+    if (wrong === undefined) return [];
+    const remedy = `correct ${field} in the contract, or export the input as float32`;
+    const expected = `whole numbers that ${dtype} holds`;
+    return [
+      { code: 'contract/conflict', tensor: name, where: `${where}, ${field}`, expected, found: String(wrong), remedy },
+    ];
+  });
+}
 
 function checkControl(input: OnnxTensor, where: string): ContractFault[] {
   // The rule asks for the shape that the tensor has, if all its sizes are fixed.

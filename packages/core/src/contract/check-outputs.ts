@@ -60,9 +60,12 @@ export function checkOutputs(contract: Contract, outputs: Readonly<Record<string
  * Whether the centres that a run wrote lie within the bounds that the contract declares, up to rounding. Bounds speak of all
  * times and views, but of controls, poses and shapes at their defaults: runs with others may leave them.
  */
-export function checkBounds({ bounds: declared, outputs }: Contract, { bounds }: OutputReport): ContractFault[] {
+export function checkBounds({ bounds: declared, outputs, dtype }: Contract, { bounds }: OutputReport): ContractFault[] {
   if (!declared || !bounds) return [];
-  const slack = 1e-3 * Math.max(...declared.max.map((max, axis) => max - declared.min[axis]));
+  const extent = Math.max(...declared.max.map((max, axis) => max - declared.min[axis]));
+  const farthest = Math.max(...[...declared.min, ...declared.max].map(Math.abs));
+  // Of a single Gaussian, or of a small scene far away, the extent says nothing of the rounding.
+  const slack = Math.max(1e-3 * extent, farthest * (dtype === 'float16' ? 2 ** -11 : 2 ** -23));
   const isInside = [0, 1, 2].every(
     (axis) => bounds.min[axis] >= declared.min[axis] - slack && bounds.max[axis] <= declared.max[axis] + slack,
   );

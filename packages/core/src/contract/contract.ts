@@ -109,7 +109,7 @@ export interface TimeInput {
   readonly unit: 'seconds' | 'normalized';
 }
 
-/** One int32 or int64: index of a frame, 0 or more. */
+/** One int32 or int64: index of a frame, 0 or more. By `fps` the one that the time falls into, the last one at the end of `duration`; without `fps` 0. */
 export interface FrameInput {
   readonly role: 'frame';
 }

@@ -74,6 +74,8 @@ export interface OnnxHeader {
   readonly metadata: ReadonlyMap<string, string>;
   /** Inputs that a caller must give: those that are initializers, too, have a default and are left out. */
   readonly inputs: readonly OnnxTensor[];
+  /** Names of inputs that are initializers, too: what the file gives them counts, for ONNX Runtime in a page takes no other. */
+  readonly optionalInputs: readonly string[];
   readonly outputs: readonly OnnxTensor[];
   /** How often each operator occurs, subgraphs included: `MatMul`, or `com.example:Name` outside ONNX's own domain. */
   readonly operators: ReadonlyMap<string, number>;

@@ -218,6 +218,7 @@ function headerOf(draft: Draft, { name, size }: ByteSource): OnnxHeader {
     opsets: draft.opsets,
     metadata: draft.metadata,
     inputs: draft.inputs.filter((input) => !draft.initializers.has(input.name)),
+    optionalInputs: draft.inputs.map(({ name }) => name).filter((name) => draft.initializers.has(name)),
     outputs: draft.outputs,
     operators: draft.operators,
     convolutions: [...draft.convWeights].flatMap((weights): Convolution[] => {

@@ -135,11 +135,11 @@ export const targetGrammar: AttributeGrammar<TargetSetting> = {
   parse: parseTarget,
 };
 
-/** `up`. */
-export const upGrammar: AttributeGrammar<UpAxis> = {
+/** `up`: undefined, `auto`, for what the scene says. */
+export const upGrammar: AttributeGrammar<UpAxis | undefined> = {
   expected: `one of ${UP_AXES.join(', ')}`,
-  fallback: '-y',
-  parse: (text) => UP_AXES.find((axis) => axis === text.trim().toLowerCase()) ?? null,
+  fallback: 'auto',
+  parse: (text) => (text === 'auto' ? undefined : (UP_AXES.find((axis) => axis === text.trim().toLowerCase()) ?? null)),
 };
 
 /** A number within a range, such as `interpolation-decay` (milliseconds) and `max-pixel-ratio`. */

@@ -1,7 +1,7 @@
 /** What the camera attributes mean for a given scene and picture: settings with `auto` and `%` become a pose. */
 import type { Bounds } from '@gaussian-splat/core';
 import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting, UpAxis } from './grammar.js';
-import { framingDistance, toViewer, viewerFrame, type Pose } from './orbit.js';
+import { framingDistance, toViewer, viewerFrame, type Pose, type ViewerFrame } from './orbit.js';
 import type { PoseLimits } from './orbit-camera.js';
 
 /** All camera attributes, read. */
@@ -13,8 +13,19 @@ export interface CameraSettings {
   readonly fieldOfView: AngleSetting;
   readonly minFieldOfView: AngleSetting;
   readonly maxFieldOfView: AngleSetting;
-  readonly up: UpAxis;
+  /** Undefined for what the scene says, else -y. */
+  readonly up: UpAxis | undefined;
 }
+
+/** Bounds of a scene, in its own frame. */
+export interface SceneBounds extends Bounds {
+  /** The axis that points up, where the scene declares one. */
+  readonly up?: UpAxis;
+}
+
+/** Rotation from the frame of a scene to viewer space. */
+export const frameOf = ({ up }: CameraSettings, bounds: SceneBounds): ViewerFrame =>
+  viewerFrame(up ?? bounds.up ?? '-y');
 
 const DEGREE = Math.PI / 180;
 /** What `auto` stands for. */
@@ -39,10 +50,10 @@ function distance(setting: RadiusSetting, auto: number, framing: number): number
 }
 
 /** The pose that the attributes ask for. `aspect` is width / height of the picture. */
-export function poseOf(settings: CameraSettings, bounds: Bounds, aspect: number): Pose {
+export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: number): Pose {
   const fieldOfView = angle(settings.fieldOfView, AUTO.fieldOfView);
   const framing = framingDistance(bounds.radius, fieldOfView, aspect);
-  const center = toViewer(viewerFrame(settings.up), bounds.center);
+  const center = toViewer(frameOf(settings, bounds), bounds.center);
   const [x, y, z] = settings.target.map((setting, axis) => (setting === 'auto' ? center[axis] : setting));
   return {
     theta: angle(settings.orbit.theta, AUTO.theta),
@@ -56,7 +67,7 @@ export function poseOf(settings: CameraSettings, bounds: Bounds, aspect: number)
 }
 
 /** The limits that the attributes ask for. An automatic limit gives way to a pose that was asked for outright. */
-export function limitsOf(settings: CameraSettings, bounds: Bounds, aspect: number): PoseLimits {
+export function limitsOf(settings: CameraSettings, bounds: SceneBounds, aspect: number): PoseLimits {
   const { minOrbit, maxOrbit } = settings;
   const pose = poseOf(settings, bounds, aspect);
   const framing = framingDistance(bounds.radius, pose.fieldOfView, aspect);

@@ -1,15 +1,15 @@
-import type { Bounds, Camera, Vector3 } from '@gaussian-splat/core';
-import { cameraOfPose, nearPlane, viewerFrame, type ViewerFrame } from '../camera/orbit.js';
+import type { Camera, Vector3 } from '@gaussian-splat/core';
+import { cameraOfPose, nearPlane, type ViewerFrame } from '../camera/orbit.js';
 import { OrbitCamera, type Pivot } from '../camera/orbit-camera.js';
-import { limitsOf, poseOf, type CameraSettings } from '../camera/settings.js';
+import { frameOf, limitsOf, poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
 import type { CameraChangeSource } from '../events.js';
 
 /** All of a subject that stands alone is shown, of other scenes their middle. */
-const framed = (bounds: Bounds): Bounds => ({ ...bounds, ...bounds.subject });
+const framed = (bounds: SceneBounds): SceneBounds => ({ ...bounds, ...bounds.subject });
 
 /** What is framed before any scene is known. */
-const UNKNOWN_BOUNDS: Bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
+const UNKNOWN_BOUNDS: SceneBounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 };
 /** Longest step of the damped motion, ms: after a pause the camera goes on from where it was. */
 const MAX_STEP_MS = 100;
 /** Length of the first step after a standstill, ms. */
@@ -59,11 +59,11 @@ export class CameraController {
 
   /** Rotation from the scene's frame to viewer space, in which orbit and target are. */
   get viewerFrame(): ViewerFrame {
-    return viewerFrame(this.#settings.up);
+    return frameOf(this.#settings, this.#bounds);
   }
 
   /** What was framed last, in the scene's own frame: of a subject that stands alone, `center` and `radius` are of all of it. */
-  get bounds(): Bounds {
+  get bounds(): SceneBounds {
     return this.#bounds;
   }
 
@@ -78,7 +78,7 @@ export class CameraController {
 
   /** The pinhole camera of this moment for a picture of width x height pixels. */
   view(width: number, height: number): Camera {
-    return cameraOfPose(this.#camera.now, viewerFrame(this.#settings.up), width, height, nearPlane(this.#bounds));
+    return cameraOfPose(this.#camera.now, this.viewerFrame, width, height, nearPlane(this.#bounds));
   }
 
   /** New attributes. What did not change keeps the place that a person may have given it. */
@@ -103,14 +103,14 @@ export class CameraController {
   }
 
   /** A new scene: the camera stands where the attributes ask, at once. */
-  frame(bounds: Bounds): void {
+  frame(bounds: SceneBounds): void {
     this.#bounds = framed(bounds);
     this.#isTouched = this.#isTurned = false;
     this.#reframe('automatic');
   }
 
   /** More of the scene is known: the camera goes where it would have stood, unless a person has moved it. */
-  refine(bounds: Bounds): void {
+  refine(bounds: SceneBounds): void {
     this.#bounds = framed(bounds);
     this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect);
     if (!this.#isTouched) {

@@ -1,4 +1,4 @@
-import { GaussianSplatError, loadModule, type Bounds, type Camera, type ShDegree } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
   Renderer,
   type FrameRequest,
@@ -8,6 +8,7 @@ import {
   type ProbePoint,
   type Quality,
 } from '@gaussian-splat/renderer';
+import type { SceneBounds } from '../camera/settings.js';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { Timeline } from '../live/live-model.js';
 import type { ReadCounts } from '../stats.js';
@@ -48,7 +49,7 @@ export interface Rendering {
  * and so cannot be shared), and the lease that keeps the device.
  */
 export class GpuScene {
-  readonly bounds: Bounds;
+  readonly bounds: SceneBounds;
   #gaussians: OwnedGaussians;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
@@ -74,7 +75,7 @@ export class GpuScene {
   constructor(
     lease: DeviceLease,
     gaussians: OwnedGaussians,
-    bounds: Bounds,
+    bounds: SceneBounds,
     submissions: number,
     { live, detail = {} }: { live?: Timeline; detail?: DetailLevers } = {},
   ) {

@@ -1,5 +1,6 @@
-import type { Bounds, Camera } from '@gaussian-splat/core';
+import type { Camera } from '@gaussian-splat/core';
 import type { DynamicGaussians } from '@gaussian-splat/renderer';
+import type { SceneBounds } from '../camera/settings.js';
 import type { ReadControls } from './values.js';
 
 /** What a page says about a model, apart from the camera. Small and capital letters of names are the same. */
@@ -26,7 +27,7 @@ export interface LiveListeners {
 /** What changes the Gaussians of a scene as time goes on: a generator, or a sequence of files. */
 export interface Timeline {
   /** Bounds of the Gaussians as they are now; absent where those of the first frame count. */
-  readBounds?(): Promise<Bounds>;
+  readBounds?(): Promise<SceneBounds>;
   /** Seconds; Infinity where the contract declares none. */
   readonly duration: number;
   /** Inputs that `control-NAME` sets; absent where there are none. */
@@ -39,7 +40,7 @@ export interface Timeline {
 /** A generator behind a scene, with the first frame in its Gaussians. */
 export interface LiveModel extends Timeline {
   readonly gaussians: DynamicGaussians;
-  readonly bounds: Bounds;
+  readonly bounds: SceneBounds;
 }
 
 /** Where the generator is, and what its first frame shows. */
@@ -58,6 +59,6 @@ export interface LiveRequest {
   /** False where controls may be another model's, which then reports what neither knows. */
   readonly ownsControls: () => boolean;
   /** A camera before anything is known of the scene but, perhaps, the bounds that the contract declares. */
-  readonly camera: (bounds: Bounds | undefined) => Camera;
+  readonly camera: (bounds: SceneBounds | undefined) => Camera;
   readonly listeners: LiveListeners;
 }

@@ -83,9 +83,13 @@ export class LivePictures {
   async #load(name: string, source: Picture): Promise<void> {
     try {
       const pixels = await pixelsOf(name, source, this.#options);
-      if (this.#isDestroyed || this.#sources.get(name) !== source) return;
-      this.#tensorFor(name, pixels).upload(pixels);
-      if (pixels !== source && pixels instanceof ImageBitmap) pixels.close();
+      try {
+        if (this.#isDestroyed || this.#sources.get(name) !== source) return;
+        this.#tensorFor(name, pixels).upload(pixels);
+      } finally {
+        // Made here, whether or not another has taken its place.
+        if (pixels !== source && pixels instanceof ImageBitmap) pixels.close();
+      }
     } catch (error) {
       if (!this.#isDestroyed && !this.#options.signal.aborted) this.#options.onError(error);
     }

@@ -2,7 +2,7 @@
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener } from '../loading/protocol.js';
-import { declaredBounds } from './declared-bounds.js';
+import { declaredBounds, upOf } from './declared-bounds.js';
 import { fetchBeside } from './fetch-beside.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
@@ -26,6 +26,8 @@ export async function openLiveModel(
     onError: (error) => (isOpen ? listeners.onError(error) : (firstFailure = error)),
     onFallback: listeners.onFallback,
   });
+  // What nobody waits for any more need not run to its end.
+  signal.addEventListener('abort', () => !isOpen && generator.close(), { once: true });
   let gaussians: DynamicGaussians | undefined;
   let pictures: LivePictures | undefined;
   try {
@@ -49,7 +51,7 @@ export async function openLiveModel(
     await generator.idle;
     signal.throwIfAborted();
     if (firstFailure !== undefined) throw asError(firstFailure);
-    const bounds = declared ?? (await gaussians.readBounds());
+    const bounds = declared ?? (await live.readBounds!());
     signal.throwIfAborted();
     isOpen = true;
     return { ...live, bounds };
@@ -67,17 +69,19 @@ function liveModel(
   pictures: LivePictures,
   { listeners, ownsControls }: LiveRequest,
 ): Omit<LiveModel, 'bounds'> {
-  const { models } = generator;
+  const { models, model } = generator;
+  const up = upOf(model.contract);
   const reader = new StateReader(models, listeners.onError);
   return {
     gaussians,
     settable: reader.settable,
-    readBounds: () => gaussians.readBounds(),
+    readBounds: async () => ({ ...(await gaussians.readBounds()), up }),
     duration: models.some(takesTime)
       ? (models.find(({ contract }) => contract.duration !== undefined)?.contract.duration ?? Infinity)
       : NaN,
     request: (state, camera) => {
       pictures.update(state.pictures);
+      reader.checkPose(state);
       // Two pictures and the pose of their cameras are one thing: no run may mix old and new. The last one to arrive asks again.
       if (!pictures.isLoading)
         generator.request(reader.read(state, camera, pictures.tensors, ownsControls() ? [] : null));
@@ -96,8 +100,11 @@ async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<Mod
   return [{ url, credentials, contract }, ...chain.map((next) => ({ url: next, credentials }))];
 }
 
-async function contractOf({ contract, credentials }: LiveRequest, signal: AbortSignal): Promise<unknown> {
-  if (typeof contract !== 'string' || contract.trim().startsWith('{')) return contract || undefined;
+async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<unknown> {
+  const { credentials } = request;
+  // Templates write attributes that hold nothing; an empty address would be that of the page.
+  const contract = typeof request.contract === 'string' ? request.contract.trim() : request.contract;
+  if (typeof contract !== 'string' || contract === '' || contract.startsWith('{')) return contract || undefined;
   const remedy = 'check the address in the attribute contract, or leave it out';
   const response = await fetchBeside(
     contract,
@@ -108,8 +115,8 @@ async function contractOf({ contract, credentials }: LiveRequest, signal: AbortS
   return response.text();
 }
 
-/** False for what the clock changes nothing of: it has nothing to play. */
-const takesTime = ({ contract }: GeneratorModel): boolean =>
-  Object.values(contract.inputs).some(({ role }) => role === 'time' || role === 'frame');
+/** False for what the clock changes nothing of: it has nothing to play. Without `fps` no time tells a frame. */
+const takesTime = ({ contract: { inputs, fps } }: GeneratorModel): boolean =>
+  Object.values(inputs).some(({ role }) => role === 'time' || (role === 'frame' && fps !== undefined));
 
 const asError = (error: unknown): Error => (error instanceof Error ? error : new Error(String(error)));

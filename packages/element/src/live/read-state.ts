@@ -1,4 +1,10 @@
-import { GaussianSplatError, type Camera, type Contract, type ControlInput } from '@gaussian-splat/core';
+import {
+  GaussianSplatError,
+  type Camera,
+  type Contract,
+  type ControlInput,
+  type InputBinding,
+} from '@gaussian-splat/core';
 import type { GeneratorModel, GeneratorState, GpuTensor } from '@gaussian-splat/generator';
 import type { LiveState } from './live-model.js';
 import { valueOf } from './values.js';
@@ -11,7 +17,7 @@ export class StateReader {
 
   /** @param models whose inputs the page may set */
   constructor(models: readonly GeneratorModel[], report: (error: GaussianSplatError) => void) {
-    this.#inputs = Object.assign({}, ...models.map(({ contract }) => contract.inputs)) as Contract['inputs'];
+    this.#inputs = merged(models.map(({ contract }) => contract.inputs));
     this.#report = report;
   }
 
@@ -29,8 +35,8 @@ export class StateReader {
       const value = valueOf(state.controls, name);
       if (binding.role === 'shape') shape = value;
       if (binding.role !== 'control') continue;
-      if (valueOf(state.pictures, name) !== undefined)
-        this.#tell(name, 'numbers', String(state.pictures[name]), 'its default counts');
+      const picture = valueOf(state.pictures, name);
+      if (picture !== undefined) this.#tell(name, 'numbers', String(picture).slice(0, 60), 'its default counts');
       if (value !== undefined) controls[name] = this.#inRange(name, binding, value);
     }
     if (others) this.#reportUnknown([...Object.keys(state.controls), ...Object.keys(state.pictures)], others);
@@ -64,10 +70,36 @@ export class StateReader {
     }
   }
 
+  /** Tells of a pose that no model takes. */
+  checkPose({ pose }: LiveState): void {
+    if (pose === undefined || Object.values(this.#inputs).some(({ role }) => role === 'pose')) return;
+    this.#say('pose', 'none: the model takes no pose', `${pose.length} numbers`, 'leave it out');
+  }
+
   #tell(name: string, expected: string, found: string, remedy: string): void {
-    const error = new GaussianSplatError('argument/value', { where: `control ${name}`, expected, found, remedy });
+    this.#say(`control ${name}`, expected, found, remedy);
+  }
+
+  #say(where: string, expected: string, found: string, remedy: string): void {
+    const error = new GaussianSplatError('argument/value', { where, expected, found, remedy });
     if (this.#reported.has(error.message)) return;
     this.#reported.add(error.message);
     this.#report(error);
   }
 }
+
+/** The inputs of several models. What two of them name the same is one control, whose values must suit both. */
+function merged(models: readonly Contract['inputs'][]): Contract['inputs'] {
+  const inputs: Record<string, InputBinding> = {};
+  for (const [name, binding] of models.flatMap(Object.entries<InputBinding>)) {
+    const known = Object.hasOwn(inputs, name) ? inputs[name] : undefined;
+    if (known?.role !== 'control') inputs[name] = binding;
+    else if (binding.role === 'control') inputs[name] = { ...known, range: common(known.range, binding.range) };
+  }
+  return inputs;
+}
+
+const common = ([a, b]: ControlInput['range'], [c, d]: ControlInput['range']): ControlInput['range'] => [
+  Math.max(a, c),
+  Math.min(b, d),
+];

@@ -1,3 +1,4 @@
+import { ContractError } from '@gaussian-splat/core';
 import { bufferBytes, TENSOR_USAGE } from '../runtime/tensor-bytes.js';
 import { elementsOf, type GpuTensor, type Inputs } from '../input-value.js';
 import type { RunOutputs } from '../runtime/live-session.js';
@@ -36,8 +37,13 @@ export class HandOver {
     return this.#rows;
   }
 
-  /** Copies what the first model wrote; the runtime's buffers are good for this moment only. */
+  /**
+   * Copies what the first model wrote; the runtime's buffers are good for this moment only.
+   * @throws ContractError `contract/rows` if it is more than the model declares. What was taken before stays.
+   */
   take({ tensors, dims, rows }: RunOutputs): void {
+    const { layout, header } = this.#model;
+    if (layout !== undefined && rows > layout.capacity) throw tooManyRows(header.name, layout.capacity, rows);
     this.#version++;
     this.#rows = rows;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.generator.hand-over' });
@@ -82,3 +88,14 @@ export class HandOver {
 
 const usedBytes = ({ dtype, dims }: GpuTensor): number =>
   Math.ceil((elementsOf(dims) * (dtype === 'float16' ? 2 : 4)) / 4) * 4;
+
+const tooManyRows = (name: string, capacity: number, rows: number): ContractError =>
+  new ContractError([
+    {
+      code: 'contract/rows',
+      where: `a run of ${name}`,
+      expected: `at most ${capacity} rows, as nMax of its contract says`,
+      found: `${rows}`,
+      remedy: 'raise nMax in the contract to the most rows that a run writes',
+    },
+  ]);

@@ -8,8 +8,13 @@ import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { runFault, startSession } from './start-session.js';
 
-/** Runs that may fail one after the other before the session is given up. */
+/** Runs that may fail one after the other before a model is given up, or, if it has run before, left alone for a while. */
 const MAX_FAILURES = 2;
+/** That while at first, and at most, ms: it doubles. */
+const FIRST_REST_MS = 250;
+const LONGEST_REST_MS = 2_000;
+/** Copies of the runtime that other models may break while one run is tried. */
+const MOST_COPIES = 5;
 
 /**
  * A generator on one device: one session of the runtime, however many show it. A run that fails takes the runtime's session with
@@ -23,6 +28,10 @@ export class GeneratorSession {
   #live: Promise<LiveSession> | undefined;
   #kind: SessionKind | undefined;
   #failures = 0;
+  #lastFailure: unknown;
+  #hasRun = false;
+  /** The last failure cost a copy of the runtime. */
+  #hasBroken = false;
   #isLost = false;
   #isReleased = false;
 
@@ -77,18 +86,23 @@ export class GeneratorSession {
    * `network/*` if the runtime cannot be fetched; what `use` throws.
    */
   async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
-    try {
-      await this.#runOnce(inputs, use);
-    } catch (error) {
-      if (!(error instanceof RuntimeGone)) throw error;
-      // Another model has broken the copy of the runtime that held this session: it starts again in the next copy.
-      this.#live = undefined;
-      await this.#runOnce(inputs, use);
+    for (let copies = 1; ; copies++) {
+      try {
+        return await this.#runOnce(inputs, use);
+      } catch (error) {
+        // Another model has broken the copy of the runtime that held this session: it starts again in the next copy.
+        if (!(error instanceof RuntimeGone) || copies === MOST_COPIES) throw error;
+      }
     }
   }
 
+  /** True for a model that will not be tried again: one that has never run, or that breaks the runtime whenever it does. */
+  get hasGivenUp(): boolean {
+    return this.#failures >= MAX_FAILURES && (!this.#hasRun || this.#hasBroken);
+  }
+
   async #runOnce(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
-    this.#requireLife();
+    await this.#rest();
     const starting = (this.#live ??= this.#start(inputs));
     const live = await this.#started(starting);
     try {
@@ -98,18 +112,36 @@ export class GeneratorSession {
         use(outputs);
       });
       this.#failures = 0;
+      this.#hasRun = true;
+      this.#hasBroken = false;
     } catch (error) {
       throw await this.#afterFailure(live, starting, error);
     }
+  }
+
+  /** After runs that have failed. @throws what the last one threw if the model is given up; what {@link #requireLife} throws */
+  async #rest(): Promise<void> {
+    this.#requireLife();
+    if (this.#failures < MAX_FAILURES) return;
+    if (this.hasGivenUp) throw this.#lastFailure;
+    // Values that a model cannot take may be followed by others that it can; starting again takes time.
+    const ms = Math.min(LONGEST_REST_MS, FIRST_REST_MS * 2 ** (this.#failures - MAX_FAILURES));
+    await new Promise((resolve) => setTimeout(resolve, ms));
+    this.#requireLife();
   }
 
   async #started(starting: Promise<LiveSession>): Promise<LiveSession> {
     try {
       return await starting;
     } catch (error) {
-      if (this.#live === starting) this.#live = undefined;
+      const isFirst = this.#live === starting;
+      if (isFirst) this.#live = undefined;
       this.#requireLife();
-      if (error instanceof ContractError) this.#failures = MAX_FAILURES;
+      if (error instanceof ContractError && isFirst) {
+        this.#lastFailure = error;
+        // Nowhere: no second attempt would be another.
+        this.#failures = Math.max(MAX_FAILURES, this.#failures + 1);
+      }
       throw error;
     }
   }
@@ -127,30 +159,42 @@ export class GeneratorSession {
 
   async #start(inputs: Inputs): Promise<LiveSession> {
     const { model, device } = this;
-    const isLost = (): boolean => this.#isLost;
+    const requireLife = (): void => this.#requireLife();
     const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;
-    const live = await startSession({ model, device, inputs, isLost, onFallback });
+    const live = await startSession({
+      model,
+      device,
+      inputs,
+      requireLife,
+      onBreakage: () => (this.#hasBroken = true),
+      onFallback,
+    });
     this.#kind = live.kind;
     return live;
   }
 
   async #afterFailure(live: LiveSession, starting: Promise<LiveSession>, error: unknown): Promise<unknown> {
-    if (!live.hasFailed) return error;
-    if (this.#live === starting) {
+    const isGone = error instanceof RuntimeGone;
+    if (!live.hasFailed && !isGone) return error;
+    const isFirst = this.#live === starting;
+    if (isFirst) {
       this.#live = undefined;
-      this.#failures++;
       await live.release();
     }
+    if (isGone) return error;
     if (this.#isLost) return deviceLost(error);
-    return new ContractError([runFault(this.model, error instanceof Error ? error.message : String(error))]);
+    const fault = new ContractError([runFault(this.model, error instanceof Error ? error.message : String(error))]);
+    if (isFirst) {
+      this.#failures++;
+      this.#hasBroken = live.hasBrokenRuntime;
+      this.#lastFailure = fault;
+    }
+    return fault;
   }
 
   #requireLife(): void {
     if (this.#isLost) throw deviceLost(undefined);
     if (this.#isReleased) throw new DOMException('The generator was closed', 'AbortError');
-    if (this.#failures >= MAX_FAILURES) {
-      throw new ContractError([runFault(this.model, `${MAX_FAILURES} runs in a row that failed`)]);
-    }
   }
 }
 

@@ -94,6 +94,11 @@ export class LiveSession {
     return this.#hasFailed;
   }
 
+  /** True if the copy of the runtime that it is in cannot be used any more. */
+  get hasBrokenRuntime(): boolean {
+    return this.#runtime.isBroken;
+  }
+
   /**
    * Runs the model, and hands what it wrote to `use`, which must submit all its work before it returns. Nothing else of the runtime
    * runs in between.

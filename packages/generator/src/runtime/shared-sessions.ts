@@ -13,6 +13,8 @@ interface Entry {
   users: number;
   readonly abort: AbortController;
   readonly session: Promise<GeneratorSession>;
+  /** Whether it is of no use to anybody any more. */
+  readonly hasGivenUp: () => boolean;
   readonly fallbackListeners: Set<(reason: string) => void>;
   fallback: string | undefined;
 }
@@ -38,7 +40,8 @@ export async function acquireSession(
   devices.set(device, entries);
   const key = keyOf(source);
   let entry = entries.get(key);
-  if (entry === undefined) entries.set(key, (entry = open(source, device, options)));
+  // Whoever asks anew may find another file at the address.
+  if (entry === undefined || entry.hasGivenUp()) entries.set(key, (entry = open(source, device, options)));
   const shared = entry;
   const { onFallback = () => undefined } = options;
   shared.users++;
@@ -72,10 +75,12 @@ function open(source: ModelSource, device: GPUDevice, { onProgress }: AcquireOpt
     entry.fallback = reason;
     for (const listener of fallbackListeners) listener(reason);
   };
+  let opened: GeneratorSession | undefined;
   const session = openModel(source, { onProgress, signal: abort.signal }).then(
-    (model) => new GeneratorSession(model, device, onFallback),
+    (model) => (opened = new GeneratorSession(model, device, onFallback)),
   );
-  const entry: Entry = { users: 0, abort, session, fallbackListeners, fallback: undefined };
+  const hasGivenUp = (): boolean => opened?.hasGivenUp ?? false;
+  const entry: Entry = { users: 0, abort, session, hasGivenUp, fallbackListeners, fallback: undefined };
   return entry;
 }
 

@@ -1,9 +1,10 @@
 import { ContractError, miscomputedConvolutions, type ContractFault } from '@gaussian-splat/core';
-import { elementsOf, isOnGpu, type Inputs } from '../input-value.js';
+import { elementsOf, isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
 import { LiveSession, type RunOutputs, type SessionKind } from './live-session.js';
-import { loadRuntime } from './load-runtime.js';
+import { loadRuntime, RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { readTensors, type TensorPart } from './read-tensors.js';
+import { TENSOR_USAGE } from './tensor-bytes.js';
 
 /** Bytes of each output in which runs are compared. */
 const COMPARED_BYTES = 65_536;
@@ -13,8 +14,10 @@ export interface StartOptions {
   readonly device: GPUDevice;
   /** Inputs of the warm-up. */
   readonly inputs: Inputs;
-  /** True once the device is lost: then there is nothing left to try. */
-  readonly isLost: () => boolean;
+  /** Throws once nobody wants the session any more, or the device is lost: then there is nothing left to try. */
+  readonly requireLife: () => void;
+  /** The model has broken a copy of the runtime. */
+  readonly onBreakage: () => void;
   /** The model runs, but on the CPU; the reason is for people. */
   readonly onFallback: (reason: string) => void;
 }
@@ -22,10 +25,11 @@ export interface StartOptions {
 /**
  * A session that has run, so that everything is compiled: with its GPU commands recorded where model and runtime allow, else with
  * commands made for every run, else on the CPU.
- * @throws ContractError `contract/run` if the model runs nowhere; GaussianSplatError `network/*` if the runtime cannot be had.
+ * @throws ContractError `contract/run` if the model runs nowhere; GaussianSplatError `network/*` if the runtime cannot be had; RuntimeGone if
+ * another model has broken the runtime meanwhile; what `requireLife` throws.
  */
 export async function startSession(options: StartOptions): Promise<LiveSession> {
-  const { model, device, isLost, onFallback } = options;
+  const { model, device, onFallback } = options;
   const refusals: string[] = [];
   if (isHalfWithoutFeature(model, device)) {
     refusals.push('webgpu: its float16 tensors need the device feature shader-f16, which this device does not have');
@@ -35,12 +39,11 @@ export async function startSession(options: StartOptions): Promise<LiveSession> 
     const session = await startOnGpu(options, refusals);
     if (session) return session;
   }
-  if (!isLost()) {
-    onFallback(refusals.join('; '));
-    const started = await start('wasm', options, refusals);
-    if (started) return started.session;
-  }
-  throw new ContractError([runFault(model, refusals.join('; ') || 'a lost device')]);
+  const reason = refusals.join('; ');
+  const started = await start('wasm', options, refusals);
+  if (started === undefined) throw new ContractError([runFault(model, refusals.join('; '))]);
+  onFallback(reason);
+  return started.session;
 }
 
 /**
@@ -50,7 +53,21 @@ export async function startSession(options: StartOptions): Promise<LiveSession> 
 async function startOnGpu(options: StartOptions, refusals: string[]): Promise<LiveSession | undefined> {
   const plain = await start('webgpu', options, refusals);
   if (plain === undefined || !canBeRecorded(options.model)) return plain?.session;
-  const changed = { ...options, inputs: otherInputs(options.inputs) };
+  const others = otherInputs(options);
+  try {
+    return await startRecorded(options, plain, { ...options, inputs: others.inputs }, refusals);
+  } finally {
+    for (const buffer of others.buffers) buffer.destroy();
+  }
+}
+
+/** @param changed the same with other inputs */
+async function startRecorded(
+  options: StartOptions,
+  plain: Started,
+  changed: StartOptions,
+  refusals: string[],
+): Promise<LiveSession | undefined> {
   const expected = await attempt(plain.session, changed, []);
   if (expected === undefined) {
     await plain.session.release();
@@ -96,13 +113,42 @@ function canBeRecorded({ header }: GeneratorModel): boolean {
   return isFixed && header.inputs.every(({ dtype }) => dtype !== 'int64');
 }
 
-/** Numbers that are not those given; what lies on the GPU stays. Whether a model likes them does not matter: two runs are compared. */
-function otherInputs(inputs: Inputs): Inputs {
-  const changed = Object.entries(inputs).map(([name, value]) => {
-    if (isOnGpu(value) || value.dtype !== 'float32') return [name, value] as const;
-    return [name, { ...value, data: Float32Array.from(value.data as Float32Array, (x) => 0.75 * x + 0.125) }] as const;
+/** What {@link otherInputs} gives. */
+interface OtherInputs {
+  readonly inputs: Inputs;
+  /** To be destroyed once nothing runs with them any more. */
+  readonly buffers: readonly GPUBuffer[];
+}
+
+/** Inputs that are not those given, pictures and Gaussians on the GPU included. Whether a model likes them does not matter: two runs are compared. */
+function otherInputs({ device, inputs }: StartOptions): OtherInputs {
+  const buffers: GPUBuffer[] = [];
+  const changed = Object.entries(inputs).map(([name, value]): [string, InputValue] => {
+    if (isOnGpu(value)) {
+      const buffer = filled(device, value);
+      buffers.push(buffer);
+      return [name, { ...value, buffer }];
+    }
+    if (value.dtype === 'float32') return [name, { ...value, data: numbers(value.data).map((x) => 0.75 * x + 0.125) }];
+    // Indices: of all others these are most likely to be within what they point into.
+    if (value.dtype === 'int32') return [name, { ...value, data: numbers(value.data).map((x) => (x === 0 ? 1 : 0)) }];
+    return [name, value];
   });
-  return Object.fromEntries(changed);
+  return { inputs: Object.fromEntries(changed), buffers };
+}
+
+const numbers = (data: unknown): Float32Array | Int32Array => data as Float32Array | Int32Array;
+
+/** What no picture and no Gaussians hold in every place: 0.25 as float32, and twice as float16. A count of rows is none. */
+const QUARTERS = { float32: 0x3e80_0000, float16: 0x3400_3400, int32: 0 } as const;
+
+/** A buffer as that of a tensor, with one number in every place. */
+function filled(device: GPUDevice, { buffer, dtype }: GpuTensor): GPUBuffer {
+  const size = Math.ceil(buffer.size / 4) * 4;
+  const other = device.createBuffer({ label: 'gs.generator.other', size, usage: TENSOR_USAGE, mappedAtCreation: true });
+  new Uint32Array(other.getMappedRange()).fill(QUARTERS[dtype]);
+  other.unmap();
+  return other;
 }
 
 interface Started {
@@ -112,12 +158,14 @@ interface Started {
 }
 
 async function start(kind: SessionKind, options: StartOptions, refusals: string[]): Promise<Started | undefined> {
-  const { model, device } = options;
+  const { model, device, requireLife } = options;
+  requireLife();
   const runtime = await loadRuntime();
   let session: LiveSession;
   try {
     session = await LiveSession.create(kind, runtime, model, device);
   } catch (error) {
+    if (error instanceof RuntimeGone) throw error;
     refusals.push(`${kind}: ${messageOf(error)}`);
     return undefined;
   }
@@ -125,11 +173,14 @@ async function start(kind: SessionKind, options: StartOptions, refusals: string[
   if (written) return { session, written };
   await session.release();
   // Whatever broke the runtime would do so again: on the CPU, for one, what does not end would stop the page.
-  if (runtime.isBroken) throw new ContractError([runFault(model, refusals.join('; '))]);
+  if (runtime.isBroken) {
+    options.onBreakage();
+    throw new ContractError([runFault(model, refusals.join('; '))]);
+  }
   return undefined;
 }
 
-/** One run, and the first bytes of what it wrote; undefined if it fails. */
+/** One run, and the first bytes of what it wrote; undefined if it fails. @throws RuntimeGone, and then the session is released. */
 async function attempt(
   session: LiveSession,
   { device, inputs, model }: StartOptions,
@@ -142,6 +193,10 @@ async function attempt(
     });
     return await reading;
   } catch (error) {
+    if (error instanceof RuntimeGone) {
+      await session.release();
+      throw error;
+    }
     refusals.push(`${session.kind}: ${messageOf(error)}`);
     return undefined;
   }
@@ -149,11 +204,11 @@ async function attempt(
 
 const messageOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
-/** What a run has written of each buffer, or the beginning of it; what lies behind is anybody's. */
+/** What a run has written of each buffer, or the beginning of it; what lies behind is anybody's. More rows than declared are not there, and refused later. */
 function writtenParts({ outputs }: GeneratorModel, { tensors, dims }: RunOutputs): TensorPart[] {
   return outputs.map(({ name, dtype }) => {
     const size = elementsOf(dims[name]) * (dtype === 'float16' ? 2 : 4);
-    return { buffer: tensors[name], size: Math.min(COMPARED_BYTES, size - (size % 4)) };
+    return { buffer: tensors[name], size: Math.min(COMPARED_BYTES, size - (size % 4), tensors[name].size) };
   });
 }
 

@@ -1,0 +1,69 @@
+/** What a page says, in a generator's words: values within ranges, and reports of what does not fit. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import type { Camera, Contract, GaussianSplatError } from '@gaussian-splat/core';
+import type { GeneratorModel, GeneratorState } from '@gaussian-splat/generator';
+import type { LiveState } from '../../packages/element/src/live/live-model.js';
+import { StateReader } from '../../packages/element/src/live/read-state.js';
+
+const CAMERA = {} as Camera;
+const STATE: LiveState = { timeSeconds: 0, pose: undefined, controls: {}, pictures: {} };
+
+/** Reads states for models with these inputs. */
+function readerOf(...models: Contract['inputs'][]): {
+  read: (state: Partial<LiveState>) => GeneratorState;
+  told: string[];
+} {
+  const told: string[] = [];
+  const reader = new StateReader(
+    models.map((inputs) => ({ contract: { inputs } }) as unknown as GeneratorModel),
+    ({ message }: GaussianSplatError) => told.push(message),
+  );
+  const read = (some: Partial<LiveState>): GeneratorState => {
+    const state = { ...STATE, ...some };
+    reader.checkPose(state);
+    return reader.read(state, CAMERA, {}, []);
+  };
+  return { read, told };
+}
+
+const control = (least: number, most: number): Contract['inputs'][string] => ({
+  role: 'control',
+  range: [least, most],
+  default: least,
+});
+
+test('a control that two models of a chain name the same stays within the ranges of both', () => {
+  const { read, told } = readerOf({ Amount: control(-2, 1) }, { Amount: control(-1, 5) });
+  assert.deepEqual(
+    [0.5, 3, -3].map((amount) => read({ controls: { amount: [amount] } }).controls),
+    [{ Amount: 0.5 }, { Amount: 1 }, { Amount: -1 }],
+  );
+  assert.equal(told.length, 2);
+  assert.match(told[0], /expected -1 to 1, found 3/);
+});
+
+test('a control that is a tensor of Gaussians in the next model can still be set', () => {
+  const { read, told } = readerOf(
+    { scales: control(0, 9) },
+    { scales: { role: 'gaussians', attribute: 'scales', scaleActivation: 'log' } },
+  );
+  assert.deepEqual([read({ controls: { scales: [4] } }).controls, told], [{ scales: 4 }, []]);
+});
+
+test('a text for a control is told as it was written, capital letters of the input or not', () => {
+  const { read, told } = readerOf({ Amount: control(0, 1) });
+  assert.deepEqual(read({ pictures: { amount: 'much' } }).controls, {});
+  assert.equal(told.length, 1);
+  assert.match(told[0], /control Amount: expected numbers, found much/);
+});
+
+test('a pose is told where no model takes one, once', () => {
+  const { read, told } = readerOf({ amount: control(0, 1) });
+  for (let i = 0; i < 2; i++) read({ pose: [1, 2, 3] });
+  assert.equal(told.length, 1);
+  assert.match(told[0], /^pose: expected none/);
+  const posed = readerOf({ amount: control(0, 1) }, { body: { role: 'pose', format: 'axis-angle' } });
+  assert.deepEqual(posed.read({ pose: [1, 2, 3] }).pose, [1, 2, 3]);
+  assert.deepEqual(posed.told, []);
+});
