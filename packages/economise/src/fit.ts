@@ -122,7 +122,8 @@ async function chooseDropping(
   ].map(({ values, cutAt }) => {
     const places = [TRIAL_SHARE, ...DROPPED_SHARES].map((share) => Math.floor(share * (values.length - 1)));
     const [trial, ...dropped] = valuesAtPlaces(values, places);
-    return { trial, dropped, cutAt };
+    // What costs nothing at all goes first, however little more may go.
+    return { trial, dropped: [leastAboveZero(values), ...dropped], cutAt };
   });
   const trials: number[] = [];
   for (const { trial, cutAt } of candidates)
@@ -130,6 +131,15 @@ async function chooseDropping(
   const { dropped, cutAt } = candidates[trials[0] <= trials[1] ? 0 : 1];
   const thresholds = [...new Set(dropped)].filter((price) => price > 0 && Number.isFinite(price));
   return { thresholds, cutAt };
+}
+
+/** GPUs may take smaller numbers for 0. */
+const LEAST_NORMAL = 2 ** -126;
+
+function leastAboveZero(values: Float32Array): number {
+  let least = Infinity;
+  for (let i = 0; i < values.length; i++) if (values[i] >= LEAST_NORMAL && values[i] < least) least = values[i];
+  return least;
 }
 
 /**

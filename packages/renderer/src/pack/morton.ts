@@ -20,18 +20,32 @@ const LEAST_COUNT = 1024;
 export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32Array {
   if (kept.length < LEAST_COUNT) return kept;
   const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis));
-  if (axes.some(({ largestTie }) => largestTie > FLAT_SHARE)) return kept;
+  if (axes.some(isFlat)) return kept;
   const codes = new Uint32Array(kept.length);
   for (let k = 0; k < kept.length; k++) codes[k] = mortonCode(positions, 3 * kept[k], axes);
   return sortByCode(kept, codes);
 }
 
+/**
+ * True for splats of planes or layers: some of them share a coordinate, so that cameras that look along its axis find them at equal depths. Whoever puts them into another order changes such
+ * pictures.
+ * @param positions [3 N] world units
+ */
+export function isOfPlanes(positions: Float32Array): boolean {
+  const all = new Uint32Array(positions.length / 3).map((_, i) => i);
+  return [0, 1, 2].some((axis) => isFlat(sampleAxis(positions, all, axis)));
+}
+
+/** A splat alone shares nothing with another. */
+const isFlat = ({ largestTie, samples }: Axis): boolean => largestTie > Math.max(1, FLAT_SHARE * samples);
+
 interface Axis {
   readonly median: number;
   /** Median distance from the median. */
   readonly spread: number;
-  /** Share of the sample that has one and the same coordinate. */
+  /** How many of the sample have one and the same coordinate. */
   readonly largestTie: number;
+  readonly samples: number;
 }
 
 function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
@@ -48,7 +62,7 @@ function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): A
     tie = sample[k] === sample[k - 1] ? tie + 1 : 1;
     largestTie = Math.max(largestTie, tie);
   }
-  return { median, spread: distances[count >> 1] || 1, largestTie: largestTie / count };
+  return { median, spread: distances[count >> 1] || 1, largestTie, samples: count };
 }
 
 /**
