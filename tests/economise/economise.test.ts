@@ -232,6 +232,17 @@ test('what nothing shows of goes at any figure, however much of the rest would c
   assert.ok(splats.after <= 240, `${splats.after} splats, of which 240 paint something`);
 });
 
+test('where few splats make the error grow in steps, what fits is found below the step', async () => {
+  for (const seed of [25, 37, 43]) {
+    const cloud = smallCloud(120, 0, seed);
+    const dealt = dealtViewsAround(boundsOf(cloud), { width: 60, height: 40, scored: 24 });
+    const own = { ...dealt, searched: dealt.searched.slice(0, 2), heldOut: dealt.heldOut.slice(0, 1) };
+    const evaluator = new PaintedEvaluator(cloud, { views: own });
+    const { splats, decibels: found } = await economise(cloud, { minDecibels: 40, name: 'a.ply', evaluator });
+    assert.ok(splats.after < 120 && found >= 40 && found < 60, `seed ${seed}: ${splats.after} splats, ${found} dB`);
+  }
+});
+
 test('where all splats of a file take as many coefficients none loses some for nothing', async () => {
   const cloud = smallCloud(400, 2);
   // Every other splat has bands that show, so that all have a place for them.

@@ -153,16 +153,17 @@ export async function scaleToFit(
   { signal, onStep = () => undefined }: FitOptions,
 ): Promise<number> {
   onStep('finding what the held-out views allow');
-  let [fits, fails, next] = [0, Infinity, 1];
+  let [fits, fails, next, last] = [0, Infinity, 1, Infinity];
   for (let tries = 0; tries < FIT_TRIES; tries++) {
     const { errors } = await evaluator.cut(cutAt(next * budget), 'heldOut', signal);
     const error = errorTogether(errors, 'heldOut');
     if (error <= budget) fits = next;
     else fails = next;
     if (fits === 1 || (error <= budget && error > NEAR_ENOUGH * budget)) break;
-    // Errors grow nearly as what is allowed does.
+    // Errors grow nearly as what is allowed does, but in steps where there are few splats: what has gone no farther down is no guide.
     const guess = (next * 0.995 * budget) / error;
-    next = guess > fits && guess < fails ? guess : (fits + Math.min(1, fails)) / 2;
+    next = guess > fits && guess < fails && error !== last ? guess : (fits + Math.min(1, fails)) / 2;
+    last = error;
   }
   return fits;
 }
