@@ -121,7 +121,6 @@ function writeCopies(out, tree, places) {
   return {
     manifest: {
       ...top.manifest,
-      splats: tree.levels[0].count * places.length,
       trees: [...top.manifest.trees, ...part.manifest.trees],
       instances: [...top.manifest.instances, ...copies],
     },

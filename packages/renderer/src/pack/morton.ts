@@ -30,25 +30,29 @@ export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32A
  * True for splats of planes or layers: some of them share a coordinate, so that cameras that look along its axis find them at equal depths. Whoever puts them into another order changes such
  * pictures.
  * @param positions [3 N] world units
+ * @param kept indices of splats; default all
  */
-export function isOfPlanes(positions: Float32Array): boolean {
-  const all = new Uint32Array(positions.length / 3).map((_, i) => i);
-  return [0, 1, 2].some((axis) => isFlat(sampleAxis(positions, all, axis)));
+export function isOfPlanes(
+  positions: Float32Array,
+  kept: Uint32Array = new Uint32Array(positions.length / 3).map((_, i) => i),
+): boolean {
+  return [0, 1, 2].some((axis) => isFlat(sampleAxis(positions, kept, axis)));
 }
 
 /** A splat alone shares nothing with another. */
 const isFlat = ({ largestTie, samples }: Axis): boolean => largestTie > Math.max(1, FLAT_SHARE * samples);
 
-interface Axis {
+export interface Axis {
   readonly median: number;
-  /** Median distance from the median. */
+  /** Median distance from the median, 1 where that is 0. */
   readonly spread: number;
   /** How many of the sample have one and the same coordinate. */
   readonly largestTie: number;
   readonly samples: number;
 }
 
-function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
+/** What some of the splats say of an axis. */
+export function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
   const count = Math.min(SAMPLE, kept.length);
   const sample = Float32Array.from({ length: count }, (_, k) => {
     const i = kept[Math.floor((k * kept.length) / count)];
