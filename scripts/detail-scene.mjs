@@ -167,8 +167,9 @@ async function main({ scene, out, degree, geometry, columns, rows, spacing }) {
   );
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
   const files = manifest.trees.reduce((sum, t) => sum + t.pages.length, 0);
+  const unusable = cloud.droppedCount > 0 ? `, ${cloud.droppedCount} unusable ones of the file left out,` : '';
   console.log(
-    `${manifest.splats} splats in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB); levels in ` +
+    `${manifest.splats} splats${unusable} in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB); levels in ` +
       `${((built - start) / 1000).toFixed(1)} s, pages in ${((performance.now() - built) / 1000).toFixed(1)} s: ${join(out, 'detail.json')}`,
   );
 }
