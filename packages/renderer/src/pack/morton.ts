@@ -32,11 +32,14 @@ export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32A
  * @param positions [3 N] world units
  * @param kept indices of splats; default all
  */
-export function isOfPlanes(
-  positions: Float32Array,
-  kept: Uint32Array = new Uint32Array(positions.length / 3).map((_, i) => i),
-): boolean {
+export function isOfPlanes(positions: Float32Array, kept: Uint32Array = spread(positions.length / 3)): boolean {
   return [0, 1, 2].some((axis) => isFlat(sampleAxis(positions, kept, axis)));
+}
+
+/** Numbers of those that are looked at, where all are there. */
+function spread(count: number): Uint32Array {
+  const samples = Math.min(SAMPLE, count);
+  return Uint32Array.from({ length: samples }, (_, k) => Math.floor((k * count) / samples));
 }
 
 /** A splat alone shares nothing with another. */
