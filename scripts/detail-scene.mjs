@@ -1,15 +1,16 @@
 /** The work behind `npm run detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
-import { existsSync, mkdirSync, readdirSync, statSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { buildDetailTree, cutPages, manifestOf, packPage, treeOfCopies } from '@gaussian-splat/renderer';
+import { writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/read-whole.mjs';
 
 const USAGE = `usage: npm run detail -- SCENE --out FOLDER [options]
 
-  --out FOLDER    an empty folder, or one that does not exist yet: detail.json and pages/, docs/detail-pages.md describes them
+  --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/detail-pages.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
   --exact         centres, shapes and opacities as float32 keeps them; default: quantized, in half of the bytes, 66 dB and more from that
   --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
@@ -49,7 +50,7 @@ function parseOptions(args) {
   if (existsSync(scene) && statSync(scene).isDirectory())
     throw new UsageError(`${positionals[0]} is a folder, no scene`);
   if (existsSync(out) && !statSync(out).isDirectory()) throw new UsageError(`--out: ${values.out} is no folder`);
-  if (existsSync(out) && readdirSync(out).length > 0) throw new UsageError(`--out: ${values.out} is not empty`);
+  if (existsSync(out) && !isEmpty(out) && !isUnfinished(out)) throw new UsageError(`--out: ${values.out} is not empty`);
   const tile = /^([1-9]\d{0,3})x([1-9]\d{0,3})$/.exec(values.tile ?? '1x1');
   if (tile === null) throw new UsageError(`--tile: expected AxB such as 24x24, found "${values.tile}"`);
   const spacing = values.spacing === undefined ? undefined : Number(values.spacing);
@@ -69,6 +70,15 @@ function parseOptions(args) {
     rows: Number(tile[2]),
     spacing,
   };
+}
+
+const isEmpty = (folder) => readdirSync(folder).length === 0;
+
+/** True for what an earlier run left that was ended before it was done: pages of ours, and no manifest, which is written last. */
+function isUnfinished(folder) {
+  const pages = join(folder, 'pages');
+  if (readdirSync(folder).join() !== 'pages' || !statSync(pages).isDirectory()) return false;
+  return readdirSync(pages).every((name) => /^(scene|top|part)-\d{5,}\.bin$/.test(name));
 }
 
 /** A cloud without the harmonics above a degree. */
@@ -121,12 +131,26 @@ function writeCopies(out, tree, places) {
   return {
     manifest: {
       ...top.manifest,
-      splats: tree.levels[0].count * places.length,
       trees: [...top.manifest.trees, ...part.manifest.trees],
       instances: [...top.manifest.instances, ...copies],
     },
     bytes: top.bytes + part.bytes,
   };
+}
+
+/** Pages first, then the manifest that names them: a folder without one is no scene. Where writing fails no pages stay. */
+function writeFolder(out, writePages) {
+  const pages = join(out, 'pages');
+  if (existsSync(out) && isUnfinished(out)) rmSync(pages, { recursive: true });
+  mkdirSync(pages, { recursive: true });
+  try {
+    const written = writePages();
+    writeWhole(join(out, 'detail.json'), JSON.stringify(written.manifest));
+    return written;
+  } catch (error) {
+    rmSync(pages, { recursive: true, force: true });
+    throw error;
+  }
 }
 
 async function main({ scene, out, degree, geometry, columns, rows, spacing }) {
@@ -137,14 +161,15 @@ async function main({ scene, out, degree, geometry, columns, rows, spacing }) {
   const built = performance.now();
   const isTiled = columns * rows > 1;
   if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
-  mkdirSync(join(out, 'pages'), { recursive: true });
   const places = isTiled ? placesOf(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : [];
-  const { manifest, bytes } = isTiled ? writeCopies(out, tree, places) : writeTree(out, 'scene', tree, cutPages(tree));
-  writeFileSync(join(out, 'detail.json'), JSON.stringify(manifest));
+  const { manifest, bytes } = writeFolder(out, () =>
+    isTiled ? writeCopies(out, tree, places) : writeTree(out, 'scene', tree, cutPages(tree)),
+  );
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
   const files = manifest.trees.reduce((sum, t) => sum + t.pages.length, 0);
+  const unusable = cloud.droppedCount > 0 ? `, ${cloud.droppedCount} unusable ones of the file left out,` : '';
   console.log(
-    `${manifest.splats} splats in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB); levels in ` +
+    `${manifest.splats} splats${unusable} in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB); levels in ` +
       `${((built - start) / 1000).toFixed(1)} s, pages in ${((performance.now() - built) / 1000).toFixed(1)} s: ${join(out, 'detail.json')}`,
   );
 }

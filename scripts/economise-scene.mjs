@@ -1,5 +1,5 @@
 /** The work behind `npm run economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
-import { readFileSync, statSync } from 'node:fs';
+import { statSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
@@ -19,6 +19,7 @@ import { inline } from '@gaussian-splat/economise/parts';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
+import { readJson } from './lib/read-json.mjs';
 import { startReading } from './lib/scene-in-parts.mjs';
 import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 
@@ -107,7 +108,7 @@ function checkFiles({ scene, out, views, report }) {
 
 function parseViews(path) {
   try {
-    const views = JSON.parse(readFileSync(path, 'utf8'))?.views;
+    const views = readJson(path)?.views;
     if (Array.isArray(views)) return views;
   } catch (error) {
     if (!(error instanceof SyntaxError)) throw error;
@@ -188,10 +189,11 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scorer,
   const share = ({ before, after }) => `${((100 * after) / Math.max(1, before)).toFixed(1)} %`;
   const [oldBytes, newBytes] = [statSync(scene).size, result.bytes.length];
   const times = Object.entries(spent).map(([work, time]) => `${work} ${time.toFixed(2)}`);
+  const unusable = cloud.droppedCount > 0 ? `; ${cloud.droppedCount} unusable ones of the file left out` : '';
   console.log(`
 asked        ${minDecibels.toFixed(2)} dB
 found        ${result.decibels.toFixed(2)} dB in ${result.heldOutViews} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
-splats       ${splats.after} of ${splats.before} (${share(splats)})
+splats       ${splats.after} of ${splats.before} (${share(splats)})${unusable}
 SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficients)}); splats by degree ${result.degrees.join(', ')}
 bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}
 seconds      ${times.join(', ')}`);

@@ -1,5 +1,4 @@
 /** The work behind `npm run render`: one scene, one camera, one image, on the same renderer that the element uses. */
-import { readFileSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { PNG } from 'pngjs';
@@ -8,6 +7,7 @@ import { readScene } from '@gaussian-splat/formats';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
+import { readJson } from './lib/read-json.mjs';
 import { readWhole } from './lib/read-whole.mjs';
 
 const USAGE = `usage: npm run render -- SCENE --camera CAMERA.json --out IMAGE.png [options]
@@ -79,7 +79,7 @@ function parseBackground(text) {
 function readCamera(path, name) {
   let content;
   try {
-    content = JSON.parse(readFileSync(resolve(from, path), 'utf8'));
+    content = readJson(resolve(from, path));
   } catch (error) {
     throw new UsageError(`--camera: cannot read ${path} as JSON: ${error.message}`);
   }
@@ -130,6 +130,8 @@ function checkFiles({ scene, camera, out, float }) {
     const obstacle = obstacleTo(file);
     if (obstacle) throw new UsageError(`--${option}: ${obstacle}`);
   }
+  if (out && float && isSameFile(resolve(from, out), resolve(from, float)))
+    throw new UsageError('--float: expected another file than that of --out');
 }
 
 async function render(options) {

@@ -1,7 +1,16 @@
 /** `npm run detail`: what it writes is what readers expect, and what it cannot do it says at once. */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
-import { existsSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import {
+  existsSync,
+  mkdirSync,
+  mkdtempSync,
+  readdirSync,
+  readFileSync,
+  rmSync,
+  statSync,
+  writeFileSync,
+} from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
@@ -75,3 +84,30 @@ test('arguments that make no sense are told of in a line, without a trace of the
   assert.match(text, /missing\.ply/);
   assert.doesNotMatch(text, /\n {4}at /);
 });
+
+test(
+  'a run that was ended early is no obstacle to the next, and what fails to be written leaves no pages',
+  { skip: process.platform === 'win32' },
+  () => {
+    const out = join(folder, 'ended');
+    mkdirSync(join(out, 'pages'), { recursive: true });
+    for (const name of ['scene-00000.bin', 'scene-00007.bin']) writeFileSync(join(out, 'pages', name), 'half');
+    const again = detail(sceneOf(300), '--out', out);
+    assert.equal(again.status, 0, again.text);
+    assert.deepEqual(readdirSync(join(out, 'pages')), ['scene-00000.bin'], 'nothing of the earlier run is left');
+    assert.match(detail(sceneOf(300), '--out', out).text, /is not empty/, 'a scene that is whole stays');
+
+    const own = join(folder, 'own');
+    mkdirSync(join(own, 'pages'), { recursive: true });
+    writeFileSync(join(own, 'pages', 'diary.txt'), 'mine');
+    assert.match(detail(sceneOf(300), '--out', own).text, /is not empty/);
+    assert.equal(readFileSync(join(own, 'pages', 'diary.txt'), 'utf8'), 'mine');
+
+    const full = join(folder, 'full');
+    const command = `ulimit -f 8; exec "${process.execPath}" scripts/detail-scene.mjs "${sceneOf(3000)}" --out "${full}"`;
+    const { status, stderr } = spawnSync('bash', ['-c', command], { encoding: 'utf8' });
+    assert.equal(status, 1, stderr);
+    assert.match(stderr, /^EFBIG: file too large/m);
+    assert.equal(existsSync(join(full, 'pages')), false);
+  },
+);

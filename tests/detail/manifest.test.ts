@@ -102,3 +102,18 @@ test('lists within lists, where a manifest has something else, are refused with 
   assert.throws(() => checkManifest({ ...manifests[0], bounds: deep }, 'detail.json'), { code: 'decode/header' });
   assert.throws(() => checkManifest({ format: deep }, 'detail.json'), { code: 'decode/unsupported' });
 });
+
+test('a manifest is checked in a time that grows as its files do', () => {
+  const [first] = manifests[1].trees[0].pages;
+  // Each file below the last chunk of the one before.
+  const pages = Array.from({ length: 60_000 }, (_, p) => ({
+    ...{ file: first.file, chunks: 5, upper: 1 },
+    ...(p > 0 && { parent: [p - 1, 4] as const }),
+  }));
+  const long = { ...manifests[1], trees: [{ pages }], instances: [{ tree: 0, translate: [0, 0, 0] }] };
+  const start = process.cpuUsage();
+  checkManifest(long, 'detail.json');
+  const seconds = process.cpuUsage(start).user / 1e6;
+  console.log(`60,000 files: ${seconds.toFixed(2)} s`);
+  assert.ok(seconds < 1.5, `${seconds} s`);
+});

@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import { after, test } from 'node:test';
 import { boundsOf, type Camera, type GaussianCloud, type Vector3 } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
+import { buildDetailTree, GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
 import {
   BUFFER_USAGE,
   cameraValues,
@@ -168,6 +168,53 @@ test('captured scenes are 66 dB and more from what was quantized', { skip: needs
     const found = await closenessOf(cloud, [0.6, 1.6], serial);
     console.log(`${file}: ${found.map((db) => db.toFixed(1)).join(', ')} dB`);
     assert.ok(Math.min(...found) > 66);
+  }
+});
+
+/** Stones of which every so many splats lie far off, as sky and floaters of captures do. */
+function scattered(count: number, every: number, distance: number): GaussianCloud {
+  const cloud = pebbles(count);
+  const random = randomSource(every);
+  for (let i = 0; i < 3 * count; i++) {
+    if (Math.floor(i / 3) % every === 1) cloud.positions[i] += distance * (2 * random() - 1);
+  }
+  return cloud;
+}
+
+const SCATTERED = [
+  [4_000, 4_000, 1e6],
+  [4_000, 400, 1e4],
+  [4_000, 20, 300],
+  [600, 60, 1e5],
+] as const;
+
+for (const [count, every, distance] of SCATTERED) {
+  test(`of ${count} splats every ${every}th ${distance} units off: what is near by stays 66 dB and more from what it was`, async () => {
+    const found = await closenessOf(scattered(count, every, distance), [0.6, 1.6], serial);
+    console.log(`${found.map((db) => db.toFixed(1)).join(', ')} dB`);
+    assert.ok(Math.min(...found) > 66, `${found}`);
+  });
+}
+
+test('what fills up chunks is no splat of the scene, and errors of coarser levels count what their centres are rounded by', () => {
+  for (const [count, every, distance] of SCATTERED) {
+    const tree = buildDetailTree(scattered(count, every, distance), quantized);
+    assert.equal(tree.splats, count);
+    const [leaves, ...coarser] = tree.levels;
+    assert.ok(leaves.count > count && leaves.opacities.filter((opacity) => opacity > 0).length === count);
+    coarser.forEach((level, k) => {
+      for (let first = 0; first < level.count; first += CULL_GROUP) {
+        const end = Math.min(level.count, first + CULL_GROUP);
+        const words = new Uint32Array(QUANTIZED_CHUNK_WORDS);
+        packQuantizedChunk(level, words, 0, first, end);
+        const off = readQuantizedChunk(words, 0, end - first).map(({ position }, n) =>
+          Math.hypot(...position.map((x, axis) => x - level.positions[3 * (first + n) + axis])),
+        );
+        const said = tree.errors[k + 1].errors[first / CULL_GROUP];
+        const most = Math.max(...off);
+        assert.ok(2 * most <= 1.001 * said, `level ${k + 1}, chunk ${first / CULL_GROUP}: ${2 * most}, ${said} said`);
+      }
+    });
   }
 });
 

@@ -210,6 +210,16 @@ test('a cut can be taken back', async () => {
   assert.deepEqual([errors, degrees], [[0], [0, 0, 0, COUNT]]);
 });
 
+test('splats of planes stay in the order of the file, in which those at one depth are painted', async () => {
+  const positions = scene.positions.map((value, k) => (k % 3 === 2 ? 1 : value));
+  const own = await GpuEvaluator.create(device, { ...scene, positions }, views);
+  await own.rank();
+  const { kept } = await own.reduce({ minContribution: 0.5 });
+  own.destroy();
+  assert.ok(kept.length > 10 && kept.length < COUNT, `${kept.length} of ${COUNT}`);
+  assert.deepEqual(kept, kept.slice().sort());
+});
+
 test('the asked figure is met by the written file', async () => {
   const result = await economise(scene, { minDecibels: 45, name: 'a.glb', evaluator });
   const written = await readScene(result.bytes, { name: 'a.glb' });

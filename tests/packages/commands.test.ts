@@ -152,6 +152,21 @@ test('npm run render draws a scene of several files', () => {
   assert.match(text, /^gltf\/scene\.gltf: 6 splats/m);
 });
 
+test('npm run render does not write one picture over the other', () => {
+  const { status, text } = command(
+    'render-image',
+    'gltf/scene.gltf',
+    '--camera',
+    'camera.json',
+    '--out',
+    'b.png',
+    '--float',
+    './b.png',
+  );
+  assert.equal(status, 2, text);
+  assert.match(text, /--float: expected another file than that of --out/);
+});
+
 test('npm run render says in a sentence what it was asked wrongly', () => {
   writeFileSync(inFolder('null.json'), 'null');
   writeFileSync(inFolder('views.json'), '{"views": 5}');

@@ -41,7 +41,6 @@ export function detailFolder(
   return {
     manifest: {
       ...top,
-      splats: cloud.count * places.length,
       trees: [...top.trees, ...part.trees],
       instances: [...top.instances, ...places.map((translate, c) => ({ tree: 1, translate, parent: parents[c] }))],
     },

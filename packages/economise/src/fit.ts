@@ -122,7 +122,8 @@ async function chooseDropping(
   ].map(({ values, cutAt }) => {
     const places = [TRIAL_SHARE, ...DROPPED_SHARES].map((share) => Math.floor(share * (values.length - 1)));
     const [trial, ...dropped] = valuesAtPlaces(values, places);
-    return { trial, dropped, cutAt };
+    // What costs nothing at all goes first, however little more may go.
+    return { trial, dropped: [leastAboveZero(values), ...dropped], cutAt };
   });
   const trials: number[] = [];
   for (const { trial, cutAt } of candidates)
@@ -130,6 +131,15 @@ async function chooseDropping(
   const { dropped, cutAt } = candidates[trials[0] <= trials[1] ? 0 : 1];
   const thresholds = [...new Set(dropped)].filter((price) => price > 0 && Number.isFinite(price));
   return { thresholds, cutAt };
+}
+
+/** GPUs may take smaller numbers for 0. */
+const LEAST_NORMAL = 2 ** -126;
+
+function leastAboveZero(values: Float32Array): number {
+  let least = Infinity;
+  for (let i = 0; i < values.length; i++) if (values[i] >= LEAST_NORMAL && values[i] < least) least = values[i];
+  return least;
 }
 
 /**
@@ -143,16 +153,17 @@ export async function scaleToFit(
   { signal, onStep = () => undefined }: FitOptions,
 ): Promise<number> {
   onStep('finding what the held-out views allow');
-  let [fits, fails, next] = [0, Infinity, 1];
+  let [fits, fails, next, last] = [0, Infinity, 1, Infinity];
   for (let tries = 0; tries < FIT_TRIES; tries++) {
     const { errors } = await evaluator.cut(cutAt(next * budget), 'heldOut', signal);
     const error = errorTogether(errors, 'heldOut');
     if (error <= budget) fits = next;
     else fails = next;
     if (fits === 1 || (error <= budget && error > NEAR_ENOUGH * budget)) break;
-    // Errors grow nearly as what is allowed does.
+    // Errors grow nearly as what is allowed does, but in steps where there are few splats: what has gone no farther down is no guide.
     const guess = (next * 0.995 * budget) / error;
-    next = guess > fits && guess < fails ? guess : (fits + Math.min(1, fails)) / 2;
+    next = guess > fits && guess < fails && error !== last ? guess : (fits + Math.min(1, fails)) / 2;
+    last = error;
   }
   return fits;
 }

@@ -105,7 +105,7 @@ export class LiveMask {
   ): Promise<LiveMask> {
     const views = viewsAround(bounds, SCORED, viewSize);
     const { weights, seen } = await contributionsIn(device, scene, views, patienceMs, signal);
-    const whole = await readPacked(device, scene);
+    const whole = await readPacked(device, scene, () => signal?.throwIfAborted());
     signal?.throwIfAborted();
     await keepUnseen(weights, whole, views.slice(0, seen));
     signal?.throwIfAborted();

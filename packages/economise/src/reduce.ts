@@ -1,4 +1,5 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { isOfPlanes } from '@gaussian-splat/renderer/stages';
 import { coarseToFine } from './order.js';
 import { allocateColumns, arraysOf, columnsOf } from './parts/cloud-memory.js';
 import { inline, partsOf, poolFor, type TaskPool } from './parts/task-pool.js';
@@ -19,7 +20,7 @@ export interface Cut {
 
 /** A cloud with its least needed parts gone. */
 export interface ReducedCloud {
-  /** From the most to the least seen: any beginning of it is a coarser picture of all. Coefficients above a splat's degree are 0. */
+  /** From the most to the least seen, so that any beginning of it is a coarser picture of all; of planes in the source's order. Coefficients above a splat's degree are 0. */
   readonly cloud: GaussianCloud;
   /** [N] degree that each splat keeps. */
   readonly degrees: Uint8Array;
@@ -35,6 +36,18 @@ export interface Choice {
   readonly degrees: Uint8Array;
 }
 
+/**
+ * The order in which splats of a cloud are written: the most seen first. Those of planes stay in the file's order, in which splats at equal depths are painted.
+ * @param splats numbers of those that stay, ascending
+ */
+export function writtenOrder(
+  cloud: Pick<GaussianCloud, 'scales' | 'positions'>,
+  contribution: Float32Array,
+  splats: Uint32Array,
+): Uint32Array {
+  return isOfPlanes(cloud.positions) ? splats.slice() : coarseToFine(cloud, contribution, splats);
+}
+
 /** Applies a cut. The source is left as it is. */
 export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedCloud {
   const { contribution, removalError, lowered } = scores;
@@ -45,7 +58,7 @@ export function reduce(cloud: GaussianCloud, scores: Scores, cut: Cut): ReducedC
     if (contribution[i] < minContribution || removalError[i] < removalPrice) continue;
     staying[count++] = i;
   }
-  const kept = coarseToFine(cloud, contribution, staying.subarray(0, count));
+  const kept = writtenOrder(cloud, contribution, staying.subarray(0, count));
   const degrees = Uint8Array.from(kept, (i) => degreeOf(cloud.shDegree, scores, i, colourPrice));
   const reduced = reduceTo(cloud, { kept, degrees });
   const length = 3 * shCoefficientCount(reduced.cloud.shDegree);

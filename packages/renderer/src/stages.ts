@@ -31,7 +31,7 @@ export { folderSource } from './detail/page-source.js';
 export { Residency } from './detail/residency.js';
 export { MOST_UPLOAD_BYTES, UPLOAD_SHARE, UploadPace } from './detail/upload-pace.js';
 export { halfBits } from './pack/half.js';
-export { mortonOrder } from './pack/morton.js';
+export { isOfPlanes, mortonOrder } from './pack/morton.js';
 export { recentred } from './pack/recentre.js';
 export { SH_PRECISION, shWords } from './pack/sh.js';
 export { planOffsets, Scratch } from './scratch.js';

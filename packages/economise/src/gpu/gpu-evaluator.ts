@@ -1,12 +1,12 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { Renderer } from '@gaussian-splat/renderer';
-import { rareKernelOf } from '@gaussian-splat/renderer/stages';
+import { isOfPlanes, rareKernelOf } from '@gaussian-splat/renderer/stages';
 import type { LoweredColours } from '../colour-moments.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
-import { coarseToFine, stayingInOrder } from '../order.js';
+import { stayingInOrder } from '../order.js';
 import { inline, poolFor, type TaskPool } from '../parts/task-pool.js';
-import { reduceInParts, type Cut, type ReducedCloud } from '../reduce.js';
+import { reduceInParts, writtenOrder, type Cut, type ReducedCloud } from '../reduce.js';
 import type { Ranking, Scores } from '../score.js';
 import type { DealtViews } from '../views.js';
 import { CloudBuffers } from './cloud-buffers.js';
@@ -164,7 +164,7 @@ export class GpuEvaluator implements Evaluator {
     const order = await this.#order;
     const kept = order
       ? stayingInOrder(order, staying)
-      : coarseToFine(this.#cloud, this.#ranking.contribution, staying);
+      : writtenOrder(this.#cloud, this.#ranking.contribution, staying);
     const degrees = new Uint8Array(kept.length);
     for (let k = 0; k < kept.length; k++) degrees[k] = all[kept[k]];
     const reduced = await reduceInParts(this.#cloud, { kept, degrees }, this.#pool);
@@ -203,9 +203,9 @@ export class GpuEvaluator implements Evaluator {
   }
 
   #orderAhead({ contribution }: Ranking): Promise<Uint32Array> | undefined {
-    const { count, scales } = this.#cloud;
+    const { count, scales, positions } = this.#cloud;
     const pool = poolFor(this.#pool, count, [scales]);
-    if (pool === inline) return undefined;
+    if (pool === inline || isOfPlanes(positions)) return undefined;
     const order = pool.run('orderAll', [{ scales, contribution }]).then(([all]) => all);
     // Whoever needs it hears of its error.
     order.catch(() => undefined);

@@ -1,4 +1,5 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { isOfPlanes } from '@gaussian-splat/renderer/stages';
 import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
@@ -22,6 +23,14 @@ const spz = (shBits: number): Encoding => ({
   title: `SPZ version 3, spherical harmonics of ${shBits} bits`,
   write: ({ cloud }) => writeSpz(cloud, { shBits }),
 });
+
+/** Splats of planes stay in their order, which primitives for each degree would take apart. */
+const GLB_OF_PLANES: Encoding = {
+  title: 'GLB, one primitive in the order of the scene',
+  write: ({ cloud, degrees }, pool) =>
+    writeGlb({ cloud, degrees: new Uint8Array(degrees.length).fill(cloud.shDegree) }, pool),
+  hasOneDegree: true,
+};
 
 /** Ways to write each kind of file, the smallest first. */
 const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
@@ -59,6 +68,7 @@ export function encodingsFor(
     });
   }
   const { positions, origin } = cloud;
+  if (positions && extension === '.glb' && isOfPlanes(positions)) return [GLB_OF_PLANES];
   if (positions && origin && extension === '.spz') fractionalBitsOf({ positions, origin });
   return found;
 }

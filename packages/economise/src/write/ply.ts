@@ -39,11 +39,14 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
       for (let k = 1; k < coefficients; k++) put(sh[3 * (coefficients * i + k) + channel]);
     }
     put(logit(opacities[i]));
-    for (let k = 0; k < 3; k++) put(Math.log(scales[3 * i + k]));
+    for (let k = 0; k < 3; k++) put(Math.max(LOG_NOTHING, Math.log(scales[3 * i + k])));
     for (let k = 0; k < 4; k++) put(rotations[4 * i + k]);
   }
   return bytes;
 }
+
+/** No extent has an infinite logarithm, at which other readers take offence; this is read as 0 in float32. */
+const LOG_NOTHING = -104;
 
 /** Opacity 1 has an infinite logit; 30 is as near as float32 comes. */
 function logit(opacity: number): number {

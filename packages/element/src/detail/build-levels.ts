@@ -10,12 +10,17 @@ import type { SceneLoader } from '../loading/scene-loader.js';
  * @throws GaussianSplatError `out-of-memory/*`, or the signal's reason
  */
 export async function buildLevels(
-  { device, gaussians }: GpuScene,
+  scene: GpuScene,
   loader: SceneLoader,
   memoryBudget: number | undefined,
   signal: AbortSignal,
 ): Promise<DetailedGaussians | undefined> {
-  const packed = await readPacked(device, gaussians);
+  const { device, gaussians } = scene;
+  const packed = await readPacked(device, gaussians, () => {
+    signal.throwIfAborted();
+    // An economy frees them when it puts others in their place.
+    if (scene.gaussians !== gaussians) throw new Error('other splats are on show');
+  });
   signal.throwIfAborted();
   const levels = await loader.buildLevels(packed, signal);
   if (levels === undefined) return undefined;

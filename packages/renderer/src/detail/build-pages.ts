@@ -4,12 +4,13 @@ import { packedOrder } from '../pack/pack.js';
 import { recentred } from '../pack/recentre.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { choosePrecision, type ShPrecision } from '../pack/sh.js';
-import { buildLevels } from './build-levels.js';
+import { levelsAbove } from './build-levels.js';
 import { boundLevel, detailRows, leafErrors, parentErrors, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
 import { pageLayout, type DetailManifest } from './manifest.js';
 import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
-import { packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
-import { chunksOf, type SplatLevel } from './splat-level.js';
+import { CENTER_ROUNDING, packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
+import { shellOrder } from './shell-order.js';
+import { chunksOf, leafLevel, type SplatLevel } from './splat-level.js';
 
 const { CULL_GROUP } = constants;
 
@@ -26,6 +27,8 @@ export interface BuiltPage {
 
 /** Levels of a scene or of a part of it, ready to be cut into pages. */
 export interface DetailTree {
+  /** Of the finest level, those that fill up chunks not counted. */
+  readonly splats: number;
   readonly levels: readonly SplatLevel[];
   /** `Chunk` rows of each level. */
   readonly chunks: readonly Float32Array[];
@@ -52,17 +55,30 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
   const kept = packedOrder(cloud);
   const { antialiased, origin } = cloud;
   const shPrecision = choosePrecision(cloud, kept);
-  return { ...treeOf(buildLevels(cloud, kept)), shPrecision, geometry, antialiased, origin, bounds: boundsOf(given) };
+  const leaves = leavesOf(cloud, kept, geometry);
+  const facts = { splats: kept.length, shPrecision, geometry, antialiased, origin, bounds: boundsOf(given) };
+  return { ...treeOf([leaves, ...levelsAbove(leaves)], geometry), ...facts };
+}
+
+/** The finest level; where coordinates are relative to chunks, in chunks whose splats are not too far apart. */
+function leavesOf(cloud: GaussianCloud, kept: Uint32Array, geometry: DetailTree['geometry']): SplatLevel {
+  if (geometry === undefined) return leafLevel(cloud, kept);
+  const { order, fillers } = shellOrder(cloud.positions, kept);
+  const leaves = leafLevel(cloud, order);
+  for (const place of fillers) leaves.opacities[place] = 0;
+  return leaves;
 }
 
 /** Bounds and errors of levels whose finest may itself stand for something, to `leaves`' errors. */
 export function treeOf(
   levels: readonly SplatLevel[],
+  geometry: DetailTree['geometry'],
   leaves?: ChunkErrors,
 ): Pick<DetailTree, 'levels' | 'chunks' | 'errors'> {
   const chunks = levels.map(boundLevel);
   const errors = [leaves ?? leafErrors(chunks[0])];
-  for (let k = 1; k < levels.length; k++) errors.push(parentErrors(levels[k], chunks[k], errors[k - 1]));
+  const rounding = geometry === undefined ? 0 : CENTER_ROUNDING;
+  for (let k = 1; k < levels.length; k++) errors.push(parentErrors(levels[k], chunks[k], errors[k - 1], rounding));
   return { levels, chunks, errors };
 }
 
@@ -144,12 +160,12 @@ export function manifestOf(
   pages: readonly BuiltPage[],
   fileOf: (page: number) => string,
 ): DetailManifest {
-  const { shPrecision, geometry, antialiased, origin, bounds, levels } = tree;
+  const { splats, shPrecision, geometry, antialiased, origin, bounds, levels } = tree;
   return {
     ...{
       format: 'gaussian-splat-detail',
       version: geometry ? 2 : 1,
-      splats: levels[0].count,
+      splats,
       shDegree: levels[0].shDegree,
     },
     ...{ shPrecision, ...(geometry && { geometry }), antialiased, origin, bounds },

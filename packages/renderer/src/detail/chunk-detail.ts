@@ -69,22 +69,25 @@ export function leafErrors(chunks: Float32Array): ChunkErrors {
   return { count, spheres, errors: new Float32Array(count) };
 }
 
-/** Errors of a coarser level, of which chunk c stands for chunks 4 c to 4 c + 3 of `finer`. */
-export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: ChunkErrors): ChunkErrors {
+/**
+ * Errors of a coarser level, of which chunk c stands for chunks 4 c to 4 c + 3 of `finer`.
+ * @param rounding of centres, twice the most, as a part of the diagonal of a chunk's box
+ */
+export function parentErrors(level: SplatLevel, chunks: Float32Array, finer: ChunkErrors, rounding = 0): ChunkErrors {
   const count = chunks.length / CHUNK_NUMBERS;
   const spheres = new Float32Array(4 * count);
   const errors = new Float32Array(count);
   for (let c = 0; c < count; c++) {
     const [x, y, z, own] = sphereOfBox(chunks, c);
-    let [radius, error] = [own, ownError(level, c)];
+    let [radius, error] = [own, Math.hypot(ownError(level, c), rounding * 2 * own)];
     for (let child = 4 * c; child < Math.min(4 * c + 4, finer.count); child++) {
       const [cx, cy, cz, r] = finer.spheres.subarray(4 * child, 4 * child + 4);
       radius = Math.max(radius, Math.hypot(x - cx, y - cy, z - cz) + r);
       error = Math.max(error, finer.errors[child]);
     }
     // Centres far from the origin are rounded themselves.
-    const rounding = 1e-6 * Math.hypot(x, y, z);
-    spheres.set([x, y, z, radius * STRICTLY + rounding], 4 * c);
+    const rounded = 1e-6 * Math.hypot(x, y, z);
+    spheres.set([x, y, z, radius * STRICTLY + rounded], 4 * c);
     errors[c] = Math.max(error * STRICTLY, LEAST_ERROR);
   }
   return { count, spheres, errors };

@@ -189,7 +189,7 @@ function checkTree(tree: Tree, fail: Fail): void {
       page.upper <= Math.min(SLOT_CHUNKS, page.chunks) &&
       page.chunks <= page.upper * (1 + SLOT_CHUNKS) &&
       (p === 0) === (page.parent === undefined) &&
-      (p === 0 || isPlace(page.parent, tree.pages.slice(0, p)));
+      (p === 0 || isPlace(page.parent, tree.pages, p));
     if (!isFine) fail(`pages[${p}]`, `a file of 1 to ${FILE_CHUNKS} chunks below an earlier one`, page);
   });
 }
@@ -199,8 +199,9 @@ const isCount = (value: unknown): value is number => Number.isSafeInteger(value)
 const isVector = (value: unknown): value is Vector3 =>
   Array.isArray(value) && value.length === 3 && value.every((number) => Number.isFinite(number));
 
-function isPlace(value: unknown, pages: readonly TreePage[]): boolean {
+/** Whether it names a chunk of one of the first files, as many as `end` says. */
+function isPlace(value: unknown, pages: readonly TreePage[], end = pages.length): boolean {
   if (!Array.isArray(value) || value.length !== 2) return false;
   const [page, chunk] = value as [unknown, unknown];
-  return isCount(page) && page < pages.length && isCount(chunk) && chunk < pages[page].chunks;
+  return isCount(page) && page < end && isCount(chunk) && chunk < pages[page].chunks;
 }

@@ -20,6 +20,8 @@ const {
 /** 32-bit words of a chunk. */
 export const QUANTIZED_CHUNK_WORDS = 4 * QUANTIZED_CHUNK_ROWS;
 const CENTER_STEPS = 65535;
+/** Twice the most that rounding moves a centre by, as a part of the diagonal of its chunk's box. */
+export const CENTER_ROUNDING = 1 / CENTER_STEPS;
 const MOST_OPACITY = 4095;
 /** The first opacity that is drawn. */
 const FIRST_VISIBLE = Math.ceil(ALPHA_MIN * QUANTIZED_OPAQUE);

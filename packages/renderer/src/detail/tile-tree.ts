@@ -14,7 +14,8 @@ export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): Deta
   const levels = [finest, ...levelsAbove(finest)];
   const { radius } = tree.bounds;
   return {
-    ...treeOf(levels, errorsOfCopies(tree.errors[top], places)),
+    ...treeOf(levels, tree.geometry, errorsOfCopies(tree.errors[top], places)),
+    splats: tree.splats * places.length,
     ...{ shPrecision: tree.shPrecision, geometry: tree.geometry, antialiased: tree.antialiased, origin: tree.origin },
     bounds: boundsAround(tree.bounds, places, radius),
   };

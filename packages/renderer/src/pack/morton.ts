@@ -20,21 +20,42 @@ const LEAST_COUNT = 1024;
 export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32Array {
   if (kept.length < LEAST_COUNT) return kept;
   const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis));
-  if (axes.some(({ largestTie }) => largestTie > FLAT_SHARE)) return kept;
+  if (axes.some(isFlat)) return kept;
   const codes = new Uint32Array(kept.length);
   for (let k = 0; k < kept.length; k++) codes[k] = mortonCode(positions, 3 * kept[k], axes);
   return sortByCode(kept, codes);
 }
 
-interface Axis {
-  readonly median: number;
-  /** Median distance from the median. */
-  readonly spread: number;
-  /** Share of the sample that has one and the same coordinate. */
-  readonly largestTie: number;
+/**
+ * True for splats of planes or layers: some of them share a coordinate, so that cameras that look along its axis find them at equal depths. Whoever puts them into another order changes such
+ * pictures.
+ * @param positions [3 N] world units
+ * @param kept indices of splats; default all
+ */
+export function isOfPlanes(positions: Float32Array, kept: Uint32Array = spread(positions.length / 3)): boolean {
+  return [0, 1, 2].some((axis) => isFlat(sampleAxis(positions, kept, axis)));
 }
 
-function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
+/** Numbers of those that are looked at, where all are there. */
+function spread(count: number): Uint32Array {
+  const samples = Math.min(SAMPLE, count);
+  return Uint32Array.from({ length: samples }, (_, k) => Math.floor((k * count) / samples));
+}
+
+/** A splat alone shares nothing with another. */
+const isFlat = ({ largestTie, samples }: Axis): boolean => largestTie > Math.max(1, FLAT_SHARE * samples);
+
+export interface Axis {
+  readonly median: number;
+  /** Median distance from the median, 1 where that is 0. */
+  readonly spread: number;
+  /** How many of the sample have one and the same coordinate. */
+  readonly largestTie: number;
+  readonly samples: number;
+}
+
+/** What some of the splats say of an axis. */
+export function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
   const count = Math.min(SAMPLE, kept.length);
   const sample = Float32Array.from({ length: count }, (_, k) => {
     const i = kept[Math.floor((k * kept.length) / count)];
@@ -48,7 +69,7 @@ function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): A
     tie = sample[k] === sample[k - 1] ? tie + 1 : 1;
     largestTie = Math.max(largestTie, tie);
   }
-  return { median, spread: distances[count >> 1] || 1, largestTie: largestTie / count };
+  return { median, spread: distances[count >> 1] || 1, largestTie, samples: count };
 }
 
 /**

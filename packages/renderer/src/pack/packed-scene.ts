@@ -21,8 +21,13 @@ const notWhole = (): GaussianSplatError =>
 /**
  * Reads a scene back from the GPU as it was packed: for tools that make another one of it. Scenes that generators write cannot be read.
  * Rejects if the device is lost meanwhile, and with GaussianSplatError `argument/value` for a scene that is streamed.
+ * @param check called before each of its buffers is read, which takes turns of the page: throws if they have been freed meanwhile
  */
-export async function readPacked(device: GPUDevice, scene: GaussianScene): Promise<PackedGaussians> {
+export async function readPacked(
+  device: GPUDevice,
+  scene: GaussianScene,
+  check: () => void = () => undefined,
+): Promise<PackedGaussians> {
   const { shDegree, shPrecision, antialiased, origin, pages, wishes } = scene;
   if (wishes) throw notWhole();
   const stride = shWords(shDegree, shPrecision);
@@ -30,6 +35,7 @@ export async function readPacked(device: GPUDevice, scene: GaussianScene): Promi
     readPages(
       device,
       pages.map((page) => ({ buffer: page[name], words: words(page.count) })),
+      check,
     );
   const geometry = await read('geometry', (count) => GEOMETRY_WORDS * count);
   const sh = await read('sh', (count) => stride * count);
@@ -45,11 +51,13 @@ export async function readPacked(device: GPUDevice, scene: GaussianScene): Promi
 async function readPages(
   device: GPUDevice,
   parts: readonly { readonly buffer: GPUBuffer; readonly words: number }[],
+  check: () => void,
 ): Promise<Uint32Array> {
   const all = new Uint32Array(parts.reduce((sum, { words }) => sum + words, 0));
   let at = 0;
   for (const { buffer, words } of parts) {
     if (words === 0) continue;
+    check();
     const usage = BUFFER_USAGE.mapRead | BUFFER_USAGE.copyDestination;
     const staging = device.createBuffer({ label: 'gs.packed.read', size: 4 * words, usage });
     const encoder = device.createCommandEncoder({ label: 'gs.packed.read' });
