@@ -1,6 +1,6 @@
 /** What the camera attributes mean for a given scene and picture: settings with `auto` and `%` become a pose. */
-import type { Bounds } from '@gaussian-splat/core';
-import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting, UpAxis } from './grammar.js';
+import type { Bounds, Vector3 } from '@gaussian-splat/core';
+import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting } from './grammar.js';
 import { framingDistance, toViewer, viewerFrame, type Pose } from './orbit.js';
 import type { PoseLimits } from './orbit-camera.js';
 
@@ -13,7 +13,8 @@ export interface CameraSettings {
   readonly fieldOfView: AngleSetting;
   readonly minFieldOfView: AngleSetting;
   readonly maxFieldOfView: AngleSetting;
-  readonly up: UpAxis;
+  /** Direction of the scene's frame that points up, of length 1. */
+  readonly up: Vector3;
 }
 
 const DEGREE = Math.PI / 180;
