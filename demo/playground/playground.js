@@ -3,6 +3,7 @@ import { copy } from '../site/copy.js';
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { viewOf } from '../site/view.js';
 import { SCRIPT, tagOf } from './html.js';
+import { askForLevel } from './level.js';
 
 const byId = (id) => document.getElementById(id);
 const scene = byId('scene');
@@ -81,10 +82,29 @@ async function copyView() {
   byId('copied').textContent = await copy(byId('html').textContent);
 }
 
+let asking = new AbortController();
+
+/** Asks for three points of the floor, and says in `up` what they come to; what was said of the view meant another one. */
+async function level() {
+  asking.abort();
+  asking = new AbortController();
+  const say = (sentence) => (byId('copied').textContent = sentence);
+  try {
+    const up = await askForLevel(scene, say, asking.signal);
+    for (const name of VIEW) form.elements[name].value = '';
+    form.elements.up.value = up;
+    show();
+    say('Upright. If it stands on its head, look at the floor from above and try again.');
+  } catch {
+    // Something else is asked for, or another scene is there.
+  }
+}
+
+scene.addEventListener('loadstart', () => asking.abort());
 scene.addEventListener('load', () => {
   const { splats, bytes } = scene.statistics;
   byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
-  byId('copy-view').disabled = false;
+  byId('copy-view').disabled = byId('level').disabled = false;
 });
 scene.addEventListener('loadstart', () => (byId('status').textContent = 'Loading'));
 for (const type of ['error', 'generator-error']) {
@@ -93,10 +113,12 @@ for (const type of ['error', 'generator-error']) {
 form.addEventListener('change', show);
 form.addEventListener('submit', (event) => event.preventDefault());
 byId('copy-view').addEventListener('click', copyView);
+byId('level').addEventListener('click', level);
 byId('copy').addEventListener('click', async () => {
   byId('copied').textContent = await copy(byId('html').textContent);
 });
 byId('reset').addEventListener('click', () => {
+  asking.abort();
   form.reset();
   show();
   scene.resetCamera();

@@ -50,7 +50,7 @@ function App() {
           loading="eager"
           cameraControls
           controls={CONTROLS}
-          style={{ width: 320, height: 240 }}
+          style={{ width: '100%', maxWidth: 320, height: 240 }}
           onLoad={({ detail }) => {
             setStatus(`loaded ${detail.url}`);
             setLoads((count) => count + 1);

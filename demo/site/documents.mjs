@@ -8,6 +8,7 @@ const SECTIONS = [
   ['Guide', [/^docs\/guide\/start/, /^docs\/guide\//, /^packages\/(element|react)\/README/]],
   ['Generators', [/^docs\/contract/, /^packages\/(generator|check|exporter)\//, /^demo\/generators\/README/]],
   ['How true, how fast', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/economise\//]],
+  ['Without the element', [/^packages\/(renderer|formats|core)\/README/, /^docs\/detail-pages/]],
   ['For contributors', [/^CONTRIBUTING/, /^docs\/architecture/, /^packages\//, /^scripts\//, /^README/]],
   ['Decisions', [/^docs\/decisions\//]],
   ['About', [/^CHANGELOG/, /^SECURITY/, /^LICENSE/, /ATTRIBUTION/, /^docs\//]],

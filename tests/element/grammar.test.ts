@@ -92,8 +92,10 @@ test('targets, fields of view, axes and numbers', () => {
   assert.equal(fieldOfViewGrammar.parse('auto'), 'auto');
   for (const text of ['0deg', '180deg', '-5deg', '45', '45m', ''])
     assert.equal(fieldOfViewGrammar.parse(text), null, text);
-  assert.equal(upGrammar.parse(' -Z '), '-z');
-  assert.equal(upGrammar.parse('down'), null);
+  assert.deepEqual(upGrammar.parse(' -Z '), [0, 0, -1]);
+  assert.deepEqual(upGrammar.parse('0 -3 4'), [0, -0.6, 0.8]);
+  for (const text of ['down', '--y', 'x y', '1 2', '0 0 0', '0 1deg 0', '1 auto 0'])
+    assert.equal(upGrammar.parse(text), null, text);
   const decay = numberGrammar(50, 0, 'milliseconds');
   assert.equal(decay.parse('0'), 0);
   for (const text of ['-1', 'fast', '', ' ', 'NaN']) assert.equal(decay.parse(text), null, text);

@@ -3,7 +3,6 @@ import { test } from 'node:test';
 import { cross, dot, eyeOf, lookAt, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
 import fc from 'fast-check';
 import { keyOf, orbitOf, panOf, pinchOf, wheelOf } from '../../packages/element/src/camera/gestures.js';
-import type { UpAxis } from '../../packages/element/src/camera/grammar.js';
 import {
   cameraOfPose,
   framingDistance,
@@ -19,15 +18,16 @@ import { limitsOf, poseOf } from '../../packages/element/src/camera/settings.js'
 import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
 import { settings } from '../support/camera-settings.js';
 
-const UPS: readonly UpAxis[] = ['x', '-x', 'y', '-y', 'z', '-z'];
-const AXES: Readonly<Record<UpAxis, Vector3>> = {
-  x: [1, 0, 0],
-  '-x': [-1, 0, 0],
-  y: [0, 1, 0],
-  '-y': [0, -1, 0],
-  z: [0, 0, 1],
-  '-z': [0, 0, -1],
-};
+/** Rows of the frame of each up axis, as they stand in no formula. */
+const FRAMES: readonly (readonly [Vector3, Vector3, Vector3])[] = [
+  [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+  [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
+  [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+  [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+  [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+]; // prettier-ignore
+const UPS: readonly Vector3[] = [...FRAMES.map(([, up]) => up), [0.48, -0.6, 0.64], [-0.48, 0.6, -0.64], [0.6, 0, 0.8]];
 const BOUNDS: Bounds = { min: [0, 1, 2], max: [2, 5, 4], center: [1, 3, 3], radius: 2 };
 
 const near = (actual: ArrayLike<number>, expected: ArrayLike<number>, tolerance = 1e-9): void => {
@@ -49,15 +49,19 @@ const pixelOf = (
 test('viewer frames are rotations that bring the up axis to +y', () => {
   for (const up of UPS) {
     const frame = viewerFrame(up);
-    near(toViewer(frame, AXES[up]), [0, 1, 0]);
+    near(toViewer(frame, up), [0, 1, 0]);
     near(cross(frame[0], frame[1]), frame[2]);
+    near(frame.map((row) => dot(row, row)), [1, 1, 1]); // prettier-ignore
     near(toScene(frame, toViewer(frame, [1, 2, 3])), [1, 2, 3]);
   }
-  assert.deepEqual(viewerFrame('-y'), [
-    [1, 0, 0],
-    [0, -1, 0],
-    [0, 0, -1],
-  ]);
+  for (const frame of FRAMES) assert.deepEqual(viewerFrame(frame[1]), frame);
+});
+
+test('a capture that is tilted a little is turned a little: degrees of theta mean what they meant', () => {
+  for (const axis of [-1, 1]) {
+    const [tilted, straight] = [viewerFrame([0.01, axis * Math.sqrt(1 - 2e-4), 0.01]), viewerFrame([0, axis, 0])];
+    for (let row = 0; row < 3; row++) near(tilted[row], straight[row], 0.0101);
+  }
 });
 
 test("the camera of a pose is core's lookAt from the same eye, for every up axis", () => {
@@ -76,7 +80,7 @@ test("the camera of a pose is core's lookAt from the same eye, for every up axis
         z + 3 * Math.cos(theta) * Math.sin(phi),
       ]);
       near(eyeOf(camera.worldToCamera), eye, 1e-7);
-      near(camera.worldToCamera, lookAt(eye, toScene(frame, [x, y, z]), AXES[up]), 1e-6);
+      near(camera.worldToCamera, lookAt(eye, toScene(frame, [x, y, z]), up), 1e-6);
     }),
   );
 });
@@ -101,7 +105,7 @@ test('the target lands in the middle and what is up in the scene is up in the pi
     );
     const target = toScene(frame, [1, 2, 3]);
     near(pixelOf(camera, target), [160, 100, 5]);
-    const above: Vector3 = [target[0] + AXES[up][0], target[1] + AXES[up][1], target[2] + AXES[up][2]];
+    const above: Vector3 = [target[0] + up[0], target[1] + up[1], target[2] + up[2]];
     assert.ok(pixelOf(camera, above)[1] < 100);
   }
 });
@@ -161,7 +165,7 @@ test('a pan moves the target with the pointer: its point stays under it', () => 
   assert.equal(drag.type, 'pan');
   if (drag.type === 'pan') camera.panBy(drag.right, drag.up);
   camera.jumpToGoal();
-  const frame = viewerFrame('y');
+  const frame = viewerFrame([0, 1, 0]);
   near(pixelOf(cameraOfPose(camera.now, frame, 400, 300, 0.1), [0, 0, 0]).slice(0, 2), [200 + 50, 150 - 30], 1e-9);
 });
 

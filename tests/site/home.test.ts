@@ -36,6 +36,25 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.ok(shifts < 0.01, `cumulative layout shift ${shifts}`);
   });
 
+  it('has its words beside the scene on a phone that lies on its side and on a tablet', async () => {
+    const { tab } = only;
+    for (const [width, height] of [
+      [844, 390],
+      [1024, 768],
+    ]) {
+      await tab.setViewportSize({ width, height });
+      const [end, start] = await tab.evaluate(() => {
+        // The lines of text, not the boxes that hold them.
+        const range = document.createRange();
+        range.selectNodeContents(document.querySelector('.hero .words')!);
+        const ends = [...range.getClientRects()].map(({ right }) => right);
+        return [Math.max(...ends), document.querySelector('#hero')!.getBoundingClientRect().left];
+      });
+      assert.ok(end <= start + 0.5, `words end at ${end}, the scene begins at ${start} of ${width}`);
+    }
+    await tab.setViewportSize({ width: 390, height: 800 });
+  });
+
   it('copies the view that somebody has turned to', async () => {
     const { tab, faults } = only;
     await tab.waitForFunction(() => document.querySelector<Splat>('#hero')!.loaded, undefined, PATIENCE);

@@ -34,16 +34,22 @@ export async function checkPage(
 ): Promise<void> {
   assert.equal(await tab.locator('h1').count(), 1, 'one heading of the first rank');
   assert.notEqual(await tab.title(), '');
+  // What a page that is 1280 pixels wide has left when somebody has zoomed in to 400 %.
+  await tab.setViewportSize({ width: NARROWEST, height: 400 });
+  assert.ok((await overflowOf(tab)) <= 0, `wider than ${NARROWEST} pixels`);
   await addAxe(tab);
   for (const { width, colorScheme } of bothScreens ? SCREENS : SCREENS.slice(0, 1)) {
     await tab.setViewportSize({ width, height: 400 });
     await tab.emulateMedia({ colorScheme });
-    const overflow = await tab.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-    assert.ok(overflow <= 0, `wider than ${width} pixels`);
+    assert.ok((await overflowOf(tab)) <= 0, `wider than ${width} pixels`);
     assert.deepEqual(await violations(tab, colors), [], `${width} pixels, ${colorScheme}`);
   }
   assert.deepEqual(faults, []);
 }
+
+const NARROWEST = 320;
+const overflowOf = (tab: Page): Promise<number> =>
+  tab.evaluate(() => document.documentElement.scrollWidth - innerWidth);
 
 export async function addAxe(tab: Page): Promise<void> {
   await tab.addScriptTag({ path: AXE });

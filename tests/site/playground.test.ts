@@ -32,6 +32,24 @@ const stateOf = (tab: Page): Promise<{ attributes: Record<string, string>; view:
     };
   });
 
+/** A .splat file: a square floor, 4 on each side, whose upright is `up` (of length 1), and nothing else. */
+function floorOf(up: readonly [number, number, number]): Buffer {
+  const [x, y, z] = up;
+  const across = [Math.hypot(y, z), (-x * y) / Math.hypot(y, z), (-x * z) / Math.hypot(y, z)];
+  const along = [y * across[2] - z * across[1], z * across[0] - x * across[2], x * across[1] - y * across[0]];
+  const side = 41;
+  const bytes = Buffer.alloc(32 * side * side);
+  for (let i = 0; i < side * side; i++) {
+    const [a, b] = [(i % side) / 10 - 2, Math.floor(i / side) / 10 - 2];
+    [0, 1, 2].forEach((k) => {
+      bytes.writeFloatLE(a * across[k] + b * along[k], 32 * i + 4 * k);
+      bytes.writeFloatLE(0.06, 32 * i + 12 + 4 * k);
+    });
+    bytes.set([200, 180, 150, 255, 255, 128, 128, 128], 32 * i + 24);
+  }
+  return bytes;
+}
+
 describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;
   let visit: Visit;
@@ -112,6 +130,43 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
       (await tab.locator('#html').textContent())!,
       /scenes\/skull\.spz"\s+alt="A skull"\s+camera-controls\s*>/,
     );
+    assert.deepEqual(faults, []);
+  });
+
+  it('sets a tilted capture upright by three points of its floor', { timeout: 120_000 }, async () => {
+    const { tab, faults } = visit;
+    const up = [0.2, -0.9, 0.3].map((value) => value / Math.hypot(0.2, 0.9, 0.3)) as [number, number, number];
+    await tab.click('#reset');
+    await tab.setInputFiles('#drop input', { name: 'floor.splat', mimeType: '', buffer: floorOf(up) });
+    await tab.waitForFunction(() => document.querySelector('gaussian-splat')!.getAttribute('src')?.startsWith('blob:'));
+    await loaded(tab);
+    await tab.waitForFunction(() => !document.querySelector<HTMLButtonElement>('#level')!.disabled);
+    // From far above: from the side a tilted floor is but an edge.
+    await tab.fill('#attribute-camera-orbit', '0deg 30deg auto');
+    await tab.locator('#attribute-camera-orbit').blur();
+    await tab.click('#level');
+    await tab.locator('gaussian-splat').scrollIntoViewIfNeeded();
+    const box = (await tab.locator('gaussian-splat').boundingBox())!;
+    const said = tab.locator('#copied');
+    const answers: string[] = [];
+    for (const [x, y] of [
+      [0.02, 0.02],
+      [0.3, 0.5],
+      [0.7, 0.45],
+      [0.5, 0.7],
+    ]) {
+      const before = await said.textContent();
+      await tab.mouse.click(box.x + x * box.width, box.y + y * box.height);
+      await tab.waitForFunction((old) => document.getElementById('copied')!.textContent !== old, before, PATIENCE);
+      answers.push((await said.textContent())!.slice(0, 9));
+      // Two at one place within half a second are a double click, which turns the camera to it.
+      await tab.waitForTimeout(600);
+    }
+    assert.deepEqual(answers, ['Nothing o', 'Two more.', 'One more.', 'Upright. ']);
+    const found = (await tab.inputValue('#attribute-up')).split(' ').map(Number);
+    const angle = (Math.acos(found.reduce((sum, value, k) => sum + value * up[k], 0)) * 180) / Math.PI;
+    assert.ok(angle < 2, `${found.join(' ')} is ${angle} degrees from upright`);
+    assert.ok((await tab.locator('#html').textContent())!.includes(`up="${found.join(' ')}"`), 'the HTML says so');
     assert.deepEqual(faults, []);
   });
 

@@ -6,6 +6,8 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import type { Page } from 'playwright-core';
+import { build } from 'esbuild';
+import { PNG } from 'pngjs';
 import ts from 'typescript';
 import { compileTemplate, parse } from 'vue/compiler-sfc';
 import { isBuilt, openSite, root } from './support.js';
@@ -153,6 +155,38 @@ describe('what documents tell people to write', { skip }, () => {
     const { stdout } = makePage(made.folder);
     assert.equal(readFileSync(join(made.folder, 'index.html'), 'utf8'), 'mine');
     assert.match(stdout, /is there already[\s\S]*<script type="module"[\s\S]*<gaussian-splat src=/);
+  });
+
+  it('the program around the renderer draws on its canvas', { timeout: 200_000 }, async () => {
+    const [program, ...others] = snippets('ts').filter(({ code }) => code.includes('requestAnimationFrame'));
+    assert.deepEqual(others, []);
+    const { outputFiles } = await build({
+      stdin: { contents: program.code, loader: 'ts', resolveDir: root },
+      ...{ bundle: true, format: 'esm', target: 'es2022', write: false, outdir: '/', splitting: true, entryNames: 'program' },
+    }); // prettier-ignore
+    const open = await openSite();
+    try {
+      const { tab, faults } = await open.visit('/docs/', { width: 640, height: 400 });
+      const { origin } = new URL(tab.url());
+      await serveScenes(tab, origin);
+      for (const { path, text } of outputFiles) {
+        await tab.route(`${origin}${path}`, (route) => route.fulfill({ contentType: 'text/javascript', body: text }));
+      }
+      const body =
+        '<!doctype html><title>Program</title><link rel="icon" href="data:,"><canvas width="120" height="90"></canvas><script type="module" src="/program.js"></script>';
+      await tab.route(`${origin}/program.html`, (route) => route.fulfill({ contentType: 'text/html', body }));
+      await tab.goto(`${origin}/program.html`);
+      const isRed = (data: Buffer, i: number): boolean => data[i] > 150 && data[i + 1] < 80 && data[i + 2] < 80;
+      const hasRed = async (): Promise<boolean> => {
+        const { data } = PNG.sync.read(await tab.locator('canvas').screenshot());
+        return Array.from({ length: data.length / 4 }, (_, i) => isRed(data, 4 * i)).includes(true);
+      };
+      const end = Date.now() + 120_000;
+      while (!(await hasRed()) && faults.length === 0 && Date.now() < end) await tab.waitForTimeout(500);
+      assert.deepEqual([await hasRed(), faults], [true, []], 'red is what stands at +x of the compass');
+    } finally {
+      await open.close();
+    }
   });
 
   it('HTML shows a picture', { timeout: 200_000 }, async () => {

@@ -3,8 +3,8 @@ import manifest from './manifest.mjs';
 
 const GROUPS = {
   Picture: ['quality', 'max-sh-degree', 'detail', 'max-pixel-ratio', 'frame-budget', 'postprocess'],
-  Camera: ['camera-controls', 'camera-orbit', 'camera-target', 'field-of-view', 'navigation'],
-  'Scene and page': ['alt', 'poster', 'loading', 'reveal', 'crossorigin', 'up'],
+  Camera: ['camera-controls', 'camera-orbit', 'camera-target', 'field-of-view', 'up', 'navigation'],
+  'Scene and page': ['alt', 'poster', 'loading', 'reveal', 'crossorigin'],
   Motion: ['auto-rotate', 'auto-rotate-delay', 'rotation-per-second', 'interpolation-decay'],
   'What people may do': [
     'disable-zoom',
@@ -27,7 +27,7 @@ const EXAMPLES = {
   'max-sh-degree': '0 to 3',
   detail: '1px',
   'rotation-per-second': '30deg',
-  up: '-y',
+  up: '-y, or 0.1 -1 0.2',
 };
 
 export default function playground() {

@@ -71,6 +71,11 @@ export abstract class MediaProperties extends SplatProperties {
     return new SceneTimeRanges(this.duration);
   }
 
+  /** Fetches the scene again, as if `src` had just been set: after an error, or when the file has changed. */
+  load(): void {
+    this.stage.reload();
+  }
+
   /**
    * Lets the time run, once the scene is there. Frames are drawn as the page has them; the generator follows as fast as it can.
    * A poster that waits for a person gives way, and a lazy scene out of sight is loaded.

@@ -92,8 +92,8 @@ export class SplatProperties extends LitElement {
   declare disableZoom: boolean;
   /** Keeps the camera's target where it is. */
   declare disablePan: boolean;
-  /** Axis of the scene's frame that points up; default what a generator's contract declares, else `-y`, as trainers write it. */
-  declare up: 'x' | '-x' | 'y' | '-y' | 'z' | '-z' | null;
+  /** What points up in the scene's frame: `x`, `-x`, `y`, `-y` (the default, as trainers write it, where a generator's contract declares nothing else), `z`, `-z`, or a direction such as `0.1 -1 0.2` for a capture that is tilted. */
+  declare up: string | null;
   /** Most drawn pixels for one CSS pixel; default no limit. */
   declare maxPixelRatio: number | string | null;
   /** Milliseconds of the GPU that a picture in motion may take with `quality="auto"`; default 0.8 of the display's interval, shared by the elements that draw at the same time. */

@@ -183,6 +183,13 @@ export class Stage {
     if (!this.isLeavingFor(source)) this.playback.keepScene();
   }
 
+  /** Asks for the scene once more, whatever has become of it. */
+  reload(): void {
+    this.scene.want(null, false);
+    this.#source.renew();
+    this.#host.requestUpdate();
+  }
+
   /** Whether a source asks for another scene than the one that is shown or loaded. */
   isLeavingFor(source: Source): boolean {
     return this.#source.isOther(source);

@@ -163,6 +163,9 @@ export const styles = css`
     transform-origin: 0 0;
     background: var(--progress-bar-color, rgb(0 110 220));
   }
+  [part='progress-bar']:dir(rtl) {
+    transform-origin: 100% 0;
+  }
   .message {
     display: flex;
     align-items: safe center;
@@ -183,6 +186,12 @@ export const styles = css`
   }
   p {
     margin: 0;
+  }
+  /* Sentences have their own direction, not the page's: the details are always English. */
+  p,
+  summary,
+  span {
+    unicode-bidi: plaintext;
   }
   p + details {
     margin-top: 0.5em;

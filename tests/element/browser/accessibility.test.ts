@@ -107,6 +107,35 @@ describe('screen readers', () => {
   });
 });
 
+describe('a page that runs from right to left', () => {
+  it('has English sentences of the element from left to right, and a progress bar that fills from the right', async () => {
+    const failed = show({ src: '/net/status/404' }, 'width: 400px; height: 200px');
+    const loading = show({ src: '/net/slow/compass.ply?ms=20000' });
+    document.body.dir = 'rtl';
+    try {
+      await nextEvent(failed, 'error');
+      await failed.updateComplete;
+      const paragraph = failed.shadowRoot!.querySelector('[part=error] p')!;
+      const sentence = document.createTreeWalker(paragraph, NodeFilter.SHOW_TEXT).nextNode()!;
+      const range = document.createRange();
+      const left = (at: number): number => {
+        range.setStart(sentence, at);
+        range.setEnd(sentence, at + 1);
+        return range.getBoundingClientRect().left;
+      };
+      const last = sentence.nodeValue!.trimEnd().length - 1;
+      assert(left(last) > left(last - 1), 'the full stop is at the end');
+      await until(() => loading.progress > 0.2 && loading.progress < 0.9, 'a part');
+      const [bar, track] = ['bar', 'track'].map((name) =>
+        loading.shadowRoot!.querySelector(`[part=progress-${name}]`)!.getBoundingClientRect(),
+      );
+      assert(bar.width < track.width && bar.right === track.right, `${bar.left} to ${bar.right} of ${track.right}`);
+    } finally {
+      document.body.dir = '';
+    }
+  });
+});
+
 describe('forced colours', () => {
   it('leave the progress bar visible', async () => {
     const element = show({ src: '/net/slow/compass.ply?ms=20000' });

@@ -2,7 +2,7 @@ import '@gaussian-splat/element';
 import type { CameraChangeDetail, GaussianSplatElement } from '@gaussian-splat/element';
 import { emulateMedia, resetMouse, sendKeys, sendMouse } from '@web/test-runner-commands';
 import { assert, assertEqual, claimFault, frames, showLoaded, until } from './support/harness.js';
-import { sendTouch, turnWheel } from './support/screen.js';
+import { isRed, screenOf, sendTouch, turnWheel } from './support/screen.js';
 
 const degrees = (radians: number): number => (radians * 180) / Math.PI;
 
@@ -314,6 +314,19 @@ describe('camera attributes', () => {
     await element.updateComplete;
     await frames();
     assert(element.loaded, 'still there');
+  });
+
+  it('up of a capture that is tilted: a direction, straight in the picture and in viewer space', async () => {
+    // The compass has red at +x of its frame, 1 from the middle: at -2 of 5 up, that is 22 degrees below the horizon.
+    const element = await showLoaded({ up: '-2 -5 0', 'camera-orbit': '0deg 90deg auto', 'interpolation-decay': '0' });
+    const level = await showLoaded({ 'camera-orbit': '0deg 90deg auto' });
+    const heightOf = async (one: GaussianSplatElement): Promise<number> => {
+      const red = (await screenOf(one)).middleOf(isRed);
+      assert(red, 'red');
+      return red.y - one.clientHeight / 2;
+    };
+    const [below, straight] = [await heightOf(element), await heightOf(level)];
+    assert(Math.abs(straight) < 2 && below > 5, `red ${straight} and ${below} pixels below the middle`);
   });
 });
 

@@ -11,7 +11,7 @@ const withoutWorker = (): SceneLoader => new Loader(() => new Worker('/net/statu
 /** From now on a file, by the end of its path, is not found; without one all are. */
 const lose = (end = ''): Promise<unknown> => fetch(`/net/lose/${end}`);
 
-async function assertLost(src: string, file: string, work: RegExp): Promise<void> {
+async function assertLost(src: string, file: string, work: RegExp): Promise<GaussianSplatElement> {
   await lose(file);
   const element = show({ src });
   await element.ready;
@@ -20,6 +20,7 @@ async function assertLost(src: string, file: string, work: RegExp): Promise<void
   assert(work.test(message), `what could not be loaded: ${message}`);
   assert(message.includes(file), `and its address: ${message}`);
   assert(/serve/i.test(message) && /Content-Security-Policy/.test(message), `and what to do: ${message}`);
+  return element;
 }
 
 describe('code that cannot be loaded when it is needed', () => {
@@ -32,17 +33,29 @@ describe('code that cannot be loaded when it is needed', () => {
   });
 
   // What a page has loaded once it has for good: the missing come before those that are there.
-  it('is told as such: all that reads scenes, worker or not', async () => {
+  it('is told as such: all that reads scenes, worker or not, and load() tries again', async () => {
     const script = '/packages/element/dist/loading/scene-worker.js';
-    GaussianSplatElement.sceneLoader = new Loader(() => new Worker(script, { type: 'module' }));
-    await assertLost(COMPASS, 'loading/scene-worker.js', /reads scenes/);
+    let workers = 0;
+    GaussianSplatElement.sceneLoader = new Loader(() => {
+      workers++;
+      return new Worker(script, { type: 'module' });
+    });
+    const element = await assertLost('/net/status/404', 'loading/scene-worker.js', /reads scenes/);
     claimFault(/this page refuses its worker/);
+    // Once it is there, it is taken: then it is the scene that is missing, which needs no more code that the tests below are to miss.
+    await lose();
+    element.load();
+    await element.ready;
+    assertEqual([element.error?.reason, workers], ['network/status', 2], 'error, workers');
   });
 
-  it('in the worker: the reader of a format', () =>
-    assertLost(`${FIXTURES}compass.ply`, 'readers/ply.js', /reads PLY/));
+  it('in the worker: the reader of a format', async () => {
+    await assertLost(`${FIXTURES}compass.ply`, 'readers/ply.js', /reads PLY/);
+  });
 
-  it('in the worker: what knows files that are no scene', () => assertLost('/net/html', 'diagnose.js', /no scene/));
+  it('in the worker: what knows files that are no scene', async () => {
+    await assertLost('/net/html', 'diagnose.js', /no scene/);
+  });
 
   it("on the page's thread: the reader of a format, and another format is read", async () => {
     GaussianSplatElement.sceneLoader = withoutWorker();
@@ -51,6 +64,7 @@ describe('code that cannot be loaded when it is needed', () => {
     await showLoaded({ src: `${FIXTURES}compass.ply` });
   });
 
-  it("on the page's thread: what runs generators", () =>
-    assertLost('/tests/fixtures/generators/packed.onnx', 'live/open-live-model.js', /runs generators/));
+  it("on the page's thread: what runs generators", async () => {
+    await assertLost('/tests/fixtures/generators/packed.onnx', 'live/open-live-model.js', /runs generators/);
+  });
 });

@@ -145,6 +145,47 @@ describe('another src', () => {
   });
 });
 
+describe('load()', () => {
+  it('fetches the same src again: after an error, and when the file is another one', async () => {
+    const src = '/net/kept/again/scene.splat';
+    const put = async (name: string): Promise<void> => {
+      await fetch(src, { method: 'PUT', body: await (await fetch(`${FIXTURES}${name}`)).blob() });
+    };
+    let signed = 0;
+    GaussianSplatElement.urlModifier = (url) => (url.endsWith(src) ? `${url}?${signed++}` : url);
+    try {
+      const element = show({ src });
+      await nextEvent(element, 'error');
+      await put('green.splat');
+      const seen = eventsOf(element);
+      element.load();
+      await element.ready;
+      assertEqual([element.loaded, element.error, element.statistics?.splats], [true, null, 1], 'after an error');
+      await put('compass.splat');
+      element.load();
+      assertEqual(element.loaded, false, 'loaded meanwhile');
+      await element.ready;
+      assert(element.loaded && element.statistics?.splats !== 1, 'the other file');
+      const loads = seen.filter((type) => type !== 'camera-change');
+      assertEqual(loads, ['emptied', 'loadstart', 'load', 'emptied', 'loadstart', 'load'], 'events');
+      assertEqual(signed, 3, 'addresses signed');
+    } finally {
+      GaussianSplatElement.urlModifier = null;
+    }
+  });
+
+  it('waits to be seen, and does nothing without a src', async () => {
+    const below = show({ src: COMPASS }, 'width: 100px; height: 100px; margin-top: 5000px');
+    const none = show({});
+    const seen = [below, none].map(eventsOf);
+    below.load();
+    none.load();
+    await none.ready;
+    await delay(200);
+    assertEqual([seen[0].includes('loadstart'), seen[1].length], [false, 0], 'events');
+  });
+});
+
 describe('a hidden element', () => {
   it('keeps the distance that a person chose', async () => {
     const element = await showLoaded({ 'camera-controls': '' }, 'width: 60px; height: 200px');

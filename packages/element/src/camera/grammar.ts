@@ -1,3 +1,5 @@
+import type { Vector3 } from '@gaussian-splat/core';
+
 /**
  * Grammar of the camera attributes: tuples of numbers with CSS-like units, as `<model-viewer>` has them, without
  * `calc()` and `env()`; what is left out at the end is `auto`, as there. An attribute that is absent takes its default; a malformed one takes it too, with a warning.
@@ -18,9 +20,6 @@ export interface OrbitSetting {
 /** What `camera-target` says: metres in viewer space. */
 export type TargetSetting = readonly [x: number | 'auto', y: number | 'auto', z: number | 'auto'];
 
-/** Axis of the scene's frame that points up. */
-export type UpAxis = 'x' | '-x' | 'y' | '-y' | 'z' | '-z';
-
 /** One attribute: how its text is read, and what is meant where it is absent or malformed. */
 export interface AttributeGrammar<T> {
   /** What the attribute should look like, for warnings. */
@@ -34,7 +33,6 @@ export interface AttributeGrammar<T> {
 const NUMBER_WITH_UNIT = /^([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)([a-z%]*)$/i;
 const METRES_PER_UNIT: Readonly<Record<string, number>> = { '': 1, m: 1, cm: 1e-2, mm: 1e-3 };
 const RADIANS_PER_UNIT: Readonly<Record<string, number>> = { deg: Math.PI / 180, rad: 1 };
-const UP_AXES: readonly UpAxis[] = ['x', '-x', 'y', '-y', 'z', '-z'];
 
 interface Quantity {
   readonly value: number;
@@ -135,11 +133,20 @@ export const targetGrammar: AttributeGrammar<TargetSetting> = {
   parse: parseTarget,
 };
 
+/** An axis such as `-y`, or three numbers: a direction of length 1, or null. */
+export function parseUp(text: string): Vector3 | null {
+  const [, sign, axis] = /^(-?)([xyz])$/.exec(terms(text).join(' ')) ?? [];
+  const length = sign ? -1 : 1;
+  const up = axis ? ['x', 'y', 'z'].map((name) => (name === axis ? length : 0)) : (parsePoint(text) ?? [0]);
+  const size = Math.hypot(...up);
+  return size > 0 ? (up.map((value) => value / size) as [number, number, number]) : null;
+}
+
 /** `up`: undefined, `auto`, for what the scene says. */
-export const upGrammar: AttributeGrammar<UpAxis | undefined> = {
-  expected: `one of ${UP_AXES.join(', ')}`,
+export const upGrammar: AttributeGrammar<Vector3 | undefined> = {
+  expected: 'x, -x, y, -y, z, -z, or a direction such as "0.1 -1 0.2"',
   fallback: 'auto',
-  parse: (text) => (text === 'auto' ? undefined : (UP_AXES.find((axis) => axis === text.trim().toLowerCase()) ?? null)),
+  parse: (text) => (text.trim() === 'auto' ? undefined : parseUp(text)),
 };
 
 /** A number within a range, such as `interpolation-decay` (milliseconds) and `max-pixel-ratio`. */

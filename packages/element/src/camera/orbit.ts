@@ -1,6 +1,5 @@
 /** Orbit geometry. Viewer space: the scene's frame turned so that y is up; right-handed, in world units (metres). */
 import { DEFAULT_FAR, dot, type Bounds, type Camera, type Vector3 } from '@gaussian-splat/core';
-import type { UpAxis } from './grammar.js';
 
 /** All that moves: the orbit, its target in viewer space, and the vertical field of view. Radians and world units. */
 export interface Pose {
@@ -17,43 +16,19 @@ export interface Pose {
 export type ViewerFrame = readonly [Vector3, Vector3, Vector3];
 
 /**
- * For each up axis the proper rotation that brings it to +y. The horizontal axes stay where they were as far as
- * possible; for -y, the frame of the trainers, this is diag(1, -1, -1).
+ * The rotation that brings a direction of length 1 to +y. The horizontal axes stay where they were as far as possible; for -y, the frame of the
+ * trainers, this is diag(1, -1, -1), and for what is near it a frame near that: it is the shortest turn to +y or to -y, whichever is nearer.
  */
-const VIEWER_FRAMES: Readonly<Record<UpAxis, ViewerFrame>> = {
-  y: [
-    [1, 0, 0],
-    [0, 1, 0],
-    [0, 0, 1],
-  ],
-  '-y': [
-    [1, 0, 0],
-    [0, -1, 0],
-    [0, 0, -1],
-  ],
-  z: [
-    [1, 0, 0],
-    [0, 0, 1],
-    [0, -1, 0],
-  ],
-  '-z': [
-    [1, 0, 0],
-    [0, 0, -1],
-    [0, 1, 0],
-  ],
-  x: [
-    [0, -1, 0],
-    [1, 0, 0],
-    [0, 0, 1],
-  ],
-  '-x': [
-    [0, 1, 0],
-    [-1, 0, 0],
-    [0, 0, 1],
-  ],
-};
-
-export const viewerFrame = (up: UpAxis): ViewerFrame => VIEWER_FRAMES[up];
+export function viewerFrame([x, y, z]: Vector3): ViewerFrame {
+  const side = y < 0 ? -1 : 1;
+  const share = 1 / (1 + side * y);
+  const both = share * x * z;
+  return [
+    [1 - share * x * x, 0 - side * x, 0 - both],
+    [x, y, z],
+    [0 - side * both, 0 - z, side * (1 - share * z * z)],
+  ];
+}
 
 /** A direction or point of the scene's frame, in viewer space. */
 export const toViewer = (frame: ViewerFrame, v: Vector3): Vector3 => [

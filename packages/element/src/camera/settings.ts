@@ -1,6 +1,6 @@
 /** What the camera attributes mean for a given scene and picture: settings with `auto` and `%` become a pose. */
-import type { Bounds } from '@gaussian-splat/core';
-import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting, UpAxis } from './grammar.js';
+import type { Bounds, Vector3 } from '@gaussian-splat/core';
+import type { AngleSetting, OrbitSetting, RadiusSetting, TargetSetting } from './grammar.js';
 import { framingDistance, toViewer, viewerFrame, type Pose, type ViewerFrame } from './orbit.js';
 import type { PoseLimits } from './orbit-camera.js';
 
@@ -13,19 +13,19 @@ export interface CameraSettings {
   readonly fieldOfView: AngleSetting;
   readonly minFieldOfView: AngleSetting;
   readonly maxFieldOfView: AngleSetting;
-  /** Undefined for what the scene says, else -y. */
-  readonly up: UpAxis | undefined;
+  /** Direction of the scene's frame that points up, of length 1; undefined for what the scene says, else -y. */
+  readonly up: Vector3 | undefined;
 }
 
 /** Bounds of a scene, in its own frame. */
 export interface SceneBounds extends Bounds {
-  /** The axis that points up, where the scene declares one. */
-  readonly up?: UpAxis;
+  /** The direction that points up, of length 1, where the scene declares one. */
+  readonly up?: Vector3;
 }
 
 /** Rotation from the frame of a scene to viewer space. */
 export const frameOf = ({ up }: CameraSettings, bounds: SceneBounds): ViewerFrame =>
-  viewerFrame(up ?? bounds.up ?? '-y');
+  viewerFrame(up ?? bounds.up ?? [0, -1, 0]);
 
 const DEGREE = Math.PI / 180;
 /** What `auto` stands for. */

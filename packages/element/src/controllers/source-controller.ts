@@ -19,7 +19,7 @@ export interface SourceOptions {
 export class SourceController {
   readonly #options: SourceOptions;
   #source: Source = { src: null, contract: null, chain: null, postprocess: null };
-  readonly #addresses = new Addresses();
+  #addresses = new Addresses();
   /** A script plays the scene, or waits to: it is loaded wherever it is. */
   #isWanted = false;
 
@@ -36,6 +36,11 @@ export class SourceController {
   /** Loads the scene although nobody may see it, until another is wanted. */
   needNow(isWanted: boolean): void {
     this.#isWanted = isWanted;
+  }
+
+  /** Addresses are found anew, as if all had just been set. */
+  renew(): void {
+    this.#addresses = new Addresses();
   }
 
   /** Asks for the scene of now, and for its bytes if it is time. */

@@ -1,4 +1,5 @@
-import type { Contract } from '@gaussian-splat/core';
+import type { Contract, Vector3 } from '@gaussian-splat/core';
+import { parseUp } from '../camera/grammar.js';
 import type { SceneBounds } from '../camera/settings.js';
 
 /** What a contract says of where its Gaussians are: bounds of the centres are those of the subject, too. Undefined where it says nothing. */
@@ -13,6 +14,6 @@ export function declaredBounds(contract: Contract): SceneBounds | undefined {
   return { min, max, center, radius, up: upOf(contract) };
 }
 
-/** The element's word for the axis that a contract declares. */
-export const upOf = ({ coordinates }: Contract): SceneBounds['up'] =>
-  coordinates?.up?.replace('+', '') as SceneBounds['up'];
+/** The direction that points up by a contract, of length 1; undefined where it says nothing. */
+export const upOf = ({ coordinates }: Contract): Vector3 | undefined =>
+  parseUp(coordinates?.up?.replace('+', '') ?? '') ?? undefined;

@@ -50,7 +50,6 @@ export class SceneLoader {
   #running: Worker | null = null;
   #nextId = 0;
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
-  #refused = false;
 
   readonly #locationOf: () => string | null;
 
@@ -129,7 +128,7 @@ export class SceneLoader {
     listeners: Listeners = {},
   ): Promise<T> {
     const worker = await this.#workerFor(signal);
-    if (worker === null) return here(await loadWorkerCode());
+    if (worker === null) return here(await this.#codeHere());
     return this.#ask<T>(worker, { ...request, id: this.#nextId++ }, signal, listeners);
   }
 
@@ -184,13 +183,22 @@ export class SceneLoader {
     onProgress: ProgressListener,
     onPreview: PreviewListener | undefined,
   ): Promise<LoadedScene | LoadedSequence> {
-    const { loadScene } = await loadWorkerCode();
+    const { loadScene } = await this.#codeHere();
     return loadScene(request, signal, onProgress, onPreview);
+  }
+
+  /** Where the code cannot be had here, either, it was no policy of the page that kept the worker away: the next load tries again. */
+  async #codeHere(): Promise<Here> {
+    try {
+      return await loadModule('the code that reads scenes', () => import('./scene-worker.js'));
+    } catch (error) {
+      this.#worker = null;
+      throw error;
+    }
   }
 
   /** The running worker, or null where this page may have none. */
   async #start(): Promise<Worker | null> {
-    if (this.#refused) return null;
     try {
       const worker = this.#spawn();
       await firstMessage(worker);
@@ -199,7 +207,6 @@ export class SceneLoader {
       this.#running = worker;
       return worker;
     } catch (error) {
-      this.#refused = true;
       const reason = error instanceof Error ? error.message : String(error);
       console.warn(
         `<gaussian-splat>: this page refuses its worker (${reason}), so scenes are read on the main thread. ` +
@@ -247,8 +254,6 @@ export class SceneLoader {
     this.#worker = null;
   }
 }
-
-const loadWorkerCode = (): Promise<Here> => loadModule('the code that reads scenes', () => import('./scene-worker.js'));
 
 function sequenceWithin(url: string): GaussianSplatError {
   return new GaussianSplatError('decode/unsupported', {

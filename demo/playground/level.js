@@ -1,0 +1,84 @@
+/** A capture that is tilted, set upright by three points of its floor: what the attribute `up` has to say. */
+import { upGrammar } from '../../packages/element/dist/camera/grammar.js';
+import { eyeOfPose, toScene, viewerFrame } from '../../packages/element/dist/camera/orbit.js';
+
+/** A press that moves farther than this, in CSS pixels, turned the scene and points at nothing. */
+const MOST_MOTION = 5;
+
+const difference = (a, b) => [a.x - b.x, a.y - b.y, a.z - b.z];
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+/**
+ * Upright of the plane through three points of viewer space, on the side of the eye.
+ * @returns {number[] | null} of length 1; null where the points are nearly in a line.
+ */
+export function uprightOf([a, b, c], eye) {
+  const [first, second] = [difference(b, a), difference(c, a)];
+  const normal = cross(first, second);
+  const length = Math.hypot(...normal);
+  if (!(length > 0.02 * Math.hypot(...first) * Math.hypot(...second))) return null;
+  const side = Math.sign(dot(normal, difference(eye, a))) || 1;
+  return normal.map((value) => (side * value) / length);
+}
+
+/** What `up` has to say for a direction of viewer space to be up, while it says `now`. */
+function upOf(direction, now) {
+  const frame = viewerFrame(upGrammar.parse(now || upGrammar.fallback));
+  return toScene(frame, direction)
+    .map((value) => Number(value.toFixed(4)))
+    .join(' ');
+}
+
+/**
+ * Asks a person for three points of the floor.
+ * @param scene {HTMLElement} a `<gaussian-splat>` with a scene on show
+ * @param say {(sentence: string) => void}
+ * @param signal {AbortSignal} ends it
+ * @returns {Promise<string>} a value for `up`; rejects where `signal` is aborted.
+ */
+export function askForLevel(scene, say, signal) {
+  const points = [];
+  const clear = () => scene.querySelectorAll('[slot^="hotspot-level"]').forEach((mark) => mark.remove());
+  say('Click three points of the floor, or of a table, far from one another. Drags turn the scene as before.');
+  return new Promise((resolve, reject) => {
+    const done = new AbortController();
+    const until = { signal: AbortSignal.any([signal, done.signal]) };
+    let pressed = { x: 0, y: 0 };
+    signal.addEventListener('abort', () => (clear(), reject(signal.reason)), { once: true });
+    scene.addEventListener('pointerdown', ({ clientX: x, clientY: y }) => (pressed = { x, y }), until);
+    scene.addEventListener(
+      'click',
+      async ({ clientX, clientY }) => {
+        if (Math.hypot(clientX - pressed.x, clientY - pressed.y) > MOST_MOTION) return;
+        const point = await scene.positionFromPoint(clientX, clientY);
+        if (signal.aborted || points.length === 3) return;
+        if (point === null) return say('Nothing of the scene is there. Another point?');
+        points.push(point);
+        scene.append(markAt(point, points.length));
+        if (points.length < 3) return say(points.length === 1 ? 'Two more.' : 'One more.');
+        const { theta, phi, radius } = scene.getCameraOrbit();
+        const [x, y, z] = eyeOfPose({ theta, phi, radius, ...scene.getCameraTarget() });
+        const upright = uprightOf(points, { x, y, z });
+        if (upright !== null) {
+          done.abort();
+          clear();
+          return resolve(upOf(upright, scene.getAttribute('up')));
+        }
+        points.length = 0;
+        clear();
+        say('These three are nearly in a line. Three others?');
+      },
+      until,
+    );
+  });
+}
+
+function markAt(point, number) {
+  const mark = document.createElement('span');
+  mark.slot = `hotspot-level-${number}`;
+  mark.className = 'mark';
+  mark.dataset.position = String(point);
+  mark.textContent = number;
+  return mark;
+}
