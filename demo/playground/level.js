@@ -1,7 +1,9 @@
 /** A capture that is tilted, set upright by three points of its floor: what the attribute `up` has to say. */
-import { upGrammar } from '../../packages/element/dist/camera/grammar.js';
+import { parseUp } from '../../packages/element/dist/camera/grammar.js';
 import { eyeOfPose, toScene, viewerFrame } from '../../packages/element/dist/camera/orbit.js';
 
+/** Up, where a scene says nothing. */
+const AS_TRAINED = [0, -1, 0];
 /** A press that moves farther than this, in CSS pixels, turned the scene and points at nothing. */
 const MOST_MOTION = 5;
 
@@ -24,7 +26,7 @@ export function uprightOf([a, b, c], eye) {
 
 /** What `up` has to say for a direction of viewer space to be up, while it says `now`. */
 function upOf(direction, now) {
-  const frame = viewerFrame(upGrammar.parse(now || upGrammar.fallback));
+  const frame = viewerFrame(parseUp(now ?? '') ?? AS_TRAINED);
   return toScene(frame, direction)
     .map((value) => Number(value.toFixed(4)))
     .join(' ');
