@@ -175,7 +175,8 @@ for (const { stage, path: ownPath, replaced } of stages) {
 
 const header = '/** Written by scripts/build-shaders.mjs from shaders/. Do not edit. */\n/* eslint-disable */\n';
 const define = ([name, value]) => `export const ${name} = ${literal(value)} as const;`;
-const part = (path) => `export const ${partName(path)} = ${JSON.stringify(parts.get(path))};`;
+/** As any string: declarations would hold all of the code once more. */
+const part = (path) => `export const ${partName(path)}: string = ${JSON.stringify(parts.get(path))};`;
 /** What several files of stages need is in `shaders.ts`. */
 const usersOf = (path) => stageFiles.filter((file) => partsIn[file].has(path));
 const isShared = (path) => partsIn.shaders.has(path) || usersOf(path).length > 1;
