@@ -4,16 +4,9 @@ import { HEADER_BYTES, splatRanges } from '@gaussian-splat/formats';
 import { readInThread } from './scene-thread.mjs';
 
 /**
- * A scene file as a cloud in shared memory, read by other threads while the caller does something else: by all of the pool where its splats can be read apart, as a large PLY's can.
- * Rejects as `readScene` does, or with the error of the file system.
- */
-export async function readInThreads(path, pool) {
-  return (await startReading(path, pool)).cloud;
-}
-
-/**
- * Starts that: once threads have their work, it goes on whatever keeps this one busy.
- * @returns {Promise<{cloud: Promise<GaussianCloud>}>}
+ * Starts to read a scene file as a cloud in shared memory, by other threads: by all of the pool where its splats can be read apart, as a large PLY's can. Once they have their work, it
+ * goes on whatever keeps this one busy.
+ * @returns {Promise<{cloud: Promise<GaussianCloud>}>} both reject as `readScene` does, or with the error of the file system
  */
 export async function startReading(path, pool) {
   const found = pool.size > 1 ? await rangesOf(path) : undefined;

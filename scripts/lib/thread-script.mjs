@@ -1,10 +1,9 @@
 /** The script of a thread, in one file: a thread that loads a hundred modules, as every one of sixteen does, takes five times as long to start. */
 import { existsSync } from 'node:fs';
-import { basename } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 const SOURCE = new URL('./task-thread.mjs', import.meta.url);
-const BUNDLE = new URL(`../../.cache/threads/${basename(SOURCE.pathname)}`, import.meta.url);
+const BUNDLE = new URL('../../.cache/threads/task-thread.mjs', import.meta.url);
 
 /** Where it is: what the last build made of it, else its source. */
 export const threadScript = () => (existsSync(BUNDLE) ? BUNDLE : SOURCE);

@@ -10,10 +10,13 @@ import { inline } from '@gaussian-splat/economise/parts';
 import { readScene } from '@gaussian-splat/formats';
 import { readInParts } from '../../packages/economise/src/parts/read-in-parts.js';
 import { reduceInParts, reduceTo } from '../../packages/economise/src/reduce.js';
-import { readInThreads } from '../../scripts/lib/scene-in-parts.mjs';
+import { startReading } from '../../scripts/lib/scene-in-parts.mjs';
 import { ThreadPool } from '../../scripts/lib/thread-pool.mjs';
 import { assertSameCloud } from '../formats/support/expect.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
+
+const readInThreads = async (path: string, pool: ThreadPool): Promise<GaussianCloud> =>
+  (await startReading(path, pool)).cloud;
 
 const COUNT = 120_000;
 const folder = mkdtempSync(join(tmpdir(), 'threads-'));

@@ -1,5 +1,15 @@
 /** How much of the true image a moving picture can afford: a pure function of what frames took. */
-import { isBelieved, predict, type Knowledge, type MeasuredRungs } from './rungs.js';
+import {
+  AS_FAST,
+  fastestKnown,
+  firstFarBelow,
+  firstInTime,
+  isAnyKnownAbove,
+  isBelieved,
+  predict,
+  type Knowledge,
+  type MeasuredRungs,
+} from './rungs.js';
 
 /** What a frame took. */
 export interface FrameSample {
@@ -66,8 +76,6 @@ const LAST_FRAMES = 5;
 const HOLD_MS = 500;
 /** After so long without a change, ms, a rung up is tried that may be in time without sparing any; at once where the last climb has cost nothing. */
 const TRIAL_MS = 6_000;
-/** Rungs that take so little longer than the fastest are as good, and truer. */
-const AS_FAST = 1.05;
 /** More of the picture that makes frames so much shorter is a reason to try still more. */
 const FASTER = 1.04;
 /** Where no rung is fast enough, less of the picture has to bring frames to such a share. */
@@ -195,32 +203,12 @@ function takeBack(pace: Pace, now: number, rules: PaceRules): Pace | null {
   return change(pace, now, to, 'trial', three);
 }
 
-/** The truest of the rungs that were measured and are as fast as the fastest of them. */
-function fastestKnown(known: Knowledge): number {
-  const times = known.costs.map((_, rung) => (isBelieved(rung, known) ? predict(rung, known) : Infinity));
-  const best = Math.min(...times);
-  return times.findIndex((time) => time <= AS_FAST * best);
-}
-
-/**
- * Before less of the picture is given up: the truest rung of a fourth of the cost, if nothing is known of those of half of it. The first rungs say little of these where fewer pixels are dear at first,
- * since they must be made a larger picture again, or where what they won is within the noise. -1 where there is none.
- */
-function firstFarBelow(known: Knowledge): number {
-  const { costs, level } = known;
-  const isKnown = costs.some((cost, rung) => 2 * cost <= costs[level] && isBelieved(rung, known));
-  return level === 0 || isKnown ? -1 : costs.findIndex((cost) => 4 * cost <= costs[level]);
-}
-
-const isAnyKnownAbove = (known: Knowledge): boolean =>
-  known.costs.some((_, rung) => rung < known.level && isBelieved(rung, known));
-
 /** Where frames are late: down to the first rung that is in time, else to the truest of the fastest, up or down. */
 function hurry(pace: Pace, now: number, { usual, last }: LateFrames, rules: PaceRules): Pace | null {
   const { level, recent } = pace;
   const known = knowledge(pace, usual, now, rules);
   const times = rules.costs.map((_, rung) => (rung > level ? predict(rung, known) : Infinity));
-  const inTime = firstInTime(times, known, rules);
+  const inTime = firstInTime(times, known, rules.targetMs);
   const isSoon = pace.climbed && isTooSoon(pace, now);
   if (isSoon && !mayHurry(pace, now)) return null;
   const isSure = inTime !== -1 && isBelieved(inTime, known);
@@ -249,18 +237,6 @@ function isFasterAbove({ level, measured, climbed, changedAt }: Pace): boolean {
   const [above, here, below] = [measured[level - 1], measured[level], measured[level + 1]];
   if (level === 0 || !climbed || below === undefined || (above !== undefined && above.at > below.at)) return false;
   return below.at >= changedAt && here.share * FASTER <= below.share;
-}
-
-/**
- * The first rung that is predicted in time; where that is a guess, half-way between it and the first that can be if all of the cost is in what rungs take away: a small step that won little
- * would lead to the last rung. -1 where there is none.
- */
-function firstInTime(times: readonly number[], known: Knowledge, { costs, targetMs }: PaceRules): number {
-  const predicted = times.findIndex((time) => time <= targetMs);
-  if (predicted === -1 || isBelieved(predicted, known)) return predicted;
-  const affordable = (costs[known.level] * targetMs) / known.milliseconds;
-  const possible = costs.findIndex((cost, rung) => rung > known.level && cost <= affordable);
-  return possible === -1 ? predicted : Math.min(predicted, Math.ceil((predicted + possible) / 2));
 }
 
 /** One rung up, after a hold, if its frames are in time, also under the loads of late. */

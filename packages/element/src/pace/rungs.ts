@@ -32,6 +32,8 @@ const BELIEVED_UNDER_LOAD_MS = 120_000;
 const SAME_LOAD = 1.25;
 /** A line through two rungs says something of a third where one costs so much more than the other: between like ones it is noise. */
 const FAR_APART = 1.2;
+/** Rungs that take so little longer than the fastest are as good, and truer. */
+export const AS_FAST = 1.05;
 /** As many times what a line says beyond its ends is reckoned with: rungs that first win, or cost, little win or cost more than that further on as often as not. */
 const TWICE = 2;
 
@@ -84,4 +86,38 @@ function nearest(
     if (isOfCost(costs[rung]) && isBelieved(rung, known)) return rung;
   }
   return null;
+}
+
+/** The truest of the rungs that were measured and are as fast as the fastest of them. */
+export function fastestKnown(known: Knowledge): number {
+  const times = known.costs.map((_, rung) => (isBelieved(rung, known) ? predict(rung, known) : Infinity));
+  const best = Math.min(...times);
+  return times.findIndex((time) => time <= AS_FAST * best);
+}
+
+/**
+ * Before less of the picture is given up: the truest rung of a fourth of the cost, if nothing is known of those of half of it. The first rungs say little of these where fewer pixels are dear at first,
+ * since they must be made a larger picture again, or where what they won is within the noise. -1 where there is none.
+ */
+export function firstFarBelow(known: Knowledge): number {
+  const { costs, level } = known;
+  const isKnown = costs.some((cost, rung) => 2 * cost <= costs[level] && isBelieved(rung, known));
+  return level === 0 || isKnown ? -1 : costs.findIndex((cost) => 4 * cost <= costs[level]);
+}
+
+/** Whether a truer rung than the one that is drawn on was measured, and that still counts. */
+export const isAnyKnownAbove = (known: Knowledge): boolean =>
+  known.costs.some((_, rung) => rung < known.level && isBelieved(rung, known));
+
+/**
+ * The first rung whose time is within the target; where that is a guess, half-way between it and the first that can be if all of the cost is in what rungs take away: a small step that won little
+ * would lead to the last rung. -1 where there is none.
+ */
+export function firstInTime(times: readonly number[], known: Knowledge, targetMs: number): number {
+  const { costs } = known;
+  const predicted = times.findIndex((time) => time <= targetMs);
+  if (predicted === -1 || isBelieved(predicted, known)) return predicted;
+  const affordable = (costs[known.level] * targetMs) / known.milliseconds;
+  const possible = costs.findIndex((cost, rung) => rung > known.level && cost <= affordable);
+  return possible === -1 ? predicted : Math.min(predicted, Math.ceil((predicted + possible) / 2));
 }
