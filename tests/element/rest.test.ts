@@ -2,7 +2,11 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { DetailController } from '../../packages/element/src/controllers/detail-controller.js';
-import { PaceController, type FramePlan } from '../../packages/element/src/controllers/pace-controller.js';
+import {
+  PaceController,
+  type FramePlan,
+  type PaceOptions,
+} from '../../packages/element/src/controllers/pace-controller.js';
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import type { GpuScene } from '../../packages/element/src/gpu/gpu-scene.js';
 import { LADDER } from '../../packages/element/src/pace/ladder.js';
@@ -13,17 +17,22 @@ const INTERVAL = 1000 / 60;
 const PIXELS = 1e6;
 const display = { displayInterval: INTERVAL, clients: 1 } as FrameScheduler;
 
+/** A controller that is on, alone on its display, and goes by that; but for what a test says. */
+const paceOf = (options: Partial<PaceOptions> = {}): PaceController =>
+  new PaceController({
+    isOn: () => true,
+    scheduler: () => display,
+    frameBudget: () => Infinity,
+    requestFrame: () => undefined,
+    onPace: () => undefined,
+    ...options,
+  });
+
 for (const wholeMs of [20, 100, 200, 214]) {
   test(`a true image of ${wholeMs} ms is on show 300 ms after rest, and not begun before 50 ms`, (context) => {
     context.mock.timers.enable({ apis: ['setTimeout'] });
     let asked = false;
-    const pace = new PaceController({
-      isOn: () => true,
-      scheduler: () => display,
-      frameBudget: () => Infinity,
-      requestFrame: () => (asked = true),
-      onPace: () => undefined,
-    });
+    const pace = paceOf({ requestFrame: () => (asked = true) });
     // A motion that is drawn whole at first, and soon no longer.
     let now = 1000;
     context.mock.method(performance, 'now', () => now);
@@ -61,11 +70,7 @@ test('true images that can not be in time are begun as soon as rest can be told,
 test('what a frame may take is what the page says, else a share of the display that elements divide', () => {
   const scheduler = { displayInterval: INTERVAL, clients: 2 } as FrameScheduler;
   let budget = Infinity;
-  const ignored = (): void => undefined;
-  const pace = new PaceController({
-    ...{ isOn: () => true, scheduler: () => scheduler, frameBudget: () => budget },
-    ...{ requestFrame: ignored, onPace: ignored },
-  });
+  const pace = paceOf({ scheduler: () => scheduler, frameBudget: () => budget });
   assert.equal(pace.targetMs, (0.8 * INTERVAL) / 2);
   for (budget of [2, 40]) {
     assert.equal(pace.targetMs, budget);
@@ -104,10 +109,7 @@ test('an element that draws now and then leaves others all but their whole time;
   context.mock.method(performance, 'now', now);
   const scheduler = new FrameScheduler();
   const ignored = (): void => undefined;
-  const pace = new PaceController({
-    ...{ isOn: () => true, scheduler: () => scheduler, frameBudget: () => Infinity },
-    ...{ requestFrame: ignored, onPace: ignored },
-  });
+  const pace = paceOf({ scheduler: () => scheduler });
   const levels: number[] = [];
   // Its frames take 0.7 of what it may.
   const moving = {
@@ -150,11 +152,7 @@ test('an element that draws now and then leaves others all but their whole time;
 });
 
 test('pictures that are small already are not made smaller, whatever they take', () => {
-  const ignored = (): void => undefined;
-  const pace = new PaceController({
-    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
-    ...{ requestFrame: ignored, onPace: ignored },
-  });
+  const pace = paceOf();
   const levelOf = (pixels: number): number => {
     for (let now = 1000; now < 3000; now += INTERVAL) {
       const plan = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
@@ -179,11 +177,7 @@ test('pictures that are small already are not made smaller, whatever they take',
 test('an element of another size is measured anew: that fewer pixels won nothing of a small picture says nothing of a large one', (context) => {
   let now = 1000;
   context.mock.method(performance, 'now', () => now);
-  const ignored = (): void => undefined;
-  const pace = new PaceController({
-    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
-    ...{ requestFrame: ignored, onPace: ignored },
-  });
+  const pace = paceOf();
   const move = (seconds: number, pixels: number, takes: (level: number) => number): number => {
     let last = 0;
     for (const end = now + 1000 * seconds; now < end; now += INTERVAL) {
@@ -212,11 +206,7 @@ test('an element of another size is measured anew: that fewer pixels won nothing
 test('an element that becomes smaller in motion shows as many pixels as before at once, not the few that the large one could afford', (context) => {
   let now = 1000;
   context.mock.method(performance, 'now', () => now);
-  const ignored = (): void => undefined;
-  const pace = new PaceController({
-    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
-    ...{ requestFrame: ignored, onPace: ignored },
-  });
+  const pace = paceOf();
   const move = (seconds: number, pixels: number, share: (level: number) => number): number[] => {
     const levels: number[] = [];
     for (const end = now + 1000 * seconds; now < end; now += INTERVAL) {
@@ -243,10 +233,7 @@ test('a scene that changes in every other picture of the display is in motion in
   context.mock.timers.enable({ apis: ['setTimeout'] });
   const asked: number[] = [];
   let now = 1000;
-  const pace = new PaceController({
-    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
-    ...{ requestFrame: () => void asked.push(now), onPace: () => undefined },
-  });
+  const pace = paceOf({ requestFrame: () => void asked.push(now) });
   const frame = (hasChanged: boolean): number => {
     const plan = pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false });
     const { level } = plan;
@@ -275,10 +262,7 @@ test('a scene that changes in every other picture of the display is in motion in
 
 test('a change that comes while the true image of a pause is drawn belongs to the motion before', (context) => {
   context.mock.timers.enable({ apis: ['setTimeout'] });
-  const pace = new PaceController({
-    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
-    ...{ requestFrame: () => undefined, onPace: () => undefined },
-  });
+  const pace = paceOf();
   const plan = (now: number, hasChanged: boolean): FramePlan =>
     pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false });
   let now = 1000;
@@ -295,11 +279,7 @@ test('a change that comes while the true image of a pause is drawn belongs to th
 
 test('what was measured before the page chose a quality is not told, and not believed afterwards', () => {
   let isOn = true;
-  const ignored = (): void => undefined;
-  const pace = new PaceController({
-    ...{ isOn: () => isOn, scheduler: () => display, frameBudget: () => Infinity },
-    ...{ requestFrame: ignored, onPace: ignored },
-  });
+  const pace = paceOf({ isOn: () => isOn });
   const frame = { pixels: PIXELS, hasChanged: true, goesOn: true };
   for (let now = 1000; now < 2000; now += INTERVAL) {
     const plan = pace.plan({ now, ...frame });
@@ -318,11 +298,7 @@ test('what was measured before the page chose a quality is not told, and not bel
 });
 
 test('what a frame took that was drawn in another size says nothing', () => {
-  const ignored = (): void => undefined;
-  const pace = new PaceController({
-    ...{ isOn: () => true, scheduler: () => display, frameBudget: () => Infinity },
-    ...{ requestFrame: ignored, onPace: ignored },
-  });
+  const pace = paceOf();
   const plan = (pixels: number): FramePlan => pace.plan({ now: 1000, pixels, hasChanged: true, goesOn: true });
   const before = plan(PIXELS);
   const after = plan(4 * PIXELS);
