@@ -58,8 +58,9 @@ async function partsOf(file) {
   const bytes = readFileSync(file);
   const json = JSON.parse(bytes.toString('utf8').replace(/^\ufeff/, ''));
   if (json.gaussianSplatSequence !== undefined) {
-    const { parseSequence } = await import('@gaussian-splat/formats');
-    return parseSequence(bytes, file).frames;
+    const { framePath, parseSequence } = await import('@gaussian-splat/formats');
+    const sequence = parseSequence(bytes, file);
+    return Array.from({ length: sequence.frameCount }, (_, frame) => framePath(sequence, frame));
   }
   const names = [];
   const open = [json];

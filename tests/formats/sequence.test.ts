@@ -1,17 +1,21 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { frameAt, isSequence, parseSequence } from '@gaussian-splat/formats';
+import { frameAt, framePath, isSequence, parseSequence, type SceneSequence } from '@gaussian-splat/formats';
 import { sequenceOf } from '../../packages/element/src/loading/sequence-of.js';
 import { expectRefusal } from './support/expect.js';
 
 const text = (json: unknown): Uint8Array => new TextEncoder().encode(JSON.stringify(json));
 const manifest = (rest: object): Uint8Array => text({ gaussianSplatSequence: 1, framesPerSecond: 24, ...rest });
 
+const pathsOf = (sequence: SceneSequence): string[] =>
+  Array.from({ length: sequence.frameCount }, (_, frame) => framePath(sequence, frame));
+
 test('a list and a numbered pattern', () => {
   const listed = parseSequence(manifest({ frames: ['a.spz', 'b.spz', 'c.ply'] }), 'a.json');
-  assert.deepEqual(listed, { frames: ['a.spz', 'b.spz', 'c.ply'], framesPerSecond: 24, durationSeconds: 0.125 });
+  const times = { framesPerSecond: 24, durationSeconds: 0.125 };
+  assert.deepEqual(listed, { frames: ['a.spz', 'b.spz', 'c.ply'], frameCount: 3, ...times });
   const numbered = parseSequence(manifest({ frames: 'f/{0098}.spz', count: 4 }), 'a.json');
-  assert.deepEqual(numbered.frames, ['f/0098.spz', 'f/0099.spz', 'f/0100.spz', 'f/0101.spz']);
+  assert.deepEqual(pathsOf(numbered), ['f/0098.spz', 'f/0099.spz', 'f/0100.spz', 'f/0101.spz']);
   assert.ok(isSequence(manifest({ frames: [] })) && !isSequence(text({ means: {} })));
 });
 
@@ -50,6 +54,7 @@ test('manifests that say nothing sensible are refused by name', async () => {
     [manifest({ frames: [] }), /frames: expected 1 to 1,000,000 paths/],
     [manifest({ frames: 'a.spz', count: 3 }), /a path with \{0001\}/],
     [manifest({ frames: '{1}.spz', count: 1e9 }), /count: expected 1 to/],
+    [manifest({ frames: `{${'0'.repeat(16)}}.spz`, count: 9 }), /frames: expected at most 15 digits/],
     [manifest({ frames: ['a.spz'], framesPerSecond: 0 }), /framesPerSecond/],
     [text({ gaussianSplatSequence: 2 }), /version 1/],
   ];

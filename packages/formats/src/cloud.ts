@@ -1,11 +1,5 @@
-import {
-  GaussianSplatError,
-  shCoefficientCount,
-  type GaussianCloud,
-  type ShDegree,
-  type Vector3,
-} from '@gaussian-splat/core';
-import { grouped } from './bytes.js';
+import { shCoefficientCount, type GaussianCloud, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import type { SceneSource } from './scene-format.js';
 
 /** Value of the constant spherical harmonic, 1/(2·sqrt(pi)): colour = 0.5 + SH_C0·f_dc. */
 export const SH_C0 = 0.28209479177387814;
@@ -15,31 +9,25 @@ export type DraftCloud = {
   -readonly [K in keyof GaussianCloud]: GaussianCloud[K];
 };
 
-/** A cloud of zeros of the given size. Throws `out-of-memory/allocation` where the arrays do not fit into memory. */
-export function allocateCloud(count: number, shDegree: ShDegree, name: string): DraftCloud {
-  const shLength = 3 * shCoefficientCount(shDegree);
-  try {
-    return {
-      count,
-      origin: [0, 0, 0] satisfies Vector3,
-      positions: new Float32Array(3 * count),
-      scales: new Float32Array(3 * count),
-      rotations: new Float32Array(4 * count),
-      opacities: new Float32Array(count),
-      sh: new Float32Array(shLength * count),
-      shDegree,
-      antialiased: false,
-      droppedCount: 0,
-    };
-  } catch (cause) {
-    throw new GaussianSplatError('out-of-memory/allocation', {
-      where: name,
-      expected: `memory for ${grouped(count)} splats of ${4 * (11 + shLength)} bytes`,
-      found: 'an allocation that failed',
-      remedy: 'use a scene with fewer splats or a lower degree of spherical harmonics',
-      cause,
-    });
-  }
+/** A cloud of zeros of the given size. Throws `out-of-memory/budget` where the load may not take as much. */
+export function allocateCloud(
+  count: number,
+  shDegree: ShDegree,
+  { budget, name }: Pick<SceneSource, 'budget' | 'name'>,
+): DraftCloud {
+  budget.takeSplats(count, shDegree, name);
+  return {
+    count,
+    origin: [0, 0, 0] satisfies Vector3,
+    positions: new Float32Array(3 * count),
+    scales: new Float32Array(3 * count),
+    rotations: new Float32Array(4 * count),
+    opacities: new Float32Array(count),
+    sh: new Float32Array(3 * shCoefficientCount(shDegree) * count),
+    shDegree,
+    antialiased: false,
+    droppedCount: 0,
+  };
 }
 
 /** Replaces logits by opacities, 1/(1 + exp(-x)), in place. */

@@ -1,6 +1,8 @@
+export type { LoadLimits } from './budget.js';
 export { detectFormat } from './detect.js';
 export { fetchScene, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './formats.js';
+export { outOfMemory } from './out-of-memory.js';
 export { openPartAt } from './open-part.js';
 export { readLodScene, type LodBox, type LodScene, type SogAddress, type SogRun } from './lod/boxes.js';
 export { readCoarsest } from './lod/read-coarsest.js';
@@ -8,6 +10,6 @@ export { SogFiles, type FetchBytes } from './lod/sog-files.js';
 export { readPrefix, readScene, type ReadSceneOptions } from './read-scene.js';
 export { isSequence } from './is-sequence.js';
 export type { FileBytes } from './bytes.js';
-export { frameAt, parseSequence, type SceneSequence } from './sequence.js';
+export { frameAt, framePath, parseSequence, type FramePattern, type SceneSequence } from './sequence.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { HEADER_BYTES, readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';

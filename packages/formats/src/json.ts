@@ -1,13 +1,21 @@
 import { asciiOf, grouped, quote } from './bytes.js';
 import { damaged } from './damaged.js';
+import type { SceneSource } from './scene-format.js';
 
 export type Json = Record<string, unknown>;
 
+/** A file, or a part of one, that is JSON. */
+export type JsonSource = Pick<SceneSource, 'bytes' | 'name' | 'budget'>;
+
+/** What the values of JSON take in memory: lists of empty lists the most. */
+const BYTES_PER_CHARACTER = 16;
+
 /** Parses JSON of a scene. Throws `decode/corrupt` with the position that the parser names. */
-export function parseJson(bytes: Uint8Array, name: string, maxBytes: number): Json {
+export function parseJson({ bytes, name, budget }: JsonSource, maxBytes: number): Json {
   if (bytes.length > maxBytes) {
     throw damaged(name, `a description of at most ${grouped(maxBytes)} bytes`, grouped(bytes.length));
   }
+  budget.take(BYTES_PER_CHARACTER * bytes.length, name);
   let value: unknown;
   try {
     value = JSON.parse(new TextDecoder().decode(bytes));

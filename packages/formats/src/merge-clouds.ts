@@ -1,5 +1,6 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { allocateCloud, type DraftCloud } from './cloud.js';
+import type { SceneSource } from './scene-format.js';
 
 /** Splats `first` to `first + count` of a cloud. */
 export interface CloudPart {
@@ -9,10 +10,13 @@ export interface CloudPart {
 }
 
 /** One cloud of parts of several, of the highest degree of them; lower degrees get zeros. All have the origin of the largest. */
-export function mergeClouds(parts: readonly CloudPart[], name: string): DraftCloud {
+export function mergeClouds(
+  parts: readonly CloudPart[],
+  source: Pick<SceneSource, 'budget' | 'name'>,
+): DraftCloud {
   const count = parts.reduce((sum, part) => sum + part.count, 0);
   const degree = parts.reduce<ShDegree>((most, { cloud }) => (cloud.shDegree > most ? cloud.shDegree : most), 0);
-  const merged = allocateCloud(count, degree, name);
+  const merged = allocateCloud(count, degree, source);
   const largest = parts.reduce<CloudPart | undefined>(
     (most, part) => (part.count > (most?.count ?? -1) ? part : most),
     undefined,

@@ -1,12 +1,14 @@
 import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-splat/core';
+import { LoadBudget, type LoadLimits } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
 import { extensionOf, findFormat } from './detect.js';
 import { loadDiagnosis, loadReader } from './load-parts.js';
 import { noSplats } from './no-splats.js';
+import { outOfMemory } from './out-of-memory.js';
 import { previewWanted, samplePreview } from './preview.js';
 import type { OpenPart, SceneSource } from './scene-format.js';
 
-export interface ReadSceneOptions {
+export interface ReadSceneOptions extends LoadLimits {
   /** File name or URL: what error messages call the file, and whose extension tells formats without a signature. */
   readonly name?: string;
   /** Media type that the server sent. */
@@ -35,7 +37,7 @@ export interface ReadSceneOptions {
  * @returns the splats in the shape and frame that `GaussianCloud` documents. Splats with values that cannot be drawn
  * are left out and counted in `droppedCount`.
  * @throws GaussianSplatError with a `decode/...` code that says what was expected and found, where and what to do,
- * `argument/value` for what are no bytes, or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
+ * `argument/value` for what are no bytes, `out-of-memory/budget` for what asks for more than its bytes or the limits in `options` allow, or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
  */
 export async function readScene(file: FileBytes, options: ReadSceneOptions = {}): Promise<GaussianCloud> {
   const { name = 'scene', contentType = '', signal, openPart, level, onPreview } = options;
@@ -57,9 +59,24 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
     if (drawable.count > 0) await onPreview?.(drawable);
     signal?.throwIfAborted();
   };
-  const openPlain = openPart && (async (path: string, query?: string) => plainBytes(await openPart(path, query), path));
-  const source: SceneSource = { bytes, name, signal, openPart: openPlain, level, onPreview: onPreview && preview };
-  const whole = await read(source);
+  const budget = new LoadBudget(bytes.length, options);
+  const known = new Set<string>();
+  const openPlain =
+    openPart &&
+    (async (path: string, query = '') => {
+      const part = plainBytes(await openPart(path, query || undefined), path);
+      // The same file again is no other.
+      if (!known.has(path + query)) budget.arrive(part.length);
+      known.add(path + query);
+      return part;
+    });
+  const source: SceneSource = {
+    ...{ bytes, name, budget, signal, openPart: openPlain, level },
+    onPreview: onPreview && preview,
+  };
+  const whole = await (async () => read(source))().catch((error: unknown) => {
+    throw outOfMemory(error, name) ?? error;
+  });
   signal?.throwIfAborted();
   // Checking and packing all splats takes longer than reading them, so that a preview is worth its while even now.
   if (!hasPreview && previewWanted(source, whole.count)) await preview(samplePreview(whole));
@@ -88,7 +105,8 @@ export async function readPrefix(
   if (!format?.readsPrefix) return undefined;
   const read = await loadReader(format);
   try {
-    const cloud = keepUsable(await read({ bytes, name, signal, isPrefix: true }));
+    const budget = new LoadBudget(bytes.length, options);
+    const cloud = keepUsable(await read({ bytes, name, budget, signal, isPrefix: true }));
     return cloud.count > 0 ? cloud : undefined;
   } catch (error) {
     signal?.throwIfAborted();

@@ -1,4 +1,5 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
+import type { LoadBudget } from './budget.js';
 
 /** Splats `first` to `end`, the latter not included, in the order of the file. */
 export interface SplatRange {
@@ -12,6 +13,8 @@ export interface SceneSource {
   readonly bytes: Uint8Array;
   /** What error messages call the file: its name or URL. */
   readonly name: string;
+  /** The account of the load: charged before anything is allocated that is not as long as what is at hand. */
+  readonly budget: LoadBudget;
   /** Readers that wait or work long call `throwIfAborted()` between steps. */
   readonly signal?: AbortSignal;
   /** True if `bytes` are only the first of the file: the splats that are whole are read, attributes that are missing left out. */
@@ -36,8 +39,8 @@ export interface SceneSource {
 export type OpenPart = (path: string, query?: string) => Promise<Uint8Array>;
 
 /**
- * Reads one file format into a cloud. A reader checks every size against the bytes present before it allocates, throws
- * `GaussianSplatError` with a code of the `decode` family (or `out-of-memory/allocation`), and leaves it to `readScene`
+ * Reads one file format into a cloud. A reader checks every size against the bytes present and charges it to the load's budget before it allocates, throws
+ * `GaussianSplatError` with a code of the `decode` family (or `out-of-memory/budget`), and leaves it to `readScene`
  * to drop unusable splats.
  */
 export type SceneReader = (source: SceneSource) => GaussianCloud | Promise<GaussianCloud>;

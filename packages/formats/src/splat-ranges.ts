@@ -1,4 +1,5 @@
 import { GaussianSplatError, keepUsable, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { LoadBudget } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
 import { findFormat } from './detect.js';
 import type { SplatRange } from './scene-format.js';
@@ -25,11 +26,12 @@ export const HEADER_BYTES = 1 << 18;
  */
 export async function splatRanges(file: FileBytes, name: string): Promise<SplatRanges | undefined> {
   const bytes = plainBytes(file, name);
+  const source = { bytes, name, budget: new LoadBudget(bytes.length) };
   switch (findFormat(bytes, name, '')?.name) {
     case 'ply':
-      return (await import('./ply/row-range.js')).plyRanges({ bytes, name });
+      return (await import('./ply/row-range.js')).plyRanges(source);
     case 'gltf':
-      return (await import('./readers/gltf.js')).gltfSplats({ bytes, name });
+      return (await import('./readers/gltf.js')).gltfSplats(source);
   }
 }
 
@@ -42,7 +44,7 @@ export async function splatRanges(file: FileBytes, name: string): Promise<SplatR
  */
 export async function readSplats(file: FileBytes, range: SplatRange, name: string): Promise<GaussianCloud> {
   const bytes = plainBytes(file, name);
-  const source = { bytes, name, range };
+  const source = { bytes, name, range, budget: new LoadBudget(bytes.length) };
   const format = findFormat(bytes, name, '')?.name;
   if (format === 'ply') return keepUsable((await import('./ply/row-range.js')).readPlyRange(source));
   if (format === 'gltf') return keepUsable(await (await import('./readers/gltf.js')).readGltf(source));

@@ -1,6 +1,6 @@
 import { asciiOf, grouped, startsWith, viewOf } from '../bytes.js';
 import { damaged } from '../damaged.js';
-import { parseJson, show } from '../json.js';
+import { parseJson, show, type JsonSource } from '../json.js';
 
 export type Json = Record<string, unknown>;
 
@@ -24,10 +24,11 @@ const HARMLESS =
   /^(KHR_gaussian_splatting|KHR_mesh_quantization|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))/;
 
 /** Takes a GLB, or a glTF in JSON, apart. Throws `decode/unsupported` where it requires what is not known here, as glTF asks of readers. */
-export function openContainer(bytes: Uint8Array, name: string): GltfFile {
+export function openContainer(source: JsonSource): GltfFile {
+  const { bytes, name } = source;
   const file = startsWith(bytes, 'glTF')
-    ? openGlb(bytes, name)
-    : { json: parseJson(bytes, name, MAX_TEXT_BYTES), binary: undefined };
+    ? openGlb(source)
+    : { json: parseJson(source, MAX_TEXT_BYTES), binary: undefined };
   const { asset, extensionsRequired } = file.json;
   const version = typeof asset === 'object' && asset !== null ? (asset as Json).version : undefined;
   if (typeof version !== 'string' || !version.startsWith('2.')) {
@@ -43,7 +44,7 @@ export function openContainer(bytes: Uint8Array, name: string): GltfFile {
   return file;
 }
 
-function openGlb(bytes: Uint8Array, name: string): GltfFile {
+function openGlb({ bytes, name, budget }: JsonSource): GltfFile {
   const where = (byte: number): string => `${name}, byte ${grouped(byte)}`;
   const view = viewOf(bytes);
   const need = (end: number): void => {
@@ -66,7 +67,8 @@ function openGlb(bytes: Uint8Array, name: string): GltfFile {
   let textEnd = jsonEnd;
   // Some writers pad with zeros in place of spaces.
   while (bytes[textEnd - 1] === 0) textEnd--;
-  const json = parseJson(bytes.subarray(HEADER_BYTES + 8, textEnd), `${name}, JSON of the GLB`, MAX_JSON_BYTES);
+  const text = bytes.subarray(HEADER_BYTES + 8, textEnd);
+  const json = parseJson({ bytes: text, name: `${name}, JSON of the GLB`, budget }, MAX_JSON_BYTES);
   if (!startsWith(bytes, 'BIN\0', jsonEnd + 4)) return { json, binary: undefined };
   const binaryEnd = jsonEnd + 8 + view.getUint32(jsonEnd, true);
   need(binaryEnd);

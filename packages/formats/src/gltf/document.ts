@@ -1,8 +1,9 @@
 import { loadModule } from '@gaussian-splat/core';
 import { alignedTo4, grouped, hostIsLittleEndian } from '../bytes.js';
 import { checkedPart } from '../checked-part.js';
+import type { LoadBudget } from '../budget.js';
 import { damaged } from '../damaged.js';
-import type { OpenPart, SplatRange } from '../scene-format.js';
+import type { OpenPart, SceneSource, SplatRange } from '../scene-format.js';
 import { isObject, show } from '../json.js';
 import type { GltfFile, Json } from './container.js';
 
@@ -44,13 +45,21 @@ export interface AccessorData {
 export class GltfDocument {
   readonly json: Json;
   readonly name: string;
+  readonly budget: LoadBudget;
   readonly #binary: Uint8Array | undefined;
   readonly #open: OpenPart;
   readonly #buffers = new Map<number, Promise<Uint8Array>>();
+  /** Each is fetched once, however many buffers name it. */
+  readonly #files = new Map<string, Promise<Uint8Array>>();
 
-  constructor({ json, binary }: GltfFile, name: string, open: OpenPart) {
+  constructor(
+    { json, binary }: GltfFile,
+    { name, budget }: Pick<SceneSource, 'name' | 'budget'>,
+    open: OpenPart,
+  ) {
     this.json = json;
     this.name = name;
+    this.budget = budget;
     this.#binary = binary;
     this.#open = open;
   }
@@ -58,6 +67,11 @@ export class GltfDocument {
   /** Throws `decode/header`. */
   fail(path: string, expected: string, found: unknown): never {
     throw damaged(`${this.name}, ${path}`, expected, show(found), 'decode/header');
+  }
+
+  /** Charges what is about to be allocated. Throws `out-of-memory/budget`. */
+  take(bytes: number): void {
+    this.budget.take(bytes, this.name);
   }
 
   /** Element `index` of an array of objects at the top of the file. */
@@ -106,6 +120,7 @@ export class GltfDocument {
     let whole = values;
     if (isSparse) {
       // They may be the file's own memory.
+      this.take(values.byteLength);
       whole = values.slice();
       const { putSparse } = await loadModule('the code that reads sparse accessors', () => import('./sparse.js'));
       await putSparse(this, sparse, { path, componentType, count, range: own, width, values: whole });
@@ -117,7 +132,10 @@ export class GltfDocument {
 
   /** Where it has no view and is not sparse either, numbers come by some extension. */
   #zeros(path: string, length: number | undefined): Float32Array {
-    if (length !== undefined) return new Float32Array(length);
+    if (length !== undefined) {
+      this.take(4 * length);
+      return new Float32Array(length);
+    }
     const expected = 'an accessor whose numbers lie in a buffer';
     throw damaged(`${this.name}, ${path}`, expected, 'one without "bufferView"', 'decode/unsupported');
   }
@@ -144,6 +162,7 @@ export class GltfDocument {
       throw damaged(`${this.name}, ${path}`, `${grouped(end)} bytes`, grouped(bytes.length), 'decode/corrupt');
     }
     const elements = last - first;
+    this.take(4 * elements * width);
     const start = byteOffset + first * byteStride;
     if (accessor.componentType === FLOAT && byteStride === 4 * width && hostIsLittleEndian) {
       // Numbers that lie as they are wanted are the file's own. A view's beginning need not be a multiple of 4.
@@ -196,7 +215,9 @@ export class GltfDocument {
     // What follows the path is for servers; the file that lies beside the scene is found without.
     const [, file, query] = /^([^?#]*)(\?[^#]*)?/.exec(uri)!;
     const path = decodeSafely(file);
-    return checkedPart(await this.#open(path, query), `${this.name}, ${path}`);
+    const found = this.#files.get(uri) ?? this.#open(path, query);
+    this.#files.set(uri, found);
+    return checkedPart(await found, `${this.name}, ${path}`);
   }
 
   #decodeDataUri(uri: string, index: number): Uint8Array {

@@ -16,6 +16,8 @@ const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 /** A scene may show the same mesh many times; more than this is no scene of splats. */
 const MAX_PLACES = 10_000;
 const MAX_DEPTH = 1_000;
+/** What a node takes that waits for its turn: nodes may name the same children again and again. */
+const NODE_BYTES = 64;
 
 /** The meshes of the default scene (of all nodes where there is none), each with the product of its nodes' transforms. */
 export function placedMeshes(document: GltfDocument): PlacedMesh[] {
@@ -29,6 +31,7 @@ export function placedMeshes(document: GltfDocument): PlacedMesh[] {
     const toScene = multiply(parent, localTransform(json, document));
     if (document.isIndex(json.mesh)) placed.push({ mesh: json.mesh, toScene });
     if (Array.isArray(json.children)) {
+      document.take(NODE_BYTES * json.children.length);
       for (const child of [...json.children].reverse()) open.push({ node: child, parent: toScene, depth: depth + 1 });
     }
   }

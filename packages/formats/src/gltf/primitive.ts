@@ -6,7 +6,7 @@ import { isObject, show } from '../json.js';
 import { readSpz } from '../readers/spz.js';
 import { transformCloud } from '../transform/transform-cloud.js';
 import type { Json } from './container.js';
-import type { SplatRange } from '../scene-format.js';
+import type { SceneSource, SplatRange } from '../scene-format.js';
 import type { GltfDocument } from './document.js';
 
 const EXTENSION = 'KHR_gaussian_splatting';
@@ -29,14 +29,6 @@ export function isUncompressed(primitive: Json): boolean {
 
 const splatsOf = ({ extensions }: Json): Json => (extensions as Json)[EXTENSION] as Json;
 
-/** What tells the splats of a primitive from those of others: where their places, or all of their numbers, are. */
-export function sourceOf(primitive: Json): string {
-  const { extensions } = splatsOf(primitive);
-  const spz = isObject(extensions) ? SPZ_EXTENSIONS.map((name) => extensions[name]).find(isObject) : undefined;
-  if (spz) return `view ${String(spz.bufferView)}`;
-  return `accessor ${isObject(primitive.attributes) ? String(primitive.attributes.POSITION) : ''}`;
-}
-
 /** Splats of a primitive whose numbers lie open, and the degree of their spherical harmonics. */
 export function splatsIn(
   document: GltfDocument,
@@ -56,14 +48,14 @@ export async function readPrimitive(
   document: GltfDocument,
   primitive: Json,
   path: string,
-  signal: AbortSignal | undefined,
+  source: Pick<SceneSource, 'budget' | 'signal'>,
   range?: SplatRange,
 ): Promise<GaussianCloud> {
   const splats = splatsOf(primitive);
   requireKnown(document, splats, path);
   const compression = isObject(splats.extensions) ? splats.extensions : {};
   const spz = SPZ_EXTENSIONS.map((name) => compression[name]).find(isObject);
-  if (spz) return readCompressed(document, spz, path, signal);
+  if (spz) return readCompressed(document, spz, path, source);
   if (Object.keys(compression).length > 0) {
     throw unsupported(
       document,
@@ -91,10 +83,10 @@ async function readCompressed(
   document: GltfDocument,
   { bufferView }: Json,
   path: string,
-  signal: AbortSignal | undefined,
+  { budget, signal }: Pick<SceneSource, 'budget' | 'signal'>,
 ): Promise<GaussianCloud> {
   const bytes = await document.readView(bufferView);
-  const cloud = await readSpz({ bytes, name: `${document.name}, ${path}, SPZ`, signal });
+  const cloud = await readSpz({ bytes, name: `${document.name}, ${path}, SPZ`, budget, signal });
   transformCloud(cloud, SPZ_TO_GLTF);
   return cloud;
 }
@@ -108,7 +100,7 @@ async function readAttributes(
   const attributes = isObject(primitive.attributes) ? primitive.attributes : {};
   // Drafts wrote _SCALE and _ROTATION.
   const own = (name: string): unknown => attributes[`${EXTENSION}:${name}`] ?? attributes[`_${name}`];
-  const all = document.accessorCount(attributes.POSITION);
+  const { count: all } = splatsIn(document, primitive, path);
   const count = range ? range.end - range.first : all;
   const read = async (name: string, index: unknown, width: number): Promise<Float32Array> => {
     if (index === undefined)
@@ -122,7 +114,7 @@ async function readAttributes(
   };
   // Positions come first: they are there, or there is no file long enough for what is allocated below.
   const positions = await read('POSITION', attributes.POSITION, 3);
-  const cloud = allocateCloud(count, degreeOf(own), document.name);
+  const cloud = allocateCloud(count, degreeOf(own), document);
   cloud.positions.set(positions);
   cloud.scales.set(await read('SCALE', own('SCALE'), 3));
   const opacity = own('OPACITY');

@@ -26,6 +26,7 @@ export async function putSparse(document: GltfDocument, sparse: unknown, target:
     return document.fail(`${path}.indices.componentType`, '5121, 5123 or 5125', indexType);
   const at = await numbersIn(document, indices, `${path}.indices`, indexType, count);
   const read = await numbersIn(document, values, `${path}.values`, target.componentType, count * width);
+  document.take(8 * count * width);
   const { first, end } = target.range;
   for (let k = 0; k < count; k++) {
     const element = at(k);

@@ -1,3 +1,4 @@
+import { LoadBudget, type LoadLimits } from '../budget.js';
 import { grouped } from '../bytes.js';
 import { damaged } from '../damaged.js';
 import { partAddress } from '../open-part.js';
@@ -33,17 +34,25 @@ export interface LodScene {
   readonly environment: SogAddress | undefined;
 }
 
-/** Splats of all levels together that an index may name: what is kept of each 256 of them before any is there is allocated at once. */
+/** Splats of all levels together that an index may name. */
 const MOST_SPLATS = 2 ** 31;
+/** What is allocated for each before any is there: bounds and state of each 256. */
+const KEPT_BYTES = 32 / 256;
 
 /**
  * Reads the index of a streamed SOG scene, `lod-meta.json`, for those who fetch it box by box.
  * @param name what error messages call it
  * @param url absolute address of the index, which all others are relative to
- * @throws GaussianSplatError `decode/header`, `decode/unsupported` for another version.
+ * @throws GaussianSplatError `decode/header`, `decode/unsupported` for another version, `out-of-memory/budget`.
  */
-export function readLodScene(bytes: Uint8Array, name: string, url: string): LodScene {
-  const { files, leaves, environment } = parseLodMeta(bytes, name);
+export function readLodScene(
+  bytes: Uint8Array,
+  name: string,
+  url: string,
+  limits?: LoadLimits,
+): LodScene {
+  const budget = new LoadBudget(bytes.length, limits);
+  const { files, leaves, environment } = parseLodMeta({ bytes, name, budget });
   const addressOf = (path: string): SogAddress => ({ url: partAddress(url, path).href, name: `${name}, ${path}` });
   const addresses = files.map(addressOf);
   const boxes = leaves.map(({ min, max, levels }) => ({
@@ -56,6 +65,7 @@ export function readLodScene(bytes: Uint8Array, name: string, url: string): LodS
   if (total > MOST_SPLATS) {
     throw damaged(`${name}, tree`, `at most ${grouped(MOST_SPLATS)} splats`, grouped(total), 'decode/header');
   }
+  budget.take(total * KEPT_BYTES, name);
   return {
     boxes: boxes.filter(({ runs }) => runs.length > 0),
     environment: environment === undefined ? undefined : addressOf(environment),

@@ -1,6 +1,6 @@
 import { damaged } from '../damaged.js';
 import { grouped } from '../bytes.js';
-import { isObject, parseJson, show } from '../json.js';
+import { isObject, parseJson, show, type JsonSource } from '../json.js';
 
 /** Splats `offset` to `offset + count` of one file. */
 export interface LodRun {
@@ -30,15 +30,16 @@ export interface LodMeta {
 }
 
 /** An index takes some 100 bytes for each leaf and level. */
-const MAX_INDEX_BYTES = 1 << 26;
+export const MAX_INDEX_BYTES = 1 << 26;
 const MAX_LEVELS = 64;
 
 /**
  * Reads `lod-meta.json` in both its dialects: that of version 1 (`version`, `asset`, `count`, `counts`) and the earlier one without
  * (whose `environment` may be null). Both agree in `lodLevels`, `filenames` and `tree`.
  */
-export function parseLodMeta(bytes: Uint8Array, name: string): LodMeta {
-  const json = parseJson(bytes, name, MAX_INDEX_BYTES);
+export function parseLodMeta(source: JsonSource): LodMeta {
+  const { name } = source;
+  const json = parseJson(source, MAX_INDEX_BYTES);
   const fail = (path: string, expected: string, found: unknown): never => {
     throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
   };

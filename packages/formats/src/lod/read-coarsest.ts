@@ -1,8 +1,9 @@
 import { keepUsable, type GaussianCloud } from '@gaussian-splat/core';
+import { LoadBudget, type LoadLimits } from '../budget.js';
 import { levelRunsOf, type NodePart } from './node-parts.js';
 import { noSplats } from '../no-splats.js';
 import { mergeClouds } from '../merge-clouds.js';
-import type { LodScene, SogRun } from './boxes.js';
+import type { LodScene, SogAddress, SogRun } from './boxes.js';
 import { cut, type FetchBytes, type SogFiles } from './sog-files.js';
 
 /**
@@ -16,7 +17,9 @@ export async function readCoarsest(
   fetch: FetchBytes,
   name: string,
   signal?: AbortSignal,
+  limits?: LoadLimits,
 ): Promise<GaussianCloud> {
+  const budget = new LoadBudget(0, limits);
   const parts: NodePart[] = new Array(boxes.length);
   const byFile = new Map<string, [node: number, run: SogRun][]>();
   boxes.forEach(({ runs: [run] }, node) => {
@@ -27,15 +30,20 @@ export async function readCoarsest(
   // Where one file is missing the others are not waited for.
   const failed = new AbortController();
   const either = AbortSignal.any([failed.signal, ...(signal ? [signal] : [])]);
+  const openFile = async (file: SogAddress): Promise<GaussianCloud> => {
+    const cloud = await files.open(file, fetch, either);
+    budget.arrive(files.arrivedBytes(cloud));
+    return cloud;
+  };
   const readFile = async (runs: readonly [number, SogRun][]): Promise<void> => {
-    const cloud = await files.open(runs[0][1], fetch, either);
+    const cloud = await openFile(runs[0][1]);
     for (const [node, run] of runs) {
-      parts[node] = { cloud: cut(cloud, run), first: 0, count: run.count, node, level: 0 };
+      parts[node] = { cloud: cut(cloud, run, budget), first: 0, count: run.count, node, level: 0 };
     }
   };
   const readAround = async (): Promise<void> => {
     if (environment === undefined) return;
-    const cloud = await files.open(environment, fetch, either);
+    const cloud = await openFile(environment);
     parts[boxes.length] = { cloud, first: 0, count: cloud.count, node: boxes.length, level: 0 };
   };
   try {
@@ -44,7 +52,7 @@ export async function readCoarsest(
     failed.abort(error);
     throw error;
   }
-  const cloud = keepUsable({ ...mergeClouds(parts, name), levelRuns: levelRunsOf(parts) });
+  const cloud = keepUsable({ ...mergeClouds(parts, { budget, name }), levelRuns: levelRunsOf(parts) });
   if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
   return cloud;
 }

@@ -1,4 +1,5 @@
 import { GaussianSplatError, keepUsable, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { LoadBudget } from '../budget.js';
 import { grouped } from '../bytes.js';
 import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
@@ -32,6 +33,8 @@ export class SogFiles {
   readonly #kept = new Map<string, GaussianCloud>();
   readonly #reading = new Map<string, Reading>();
   readonly #gate = new Gate(FILES_AT_A_TIME);
+  /** Bytes that each cloud arrived as. */
+  readonly #arrived = new WeakMap<GaussianCloud, number>();
 
   /** @param keptBytes decoded splats that are kept, default 128 MB; the last file is, however large */
   constructor(keptBytes = KEPT_BYTES) {
@@ -41,7 +44,7 @@ export class SogFiles {
   /**
    * Reads the splats of a run, those left out that cannot be drawn.
    * @param fetch brings the files that are not here
-   * @throws GaussianSplatError `decode/*`, `decode/corrupt` for a run that reaches beyond its file, `decode/empty` for one without a splat that can be drawn; what `fetch` throws; the
+   * @throws GaussianSplatError `decode/*`, `decode/corrupt` for a run that reaches beyond its file, `decode/empty` for one without a splat that can be drawn, `out-of-memory/budget`; what `fetch` throws; the
    * reason of `signal` as soon as that is aborted.
    */
   async read(run: SogRun, fetch: FetchBytes, signal?: AbortSignal): Promise<GaussianCloud> {
@@ -72,6 +75,11 @@ export class SogFiles {
     return this.#wait(file.url, reading, signal);
   }
 
+  /** Bytes that a file arrived as, which {@link open} has given. */
+  arrivedBytes(cloud: GaussianCloud): number {
+    return this.#arrived.get(cloud) ?? 0;
+  }
+
   /** Waits with others for a file; the last that gives up ends its reading. */
   async #wait(url: string, reading: Reading, signal: AbortSignal | undefined): Promise<GaussianCloud> {
     reading.readers++;
@@ -98,8 +106,14 @@ export class SogFiles {
     try {
       signal.throwIfAborted();
       const bytes = await checkedPart(await fetch(url, signal), name);
-      const open = (path: string): Promise<Uint8Array> => fetch(partAddress(url, path).href, signal);
-      const cloud = await readSogPart(bytes, name, open, signal);
+      const budget = new LoadBudget(bytes.length);
+      const open = async (path: string): Promise<Uint8Array> => {
+        const part = await fetch(partAddress(url, path).href, signal);
+        budget.arrive(part.length);
+        return part;
+      };
+      const cloud = await readSogPart({ bytes, name, budget, signal }, open);
+      this.#arrived.set(cloud, budget.arrived);
       this.#keep(url, cloud);
       return cloud;
     } finally {
@@ -128,10 +142,11 @@ const byteLengthOf = ({ positions, scales, rotations, opacities, sh }: GaussianC
 
 /**
  * Some splats of a cloud, with arrays of their own.
+ * @param budget is charged for them
  * @throws GaussianSplatError `decode/corrupt` if the cloud has not as many
  */
-export function cut(cloud: GaussianCloud, run: SogRun): GaussianCloud {
-  const { first, count } = run;
+export function cut(cloud: GaussianCloud, run: SogRun, budget?: LoadBudget): GaussianCloud {
+  const { first, count, name } = run;
   if (first + count > cloud.count) {
     throw damaged(
       whereOf(run),
@@ -139,6 +154,7 @@ export function cut(cloud: GaussianCloud, run: SogRun): GaussianCloud {
       'one that reaches beyond',
     );
   }
+  budget?.takeSplats(count, cloud.shDegree, name);
   const part = (values: Float32Array, stride: number): Float32Array =>
     values.slice(stride * first, stride * (first + count));
   return {

@@ -73,9 +73,8 @@ export function withPlainNames(header: PlyHeader): PlyHeader {
 export function shDegreeOf(source: SceneSource, element: PlyElement): ShDegree | 4 {
   const rest = element.properties.filter((property) => /^f_rest_\d+$/.test(property.name));
   const degree = DEGREE_OF_REST_COUNT.get(rest.length / 3);
-  const isComplete = rest.every((_, k) =>
-    rest.some((property) => property.name === `f_rest_${k}` && !property.listCountType),
-  );
+  const scalars = new Set(rest.filter(({ listCountType }) => !listCountType).map(({ name }) => name));
+  const isComplete = rest.every((_, k) => scalars.has(`f_rest_${k}`));
   if (degree !== undefined && isComplete) return degree;
   throw new GaussianSplatError('decode/header', {
     where: `${source.name}, PLY header, element "${element.name}"`,

@@ -68,6 +68,8 @@ export function exceedsFloat32(type: ScalarType): boolean {
 export function parsePlyHeader(source: SceneSource): PlyHeader {
   const { lines, dataStart } = splitHeader(source);
   const elements: { name: string; count: number; properties: PlyProperty[] }[] = [];
+  /** Names of all elements, and of the properties of the last: a header may have a hundred thousand lines. */
+  const [names, own] = [new Set<string>(), new Set<string>()];
   const comments: string[] = [];
   let encoding: PlyHeader['encoding'] | undefined;
   lines.forEach((line, index) => {
@@ -79,10 +81,11 @@ export function parsePlyHeader(source: SceneSource): PlyHeader {
     } else if (keyword === 'comment') {
       comments.push(words.join(' '));
     } else if (keyword === 'element') {
-      elements.push(parseElement(words, elements, fail));
+      elements.push(parseElement(words, names, fail));
+      own.clear();
     } else if (keyword === 'property') {
       const element = elements.at(-1) ?? fail('an element before its properties');
-      element.properties.push(parseProperty(words, element.properties, fail));
+      element.properties.push(parseProperty(words, own, fail));
     } else if (keyword !== '' && keyword !== 'obj_info' && index > 0) {
       fail('format, comment, obj_info, element or property');
     }
@@ -93,20 +96,22 @@ export function parsePlyHeader(source: SceneSource): PlyHeader {
 
 type Fail = (expected: string) => never;
 
-function parseElement(words: readonly string[], elements: readonly PlyElement[], fail: Fail) {
+function parseElement(words: readonly string[], elements: Set<string>, fail: Fail) {
   const [name, text] = words;
   const count = Number(text);
   if (words.length !== 2 || !/^\d+$/.test(text) || !Number.isSafeInteger(count)) fail('"element NAME COUNT"');
-  if (elements.some((element) => element.name === name)) fail(`one element named ${quote(name)}`);
+  if (elements.has(name)) fail(`one element named ${quote(name)}`);
+  elements.add(name);
   return { name, count, properties: [] };
 }
 
-function parseProperty(words: readonly string[], properties: readonly PlyProperty[], fail: Fail): PlyProperty {
+function parseProperty(words: readonly string[], properties: Set<string>, fail: Fail): PlyProperty {
   const isList = words[0] === 'list';
   if (words.length !== (isList ? 4 : 2)) fail('"property TYPE NAME" or "property list COUNT_TYPE TYPE NAME"');
   const name = words[words.length - 1];
   const type = TYPES.get(words[words.length - 2]) ?? fail(`a type out of ${[...TYPES.keys()].join(', ')}`);
-  if (properties.some((property) => property.name === name)) fail(`one property named ${quote(name)} in the element`);
+  if (properties.has(name)) fail(`one property named ${quote(name)} in the element`);
+  properties.add(name);
   if (!isList) return { name, type };
   const listCountType = TYPES.get(words[1]);
   if (!listCountType || listCountType.startsWith('float')) return fail('an integer type for the length of a list');

@@ -38,7 +38,7 @@ export function readCompressedPly(source: SceneSource): GaussianCloud {
     PACKED.map((property, offset) => ({ property, array: words, stride: 4, offset })),
   );
   source.signal?.throwIfAborted();
-  const cloud = allocateCloud(count, keptDegree(degree), source.name);
+  const cloud = allocateCloud(count, keptDegree(degree), source);
   unpackSplats(words, chunkBounds, cloud);
   if (sh && !source.isPrefix) readHarmonics(source, header, degree, cloud);
   return cloud;

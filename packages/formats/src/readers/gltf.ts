@@ -1,9 +1,8 @@
-import { GaussianSplatError, shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { grouped } from '../bytes.js';
+import { GaussianSplatError, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { openContainer, type Json } from '../gltf/container.js';
 import { GltfDocument } from '../gltf/document.js';
 import { multiply, placedMeshes, type Affine } from '../gltf/nodes.js';
-import { isSplats, isUncompressed, readPrimitive, sourceOf, splatsIn } from '../gltf/primitive.js';
+import { isSplats, isUncompressed, readPrimitive, splatsIn } from '../gltf/primitive.js';
 import { isObject } from '../json.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
@@ -13,11 +12,8 @@ import { noParts } from './sog.js';
 /** glTF's axes are left, up and forward, seen from what is shown; a cloud's are right, down and forward. */
 const TO_CLOUD: Affine = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0];
 
-/** Primitives of splats in a scene, each time that one is shown counted: a short file can name the same ones over and over. */
-const MAX_PRIMITIVES = 100_000;
-
-/** The same mesh in many places is copied for each, and copies take no bytes of the file: these, 9 million splats of degree 3, are all that copies may take. */
-const MAX_COPIED_BYTES = 2 ** 31;
+/** Charged for each primitive of splats, each time that the scene shows it: a short file can name the same ones over and over. */
+const PRIMITIVE_BYTES = 1024;
 
 /** Splats by which the middle of a primitive is found. */
 const SAMPLES = 4096;
@@ -32,9 +28,6 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   const { document, placed, others } = open(source);
   if (placed.length === 0) throw noSplats(document.json, name, others);
   const clouds: GaussianCloud[] = [];
-  const copies = new Copies(document);
-  for (const { primitive, path } of range ? [] : placed)
-    if (isUncompressed(primitive)) copies.count(primitive, splatsIn(document, primitive, path));
   let splats = 0;
   for (const { primitive, path, toScene } of placed) {
     signal?.throwIfAborted();
@@ -43,36 +36,15 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
       splats += own.count;
       continue;
     }
-    const cloud = await readPrimitive(document, primitive, path, signal, own);
+    const cloud = await readPrimitive(document, primitive, path, source, own);
     splats += own?.count ?? cloud.count;
-    if (!isUncompressed(primitive)) copies.count(primitive, cloud);
     clouds.push(moved(cloud, multiply(TO_CLOUD, toScene)));
   }
   if (clouds.length === 1) return clouds[0];
   return mergeClouds(
     clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
-    name,
+    source,
   );
-}
-
-/** Adds up what splats take that have been read before, for another place. */
-class Copies {
-  readonly #document: GltfDocument;
-  readonly #known = new Set<unknown>();
-  #bytes = 0;
-
-  constructor(document: GltfDocument) {
-    this.#document = document;
-  }
-
-  /** A primitive is shown once more. Throws `decode/header` where that is too much. */
-  count(primitive: Json, { count, shDegree }: Pick<GaussianCloud, 'count' | 'shDegree'>): void {
-    const source = sourceOf(primitive);
-    if (this.#known.has(source)) this.#bytes += 4 * count * (11 + 3 * shCoefficientCount(shDegree));
-    this.#known.add(source);
-    if (this.#bytes > MAX_COPIED_BYTES)
-      this.#document.fail('nodes', `copies of at most ${grouped(MAX_COPIED_BYTES)} bytes`, 'more');
-  }
 }
 
 /** True if a node moves so far, as georeferenced ones do, that float32 would round what it moves by more than a few hundredths of a millimetre. */
@@ -124,12 +96,12 @@ interface PlacedSplats {
 }
 
 /** The primitives of splats of the default scene in their order, and how many others there are. */
-function open({ bytes, name, openPart }: SceneSource): {
+function open({ bytes, name, openPart, budget }: SceneSource): {
   document: GltfDocument;
   placed: PlacedSplats[];
   others: number;
 } {
-  const document = new GltfDocument(openContainer(bytes, name), name, openPart ?? noParts(name, 'scene.glb'));
+  const document = new GltfDocument(openContainer({ bytes, name, budget }), { name, budget }, openPart ?? noParts(name, 'scene.glb'));
   const placed: PlacedSplats[] = [];
   const known = new Map<number, MeshParts>();
   let others = 0;
@@ -137,8 +109,7 @@ function open({ bytes, name, openPart }: SceneSource): {
     const parts = known.get(mesh) ?? partsOf(document, mesh);
     known.set(mesh, parts);
     others += parts.others;
-    if (placed.length + parts.splats.length > MAX_PRIMITIVES)
-      document.fail('nodes', `at most ${grouped(MAX_PRIMITIVES)} primitives of splats in the scene`, 'more');
+    budget.take(PRIMITIVE_BYTES * parts.splats.length, name);
     for (const splats of parts.splats) placed.push({ ...splats, toScene });
   }
   return { document, placed, others };

@@ -9,9 +9,10 @@ import type { SceneSource } from '../scene-format.js';
  * 0 in float32, at 1 and 2 with 16-bit positions within buckets and float16, at 2 with coefficients in bytes. Sections
  * of a lower degree than the highest get zeros.
  */
-export function readKsplat({ bytes, name, signal, isPrefix = false }: SceneSource): GaussianCloud {
+export function readKsplat(source: SceneSource): GaussianCloud {
+  const { bytes, name, signal, isPrefix = false } = source;
   const header = parseKsplatHeader(bytes, name, isPrefix);
-  const cloud = allocateCloud(header.count, header.degree, name);
+  const cloud = allocateCloud(header.count, header.degree, source);
   let first = 0;
   for (const section of header.sections) {
     signal?.throwIfAborted();

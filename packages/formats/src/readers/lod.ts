@@ -16,7 +16,7 @@ import { noParts } from './sog.js';
  */
 export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   const { name, level = 0 } = source;
-  const meta = parseLodMeta(source.bytes, name);
+  const meta = parseLodMeta(source);
   const open = source.openPart ?? noParts(name, 'scene.zip');
   const coarsest = runsAtLevel(meta, meta.levels - 1);
   const runs = level === 'all' ? runsAtAllLevels(meta) : runsAtLevel(meta, Math.min(level, meta.levels - 1));
@@ -24,10 +24,10 @@ export async function readLod(source: SceneSource): Promise<GaussianCloud> {
   const countOf = (some: readonly NodeRun[]): number => some.reduce((sum, { count }) => sum + count, 0);
   if (previewWanted(source, countOf(runs)) && countOf(coarsest) < countOf(runs) / 2) {
     const parts = [...(await readRuns(coarsest, meta, open, source)), ...around];
-    if (parts.length > 0) await source.onPreview?.(mergeClouds(parts, name));
+    if (parts.length > 0) await source.onPreview?.(mergeClouds(parts, source));
   }
   const parts = [...(await readRuns(runs, meta, open, source)), ...around];
-  const merged = mergeClouds(parts, name);
+  const merged = mergeClouds(parts, source);
   return level === 'all' ? { ...merged, levelRuns: levelRunsOf(parts) } : merged;
 }
 
@@ -65,11 +65,12 @@ async function readEnvironment(
 }
 
 /** One SOG of the scene; the paths in its description are relative to it. */
-async function readPart(path: string, open: OpenPart, { name, signal }: SceneSource): Promise<GaussianCloud> {
+async function readPart(path: string, open: OpenPart, source: SceneSource): Promise<GaussianCloud> {
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
-  const own = `${name}, ${path}`;
-  const bytes = await checkedPart(await open(path), own);
-  return readSogPart(bytes, own, (part) => open(folder + part), signal);
+  const { budget, signal } = source;
+  const name = `${source.name}, ${path}`;
+  const bytes = await checkedPart(await open(path), name);
+  return readSogPart({ bytes, name, budget, signal }, (part) => open(folder + part));
 }
 
 /** The runs must lie within the file and apart from one another: together they never hold more splats than the file. */

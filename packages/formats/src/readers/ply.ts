@@ -16,7 +16,7 @@ export function readPly(source: SceneSource): GaussianCloud {
   const header = withPlainNames(parsePlyHeader(source));
   const layout = findGaussians(source, header);
   const data = openElement(source, header, 'vertex');
-  const cloud = allocateCloud(data.element.count, keptDegree(layout.degree), source.name);
+  const cloud = allocateCloud(data.element.count, keptDegree(layout.degree), source);
   cloud.antialiased = layout.antialiased;
   source.signal?.throwIfAborted();
   const filter = new Float32Array(layout.hasFilter ? cloud.count : 0);

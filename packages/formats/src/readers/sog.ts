@@ -11,7 +11,7 @@ const LAST_PART = /[^/]*$/;
  * images, coefficients above the constant one in a palette. Bundles (`.sog`) are ZIP files, which `readers/zip.ts` opens.
  */
 export async function readSog(source: SceneSource): Promise<GaussianCloud> {
-  const meta = parseSogMeta(source.bytes, source.name);
+  const meta = parseSogMeta(source);
   return readSogImages(meta, source.openPart ?? noParts(source.name), source);
 }
 

@@ -31,7 +31,7 @@ export function readSplat(source: SceneSource): GaussianCloud {
       remedy: 'check that the file really is a .splat file; its name says so, but its content does not',
     });
   }
-  const cloud = allocateCloud(count, 0, name);
+  const cloud = allocateCloud(count, 0, source);
   const body = alignedTo4(bytes);
   const floats = new Float32Array(body.buffer, body.byteOffset, body.length / 4);
   for (let i = 0; i < count; i++) {

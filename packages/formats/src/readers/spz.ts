@@ -27,18 +27,18 @@ export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
   if (source.isPrefix) return readWithoutHarmonics(source);
   const { header, scene } = startsWith(source.bytes, 'NGSP') ? readPlain(source) : await readGzip(source);
   source.signal?.throwIfAborted();
-  if (previewWanted(source, header.count)) await source.onPreview?.(previewOf(header, scene, source.name));
-  return unpackSplats(header, scene, source.name);
+  if (previewWanted(source, header.count)) await source.onPreview?.(previewOf(header, scene, source));
+  return unpackSplats(header, scene, source);
 }
 
 /** Every so many-th splat, without coefficients above the constant one. */
-function previewOf(header: SpzHeader, { attributes, axes }: PackedScene, name: string): GaussianCloud {
+function previewOf(header: SpzHeader, { attributes, axes }: PackedScene, source: SceneSource): GaussianCloud {
   const sizes = bytesPerSplat(header.version, 0);
   const count = Math.ceil(header.count / PREVIEW_STEP);
   const taken = Object.fromEntries(
     SPZ_ATTRIBUTES.map((attribute) => [attribute, everyNth(attributes[attribute], sizes[attribute], count)]),
   ) as PackedScene['attributes'];
-  return sparse(unpackSplats({ ...header, count, degree: 0 }, { attributes: taken, axes }, name));
+  return sparse(unpackSplats({ ...header, count, degree: 0 }, { attributes: taken, axes }, source));
 }
 
 function everyNth(values: Uint8Array, size: number, count: number): Uint8Array {
@@ -57,9 +57,9 @@ async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud>
     if (header.version === 4) {
       const plain = { ...header, degree: 0 } as const;
       requirePlausibleCount(plain, bytes.length, name);
-      return unpackSplats(plain, readStreams(source, header), name);
+      return unpackSplats(plain, readStreams(source, header), source);
     }
-    return unpackLegacy(bytes, header, name);
+    return unpackLegacy(source, bytes, header);
   }
   const gunzip = new Gunzip(source);
   try {
@@ -67,16 +67,17 @@ async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud>
     const plain = { ...header, degree: 0 } as const;
     // More than the bytes so far can hold is not there yet, or never will be.
     requirePlausibleCount(plain, bytes.length, name);
-    return unpackLegacy(await gunzip.upTo(SPZ_HEADER_BYTES + bodyBytes(plain, header.version)), header, name);
+    const length = SPZ_HEADER_BYTES + bodyBytes(plain, header.version);
+    return unpackLegacy(source, await gunzip.upTo(length), header);
   } finally {
     gunzip.close();
   }
 }
 
-function unpackLegacy(file: Uint8Array, header: SpzHeader, name: string): GaussianCloud {
+function unpackLegacy(source: SceneSource, file: Uint8Array, header: SpzHeader): GaussianCloud {
   const plain = { ...header, degree: 0, hasExtensions: false } as const;
   const body = file.subarray(0, SPZ_HEADER_BYTES + bodyBytes(plain, header.version));
-  return unpackSplats(plain, readLegacyBody(body, plain, name), name);
+  return unpackSplats(plain, readLegacyBody(body, plain, source.name), source);
 }
 
 interface SpzParts {

@@ -1,12 +1,17 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { findFormat } from '../detect.js';
 import { loadReader } from '../load-parts.js';
+import { MAX_INDEX_BYTES } from '../lod/meta.js';
 import type { SceneSource } from '../scene-format.js';
+import { MAX_META_BYTES } from '../sog/meta.js';
 import { Archive } from '../zip/archive.js';
 import { listed, namedLike, relevant, shallowest } from '../zip/paths.js';
 
-/** Main files of scenes of several files, in the order in which they are looked for: an index names descriptions. */
-const DESCRIPTIONS = ['lod-meta.json', 'meta.json'];
+/** Main files of scenes of several files, in the order in which they are looked for, since an index names descriptions; and how long these may be. */
+const DESCRIPTIONS = [
+  ['lod-meta.json', MAX_INDEX_BYTES],
+  ['meta.json', MAX_META_BYTES],
+] as const;
 /** So many files with these names are opened at most to find a scene. */
 const MAX_DESCRIPTIONS = 16;
 const SCENE_FILE = /\.(gltf|glb|ply|spz|splat|ksplat|sog)$/i;
@@ -20,8 +25,8 @@ const ITERATION = /^(.*\/)?iteration_(\d+)\/point_cloud\.ply$/i;
  * other format. The scene that lies least deep counts; of a training's output, the one after most iterations. Archives within archives are bundles and are read one deep.
  */
 export async function readZip(source: SceneSource): Promise<GaussianCloud> {
-  const { name, bytes } = source;
-  const archive = new Archive(bytes, name);
+  const { name } = source;
+  const archive = new Archive(source);
   const path = mainFile(archive, name);
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const inner = archive.open(path);
@@ -40,9 +45,11 @@ const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 
 function mainFile(archive: Archive, name: string): string {
   const paths = relevant(archive.paths);
-  for (const description of DESCRIPTIONS) {
+  for (const [description, most] of DESCRIPTIONS) {
     // Other programs have a meta.json, too.
-    const named = namedLike(description, paths).slice(0, MAX_DESCRIPTIONS);
+    const named = namedLike(description, paths)
+      .filter((path) => archive.lengthOf(path) <= most)
+      .slice(0, MAX_DESCRIPTIONS);
     const found = shallowest(named.filter((path) => findFormat(archive.open(path), '', '') !== undefined));
     if (found.length > 1) throw severalScenes(name, found);
     if (found.length === 1) return found[0];
@@ -65,7 +72,7 @@ function mainFile(archive: Archive, name: string): string {
 function lastIteration(paths: readonly string[]): string | undefined {
   const found = paths.map((path) => ITERATION.exec(path));
   const [first] = found;
-  if (!first || found.some((match) => match?.[1] !== first[1])) return undefined;
+  if (!first || found.some((match) => match === null || match[1] !== first[1])) return undefined;
   const iterations = found.map((match) => Number(match![2]));
   return paths[iterations.indexOf(Math.max(...iterations))];
 }

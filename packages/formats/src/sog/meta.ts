@@ -1,7 +1,7 @@
 import { GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { damaged } from '../damaged.js';
-import { isObject, parseJson, show, type Json } from '../json.js';
+import { isObject, parseJson, show, type Json, type JsonSource } from '../json.js';
 
 /** A value of each byte 0..255, for each channel of a plane. */
 export type ByteTable = readonly Float32Array[];
@@ -31,13 +31,14 @@ export interface SogMeta {
 }
 
 /** A description has a few codebooks of 256 numbers; a larger file is none. */
-const MAX_META_BYTES = 1 << 20;
+export const MAX_META_BYTES = 1 << 20;
 /** Labels have 16 bits. */
 const MAX_PALETTE = 65_536;
 
 /** Reads and checks the `meta.json` of a SOG scene of version 1 (which does not say so) or 2. */
-export function parseSogMeta(bytes: Uint8Array, name: string): SogMeta {
-  const json = parseJson(bytes, name, MAX_META_BYTES);
+export function parseSogMeta(source: JsonSource): SogMeta {
+  const { name } = source;
+  const json = parseJson(source, MAX_META_BYTES);
   const fail = (path: string, expected: string, found: unknown): never => {
     throw damaged(`${name}, ${path}`, expected, show(found), 'decode/header');
   };

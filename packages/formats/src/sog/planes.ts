@@ -2,7 +2,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
 import { checkedPart } from '../checked-part.js';
 import { damaged } from '../damaged.js';
-import type { OpenPart } from '../scene-format.js';
+import type { OpenPart, SceneSource } from '../scene-format.js';
 import { decodeWebp, webpSize, type WebpImage } from '../webp/decode.js';
 import { WebpError } from '../webp/webp-error.js';
 
@@ -12,40 +12,54 @@ const SPARE_PIXELS = 65_536;
 /** Opens the images of a SOG scene and decodes them, with bounds on what they may take. */
 export class Planes {
   readonly #open: OpenPart;
-  readonly #name: string;
-  readonly #signal: AbortSignal | undefined;
+  readonly #source: SceneSource;
+  readonly #loaded = new Map<string, Promise<Uint8Array>>();
+  /** The image decoded last: names may repeat. */
+  #last: { readonly file: string; readonly image: WebpImage } | undefined;
 
-  constructor(open: OpenPart, name: string, signal: AbortSignal | undefined) {
+  constructor(open: OpenPart, source: SceneSource) {
     this.#open = open;
-    this.#name = name;
-    this.#signal = signal;
+    this.#source = source;
   }
 
-  /** Downloads an image. */
-  async load(file: string): Promise<Uint8Array> {
-    this.#signal?.throwIfAborted();
-    return checkedPart(await this.#open(file), `${this.#name}, ${file}`);
+  /** Downloads an image: each once, however often it is named. */
+  load(file: string): Promise<Uint8Array> {
+    const loading = this.#loaded.get(file) ?? this.#load(file);
+    this.#loaded.set(file, loading);
+    return loading;
+  }
+
+  async #load(file: string): Promise<Uint8Array> {
+    this.#source.signal?.throwIfAborted();
+    return checkedPart(await this.#open(file), `${this.#source.name}, ${file}`);
   }
 
   /** A plane with one pixel for each splat: at least `count` pixels, and not many more. */
   decodePlane(bytes: Uint8Array, file: string, count: number): Uint32Array {
     const { pixels } = this.decode(bytes, file, 2 * count + SPARE_PIXELS);
     if (pixels.length < count) {
-      throw damaged(`${this.#name}, ${file}`, `${grouped(count)} pixels, one for each splat`, grouped(pixels.length));
+      throw damaged(`${this.#source.name}, ${file}`, `${grouped(count)} pixels, one for each splat`, grouped(pixels.length));
     }
     return pixels;
   }
 
   /** Any image of at most `maxPixels`; its header is asked before anything is allocated. */
   decode(bytes: Uint8Array, file: string, maxPixels: number): WebpImage {
-    this.#signal?.throwIfAborted();
-    const where = `${this.#name}, ${file}`;
+    const { signal, name, budget } = this.#source;
+    signal?.throwIfAborted();
+    if (this.#last?.file === file) return this.#last.image;
+    const where = `${name}, ${file}`;
+    const take = (bytes: number): void => budget.take(bytes, where);
     try {
       const { width, height } = webpSize(bytes);
       if (width * height > maxPixels) {
         throw damaged(where, `at most ${grouped(maxPixels)} pixels`, `${width} x ${height}`);
       }
-      return decodeWebp(bytes);
+      // Pixels, and those before a transform of their own size is undone.
+      take(8 * width * height);
+      const image = decodeWebp(bytes, take);
+      this.#last = { file, image };
+      return image;
     } catch (cause) {
       if (cause instanceof GaussianSplatError || !(cause instanceof WebpError)) throw cause;
       const code = cause.isForeign ? 'decode/unsupported' : cause.isCut ? 'decode/truncated' : 'decode/corrupt';

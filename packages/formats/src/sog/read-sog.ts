@@ -37,8 +37,8 @@ interface GeometryPlanes {
 
 /** Reads the images that a `meta.json` names. */
 export async function readSogImages(meta: SogMeta, open: OpenPart, source: SceneSource): Promise<GaussianCloud> {
-  const { name, signal } = source;
-  const images = new Planes(open, name, signal);
+  const { name } = source;
+  const images = new Planes(open, source);
   const { count } = meta;
   // On their way early, but decoded only after what a preview needs.
   const harmonics = meta.shN?.files.slice(0, 2).map((file) => images.load(file));
@@ -46,12 +46,12 @@ export async function readSogImages(meta: SogMeta, open: OpenPart, source: Scene
   harmonics?.forEach((file) => file.catch(() => undefined));
   const planes = await decodeGeometry(images, meta, name);
   if (previewWanted(source, count))
-    await source.onPreview?.(sparse(unpackGeometry(planes, meta, PREVIEW_STEP, 0, name)));
-  if (!meta.shN || !harmonics) return unpackGeometry(planes, meta, 1, 0, name);
+    await source.onPreview?.(sparse(unpackGeometry(planes, meta, PREVIEW_STEP, 0, source)));
+  if (!meta.shN || !harmonics) return unpackGeometry(planes, meta, 1, 0, source);
   const palette = images.decode(await harmonics[0], meta.shN.files[0], MAX_PALETTE_PIXELS);
   const degree = checkDegree(meta, palette.width, name);
   const labels = images.decodePlane(await harmonics[1], meta.shN.files[1], count);
-  const cloud = unpackGeometry(planes, meta, 1, degree, name);
+  const cloud = unpackGeometry(planes, meta, 1, degree, source);
   unpackHarmonics(labels, paletteOf(meta.shN, palette), cloud);
   return cloud;
 }
@@ -80,10 +80,10 @@ function unpackGeometry(
   meta: SogMeta,
   step: number,
   degree: ShDegree,
-  name: string,
+  source: SceneSource,
 ): DraftCloud {
   const selection: Selection = { count: Math.ceil(meta.count / step), step };
-  const cloud = allocateCloud(selection.count, degree, name);
+  const cloud = allocateCloud(selection.count, degree, source);
   cloud.antialiased = meta.antialiased;
   unpackMeans(planes.low, planes.high, meta.means, selection, cloud.positions);
   unpackScales(planes.scales, meta.scales, selection, cloud.scales);

@@ -26,8 +26,11 @@ export class Gunzip {
     this.#feed(writable.getWriter()).catch(() => {});
   }
 
-  /** Inflates on until there are `length` bytes or the stream ends; returns all bytes so far, maybe more than asked. */
+  /** Inflates on until there are `length` bytes or the stream ends; returns all bytes so far, maybe more than asked. Throws `out-of-memory/budget` where the load may not take as many. */
   async upTo(length: number): Promise<Uint8Array> {
+    const { budget, name } = this.#source;
+    // What grows is there twice while it is copied.
+    budget.take(2 * length, name);
     while (this.#output.length < length && !this.#isEnded) {
       this.#source.signal?.throwIfAborted();
       const { value } = await this.#reader.read().catch((cause: unknown) => {

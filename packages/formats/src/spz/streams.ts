@@ -46,6 +46,7 @@ export function readStreams(source: SceneSource, header: SpzHeader): PackedScene
       throw contradiction(name, entry + 8, `${grouped(expected)} bytes of ${attribute}`, grouped(uncompressed));
     }
     if (at + compressed > bytes.length) throw truncatedStream(source, attribute, at, compressed);
+    source.budget.take(expected, name);
     attributes[attribute] = inflate(bytes.subarray(at, at + compressed), expected, attribute, at, name);
     at += compressed;
   });

@@ -4,14 +4,19 @@ import { allocateCloud, expInPlace, keptDegree } from '../cloud.js';
 import { float16 } from '../float16.js';
 import { harmonicSigns, quaternionSigns, type AxisSigns } from './axes.js';
 import { bytesPerSplat, type SpzHeader } from './header.js';
+import type { SceneSource } from '../scene-format.js';
 import type { PackedScene } from './streams.js';
 
 /** Colours are stored as 0.5 + 0.15·f_dc, which leaves room for constant terms outside 0..1. */
 const COLOUR_SCALE = 0.15;
 
 /** Unpacks all attributes into a cloud (the definition is `unpackGaussians` in SPZ's `src/cc/load-spz.cc`). */
-export function unpackSplats(header: SpzHeader, { attributes, axes }: PackedScene, name: string): GaussianCloud {
-  const cloud = allocateCloud(header.count, keptDegree(header.degree), name);
+export function unpackSplats(
+  header: SpzHeader,
+  { attributes, axes }: PackedScene,
+  source: Pick<SceneSource, 'budget' | 'name'>,
+): GaussianCloud {
+  const cloud = allocateCloud(header.count, keptDegree(header.degree), source);
   cloud.antialiased = header.antialiased;
   if (header.version === 1) unpackHalfPositions(attributes.positions, axes, cloud.positions);
   else unpackFixedPositions(attributes.positions, header.fractionalBits, axes, cloud.positions);

@@ -11,7 +11,11 @@ export class BitReader {
   /** Bits of the stream. */
   readonly length: number;
 
-  constructor(stream: Uint8Array) {
+  /** Charges what is about to be allocated. */
+  readonly take: (bytes: number) => void;
+
+  constructor(stream: Uint8Array, take: (bytes: number) => void) {
+    this.take = take;
     this.bytes = new Uint8Array(stream.length + PADDING);
     this.bytes.set(stream);
     this.length = 8 * stream.length;

@@ -16,17 +16,18 @@ const SIGNATURE = 0x2f;
 
 /** Size of a lossless image from its first bytes: nothing is decoded or allocated. */
 export function webpSize(file: Uint8Array): { width: number; height: number } {
-  const bits = new BitReader(losslessStream(file).subarray(0, 5));
+  const bits = new BitReader(losslessStream(file).subarray(0, 5), () => undefined);
   return readHeader(bits);
 }
 
 /**
  * Decodes a lossless WebP image (RFC 9649) to the exact bytes that were encoded, alpha and the colours below it included, which
  * browsers' canvases do not promise. Memory is bounded by the image's size: look at {@link webpSize} first.
+ * @param take hears what is about to be allocated beside the pixels, and may throw
  * @throws WebpError
  */
-export function decodeWebp(file: Uint8Array): WebpImage {
-  const bits = new BitReader(losslessStream(file));
+export function decodeWebp(file: Uint8Array, take: (bytes: number) => void = () => undefined): WebpImage {
+  const bits = new BitReader(losslessStream(file), take);
   const { width, height } = readHeader(bits);
   const transforms: Transform[] = [];
   let storedWidth = width;

@@ -6,8 +6,8 @@ const LITERALS = 256;
 const LENGTH_SYMBOLS = 24;
 const DISTANCE_SYMBOLS = 40;
 const CACHE_HASH = 0x1e35a7bd;
-/** Entries of all tables of one image; real images have a few hundred thousand. */
-const MAX_TABLE_ENTRIES = 1 << 23;
+/** What the five codes of a group take beside their tables, and what their reading costs at least. */
+const GROUP_BYTES = 1024;
 
 /** The codes of one group: green with lengths and colour cache, red, blue, alpha, distance. */
 type Group = readonly [green: PrefixCode, red: PrefixCode, blue: PrefixCode, alpha: PrefixCode, distance: PrefixCode];
@@ -54,14 +54,13 @@ function readGroupMap(bits: BitReader, width: number, height: number): GroupMap 
 
 function readGroups(bits: BitReader, count: number, cacheBits: number): Group[] {
   const cacheSize = cacheBits > 0 ? 1 << cacheBits : 0;
-  let entries = 0;
   const read = (alphabet: number): PrefixCode => {
     const code = readPrefixCode(bits, alphabet);
-    entries += code.table.length;
-    if (entries > MAX_TABLE_ENTRIES) throw new WebpError('more prefix codes than any image needs');
+    bits.take(4 * code.table.length);
     return code;
   };
   return Array.from({ length: count }, (): Group => {
+    bits.take(GROUP_BYTES);
     const green = read(LITERALS + LENGTH_SYMBOLS + cacheSize);
     return [green, read(LITERALS), read(LITERALS), read(LITERALS), read(DISTANCE_SYMBOLS)];
   });

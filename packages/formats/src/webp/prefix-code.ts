@@ -23,21 +23,21 @@ const LENGTH_ORDER = [17, 18, 0, 1, 2, 3, 4, 5, 16, 6, 7, 8, 9, 10, 11, 12, 13, 
 
 /** Reads one prefix code over `alphabet` symbols. */
 export function readPrefixCode(bits: BitReader, alphabet: number): PrefixCode {
+  if (bits.read(1) === 1) return readSimple(bits, alphabet);
   const lengths = new Uint8Array(alphabet);
-  if (bits.read(1) === 1) readSimpleLengths(bits, lengths);
-  else readLengths(bits, lengths);
+  readLengths(bits, lengths);
   return buildTables(lengths);
 }
 
-/** One or two symbols, named outright. */
-function readSimpleLengths(bits: BitReader, lengths: Uint8Array): void {
+/** One or two symbols, named outright: their code is known without lengths, which would cost hundreds of steps for 4 bits. */
+function readSimple(bits: BitReader, alphabet: number): PrefixCode {
   const count = bits.read(1) + 1;
   const first = bits.read(bits.read(1) === 1 ? 8 : 1);
-  const symbols = count === 2 ? [first, bits.read(8)] : [first];
-  for (const symbol of symbols) {
-    if (symbol >= lengths.length) throw new WebpError('a symbol outside its alphabet');
-    lengths[symbol] = 1;
-  }
+  const second = count === 2 ? bits.read(8) : first;
+  const [low, high] = [Math.min(first, second), Math.max(first, second)];
+  if (high >= alphabet) throw new WebpError('a symbol outside its alphabet');
+  if (low === high) return { table: Uint32Array.of(low << 8), rootBits: 0 };
+  return { table: Uint32Array.of((low << 8) | 1, (high << 8) | 1), rootBits: 1 };
 }
 
 function readLengths(bits: BitReader, lengths: Uint8Array): void {

@@ -1,7 +1,9 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { inflateSync } from 'fflate';
+import type { LoadBudget } from '../budget.js';
 import { grouped, quote, viewOf } from '../bytes.js';
 import { damaged } from '../damaged.js';
+import type { SceneSource } from '../scene-format.js';
 import { crc32 } from './crc32.js';
 import { readDirectory, type ZipEntry } from './directory.js';
 
@@ -15,13 +17,15 @@ const [STORED, DEFLATED] = [0, 8];
 export class Archive {
   readonly #file: Uint8Array;
   readonly #name: string;
+  readonly #budget: LoadBudget;
   readonly #entries = new Map<string, ZipEntry>();
 
   /** Reads the directory. Throws `decode/corrupt`, `decode/truncated` or `decode/unsupported`. */
-  constructor(file: Uint8Array, name: string) {
-    this.#file = file;
+  constructor({ bytes, name, budget }: Pick<SceneSource, 'bytes' | 'name' | 'budget'>) {
+    this.#file = bytes;
     this.#name = name;
-    for (const entry of readDirectory(file, name)) {
+    this.#budget = budget;
+    for (const entry of readDirectory(bytes, name)) {
       const path = normalised(entry.path);
       if (!isFolder(entry.path) && !this.#entries.has(path)) this.#entries.set(path, entry);
     }
@@ -32,8 +36,13 @@ export class Archive {
     return [...this.#entries.keys()];
   }
 
+  /** Bytes of a file once it is inflated, as the directory says. */
+  lengthOf(path: string): number {
+    return this.#entries.get(normalised(path))?.bytes ?? 0;
+  }
+
   /**
-   * The content of a file; not to be changed, for it may be the archive's own memory. Throws `decode/corrupt`, `decode/truncated` or `decode/unsupported`.
+   * The content of a file; not to be changed, for it may be the archive's own memory. Throws `decode/corrupt`, `decode/truncated`, `decode/unsupported` or `out-of-memory/budget`.
    * @param path may have `.` and `..` in it
    */
   open(path: string): Uint8Array {
@@ -51,6 +60,8 @@ export class Archive {
       const found = `${grouped(entry.bytes)} bytes out of ${grouped(there)}`;
       throw damaged(where, 'a size that deflate can reach', found);
     }
+    // Whether or not it is inflated, all of it is read for its checksum.
+    this.#budget.take(entry.bytes, where);
     const content = this.#contentOf(entry, where);
     if (content.length !== entry.bytes) throw damaged(where, `${grouped(entry.bytes)} bytes`, grouped(content.length));
     // Programs that do not know it before they write the content leave 0.
@@ -67,10 +78,10 @@ export class Archive {
     const start = headerAt + HEADER_BYTES + view.getUint16(headerAt + 26, true) + view.getUint16(headerAt + 28, true);
     const stored = this.#file.subarray(start, start + compressedBytes);
     if (method === STORED) return stored;
-    const out = allocate(bytes, where);
     try {
-      return inflateSync(stored, { out });
+      return inflateSync(stored, { out: new Uint8Array(bytes) });
     } catch (cause) {
+      if (cause instanceof RangeError) throw cause;
       throw damaged(where, 'an intact deflate stream', (cause as Error).message || 'damage', 'decode/corrupt', cause);
     }
   }
@@ -85,26 +96,12 @@ export class Archive {
   }
 }
 
-function allocate(bytes: number, where: string): Uint8Array {
-  try {
-    return new Uint8Array(bytes);
-  } catch (cause) {
-    throw new GaussianSplatError('out-of-memory/allocation', {
-      where,
-      expected: `memory for ${grouped(bytes)} bytes`,
-      found: 'an allocation that failed',
-      remedy: 'use a smaller scene, or one that is not packed',
-      cause,
-    });
-  }
-}
-
 const hex = (value: number): string => value.toString(16).padStart(8, '0');
 
 const isFolder = (path: string): boolean => /[\\/]$/.test(path);
 
 /** A path without `.` and `..`, which stay within the archive. */
-export function normalised(path: string): string {
+function normalised(path: string): string {
   const parts: string[] = [];
   for (const part of path.replaceAll('\\', '/').split('/')) {
     if (part === '..') parts.pop();

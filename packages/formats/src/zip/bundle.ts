@@ -1,5 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { OpenPart } from '../scene-format.js';
+import type { OpenPart, SceneSource } from '../scene-format.js';
 import { Archive } from './archive.js';
 import { listed, namedLike, relevant } from './paths.js';
 
@@ -7,12 +7,12 @@ import { listed, namedLike, relevant } from './paths.js';
  * The description in a SOG bundle, and a way to its images.
  * @throws GaussianSplatError `decode/unknown-format` if there is none; what is wrong with the archive
  */
-export function openBundle(file: Uint8Array, name: string): { bytes: Uint8Array; open: OpenPart } {
-  const archive = new Archive(file, name);
+export function openBundle(source: Pick<SceneSource, 'bytes' | 'name' | 'budget'>): { bytes: Uint8Array; open: OpenPart } {
+  const archive = new Archive(source);
   const [path] = namedLike('meta.json', relevant(archive.paths));
   if (path === undefined) {
     throw new GaussianSplatError('decode/unknown-format', {
-      where: name,
+      where: source.name,
       expected: 'a SOG bundle, with a meta.json in it',
       found: `a ZIP archive with ${listed(archive.paths)}`,
       remedy: 'export the scene again; its index names another file than a SOG',
