@@ -210,12 +210,12 @@ test('a connection on which nothing comes for half a minute counts as broken', a
         pulls++;
         if (from > 0) stream.enqueue(CONTENT.slice(from));
         if (from > 0) return stream.close();
-        if (pulls === 1) stream.enqueue(CONTENT.slice(0, 10));
+        if (pulls === 1) stream.enqueue(CONTENT.slice(0, 2_000));
         return new Promise(() => undefined);
       },
     });
     const range = { 'Content-Range': `bytes ${from}-${CONTENT.length - 1}/${CONTENT.length}` };
-    const length = { 'Content-Length': String(CONTENT.length - from) };
+    const length = { 'Content-Length': String(CONTENT.length - from), ETag: '"a"' };
     return new Response(body, { status: from > 0 ? 206 : 200, headers: { ...length, ...(from > 0 && range) } });
   });
   const fetched = fetchScene('http://host/a.ply');

@@ -5,6 +5,7 @@ import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
 import type { LiveState } from './live/live-model.js';
+import type { SceneLimits } from './loading/protocol.js';
 import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
 import { Stage } from './stage.js';
 import type { SceneStats } from './stats.js';
@@ -109,6 +110,11 @@ export class GaussianSplatElement extends ViewingMethods {
    * scenes of a page together may take the default, or this if it is more.
    */
   static memoryBudget: number | null = null;
+  /**
+   * What one load may cost, for pages whose visitors choose the scenes: `{ maxSplats, maxBytes, maxSeconds }`. More is refused with `out-of-memory/budget` before it is allocated. Default
+   * of `maxBytes`, memory of the page in which the file counts double: eight times {@link memoryBudget}, 4 GiB at most. `origins` are other servers that manifests may name files on.
+   */
+  static sceneLimits: SceneLimits = {};
   /** Folder of the files of onnxruntime-web 1.30.0, which generators need; null for `onnxruntime/` beside the bundle. */
   static runtimeLocation: string | null = null;
   /** Address of `scene-worker.js`, where a bundler or a server has put it elsewhere; null for the one beside the bundle. Set it before the first scene is loaded. */

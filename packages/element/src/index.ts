@@ -32,10 +32,11 @@ export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';
 export { SceneTimeRanges } from './time-ranges.js';
 export type { ControlValues, Numbers, Picture } from './live/values.js';
+export type { SceneLimits } from './loading/protocol.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 
 const CONFIGURABLE = [
-  ...(['runtimeLocation', 'workerLocation', 'urlModifier', 'releaseDelay', 'sharedDevice', 'memoryBudget'] as const),
+  ...(['runtimeLocation', 'workerLocation', 'urlModifier', 'releaseDelay', 'sharedDevice', 'memoryBudget', 'sceneLimits'] as const),
 ] as const;
 
 /** What a page may put into `globalThis.GaussianSplatElement` before this module runs: statics of the class. */

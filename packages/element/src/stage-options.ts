@@ -3,6 +3,7 @@ import type { SpokenStrings } from './words.js';
 import type { InputOptions } from './controllers/input-controller.js';
 import type { SharedDevice } from './gpu/shared-device.js';
 import type { LiveState } from './live/live-model.js';
+import type { SceneLimits } from './loading/protocol.js';
 import type { SceneLoader } from './loading/scene-loader.js';
 
 /** What elements share. */
@@ -13,6 +14,7 @@ export interface Services {
   readonly releaseDelay: number;
   /** Bytes of GPU memory that one scene may take; null for what suits the device. */
   readonly memoryBudget: number | null;
+  readonly sceneLimits: SceneLimits;
   /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
   /** Rewrites the addresses of scenes before they are fetched. */

@@ -1,6 +1,10 @@
-import { GrowingBytes } from './bytes.js';
-import { badStatus, forbidden, interrupted, unreachable } from './network-errors.js';
+import { refuse } from './budget.js';
+import { grouped, GrowingBytes } from './bytes.js';
+import { badStatus, forbidden, interrupted, label, unreachable } from './network-errors.js';
 import type { FetchSceneOptions } from './fetch-scene.js';
+
+/** Bytes before the break that are asked for again, and compared: a tag may be the same, and the file another. */
+const OVERLAP = 1024;
 
 /** One file on its way, over one connection after another. */
 export class Download {
@@ -8,6 +12,8 @@ export class Download {
   readonly #options: FetchSceneOptions;
   #response: Response | undefined;
   #body = new GrowingBytes(0);
+  /** Byte of the file that the response begins with. */
+  #at = 0;
   #total: number | undefined;
   /** What tells one state of the file from another; undefined where the server or CORS keeps it hidden. */
   #tag: string | undefined;
@@ -22,48 +28,62 @@ export class Download {
     return this.#body.view();
   }
 
-  /** Asks for the whole file. */
-  async start(): Promise<void> {
+  /** Asks for the whole file. @returns the error of a server that has no time now. */
+  async start(): Promise<Error | undefined> {
     const response = await this.#request({});
-    if (!response.ok) {
-      await discard(response);
-      throw badStatus(this.#address, response);
-    }
-    this.#begin(response);
+    if (response.ok) return void this.#begin(response);
+    await discard(response);
+    const error = badStatus(this.#address, response);
+    if (response.status === 429 || response.status === 503) return error;
+    throw error;
   }
 
   #begin(response: Response): void {
     this.#response = response;
+    this.#at = 0;
     this.#total = lengthOf(response);
     this.#tag = tagOf(response);
+    this.#requireRoom(this.#total ?? 0);
     this.#body = new GrowingBytes(this.#total ?? 65_536);
   }
 
-  /**
-   * Asks for what is missing, or for all of it where nothing has come or the length is not known; of a server that sends the whole file again, that is taken. `later`: nobody
-   * answers, or the server has no time now. `changed`: it sends something else, or the file has changed.
-   */
-  async resume(): Promise<'begun' | 'later' | 'changed'> {
-    const from = this.#body.length;
-    const isPart = from > 0 && this.#total !== undefined;
-    const response = await this.#request(isPart ? { Range: `bytes=${from}-` } : {}).catch(() => undefined);
-    this.#options.signal?.throwIfAborted();
-    if (response === undefined) return 'later';
-    if (response.status === 200) {
-      this.#begin(response);
-      return 'begun';
-    }
-    const tag = tagOf(response);
-    const isSame = this.#tag === undefined || tag === undefined || tag === this.#tag;
-    if (response.status === 206 && isSame && this.#isRest(response, from)) {
-      this.#response = response;
-      return 'begun';
-    }
-    await discard(response);
-    return response.status === 429 || response.status >= 500 ? 'later' : 'changed';
+  #requireRoom(bytes: number): void {
+    const { maxBytes = Infinity } = this.#options;
+    if (bytes <= maxBytes) return;
+    void this.#response?.body?.cancel().catch(() => {});
+    refuse(label(this.#address), `at most ${grouped(maxBytes)} bytes`, grouped(bytes));
   }
 
-  /** True if a partial answer begins where we stopped and ends where the file ends. */
+  /**
+   * Asks for what is missing where it can be told whether that belongs to what has come, or for all of it; of a server that sends the whole file again, that is taken.
+   * @returns false if nobody answers, the server has no time now, or the file is another: then all of it is to be asked for again
+   */
+  async resume(): Promise<boolean> {
+    const from = Math.max(0, this.#body.length - OVERLAP);
+    const [total, tag] = [this.#total, this.#tag];
+    const isPart = from > 0 && total !== undefined && tag !== undefined;
+    const isOwn = (globalThis.location?.origin ?? this.#address.origin) === this.#address.origin;
+    // Servers of other origins would be asked first whether they allow that header, and weak tags are not for it.
+    const ifRange = isPart && isOwn && !tag.startsWith('W/') ? { 'If-Range': tag } : {};
+    const headers = isPart ? { Range: `bytes=${from}-`, ...ifRange } : {};
+    const response = await this.#request(headers).catch(() => undefined);
+    this.#options.signal?.throwIfAborted();
+    if (response?.status === 200) {
+      this.#begin(response);
+      return true;
+    }
+    if (response?.status === 206 && tagOf(response) === tag && this.#isRest(response, from)) {
+      this.#response = response;
+      this.#at = from;
+      return true;
+    }
+    if (response === undefined) return false;
+    await discard(response);
+    if (response.status !== 429 && response.status < 500) this.#tag = undefined;
+    return false;
+  }
+
+  /** True if a partial answer begins where it ought to and ends where the file ends. */
   #isRest(response: Response, from: number): boolean {
     const range = /^bytes (\d+)-(\d+)\/(\d+)$/.exec(response.headers.get('Content-Range') ?? '');
     if (range) return Number(range[1]) === from && Number(range[3]) === this.#total;
@@ -77,13 +97,23 @@ export class Download {
     const body = this.#body;
     const reader = this.#response?.body?.getReader();
     const broken = (cause: unknown): Error => interrupted(this.#address, body.length, this.#total, cause);
-    for (;;) {
-      const chunk = await (reader ? withinPatience(reader) : undefined)?.catch((cause: unknown) => {
+    const patience = new Patience();
+    while (reader) {
+      const { done, value } = await patience.read(reader).catch((cause: unknown) => {
         signal?.throwIfAborted();
         throw broken(cause);
       });
-      if (!chunk || chunk.done) break;
-      body.append(chunk.value);
+      if (done) break;
+      const rest = this.#rest(value);
+      if (rest === undefined) {
+        void reader.cancel().catch(() => {});
+        // Nothing of it is right: all is asked for again.
+        this.#tag = undefined;
+        throw broken(new Error('another file than before'));
+      }
+      if (rest.length === 0) continue;
+      this.#requireRoom(body.length + rest.length);
+      body.append(rest);
       // Across origins a Content-Encoding is hidden from scripts; a body longer than announced gives it away.
       const total = this.#total !== undefined && body.length <= this.#total ? this.#total : undefined;
       onProgress?.(body.length, total);
@@ -94,14 +124,27 @@ export class Download {
     if (isExact && body.length < this.#total!) throw broken(undefined);
   }
 
+  /** What of a chunk has not come before; undefined if what has come before was other bytes. */
+  #rest(chunk: Uint8Array): Uint8Array | undefined {
+    const known = this.#body.view().subarray(this.#at, this.#at + chunk.length);
+    this.#at += chunk.length;
+    return known.every((byte, i) => byte === chunk[i]) ? chunk.subarray(known.length) : undefined;
+  }
+
   async #request(headers: Record<string, string>): Promise<Response> {
     const { mode = 'cors', credentials = 'same-origin', signal } = this.#options;
-    return fetch(this.#address, { mode, credentials, signal, headers }).catch(async (cause: unknown) => {
-      signal?.throwIfAborted();
-      const isForbidden = mode === 'cors' && (await answersUnread(this.#address, signal));
-      signal?.throwIfAborted();
-      throw isForbidden ? forbidden(this.#address, cause) : unreachable(this.#address, cause);
-    });
+    const patience = new AbortController();
+    const timer = setTimeout(() => patience.abort(), PATIENCE_MS);
+    const either = AbortSignal.any([patience.signal, ...(signal ? [signal] : [])]);
+    return fetch(this.#address, { mode, credentials, signal: either, headers })
+      .catch(async (cause: unknown) => {
+        signal?.throwIfAborted();
+        if (patience.signal.aborted) throw unreachable(this.#address, new Error(NOTHING));
+        const isForbidden = mode === 'cors' && (await answersUnread(this.#address, either));
+        signal?.throwIfAborted();
+        throw isForbidden ? forbidden(this.#address, cause) : unreachable(this.#address, cause);
+      })
+      .finally(() => clearTimeout(timer));
   }
 }
 
@@ -117,19 +160,34 @@ async function answersUnread(address: URL, signal: AbortSignal | undefined): Pro
   }
 }
 
-/** A connection on which nothing comes for so long has broken without a word, ms. */
+/** A connection on which next to nothing comes for so long has broken without a word, ms. */
 const PATIENCE_MS = 30_000;
+/** Bytes that are more than next to nothing. */
+const PATIENCE_BYTES = 1024;
+const NOTHING = `nothing came for ${PATIENCE_MS / 1000} s`;
 
-/** The next piece of a body, or a rejection where none comes. */
-async function withinPatience<T>(reader: ReadableStreamDefaultReader<T>): Promise<ReadableStreamReadResult<T>> {
-  let timer: ReturnType<typeof setTimeout> | undefined;
-  const stalled = new Promise<never>((_, reject) => {
-    timer = setTimeout(() => {
-      reject(new Error(`nothing came for ${PATIENCE_MS / 1000} s`));
-      void reader.cancel().catch(() => {});
-    }, PATIENCE_MS);
-  });
-  return Promise.race([reader.read(), stalled]).finally(() => clearTimeout(timer));
+/** Waits for the pieces of a body. */
+class Patience {
+  /** Milliseconds waited, and bytes come, since it was last enough. */
+  #waited = 0;
+  #bytes = 0;
+
+  /** The next piece, or a rejection where none comes. */
+  async read(reader: ReadableStreamDefaultReader<Uint8Array>): Promise<ReadableStreamReadResult<Uint8Array>> {
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const stalled = new Promise<never>((_, reject) => {
+      timer = setTimeout(() => {
+        reject(new Error(NOTHING));
+        void reader.cancel().catch(() => {});
+      }, PATIENCE_MS - this.#waited);
+    });
+    const start = performance.now();
+    const piece = await Promise.race([reader.read(), stalled]).finally(() => clearTimeout(timer));
+    this.#waited += performance.now() - start;
+    this.#bytes += piece.value?.length ?? 0;
+    if (this.#bytes >= PATIENCE_BYTES) this.#waited = this.#bytes = 0;
+    return piece;
+  }
 }
 
 function discard({ body }: Response): Promise<void> {

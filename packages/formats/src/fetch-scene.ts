@@ -1,8 +1,12 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { refuse, type LoadLimits } from './budget.js';
 import { quote } from './bytes.js';
 import { Download } from './download.js';
+import { label } from './network-errors.js';
+import { outOfMemory } from './out-of-memory.js';
 
-export interface FetchSceneOptions {
+/** `maxBytes` and `maxSeconds` end the download with `out-of-memory/budget`. */
+export interface FetchSceneOptions extends Pick<LoadLimits, 'maxBytes' | 'maxSeconds'> {
   /** `cors` (default) or `same-origin`; answers to `no-cors` requests cannot be read. */
   readonly mode?: 'cors' | 'same-origin';
   /** Which cookies are sent; default `same-origin`. */
@@ -19,43 +23,61 @@ export interface FetchSceneOptions {
    * promise fulfils. A server that cannot go on where a connection broke begins again, and so do these bytes.
    */
   readonly onArrival?: (bytes: Uint8Array, totalBytes: number | undefined) => void | Promise<void>;
-  /** How often in a row, without getting farther, a download that broke off is taken up again, where it stopped if the server can do that; default 3. */
+  /** How often in a row, without getting farther by 64 KiB, a download that broke off is taken up again, where it stopped if the server can do that; default 3. */
   readonly retries?: number;
 }
 
 /** Pause before a download is taken up again the first time, ms; it doubles each time. */
 const RETRY_DELAY_MS = 250;
+/** Bytes by which a download has got farther: a connection for each byte is no way to load a file. */
+const LEAST_PROGRESS = 65_536;
 
 /**
- * Downloads a file with true progress. A connection that breaks off, or on which nothing comes for 30 s, is taken up again where it stopped, by a range request, if the file is still the
- * same; a server that knows no ranges, or does not say how long the file is, begins again. One that nobody answers, or that has no time (429, 5xx), is asked again after a while.
+ * Downloads a file with true progress. A connection that breaks off, or on which less than 1 KiB comes in 30 s, is taken up again where it stopped, by a range request, if the server tells
+ * (ETag, Last-Modified) that the file is still the same; otherwise all of it is asked for again. A server that has no time (429, 503; 5xx once it had begun) is asked again after a while, one
+ * that does not answer within 30 s is given up.
  *
  * @param url absolute, or relative to the page or worker script (which in a worker made from a blob has no address:
  * resolve the URL before).
  * @throws GaussianSplatError `network/url`, `network/unreachable` (no server, offline, CORS, mixed content),
- * `network/status` or `network/interrupted`; the reason of `signal`, usually a DOMException named AbortError.
+ * `network/status`, `network/interrupted`, `out-of-memory/budget` or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError.
  */
 export async function fetchScene(url: string | URL, options: FetchSceneOptions = {}): Promise<Uint8Array> {
   const address = parseUrl(url);
-  const download = new Download(address, options);
-  await download.start();
-  const { retries = 3, signal } = options;
+  const { signal, maxSeconds = Infinity } = options;
+  // Timers end at 2^31 ms.
+  const limit = maxSeconds < 2e6 ? AbortSignal.timeout(1000 * Math.max(0, maxSeconds)) : undefined;
+  const signals = [signal, limit].filter((each) => each !== undefined);
+  const either = signals.length > 1 ? AbortSignal.any(signals) : signals[0];
+  try {
+    return await bring(new Download(address, { ...options, signal: either }), either, options.retries);
+  } catch (error) {
+    signal?.throwIfAborted();
+    if (limit?.aborted) refuse(label(address), `at most ${maxSeconds} s`, 'more', error);
+    throw outOfMemory(error, label(address)) ?? error;
+  }
+}
+
+async function bring(download: Download, signal: AbortSignal | undefined, retries = 3): Promise<Uint8Array> {
   let [tries, farthest] = [0, 0];
+  /** Waits before another try; throws what went wrong once there have been enough. */
+  const pause = async (error: unknown): Promise<void> => {
+    if (tries >= retries) throw error;
+    await delay(RETRY_DELAY_MS * 2 ** tries++, signal);
+  };
+  for (let busy = await download.start(); busy; busy = await download.start()) await pause(busy);
   for (;;) {
     try {
       await download.read();
       return download.bytes;
     } catch (error) {
       signal?.throwIfAborted();
+      if (!(error instanceof GaussianSplatError) || error.code !== 'network/interrupted') throw error;
       const { length } = download.bytes;
-      if (length > farthest) [tries, farthest] = [0, length];
-      for (let answer = 'later'; answer === 'later';) {
-        // Whatever goes wrong now, what is to be told is that the connection broke.
-        if (tries >= retries) throw error;
-        await delay(RETRY_DELAY_MS * 2 ** tries++, signal);
-        answer = await download.resume();
-        if (answer === 'changed') throw error;
-      }
+      if (length >= farthest + LEAST_PROGRESS) [tries, farthest] = [0, length];
+      // Whatever goes wrong now, what is to be told is that the connection broke.
+      do await pause(error);
+      while (!(await download.resume()));
     }
   }
 }

@@ -60,6 +60,6 @@ export function interrupted(
 }
 
 /** The address for messages, short where it carries its data along. */
-function label({ href }: URL): string {
+export function label({ href }: URL): string {
   return href.length > 200 ? `${href.slice(0, 200)}...` : href;
 }

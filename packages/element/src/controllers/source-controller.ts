@@ -62,6 +62,8 @@ export class SourceController {
 
   #requestOf(source: Source): SceneRequest | null {
     const { attributes, services } = this.#options;
-    return this.#addresses.request(source, attributes(), services().urlModifier);
+    const { sceneLimits, urlModifier } = services();
+    const request = this.#addresses.request(source, attributes(), urlModifier);
+    return request && { ...request, limits: sceneLimits };
   }
 }

@@ -15,6 +15,9 @@ export function defaultMemoryBudget(): number | undefined {
   return deviceMemory === undefined ? undefined : deviceMemory * 2 ** 29;
 }
 
+/** Bytes of the page's memory that a load may take where the page says nothing: a splat takes several times as many there, as file and as numbers, as on the GPU. */
+export const loadBytes = (memoryBudget = Infinity): number => Math.min(8 * memoryBudget, 2 ** 32);
+
 /** What was set here, by device: another figure is the page's own, and stays. */
 const set = new WeakMap<GPUDevice, number>();
 

@@ -5,7 +5,7 @@ import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { chooseAtRest } from './choose-at-rest.js';
 import { GpuScene } from './gpu-scene.js';
-import { limitScenes } from './memory-budget.js';
+import { limitScenes, loadBytes } from './memory-budget.js';
 import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
@@ -37,7 +37,8 @@ export async function openGpuScene(request: SceneRequest, options: OpenOptions):
   // Known at once, and then not a byte is fetched.
   assertWebGpu();
   const open = isGenerator(request) ? openLiveScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
-  const scene = await open(request, options);
+  const limits = { maxBytes: loadBytes(options.memoryBudget), ...request.limits };
+  const scene = await open({ ...request, limits }, options);
   chooseAtRest(scene.device);
   return scene;
 }

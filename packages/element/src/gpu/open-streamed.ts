@@ -1,5 +1,5 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
-import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
+import { GaussianSplatError, partRequest } from '@gaussian-splat/core';
 import { fetchScene } from '@gaussian-splat/formats';
 import {
   checkManifest,
@@ -72,21 +72,23 @@ type Open = (
   pool: PoolOptions,
 ) => Promise<StreamedGaussians>;
 
-const openPages: Open = async ({ url, credentials }, device, { loader, signal, onProgress }, pool) => {
-  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress });
+const openPages: Open = async (request, device, { loader, signal, onProgress }, pool) => {
+  const { url, credentials, limits = {} } = request;
+  const { maxBytes, maxSeconds, origins } = limits;
+  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress, maxBytes, maxSeconds });
   const manifest = checkManifest(parsed(bytes, url), url);
   return StreamedGaussians.open(device, manifest, {
     ...pool,
-    fetchPage: (file, aborted) => loader.fetchFile({ url: partUrl(file, url).href, credentials }, aborted),
+    fetchPage: async (file, aborted) => loader.fetchFile({ ...partRequest(file, request, origins), limits }, aborted),
   });
 };
 
 const openBoxes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
   const { levels, runs } = await loader.openBoxes(request, signal, onProgress);
-  const { credentials } = request;
+  const { credentials, limits } = request;
   const source = levelSource(levels, async (page, aborted) => {
     const run = runs[page.box][page.level];
-    return new Uint32Array(await loader.readBox({ run, page, scene: levels.scene, credentials }, aborted));
+    return new Uint32Array(await loader.readBox({ run, page, scene: levels.scene, credentials, limits }, aborted));
   });
   return StreamedGaussians.openSource(device, source, pool);
 };

@@ -1,6 +1,6 @@
 /** Loaded only when a sequence is shown. */
-import { partUrl, type Bounds } from '@gaussian-splat/core';
-import { frameAt, type SceneSequence } from '@gaussian-splat/formats';
+import { partRequest, type Bounds } from '@gaussian-splat/core';
+import { frameAt, framePath, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import type { LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
@@ -25,11 +25,20 @@ export interface SequenceOptions {
 /** Frames that are fetched and unpacked at once. */
 const AT_ONCE = 3;
 
-/** A frame: on its way, there, or never to come. */
+/** Milliseconds before a frame that did not come is asked for again, four times as many after each further failure, and how often it is asked for at all. */
+const RETRY_MS = 5_000;
+const MOST_TRIES = 4;
+
+/** A frame: on its way, or there. */
 interface Slot {
   readonly abort: AbortController;
   packed?: PackedGaussians;
-  isFailed?: boolean;
+}
+
+/** How often a frame has not come, and until when it is not asked for. */
+interface Failure {
+  readonly times: number;
+  readonly until: number;
 }
 
 /**
@@ -44,11 +53,10 @@ export class SequencePlayer implements Timeline {
   readonly #sequence: SceneSequence;
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, Slot>();
+  readonly #failures = new Map<number, Failure>();
   readonly #room: FrameRoom;
   #gaussians: SequenceGaussians;
   #shown = 0;
-  /** The frame that was asked for last. */
-  #asked = 0;
   #isGrowing = false;
   #isClosed = false;
 
@@ -63,16 +71,15 @@ export class SequencePlayer implements Timeline {
     this.#gaussians = gaussians;
     this.duration = sequence.durationSeconds;
     this.bounds = first.bounds;
-    this.#room = new FrameRoom(sequence.frames.length, sequence.framesPerSecond);
+    this.#room = new FrameRoom(sequence.frameCount, sequence.framesPerSecond);
     this.#room.note(bytesOf(first.packed));
     this.#slots.set(0, { abort: new AbortController(), packed: first.packed });
   }
 
   /** With its first frame on the GPU. Rejects with GaussianSplatError, or the signal's reason. */
-  static async open({ frames, ...times }: LoadedSequence, options: SequenceOptions): Promise<SequencePlayer> {
+  static async open(sequence: LoadedSequence, options: SequenceOptions): Promise<SequencePlayer> {
     const { device, signal, onProgress, memoryBudget, beforeUpload } = options;
-    const sequence = { frames, ...times };
-    const first = await load(frames[0], options, 'auto', signal, onProgress);
+    const first = await load(framePath(sequence, 0), options, 'auto', signal, onProgress);
     signal.throwIfAborted();
     beforeUpload(bytesOf(first.packed));
     const gaussians = await SequenceGaussians.create(device, first.packed, { memoryBudget });
@@ -94,14 +101,11 @@ export class SequencePlayer implements Timeline {
   request({ timeSeconds }: LiveState): void {
     const frame = this.#frameAt(timeSeconds);
     this.#showLate(frame);
-    // Once around, or back: what failed may be had now.
-    if (frame < this.#asked) for (const [failed, { isFailed }] of this.#slots) if (isFailed) this.#slots.delete(failed);
-    this.#asked = frame;
     this.#prefetch(frame);
     const slot = this.#slots.get(frame);
     if (frame !== this.#shown && slot?.packed) this.#show(frame);
     // A frame that cannot be had is passed over, so that a seek to it ends.
-    if (frame === this.#shown || slot?.isFailed) this.#tell(timeSeconds);
+    if (frame === this.#shown || this.#isMissing(frame)) this.#tell(timeSeconds);
   }
 
   /** The newest of those that came after their time: where every frame comes late, pictures follow the clock at a distance. */
@@ -153,9 +157,7 @@ export class SequencePlayer implements Timeline {
       listeners.onInput();
     } catch (error) {
       // Passed over like one that cannot be had: there is no room for it, and each frame would ask again.
-      const slot = this.#slots.get(frame);
-      if (slot?.packed === packed) Object.assign(slot, { packed: undefined, isFailed: true });
-      if (!this.#isClosed) listeners.onError(error);
+      if (this.#slots.get(frame)?.packed === packed) this.#fail(frame, error);
     } finally {
       this.#isGrowing = false;
     }
@@ -164,25 +166,39 @@ export class SequencePlayer implements Timeline {
   /** Fetches what is ahead, the nearest first, and forgets what is not. */
   #prefetch(frame: number): void {
     const wanted = this.#wantedFrom(frame);
-    for (const [held, { abort, packed, isFailed }] of this.#slots) {
+    for (const [held, { abort, packed }] of this.#slots) {
       // What the clock has just passed on its way here is let come: on a slow line all are passed.
-      const isLate = held < frame && frame - held <= this.#room.frames && !packed && !isFailed;
+      const isLate = held < frame && frame - held <= this.#room.frames && !packed;
       if (wanted.includes(held) || isLate) continue;
       abort.abort();
       this.#slots.delete(held);
     }
     let busy = 0;
-    for (const { packed, isFailed } of this.#slots.values()) if (!packed && !isFailed) busy++;
+    for (const { packed } of this.#slots.values()) if (!packed) busy++;
     for (const next of wanted) {
       if (busy >= AT_ONCE) return;
-      if (this.#slots.has(next)) continue;
+      if (this.#slots.has(next) || this.#isMissing(next)) continue;
       busy++;
       void this.#fetch(next);
     }
   }
 
+  /** True of a frame that has not come, until it is asked for again. */
+  #isMissing(frame: number): boolean {
+    return performance.now() < (this.#failures.get(frame)?.until ?? -Infinity);
+  }
+
+  /** A frame cannot be had: that is told once, and it is asked for ever more rarely, then no more. */
+  #fail(frame: number, error: unknown): void {
+    this.#slots.delete(frame);
+    const times = (this.#failures.get(frame)?.times ?? 0) + 1;
+    const until = times < MOST_TRIES ? performance.now() + RETRY_MS * 4 ** (times - 1) : Infinity;
+    this.#failures.set(frame, { times, until });
+    if (times === 1 && !this.#isClosed) this.#options.listeners.onError(error);
+  }
+
   #wantedFrom(frame: number): number[] {
-    const { length } = this.#sequence.frames;
+    const { frameCount: length } = this.#sequence;
     const following = Array.from({ length: this.#room.frames }, (_, k) => frame + k);
     return this.#options.loops() ? following.map((each) => each % length) : following.filter((each) => each < length);
   }
@@ -193,35 +209,33 @@ export class SequencePlayer implements Timeline {
     const { listeners } = this.#options;
     const { shPrecision } = this.#gaussians;
     try {
-      const url = this.#sequence.frames[frame];
-      slot.packed = (await load(url, this.#options, shPrecision, slot.abort.signal, () => undefined)).packed;
+      const path = framePath(this.#sequence, frame);
+      slot.packed = (await load(path, this.#options, shPrecision, slot.abort.signal, () => undefined)).packed;
+      this.#failures.delete(frame);
       this.#room.note(bytesOf(slot.packed));
     } catch (error) {
       if (slot.abort.signal.aborted) return;
-      slot.isFailed = true;
-      listeners.onError(error);
+      this.#fail(frame, error);
     }
     // Whoever waits for it, and for those behind it, asks again.
     if (!slot.abort.signal.aborted) listeners.onInput();
   }
 }
 
-function load(
-  url: string,
+async function load(
+  path: string,
   { loader, request, frameUrl }: SequenceOptions,
   sh: SceneRequest['sh'],
   signal: AbortSignal,
   onProgress: ProgressListener,
 ): Promise<LoadedScene> {
-  const { credentials } = request;
-  const asked = frameUrl(url);
+  const { limits } = request;
+  const own = partRequest(path, request, limits?.origins);
+  // What the page has made of an address is not changed.
+  const { href } = new URL(path, request.url);
+  const asked = frameUrl(href);
   return loader.load(
-    // What the page has made of an address is not changed.
-    {
-      url: asked === url ? partUrl(url, request.url).href : asked,
-      credentials,
-      sh: request.sh === 'auto' ? sh : request.sh,
-    },
+    { ...own, ...(asked !== href && { url: asked }), limits, sh: request.sh === 'auto' ? sh : request.sh },
     signal,
     onProgress,
   );

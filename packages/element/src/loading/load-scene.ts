@@ -1,6 +1,14 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
 import { boundsOf, GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
-import { fetchScene, isSequence, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
+import {
+  fetchScene,
+  isSequence,
+  openPartAt,
+  outOfMemory,
+  readScene,
+  type FetchSceneOptions,
+  type LoadLimits,
+} from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
 import { PreviewSchedule } from './preview-schedule.js';
 import { ProgressSum } from './progress-sum.js';
@@ -22,8 +30,12 @@ export async function loadScene(
   try {
     const { url, credentials } = request;
     const name = fileName(url);
+    const limits = limitsFrom(request);
     const progress = new ProgressSum(throttled(onProgress), mayHaveParts(name));
-    const options = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, onProgress: progress.add() });
+    const options = (): FetchSceneOptions => ({
+      ...{ mode: 'cors', credentials, signal, onProgress: progress.add() },
+      ...fileLimits(limits()),
+    });
     const pack = (cloud: GaussianCloud): LoadedScene => ({
       packed: packGaussians(cloud, { sh: request.sh }),
       bounds: boundsOf(cloud),
@@ -31,13 +43,16 @@ export async function loadScene(
     const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
     const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
     if (isSequence(bytes)) {
-      const { sequenceOf } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
-      return sequenceOf(bytes, name, url);
+      const { parseSequence } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
+      return parseSequence(bytes, name);
     }
     // Nothing lies beside what has no place.
     const openPart = /^(blob|data):/.test(url) ? undefined : openPartAt(url, options);
     const level = request.levels ? 'all' : 0;
-    const cloud = await readScene(bytes, { name, signal, openPart, level, onPreview: previews?.onPreview });
+    const cloud = await readScene(bytes, {
+      ...{ name, signal, openPart, level, onPreview: previews?.onPreview },
+      ...limits(),
+    });
     signal.throwIfAborted();
     if (cloud.levelRuns === undefined) return pack(cloud);
     const { packLevels } = await loadModule('the code that packs levels of detail', () => import('./pack-levels.js'));
@@ -47,6 +62,18 @@ export async function loadScene(
     throw named(error, fileName(request.url));
   }
 }
+
+/** The limits of a load that begins now, with the seconds that are left whenever they are asked for. */
+export function limitsFrom({ limits }: Pick<SceneRequest, 'limits'>): () => LoadLimits {
+  const start = performance.now();
+  return () => ({ ...limits, maxSeconds: (limits?.maxSeconds ?? Infinity) - (performance.now() - start) / 1000 });
+}
+
+/** What one file may have of that: a scene takes as much again as its file. */
+export const fileLimits = ({ maxBytes = Infinity, maxSeconds }: LoadLimits): LoadLimits => ({
+  maxBytes: maxBytes / 2,
+  maxSeconds,
+});
 
 /**
  * Last part of the URL's path: what people call the file, and whose extension tells formats without a signature. A `blob:`
@@ -86,15 +113,8 @@ export function throttled(onProgress: ProgressListener): ProgressListener {
 /** Errors that no reader named: memory that was not to be had, or a fault of ours that the file brought to light. */
 export function named(error: unknown, where: string): GaussianSplatError {
   if (error instanceof GaussianSplatError) return error;
-  if (error instanceof RangeError) {
-    return new GaussianSplatError('out-of-memory/allocation', {
-      where,
-      expected: 'memory enough to unpack the scene',
-      found: error.message,
-      remedy: 'use a smaller scene, or close other pages',
-      cause: error,
-    });
-  }
+  const memory = outOfMemory(error, where);
+  if (memory) return memory;
   return new GaussianSplatError('decode/corrupt', {
     where,
     expected: 'a scene that can be read',

@@ -1,6 +1,6 @@
 /** What the page and the scene worker say to each other. */
 import type { Bounds, ErrorData } from '@gaussian-splat/core';
-import type { SogRun } from '@gaussian-splat/formats';
+import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
 import type {
   LevelPage,
   LevelScene,
@@ -16,6 +16,13 @@ export interface FileRequest {
   readonly url: string;
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
+  readonly limits?: SceneLimits | undefined;
+}
+
+/** What loads of a page may cost, and whom they may ask: see `GaussianSplatElement.sceneLimits`. */
+export interface SceneLimits extends LoadLimits {
+  /** Origins of other servers that manifests may name files on, such as `https://cdn.example`; they get no cookies. Default: none but the manifest's own. */
+  readonly origins?: readonly string[];
 }
 
 /** A scene to fetch. */
@@ -36,13 +43,8 @@ export interface LoadedScene {
   readonly bounds: Bounds;
 }
 
-/** The manifest of scenes that follow one another in time, in place of a scene. */
-export interface LoadedSequence {
-  /** Absolute URLs of the frames, in order. */
-  readonly frames: readonly string[];
-  readonly framesPerSecond: number;
-  readonly durationSeconds: number;
-}
+/** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */
+export type LoadedSequence = SceneSequence;
 
 /** A streamed SOG scene of which the coarsest levels are there. */
 export interface LoadedBoxes {
@@ -57,6 +59,7 @@ export interface BoxRequest {
   readonly page: LevelPage;
   readonly scene: StreamedScene;
   readonly credentials: RequestCredentials;
+  readonly limits?: SceneLimits | undefined;
 }
 
 /**

@@ -7,9 +7,9 @@ export const MOST_FETCHES = 64;
 export const MOST_UNDER_WAY = 240;
 /** How much a page counts in the mean time of arrival when the next one has come. */
 const MEMORY = 0.95;
-/** Milliseconds before a page that did not come is asked for again; twice as long after each further failure, so many times. */
+/** Milliseconds before a page that did not come is asked for again; twice as long after each further failure, and after so many no more. */
 const RETRY_MS = 4_000;
-const MOST_DOUBLINGS = 6;
+const MOST_TRIES = 8;
 /** Milliseconds after a failure before those are tried again that had no room beside it: of many failures once. */
 const ANEW_MS = 250;
 
@@ -141,7 +141,7 @@ export class PageTraffic<Words> {
 
   #noteFailure(page: number): void {
     const times = (this.#failures.get(page)?.times ?? 0) + 1;
-    const pause = RETRY_MS * 2 ** Math.min(times - 1, MOST_DOUBLINGS);
+    const pause = times < MOST_TRIES ? RETRY_MS * 2 ** (times - 1) : Infinity;
     this.#failures.set(page, { times, until: this.#now() + pause });
     this.#retryLater();
     // The room that was kept for it is for others.
@@ -157,6 +157,7 @@ export class PageTraffic<Words> {
       this.#retry = undefined;
       let isNeeded = false;
       for (const [page, { times, until }] of this.#failures) {
+        if (until === Infinity) continue;
         if (this.#hasFailedLately(page)) this.#retryLater();
         else if (until > MAY_COME) {
           this.#failures.set(page, { times, until: MAY_COME });
@@ -208,7 +209,7 @@ export class PageTraffic<Words> {
       this.#residency.giveUp(page);
       this.#sentAt.delete(page);
       this.#noteFailure(page);
-      this.#options.onError(error);
+      if (this.#failures.get(page)?.times === 1) this.#options.onError(error);
     }
     this.#fetching.delete(page);
     this.sendForMore();
