@@ -62,7 +62,11 @@ export class LoadBudget {
     this.#taken += bytes;
     const { allowed } = this;
     if (this.#taken > allowed)
-      refuse(where, `at most ${grouped(allowed)} bytes of memory for ${grouped(this.#arrived)} that arrived`, `${grouped(this.#taken)} or more`);
+      refuse(
+        where,
+        `at most ${grouped(allowed)} bytes of memory for ${grouped(this.#arrived)} that arrived`,
+        `${grouped(this.#taken)} or more`,
+      );
     const { maxSeconds = Infinity } = this.#limits;
     if (performance.now() - this.#start > 1000 * maxSeconds) refuse(where, `at most ${maxSeconds} s`, 'more');
   }

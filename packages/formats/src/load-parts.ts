@@ -1,8 +1,9 @@
 import { loadModule } from '@gaussian-splat/core';
+import type * as detection from './detect.js';
 import type * as diagnosis from './diagnose.js';
 import type { SceneFormat, SceneReader } from './scene-format.js';
 
-/** The parts of this package that are loaded when they are first needed. Both throw GaussianSplatError `network/unreachable`. */
+/** The parts of this package that are loaded when they are first needed. All throw GaussianSplatError `network/unreachable`. */
 
 export const loadReader = ({ title, load }: SceneFormat): Promise<SceneReader> =>
   loadModule(`the code that reads ${title}`, load);
@@ -13,3 +14,7 @@ export const loadDiagnosis = (): Promise<typeof diagnosis.diagnose> =>
     'the code that tells what a file is that is no scene',
     async () => (await import('./diagnose.js')).diagnose,
   );
+
+/** What knows formats without a signature. */
+export const loadDetection = (): Promise<typeof detection> =>
+  loadModule('the code that tells formats by their names', () => import('./detect.js'));

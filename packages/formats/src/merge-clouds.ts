@@ -10,10 +10,7 @@ export interface CloudPart {
 }
 
 /** One cloud of parts of several, of the highest degree of them; lower degrees get zeros. All have the origin of the largest. */
-export function mergeClouds(
-  parts: readonly CloudPart[],
-  source: Pick<SceneSource, 'budget' | 'name'>,
-): DraftCloud {
+export function mergeClouds(parts: readonly CloudPart[], source: Pick<SceneSource, 'budget' | 'name'>): DraftCloud {
   const count = parts.reduce((sum, part) => sum + part.count, 0);
   const degree = parts.reduce<ShDegree>((most, { cloud }) => (cloud.shDegree > most ? cloud.shDegree : most), 0);
   const merged = allocateCloud(count, degree, source);

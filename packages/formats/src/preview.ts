@@ -1,16 +1,7 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import type { SceneSource } from './scene-format.js';
 
 /** A preview has every so many-th splat. */
 export const PREVIEW_STEP = 16;
-/** Smaller scenes are read as fast as a preview would be. */
-const MIN_SPLATS = 50_000;
-
-/** True if somebody wants a preview of a scene of so many splats, and the scene is large enough for one to be worth its time. */
-export function previewWanted({ onPreview }: SceneSource, count: number): boolean {
-  return onPreview !== undefined && count >= MIN_SPLATS;
-}
-
 /** Every so many-th splat of a cloud, without coefficients above the constant one, larger to stand for the rest. */
 export function samplePreview(cloud: GaussianCloud): GaussianCloud {
   const count = Math.ceil(cloud.count / PREVIEW_STEP);

@@ -1,12 +1,12 @@
-import { GaussianSplatError, keepUsable, type GaussianCloud } from '@gaussian-splat/core';
+import { GaussianSplatError, keepUsable, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import { LoadBudget, type LoadLimits } from './budget.js';
 import { plainBytes, type FileBytes } from './bytes.js';
-import { extensionOf, findFormat } from './detect.js';
-import { loadDiagnosis, loadReader } from './load-parts.js';
+import { loadDetection, loadDiagnosis, loadReader } from './load-parts.js';
 import { noSplats } from './no-splats.js';
 import { outOfMemory } from './out-of-memory.js';
-import { previewWanted, samplePreview } from './preview.js';
+import { previewWanted } from './preview-wanted.js';
 import type { OpenPart, SceneSource } from './scene-format.js';
+import { signedFormat } from './signed-format.js';
 
 export interface ReadSceneOptions extends LoadLimits {
   /** File name or URL: what error messages call the file, and whose extension tells formats without a signature. */
@@ -44,11 +44,13 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   signal?.throwIfAborted();
   const bytes = plainBytes(file, name);
   if (bytes.length === 0) throw emptyFile(name);
-  const format = findFormat(bytes, name, contentType);
+  let format = signedFormat(bytes);
   if (!format) {
-    const diagnose = await loadDiagnosis();
+    const { extensionOf, findFormat } = await loadDetection();
+    format = findFormat(bytes, name, contentType);
+    const diagnose = format ? undefined : await loadDiagnosis();
     signal?.throwIfAborted();
-    throw diagnose(bytes, name, extensionOf(name));
+    if (!format) throw diagnose!(bytes, name, extensionOf(name));
   }
   const read = await loadReader(format);
   signal?.throwIfAborted();
@@ -79,40 +81,14 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   });
   signal?.throwIfAborted();
   // Checking and packing all splats takes longer than reading them, so that a preview is worth its while even now.
-  if (!hasPreview && previewWanted(source, whole.count)) await preview(samplePreview(whole));
+  if (!hasPreview && previewWanted(source, whole.count)) {
+    const { samplePreview } = await loadModule('the code that makes previews', () => import('./preview.js'));
+    await preview(samplePreview(whole));
+  }
   const cloud = keepUsable(whole);
   signal?.throwIfAborted();
   if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
   return cloud;
-}
-
-/**
- * Reads what can be seen of a file that is still arriving: the splats that are whole (PLY, compressed PLY, .splat, .ksplat), or all splats
- * without their view-dependent colours once these are all that is missing (SPZ, compressed PLY).
- *
- * @param beginning the first bytes of the file.
- * @returns the splats in the order of the file, or undefined if there are none yet or the format cannot be read in part. Never throws for
- * what the bytes are: `readScene` says what is wrong once the file is whole.
- */
-export async function readPrefix(
-  beginning: FileBytes,
-  options: ReadSceneOptions = {},
-): Promise<GaussianCloud | undefined> {
-  const { name = 'scene', contentType = '', signal } = options;
-  signal?.throwIfAborted();
-  const bytes = plainBytes(beginning, name);
-  const format = bytes.length === 0 ? undefined : findFormat(bytes, name, contentType);
-  if (!format?.readsPrefix) return undefined;
-  const read = await loadReader(format);
-  try {
-    const budget = new LoadBudget(bytes.length, options);
-    const cloud = keepUsable(await read({ bytes, name, budget, signal, isPrefix: true }));
-    return cloud.count > 0 ? cloud : undefined;
-  } catch (error) {
-    signal?.throwIfAborted();
-    if (error instanceof GaussianSplatError) return undefined;
-    throw error;
-  }
 }
 
 function emptyFile(name: string): GaussianSplatError {

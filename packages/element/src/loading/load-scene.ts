@@ -10,12 +10,16 @@ import {
   type LoadLimits,
 } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
-import { PreviewSchedule } from './preview-schedule.js';
+import type { PreviewSchedule } from './preview-schedule.js';
 import { ProgressSum } from './progress-sum.js';
 import type { LoadedScene, LoadedSequence, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
 
 /** Milliseconds between two progress reports: chunks may arrive by the thousand. */
 const PROGRESS_INTERVAL_MS = 50;
+/** Downloads that are over sooner need no preview. */
+const PREVIEW_AFTER_MS = 300;
+/** Without the code of previews a scene comes all the same. */
+const none = (): undefined => undefined;
 
 /**
  * Loads one scene, or the manifest of several. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's
@@ -40,8 +44,16 @@ export async function loadScene(
       packed: packGaussians(cloud, { sh: request.sh }),
       bounds: boundsOf(cloud),
     });
-    const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
-    const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
+    const start = performance.now();
+    let loading: Promise<PreviewSchedule> | undefined;
+    const previews = (): Promise<PreviewSchedule> =>
+      (loading ??= import('./preview-schedule.js').then(
+        (code) => new code.PreviewSchedule(name, signal, start, (cloud) => onPreview?.(pack(cloud))),
+      ));
+    const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
+      if (performance.now() - start >= PREVIEW_AFTER_MS) await (await previews().catch(none))?.onArrival(bytes, total);
+    };
+    const bytes = await fetchScene(url, { ...options(), onArrival: onPreview && onArrival });
     if (isSequence(bytes)) {
       const { parseSequence } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
       return parseSequence(bytes, name);
@@ -50,7 +62,13 @@ export async function loadScene(
     const openPart = /^(blob|data):/.test(url) ? undefined : openPartAt(url, options);
     const level = request.levels ? 'all' : 0;
     const cloud = await readScene(bytes, {
-      ...{ name, signal, openPart, level, onPreview: previews?.onPreview },
+      ...{
+        name,
+        signal,
+        openPart,
+        level,
+        onPreview: onPreview && (async (cloud) => (await previews().catch(none))?.onPreview(cloud)),
+      },
       ...limits(),
     });
     signal.throwIfAborted();

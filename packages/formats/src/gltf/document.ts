@@ -52,11 +52,7 @@ export class GltfDocument {
   /** Each is fetched once, however many buffers name it. */
   readonly #files = new Map<string, Promise<Uint8Array>>();
 
-  constructor(
-    { json, binary }: GltfFile,
-    { name, budget }: Pick<SceneSource, 'name' | 'budget'>,
-    open: OpenPart,
-  ) {
+  constructor({ json, binary }: GltfFile, { name, budget }: Pick<SceneSource, 'name' | 'budget'>, open: OpenPart) {
     this.json = json;
     this.name = name;
     this.budget = budget;

@@ -45,12 +45,7 @@ const KEPT_BYTES = 32 / 256;
  * @param url absolute address of the index, which all others are relative to
  * @throws GaussianSplatError `decode/header`, `decode/unsupported` for another version, `out-of-memory/budget`.
  */
-export function readLodScene(
-  bytes: Uint8Array,
-  name: string,
-  url: string,
-  limits?: LoadLimits,
-): LodScene {
+export function readLodScene(bytes: Uint8Array, name: string, url: string, limits?: LoadLimits): LodScene {
   const budget = new LoadBudget(bytes.length, limits);
   const { files, leaves, environment } = parseLodMeta({ bytes, name, budget });
   const addressOf = (path: string): SogAddress => ({ url: partAddress(url, path).href, name: `${name}, ${path}` });

@@ -101,7 +101,11 @@ function open({ bytes, name, openPart, budget }: SceneSource): {
   placed: PlacedSplats[];
   others: number;
 } {
-  const document = new GltfDocument(openContainer({ bytes, name, budget }), { name, budget }, openPart ?? noParts(name, 'scene.glb'));
+  const document = new GltfDocument(
+    openContainer({ bytes, name, budget }),
+    { name, budget },
+    openPart ?? noParts(name, 'scene.glb'),
+  );
   const placed: PlacedSplats[] = [];
   const known = new Map<number, MeshParts>();
   let others = 0;

@@ -5,7 +5,7 @@ import { damaged } from '../damaged.js';
 import { parseLodMeta, runsAtAllLevels, runsAtLevel, type LodMeta, type NodeRun } from '../lod/meta.js';
 import { levelRunsOf, type NodePart } from '../lod/node-parts.js';
 import { mergeClouds } from '../merge-clouds.js';
-import { previewWanted } from '../preview.js';
+import { previewWanted } from '../preview-wanted.js';
 import type { OpenPart, SceneSource } from '../scene-format.js';
 import { readSogPart } from '../sog/read-part.js';
 import { noParts } from './sog.js';

@@ -1,7 +1,8 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { startsWith } from '../bytes.js';
 import { describeContent } from '../diagnose.js';
-import { PREVIEW_STEP, previewWanted, sparse } from '../preview.js';
+import { PREVIEW_STEP, sparse } from '../preview.js';
+import { previewWanted } from '../preview-wanted.js';
 import type { SceneSource } from '../scene-format.js';
 import { Gunzip } from '../spz/gunzip.js';
 import {

@@ -38,7 +38,11 @@ export class Planes {
   decodePlane(bytes: Uint8Array, file: string, count: number): Uint32Array {
     const { pixels } = this.decode(bytes, file, 2 * count + SPARE_PIXELS);
     if (pixels.length < count) {
-      throw damaged(`${this.#source.name}, ${file}`, `${grouped(count)} pixels, one for each splat`, grouped(pixels.length));
+      throw damaged(
+        `${this.#source.name}, ${file}`,
+        `${grouped(count)} pixels, one for each splat`,
+        grouped(pixels.length),
+      );
     }
     return pixels;
   }

@@ -7,7 +7,10 @@ import { listed, namedLike, relevant } from './paths.js';
  * The description in a SOG bundle, and a way to its images.
  * @throws GaussianSplatError `decode/unknown-format` if there is none; what is wrong with the archive
  */
-export function openBundle(source: Pick<SceneSource, 'bytes' | 'name' | 'budget'>): { bytes: Uint8Array; open: OpenPart } {
+export function openBundle(source: Pick<SceneSource, 'bytes' | 'name' | 'budget'>): {
+  bytes: Uint8Array;
+  open: OpenPart;
+} {
   const archive = new Archive(source);
   const [path] = namedLike('meta.json', relevant(archive.paths));
   if (path === undefined) {

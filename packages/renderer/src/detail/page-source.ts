@@ -2,7 +2,7 @@ import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
 import { pageLayout, type DetailManifest, type PageFormat } from './manifest.js';
 import { PageFiles } from './page-files.js';
 import { listPages, type PageList } from './page-list.js';
-import type { SlotWords } from './slot-words.js';
+import { chunkLayout, type SlotWords } from './slot-words.js';
 
 /** What is known of a streamed scene before any page of it has come. */
 export type StreamedScene = PageFormat & Pick<DetailManifest, 'splats' | 'antialiased' | 'origin' | 'bounds'>;
@@ -35,8 +35,12 @@ export function folderSource(
   const lengths = new Map(
     manifest.trees.flatMap(({ pages }) => pages.map(({ file, chunks }) => [file, lengthOf(chunks)])),
   );
-  const fetchWhole = async (file: string, signal: AbortSignal): Promise<ArrayBuffer> =>
-    wholeFile(file, lengths.get(file)!, await fetchPage(file, signal));
+  const layout = chunkLayout(manifest);
+  const fetchWhole = async (file: string, signal: AbortSignal): Promise<ArrayBuffer> => {
+    const bytes = wholeFile(file, lengths.get(file)!, await fetchPage(file, signal));
+    requireBounds(file, new Float32Array(bytes, 0, (layout.chunks * bytes.byteLength) / (4 * layout.total)));
+    return bytes;
+  };
   const files = new PageFiles(fetchWhole, KEPT_BYTES);
   const fetch = async (page: number, signal: AbortSignal): Promise<SlotWords[]> => {
     const { file, first, chunks } = list.place(page);
@@ -56,6 +60,17 @@ function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBuff
     expected: `${length} bytes`,
     found: `${bytes.byteLength} bytes`,
     remedy: 'upload the folder again, all files of it from one run of npm run detail',
+  });
+}
+
+/** Of splats without bounds none is ever drawn: such a page is an error, as a file of them is. */
+function requireBounds(where: string, bounds: Float32Array): void {
+  if (bounds.every((number) => Number.isFinite(number))) return;
+  throw new GaussianSplatError('decode/corrupt', {
+    where,
+    expected: 'bounds of splats',
+    found: 'numbers that are not finite',
+    remedy: 'write the folder again with npm run detail, and upload all files of it',
   });
 }
 

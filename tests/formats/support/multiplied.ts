@@ -1,0 +1,166 @@
+/** Files that name the same thing again and again, or announce much with few bytes. */
+import { gzipSync, strToU8, zipSync } from 'fflate';
+import { buildGltf, writeGlb } from './gltf-writer.js';
+import { smallCloud } from './small-cloud.js';
+import { writeSog } from './sog-writer.js';
+import { writeWebp } from './webp-writer.js';
+
+/** A file that names something so many times, and the file beside it that it names. */
+export interface Multiplied {
+  readonly file: Uint8Array;
+  readonly beside?: Uint8Array;
+}
+
+const json = (value: unknown): Uint8Array => strToU8(JSON.stringify(value));
+const many = <T>(count: number, make: (k: number) => T): T[] => Array.from({ length: count }, (_, k) => make(k));
+const bound = { min: [0, 0, 0], max: [1, 1, 1] };
+
+/** Splats of one colour, which take next to no bytes. */
+function plainSog(side: number): { meta: object; image: Uint8Array } {
+  const image = writeWebp(new Uint8Array(4 * side * side).fill(255), side, side);
+  const codebook = [0.1];
+  return {
+    image,
+    meta: {
+      ...{ version: 2, count: side * side },
+      means: { mins: [0, 0, 0], maxs: [1, 1, 1], files: ['i', 'i'] },
+      ...{ scales: { codebook, files: ['i'] }, quats: { files: ['i'] }, sh0: { codebook, files: ['i'] } },
+    },
+  };
+}
+
+function lodZip(
+  filenames: string[],
+  runs: { file: number; offset: number; count: number }[],
+  side: number,
+): Uint8Array {
+  const { meta, image } = plainSog(side);
+  const tree = { bound, children: runs.map((run) => ({ bound, lods: { 0: run } })) };
+  const index = json({ version: 1, lodLevels: 1, filenames, tree });
+  return zipSync({ 'lod-meta.json': index, 's/meta.json': json(meta), 's/i': image });
+}
+
+const { json: gltf, buffer } = buildGltf([[{ cloud: smallCloud(400, 3) }]], [{ mesh: 0 }], [0]);
+type Primitive = { attributes: Record<string, number> };
+const primitive = (gltf.meshes as { primitives: Primitive[] }[])[0].primitives[0];
+const plyHeader = (lines: string[]): Uint8Array =>
+  strToU8(['ply', 'format ascii 1.0', ...lines, 'end_header', ''].join('\n'));
+
+/** SPZ version 2 of zeros, as many splats as deflate can hold. */
+function spz(count: number): Uint8Array {
+  const body = new Uint8Array(16 + 64 * count);
+  const view = new DataView(body.buffer);
+  body.set(strToU8('NGSP'));
+  view.setUint32(4, 2, true);
+  view.setUint32(8, count, true);
+  body[12] = 3;
+  return gzipSync(body, { mem: 8 });
+}
+
+/** An archive whose directory says of so many names that they are the same bytes. */
+function overlappingZip(count: number): Uint8Array {
+  const inner = { 'a/meta.json': new Uint8Array(1 << 20).fill(32) };
+  const one = zipSync(inner);
+  const end = one.length - 22;
+  const view = new DataView(one.buffer, one.byteOffset);
+  const entry = one.subarray(view.getUint32(end + 16, true), end);
+  const names = many(Math.min(count, 65_535), (k) => {
+    const own = entry.slice();
+    own[46] = 97 + (k % 26);
+    return own;
+  });
+  const directory = Buffer.concat(names);
+  const tail = one.slice(end);
+  const tailView = new DataView(tail.buffer);
+  for (const at of [8, 10]) tailView.setUint16(at, names.length, true);
+  tailView.setUint32(12, directory.length, true);
+  return Buffer.concat([one.subarray(0, view.getUint32(end + 16, true)), directory, tail]);
+}
+
+/** By what is multiplied. */
+export const MULTIPLIED: Readonly<Record<string, (factor: number) => Multiplied>> = {
+  'frames of a pattern': (n) => ({
+    file: json({ gaussianSplatSequence: 1, framesPerSecond: 24, frames: `${'a'.repeat(999)}{0}.spz`, count: n }),
+  }),
+  'digits of a pattern': (n) => ({
+    file: json({ gaussianSplatSequence: 1, framesPerSecond: 24, frames: `{${'0'.repeat(n)}}.spz`, count: 1e6 }),
+  }),
+  'frames of a list': (n) => ({
+    file: json({ gaussianSplatSequence: 1, framesPerSecond: 24, frames: many(n, () => 'a') }),
+  }),
+  'names of a streamed SOG': (n) => ({
+    file: lodZip(
+      many(n, () => 's/meta.json'),
+      many(n, (file) => ({ file, offset: 0, count: 65_536 })),
+      256,
+    ),
+  }),
+  'runs of a streamed SOG': (n) => ({
+    file: lodZip(
+      ['s/meta.json'],
+      many(n, (k) => ({ file: 0, offset: k % 65_536, count: 1 })),
+      256,
+    ),
+  }),
+  'splats of a SOG of one colour': (n) => {
+    const { meta, image } = plainSog(Math.min(1_500, Math.ceil(Math.sqrt(256 * n))));
+    return { file: zipSync({ 'meta.json': json(meta), i: image }, { level: 9 }) };
+  },
+  'spaces before a SOG': (n) => ({ file: zipSync({ 'meta.json': strToU8(' '.repeat(100 * n) + '{}') }) }),
+  'lists in the index of a streamed SOG': (n) => ({
+    file: zipSync({ 'lod-meta.json': strToU8(`{"lodLevels":[${'[],'.repeat(10 * n)}[]]}`) }),
+  }),
+  'nodes of a mesh': (n) => ({
+    file: writeGlb({ ...gltf, nodes: [{ children: many(n, () => 1) }, { mesh: 0 }], scenes: [{ nodes: [0] }] }, buffer),
+  }),
+  'children of a node below itself': (n) => ({
+    file: writeGlb({ ...gltf, nodes: [{ children: many(n, () => 0) }], scenes: [{ nodes: [0] }] }, buffer),
+  }),
+  'primitives of a mesh': (n) => ({
+    file: writeGlb({ ...gltf, meshes: [{ primitives: many(n, () => primitive) }] }, buffer),
+  }),
+  'accessors of a view': (n) => {
+    const accessors = gltf.accessors as object[];
+    const { POSITION } = primitive.attributes;
+    const primitives = many(n, (k) => ({
+      ...primitive,
+      attributes: { ...primitive.attributes, POSITION: accessors.length + k },
+    }));
+    const more = [...accessors, ...many(n, () => accessors[POSITION])];
+    return { file: writeGlb({ ...gltf, accessors: more, meshes: [{ primitives }] }, buffer) };
+  },
+  'buffers of a file': (n) => {
+    const [view] = gltf.bufferViews as object[];
+    const [accessor] = gltf.accessors as object[];
+    const accessors = many(n, (bufferView) => ({ ...accessor, bufferView }));
+    const primitives = many(n, (POSITION) => ({ ...primitive, attributes: { ...primitive.attributes, POSITION } }));
+    return {
+      file: json({
+        ...{ ...gltf, accessors, meshes: [{ primitives }] },
+        bufferViews: many(n, (k) => ({ ...view, buffer: k })),
+        buffers: many(n, () => ({ uri: 'a.bin', byteLength: buffer.length })),
+      }),
+      beside: buffer,
+    };
+  },
+  'splats of an SPZ of zeros': (n) => ({ file: spz(10 * n) }),
+  'entries of an archive': (n) => ({ file: overlappingZip(n) }),
+  'elements of a PLY': (n) => ({ file: plyHeader(many(n, (k) => `element e${k} 0`)) }),
+  'properties of a PLY': (n) => ({
+    file: plyHeader(['element vertex 1', ...many(n, (k) => `property float f_rest_${k}`)]),
+  }),
+  'comments of a PLY': (n) => ({ file: plyHeader(many(n, () => 'comment')) }),
+  'sections of a ksplat': (n) => {
+    const file = new Uint8Array(4096 + 1024 * Math.min(n, 1000));
+    file[1] = 1;
+    new DataView(file.buffer).setUint32(4, Math.min(n, 1000), true);
+    return { file };
+  },
+  'images of a SOG': (n) => {
+    const files = writeSog(smallCloud(400, 3));
+    const padded = Object.fromEntries(Object.entries(files).map(([name, bytes]) => [name, bytes]));
+    for (const name of Object.keys(padded))
+      if (name !== 'meta.json') padded[name] = Buffer.concat([padded[name], new Uint8Array(100 * n)]);
+    return { file: zipSync(padded, { level: 9 }) };
+  },
+};
