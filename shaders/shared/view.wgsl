@@ -28,8 +28,6 @@ struct View {
   key_bits: u32,
   // 1 if the survivors are listed in depth order already, so that they need no keys.
   is_ordered: u32,
-  // Tiles across and down of the depths beyond which nothing shows (shared/occlusion); 0 if there are none.
-  occlusion_tiles: vec2u,
   // Most that the camera's matrix stretches a vector: 1 unless it is more than a rotation and a translation.
   stretch: f32,
   // 1 if the page has levels of detail.

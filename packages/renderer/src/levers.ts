@@ -1,6 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
-import { SORT_NAMES, type SortName } from './stages/sort.js';
 import type { Threads } from './stages/threads.js';
 
 /**
@@ -14,8 +13,6 @@ export interface Levers {
   readonly rasterizer: 'auto' | RasterizerName;
   /** How stages share their work; the image is the same. `auto`: see {@link Renderer.create}. */
   readonly threads: 'auto' | Threads;
-  /** How keys are sorted; the order is the same. `auto`: see {@link Renderer.create}. */
-  readonly sort: 'auto' | SortName;
   /**
    * Precision in which quads are blended and images kept. `auto`: see {@link Renderer.create}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
    * feature `float32-blendable`.
@@ -36,11 +33,6 @@ export interface Levers {
    * half of that a frame; larger ones, and a camera that turns faster, have the visible splats sorted for each frame.
    */
   readonly sortAngle: number;
-  /**
-   * Tiles leave out splats behind what took all pixels of their tiles to this transmittance or less in the last frame; 0 leaves out
-   * none. While the camera moves a tile can lack for one frame what has just come into sight.
-   */
-  readonly occludedBelow: number;
   /** Tiles finish a pixel before the splat that would leave it this transmittance or less. */
   readonly transmittanceMin: number;
   /** A splat paints a pixel only with at least this alpha. */
@@ -74,12 +66,10 @@ const radians = (degrees: number): number => (degrees * Math.PI) / 180;
 const EXACT: Levers = {
   rasterizer: 'auto',
   threads: 'auto',
-  sort: 'auto',
   accumulation: 'auto',
   depthKeyBits: 24,
   submissions: 1,
   sortAngle: 1e-7,
-  occludedBelow: 0,
   transmittanceMin: 1e-4,
   alphaMin: 1 / 255,
   minContribution: 0,
@@ -134,7 +124,6 @@ export type FrameLevers = Pick<Levers, (typeof FRAME_LEVERS)[number]>;
 const FRAME_LEVERS = [
   'depthKeyBits',
   'sortAngle',
-  'occludedBelow',
   'transmittanceMin',
   'alphaMin',
   'minContribution',
@@ -148,7 +137,6 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
   submissions: [1, 256],
   sortAngle: [0, Math.PI],
   transmittanceMin: [0, 1],
-  occludedBelow: [0, 1],
   alphaMin: [1 / 255, 1],
   minContribution: [0, Infinity],
   detail: [0, 64],
@@ -161,7 +149,6 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
 const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
   rasterizer: ['auto', 'quads', 'tiles'],
   threads: ['auto', 'parallel', 'serial'],
-  sort: ['auto', ...SORT_NAMES],
   accumulation: ['auto', 'rgba16float', 'rgba32float'],
   depthKeyBits: [16, 24, 32],
   visibleSets: [false, true],

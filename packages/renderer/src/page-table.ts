@@ -97,13 +97,11 @@ export class PageTable {
     camera: Camera,
     { shDegree, depthKeyBits, detail, detailFade, splatBudget, alphaMin, minContribution, visibleSets }: Levers,
     isOrdered: boolean,
-    occlusionTiles: readonly [number, number],
   ): void {
     const shared = {
       sh_cap: shDegree,
       key_bits: depthKeyBits,
       is_ordered: isOrdered ? 1 : 0,
-      occlusion_tiles: occlusionTiles,
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,

@@ -22,7 +22,6 @@ export type CameraValues = Omit<
   | 'antialiased'
   | 'key_bits'
   | 'is_ordered'
-  | 'occlusion_tiles'
   | 'has_detail'
   | 'detail'
   | 'detail_fade'
