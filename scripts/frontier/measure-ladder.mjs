@@ -124,7 +124,7 @@ const report = {
     width: WIDTH,
     height: HEIGHT,
     views: views.length,
-    variants: { rasterizer, accumulation, threads, sort },
+    variants: { rasterizer, accumulation, threads },
   },
   rungs: results.map(({ psnr, ...rest }) => ({ ...rest, psnr: Number.isFinite(psnr) ? psnr : null })),
 };

@@ -15,6 +15,9 @@
 @group(0) @binding(4) var<storage, read> tile_bits: array<u32>;
 @group(0) @binding(5) var image: texture_storage_2d<rgba16float, write>;
 
+// True if the splat that would leave a pixel too little light is refused, as trainers do at 1/10,000; false if it is blended and the pixel ends behind it: at
+// a higher threshold a refused splat is a hole, since an opaque one leaves 1/1,000 by itself.
+override refuses_last: bool = true;
 // True to write premultiplied colour over the background, false for colour and transmittance.
 override is_final: bool = false;
 // True if the image holds float16, and if it holds bytes. Neither: float32.
@@ -154,7 +157,7 @@ fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
 struct Pixel {
   color: vec3f,
   transmittance: f32,
-  // Transmittance to which no splat may take the pixel; once one would have, or there is nothing to paint, FINISHED.
+  // Transmittance to which no splat may take the pixel, or behind which none is blended; once that has come, or there is nothing to paint, FINISHED.
   least: f32,
 }
 
@@ -181,7 +184,7 @@ fn blend(pixel: ptr<function, Pixel>, k: u32, brush: Brush, place: vec2f, least_
   let before = (*pixel).transmittance;
   let full_weight = before * alpha;
   let remaining = before - full_weight;
-  let ends = remaining <= (*pixel).least;
+  let ends = select(before, remaining, refuses_last) <= (*pixel).least;
   (*pixel).least = select((*pixel).least, FINISHED, ends);
   let after = select(remaining, before, ends);
   let weight = select(full_weight, 0.0, ends);

@@ -33,7 +33,9 @@ export interface Levers {
    * half of that a frame; larger ones, and a camera that turns faster, have the visible splats sorted for each frame.
    */
   readonly sortAngle: number;
-  /** Tiles finish a pixel before the splat that would leave it this transmittance or less. */
+  /**
+   * Where tiles end a pixel. Up to 1e-4, which scenes are trained with: before the splat that would leave it this transmittance or less. Above: behind that splat.
+   */
   readonly transmittanceMin: number;
   /** A splat paints a pixel only with at least this alpha. */
   readonly alphaMin: number;
@@ -62,6 +64,9 @@ export interface Levers {
 
 const radians = (degrees: number): number => (degrees * Math.PI) / 180;
 
+/** The threshold of the trainers: INRIA's, gsplat's. */
+export const TRAINED_TRANSMITTANCE = 1e-4;
+
 /** The levers that leave nothing out: what scenes were trained with. */
 const EXACT: Levers = {
   rasterizer: 'auto',
@@ -70,7 +75,7 @@ const EXACT: Levers = {
   depthKeyBits: 24,
   submissions: 1,
   sortAngle: 1e-7,
-  transmittanceMin: 1e-4,
+  transmittanceMin: TRAINED_TRANSMITTANCE,
   alphaMin: 1 / 255,
   minContribution: 0,
   visibleSets: false,

@@ -159,7 +159,8 @@ export class Renderer {
     const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined };
     const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     const own = { ...levers, ...detail };
-    table.look(drawn, own, isOrdered);
+    const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
+    table.look(drawn, pixelArea, own, isOrdered);
     const wishes = recordProjection(encoder, {
       stages: this.#stages,
       bindings,

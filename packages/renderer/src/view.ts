@@ -20,6 +20,7 @@ export type CameraValues = Omit<
   | 'sh_cap'
   | 'sh_encoding'
   | 'antialiased'
+  | 'filter_variance'
   | 'key_bits'
   | 'is_ordered'
   | 'has_detail'

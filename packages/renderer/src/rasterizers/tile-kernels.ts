@@ -27,14 +27,19 @@ export interface RasterizeVariant {
   readonly format: GPUTextureFormat;
   readonly isFinal: boolean;
   readonly isNoting: boolean;
+  /** See `transmittanceMin` of the levers. */
+  readonly refusesLast: boolean;
 }
 
 /** The pipeline for a variant; made once for each device. */
 export function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
-  const { format, isFinal, isNoting } = variant;
+  const { format, isFinal, isNoting, refusesLast } = variant;
   const shader = isNoting ? (rasterizeTilesNoting as unknown as typeof rasterizeTiles) : rasterizeTiles;
   const [writesHalf, writesBytes] = [format === 'rgba16float', format.endsWith('8unorm')];
-  const constants = { is_final: +isFinal, writes_half: +writesHalf, writes_bytes: +writesBytes };
+  const constants = {
+    ...{ refuses_last: +refusesLast, is_final: +isFinal },
+    ...{ writes_half: +writesHalf, writes_bytes: +writesBytes },
+  };
   const key = `${shader.name} ${format} ${JSON.stringify(constants)}`;
   return perDevice(device, key, () => new ComputeKernel(device, storingInto(shader, format), constants));
 }

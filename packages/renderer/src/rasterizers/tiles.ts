@@ -4,6 +4,7 @@ import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
 import type { Threads } from '../stages/threads.js';
+import { TRAINED_TRANSMITTANCE } from '../levers.js';
 import type {
   AccumulationFormat,
   FrameNotes,
@@ -50,6 +51,9 @@ const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
 
 /** Numbers of bins that are kept bound. */
 const MAX_GRIDS = 12;
+
+/** At the threshold that scenes are trained with, the splat that would go below it is refused; at higher ones it is the last that is blended. */
+const refusesLast = ({ transmittanceMin }: PaintingLevers): boolean => transmittanceMin <= TRAINED_TRANSMITTANCE;
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
@@ -116,8 +120,8 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = pairBuffers(this.#memory, inputs);
   }
 
-  prepare(_levers: PaintingLevers, format: GPUTextureFormat): void {
-    const variant = { isNoting: false };
+  prepare(levers: PaintingLevers, format: GPUTextureFormat): void {
+    const variant = { isNoting: false, refusesLast: refusesLast(levers) };
     if (this.finishes(format)) rasterizeKernel(this.#device, { ...variant, format, isFinal: true }).prepare();
     rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false }).prepare();
   }
@@ -159,6 +163,7 @@ export class TilesRasterizer implements Rasterizer {
       format,
       isFinal: background !== undefined,
       isNoting: notes !== undefined,
+      refusesLast: refusesLast(levers),
     });
     const image = notes
       ? this.#bindNoting(kernel, bound, surface.view, notes)
