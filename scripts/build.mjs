@@ -11,6 +11,9 @@ import { must, root } from './lib/run.mjs';
 /** Scripts of pages, each beside its page. */
 const SCRIPTS = ['home.js', 'check/check.js', 'compare/compare.js', 'examples/examples.js', 'playground/playground.js'];
 
+/** Texts of ONNX Runtime and of what is in it, as its releases bring them. */
+const RUNTIME_LICENCES = 'packages/element/third-party/onnxruntime';
+
 const isWhole = !process.argv.includes('--element');
 
 ensureDependencies();
@@ -47,11 +50,14 @@ function writeLicences() {
     if (existsSync(join(folder, 'package.json'))) copyFileSync(join(root, 'LICENSE'), join(folder, 'LICENSE'));
   }
   const own = readFileSync(join(root, 'LICENSE'), 'utf8');
-  const lit = readFileSync(join(root, 'node_modules/lit/LICENSE'), 'utf8');
-  const text = `gaussian-splat\n\n${own}\n\nLit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js\n\n${lit}`;
-  const runtime =
-    'ONNX Runtime, in onnxruntime/: MIT, copyright Microsoft Corporation, https://github.com/microsoft/onnxruntime';
-  writeFileSync(join(root, 'packages/element/cdn/LICENSES.txt'), `${text}\n\n${runtime}\n`);
+  const others = [
+    ['Lit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js', 'node_modules/lit/LICENSE'],
+    ['fflate, in readers/', 'node_modules/fflate/LICENSE'],
+    // Its npm package has neither.
+    ['ONNX Runtime, in onnxruntime/', `${RUNTIME_LICENCES}/LICENSE`],
+    ['What ONNX Runtime is made of', `${RUNTIME_LICENCES}/ThirdPartyNotices.txt`],
+  ].map(([what, file]) => `${what}\n\n${readFileSync(join(root, file), 'utf8')}`);
+  writeFileSync(join(root, 'packages/element/cdn/LICENSES.txt'), [`gaussian-splat\n\n${own}`, ...others].join('\n\n'));
 }
 
 /** What editors and tools know of the element, from its sources. */
