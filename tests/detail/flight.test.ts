@@ -159,6 +159,11 @@ test('a file that comes short is refused and fetched again, and a view of bytes 
   const whole = files.get('part-0')!;
   const padded = new Uint8Array(whole.byteLength + 24);
   padded.set(new Uint8Array(whole), 8);
+  const nowhere = new Uint8Array(whole.byteLength).fill(255);
+  answers.push(nowhere);
+  await assert.rejects(source.fetch(0, signal), { code: 'decode/corrupt' }, 'bounds that are not finite');
+  assert.ok(!source.isAtHand!(0));
+  fetched = 0;
   answers.push(whole.slice(8), padded.subarray(8, 8 + whole.byteLength));
   await assert.rejects(source.fetch(0, signal), { code: 'decode/truncated' });
   assert.ok(!source.isAtHand!(0));

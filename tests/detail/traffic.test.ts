@@ -218,6 +218,20 @@ test('a page that fails again and again is asked for after 4 s, then 8 s, and so
   all.traffic.close();
 });
 
+test('a page that never comes is told once, and given up after eight tries', async () => {
+  let now = 0;
+  const all = pool(2, 2, 16, () => now);
+  for (let minute = 0; minute < 120; minute++) {
+    now = 60_000 * minute;
+    all.look(() => 0.5);
+    all.server.open.splice(0).forEach((fetch) => fetch.fail());
+    await turn();
+  }
+  assert.equal(all.server.log.length, 8);
+  assert.equal(all.errors.length, 1);
+  all.traffic.close();
+});
+
 test('in a small pool, whatever comes in whatever order, what is above a page is there, and views at rest come to rest', async () => {
   const all = pool(2000, 120);
   const random = randomSource(6);

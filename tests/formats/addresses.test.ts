@@ -17,10 +17,21 @@ test('files beside a manifest are asked for as it was', () => {
 });
 
 test('other servers are refused, unless the page allows them; they get no cookies', () => {
-  const others = ['https://y.test/b', '//y.test/b', '/\\\\y.test/b', '\t//y.test/b', 'http://x.test/b', 'https://x.test:444/b'];
+  const others = [
+    'https://y.test/b',
+    '//y.test/b',
+    '/\\\\y.test/b',
+    '\t//y.test/b',
+    'http://x.test/b',
+    'https://x.test:444/b',
+  ];
   const foreign = ['data:,b', 'javascript:alert(1)', 'file:///etc/passwd', 'blob:https://y.test/1-2', 'blob:x'];
   for (const path of [...others, ...foreign]) {
-    assert.throws(() => partRequest(path, manifest), /x\.test.*or on servers that the page allows.*decode\/unsupported/, path);
+    assert.throws(
+      () => partRequest(path, manifest),
+      /x\.test.*or on servers that the page allows.*decode\/unsupported/,
+      path,
+    );
   }
   const allowed = partRequest('//y.test/b', manifest, ['https://y.test']);
   assert.deepEqual(allowed, { url: 'https://y.test/b', credentials: 'omit' });
@@ -30,7 +41,8 @@ test('other servers are refused, unless the page allows them; they get no cookie
 test('a manifest that is a file of the page names whole addresses of its server', () => {
   const own = { url: 'blob:https://x.test/1-2', credentials: 'same-origin' } as const;
   assert.equal(partRequest('https://x.test/b.spz', own).url, 'https://x.test/b.spz');
-  for (const path of ['b.spz', 'https://y.test/b.spz']) assert.throws(() => partRequest(path, own), /serve the manifest/i);
+  for (const path of ['b.spz', 'https://y.test/b.spz'])
+    assert.throws(() => partRequest(path, own), /serve the manifest/i);
   const local = { url: 'file:///a/scene.json', credentials: 'omit' } as const;
   assert.equal(partRequest('b.spz', local).url, 'file:///a/b.spz');
   assert.throws(() => partRequest('https://x.test/b.spz', local), GaussianSplatError);

@@ -16,24 +16,24 @@ const IDENTITY: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 /** A scene may show the same mesh many times; more than this is no scene of splats. */
 const MAX_PLACES = 10_000;
 const MAX_DEPTH = 1_000;
-/** What a node takes that waits for its turn: nodes may name the same children again and again. */
-const NODE_BYTES = 64;
 
 /** The meshes of the default scene (of all nodes where there is none), each with the product of its nodes' transforms. */
 export function placedMeshes(document: GltfDocument): PlacedMesh[] {
   const placed: PlacedMesh[] = [];
-  const open = rootNodes(document).map((node) => ({ node, parent: IDENTITY, depth: 0 }));
-  for (let visited = 0; open.length > 0; visited++) {
-    if (visited > MAX_PLACES) document.fail('nodes', `at most ${MAX_PLACES} nodes`, 'more');
-    const { node, parent, depth } = open.pop()!;
-    if (depth > MAX_DEPTH) document.fail('nodes', 'a tree', 'nodes that contain themselves');
-    const json = document.item('nodes', node);
-    const toScene = multiply(parent, localTransform(json, document));
-    if (document.isIndex(json.mesh)) placed.push({ mesh: json.mesh, toScene });
-    if (Array.isArray(json.children)) {
-      document.take(NODE_BYTES * json.children.length);
-      for (const child of [...json.children].reverse()) open.push({ node: child, parent: toScene, depth: depth + 1 });
+  // Lists of nodes, and how far each has been followed: nodes may name the same long list again and again.
+  const open = [{ nodes: rootNodes(document), next: 0, parent: IDENTITY }];
+  for (let visited = 0; open.length > 0;) {
+    const list = open[open.length - 1];
+    if (list.next === list.nodes.length) {
+      open.pop();
+      continue;
     }
+    if (visited++ > MAX_PLACES) document.fail('nodes', `at most ${MAX_PLACES} nodes`, 'more');
+    if (open.length > MAX_DEPTH) document.fail('nodes', 'a tree', 'nodes that contain themselves');
+    const json = document.item('nodes', list.nodes[list.next++]);
+    const toScene = multiply(list.parent, localTransform(json, document));
+    if (document.isIndex(json.mesh)) placed.push({ mesh: json.mesh, toScene });
+    if (Array.isArray(json.children)) open.push({ nodes: json.children, next: 0, parent: toScene });
   }
   return placed;
 }
@@ -42,16 +42,13 @@ function rootNodes(document: GltfDocument): unknown[] {
   const { scenes, scene = 0, nodes } = document.json;
   if (Array.isArray(scenes) && scenes.length > 0) {
     const { nodes: roots } = document.item('scenes', scene);
-    return Array.isArray(roots) ? [...roots].reverse() : [];
+    return Array.isArray(roots) ? roots : [];
   }
   if (!Array.isArray(nodes)) return [];
   const children = new Set(
     nodes.flatMap((node) => (isObject(node) && Array.isArray(node.children) ? node.children : [])),
   );
-  return nodes
-    .map((_, index) => index)
-    .filter((index) => !children.has(index))
-    .reverse();
+  return nodes.map((_, index) => index).filter((index) => !children.has(index));
 }
 
 function localTransform(node: Json, document: GltfDocument): Affine {
