@@ -73,8 +73,8 @@ describe('scenes of strangers', () => {
       element.remove();
       return reason;
     };
-    assertEqual(await refused({ maxSplats: 10 }), 'out-of-memory/budget', 'splats');
-    assertEqual(await refused({ maxBytes: 1_000 }), 'out-of-memory/budget', 'bytes');
+    assertEqual(await refused({ maxSplats: 5 }), 'out-of-memory/budget', 'splats');
+    assertEqual(await refused({ maxBytes: 300 }), 'out-of-memory/budget', 'bytes');
     const slow = '/net/slow/compass.splat?ms=8000';
     assertEqual(await refused({ maxSeconds: 0.5 }, slow), 'out-of-memory/budget', 'seconds');
     assertEqual(await refused({ maxSplats: 1e6, maxBytes: 1e9, maxSeconds: 60 }), 'none', 'enough of all');
