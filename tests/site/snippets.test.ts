@@ -44,7 +44,7 @@ declare global {
   const boundsOf: typeof core.boundsOf;
   const gaussianLayout: typeof core.gaussianLayout;
   const views: { readonly scored: Parameters<typeof economise.scoreSplats>[1] };
-  const { scoreSplats, cpuScorer, economical, parseEconomy, LiveMask }: typeof economise;
+  const { scoreSplats, cpuScorer }: typeof economise;
   const gaussians: drawing.GaussianBuffers;
   const { DynamicGaussians }: typeof drawing;
   const generator: models.Generator;

@@ -3,17 +3,7 @@ export { cpuPainter, cpuScorer } from './cpu-raster.js';
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
 export type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
 export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
-export { lookAround, visibleSetsDecibels, type LookAroundOptions } from './look-around.js';
-export { LiveMask, heaviest, type LiveMaskOptions, type MaskedScene, type ViewSize } from './live-mask.js';
-export {
-  contributionOfShare,
-  economical,
-  parseEconomy,
-  parseEconomyGoal,
-  type EconomyGoal,
-  type EconomyShare,
-  type MaskGoal,
-} from './mask.js';
+export { lookAround, visibleSetsDecibels, type LookAroundOptions, type ViewSize } from './look-around.js';
 export { MergingEvaluator, type MergingOptions } from './merge/merging-evaluator.js';
 export { decibels, meanSquare, Studio, type Image, type Painter } from './measure.js';
 export { PaintedEvaluator, type PaintedEvaluatorOptions } from './painted-evaluator.js';

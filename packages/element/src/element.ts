@@ -280,7 +280,6 @@ export class GaussianSplatElement extends ViewingMethods {
         touchAction: this.#attributes.touchAction,
       }),
       services: () => this.constructor as typeof GaussianSplatElement,
-      economy: () => this.economy || null,
       loops: () => this.loop,
       autoplays: () => this.autoplay,
       startTime: () => (Number.isFinite(this.#startTime) ? this.#startTime : 0),

@@ -34,7 +34,6 @@ export class SplatProperties extends LitElement {
     quality: {},
     maxShDegree: { attribute: 'max-sh-degree' },
     detail: {},
-    economy: {},
     contract: {},
     chain: {},
     postprocess: {},
@@ -110,12 +109,6 @@ export class SplatProperties extends LitElement {
    * is drawn, at rest too, may be displaced by so many for having been merged.
    */
   declare detail: string | null;
-  /**
-   * Leaves out what views around the scene need least: a share of the splats to keep such as `60%`, or a figure such as `57db` that the picture keeps to;
-   * or of each picture in motion what does not show from its side: `views`.
-   * Without it all splats are there.
-   */
-  declare economy: string | null;
   /** Contract of a generator: its URL, its JSON, or the object. Default: what is beside the model or in it. */
   declare contract: string | object | null;
   /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */

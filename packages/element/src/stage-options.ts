@@ -33,8 +33,6 @@ export interface StageOptions {
   readonly attributes: () => Attributes;
   readonly input: () => InputOptions;
   readonly services: () => Services;
-  /** The attribute `economy`. */
-  readonly economy: () => string | null;
   readonly loops: () => boolean;
   readonly autoplays: () => boolean;
   /** The attribute `time`, in seconds; 0 without. */

@@ -3,7 +3,6 @@ import type { ReactiveControllerHost } from 'lit';
 import { Behaviours } from './behaviours.js';
 import { CameraController } from './controllers/camera-controller.js';
 import { DetailController } from './controllers/detail-controller.js';
-import { EconomyController } from './controllers/economy-controller.js';
 import { HotspotController } from './controllers/hotspot-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController } from './controllers/playback-controller.js';
@@ -32,7 +31,6 @@ import { windowOf } from './window-of.js';
 export class Stage {
   readonly camera: CameraController;
   readonly scene: SceneController;
-  readonly economy: EconomyController;
   readonly detail: DetailController;
   readonly playback: PlaybackController;
   readonly reveal: RevealController;
@@ -83,12 +81,6 @@ export class Stage {
       isConnected: () => host.isConnected,
       want: (request, mayStart) => this.scene.want(request, mayStart),
       isOther: (request) => this.scene.isOther(request),
-    });
-    this.economy = new EconomyController({
-      economy: options.economy,
-      memoryBudget: () => this.#memoryBudget(),
-      onChange: () => this.#onOtherSplats(),
-      warn: options.warn,
     });
     this.detail = new DetailController({
       detail: () => options.attributes().detail,
@@ -156,7 +148,6 @@ export class Stage {
       quality,
       pace: this.#view.pace.report,
       counts: this.#counts,
-      economy: this.economy.report,
       isPreview: this.scene.isPreview,
     });
   }
@@ -330,9 +321,7 @@ export class Stage {
 
   #onUpdate(): void {
     this.reveal.settle();
-    const whole = this.scene.state === 'ready' ? this.scene.scene : null;
-    this.economy.update(whole);
-    this.detail.update(whole);
+    this.detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
   }
 
   #onOtherSplats(): void {

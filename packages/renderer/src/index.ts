@@ -29,7 +29,7 @@ export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './
 export { levelSource, packLevelPage } from './detail/level-source.js';
 export { checkManifest, type DetailManifest } from './detail/manifest.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
-export { readPacked, selectPacked } from './pack/packed-scene.js';
+export { readPacked } from './pack/packed-scene.js';
 export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, NotedFrame, RasterizerName } from './rasterizers/rasterizer.js';
 export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';

@@ -107,7 +107,7 @@ export class DetailController {
       const { buildLevels } = await import('../detail/build-levels.js');
       signal.throwIfAborted();
       const levels = await buildLevels(scene, loader(), memoryBudget(), signal);
-      // An economy may have put other splats in their place meanwhile.
+      // A sequence may have put other splats in their place meanwhile.
       if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
       scene.setLevels(levels);
       onChange();
