@@ -10,9 +10,7 @@ import {
   encodingsFor,
   GpuEvaluator,
   MergingEvaluator,
-  PaintedEvaluator,
   RefiningEvaluator,
-  Studio,
   viewsBetween,
 } from '@gaussian-splat/economise';
 import { inline } from '@gaussian-splat/economise/parts';
@@ -31,8 +29,6 @@ const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
                   Larger ones are drawn with 1600 pixels a side
   --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
-  --scorer NAME   what scores splats and measures cuts: gpu, cpu (plain code; the project's renderer draws what the result is judged by), or
-                  auto (default): gpu where there is one
   --threads N     that share what comes in parts: reading a large PLY, writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
   --merge         merges splats that look like one, too: more go at the same figure, for several times the seconds
   --refine        fits the splats that stay to pictures of the whole scene, on the GPU, and drops more where that helps
@@ -59,7 +55,6 @@ function parseOptions(args) {
         out: text,
         views: text,
         report: text,
-        scorer: { ...text, default: 'auto' },
         scored: { ...text, default: '216' },
         threads: { ...text, default: String(usualThreads()) },
         merge: { type: 'boolean', default: false },
@@ -76,20 +71,18 @@ function parseOptions(args) {
   const minDecibels = Number(values['min-db']);
   if (!(minDecibels >= 10 && minDecibels <= 100)) throw new UsageError('--min-db: expected a number from 10 to 100');
   if (values.out === undefined) throw new UsageError('--out is missing');
-  const { scorer, merge, refine } = values;
+  const { merge, refine } = values;
   const [scene, out, views, report] = [positionals[0], values.out, values.views, values.report].map(
     (path) => path && resolve(from, path),
   );
   checkFiles({ scene, out, views, report });
-  if (!['auto', 'gpu', 'cpu'].includes(scorer))
-    throw new UsageError(`--scorer: expected auto, gpu or cpu, found "${scorer}"`);
   const scored = Number(values.scored);
   if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
     throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
   const threads = Number(values.threads);
   if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
     throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
-  return { scene, out, minDecibels, views, report, scorer, scored, threads, merge, refine };
+  return { scene, out, minDecibels, views, report, scored, threads, merge, refine };
 }
 
 /** All that can be said of files before the work. */
@@ -131,8 +124,9 @@ function atMostLargest(camera) {
   return { ...camera, width, height, fx: x * camera.fx, fy: y * camera.fy, cx: x * camera.cx, cy: y * camera.cy };
 }
 
-function readViews(path, bounds, scored) {
-  if (path === undefined) return dealtViewsAround(bounds, { scored });
+/** undefined without a path. */
+function readViews(path) {
+  if (path === undefined) return undefined;
   const views = parseViews(path);
   const cameras = views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`));
   const drawn = cameras.map(atMostLargest);
@@ -143,37 +137,34 @@ function readViews(path, bounds, scored) {
   throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
 }
 
-/** SwiftShader is a processor in disguise, slower than plain code on the same. */
-async function openDevice(scorer) {
+async function openDevice() {
   const adapter = await requestNodeAdapter({ isTrusted: true });
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
   const { vendor, architecture, device: model, description } = adapter.info;
-  const isGpu = scorer === 'gpu' || (scorer === 'auto' && !/swiftshader/i.test(description));
-  console.log(
-    `adapter      ${[vendor, architecture, model, description].filter(Boolean).join(' ')}${isGpu ? '' : '; scores and cuts on the CPU'}`,
-  );
-  return { device, isGpu };
+  const slow = /swiftshader/i.test(description) ? ', which is no GPU: large scenes take long' : '';
+  console.log(`adapter      ${[vendor, architecture, model, description].filter(Boolean).join(' ')}${slow}`);
+  return device;
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report, scorer, scored, threads, merge, refine }) {
+async function main({ scene, out, minDecibels, views: viewsFile, report, scored, threads, merge, refine }) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
+  // What is wrong with it is said before the work.
+  const ownViews = readViews(viewsFile);
   // The file and the driver take their time at the same time.
   const pool = threads > 1 ? new ThreadPool(threads) : inline;
   const { cloud: reading } = await startReading(scene, pool);
   reading.catch(() => undefined);
-  const { device, isGpu } = await openDevice(scorer);
-  if (isGpu) GpuEvaluator.prepare(device);
+  const device = await openDevice();
+  GpuEvaluator.prepare(device);
   const opened = seconds();
   const cloud = await reading;
   // What this format has no place for is told before a picture is drawn.
   encodingsFor(out, cloud);
   // What is left of it when the device is there.
   const read = seconds() - opened;
-  const views = readViews(viewsFile, boundsOf(cloud), scored);
-  const measuring = isGpu
-    ? await GpuEvaluator.create(device, cloud, views, { pool })
-    : new PaintedEvaluator(cloud, { views, studio: new Studio(device, 'default') });
+  const views = ownViews ?? dealtViewsAround(boundsOf(cloud), { scored });
+  const measuring = await GpuEvaluator.create(device, cloud, views, { pool });
   const mostError = 10 ** (-minDecibels / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
   const merging = { views: views.scored, mostError, pool };
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;

@@ -12,24 +12,20 @@ import {
   type Vector3,
 } from '@gaussian-splat/core';
 import {
-  cpuPainter,
-  cpuScorer,
   dealtViewsAround,
   dealViews,
   decibels,
   economise,
   encodingsFor,
   meanSquare,
-  PaintedEvaluator,
   reduce,
-  scoreSplats,
-  Studio,
   viewsAround,
   viewsBetween,
 } from '@gaussian-splat/economise';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { cpuPainter, cpuScorer, PaintedEvaluator, scoreSplats, Studio } from './twin/index.js';
 
 const SIZE = { width: 120, height: 80 };
 

@@ -3,13 +3,11 @@ import assert from 'node:assert/strict';
 import { before, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import {
-  cpuPainter,
   dealtViewsAround,
   decibels,
   economise,
   meanSquare,
   MergingEvaluator,
-  PaintedEvaluator,
   reduce,
   type Cut,
   type ReducedCloud,
@@ -19,6 +17,7 @@ import { smallCloud } from '../formats/support/small-cloud.js';
 import { covarianceOf } from '../support/generator-tensors.js';
 import { findMerges } from '../../packages/economise/src/merge/find-merges.js';
 import { ThreadPool } from '../../scripts/lib/thread-pool.mjs';
+import { cpuPainter, PaintedEvaluator } from './twin/index.js';
 
 const SIZE = { width: 120, height: 80 };
 const SPLATS = 600;

@@ -43,8 +43,7 @@ declare global {
   const contract: core.Contract;
   const boundsOf: typeof core.boundsOf;
   const gaussianLayout: typeof core.gaussianLayout;
-  const views: { readonly scored: Parameters<typeof economise.scoreSplats>[1] };
-  const { scoreSplats, cpuScorer }: typeof economise;
+  const views: economise.DealtViews;
   const gaussians: drawing.GaussianBuffers;
   const { DynamicGaussians }: typeof drawing;
   const generator: models.Generator;

@@ -15,7 +15,7 @@ export interface EconomiseOptions {
   readonly minDecibels: number;
   /** Name of the file to be written; its extension tells the format. */
   readonly name: string;
-  /** Looks at the cloud: `GpuEvaluator` where there is a GPU, else `PaintedEvaluator`. */
+  /** Looks at the cloud: `GpuEvaluator`, or one around it. */
   readonly evaluator: Evaluator;
   /** Does what comes in parts, of writing and reading the file again; default {@link inline}. */
   readonly pool?: TaskPool;

@@ -1,6 +1,6 @@
 import { shCoefficientCount, type Camera, type GaussianCloud } from '@gaussian-splat/core';
 import { splatRows } from '@gaussian-splat/renderer/stages';
-import { DILATION } from '../cpu-project.js';
+import { DILATION } from './project.js';
 import { writeRow } from './splat-row.js';
 import { AMPLITUDE, SEEN, seenSplats, U, UU, UV, V, VV } from './seen-splats.js';
 

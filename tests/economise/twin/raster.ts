@@ -1,6 +1,8 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { ALPHA_MIN, coloursOf, factors, project, type Projected } from './cpu-project.js';
-import type { Image, Painter } from './measure.js';
+import type { Image } from '@gaussian-splat/economise';
+import { ALPHA_MIN, factors, project, type Projected } from '../../../packages/economise/src/merge/project.js';
+import { coloursOf } from './colours.js';
+import type { Painter } from './painter.js';
 import type { ContributionScorer, Contributions } from './scorer.js';
 
 const ALPHA_MAX = 0.99;

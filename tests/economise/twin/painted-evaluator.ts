@@ -1,11 +1,22 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
-import { cpuPainter, cpuScorer } from './cpu-raster.js';
-import type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
-import { isCovered, meanSquare, type Image, type Painter } from './measure.js';
-import { degreesOf, reduce, type Cut, type ReducedCloud } from './reduce.js';
-import { scoreSplats, type Ranking, type Scores } from './score.js';
+import {
+  degreesOf,
+  meanSquare,
+  reduce,
+  type Cut,
+  type CutFigures,
+  type DealtViews,
+  type Evaluator,
+  type Image,
+  type JudgedViews,
+  type Ranking,
+  type ReducedCloud,
+  type Scores,
+} from '@gaussian-splat/economise';
+import { isCovered, type Painter } from './painter.js';
+import { cpuPainter, cpuScorer } from './raster.js';
+import { scoreSplats } from './score.js';
 import type { ContributionScorer } from './scorer.js';
-import type { DealtViews } from './views.js';
 
 export interface PaintedEvaluatorOptions {
   /** The views of three kinds, none of which may share one: what was not seen in the first would seem unneeded in the second. */
@@ -18,7 +29,7 @@ export interface PaintedEvaluatorOptions {
   readonly scorer?: ContributionScorer;
 }
 
-/** Scores in plain code, and draws each reduced cloud anew: where there is no GPU, and what others are held against. */
+/** Scores in plain code, and draws each reduced cloud anew: what the GPU's evaluator is held against, and what searches are tested with. */
 export class PaintedEvaluator implements Evaluator {
   readonly #cloud: GaussianCloud;
   readonly #options: PaintedEvaluatorOptions;

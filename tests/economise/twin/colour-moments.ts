@@ -1,16 +1,6 @@
 import { eyeOf, shCoefficientCount, type Camera, type GaussianCloud } from '@gaussian-splat/core';
+import { PRIOR_VIEWS, type LoweredColours } from '../../../packages/economise/src/score.js';
 import { shBasis } from './colour.js';
-
-/** A few views know little of a colour that depends on the view: so many more are imagined, from everywhere. */
-export const PRIOR_VIEWS = 4;
-
-/** The colours of all splats with fewer bands. */
-export interface LoweredColours {
-  /** [N] the mean squared error of the views' images if this splat alone has them; Infinity for splats that too few views looked at. */
-  readonly error: Float32Array;
-  /** [(degree + 1)², 3] coefficients of splat i: those that come nearest to the colours that the views saw. */
-  of(i: number): Float32Array;
-}
 
 /**
  * From where, and with how much weight, each splat of a cloud was seen: for each the matrix of the basis functions against one another, weighted by the
