@@ -1,4 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
+import { credentialsOf } from '../attributes.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import { toElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
@@ -26,7 +27,7 @@ export class LiveWiring {
     this.post = new PostController({
       requestFrame,
       request: () => ({
-        credentials: attributes().credentials,
+        credentials: credentialsOf(attributes().crossorigin),
         runtimeLocation: services().runtimeLocation,
         state: () => this.state,
         onError: (error) => this.#fail(error),
