@@ -1,7 +1,7 @@
 /** From what an element's attributes say to addresses and requests. */
 import { credentialsOf, type Attributes } from './attributes.js';
 import type { SceneRequest } from './loading/protocol.js';
-import type { Source } from './stage-options.js';
+import type { Source } from './stage-host.js';
 
 /** A page's hand in every address; null or undefined for none. */
 export type UrlModifier = ((url: string) => string) | null | undefined;

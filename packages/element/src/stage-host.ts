@@ -28,23 +28,22 @@ export interface Source {
   readonly postprocess: string | null;
 }
 
-/** What the stage asks its element for. */
-export interface StageOptions {
-  readonly attributes: () => Attributes;
-  readonly input: () => InputOptions;
-  readonly services: () => Services;
-  readonly loops: () => boolean;
-  readonly autoplays: () => boolean;
+/** What the stage knows of its element, as of now: its attributes and the parts of its shadow tree, once they are rendered. */
+export interface StageHost {
+  readonly attributes: Attributes;
+  readonly input: InputOptions;
+  readonly services: Services;
+  readonly loops: boolean;
+  readonly autoplays: boolean;
   /** The attribute `time`, in seconds; 0 without. */
-  readonly startTime: () => number;
-  readonly autoRotates: () => boolean;
+  readonly startTime: number;
+  readonly autoRotates: boolean;
   /** A double click or a double tap picks the point to turn around. */
-  readonly retargets: () => boolean;
-  readonly strings: () => SpokenStrings;
-  readonly liveValues: () => Omit<LiveState, 'timeSeconds'>;
-  /** Parts of the shadow tree, once they are rendered. */
-  readonly canvas: () => HTMLCanvasElement | null;
-  readonly surface: () => HTMLElement | null;
-  readonly hotspotLayer: () => HTMLElement | null;
-  readonly warn: (sentence: string) => void;
+  readonly retargets: boolean;
+  readonly strings: SpokenStrings;
+  readonly liveValues: Omit<LiveState, 'timeSeconds'>;
+  readonly canvas: HTMLCanvasElement | null;
+  readonly surface: HTMLElement | null;
+  readonly hotspotLayer: HTMLElement | null;
+  warn(sentence: string): void;
 }
