@@ -26,7 +26,7 @@ must(process.execPath, [
 writeLicences();
 console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
 if (isWhole) {
-  const { bundleThreadScript } = await import('./lib/thread-script.mjs');
+  const { bundleThreadScript } = await import('../packages/cli/src/lib/thread-script.mjs');
   await bundleThreadScript();
   describeElement();
   await buildDemo();

@@ -1,4 +1,4 @@
-/** `npm run economise` as people meet it: what it refuses before any work, what it writes, and that what it reads stays as it is. */
+/** `gaussian-splat economise` as people meet it: what it refuses before any work, what it writes, and that what it reads stays as it is. */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { linkSync, mkdtempSync, readdirSync, readFileSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
@@ -9,10 +9,10 @@ import { fileURLToPath } from 'node:url';
 import { boundsOf, type Camera } from '@gaussian-splat/core';
 import { encodingsFor, viewsAround } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
-import { writeWhole } from '../../scripts/lib/output-file.mjs';
+import { writeWhole } from '../../packages/cli/src/lib/output-file.mjs';
 import { smallCloud } from '../formats/support/small-cloud.js';
 
-const script = fileURLToPath(new URL('../../scripts/economise-scene.mjs', import.meta.url));
+const script = fileURLToPath(new URL('../../packages/cli/bin/gaussian-splat.mjs', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'economise-'));
 after(() => rmSync(folder, { recursive: true }));
 
@@ -36,7 +36,10 @@ writeFileSync(cameras, JSON.stringify({ views }));
 
 function command(...args: string[]): { status: number | null; said: string } {
   const env = { ...process.env, INIT_CWD: folder };
-  const { status, stdout, stderr } = spawnSync(process.execPath, [script, ...args], { encoding: 'utf8', env });
+  const { status, stdout, stderr } = spawnSync(process.execPath, [script, 'economise', ...args], {
+    encoding: 'utf8',
+    env,
+  });
   return { status, said: stdout + stderr };
 }
 

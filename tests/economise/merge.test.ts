@@ -16,7 +16,7 @@ import { readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { covarianceOf } from '../support/generator-tensors.js';
 import { findMerges } from '../../packages/economise/src/merge/find-merges.js';
-import { ThreadPool } from '../../scripts/lib/thread-pool.mjs';
+import { ThreadPool } from '../../packages/cli/src/lib/thread-pool.mjs';
 import { cpuPainter, PaintedEvaluator } from './twin/index.js';
 
 const SIZE = { width: 120, height: 80 };

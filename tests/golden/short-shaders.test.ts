@@ -6,7 +6,7 @@ import { after, test } from 'node:test';
 import { fileURLToPath, pathToFileURL } from 'node:url';
 import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
 import * as stages from '@gaussian-splat/renderer/stages';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { endNodeDevice } from '../support/node-device.js';
 
 /** What this test needs of the plugin's own module and the others. */

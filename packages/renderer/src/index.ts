@@ -1,4 +1,5 @@
 export { capture } from './capture.js';
+export { createRenderer } from './choice/create-renderer.js';
 export { chooseVariants, startVariants, type ChoiceOptions, type StartOptions } from './choice/choose.js';
 export type { ChoiceStore } from './choice/kept-choice.js';
 export type { ProbeAnswer, ProbePoint } from './depth-probe.js';

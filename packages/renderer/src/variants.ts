@@ -16,6 +16,8 @@ export const SAFE: Variants = {
   accumulation: 'rgba16float',
   threads: 'parallel',
 };
+/** What is likely to suit a GPU. */
+export const LIKELY: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' };
 
 /** Variants known to suit a device, set by `chooseVariants`. */
 const known = (device: GPUDevice): { variants: Variants } => perDevice(device, 'variants', () => ({ variants: SAFE }));

@@ -3,7 +3,7 @@ import { existsSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 
 const SOURCE = new URL('./task-thread.mjs', import.meta.url);
-const BUNDLE = new URL('../../.cache/threads/task-thread.mjs', import.meta.url);
+const BUNDLE = new URL('../../../../.cache/threads/task-thread.mjs', import.meta.url);
 
 /** Where it is: what the last build made of it, else its source. */
 export const threadScript = () => (existsSync(BUNDLE) ? BUNDLE : SOURCE);

@@ -1,4 +1,4 @@
-/** The work behind `npm run render`: one scene, one camera, one image, on the same renderer that the element uses. */
+/** The work behind `gaussian-splat render`: one scene, one camera, one image, on the same renderer that the element uses. */
 import { basename, dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { PNG } from 'pngjs';
@@ -10,7 +10,7 @@ import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
 import { readJson } from './lib/read-json.mjs';
 import { readWhole } from './lib/read-whole.mjs';
 
-const USAGE = `usage: npm run render -- SCENE --camera CAMERA.json --out IMAGE.png [options]
+const USAGE = `usage: gaussian-splat render SCENE --camera CAMERA.json --out IMAGE.png [options]
 
   --camera FILE        one view: {width, height, K (3x3, pixels), worldToCamera (4x4, OpenCV axes)}, optionally near and far;
                        or {views: [...]} together with --view NAME
@@ -26,7 +26,7 @@ const USAGE = `usage: npm run render -- SCENE --camera CAMERA.json --out IMAGE.p
 
 class UsageError extends Error {}
 
-/** Folder that a person's relative paths start from: npm itself runs scripts in the project's root. */
+/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
 const from = process.env.INIT_CWD ?? process.cwd();
 
 function parseOptions(args) {

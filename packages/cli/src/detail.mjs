@@ -1,4 +1,4 @@
-/** The work behind `npm run detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
+/** The work behind `gaussian-splat detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -8,7 +8,7 @@ import { buildDetailTree, cutPages, manifestOf, packPage, treeOfCopies } from '@
 import { writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/read-whole.mjs';
 
-const USAGE = `usage: npm run detail -- SCENE --out FOLDER [options]
+const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
 
   --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/detail-pages.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
@@ -19,7 +19,7 @@ const USAGE = `usage: npm run detail -- SCENE --out FOLDER [options]
 
 class UsageError extends Error {}
 
-/** Folder that a person's relative paths start from: npm itself runs scripts in the project's root. */
+/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
 const from = process.env.INIT_CWD ?? process.cwd();
 
 function parseOptions(args) {

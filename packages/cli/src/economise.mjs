@@ -1,4 +1,4 @@
-/** The work behind `npm run economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
+/** The work behind `gaussian-splat economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
 import { statSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -21,7 +21,7 @@ import { readJson } from './lib/read-json.mjs';
 import { startReading } from './lib/scene-in-parts.mjs';
 import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 
-const USAGE = `usage: npm run economise -- SCENE --min-db DB --out FILE [options]
+const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [options]
 
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
   --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
@@ -40,7 +40,7 @@ class UsageError extends Error {}
 /** Whether the file system says it: ENOENT, EACCES, ENOSPC. Its sentence is enough for people. */
 const isOfFiles = ({ code }) => /^E[A-Z]+$/.test(code);
 
-/** Folder that a person's relative paths start from: npm itself runs scripts in the project's root. */
+/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
 const from = process.env.INIT_CWD ?? process.cwd();
 
 function parseOptions(args) {

@@ -1,23 +1,20 @@
 /**
- * `npm run page -- SCENE FOLDER [--port 8000] [--no-serve]`: a page with a scene of one's own. Builds the element if it is not built, puts it and the scene into
+ * `gaussian-splat page SCENE FOLDER [--port 8000] [--no-serve]`: a page with a scene of one's own. Puts the element and the scene into
  * FOLDER, writes an index.html unless there is one, and serves the folder. What then lies there is static: any host can have it.
  */
 import { cpSync, existsSync, mkdirSync, statSync, writeFileSync } from 'node:fs';
 import { basename, dirname, extname, join, relative, resolve } from 'node:path';
+import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 import { filesBeside } from './lib/files-beside.mjs';
-import { ensureDependencies, ensureElement } from './lib/prepare.mjs';
-import { root } from './lib/run.mjs';
 import { serve } from './lib/server.mjs';
 
-const USAGE = 'npm run page -- SCENE FOLDER [--port 8000] [--no-serve]';
-const CDN = join(root, 'packages/element/cdn');
+const USAGE = 'gaussian-splat page SCENE FOLDER [--port 8000] [--no-serve]';
+const CDN = fileURLToPath(new URL('cdn', import.meta.resolve('@gaussian-splat/element/package.json')));
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
 const { scene, folder, port, isServed } = parseOptions();
 
-ensureDependencies();
-ensureElement();
 mkdirSync(folder, { recursive: true });
 copyElement(join(folder, 'cdn'));
 const tag = tagOf(await copyScene());
