@@ -7,8 +7,25 @@ import { readInParts } from './parts/read-in-parts.js';
 import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
 import { cutCloud, searchRefined, type CutCloud, type Plan } from './refine/search-refined.js';
-import { Stopwatch } from './stopwatch.js';
 import { encodingsFor, type Encoding } from './write/index.js';
+
+/** Where the time goes. */
+export class Stopwatch {
+  readonly #seconds: Record<string, number> = {};
+  #last = performance.now();
+
+  /** Adds what has passed since the last lap to a kind of work. */
+  lap(work: string): void {
+    const now = performance.now();
+    this.#seconds[work] = (this.#seconds[work] ?? 0) + (now - this.#last) / 1000;
+    this.#last = now;
+  }
+
+  /** By the kind of work, s. */
+  get seconds(): Readonly<Record<string, number>> {
+    return { ...this.#seconds };
+  }
+}
 
 export interface EconomiseOptions {
   /** PSNR over the covered pixels of the held-out views that the written file must reach, dB. */

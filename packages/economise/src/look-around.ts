@@ -19,7 +19,7 @@ import {
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
 import { noteSides, SIDE_GROUP, Side as layout } from './generated/shaders.js';
-import { NO_VIEW } from './gpu/no-view.js';
+import { NO_VIEW } from './gpu/layouts.js';
 import { PictureErrors } from './gpu/picture-errors.js';
 import { readBack } from './gpu/read-back.js';
 import { decibelsTogether } from './measure.js';

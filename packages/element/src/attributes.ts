@@ -18,8 +18,10 @@ import {
 } from './camera/grammar.js';
 import type { CameraSettings } from './camera/settings.js';
 import type { Numbers } from './live/values.js';
-import { timerMs } from './timer-ms.js';
 import type { SpokenStrings } from './words.js';
+
+/** As much of a wait, ms, as timers can: whatever is longer, `Infinity` too, they take for none at all. */
+export const timerMs = (wait: number): number => Math.min(wait, 2 ** 31 - 1);
 
 /** When loading starts: once the element is in sight, or as soon as it is in the page. */
 export type Loading = 'lazy' | 'eager';

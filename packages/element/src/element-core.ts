@@ -6,7 +6,7 @@ import type { GaussianSplatEventMap } from './events.js';
 import { FrameScheduler } from './gpu/frame-scheduler.js';
 import { defaultMemoryBudget } from './gpu/memory-budget.js';
 import type { Services, StageHost } from './stage-host.js';
-import { windowOf } from './window-of.js';
+import { windowOf } from './controllers/size-controller.js';
 import type { SpokenStrings } from './words.js';
 
 /** What the page says of an element, as of now, and what it is told: the part of the stage that no controller has a hand in. */

@@ -1,5 +1,5 @@
 import { isServer, type PropertyValues, type TemplateResult } from 'lit';
-import { adoptStyles } from './adopt-styles.js';
+import { adoptStyles, styles } from './styles.js';
 import { readAttributes, type Attributes } from './attributes.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from './gpu/shared-device.js';
@@ -9,7 +9,6 @@ import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
 import { Stage } from './stage.js';
 import type { StageHost } from './stage-host.js';
 import type { SceneStats } from './stats.js';
-import { styles } from './styles.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
 import { readSpokenStrings, type SpokenStrings } from './words.js';

@@ -1,5 +1,5 @@
 export { capture } from './capture.js';
-export { createRenderer } from './choice/create-renderer.js';
+export { createRenderer } from './choice/choose.js';
 export { chooseVariants, startVariants, type ChoiceOptions, type StartOptions } from './choice/choose.js';
 export type { ChoiceStore } from './choice/kept-choice.js';
 export type { ProbeAnswer, ProbePoint } from './depth-probe.js';
@@ -41,6 +41,6 @@ export { SidedGaussians, type HeldScene } from './sided-gaussians.js';
 export { SIDES, sidesNear, type Surroundings } from './sides.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';
-export type { Threads } from './stages/threads.js';
+export type { Threads } from './stages/plan.js';
 export type { Variants } from './variants.js';
 export { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';

@@ -1,7 +1,7 @@
 import { perDevice } from './gpu/kernel.js';
 import type { Levers } from './levers.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
-import type { Threads } from './stages/threads.js';
+import type { Threads } from './stages/plan.js';
 
 /** What a renderer leaves to the device: all of them draw the same image, at different speeds. */
 export interface Variants {

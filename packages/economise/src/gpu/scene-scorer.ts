@@ -13,8 +13,7 @@ import {
 } from '@gaussian-splat/renderer/stages';
 import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
 import { MIN_LOOKS, PRIOR_VIEWS, UNSEEN_CONTRAST } from '../score.js';
-import { layouts } from './layouts.js';
-import { NO_VIEW } from './no-view.js';
+import { layouts, NO_VIEW } from './layouts.js';
 import { readBack } from './read-back.js';
 import type { SceneParts } from './scene-parts.js';
 

@@ -7,7 +7,7 @@ import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { isSameContract } from '../loading/same-contract.js';
 import type { Services } from '../stage-host.js';
-import { timerMs } from '../timer-ms.js';
+import { timerMs } from '../attributes.js';
 
 /** `waiting`: there is a scene to load, but the element is not in sight yet. */
 export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';

@@ -4,6 +4,18 @@ import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
 import { FrameClock } from './frame-clock.js';
 import { keyFor, pageStore, readChoice, writeChoice, type ChoiceStore } from './kept-choice.js';
 import { ANSWER_TARGET, isRight, timeFrames, type Trial } from './trials.js';
+import type { RendererOptions } from '../frame-request.js';
+import { Renderer } from '../renderer.js';
+
+/**
+ * A renderer whose `auto` levers have been decided on this device: variants that give a wrong image are ruled out by a known answer, the
+ * others are timed (see {@link chooseVariants}). The constructor decides by what has been chosen on the device before, or else takes
+ * `quads`, `rgba16float` and `parallel`, which work everywhere.
+ */
+export async function createRenderer(device: GPUDevice, options: RendererOptions = {}): Promise<Renderer> {
+  await chooseVariants(device);
+  return new Renderer(device, options);
+}
 
 export interface ChoiceOptions {
   /** Default: the page's `localStorage` where there is one. null: nothing is kept. */
