@@ -1,7 +1,7 @@
 /**
  * What the chart of speed against accuracy compares, a line for each configuration: its name, what it aims at (`tier`), and
- * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail, `sides: true` makes visible sets,
- * `economy` leaves out what no view needs at so many dB) or in resolution scale. A line whose options the renderer does not have yet is left out of the chart and listed as such.
+ * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail, `sides: true` makes visible sets)
+ * or in resolution scale. A line whose options the renderer does not have yet is left out of the chart and listed as such.
  */
 export const configurations = [
   { name: 'default', tier: 'tier' },
@@ -33,9 +33,6 @@ export const configurations = [
   { name: 'detail 1 px', tier: 'lever', options: { detail: 1 }, pack: { detail: true } },
   { name: 'detail 2 px', tier: 'lever', options: { detail: 2 }, pack: { detail: true } },
   { name: 'visible sets', tier: 'lever', options: { visibleSets: true }, pack: { sides: true } },
-  { name: 'economy at 57 dB', tier: 'lever', pack: { economy: 57 } },
-  { name: 'economy at 50 dB', tier: 'lever', pack: { economy: 50 } },
-  { name: 'economy at 44 dB', tier: 'lever', pack: { economy: 44 } },
   { name: 'balanced, visible sets', tier: 'lever', options: { quality: 'balanced' }, pack: { sides: true } },
   ...[0.84, 0.71, 0.59, 0.5, 0.42, 0.35, 0.25].map((resolutionScale) => ({
     ...{ name: `balanced at ${resolutionScale}`, tier: 'lever' },

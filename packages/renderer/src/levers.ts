@@ -1,6 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
-import type { Threads } from './stages/threads.js';
+import type { Threads } from './stages/plan.js';
 
 /**
  * Everything that trades accuracy for speed, one lever each. docs/frontier has what each costs and saves.
@@ -8,13 +8,13 @@ import type { Threads } from './stages/threads.js';
 export interface Levers {
   /**
    * How splats become pixels: `quads` by the GPU's own rasterizer and blending, `tiles` by compute shaders, front to back
-   * in float32 and with an end where nothing behind can be seen. `auto`: see {@link Renderer.create}.
+   * in float32 and with an end where nothing behind can be seen. `auto`: see {@link createRenderer}.
    */
   readonly rasterizer: 'auto' | RasterizerName;
-  /** How stages share their work; the image is the same. `auto`: see {@link Renderer.create}. */
+  /** How stages share their work; the image is the same. `auto`: see {@link createRenderer}. */
   readonly threads: 'auto' | Threads;
   /**
-   * Precision in which quads are blended and images kept. `auto`: see {@link Renderer.create}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
+   * Precision in which quads are blended and images kept. `auto`: see {@link createRenderer}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
    * feature `float32-blendable`.
    */
   readonly accumulation: 'auto' | AccumulationFormat;

@@ -18,7 +18,6 @@ import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { copyCounts, readStatistics, type FrameStatistics } from './statistics.js';
-import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
 import { scaled } from './view.js';
 
@@ -96,16 +95,6 @@ export class Renderer {
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
-  }
-
-  /**
-   * A renderer whose `auto` levers have been decided on this device: variants that give a wrong image are ruled out by a known answer, the
-   * others are timed (see {@link chooseVariants}). The constructor decides by what has been chosen on the device before, or else takes
-   * `quads`, `rgba16float` and `parallel`, which work everywhere.
-   */
-  static async create(device: GPUDevice, options: RendererOptions = {}): Promise<Renderer> {
-    await chooseVariants(device);
-    return new Renderer(device, options);
   }
 
   /** Name of the rasterizer in use. */
