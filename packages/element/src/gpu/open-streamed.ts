@@ -1,13 +1,6 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
-import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
-import { fetchScene } from '@gaussian-splat/formats';
-import {
-  checkManifest,
-  levelSource,
-  MemoryLedger,
-  StreamedGaussians,
-  type PoolOptions,
-} from '@gaussian-splat/renderer';
+import { partUrl } from '@gaussian-splat/core';
+import { levelSource, MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { DetailLevers } from './gpu-scene.js';
@@ -73,8 +66,7 @@ type Open = (
 ) => Promise<StreamedGaussians>;
 
 const openPages: Open = async ({ url, credentials }, device, { loader, signal, onProgress }, pool) => {
-  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress });
-  const manifest = checkManifest(parsed(bytes, url), url);
+  const manifest = await loader.openManifest({ url, credentials }, signal, onProgress);
   return StreamedGaussians.open(device, manifest, {
     ...pool,
     fetchPage: (file, aborted) => loader.fetchFile({ url: partUrl(file, url).href, credentials }, aborted),
@@ -90,17 +82,3 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
   });
   return StreamedGaussians.openSource(device, source, pool);
 };
-
-function parsed(bytes: Uint8Array, where: string): unknown {
-  try {
-    return JSON.parse(new TextDecoder().decode(bytes));
-  } catch (cause) {
-    throw new GaussianSplatError('decode/header', {
-      where,
-      expected: 'JSON that npm run detail wrote',
-      found: (cause as Error).message,
-      remedy: 'check the address, or write the folder again',
-      cause,
-    });
-  }
-}

@@ -1,13 +1,36 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
 import { boundsOf, GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
-import { fetchScene, isSequence, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
+import {
+  fetchScene,
+  HEADER_BYTES,
+  isSequence,
+  openPartAt,
+  readScene,
+  type FetchSceneOptions,
+} from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
+import type { LargePly } from './large-ply.js';
 import { PreviewSchedule } from './preview-schedule.js';
 import { ProgressSum } from './progress-sum.js';
 import type { LoadedScene, LoadedSequence, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
 
 /** Milliseconds between two progress reports: chunks may arrive by the thousand. */
 const PROGRESS_INTERVAL_MS = 50;
+
+/** What a load tells, and whom it asks. */
+export interface LoadListeners {
+  readonly onProgress: ProgressListener;
+  /** Absent: previews are not wanted. */
+  readonly onPreview?: PreviewListener | undefined;
+  /** Called before the thread is kept busy for a while. */
+  readonly onReading?: () => void;
+  /**
+   * Asks for other workers to share the packing with.
+   * @param most so many at most
+   * @param onHelper gets a way to each of them as soon as it is there
+   */
+  readonly askForHelp?: (most: number, onHelper: (port: MessagePort) => void) => void;
+}
 
 /**
  * Loads one scene, or the manifest of several. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's
@@ -16,9 +39,9 @@ const PROGRESS_INTERVAL_MS = 50;
 export async function loadScene(
   request: SceneRequest,
   signal: AbortSignal,
-  onProgress: ProgressListener,
-  onPreview?: PreviewListener,
+  listeners: LoadListeners,
 ): Promise<LoadedScene | LoadedSequence> {
+  const { onProgress, onPreview, onReading, askForHelp } = listeners;
   try {
     const { url, credentials } = request;
     const name = fileName(url);
@@ -28,8 +51,16 @@ export async function loadScene(
       packed: packGaussians(cloud, { sh: request.sh }),
       bounds: boundsOf(cloud),
     });
-    const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
-    const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
+    const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)), onReading);
+    const shared = askForHelp && new SharedReading(request, name, signal, listeners);
+    const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
+      const ply = await shared?.plyIn(bytes, total);
+      await (ply ? ply.onArrival(bytes) : previews?.onArrival(bytes, total));
+    };
+    const bytes = await fetchScene(url, { ...options(), onArrival });
+    onReading?.();
+    const joined = await (await shared?.ply)?.finish(bytes);
+    if (joined) return joined;
     if (isSequence(bytes)) {
       const { sequenceOf } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
       return sequenceOf(bytes, name, url);
@@ -45,6 +76,31 @@ export async function loadScene(
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(request.url));
+  }
+}
+
+/** Bytes of a PLY from which on several workers share its rows. */
+const LARGE_BYTES = 1 << 25;
+
+/** Finds out whether a file that is on its way is a PLY whose rows several workers can share. */
+class SharedReading {
+  readonly #of: readonly [name: string, request: SceneRequest, signal: AbortSignal, listeners: LoadListeners];
+  /** Undefined for any other. */
+  ply: Promise<LargePly | undefined> | undefined;
+
+  constructor(request: SceneRequest, name: string, signal: AbortSignal, listeners: LoadListeners) {
+    this.#of = [name, request, signal, listeners];
+  }
+
+  plyIn(bytes: Uint8Array, total = 0): Promise<LargePly | undefined> | undefined {
+    const isPly = bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79;
+    if (total >= LARGE_BYTES && isPly && bytes.length >= HEADER_BYTES) this.ply ??= this.#open(bytes, total);
+    return this.ply;
+  }
+
+  async #open(bytes: Uint8Array, total: number): Promise<LargePly | undefined> {
+    const { LargePly } = await loadModule('the code that shares the reading of PLY', () => import('./large-ply.js'));
+    return LargePly.open(bytes, total, ...this.#of);
   }
 }
 

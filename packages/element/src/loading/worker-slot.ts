@@ -1,0 +1,117 @@
+import type { PageMessage, PreviewListener, ProgressListener, WorkerRequest } from './protocol.js';
+
+/** How long a script that is late is waited for once more, ms. */
+const GRACE_MS = 500;
+
+/** What a worker is asked for. */
+export interface Job {
+  readonly id: number;
+  readonly request: WorkerRequest;
+  readonly onProgress?: ProgressListener | undefined;
+  readonly onPreview?: PreviewListener | undefined;
+  /** Buffers that go with the request, which can then be sent only once. */
+  readonly transfer?: Transferable[] | undefined;
+  /** Does the work on the page's own thread. */
+  readonly here: () => Promise<unknown>;
+  readonly resolve: (answer: unknown) => void;
+  readonly reject: (reason: unknown) => void;
+  /** How often it has begun again. */
+  moves: number;
+  slot?: WorkerSlot | undefined;
+}
+
+/** A worker, and what it was asked for. */
+export class WorkerSlot {
+  readonly worker: Worker;
+  readonly jobs = new Map<number, Job>();
+  /** Ends the workers that help with a job. */
+  readonly helpers = new Map<number, () => void>();
+  isReady = false;
+  isLate = false;
+  /** Questions in a row without an answer. */
+  missed = 0;
+  /** What it has last said to read: that alone keeps it from answering. */
+  reading: number | undefined;
+  startTimer: ReturnType<typeof setTimeout> | undefined;
+  #idleTimer: ReturnType<typeof setTimeout> | undefined;
+  #life: MessagePort | undefined;
+  #tellReady: (isReady: boolean) => void = () => undefined;
+
+  constructor(worker: Worker) {
+    this.worker = worker;
+  }
+
+  /** Whether it is worth asking for a sign of life. */
+  get isAsked(): boolean {
+    return this.isReady && (this.jobs.size > 0 || this.reading !== undefined);
+  }
+
+  /** The job that it reads, unless that was called off. */
+  get reader(): Job | undefined {
+    return this.reading === undefined ? undefined : this.jobs.get(this.reading);
+  }
+
+  /** Whether its script comes after all. */
+  get soon(): Promise<boolean> {
+    return new Promise((resolve) => {
+      this.#tellReady = resolve;
+      setTimeout(() => resolve(this.isReady), GRACE_MS);
+    });
+  }
+
+  /** What cannot begin again shares its worker with nothing else; nor is one given more that reads what nobody wants. */
+  mayTake(job: Job): boolean {
+    const jobs = [...this.jobs.values()];
+    const isLeft = this.reading !== undefined && !this.reader;
+    return !isLeft && (job.transfer ? jobs.length === 0 : !jobs.some(({ transfer }) => transfer));
+  }
+
+  take(job: Job): void {
+    clearTimeout(this.#idleTimer);
+    job.slot = this;
+    this.jobs.set(job.id, job);
+    if (this.isReady) this.#send(job);
+  }
+
+  /** The script runs. */
+  begin(life: MessagePort | undefined, onDeath: () => void): void {
+    clearTimeout(this.startTimer);
+    this.isReady = true;
+    this.isLate = false;
+    // Whoever ends a worker, or whatever: its ports close. Not every browser says so.
+    this.#life = life;
+    life?.addEventListener('close', onDeath);
+    life?.start();
+    this.#tellReady(true);
+    for (const job of this.jobs.values()) this.#send(job);
+  }
+
+  /** The job is done, or nobody wants it any more. */
+  drop(job: Job): void {
+    job.slot = undefined;
+    this.helpers.get(job.id)?.();
+    this.helpers.delete(job.id);
+    if (this.jobs.delete(job.id) && this.isReady) this.post({ type: 'cancel', id: job.id });
+  }
+
+  rest(milliseconds: number, onIdle: () => void): void {
+    clearTimeout(this.#idleTimer);
+    this.#idleTimer = setTimeout(onIdle, milliseconds);
+  }
+
+  post(message: PageMessage, transfer: Transferable[] = []): void {
+    this.worker.postMessage(message, transfer);
+  }
+
+  end(): void {
+    clearTimeout(this.#idleTimer);
+    clearTimeout(this.startTimer);
+    this.#life?.close();
+    this.worker.terminate();
+    for (const stop of this.helpers.values()) stop();
+  }
+
+  #send({ id, request, transfer }: Job): void {
+    this.post({ ...request, id }, transfer);
+  }
+}
