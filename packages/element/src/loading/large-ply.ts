@@ -86,7 +86,6 @@ export class LargePly {
     if (bytes.length < this.#bytes.length) this.#forget();
     this.#bytes = bytes;
     this.#feed();
-    this.#listeners.onReading?.();
     const isAlone = this.#helpers.length === 0 && performance.now() - this.#began > ALONE_AFTER_MS;
     if (isAlone && this.#next < this.#arrived) await this.#packHere(this.#next++);
     if (this.#listeners.onPreview) this.#previews.showIfDue();
@@ -96,7 +95,6 @@ export class LargePly {
   async finish(bytes: Uint8Array): Promise<LoadedScene | undefined> {
     this.#bytes = bytes;
     if (this.#arrived < this.#answers.length) return undefined;
-    this.#listeners.onReading?.();
     for (;;) {
       await this.#packAll();
       const shares = this.#answers.map((answer) => answer?.packed);
@@ -105,6 +103,7 @@ export class LargePly {
       const { shDegree = 0, antialiased = false, origin = [0, 0, 0] } = first;
       const packed = shares as PackedShare[];
       const droppedCount = this.#count - packed.reduce((sum, { count }) => sum + count, 0);
+      this.#listeners.onReading?.(true);
       const joined = joinShares(packed, { sh: this.#sh }, { shDegree, antialiased, origin, droppedCount });
       if (typeof joined !== 'string') {
         const { positions, opacities } = joined;
@@ -188,6 +187,7 @@ export class LargePly {
   }
 
   async #packHere(share: number): Promise<void> {
+    this.#listeners.onReading?.(true);
     this.#keep(await packRows(this.#request(share)));
   }
 

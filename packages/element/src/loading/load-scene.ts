@@ -22,8 +22,8 @@ export interface LoadListeners {
   readonly onProgress: ProgressListener;
   /** Absent: previews are not wanted. */
   readonly onPreview?: PreviewListener | undefined;
-  /** Called before the thread is kept busy for a while. */
-  readonly onReading?: () => void;
+  /** Called before the thread is kept busy for a while, and while it is; with false when it has more time again. */
+  readonly onReading?: (isReading: boolean) => void;
   /**
    * Asks for other workers to share the packing with.
    * @param most so many at most
@@ -58,7 +58,7 @@ export async function loadScene(
       await (ply ? ply.onArrival(bytes) : previews?.onArrival(bytes, total));
     };
     const bytes = await fetchScene(url, { ...options(), onArrival });
-    onReading?.();
+    onReading?.(true);
     const joined = await (await shared?.ply)?.finish(bytes);
     if (joined) return joined;
     if (isSequence(bytes)) {
@@ -70,6 +70,7 @@ export async function loadScene(
     const level = request.levels ? 'all' : 0;
     const cloud = await readScene(bytes, { name, signal, openPart, level, onPreview: previews?.onPreview });
     signal.throwIfAborted();
+    onReading?.(true);
     if (cloud.levelRuns === undefined) return pack(cloud);
     const { packLevels } = await loadModule('the code that packs levels of detail', () => import('./pack-levels.js'));
     return packLevels(cloud, request.sh);

@@ -84,13 +84,13 @@ export type PageMessage =
   | { readonly type: 'pack'; readonly port: MessagePort };
 
 export type WorkerMessage =
-  /** The script runs. The port closes when the worker ends, for whatever reason. */
-  | { readonly type: 'ready'; readonly life: MessagePort }
+  /** The script runs. */
+  | { readonly type: 'ready' }
   | { readonly type: 'pong' }
   /** From now on it reads for a request, and may not answer for long. */
   | { readonly type: 'reading'; readonly id: number }
-  /** Nothing is done for a request any more. */
-  | { readonly type: 'gone'; readonly id: number }
+  /** It has read for a request, or nothing is done for it any more. */
+  | { readonly type: 'rested'; readonly id: number }
   /** Other workers could share the packing for a request: so many at most. */
   | { readonly type: 'help'; readonly id: number; readonly most: number }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }

@@ -27,11 +27,14 @@ export class SceneLoader {
    * @param locationOf address of the worker's script; null for the one beside the code
    */
   constructor(spawn?: () => Worker, locationOf: () => string | null = () => null) {
-    this.#pool = new WorkerPool(spawn ?? (() => spawnSceneWorker(locationOf())), (reason) =>
-      console.warn(
-        `<gaussian-splat>: this page refuses its worker (${reason}), so scenes are read on the main thread. ` +
-          `Allow it with the Content-Security-Policy directive worker-src, or name its script (${locationOf() ?? 'scene-worker.js beside the code'}) with GaussianSplatElement.workerLocation.`,
-      ),
+    this.#pool = new WorkerPool(
+      spawn ?? (() => spawnSceneWorker(locationOf())),
+      () => this.#code(),
+      (reason) =>
+        console.warn(
+          `<gaussian-splat>: this page refuses its worker (${reason}), so scenes are read on the main thread. ` +
+            `Allow it with the Content-Security-Policy directive worker-src, or name its script (${locationOf() ?? 'scene-worker.js beside the code'}) with GaussianSplatElement.workerLocation.`,
+        ),
     );
   }
 
@@ -118,17 +121,17 @@ export class SceneLoader {
 
   /** Work with the worker's code on the page's own thread: slower for the page, but it works under any policy. */
   #here<T>(work: (code: Here) => Promise<T>): () => Promise<T> {
-    return async () => {
-      let code: Here;
-      try {
-        code = await loadModule('the code that reads scenes', () => import('./scene-worker.js'));
-      } catch (error) {
-        // Where it cannot be had here, either, it was no policy of the page that kept the worker away.
-        this.#pool.retry();
-        throw error;
-      }
-      return work(code);
-    };
+    return async () => work(await this.#code());
+  }
+
+  async #code(): Promise<Here> {
+    try {
+      return await loadModule('the code that reads scenes', () => import('./scene-worker.js'));
+    } catch (error) {
+      // Where it cannot be had here, either, it was no policy of the page that kept the worker away.
+      this.#pool.retry();
+      throw error;
+    }
   }
 }
 

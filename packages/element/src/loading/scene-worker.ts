@@ -67,7 +67,7 @@ function serve(scope: WorkerScope): void {
       onPreview: message.wantsPreviews
         ? (preview) => scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview.packed))
         : undefined,
-      onReading: () => scope.postMessage({ type: 'reading', id }),
+      onReading: (isReading) => scope.postMessage({ type: isReading ? 'reading' : 'rested', id }),
       askForHelp: (most, onHelper) => {
         work.onHelper = onHelper;
         scope.postMessage({ type: 'help', id, most });
@@ -121,7 +121,7 @@ function serve(scope: WorkerScope): void {
       if (!signal.aborted) scope.postMessage({ type: 'error', id, error: named(error, 'scene worker').toData() });
     } finally {
       running.delete(id);
-      scope.postMessage({ type: 'gone', id });
+      scope.postMessage({ type: 'rested', id });
     }
   }
 
@@ -132,13 +132,8 @@ function serve(scope: WorkerScope): void {
     else if (data.type === 'pack') void import('./pack-shares.js').then(({ packShares }) => packShares(data.port));
     else void run(data.id, data);
   });
-  const { port1, port2 } = new MessageChannel();
-  life = port1;
-  scope.postMessage({ type: 'ready', life: port2 }, [port2]);
+  scope.postMessage({ type: 'ready' });
 }
-
-/** Held for as long as the worker lives. */
-export let life: MessagePort | undefined;
 
 const isWorker = typeof document === 'undefined' && 'WorkerGlobalScope' in globalThis;
 if (isWorker) serve(globalThis as unknown as WorkerScope);

@@ -12,14 +12,19 @@ const TICK_MS = 100;
 const BUSY = 2;
 /** And after which what else waits in it begins again elsewhere, and a worker whose load was called off is ended. */
 const SILENT = 5;
-/** And after which its load is given up, too. */
-const DEAD = 1_200;
+/** And after which it counts as dead, whatever it was said to read: browsers do not tell. */
+const DEAD = 600;
 /** A script that takes longer is loaded without the worker, ms. */
 const START_MS = 2_000;
+const RESTART_MS = 15_000;
+/** How long it is waited for once more when all that is needed without it is there, ms. */
+const GRACE_MS = 500;
 /** Workers of a page at most. Scenes of strangers that never end hold one each; what comes after them waits. */
 const MOST_WORKERS = 8;
 /** How often a load may begin again: it may have been next to several that never answer. */
 const MOST_MOVES = 3;
+/** So often counts a death while it was read: once more, and no more. */
+const AFTER_DEATH = 2;
 
 /** Why work is done on the page's thread. */
 export type Refusal = (reason: string) => void;
@@ -30,15 +35,24 @@ export type Refusal = (reason: string) => void;
  */
 export class WorkerPool {
   readonly #spawn: () => Worker;
+  readonly #prepare: () => Promise<unknown>;
   readonly #onRefused: Refusal;
   readonly #slots = new Set<WorkerSlot>();
   readonly #queue: Job[] = [];
   #isRefused = false;
+  #hasWarned = false;
+  /** The script has come once: where it does not come at once now, the machine is busy. */
+  #hasStarted = false;
   #nextId = 0;
   #clock: ReturnType<typeof setInterval> | undefined;
 
-  constructor(spawn: () => Worker, onRefused: Refusal) {
+  /**
+   * @param prepare fetches what work on the page's own thread needs
+   * @param onRefused called once where work is done there
+   */
+  constructor(spawn: () => Worker, prepare: () => Promise<unknown>, onRefused: Refusal) {
     this.#spawn = spawn;
+    this.#prepare = prepare;
     this.#onRefused = onRefused;
   }
 
@@ -80,7 +94,7 @@ export class WorkerPool {
     if (this.#isRefused) return job.resolve(job.here());
     const slots = [...this.#slots];
     const late = slots.find(({ isLate }) => isLate);
-    if (late) return this.#doWithout(late, job);
+    if (late) return void this.#doWithout(late, job);
     const free = slots.find((slot) => slot.missed < BUSY && slot.mayTake(job));
     const slot = free ?? (slots.length < MOST_WORKERS ? this.#start() : undefined);
     // A worker that cannot even be made has said so.
@@ -130,20 +144,21 @@ export class WorkerPool {
       if (slot.isReady) this.#crash(slot, event.message);
       else this.#fail(slot, event.message || 'its script could not be loaded');
     });
-    slot.startTimer = setTimeout(() => this.#late(slot), START_MS);
+    slot.startTimer = setTimeout(() => this.#late(slot), this.#hasStarted ? RESTART_MS : START_MS);
     return slot;
   }
 
   #receive(slot: WorkerSlot, message: WorkerMessage): void {
     slot.missed = 0;
     if (message.type === 'ready') {
-      slot.begin(message.life, () => this.#crash(slot));
+      slot.begin();
+      this.#hasStarted = true;
       this.#watch();
       return this.#rest(slot, IDLE_MS);
     }
     if (message.type === 'pong') return;
     if (message.type === 'reading') return void (slot.reading = message.id);
-    if (message.type === 'gone') return void (slot.reading = slot.reading === message.id ? undefined : slot.reading);
+    if (message.type === 'rested') return void (slot.reading = slot.reading === message.id ? undefined : slot.reading);
     const job = slot.jobs.get(message.id);
     if (message.type === 'progress') job?.onProgress?.(message.loaded, message.total);
     else if (message.type === 'preview') job?.onPreview?.(message.scene);
@@ -168,25 +183,37 @@ export class WorkerPool {
 
   #refuse(reason: string): void {
     this.#isRefused = true;
-    this.#onRefused(reason);
+    this.#warn(reason);
     this.#placeQueued();
   }
 
   /** The worker's script does not come. It may yet. */
   #late(slot: WorkerSlot): void {
     slot.isLate = true;
-    this.#onRefused(`its script has not come within ${START_MS / 1000} s`);
     for (const job of slot.jobs.values()) {
       slot.jobs.delete(job.id);
-      this.#doWithout(slot, job);
+      void this.#doWithout(slot, job);
     }
     this.#placeQueued();
   }
 
-  #doWithout(slot: WorkerSlot, job: Job): void {
+  /** The code may come for both: then the worker is a little later. */
+  async #doWithout(slot: WorkerSlot, job: Job): Promise<void> {
     job.slot = undefined;
-    // The code may have come for both.
-    void slot.soon.then((isReady) => (isReady ? this.#place(job) : job.resolve(job.here())));
+    try {
+      await this.#prepare();
+      await new Promise((resolve) => setTimeout(resolve, GRACE_MS));
+      if (slot.isReady) return this.#place(job);
+      this.#warn('its script does not come');
+      job.resolve(job.here());
+    } catch (error) {
+      job.reject(error);
+    }
+  }
+
+  #warn(reason: string): void {
+    if (!this.#hasWarned) this.#onRefused(reason);
+    this.#hasWarned = true;
   }
 
   readonly #tick = (): void => {
@@ -204,14 +231,17 @@ export class WorkerPool {
 
   /** What waits in a worker that does not answer begins again elsewhere. Without a load of its own it reads what nobody wants, or is dead. */
   #relieve(slot: WorkerSlot): void {
-    const reader = slot.reader;
-    if (!reader || slot.missed >= DEAD) this.#end(slot);
-    if (slot.missed >= DEAD) reader?.reject(stopped('a worker that gave no sign of life for two minutes'));
-    for (const job of [...slot.jobs.values()]) if (job !== reader) this.#move(slot, job, 1);
+    const isDead = slot.missed >= DEAD;
+    const reader = isDead ? undefined : slot.reader;
+    const jobs = [...slot.jobs.values()].filter((job) => job !== reader);
+    const guilty = slot.reader;
+    if (!reader) this.#end(slot);
+    for (const job of jobs) this.#move(slot, job, job === guilty ? AFTER_DEATH : 1);
     this.#placeQueued();
   }
 
-  #move(slot: WorkerSlot, job: Job, moves: number, found = 'a worker that stopped'): void {
+  /** A load begins again, alone in a worker: it may be what has kept the other one busy. */
+  #move(slot: WorkerSlot, job: Job, moves: number, found = 'a worker that gave no sign of life'): void {
     slot.drop(job);
     job.moves += moves;
     // What was given away cannot be given again.
@@ -219,15 +249,13 @@ export class WorkerPool {
     this.#place(job);
   }
 
-  /** A worker that dies after it had started was most likely denied memory. Who is not to blame for it begins again, and once more who may be. */
-  #crash(slot: WorkerSlot, message?: string): void {
+  /** A worker that dies after it had started was most likely denied memory: by what it read, or by its only load. The others begin again. */
+  #crash(slot: WorkerSlot, message: string): void {
     const jobs = [...slot.jobs.values()];
     const guilty = slot.reader ?? (jobs.length === 1 ? jobs[0] : undefined);
     this.#end(slot);
-    for (const job of jobs) {
-      const blame = message === undefined ? 2 : MOST_MOVES + 1;
-      this.#move(slot, job, job === guilty ? blame : 1, message || undefined);
-    }
+    for (const job of jobs)
+      this.#move(slot, job, job === guilty ? MOST_MOVES + 1 : 1, message || 'a worker that stopped');
     this.#placeQueued();
   }
 

@@ -1,8 +1,5 @@
 import type { PageMessage, PreviewListener, ProgressListener, WorkerRequest } from './protocol.js';
 
-/** How long a script that is late is waited for once more, ms. */
-const GRACE_MS = 500;
-
 /** What a worker is asked for. */
 export interface Job {
   readonly id: number;
@@ -34,8 +31,6 @@ export class WorkerSlot {
   reading: number | undefined;
   startTimer: ReturnType<typeof setTimeout> | undefined;
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
-  #life: MessagePort | undefined;
-  #tellReady: (isReady: boolean) => void = () => undefined;
 
   constructor(worker: Worker) {
     this.worker = worker;
@@ -51,19 +46,11 @@ export class WorkerSlot {
     return this.reading === undefined ? undefined : this.jobs.get(this.reading);
   }
 
-  /** Whether its script comes after all. */
-  get soon(): Promise<boolean> {
-    return new Promise((resolve) => {
-      this.#tellReady = resolve;
-      setTimeout(() => resolve(this.isReady), GRACE_MS);
-    });
-  }
-
-  /** What cannot begin again shares its worker with nothing else; nor is one given more that reads what nobody wants. */
+  /** What cannot begin again, or has once, shares its worker with nothing else; nor is one given more that reads what nobody wants. */
   mayTake(job: Job): boolean {
     const jobs = [...this.jobs.values()];
     const isLeft = this.reading !== undefined && !this.reader;
-    return !isLeft && (job.transfer ? jobs.length === 0 : !jobs.some(({ transfer }) => transfer));
+    return !isLeft && (jobs.length === 0 || ![job, ...jobs].some(({ transfer, moves }) => transfer || moves > 0));
   }
 
   take(job: Job): void {
@@ -74,15 +61,10 @@ export class WorkerSlot {
   }
 
   /** The script runs. */
-  begin(life: MessagePort | undefined, onDeath: () => void): void {
+  begin(): void {
     clearTimeout(this.startTimer);
     this.isReady = true;
     this.isLate = false;
-    // Whoever ends a worker, or whatever: its ports close. Not every browser says so.
-    this.#life = life;
-    life?.addEventListener('close', onDeath);
-    life?.start();
-    this.#tellReady(true);
     for (const job of this.jobs.values()) this.#send(job);
   }
 
@@ -106,7 +88,6 @@ export class WorkerSlot {
   end(): void {
     clearTimeout(this.#idleTimer);
     clearTimeout(this.startTimer);
-    this.#life?.close();
     this.worker.terminate();
     for (const stop of this.helpers.values()) stop();
   }

@@ -55,6 +55,11 @@ const ANSWERS = {
     context.status = 204;
   },
 
+  /** Never answered. */
+  never(context) {
+    context.respond = false;
+  },
+
   html(context) {
     context.type = 'text/html';
     context.body = '<!doctype html><title>Log in</title><p>Please log in.</p>';
