@@ -1,6 +1,16 @@
 /** Loads that never end, and workers that die: nobody else waits for them. */
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, claimFault, COMPASS, delay, FIXTURES, show, showLoaded, until } from './support/harness.js';
+import {
+  assert,
+  assertEqual,
+  claimFault,
+  COMPASS,
+  delay,
+  FIXTURES,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
 
 type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
 const original = GaussianSplatElement.sceneLoader;
@@ -39,7 +49,7 @@ const timeOf = async (work: () => Promise<unknown>): Promise<number> => {
   const start = performance.now();
   await work();
   const time = performance.now() - start;
-  console.info(`${time.toFixed(0)} ms`);
+  console.log(`${time.toFixed(0)} ms`);
   return time;
 };
 
