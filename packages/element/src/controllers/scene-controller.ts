@@ -214,6 +214,16 @@ export class SceneController implements ReactiveController {
     void this.#refine();
   }
 
+  /** The browser has no device for now: the scene is loaded again once there is one, unless something else is asked for. */
+  async #comeBack(request: SceneRequest): Promise<void> {
+    const { signal } = this.#running;
+    const { deviceBack } = await import('../gpu/come-back.js');
+    const lease = await deviceBack(this.#options.device(), signal);
+    if (lease === undefined) return;
+    this.#error = null;
+    await this.#load(request).finally(() => lease.release());
+  }
+
   #tellRestored(): void {
     if (!this.#isContextLost) return;
     this.#isContextLost = false;
@@ -237,7 +247,12 @@ export class SceneController implements ReactiveController {
         if (error instanceof DeviceLostError) loss = error.info;
         this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
-        if (++failures >= MAX_FAILURES) return this.fail(unrecoverable(error, loss));
+        if (++failures >= MAX_FAILURES) {
+          this.fail(unrecoverable(error, loss));
+          // A scene that has cost one device after the other has no more of them.
+          if (!isNew && !(error instanceof DeviceLostError)) void this.#comeBack(request);
+          return;
+        }
         await delay(RETRY_DELAY_MS);
         if (signal.aborted) return;
       }

@@ -1,6 +1,9 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { requestGpuDevice } from './request-device.js';
 
+/** How long a device is waited for, ms. */
+const ANSWER_MS = 20_000;
+
 /** A share in the page's GPU device. */
 export interface DeviceLease {
   readonly device: GPUDevice;
@@ -111,7 +114,25 @@ export class SharedDevice {
   }
 
   async #start(): Promise<DeviceSession> {
-    return new DeviceSession(await this.#request(), this.#keepDevice);
+    return new DeviceSession(await this.#answer(), this.#keepDevice);
+  }
+
+  /** A browser whose GPU process hangs never answers. */
+  async #answer(): Promise<GPUDevice> {
+    let isLate = false;
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const asked = Promise.resolve(this.#request());
+    const silence = new Promise<never>((_, reject) => {
+      timer = setTimeout(() => {
+        isLate = true;
+        reject(new Error(`no answer within ${ANSWER_MS / 1000} s`));
+      }, ANSWER_MS);
+    });
+    asked.then(
+      (device) => isLate && !this.#keepDevice && device.destroy(),
+      () => undefined,
+    );
+    return Promise.race([asked, silence]).finally(() => clearTimeout(timer));
   }
 
   #forget(opening: Promise<DeviceSession>): void {

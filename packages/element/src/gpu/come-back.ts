@@ -1,0 +1,44 @@
+/** Loaded only where the browser has no other device in place of one that was lost. */
+import { timerMs } from '../timer-ms.js';
+import { delay } from './device-failures.js';
+import type { DeviceLease, SharedDevice } from './shared-device.js';
+
+/** Pause before the first question, ms; it doubles each time. */
+const FIRST_MS = 5_000;
+const LONGEST_MS = 300_000;
+/** A page that comes into sight asks at once, but no sooner than this after the last question, ms. */
+const LEAST_MS = 2_000;
+
+/**
+ * Asks for a device ever more rarely, and whenever the page comes into sight: browsers that refuse a page the GPU after crashes do so for some minutes.
+ * @returns a share in it; undefined once the wait is aborted
+ */
+export async function deviceBack(device: SharedDevice, signal: AbortSignal): Promise<DeviceLease | undefined> {
+  for (let pause = FIRST_MS; ; pause = Math.min(LONGEST_MS, 2 * pause)) {
+    await delay(LEAST_MS);
+    await untilShown(pause - LEAST_MS, signal);
+    if (signal.aborted) return undefined;
+    const lease = await device.acquire().catch(() => undefined);
+    if (lease && !signal.aborted) return lease;
+    lease?.release();
+  }
+}
+
+/** Fulfils after a while, when the page comes into sight, or when the wait is aborted. */
+function untilShown(milliseconds: number, signal: AbortSignal): Promise<void> {
+  return new Promise((resolve) => {
+    const end = (): void => {
+      clearTimeout(timer);
+      document.removeEventListener('visibilitychange', check);
+      signal.removeEventListener('abort', end);
+      resolve();
+    };
+    const check = (): void => {
+      if (document.visibilityState === 'visible') end();
+    };
+    const timer = setTimeout(end, timerMs(milliseconds));
+    document.addEventListener('visibilitychange', check);
+    signal.addEventListener('abort', end);
+    if (signal.aborted) end();
+  });
+}
