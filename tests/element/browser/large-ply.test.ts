@@ -1,6 +1,7 @@
 /** A large PLY, whose rows several workers read and pack while they arrive. */
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { PackedGaussians } from '@gaussian-splat/renderer';
+import type * as sceneWorker from '../../../packages/element/src/loading/scene-worker.js';
 import { assert, assertEqual, nextEvent, show, showLoaded } from './support/harness.js';
 
 const SPLATS = 200_000;

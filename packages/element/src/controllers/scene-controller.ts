@@ -1,7 +1,9 @@
+import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
-import { delay, DeviceLostError, isDeviceFailure, pageVisible, unrecoverable } from '../gpu/device-failures.js';
+import type * as comeBack from '../gpu/come-back.js';
+import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/device-failures.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { SharedDevice } from '../gpu/shared-device.js';
@@ -44,6 +46,16 @@ export interface SceneOptions {
   readonly onEmptied: () => void;
   readonly onError: (error: ElementError) => void;
   readonly onContext: (event: 'contextlost' | 'contextrestored') => void;
+}
+
+type DeviceBack = (typeof comeBack)['deviceBack'];
+
+/** Why no device is asked for any more, at first. */
+interface GivenUp {
+  readonly signal: AbortSignal;
+  readonly error: unknown;
+  readonly loss: GPUDeviceLostInfo | undefined;
+  readonly mayReturn: boolean;
 }
 
 /** So many failures in a row to bring a lost device back are final. */
@@ -214,11 +226,23 @@ export class SceneController implements ReactiveController {
     void this.#refine();
   }
 
-  /** The browser has no device for now: the scene is loaded again once there is one, unless something else is asked for. */
-  async #comeBack(request: SceneRequest): Promise<void> {
-    const { signal } = this.#running;
-    const { deviceBack } = await import('../gpu/come-back.js');
-    const lease = await deviceBack(this.#options.device(), signal);
+  /** No device comes, or none stays. The scene is loaded again once there is one, if it may be and nothing else is asked for. */
+  async #giveUp(request: SceneRequest, { signal: given, error, loss, mayReturn }: GivenUp): Promise<void> {
+    try {
+      const { deviceBack, unrecoverable } = await loadModule(
+        'the code for lost devices',
+        () => import('../gpu/come-back.js'),
+      );
+      if (given.aborted) return;
+      this.fail(unrecoverable(error, loss));
+      if (mayReturn) void this.#comeBack(request, deviceBack);
+    } catch (missing) {
+      if (!given.aborted) this.fail(missing);
+    }
+  }
+
+  async #comeBack(request: SceneRequest, deviceBack: DeviceBack): Promise<void> {
+    const lease = await deviceBack(this.#options.device(), this.#running.signal);
     if (lease === undefined) return;
     this.#error = null;
     await this.#load(request).finally(() => lease.release());
@@ -248,10 +272,9 @@ export class SceneController implements ReactiveController {
         this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
         if (++failures >= MAX_FAILURES) {
-          this.fail(unrecoverable(error, loss));
-          // A scene that has cost one device after the other has no more of them.
-          if (!isNew && !(error instanceof DeviceLostError)) void this.#comeBack(request);
-          return;
+          // A scene that has cost one device after the other gets no more of them.
+          const mayReturn = !isNew && !(error instanceof DeviceLostError);
+          return this.#giveUp(request, { signal, error, loss, mayReturn });
         }
         await delay(RETRY_DELAY_MS);
         if (signal.aborted) return;

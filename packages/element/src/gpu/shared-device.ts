@@ -1,5 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { requestGpuDevice } from './request-device.js';
+import { requestGpuDevice, why } from './request-device.js';
 
 /** How long a device is waited for, ms. */
 const ANSWER_MS = 20_000;
@@ -96,7 +96,8 @@ export class SharedDevice {
     try {
       session = await opening;
     } catch (error) {
-      throw error instanceof GaussianSplatError ? error : noDevice(error);
+      if (error instanceof GaussianSplatError) throw error;
+      throw await why(({ noDevice }) => noDevice(error));
     }
     // Its last user may have closed it while we waited.
     if (session.isClosed) return this.acquire();
@@ -138,14 +139,4 @@ export class SharedDevice {
   #forget(opening: Promise<DeviceSession>): void {
     if (this.#session === opening) this.#session = null;
   }
-}
-
-function noDevice(cause: unknown): GaussianSplatError {
-  return new GaussianSplatError('unsupported/no-adapter', {
-    where: 'the graphics adapter',
-    expected: 'a WebGPU device',
-    found: cause instanceof Error ? cause.message : String(cause),
-    remedy: 'reload the page, or update the graphics driver',
-    cause,
-  });
 }

@@ -1,22 +1,19 @@
 import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
-import type { DetailManifest, PackedGaussians, PackedLevels } from '@gaussian-splat/renderer';
-import { buffersOf } from './buffers-of.js';
 import type {
-  BoxRequest,
   FileRequest,
-  LoadedBoxes,
   LoadedScene,
   LoadedSequence,
   PreviewListener,
   ProgressListener,
   SceneRequest,
+  WorkerRequest,
 } from './protocol.js';
 import type * as workerModule from './scene-worker.js';
 import { spawnSceneWorker } from './spawn-worker.js';
 import { WorkerPool } from './worker-pool.js';
 
 /** The worker's code. */
-type Here = typeof workerModule;
+export type Here = typeof workerModule;
 
 /** Loads scenes in workers: one for the whole page, started on the first load and ended when idle, and more only where that one does not answer. */
 export class SceneLoader {
@@ -62,66 +59,30 @@ export class SceneLoader {
     onProgress: ProgressListener,
     onPreview?: PreviewListener,
   ): Promise<LoadedScene | LoadedSequence> {
-    return this.#pool.run(
+    return this.ask(
       { type: 'load', request, wantsPreviews: onPreview !== undefined },
       signal,
-      this.#here(({ loadScene }) => loadScene(request, signal, { onProgress, onPreview })),
+      ({ loadScene }) => loadScene(request, signal, { onProgress, onPreview }),
       { onProgress, onPreview },
     );
   }
 
   /** The bytes of one file. Rejects with GaussianSplatError `network/*`, `out-of-memory/allocation`, or with the signal's reason as soon as that is aborted. */
   fetchFile(request: FileRequest, signal: AbortSignal): Promise<ArrayBuffer> {
-    return this.#pool.run(
-      { type: 'file', request },
-      signal,
-      this.#here(({ fetchFile }) => fetchFile(request, signal)),
-    );
-  }
-
-  /** The checked manifest of a streamed scene. Rejects as {@link load} does. */
-  openManifest(request: FileRequest, signal: AbortSignal, onProgress: ProgressListener): Promise<DetailManifest> {
-    return this.#pool.run(
-      { type: 'manifest', request },
-      signal,
-      this.#here(({ openManifest }) => openManifest(request, signal, onProgress)),
-      { onProgress },
-    );
-  }
-
-  /** The coarsest levels of a streamed SOG scene. Rejects as {@link load} does. */
-  openBoxes(request: SceneRequest, signal: AbortSignal, onProgress: ProgressListener): Promise<LoadedBoxes> {
-    return this.#pool.run(
-      { type: 'boxes', request },
-      signal,
-      this.#here(({ openBoxes }) => openBoxes(request, signal, onProgress)),
-      { onProgress },
-    );
-  }
-
-  /** The words of a level of a box of it. Rejects as {@link load} does. */
-  readBox(request: BoxRequest, signal: AbortSignal): Promise<ArrayBuffer> {
-    return this.#pool.run(
-      { type: 'box', request },
-      signal,
-      this.#here(({ readBox }) => readBox(request, signal)),
-    );
+    return this.ask({ type: 'file', request }, signal, ({ fetchFile }) => fetchFile(request, signal));
   }
 
   /**
-   * Builds the levels of detail of a packed scene, whose arrays are the worker's afterwards; undefined for one that is too small to have any, and where the page
-   * refuses workers: its own thread would stand still for seconds. Rejects with GaussianSplatError `out-of-memory/allocation` or the signal's reason.
+   * Has a worker do what it knows: see `WorkerRequest`. Rejects as {@link load} does.
+   * @param here does it on the page's own thread, where workers are refused
    */
-  buildLevels(packed: PackedGaussians, signal: AbortSignal): Promise<PackedLevels | undefined> {
-    const here = async (): Promise<undefined> => undefined;
-    return this.#pool.run<PackedLevels | undefined>({ type: 'levels', packed }, signal, here, {
-      transfer: buffersOf(packed),
-    });
-  }
-
-  /** Work with the worker's code on the page's own thread: slower for the page, but it works under any policy. */
-  #here<T>(work: (code: Here) => Promise<T>): () => Promise<T> {
-    return async () => work(await this.#code());
+  ask<T>(
+    request: WorkerRequest,
+    signal: AbortSignal,
+    here: (code: Here) => Promise<T>,
+    options?: Parameters<WorkerPool['run']>[3],
+  ): Promise<T> {
+    return this.#pool.run(request, signal, async () => here(await this.#code()), options);
   }
 
   async #code(): Promise<Here> {
