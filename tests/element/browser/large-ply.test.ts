@@ -38,9 +38,7 @@ describe('a large PLY', () => {
   let expected: PackedGaussians;
   before(async () => {
     // By one thread, which has nobody to ask.
-    const { loadScene } = (await import(
-      SCRIPT
-    )) as typeof import('../../../packages/element/src/loading/scene-worker.js');
+    const { loadScene } = (await import(SCRIPT)) as typeof sceneWorker;
     const whole = await loadScene(request(FILE), signal, { onProgress: ignore });
     assert('packed' in whole, 'a scene');
     expected = whole.packed;

@@ -54,8 +54,9 @@ export async function loadScene(
     const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)), onReading);
     const shared = askForHelp && new SharedReading(request, name, signal, listeners);
     const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
-      const ply = await shared?.plyIn(bytes, total);
-      await (ply ? ply.onArrival(bytes) : previews?.onArrival(bytes, total));
+      // Of a PLY that is large there are previews of its own.
+      if (shared?.mayBeShared(bytes, total)) await (await shared.plyIn(bytes, total))?.onArrival(bytes);
+      else await previews?.onArrival(bytes, total);
     };
     const bytes = await fetchScene(url, { ...options(), onArrival });
     onReading?.(true);
@@ -86,6 +87,7 @@ const LARGE_BYTES = 1 << 25;
 /** Finds out whether a file that is on its way is a PLY whose rows several workers can share. */
 class SharedReading {
   readonly #of: readonly [name: string, request: SceneRequest, signal: AbortSignal, listeners: LoadListeners];
+  #isRefused = false;
   /** Undefined for any other. */
   ply: Promise<LargePly | undefined> | undefined;
 
@@ -93,10 +95,16 @@ class SharedReading {
     this.#of = [name, request, signal, listeners];
   }
 
-  plyIn(bytes: Uint8Array, total = 0): Promise<LargePly | undefined> | undefined {
-    const isPly = bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79;
-    if (total >= LARGE_BYTES && isPly && bytes.length >= HEADER_BYTES) this.ply ??= this.#open(bytes, total);
-    return this.ply;
+  /** True of large PLYs, but for those whose rows must be read in order. */
+  mayBeShared(bytes: Uint8Array, total = 0): boolean {
+    return total >= LARGE_BYTES && bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79 && !this.#isRefused;
+  }
+
+  async plyIn(bytes: Uint8Array, total = 0): Promise<LargePly | undefined> {
+    if (bytes.length >= HEADER_BYTES) this.ply ??= this.#open(bytes, total);
+    const ply = await this.ply;
+    this.#isRefused = this.ply !== undefined && ply === undefined;
+    return ply;
   }
 
   async #open(bytes: Uint8Array, total: number): Promise<LargePly | undefined> {

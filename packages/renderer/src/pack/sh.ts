@@ -61,12 +61,18 @@ function meanNoise(noiseOf: NoiseOf, kept: Uint32Array, first: number, end: numb
   return noise / Math.max(1, samples);
 }
 
+/** Eighths of an octave that magnitudes have, nearly always. */
+const POWERS = Float64Array.from({ length: 512 }, (_, k) => 2 ** ((k - 256) / SCALE_STEPS));
+
+/** 2 to so many eighths. */
+const powerOf = (eighths: number): number => POWERS[eighths + 256] ?? 2 ** (eighths / SCALE_STEPS);
+
 function shNoise(sh: Float32Array, first: number, shDegree: ShDegree): number {
   let noise = 0;
   let at = first + 3;
   for (let band = 1; band <= shDegree; band++) {
     const size = 3 * (2 * band + 1);
-    const scale = 2 ** (Math.ceil(SCALE_STEPS * Math.log2(largestOf(sh, at, size))) / SCALE_STEPS);
+    const scale = powerOf(Math.ceil(SCALE_STEPS * Math.log2(largestOf(sh, at, size))));
     noise += ((scale / 127) ** 2 / 12) * ((2 * band + 1) / (4 * Math.PI));
     at += size;
   }

@@ -10,10 +10,17 @@ const { CULL_GROUP } = constants;
 
 /** Splats of a share at most, a power of two. */
 export const SHARE_SPLATS = 1 << 14;
+/** Where neighbours lie in a share need not be known exactly. */
+const SHARE_SAMPLES = 256;
 
-/** Some splats of a scene, packed in the order that they came in: all but what takes the whole scene to know. Its buffers are transferable. */
+/**
+ * Some splats of a scene, packed: all but what takes the whole scene to know. Neighbours in space are neighbours here, too, so that the whole is put together with
+ * few jumps through memory. Its buffers are transferable.
+ */
 export interface PackedShare {
   readonly count: number;
+  /** Where each of them stood in the order that they came in. */
+  readonly rows: Uint16Array<ArrayBuffer>;
   readonly shPrecision: ShPrecision;
   readonly geometry: Uint32Array<ArrayBuffer>;
   readonly sh: Uint32Array<ArrayBuffer>;
@@ -43,19 +50,21 @@ export interface JoinedShares {
 /** Packs at most {@link SHARE_SPLATS} splats, all of which can be drawn. */
 export function packShare(cloud: GaussianCloud, shPrecision: ShPrecision): PackedShare {
   const { count } = cloud;
-  const all = identity(count);
+  const order = mortonOrder(cloud.positions, identity(count), SHARE_SAMPLES);
   const noiseOf = noiseIn(cloud);
   const noises = new Float64Array(count);
   const reaches = new Float32Array(count);
-  for (let i = 0; i < count; i++) {
-    noises[i] = noiseOf(i);
-    reaches[i] = reachOf(cloud, i);
+  const opacities = new Float32Array(count);
+  for (let k = 0; k < count; k++) {
+    noises[k] = noiseOf(order[k]);
+    reaches[k] = reachOf(cloud, order[k]);
+    opacities[k] = cloud.opacities[order[k]];
   }
   return {
-    ...{ count, shPrecision, noises, reaches },
-    geometry: packGeometry(cloud, all) as Uint32Array<ArrayBuffer>,
-    sh: packSh(cloud, all, shPrecision) as Uint32Array<ArrayBuffer>,
-    opacities: cloud.opacities.slice(),
+    ...{ count, shPrecision, opacities, noises, reaches },
+    rows: Uint16Array.from(order),
+    geometry: packGeometry(cloud, order) as Uint32Array<ArrayBuffer>,
+    sh: packSh(cloud, order, shPrecision) as Uint32Array<ArrayBuffer>,
   };
 }
 
@@ -86,7 +95,13 @@ export function joinShares(
       origin: cloud.origin,
     },
     droppedCount: facts.droppedCount + count - kept.length,
-    ...gather(shares, kept, places, cloud.positions, shWords(facts.shDegree, shPrecision)),
+    ...gather(
+      shares,
+      kept,
+      places,
+      cloud.positions === positions ? undefined : cloud.positions,
+      shWords(facts.shDegree, shPrecision),
+    ),
   };
   return { packed, positions, opacities };
 }
@@ -108,16 +123,18 @@ function columnsOf(
   const positions = new Float32Array(3 * count);
   const opacities = new Float32Array(count);
   const places = new Uint32Array(count);
-  let at = 0;
+  let first = 0;
   shares.forEach((share, number) => {
     const floats = new Float32Array(share.geometry.buffer);
-    opacities.set(share.opacities, at);
-    for (let i = 0; i < share.count; i++, at++) {
-      positions[3 * at] = floats[GEOMETRY_WORDS * i];
-      positions[3 * at + 1] = floats[GEOMETRY_WORDS * i + 1];
-      positions[3 * at + 2] = floats[GEOMETRY_WORDS * i + 2];
-      places[at] = (number << SHIFT) | i;
+    for (let i = 0; i < share.count; i++) {
+      const splat = first + share.rows[i];
+      positions[3 * splat] = floats[GEOMETRY_WORDS * i];
+      positions[3 * splat + 1] = floats[GEOMETRY_WORDS * i + 1];
+      positions[3 * splat + 2] = floats[GEOMETRY_WORDS * i + 2];
+      opacities[splat] = share.opacities[i];
+      places[splat] = (number << SHIFT) | i;
     }
+    first += share.count;
   });
   return { positions, opacities, places };
 }
@@ -134,41 +151,55 @@ function usableOf(positions: Float32Array, count: number): Uint32Array {
   return usable.subarray(0, kept);
 }
 
-/** The words of the splats in their order, and the bounds of each chunk of them. */
+/** The words of the splats in their order, and the bounds of each chunk of them. Its time is waiting for memory: a splat is read once, where it lies. */
 function gather(
   shares: readonly PackedShare[],
   kept: Uint32Array,
   places: Uint32Array,
-  positions: Float32Array,
+  moved: Float32Array | undefined,
   shStride: number,
 ): Pick<PackedGaussians, 'geometry' | 'sh' | 'chunks'> {
   const geometry = new Uint32Array(GEOMETRY_WORDS * kept.length);
   const floats = new Float32Array(geometry.buffer);
   const sh = new Uint32Array(shStride * kept.length);
   const chunks = new Float32Array(CHUNK_NUMBERS * Math.ceil(kept.length / CULL_GROUP));
-  const low = new Float64Array(3);
-  const high = new Float64Array(3);
-  for (let first = 0; first < kept.length; first += CULL_GROUP) {
-    low.fill(Infinity);
-    high.fill(-Infinity);
-    let reach = 0;
-    for (let k = first; k < Math.min(first + CULL_GROUP, kept.length); k++) {
-      const splat = kept[k];
-      const share = shares[places[splat] >>> SHIFT];
-      const i = places[splat] & MASK;
-      for (let axis = 0; axis < 3; axis++) {
-        const x = positions[3 * splat + axis];
-        floats[GEOMETRY_WORDS * k + axis] = x;
-        if (x < low[axis]) low[axis] = x;
-        if (x > high[axis]) high[axis] = x;
-      }
-      copy(share.geometry, GEOMETRY_WORDS * i + 3, geometry, GEOMETRY_WORDS * k + 3, GEOMETRY_WORDS - 3);
-      copy(share.sh, shStride * i, sh, shStride * k, shStride);
-      if (share.reaches[i] > reach) reach = share.reaches[i];
-    }
-    chunks.set([...low, reach, ...high, 0], (CHUNK_NUMBERS * first) / CULL_GROUP);
+  const geometries = shares.map((share) => share.geometry);
+  const harmonics = shares.map((share) => share.sh);
+  const reaches = shares.map((share) => share.reaches);
+  for (let k = 0; k < kept.length; k++) {
+    const place = places[kept[k]];
+    const share = place >>> SHIFT;
+    const i = place & MASK;
+    copy(geometries[share], GEOMETRY_WORDS * i, geometry, GEOMETRY_WORDS * k, GEOMETRY_WORDS);
+    copy(harmonics[share], shStride * i, sh, shStride * k, shStride);
+    if (moved) for (let axis = 0; axis < 3; axis++) floats[GEOMETRY_WORDS * k + axis] = moved[3 * kept[k] + axis];
+    grow(
+      chunks,
+      CHUNK_NUMBERS * Math.floor(k / CULL_GROUP),
+      floats,
+      GEOMETRY_WORDS * k,
+      reaches[share][i],
+      k % CULL_GROUP === 0,
+    );
   }
   return { geometry, sh, chunks };
+}
+
+/** Takes another splat into a chunk: see `boundChunks`. */
+function grow(
+  chunks: Float32Array,
+  at: number,
+  floats: Float32Array,
+  from: number,
+  reach: number,
+  isFirst: boolean,
+): void {
+  for (let axis = 0; axis < 3; axis++) {
+    const x = floats[from + axis];
+    if (isFirst || x < chunks[at + axis]) chunks[at + axis] = x;
+    if (isFirst || x > chunks[at + 4 + axis]) chunks[at + 4 + axis] = x;
+  }
+  if (reach > chunks[at + 3]) chunks[at + 3] = reach;
 }
 
 function copy(from: Uint32Array, start: number, to: Uint32Array, at: number, count: number): void {
