@@ -1,6 +1,6 @@
 /** Loaded only where no other device comes in place of one that was lost. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { timerMs } from '../timer-ms.js';
+import { timerMs } from '../attributes.js';
 import { delay, isDeviceFailure } from './device-failures.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 

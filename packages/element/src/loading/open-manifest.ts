@@ -37,7 +37,7 @@ function parsed(bytes: Uint8Array, where: string): unknown {
 const wrong = (where: string, found: string, cause?: unknown): GaussianSplatError =>
   new GaussianSplatError('decode/header', {
     where,
-    expected: `JSON that npm run detail wrote, of at most ${MAX_BYTES} bytes`,
+    expected: `JSON that gaussian-splat detail wrote, of at most ${MAX_BYTES} bytes`,
     found,
     remedy: 'check the address, or write the folder again',
     cause,
