@@ -11,6 +11,7 @@ import { DEVELOPMENT_APP, developmentScript, plainApp } from './apps.mjs';
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
 const fixtures = fileURLToPath(new URL('../fixtures/', import.meta.url));
 const generators = join(root, 'tests/fixtures/generators');
+const attackCases = join(root, '../shared/cases/attack');
 const sharedData = join(root, '../shared/data');
 
 /** Answers under /net/; everything else is left to the test runner's own server, unless a test has it be lost. */
@@ -77,6 +78,13 @@ const ANSWERS = {
   'short-ply'(context) {
     const { header, block } = largePly(200_000);
     context.body = Buffer.concat([header, ...Array.from({ length: 9 }, () => block)]);
+  },
+
+  /** Files that cost more than they weigh, where they are there. */
+  attack(context, name) {
+    const path = join(attackCases, normalize(`/${name}`));
+    context.status = existsSync(path) ? 200 : 404;
+    context.body = existsSync(path) ? readFileSync(path) : 'absent';
   },
 
   /** Never answered. */
