@@ -44,3 +44,11 @@ export type { FrameStatistics } from './statistics.js';
 export type { Threads } from './stages/plan.js';
 export type { Variants } from './variants.js';
 export { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
+export {
+  joinShares,
+  packShare,
+  SHARE_SPLATS,
+  type JoinedShares,
+  type PackedShare,
+  type ShareFacts,
+} from './pack/shares.js';

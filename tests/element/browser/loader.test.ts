@@ -53,9 +53,10 @@ describe('the scene worker', () => {
   });
 
   it('answers also where something fails that nobody foresaw', async () => {
-    const nothing = null as unknown as Parameters<typeof loader.openBoxes>[0];
+    const nothing = { type: 'boxes', request: null } as unknown as Parameters<typeof loader.ask>[0];
     const loader = GaussianSplatElement.sceneLoader;
-    const failed = loader.openBoxes(nothing, new AbortController().signal, () => undefined).catch((error) => error);
+    const never = () => Promise.reject(new Error('on the page'));
+    const failed = loader.ask(nothing, new AbortController().signal, never).catch((error) => error);
     const error: unknown = await Promise.race([failed, delay(10_000)]);
     assert(error instanceof Error && /decode\/corrupt/.test(error.message), `an error with a name: ${String(error)}`);
   });

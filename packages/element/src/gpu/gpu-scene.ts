@@ -152,6 +152,14 @@ export class GpuScene {
     return this.#lease.lost;
   }
 
+  /** Whether the device was lost before all that was submitted was done. */
+  async wasLost(): Promise<boolean> {
+    await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
+    // The loss is told a little later.
+    await new Promise((resolve) => setTimeout(resolve));
+    return this.isLost;
+  }
+
   get isDestroyed(): boolean {
     return this.#destroyed;
   }
