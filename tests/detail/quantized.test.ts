@@ -43,7 +43,7 @@ const around = (cloud: GaussianCloud, distance: number, angle = 0.5): Camera => 
   const { center: c, radius } = boundsOf(cloud);
   const r = distance * radius;
   const eye: Vector3 = [c[0] + r * Math.cos(angle), c[1] - 0.3 * r, c[2] + r * Math.sin(angle)];
-  return cameraAt(eye, c, { width: 180, height: 120, fovXDegrees: 60, near: 0.01 });
+  return cameraAt(eye, c, { width: 120, height: 80, fovXDegrees: 60, near: 0.01 });
 };
 
 /** Leaves of a random shape and size, sheets and needles among them. */

@@ -9,6 +9,7 @@ import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { GaussianBuffers, packGaussians, Renderer, type RendererOptions } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { endNodeDevice } from '../support/node-device.js';
 import { room } from '../support/scenes.js';
 import { countWork } from '../support/work-counters.js';
 
@@ -107,6 +108,5 @@ test('the counter sees what it is there to see', async () => {
 
 after(() => {
   if (process.env.UPDATE_WORK_COUNTERS) writeFileSync(file, `${JSON.stringify(found, null, 2)}\n`);
-  // Dawn keeps Node alive.
-  setImmediate(() => process.exit());
+  return endNodeDevice();
 });
