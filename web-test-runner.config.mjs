@@ -41,7 +41,7 @@ export default {
   testsFinishTimeout: isFull ? 1_800_000 : 240_000,
   testFramework: { config: { ui: 'bdd', timeout: isFull ? 900_000 : 60_000 } },
   testRunnerHtml: (framework) =>
-    `<!doctype html><html><body><script>STABILITY = ${JSON.stringify(process.env.STABILITY ?? 'fast')}</script><script type="module" src="${framework}"></script></body></html>`,
+    `<!doctype html><html><body><script>STABILITY = ${JSON.stringify(process.env.STABILITY ?? 'fast')}; TESTS = ${JSON.stringify(process.env.TESTS ?? 'fast')}</script><script type="module" src="${framework}"></script></body></html>`,
   browsers: [chromium(group === 'dense' ? 2 : 1)],
   middleware: [hostileServer(otherOrigin)],
   plugins: [typescript(), pageCommands()],

@@ -18,6 +18,7 @@ ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, ['node_modules/typescript/bin/tsc', '--build', ...projects()]);
 writeLicences();
+if (extent !== 'element') await bundleThreads();
 if (extent !== 'packages') {
   const others = extent === 'whole' ? buildBesideBundle() : undefined;
   await bundleElement();
@@ -38,10 +39,14 @@ async function bundleElement() {
   console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
 }
 
-/** All that needs the packages, but not the bundle. */
-async function buildBesideBundle() {
+/** The script of threads that commands start. */
+async function bundleThreads() {
   const { bundleThreadScript } = await import('./lib/thread-script.mjs');
   await bundleThreadScript();
+}
+
+/** All that needs the packages, but not the bundle. */
+async function buildBesideBundle() {
   await describeElement();
   await buildDemo();
 }

@@ -1,8 +1,8 @@
 /** `npm run check -- MODEL [--contract CONTRACT.json] [--run]`: the conformance checker of packages/check. */
-import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
+import { ensureDependencies, ensurePackages } from './lib/prepare.mjs';
 
 ensureDependencies();
-ensureBuilt();
+ensurePackages();
 // npm runs scripts in the repository's root, wherever it was called.
 process.chdir(process.env.INIT_CWD ?? '.');
 const { main } = await import('../packages/check/dist/index.js');

@@ -1,11 +1,11 @@
 /** `npm run economise`: makes a scene smaller without going below a figure in dB. See scripts/economise-scene.mjs. */
 import { ensureChromium, findSwiftShader } from './lib/chromium.mjs';
 import { gpuEnvironment } from './lib/gpu-environment.mjs';
-import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
+import { ensureDependencies, ensurePackages } from './lib/prepare.mjs';
 import { run } from './lib/run.mjs';
 
 ensureDependencies();
-ensureBuilt();
+ensurePackages();
 // On Linux, Dawn in Node uses the SwiftShader that comes with Chromium.
 if (process.platform === 'linux' && process.env.GAUSSIAN_SPLAT_GPU !== 'system' && !findSwiftShader()) ensureChromium();
 process.exit(

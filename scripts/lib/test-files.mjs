@@ -12,6 +12,7 @@ const LABORATORY = [
   /^tests\/bench\/(scene|pages)/,
   /^tests\/frameworks\/browser\/(react-strict|vue)/,
   /^tests\/site\/(compare|cost-card|playground)/,
+  /^tests\/generator\/browser\/examples\/(plant|walker)/,
 ];
 /** Tests in Chromium that look at what happens in time: no other page runs beside them. */
 const TIMING = [
@@ -20,6 +21,9 @@ const TIMING = [
   'tests/element/browser/lifecycle.test.ts',
   'tests/element/browser/meanwhile.test.ts',
   'tests/element/browser/pace.test.ts',
+  'tests/element/browser/previews.test.ts',
+  'tests/generator/browser/element.test.ts',
+  'tests/generator/browser/instances.test.ts',
   'tests/generator/browser/orbit.test.ts',
 ];
 /** Runs in a browser of its own, whose screen is dense. */
@@ -53,7 +57,8 @@ export function testFiles() {
 export const isLaboratory = (file) => LABORATORY.some((pattern) => pattern.test(file));
 
 /** Whether some tests of a file are the laboratory's (`onlyInLab` of tests/support/extent.ts). */
-export const hasBreadth = (file) => /\bonlyInLab\b|\bisLab\b/.test(readFileSync(join(root, file), 'utf8'));
+export const hasBreadth = (file) =>
+  /\bonlyInLab\b|\bisLab\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
 
 /** Files of Node: those that can share a device, and those that have a process each. */
 export function byProcess(files) {
