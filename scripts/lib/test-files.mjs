@@ -30,8 +30,8 @@ const TIMING = [
 const DENSE = 'tests/element/browser/high-density.test.ts';
 /** Files of Node that take the device of tests/support share a process, and so the device and what it has compiled. */
 const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
-/** Spoils shaders for the whole process. */
-const SPOILS_PROCESS = 'tests/golden/short-shaders.test.ts';
+/** What changes shaders for the whole process, or the shared device for good. */
+const OWN_PROCESS = ['tests/golden/frame-levers.test.ts', 'tests/golden/short-shaders.test.ts'];
 const TAKES_DEVICE = /from '[./]*support\/(node-device|read-rows|draw-until-calm|work-counters)\.js'/;
 
 /** Where the tests of each package are; those of demo and documents are the site's. */
@@ -63,7 +63,7 @@ export const hasBreadth = (file) =>
 /** Files of Node: those that can share a device, and those that have a process each. */
 export function byProcess(files) {
   const shares = (file) =>
-    SHARES_DEVICE.test(file) && file !== SPOILS_PROCESS && TAKES_DEVICE.test(readFileSync(join(root, file), 'utf8'));
+    SHARES_DEVICE.test(file) && !OWN_PROCESS.includes(file) && TAKES_DEVICE.test(readFileSync(join(root, file), 'utf8'));
   return { sharing: files.filter(shares), alone: files.filter((file) => !shares(file)) };
 }
 
