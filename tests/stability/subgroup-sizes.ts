@@ -89,7 +89,7 @@ for (const variant of SORT_NAMES) {
   test(`any keys, ${variant}`, async (context) => {
     const device = await (variant.startsWith('subgroup') ? fullDevice() : nodeDevice());
     if (!canSort(device, variant)) return context.skip(`this device has no subgroups for ${variant}`);
-    const wrong = await misplaced(device, variant, sized(25, 400));
+    const wrong = await misplaced(device, variant, sized(8, 400));
     holds('S15', `misplaced keys, ${variant}`, wrong, { atMost: 0, unit: 'keys' });
   });
 }
