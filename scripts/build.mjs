@@ -5,6 +5,7 @@
  */
 import { copyFileSync, existsSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { writeAttributeRows } from '../packages/element/scripts/attributes.mjs';
 import { writeIntegrity } from '../packages/element/scripts/integrity.mjs';
 import { ensureDependencies, noteBuilt } from './lib/prepare.mjs';
 import { must, mustSoon, root } from './lib/run.mjs';
@@ -41,7 +42,7 @@ async function bundleElement() {
 
 /** The script of threads that commands start. */
 async function bundleThreads() {
-  const { bundleThreadScript } = await import('./lib/thread-script.mjs');
+  const { bundleThreadScript } = await import('../packages/cli/src/lib/thread-script.mjs');
   await bundleThreadScript();
 }
 
@@ -79,12 +80,12 @@ function writeLicencesOfBundle() {
 }
 
 /** What editors and tools know of the element, from its sources. */
-function describeElement() {
+async function describeElement() {
   const analyzer = join(root, 'node_modules/@custom-elements-manifest/analyzer/cem.js');
   const config = 'custom-elements-manifest.config.mjs';
-  return mustSoon(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], {
-    cwd: join(root, 'packages/element'),
-  });
+  const cwd = join(root, 'packages/element');
+  await mustSoon(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], { cwd });
+  writeAttributeRows(JSON.parse(readFileSync(join(cwd, 'custom-elements.json'), 'utf8')));
 }
 
 /** Scripts and scenes of the site, but its pages: those of pages by esbuild, the apps by Vite. */

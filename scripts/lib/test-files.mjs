@@ -42,6 +42,7 @@ export const TESTS_OF = {
   generator: ['generator'],
   check: ['check'],
   economise: ['economise'],
+  cli: ['packages'],
   element: ['element', 'packages'],
   react: ['frameworks'],
   site: ['site'],
@@ -63,7 +64,9 @@ export const hasBreadth = (file) =>
 /** Files of Node: those that can share a device, and those that have a process each. */
 export function byProcess(files) {
   const shares = (file) =>
-    SHARES_DEVICE.test(file) && !OWN_PROCESS.includes(file) && TAKES_DEVICE.test(readFileSync(join(root, file), 'utf8'));
+    SHARES_DEVICE.test(file) &&
+    !OWN_PROCESS.includes(file) &&
+    TAKES_DEVICE.test(readFileSync(join(root, file), 'utf8'));
   return { sharing: files.filter(shares), alone: files.filter((file) => !shares(file)) };
 }
 
