@@ -235,7 +235,7 @@ test('a rung that costs more than the ladder says is tried again once in two min
   for (let now = 0; now < 600_000; now += 16.7) {
     const { level } = pace;
     const milliseconds = targetMs * (level === 0 ? 1.3 : 0.5);
-    pace = keepPace(pace, { now, level, milliseconds }, { targetMs, costs: COSTS });
+    pace = keepPace(pace, { now, level, milliseconds }, { targetMs, levels: LADDER });
     if (pace.level === 0 && level > 0) changes.push(now);
   }
   assert.ok(changes.length >= 3 && changes.length <= 5, changes.join(' '));
@@ -248,14 +248,14 @@ test('a rung that costs more than the ladder says is tried again once in two min
 
 test('frames of another level say nothing', () => {
   const pace = { ...INITIAL_PACE, level: 3 };
-  assert.equal(keepPace(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, costs: COSTS }), pace);
+  assert.equal(keepPace(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, levels: LADDER }), pace);
 });
 
 test('what the true image took at rest is what the pace comes back to where less takes longer', () => {
   const targetMs = 13.3;
   let [pace, now] = [INITIAL_PACE, 0];
   const draw = (level: number, milliseconds: number): void => {
-    pace = keepPace(pace, { now: (now += 16.7), level, milliseconds }, { targetMs, costs: COSTS });
+    pace = keepPace(pace, { now: (now += 16.7), level, milliseconds }, { targetMs, levels: LADDER });
   };
   const move = (seconds: number, shares: readonly number[], load: number): void => {
     for (const end = now + 1000 * seconds; now < end;) draw(pace.level, targetMs * load * shares[pace.level]);

@@ -3,8 +3,8 @@ import { LADDER } from '../../packages/element/src/pace/ladder.js';
 import { INITIAL_PACE, keepPace, quantile, type Pace } from '../../packages/element/src/pace/pace.js';
 import { randomSource } from './gpu.js';
 
-/** Of each rung, as the ladder says. */
-export const COSTS = LADDER.map(({ cost }) => cost);
+/** What the levels of a simulated GPU take unless it says otherwise, as shares of the whole image: all of it scales with pixels. */
+export const COSTS = LADDER.map(({ scale }, level) => [1, 0.73][level] ?? 0.72 * scale ** 2);
 export interface Gpu {
   /** Pictures a second of the display. */
   readonly hertz: number;
@@ -43,7 +43,7 @@ export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Pa
   for (let at = 0; at < milliseconds; at += interval) {
     while (waiting.length > 0 && waiting[0].due <= at) {
       const { due, level, spent } = waiting.shift()!;
-      pace = keepPace(pace, { now: due, level, milliseconds: spent }, { targetMs, costs: COSTS });
+      pace = keepPace(pace, { now: due, level, milliseconds: spent }, { targetMs, levels: LADDER });
     }
     if (gpu.moves?.(at) === false || free > at + interval) continue;
     const { level } = pace;

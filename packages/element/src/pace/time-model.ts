@@ -1,0 +1,67 @@
+/** What frames on the levels take: `a + b * pixels` on those that are reduced, a time of its own for the whole image, learned from what they took. */
+import type { Level } from './ladder.js';
+
+/** What is supposed until it is measured: the share of a reduced frame that fewer pixels leave, and what the whole image takes beyond a reduced one of as many pixels. */
+const FIXED = 0.2;
+const WHOLE = 1.35;
+/** How much of the supposed slope is kept: as if it had been measured by levels that lie apart by the root of this share of the pixels. */
+const STIFFNESS = 0.01;
+/** How long a measurement counts, ms, and how long where the load has changed by more than a quarter since. */
+const KNOWN_MS = 120_000;
+const KNOWN_UNDER_OTHER_LOAD_MS = 5_000;
+const SAME_LOAD = Math.log(1.25);
+
+/** What a level was measured to take. */
+export interface Measured {
+  /** As a multiple of the load, which all levels have in common. */
+  readonly share: number;
+  /** When, ms, and under which load, ms. */
+  readonly at: number;
+  readonly load: number;
+}
+
+/** The levels that were measured, by number. */
+export type MeasuredLevels = Readonly<Record<number, Measured>>;
+
+/** What the levels take as multiples of the load, and which of them were measured. */
+export interface TimeModel {
+  readonly shares: readonly number[];
+  readonly isKnown: readonly boolean[];
+}
+
+const supposed = (pixels: number): number => FIXED + (1 - FIXED) * pixels;
+
+/** @param now with the load of that moment, ms: what counts of what was measured depends on both */
+export function modelOf(levels: readonly Level[], measured: MeasuredLevels, now: number, load: number): TimeModel {
+  const isKnown = levels.map((_, level) => {
+    const found = measured[level] as Measured | undefined;
+    if (found === undefined) return false;
+    const isSame = Math.abs(Math.log(load / found.load)) < SAME_LOAD;
+    return now - found.at < (isSame ? KNOWN_MS : KNOWN_UNDER_OTHER_LOAD_MS);
+  });
+  const pixels = levels.map(({ scale }) => scale ** 2);
+  const points = levels.flatMap((_, level) =>
+    level > 0 && isKnown[level] ? [{ x: pixels[level], y: measured[level].share }] : [],
+  );
+  const line = lineThrough(points, isKnown[0] ? measured[0].share : 1);
+  const shares = levels.map((_, level) => {
+    if (isKnown[level]) return measured[level].share;
+    return level === 0 ? WHOLE * line(1) : line(pixels[level]);
+  });
+  return { shares, isKnown };
+}
+
+/** The line of least squares, stiff where the points do not say how steep it is. */
+function lineThrough(points: readonly { x: number; y: number }[], whole: number): (pixels: number) => number {
+  if (points.length === 0) return (pixels) => (whole / WHOLE) * supposed(pixels);
+  const mean = (of: (point: { x: number; y: number }) => number): number =>
+    points.reduce((sum, point) => sum + of(point), 0) / points.length;
+  const [x, y] = [mean((point) => point.x), mean((point) => point.y)];
+  const slope = (y * (1 - FIXED)) / supposed(x);
+  const covariance = points.length * mean((point) => (point.x - x) * (point.y - y));
+  const variance = points.length * mean((point) => (point.x - x) ** 2);
+  const b = (covariance + STIFFNESS * slope) / (variance + STIFFNESS);
+  // Fewer pixels never win more than in proportion.
+  const steepest = Math.min(b, ...points.map((point) => point.y / point.x), y / x);
+  return (pixels) => y + steepest * (pixels - x);
+}
