@@ -149,7 +149,9 @@ Object.entries(kinds).forEach(([name, { make, restless = 0, excess = 1.081 }], k
     const over: number[] = [];
     for (let i = 0; i < RUNS; i++) {
       const { frames, load } = draw(make, 1000 * (k + 1) + i);
-      const windows = restlessWindows(frames);
+      // The step itself may turn the level.
+      const [early, late] = [frames.filter(({ at }) => at < load.at), frames.filter(({ at }) => at >= load.at)];
+      const windows = restlessWindows(early) + restlessWindows(late);
       assert.ok(windows <= 1, `run ${i}: ${windows} times two changes of direction in five seconds`);
       turnedTwice += windows;
       for (const [from, to, curve] of [
@@ -158,8 +160,8 @@ Object.entries(kinds).forEach(([name, { make, restless = 0, excess = 1.081 }], k
       ] as const) {
         const best = Math.min(...curve);
         if (best <= 0.9) {
-          const late = p95(frames, from + 1_000, Math.min(to, from + 6_000));
-          assert.ok(late <= 1.12, `run ${i}: p95 is ${late} of the target`);
+          const slow = p95(frames, from + 1_000, Math.min(to, from + 6_000));
+          assert.ok(slow <= 1.12, `run ${i}: p95 is ${slow} of the target`);
         }
         const last = frames.filter(({ at }) => at >= to - 3_000 && at < to);
         if (best > 1.05 && to === RUN_MS)

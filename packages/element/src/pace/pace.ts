@@ -1,6 +1,6 @@
 /** How much of the whole image a frame in motion can afford: a pure function of what frames took. */
 import type { Level } from './ladder.js';
-import { modelOf, type MeasuredLevels, type TimeModel } from './time-model.js';
+import { inPixels, modelOf, type MeasuredLevels, type TimeModel } from './time-model.js';
 
 /** What a frame took. */
 export interface FrameSample {
@@ -123,7 +123,7 @@ function learnAtRest(pace: Pace, { now, milliseconds }: FrameSample, { levels }:
   const { level, recent, measured, sampledAt } = pace;
   if (recent.length < LEAST || now - sampledAt > AT_REST_MS + milliseconds) return pace;
   const load = usualOf(recent) / measured[level].share;
-  if (modelOf(levels, measured, now, load).isKnown[0]) return pace;
+  if (modelOf(levels, measured, { now, level, load }).isKnown[0]) return pace;
   return { ...pace, measured: { ...measured, 0: { share: milliseconds / load, at: now, load } } };
 }
 
@@ -133,9 +133,9 @@ function choose(pace: Pace, now: number, rules: PaceRules): Pace | null {
   if (recent.length < LEAST) return null;
   const usual = usualOf(recent);
   const load = usual / measured[level].share;
-  const model = modelOf(rules.levels, measured, now, load);
+  const model = modelOf(rules.levels, measured, { now, level, load });
   const times = model.shares.map((share) => share * load);
-  if (pace.believed > LATE * rules.targetMs) return whereLate(pace, now, times, usual, rules);
+  if (pace.believed > LATE * rules.targetMs) return whereLate(pace, now, times, model, rules);
   return level > 0 ? whereInTime(pace, now, times, model, rules) : null;
 }
 
@@ -146,24 +146,36 @@ function bestOf(times: readonly number[], targetMs: number): number {
   return times.findIndex((time) => time <= within);
 }
 
-function whereLate(pace: Pace, now: number, times: number[], usual: number, { targetMs }: PaceRules): Pace | null {
-  const { level, direction, turnedAt } = pace;
-  const to = bestOf(times, targetMs);
-  if (to === level || times[to] * AS_FAST > usual) return null;
+function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeModel, rules: PaceRules): Pace | null {
+  const { level, recent, direction, turnedAt } = pace;
+  const { targetMs } = rules;
+  const usual = times[level];
+  let to = bestOf(times, targetMs);
+  // What is not worth a try must be known to be as fast.
+  if (times[to] * AS_FAST > usual) to = bestOf(times.map((time, other) => (isKnown[other] ? time : Infinity)), targetMs);
+  if (to === level) return null;
   const isTurn = direction !== (to > level ? 'down' : 'up');
   const isSoon = now - turnedAt < HOLD_MS;
-  if (isTurn && isSoon && !(to > level && usual > FAR_TOO_LATE * targetMs)) return null;
+  const isUrgent = to > level && usual > FAR_TOO_LATE * targetMs && times[to] <= targetMs;
+  if (isTurn && isSoon && !isUrgent) return null;
+  if (to < level && recent.length < ENOUGH) return null;
   return change(pace, now, to, 'slow', times[to]);
 }
 
-/** Up, where that is predicted in time. */
+/** Up, where that is predicted in time; after a while without a change, one level up where that may be. */
 function whereInTime(pace: Pace, now: number, times: number[], { isKnown }: TimeModel, rules: PaceRules): Pace | null {
   const { level, recent, changedAt, turnedAt, direction, hold } = pace;
+  const { levels, targetMs } = rules;
   if (recent.length < ENOUGH || now - changedAt < SETTLE_MS) return null;
   if (direction === 'down' && now - turnedAt < hold) return null;
-  const to = bestOf(times, rules.targetMs);
-  if (to < level && times[to] <= AIM * rules.targetMs) return change(pace, now, to, 'spare', times[to]);
-  return null;
+  // What was never measured may take as much as its pixels say.
+  const mostOf = (other: number): number =>
+    isKnown[other] ? times[other] : (times[level] * inPixels(levels[other], other)) / inPixels(levels[level], level);
+  const to = times.findIndex((time, other) => time <= AIM * targetMs && mostOf(other) <= targetMs);
+  if (to !== -1 && to < level) return change(pace, now, to, 'spare', times[to]);
+  const above = level - 1;
+  const isTried = now - changedAt > TRIAL_MS && !isKnown[above] && times[above] + mostOf(above) <= 2 * targetMs;
+  return isTried ? change(pace, now, above, 'trial', times[above]) : null;
 }
 
 function change(pace: Pace, now: number, level: number, reason: PaceReason, predicted: number): Pace {

@@ -29,13 +29,24 @@ export interface TimeModel {
   readonly isKnown: readonly boolean[];
 }
 
+/** What a level takes, as against others, where all of it is in the pixels. */
+export const inPixels = ({ scale }: Level, level: number): number => (level === 0 ? WHOLE : scale ** 2);
+
 const supposed = (pixels: number): number => FIXED + (1 - FIXED) * pixels;
 
-/** @param now with the load of that moment, ms: what counts of what was measured depends on both */
-export function modelOf(levels: readonly Level[], measured: MeasuredLevels, now: number, load: number): TimeModel {
-  const isKnown = levels.map((_, level) => {
-    const found = measured[level] as Measured | undefined;
-    if (found === undefined) return false;
+/** What is known of a moment. */
+export interface Moment {
+  readonly now: number;
+  /** The level that is drawn with, which was measured, and the load under which it takes what it does, ms. */
+  readonly level: number;
+  readonly load: number;
+}
+
+/** The model of a moment, which says what still counts of what was measured. */
+export function modelOf(levels: readonly Level[], measured: MeasuredLevels, { now, level, load }: Moment): TimeModel {
+  const isKnown = levels.map((_, other) => {
+    const found = measured[other] as Measured | undefined;
+    if (found === undefined || other === level) return other === level;
     const isSame = Math.abs(Math.log(load / found.load)) < SAME_LOAD;
     return now - found.at < (isSame ? KNOWN_MS : KNOWN_UNDER_OTHER_LOAD_MS);
   });
@@ -43,7 +54,7 @@ export function modelOf(levels: readonly Level[], measured: MeasuredLevels, now:
   const points = levels.flatMap((_, level) =>
     level > 0 && isKnown[level] ? [{ x: pixels[level], y: measured[level].share }] : [],
   );
-  const line = lineThrough(points, isKnown[0] ? measured[0].share : 1);
+  const line = lineThrough(points, isKnown[0] ? measured[0].share : undefined);
   const shares = levels.map((_, level) => {
     if (isKnown[level]) return measured[level].share;
     return level === 0 ? WHOLE * line(1) : line(pixels[level]);
@@ -52,7 +63,7 @@ export function modelOf(levels: readonly Level[], measured: MeasuredLevels, now:
 }
 
 /** The line of least squares, stiff where the points do not say how steep it is. */
-function lineThrough(points: readonly { x: number; y: number }[], whole: number): (pixels: number) => number {
+function lineThrough(points: readonly { x: number; y: number }[], whole = Infinity): (pixels: number) => number {
   if (points.length === 0) return (pixels) => (whole / WHOLE) * supposed(pixels);
   const mean = (of: (point: { x: number; y: number }) => number): number =>
     points.reduce((sum, point) => sum + of(point), 0) / points.length;
@@ -61,7 +72,8 @@ function lineThrough(points: readonly { x: number; y: number }[], whole: number)
   const covariance = points.length * mean((point) => (point.x - x) * (point.y - y));
   const variance = points.length * mean((point) => (point.x - x) ** 2);
   const b = (covariance + STIFFNESS * slope) / (variance + STIFFNESS);
-  // Fewer pixels never win more than in proportion.
-  const steepest = Math.min(b, ...points.map((point) => point.y / point.x), y / x);
-  return (pixels) => y + steepest * (pixels - x);
+  // Fewer pixels win no more than in proportion; more of them no more than the whole image takes less.
+  const least = Math.min(0, (whole / WHOLE - y) / Math.max(1 - x, STIFFNESS));
+  const held = Math.max(least, Math.min(b, y / x));
+  return (pixels) => y + held * (pixels - x);
 }
