@@ -1,6 +1,7 @@
 import type { FrameLevers } from '@gaussian-splat/renderer';
+import type { FrameTime } from '../gpu/frame-meter.js';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
-import { LADDER, rungsFor } from '../pace/ladder.js';
+import { levelsFor, LADDER } from '../pace/ladder.js';
 import { INITIAL_PACE, keepPace, quantile, resized, type Pace, type PaceReason } from '../pace/pace.js';
 import { waitForRest } from '../pace/rest.js';
 
@@ -14,8 +15,6 @@ const LONGEST_PAUSE_MS = 2_000;
 
 /** Pictures of so many times the pixels are others: what rungs take is measured anew. */
 const OTHER_SIZE = 1.25;
-
-const COSTS = LADDER.map(({ cost }) => cost);
 
 /** How a frame is to be drawn. */
 export interface FramePlan {
@@ -72,7 +71,7 @@ export interface PaceOptions {
 export class PaceController {
   readonly #options: PaceOptions;
   #pace: Pace = INITIAL_PACE;
-  #rungs = LADDER.length;
+  #levels = LADDER;
   /** Of the pictures that the pace has measured. */
   #pixels = 0;
   /** How many sizes pictures have had: frames of another one come late. */
@@ -133,10 +132,10 @@ export class PaceController {
   }
 
   #fit(pixels: number): void {
-    this.#rungs = rungsFor(pixels);
+    this.#levels = levelsFor(pixels);
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
-    if (!isOther && this.#pace.level < this.#rungs) return;
-    this.#pace = resized(this.#pace, pixels / this.#pixels, this.#rungs, COSTS);
+    if (!isOther && this.#pace.level < this.#levels.length) return;
+    this.#pace = resized(this.#pace, pixels / this.#pixels, this.#levels);
     this.#pixels = pixels;
     this.#size++;
   }
@@ -147,12 +146,19 @@ export class PaceController {
   };
 
   /** What a frame took that was drawn by a plan. */
-  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, milliseconds: number): void {
+  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { atLeast, atMost }: FrameTime): void {
     if (!this.#options.isOn() || size !== this.#size) return;
+    const { targetMs } = this;
+    // What is in time at most, or too slow at least, is known well enough.
+    if (atMost > targetMs && atLeast <= targetMs && atLeast < atMost) return;
+    const milliseconds = atMost > targetMs ? atLeast : atMost;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
-    const sample = { now: performance.now(), level, milliseconds };
-    this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS.slice(0, this.#rungs) });
+    this.#pace = keepPace(
+      this.#pace,
+      { now: performance.now(), level, milliseconds },
+      { targetMs, levels: this.#levels },
+    );
     const isWhole = this.#pace.level === 0;
     if (isWhole || level > 0) this.#options.onPace(isWhole);
   }

@@ -3,6 +3,7 @@ import type { FrameLevers } from '@gaussian-splat/renderer';
 import type { QualityChoice } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
+import type { FrameTime } from '../gpu/frame-meter.js';
 import type { GpuScene, Rendering } from '../gpu/gpu-scene.js';
 import type { Frame } from '../live/frame-filter.js';
 import { LADDER } from '../pace/ladder.js';
@@ -65,7 +66,7 @@ export class ViewController implements FrameClient {
   constructor(options: ViewOptions) {
     this.#options = options;
     this.pace = new PaceController({
-      isOn: () => options.rendering().quality === 'auto' && (this.#scene?.isMeasurable ?? false),
+      isOn: () => options.rendering().quality === 'auto',
       scheduler: options.scheduler,
       frameBudget: options.frameBudget,
       requestFrame: () => this.requestFrame(),
@@ -178,7 +179,7 @@ export class ViewController implements FrameClient {
     const { levers } = plan;
     // Who has chosen a quality pays for no clock.
     const onTime =
-      this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(plan, spent) : undefined;
+      this.#options.rendering().quality === 'auto' ? (time: FrameTime) => this.pace.sample(plan, time) : undefined;
     if (first !== undefined) {
       scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
       return;
@@ -194,7 +195,7 @@ export class ViewController implements FrameClient {
 
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
   #prepareSoon(scene: GpuScene, { target: { format } }: Frame): void {
-    if (scene.isPrepared || this.#options.rendering().quality !== 'auto' || !scene.isMeasurable) return;
+    if (scene.isPrepared || this.#options.rendering().quality !== 'auto') return;
     this.#preparing ??= setTimeout(() => {
       this.#preparing = undefined;
       if (this.#scene === scene) scene.prepare(MOVING_LEVERS, format);

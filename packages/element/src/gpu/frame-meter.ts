@@ -1,72 +1,83 @@
-import { SpanTimer, type FrameTimer } from '@gaussian-splat/renderer';
+import type { QueueClock } from '@gaussian-splat/renderer';
 
-/** So many frames in a row whose timestamps cannot be believed are enough. */
-const MAX_FAILURES = 8;
-/** When what was submitted was last known to be done, by whichever element: the page's one queue does one thing after the other. */
-let lastDone = -Infinity;
+/** How long a frame kept the GPU, ms. Both are one where the page's thread was free when it was done. */
+export interface FrameTime {
+  readonly atLeast: number;
+  readonly atMost: number;
+}
+
+/** Milliseconds between two looks whether the page's thread is free, and by which they may be late. */
+const BEAT_MS = 4;
+const LATE_MS = 2;
+
+/** Knows when the page's thread was last blocked, as long as somebody waits: what is told then is told late. */
+class ThreadWatch {
+  #waiting = 0;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  /** When the next look is due, and when the last block began and ended. */
+  #due = 0;
+  #block = { from: 0, to: 0 };
+
+  /** Waits. @returns when that was over, and since when it may have been */
+  async during(waiting: Promise<number>): Promise<{ now: number; since: number }> {
+    this.#waiting++;
+    if (this.#timer === undefined) this.#next(0);
+    try {
+      const now = await waiting;
+      this.#note(now);
+      const { from, to } = this.#block;
+      return { now, since: now - to < LATE_MS ? from : now };
+    } finally {
+      if (--this.#waiting === 0) {
+        clearTimeout(this.#timer);
+        this.#timer = undefined;
+      }
+    }
+  }
+
+  #next(milliseconds: number): void {
+    this.#due = performance.now() + milliseconds;
+    this.#timer = setTimeout(this.#beat, milliseconds);
+  }
+
+  #note(now: number): void {
+    if (now > this.#due + LATE_MS) this.#block = { from: this.#due, to: now };
+  }
+
+  readonly #beat = (): void => {
+    this.#note(performance.now());
+    this.#next(BEAT_MS);
+  };
+}
+
+/** One for the page: it has one thread. */
+const thread = new ThreadWatch();
 
 /**
- * How long frames keep the GPU: by its own clock where the device has the feature `timestamp-query`, else by when their work is done. Nothing waits;
- * figures come a few frames later.
+ * How long frames keep the GPU, by when their work is done: from when a frame could begin, which is when it was submitted and all that came before was done, whoever
+ * submitted that. Figures come when the frame is done; nothing waits, nothing is submitted.
  */
 export class FrameMeter {
-  readonly #queue: GPUQueue;
-  /** Others that work on the same queue between frames (a generator, a post-processor) would be counted with them. */
-  readonly #mayGuess: () => boolean;
-  #timer: SpanTimer | undefined;
-  #failures = 0;
+  readonly #clock: QueueClock;
 
-  /** @param mayGuess false where the time until work is done says nothing about the frame */
-  constructor(device: GPUDevice, mayGuess: () => boolean) {
-    this.#queue = device.queue;
-    this.#mayGuess = mayGuess;
-    if (device.features.has('timestamp-query')) this.#timer = new SpanTimer(device);
+  constructor(clock: QueueClock) {
+    this.#clock = clock;
   }
 
-  /** False where frames cannot be timed at all. */
-  get isAble(): boolean {
-    return this.#timer !== undefined || this.#mayGuess();
-  }
-
-  /**
-   * Times a frame.
-   * @param draw submits it; gets what its passes are timed with, if anything is
-   * @param onTime gets milliseconds on the GPU
-   */
-  measure(draw: (timer: FrameTimer | undefined) => void, onTime: (milliseconds: number) => void): void {
-    const timer = this.#timer;
-    if (timer) {
-      const isTimed = timer.expect((span) => this.#accept(span, onTime));
-      draw(isTimed ? timer : undefined);
-      return;
-    }
+  /** @param draw submits the frame */
+  measure(draw: () => void, onTime: (time: FrameTime) => void): void {
+    const clock = this.#clock;
+    const before = thread.during(clock.done());
+    draw();
     const submitted = performance.now();
-    draw(undefined);
-    if (this.#mayGuess()) void this.#waitAside(submitted, onTime);
-  }
-
-  destroy(): void {
-    this.#timer?.destroy();
-    this.#timer = undefined;
-  }
-
-  #accept(span: number | null, onTime: (milliseconds: number) => void): void {
-    this.#failures = span === null ? this.#failures + 1 : 0;
-    if (span !== null) onTime(span);
-    if (this.#failures >= MAX_FAILURES) this.destroy();
-  }
-
-  /** From when the frame could begin, after its submission and the frame before, until it is done. */
-  async #waitAside(submitted: number, onTime: (milliseconds: number) => void): Promise<void> {
-    try {
-      await this.#queue.onSubmittedWorkDone();
-    } catch {
+    Promise.all([before, thread.during(clock.done())]).then(
+      ([began, done]) => {
+        clock.note(done.now - submitted);
+        const atMost = clock.spent(began.since, submitted, done.now);
+        onTime({ atMost, atLeast: Math.min(atMost, clock.spent(began.now, submitted, done.since)) });
+      },
       // A lost device has been noticed elsewhere.
-      return;
-    }
-    const done = performance.now();
-    const began = Math.max(submitted, lastDone);
-    lastDone = done;
-    onTime(done - began);
+      () => undefined,
+    );
   }
 }

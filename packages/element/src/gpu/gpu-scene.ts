@@ -1,5 +1,6 @@
 import { GaussianSplatError, loadModule, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
+  QueueClock,
   Renderer,
   type FrameRequest,
   type GaussianScene,
@@ -12,7 +13,7 @@ import type { SceneBounds } from '../camera/settings.js';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { Timeline } from '../live/live-model.js';
 import type { ReadCounts } from '../stats.js';
-import { FrameMeter } from './frame-meter.js';
+import { FrameMeter, type FrameTime } from './frame-meter.js';
 import type { DeviceLease } from './shared-device.js';
 
 /** How much detail is drawn of a scene that has levels of it. */
@@ -86,17 +87,12 @@ export class GpuScene {
     this.bounds = bounds;
     this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
-    this.#meter = new FrameMeter(lease.device, () => !live && !this.#filter);
+    this.#meter = new FrameMeter(QueueClock.of(lease.device));
   }
 
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
   get frameBytes(): number {
     return this.#renderer.byteLength + (this.#filter?.byteLength ?? 0);
-  }
-
-  /** True if it can be told how long frames take. */
-  get isMeasurable(): boolean {
-    return this.#meter.isAble;
   }
 
   /** Its splats. */
@@ -207,9 +203,9 @@ export class GpuScene {
 
   /**
    * Encodes and submits one frame.
-   * @param onTime gets milliseconds that the frame kept the GPU, some frames later; not every frame is timed
+   * @param onTime gets how long the frame kept the GPU, some frames later
    */
-  render(frame: Frame, onTime?: (milliseconds: number) => void): void {
+  render(frame: Frame, onTime?: (time: FrameTime) => void): void {
     const size = sizeOf(frame);
     if (size === this.#drawnSize) return this.#renderOnce(frame, onTime);
     this.#drawnSize = size;
@@ -218,8 +214,8 @@ export class GpuScene {
     });
   }
 
-  #renderOnce(frame: Frame, onTime: ((milliseconds: number) => void) | undefined): void {
-    if (onTime) this.#meter.measure((timer) => this.#draw({ ...frame, timer }), onTime);
+  #renderOnce(frame: Frame, onTime: ((time: FrameTime) => void) | undefined): void {
+    if (onTime) this.#meter.measure(() => this.#draw(frame), onTime);
     else this.#draw(frame);
   }
 
@@ -244,6 +240,10 @@ export class GpuScene {
     const error = await this.#withRefusal(() => this.#draw(frame));
     if (error !== null) throw outOfMemory('first frame', error);
     await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
+    // The GPU has nothing to do now. Nobody waits for it.
+    QueueClock.of(this.device)
+      .calibrate()
+      .catch(() => undefined);
   }
 
   /** Fulfils with what the device says if memory was lacking for some work. */
@@ -283,7 +283,6 @@ export class GpuScene {
     this.onDestroy();
     this.setFilter(undefined);
     this.live?.close();
-    this.#meter.destroy();
     this.#renderer.destroy();
     this.#levels?.destroy();
     this.#gaussians.destroy();

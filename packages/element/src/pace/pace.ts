@@ -152,7 +152,11 @@ function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeMo
   const usual = times[level];
   let to = bestOf(times, targetMs);
   // What is not worth a try must be known to be as fast.
-  if (times[to] * AS_FAST > usual) to = bestOf(times.map((time, other) => (isKnown[other] ? time : Infinity)), targetMs);
+  if (times[to] * AS_FAST > usual)
+    to = bestOf(
+      times.map((time, other) => (isKnown[other] ? time : Infinity)),
+      targetMs,
+    );
   if (to === level) return null;
   const isTurn = direction !== (to > level ? 'down' : 'up');
   const isSoon = now - turnedAt < HOLD_MS;
@@ -197,6 +201,18 @@ function change(pace: Pace, now: number, level: number, reason: PaceReason, pred
     load,
     measured: { ...measured, [pace.level]: { ...measured[pace.level], at: now, load } },
   };
+}
+
+/**
+ * The pace where images have so many times the pixels, and other levels may serve: what was measured says nothing of these. Fewer pixels are drawn with as
+ * many of them as before, for they take no longer.
+ */
+export function resized(pace: Pace, growth: number, levels: readonly Level[]): Pace {
+  const { recent, believed, load, measured } = INITIAL_PACE;
+  const level = Math.min(pace.level, levels.length - 1);
+  const pixels = inPixels(levels[level], level);
+  const asMany = levels.findIndex((other, number) => growth * inPixels(other, number) <= pixels);
+  return { ...pace, level: asMany === -1 ? level : Math.min(level, asMany), recent, believed, load, measured };
 }
 
 /** The smallest of the values that at least this share of them do not exceed. */

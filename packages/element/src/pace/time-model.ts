@@ -5,7 +5,7 @@ import type { Level } from './ladder.js';
 const FIXED = 0.2;
 const WHOLE = 1.35;
 /** How much of the supposed slope is kept: as if it had been measured by levels that lie apart by the root of this share of the pixels. */
-const STIFFNESS = 0.01;
+const STIFFNESS = 0.001;
 /** How long a measurement counts, ms, and how long where the load has changed by more than a quarter since. */
 const KNOWN_MS = 120_000;
 const KNOWN_UNDER_OTHER_LOAD_MS = 5_000;
