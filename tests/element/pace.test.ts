@@ -217,14 +217,14 @@ test('where the lowest rungs are no faster and still too slow, the level turns a
   assert.equal(restless, 0);
 });
 
-test('when the load is gone the true image comes back, one rung after the other', () => {
+test('when the load is gone the whole image comes back within a second, without a detour', () => {
   const load = (now: number): number => (now < 5_000 ? 4 : 0.2);
   const { frames } = run({ hertz: 60, load, fixed: 0.2, noise: 0.1, spikes: 0, latency: 2, seed: 4 }, 15_000);
   const after = frames.filter(({ at }) => at > 5_000);
   for (let k = 1; k < after.length; k++) {
-    assert.ok([0, 1].includes(after[k - 1].level - after[k].level), 'one rung at a time');
+    assert.ok(after[k].level <= after[k - 1].level, 'no way down');
   }
-  assert.ok(after.filter(({ at }) => at > 12_000).every(({ level }) => level === 0));
+  assert.ok(after.filter(({ at }) => at > 6_000).every(({ level }) => level === 0));
 });
 
 test('a rung that costs more than the ladder says is tried again once in two minutes', () => {
@@ -261,18 +261,19 @@ test('what the true image took at rest is what the pace comes back to where less
     for (const end = now + 1000 * seconds; now < end;) draw(pace.level, targetMs * load * shares[pace.level]);
   };
   move(8, COSTS, 2);
-  assert.ok(pace.level >= 4, `${pace.level}`);
+  assert.ok(pace.level >= 3, `${pace.level}`);
   // The element becomes small: all rungs are too slow, and the whole picture is the fastest.
   move(4, SMALL, 5);
   const { level } = pace;
-  assert.ok(level >= 4, `${level}`);
+  assert.ok(level > 4, `${level}`);
   draw(0, targetMs * 5);
   move(2, SMALL, 5);
-  assert.equal(pace.level, 0);
+  // Within 5 % of the fastest.
+  assert.ok(pace.level <= 1, `${pace.level}`);
   // At rest it took less than in motion: that was measured, and counts.
   move(8, COSTS, 2);
   const settled = pace.level;
-  assert.ok(settled >= 4, `${settled}`);
+  assert.ok(settled >= 3, `${settled}`);
   draw(0, targetMs * 0.5);
   move(6, COSTS, 2);
   assert.equal(pace.level, settled);

@@ -77,7 +77,7 @@ export class PaceController {
   /** How many sizes pictures have had: frames of another one come late. */
   #size = 0;
   #changedAt = -Infinity;
-  #drawn = 0;
+  #drawn = LADDER[0];
   /** What the last frame took, of those that are known. */
   #lastMs = 0;
   /** What the last true image took, of those that are known. */
@@ -100,8 +100,8 @@ export class PaceController {
     const { level, reason, recent } = this.#pace;
     const frameMs = recent.length > 0 ? quantile(recent, 0.5) : null;
     return {
-      drawn: LADDER[this.#drawn].name,
-      moving: LADDER[level].name,
+      drawn: this.#drawn.name,
+      moving: this.#levels[level].name,
       reason,
       frameMs,
       lastMs: this.#lastMs || null,
@@ -124,17 +124,18 @@ export class PaceController {
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
     const level = isMotion ? this.#pace.level : 0;
-    this.#drawn = level;
+    this.#drawn = this.#levels[level];
     if (hasChanged || level === 0) this.stop();
     const { displayInterval } = this.#options.scheduler();
     if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, displayInterval));
-    return { level, levers: LADDER[level].levers, size: this.#size };
+    return { level, levers: this.#drawn.levers, size: this.#size };
   }
 
   #fit(pixels: number): void {
-    this.#levels = levelsFor(pixels);
+    const levels = levelsFor(pixels);
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
-    if (!isOther && this.#pace.level < this.#levels.length) return;
+    if (!isOther && levels.length === this.#levels.length) return;
+    this.#levels = levels;
     this.#pace = resized(this.#pace, pixels / this.#pixels, this.#levels);
     this.#pixels = pixels;
     this.#size++;
@@ -146,7 +147,7 @@ export class PaceController {
   };
 
   /** What a frame took that was drawn by a plan. */
-  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { atLeast, atMost }: FrameTime): void {
+  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { doneAt, atLeast, atMost }: FrameTime): void {
     if (!this.#options.isOn() || size !== this.#size) return;
     const { targetMs } = this;
     // What is in time at most, or too slow at least, is known well enough.
@@ -154,11 +155,7 @@ export class PaceController {
     const milliseconds = atMost > targetMs ? atLeast : atMost;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
-    this.#pace = keepPace(
-      this.#pace,
-      { now: performance.now(), level, milliseconds },
-      { targetMs, levels: this.#levels },
-    );
+    this.#pace = keepPace(this.#pace, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
     const isWhole = this.#pace.level === 0;
     if (isWhole || level > 0) this.#options.onPace(isWhole);
   }
@@ -168,7 +165,7 @@ export class PaceController {
     this.stop();
     this.#pace = INITIAL_PACE;
     this.#changedAt = -Infinity;
-    this.#drawn = 0;
+    this.#drawn = LADDER[0];
     this.#lastMs = 0;
     this.#wholeMs = 0;
   }

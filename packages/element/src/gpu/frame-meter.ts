@@ -1,7 +1,9 @@
 import type { QueueClock } from '@gaussian-splat/renderer';
 
-/** How long a frame kept the GPU, ms. Both are one where the page's thread was free when it was done. */
+/** How long a frame kept the GPU, ms: one figure where the page's thread was free when it was done. */
 export interface FrameTime {
+  /** When it was done, by the page's clock. */
+  readonly doneAt: number;
   readonly atLeast: number;
   readonly atMost: number;
 }
@@ -74,7 +76,8 @@ export class FrameMeter {
       ([began, done]) => {
         clock.note(done.now - submitted);
         const atMost = clock.spent(began.since, submitted, done.now);
-        onTime({ atMost, atLeast: Math.min(atMost, clock.spent(began.now, submitted, done.since)) });
+        const atLeast = Math.min(atMost, clock.spent(began.now, submitted, done.since));
+        onTime({ doneAt: done.now, atLeast, atMost });
       },
       // A lost device has been noticed elsewhere.
       () => undefined,

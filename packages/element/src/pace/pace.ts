@@ -147,7 +147,7 @@ function bestOf(times: readonly number[], targetMs: number): number {
 }
 
 function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeModel, rules: PaceRules): Pace | null {
-  const { level, recent, direction, turnedAt } = pace;
+  const { level, recent, direction, changedAt, turnedAt } = pace;
   const { targetMs } = rules;
   const usual = times[level];
   let to = bestOf(times, targetMs);
@@ -157,7 +157,12 @@ function whereLate(pace: Pace, now: number, times: number[], { isKnown }: TimeMo
       times.map((time, other) => (isKnown[other] ? time : Infinity)),
       targetMs,
     );
-  if (to === level) return null;
+  if (to === level) {
+    // Where nothing is left below and nothing known above, it may be no dearer.
+    const isLost =
+      level === rules.levels.length - 1 && now - changedAt > SETTLE_MS && !isKnown.slice(0, level).some(Boolean);
+    return isLost && level > 0 ? change(pace, now, level - 1, 'trial', times[level - 1]) : null;
+  }
   const isTurn = direction !== (to > level ? 'down' : 'up');
   const isSoon = now - turnedAt < HOLD_MS;
   const isUrgent = to > level && usual > FAR_TOO_LATE * targetMs && times[to] <= targetMs;
@@ -208,11 +213,11 @@ function change(pace: Pace, now: number, level: number, reason: PaceReason, pred
  * many of them as before, for they take no longer.
  */
 export function resized(pace: Pace, growth: number, levels: readonly Level[]): Pace {
-  const { recent, believed, load, measured } = INITIAL_PACE;
   const level = Math.min(pace.level, levels.length - 1);
   const pixels = inPixels(levels[level], level);
   const asMany = levels.findIndex((other, number) => growth * inPixels(other, number) <= pixels);
-  return { ...pace, level: asMany === -1 ? level : Math.min(level, asMany), recent, believed, load, measured };
+  const { reason, sampledAt, movedAt } = pace;
+  return { ...INITIAL_PACE, level: asMany === -1 ? level : Math.min(level, asMany), reason, sampledAt, movedAt };
 }
 
 /** The smallest of the values that at least this share of them do not exceed. */

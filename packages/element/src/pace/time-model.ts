@@ -63,8 +63,8 @@ export function modelOf(levels: readonly Level[], measured: MeasuredLevels, { no
 }
 
 /** The line of least squares, stiff where the points do not say how steep it is. */
-function lineThrough(points: readonly { x: number; y: number }[], whole = Infinity): (pixels: number) => number {
-  if (points.length === 0) return (pixels) => (whole / WHOLE) * supposed(pixels);
+function lineThrough(points: readonly { x: number; y: number }[], whole?: number): (pixels: number) => number {
+  if (points.length === 0) return (pixels) => ((whole ?? 1) / WHOLE) * supposed(pixels);
   const mean = (of: (point: { x: number; y: number }) => number): number =>
     points.reduce((sum, point) => sum + of(point), 0) / points.length;
   const [x, y] = [mean((point) => point.x), mean((point) => point.y)];
@@ -72,8 +72,8 @@ function lineThrough(points: readonly { x: number; y: number }[], whole = Infini
   const covariance = points.length * mean((point) => (point.x - x) * (point.y - y));
   const variance = points.length * mean((point) => (point.x - x) ** 2);
   const b = (covariance + STIFFNESS * slope) / (variance + STIFFNESS);
-  // Fewer pixels win no more than in proportion; more of them no more than the whole image takes less.
-  const least = Math.min(0, (whole / WHOLE - y) / Math.max(1 - x, STIFFNESS));
+  // Fewer pixels win no more than in proportion; more of them, where that is so at all, no more than the whole image lets hope.
+  const least = Math.min(0, ((whole === undefined ? y / 2 : whole / WHOLE) - y) / Math.max(1 - x, STIFFNESS));
   const held = Math.max(least, Math.min(b, y / x));
   return (pixels) => y + held * (pixels - x);
 }
