@@ -42,11 +42,8 @@ const stepped =
   (random: Random): Load =>
     step(times(curve, random(least, most)), times(curve, random(least, most)));
 
-/** Kinds of GPUs and loads; how many runs of all may turn twice in five seconds, once each, and how much longer than on the fastest rung frames may take where none is in time. */
-const kinds: Record<
-  string,
-  { readonly make: (random: Random) => Load; readonly restless?: number; readonly excess?: number }
-> = {
+/** Kinds of GPUs and loads, and how much longer than on the fastest rung frames may take where none is in time. */
+const kinds: Record<string, { readonly make: (random: Random) => Load; readonly excess?: number }> = {
   'the lowest rungs take as long as one another, all too long': {
     make: (random) => {
       const least = random(1.02, 2.5);
@@ -100,22 +97,20 @@ const kinds: Record<
     },
     excess: 1.32,
   },
-  'a step of an H200, close up': { make: stepped(STEEP, 0.3, 3), restless: 1 },
+  'a step of an H200, close up': { make: stepped(STEEP, 0.3, 3) },
   'a step of an H200, from afar': { make: stepped(FLAT, 0.3, 3) },
-  'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3), restless: 1 },
+  'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3) },
   'a wide GPU': { make: stepped(WIDE, 0.3, 1.6) },
   // The lowest takes so much longer than the fastest.
   'a wide GPU, too slow': { make: stepped(WIDE, 1.7, 4), excess: 1.09 },
   'a wide GPU, other work beside whole pictures': {
     make: (random) => step(disturbed(times(WIDE, random(0.3, 1.6))), disturbed(times(WIDE, random(0.3, 1.6)))),
-    restless: 1,
   },
   'a part that no rung makes cheaper': {
     make: (random) => {
       const share = random(0, 0.7);
       return step(withFixed(share, random(0.3, 3)), withFixed(share, random(0.3, 3)));
     },
-    restless: 1,
   },
 };
 
@@ -144,17 +139,15 @@ function draw(kind: (random: Random) => Load, seed: number): { frames: readonly 
   return { load, frames: run({ ...gpu, load: () => 1, shares }, RUN_MS).frames };
 }
 
-Object.entries(kinds).forEach(([name, { make, restless = 0, excess = 1.081 }], k) => {
+Object.entries(kinds).forEach(([name, { make, excess = 1.081 }], k) => {
   test(name, () => {
-    let turnedTwice = 0;
     const over: number[] = [];
     for (let i = 0; i < RUNS; i++) {
       const { frames, load } = draw(make, 1000 * (k + 1) + i);
       // The step itself may turn the level.
       const [early, late] = [frames.filter(({ at }) => at < load.at), frames.filter(({ at }) => at >= load.at)];
       const windows = restlessWindows(early) + restlessWindows(late);
-      assert.ok(windows <= 1, `run ${i}: ${windows} times two changes of direction in five seconds`);
-      turnedTwice += windows;
+      assert.equal(windows, 0, `run ${i}: ${windows} times two changes of direction in five seconds`);
       for (const [from, to, curve] of [
         [0, load.at, load.before],
         [load.at, RUN_MS, load.after],
@@ -174,11 +167,8 @@ Object.entries(kinds).forEach(([name, { make, restless = 0, excess = 1.081 }], k
           );
       }
     }
-    assert.ok(turnedTwice <= restless, `${turnedTwice} of ${RUNS} runs turn twice in five seconds`);
     assert.ok(Math.max(1, ...over) <= excess, `${Math.max(...over)} of what the fastest rung takes`);
-    console.log(
-      `${name}: ${turnedTwice} of ${RUNS} runs turn twice in five seconds; at worst ${Math.max(1, ...over).toFixed(2)} of the fastest rung`,
-    );
+    console.log(`${name}: at worst ${Math.max(1, ...over).toFixed(2)} of the fastest level`);
   });
 });
 
