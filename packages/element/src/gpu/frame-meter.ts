@@ -16,7 +16,8 @@ const LATE_MS = 2;
 class ThreadWatch {
   #waiting = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
-  /** When the next look is due, and when the last block began and ended. */
+  /** When the last look was and the next one is due, and when the last block began, at the earliest, and ended. */
+  #looked = 0;
   #due = 0;
   #block = { from: 0, to: 0 };
 
@@ -38,12 +39,13 @@ class ThreadWatch {
   }
 
   #next(milliseconds: number): void {
-    this.#due = performance.now() + milliseconds;
+    this.#looked = performance.now();
+    this.#due = this.#looked + milliseconds;
     this.#timer = setTimeout(this.#beat, milliseconds);
   }
 
   #note(now: number): void {
-    if (now > this.#due + LATE_MS) this.#block = { from: this.#due, to: now };
+    if (now > this.#due + LATE_MS) this.#block = { from: this.#looked, to: now };
   }
 
   readonly #beat = (): void => {

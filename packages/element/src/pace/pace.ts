@@ -47,6 +47,8 @@ export interface Pace {
 /** Frames whose median counts: a slow one now and then is no reason for anything. */
 const MEMORY = 9;
 const ENOUGH = 5;
+/** What takes less cannot be told from nothing, ms. */
+const NOTHING_MS = 0.01;
 /** Fewer, where all of them are too slow. */
 const LEAST = 3;
 /** The level is chosen to take this share of the target; it stays up to the other. */
@@ -100,7 +102,7 @@ export function keepPace(pace: Pace, sample: FrameSample, rules: PaceRules): Pac
 function observe(pace: Pace, { now, level, milliseconds }: FrameSample, { targetMs }: PaceRules): Pace {
   const hasRested = now - milliseconds - pace.sampledAt > REST_MS;
   const movedAt = hasRested ? now - milliseconds : pace.movedAt;
-  const recent = [...pace.recent, milliseconds].slice(-MEMORY);
+  const recent = [...pace.recent, Math.max(NOTHING_MS, milliseconds)].slice(-MEMORY);
   const usual = usualOf(recent);
   const isWaking = hasRested || now - movedAt < WAKING_MS;
   const step = isWaking ? 0 : Math.min(LONGEST_STEP_MS, now - pace.sampledAt);
