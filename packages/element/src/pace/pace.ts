@@ -66,7 +66,7 @@ const WAKING_MS = 400;
 /** Between a change and a climb, ms. */
 const SETTLE_MS = 350;
 /** Between two changes of direction, ms: five seconds and what times may be late. Longer by times where the last climb was regretted. */
-export const HOLD_MS = 5_200;
+const HOLD_MS = 5_200;
 const LONGER = 3;
 const LONGEST_HOLD_MS = 60_000;
 /** A fall so late may come sooner. */
