@@ -5,7 +5,7 @@ import { levelsFor, LADDER } from '../pace/ladder.js';
 import { INITIAL_PACE, keepPace, quantile, resized, type Pace, type PaceReason } from '../pace/pace.js';
 import { waitForRest } from '../pace/rest.js';
 
-/** Share of the display's interval that frames may take on the GPU: the page and its compositor need the rest. */
+/** Share of the display's interval that frames may take: the page and its compositor need the rest. */
 const SHARE_OF_INTERVAL = 0.8;
 /** A change so soon after another, ms, belongs to the same motion. */
 const MOTION_MS = 150;
@@ -13,12 +13,12 @@ const MOTION_MS = 150;
 const FRAMES_OF_MOTION = 2;
 const LONGEST_PAUSE_MS = 2_000;
 
-/** Pictures of so many times the pixels are others: what rungs take is measured anew. */
+/** Images of so many times the pixels are others: what levels take is measured anew. */
 const OTHER_SIZE = 1.25;
 
 /** How a frame is to be drawn. */
 export interface FramePlan {
-  /** Rung of the ladder; 0 is the true image. */
+  /** Number of the level; 0 is the whole image. */
   readonly level: number;
   readonly levers: Partial<FrameLevers> | undefined;
   /** Number of the size that pictures have. */
@@ -39,15 +39,15 @@ export interface FrameOccasion {
 
 /** What the controller says about itself. */
 export interface PaceReport {
-  /** Name of the rung that the last frame was drawn on; `whole` is the true image. */
+  /** Name of the level that the last frame was drawn with; `whole` is the image at rest. */
   readonly drawn: string;
-  /** Name of the rung for pictures in motion. */
+  /** Name of the level of frames in motion. */
   readonly moving: string;
   /** Why: see {@link PaceReason}. */
   readonly reason: PaceReason;
-  /** Median of the last frames on that rung, ms on the GPU; null while there are none. */
+  /** Median of the last frames on that level, ms: from when a frame could begin until its work was done; null while there are none. */
   readonly frameMs: number | null;
-  /** The last frame that was timed, at rest or in motion, ms on the GPU; null while there is none, and with a chosen quality. */
+  /** The last frame that was timed, at rest or in motion, ms; null while there is none, and with a chosen quality. */
   readonly lastMs: number | null;
   /** What a frame may take, ms. */
   readonly targetMs: number;
@@ -79,7 +79,7 @@ export class PaceController {
   #changedAt = -Infinity;
   #drawn = LADDER[0];
   /** What the last frame took, of those that are known. */
-  #lastMs = 0;
+  #lastMs: number | null = null;
   /** What the last true image took, of those that are known. */
   #wholeMs = 0;
   #restTimer: ReturnType<typeof setTimeout> | undefined;
@@ -104,7 +104,7 @@ export class PaceController {
       moving: this.#levels[level].name,
       reason,
       frameMs,
-      lastMs: this.#lastMs || null,
+      lastMs: this.#lastMs,
       targetMs: this.targetMs,
     };
   }
@@ -118,7 +118,7 @@ export class PaceController {
     this.#fit(pixels);
     const pause = Math.max(
       MOTION_MS,
-      Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * Math.max(this.#lastMs, this.#wholeMs)),
+      Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * Math.max(this.#lastMs ?? 0, this.#wholeMs)),
     );
     // Between two changes of one motion (a sequence of fewer pictures than the display's) what is drawn for other reasons is a part of it, until rest is due.
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
@@ -166,7 +166,7 @@ export class PaceController {
     this.#pace = INITIAL_PACE;
     this.#changedAt = -Infinity;
     this.#drawn = LADDER[0];
-    this.#lastMs = 0;
+    this.#lastMs = null;
     this.#wholeMs = 0;
   }
 
