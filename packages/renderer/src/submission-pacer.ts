@@ -78,7 +78,7 @@ export class SubmissionWatch {
   /** Call it after each submission. */
   note(): void {
     this.#submitted.push(performance.now());
-    this.#done.push(this.#clock.done());
+    this.#done.push(this.#clock.done().then(({ now }) => now));
   }
 
   /**

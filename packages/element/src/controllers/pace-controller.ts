@@ -1,5 +1,4 @@
-import type { FrameLevers } from '@gaussian-splat/renderer';
-import type { FrameTime } from '../gpu/frame-meter.js';
+import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
 import { levelsFor, LADDER } from '../pace/ladder.js';
 import { INITIAL_PACE, keepPace, quantile, resized, type Pace, type PaceReason } from '../pace/pace.js';
@@ -147,7 +146,7 @@ export class PaceController {
   };
 
   /** What a frame took that was drawn by a plan. */
-  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { doneAt, atLeast, atMost }: FrameTime): void {
+  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { doneAt, atLeast, atMost }: WorkTime): void {
     if (!this.#options.isOn() || size !== this.#size) return;
     const { targetMs } = this;
     // What is in time at most, or too slow at least, is known well enough.

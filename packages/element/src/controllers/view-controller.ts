@@ -1,9 +1,8 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import type { FrameLevers } from '@gaussian-splat/renderer';
+import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { QualityChoice } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
-import type { FrameTime } from '../gpu/frame-meter.js';
 import type { GpuScene, Rendering } from '../gpu/gpu-scene.js';
 import type { Frame } from '../live/frame-filter.js';
 import { LADDER } from '../pace/ladder.js';
@@ -179,7 +178,7 @@ export class ViewController implements FrameClient {
     const { levers } = plan;
     // Who has chosen a quality pays for no clock.
     const onTime =
-      this.#options.rendering().quality === 'auto' ? (time: FrameTime) => this.pace.sample(plan, time) : undefined;
+      this.#options.rendering().quality === 'auto' ? (time: WorkTime) => this.pace.sample(plan, time) : undefined;
     if (first !== undefined) {
       scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
       return;

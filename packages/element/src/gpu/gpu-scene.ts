@@ -8,12 +8,12 @@ import {
   type ProbeAnswer,
   type ProbePoint,
   type Quality,
+  type WorkTime,
 } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { Timeline } from '../live/live-model.js';
 import type { ReadCounts } from '../stats.js';
-import { FrameMeter, type FrameTime } from './frame-meter.js';
 import type { DeviceLease } from './shared-device.js';
 
 /** How much detail is drawn of a scene that has levels of it. */
@@ -65,7 +65,7 @@ export class GpuScene {
   #filter: FrameFilter | undefined;
   readonly #submissions: number;
   readonly #lease: DeviceLease;
-  readonly #meter: FrameMeter;
+  readonly #clock: QueueClock;
   #detail: DetailLevers;
   #levels: OwnedLevels | undefined;
   #destroyed = false;
@@ -87,7 +87,8 @@ export class GpuScene {
     this.bounds = bounds;
     this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
-    this.#meter = new FrameMeter(QueueClock.of(lease.device));
+    this.#clock = QueueClock.of(lease.device);
+    if (live) this.#clock.isShared = true;
   }
 
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
@@ -176,6 +177,7 @@ export class GpuScene {
   setFilter(filter: FrameFilter | undefined): void {
     this.#filter?.close();
     this.#filter = filter;
+    if (filter) this.#clock.isShared = true;
     this.#drawnSize = '';
   }
 
@@ -205,7 +207,7 @@ export class GpuScene {
    * Encodes and submits one frame.
    * @param onTime gets how long the frame kept the GPU, some frames later
    */
-  render(frame: Frame, onTime?: (time: FrameTime) => void): void {
+  render(frame: Frame, onTime?: (time: WorkTime) => void): void {
     const size = sizeOf(frame);
     if (size === this.#drawnSize) return this.#renderOnce(frame, onTime);
     this.#drawnSize = size;
@@ -214,8 +216,9 @@ export class GpuScene {
     });
   }
 
-  #renderOnce(frame: Frame, onTime: ((time: FrameTime) => void) | undefined): void {
-    if (onTime) this.#meter.measure(() => this.#draw(frame), onTime);
+  #renderOnce(frame: Frame, onTime: ((time: WorkTime) => void) | undefined): void {
+    // A lost device has been noticed elsewhere.
+    if (onTime) this.#clock.time(() => this.#draw(frame)).then(onTime, () => undefined);
     else this.#draw(frame);
   }
 
@@ -241,9 +244,7 @@ export class GpuScene {
     if (error !== null) throw outOfMemory('first frame', error);
     await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
     // The GPU has nothing to do now. Nobody waits for it.
-    QueueClock.of(this.device)
-      .calibrate()
-      .catch(() => undefined);
+    this.#clock.calibrate().catch(() => undefined);
   }
 
   /** Fulfils with what the device says if memory was lacking for some work. */

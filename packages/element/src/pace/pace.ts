@@ -28,7 +28,7 @@ export interface Pace {
   readonly reason: PaceReason;
   /** Times of the last frames on this level, oldest first, ms. */
   readonly recent: readonly number[];
-  /** What frames are believed to take, ms: their median, which it follows up only so fast. 0 before the first frame. */
+  /** What frames are believed to take, ms: what they usually do, which it follows up only so fast. 0 before the first frame. */
   readonly believed: number;
   /** When the last frame was known, and when the motion began that it belongs to. */
   readonly sampledAt: number;
@@ -44,7 +44,7 @@ export interface Pace {
   readonly measured: MeasuredLevels;
 }
 
-/** Frames whose median counts: a slow one now and then is no reason for anything. */
+/** Frames of which the usual ones count: a slow one now and then is no reason for anything. */
 const MEMORY = 9;
 const ENOUGH = 5;
 /** What takes less cannot be told from nothing, ms. */
@@ -116,9 +116,13 @@ function observe(pace: Pace, { now, level, milliseconds }: FrameSample, { target
   return { ...pace, recent, movedAt, sampledAt: now, load, measured, believed };
 }
 
-/** What frames take, ms; of few frames, the fastest. */
-const usualOf = (recent: readonly number[]): number =>
-  recent.length < ENOUGH ? Math.min(...recent) : quantile(recent, 0.5);
+/** What frames take, ms: the mean of the middle half, since the answers for two frames that wait for one another may come together; of few frames, the fastest. */
+function usualOf(recent: readonly number[]): number {
+  if (recent.length < ENOUGH) return Math.min(...recent);
+  const cut = recent.length >> 2;
+  const middle = [...recent].sort((x, y) => x - y).slice(cut, recent.length - cut);
+  return middle.reduce((sum, time) => sum + time, 0) / middle.length;
+}
 
 /** With what the whole image took at rest, right after a motion, where that is not known of motion: other work may make frames in motion longer. */
 function learnAtRest(pace: Pace, { now, milliseconds }: FrameSample, { levels }: PaceRules): Pace {
@@ -185,7 +189,8 @@ function whereInTime(pace: Pace, now: number, times: number[], { isKnown }: Time
   const to = times.findIndex((time, other) => time <= AIM * targetMs && mostOf(other) <= targetMs);
   if (to !== -1 && to < level) return change(pace, now, to, 'spare', times[to]);
   const above = level - 1;
-  const isTried = now - changedAt > TRIAL_MS && !isKnown[above] && times[above] + mostOf(above) <= 2 * targetMs;
+  const mayBe = times[above] <= targetMs && mostOf(above) <= FAR_TOO_LATE * targetMs;
+  const isTried = now - changedAt > TRIAL_MS && !isKnown[above] && mayBe;
   return isTried ? change(pace, now, above, 'trial', times[above]) : null;
 }
 

@@ -18,7 +18,7 @@ export class FrameClock {
   async time(count: number, draw: () => void): Promise<number> {
     const begin = performance.now();
     for (let frame = 0; frame < count; frame++) draw();
-    const done = await this.#clock.done();
-    return Math.max(0, done - begin - this.#clock.latency) / count;
+    const { now } = await this.#clock.done();
+    return Math.max(0, now - begin - this.#clock.latency) / count;
   }
 }

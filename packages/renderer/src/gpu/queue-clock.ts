@@ -1,18 +1,31 @@
 import { perDevice } from './kernel.js';
+import { threadWatch, type Told } from './thread-watch.js';
 
 /** Empty submissions of which the fastest tells how long a GPU with nothing to do takes to say so. */
 const TRIES = 4;
 /** What that takes is measured anew after so long, ms. */
 const VALID_MS = 60_000;
 
+/** How long work kept the GPU, ms: one figure where the page's thread was free when it was done. */
+export interface WorkTime {
+  /** When it was done, by the page's clock. */
+  readonly doneAt: number;
+  readonly atLeast: number;
+  readonly atMost: number;
+}
+
 /**
  * Times work as a page waits for it: until the queue says that it is done, less what waiting for nothing takes. The time between a GPU's own timestamps leaves out what the browser
- * does between passes, which can be most of a frame.
+ * does between passes, which can be most of a frame. Nothing waits for it, and nothing is submitted but to calibrate.
  */
 export class QueueClock {
+  /** Others, who do not wait by this clock, work on the queue, too: when their work is done is asked before each frame. */
+  isShared = false;
   readonly #device: GPUDevice;
   #latency = Infinity;
   #measuredAt = -Infinity;
+  /** When what was submitted was last known to be done. */
+  #last: Told = { now: -Infinity, since: -Infinity };
 
   /** The one of a device. */
   static of(device: GPUDevice): QueueClock {
@@ -30,27 +43,35 @@ export class QueueClock {
 
   /** Measures what waiting for nothing takes, by a few empty submissions, unless that was done of late. Call it where the GPU has nothing to do. */
   async calibrate(): Promise<void> {
-    const { queue } = this.#device;
     if (performance.now() - this.#measuredAt < VALID_MS) return;
     this.#measuredAt = performance.now();
     const times: number[] = [];
     for (let i = 0; i < TRIES; i++) {
       const begin = performance.now();
-      queue.submit([this.#device.createCommandEncoder({ label: 'gs.clock' }).finish()]);
-      times.push((await this.done()) - begin);
+      this.#device.queue.submit([this.#device.createCommandEncoder({ label: 'gs.clock' }).finish()]);
+      times.push((await this.done()).now - begin);
     }
     this.#latency = Math.min(...times);
   }
 
-  /** Waits until all that was submitted is done. @returns when that was known, by the page's clock */
-  async done(): Promise<number> {
-    await this.#device.queue.onSubmittedWorkDone();
-    return performance.now();
+  /** Waits until all that was submitted is done. @returns when the page was told, and when of what was done before */
+  async done(): Promise<Told & { readonly before: Told }> {
+    const told = await threadWatch.during(this.#device.queue.onSubmittedWorkDone());
+    const before = this.#last;
+    this.#last = told;
+    return { ...told, before };
   }
 
-  /** Takes note of how long somebody waited for work: no work takes less than none. */
-  note(milliseconds: number): void {
-    this.#latency = Math.min(this.#latency, milliseconds);
+  /** Times what `submit` submits. Rejects where the device is lost. */
+  async time(submit: () => void): Promise<WorkTime> {
+    if (this.isShared) this.done().catch(() => undefined);
+    submit();
+    const submitted = performance.now();
+    const { now, since, before } = await this.done();
+    // No work takes less than none.
+    this.#latency = Math.min(this.#latency, now - submitted);
+    const atMost = this.spent(before.since, submitted, now);
+    return { doneAt: now, atLeast: Math.min(atMost, this.spent(before.now, submitted, since)), atMost };
   }
 
   /**
