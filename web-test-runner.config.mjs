@@ -12,7 +12,7 @@ import { typescript } from './tests/element/browser/support/typescript.mjs';
 
 const otherOrigin = await startOtherOrigin();
 
-/** `npm run stability` runs whole recipes. */
+/** `npm run lab:stability` runs whole recipes. */
 const isFull = process.env.STABILITY === 'full';
 
 /** Chromium hides float16 in shaders on NVIDIA under Linux; elsewhere this does nothing. */

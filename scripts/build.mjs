@@ -4,6 +4,7 @@
  */
 import { copyFileSync, existsSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { writeAttributeRows } from '../packages/element/scripts/attributes.mjs';
 import { writeIntegrity } from '../packages/element/scripts/integrity.mjs';
 import { ensureDependencies, noteBuilt } from './lib/prepare.mjs';
 import { must, root } from './lib/run.mjs';
@@ -25,7 +26,7 @@ must(process.execPath, [
 writeLicences();
 console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
 if (isWhole) {
-  const { bundleThreadScript } = await import('./lib/thread-script.mjs');
+  const { bundleThreadScript } = await import('../packages/cli/src/lib/thread-script.mjs');
   await bundleThreadScript();
   describeElement();
   await buildDemo();
@@ -58,7 +59,9 @@ function writeLicences() {
 function describeElement() {
   const analyzer = join(root, 'node_modules/@custom-elements-manifest/analyzer/cem.js');
   const config = 'custom-elements-manifest.config.mjs';
-  must(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], { cwd: join(root, 'packages/element') });
+  const cwd = join(root, 'packages/element');
+  must(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], { cwd });
+  writeAttributeRows(JSON.parse(readFileSync(join(cwd, 'custom-elements.json'), 'utf8')));
 }
 
 /** demo/dist is the whole site: any static host can serve it. Pages by Eleventy, their scripts by esbuild, the apps by Vite. */

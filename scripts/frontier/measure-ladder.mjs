@@ -1,5 +1,5 @@
 /**
- * The work behind `npm run frontier:ladder`: what each rung of pictures in motion (packages/element/src/pace/ladder.ts) takes and loses, and fewer pixels alone for
+ * The work behind `npm run lab:frontier:ladder`: what each rung of pictures in motion (packages/element/src/pace/ladder.ts) takes and loses, and fewer pixels alone for
  * comparison, in Node. A GPU tells its own time. SwiftShader is a processor: its time is what it used of the processor, which others on the machine hardly change.
  */
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -13,9 +13,10 @@ import {
   packGaussians,
   Renderer,
   SpanTimer,
+  createRenderer,
 } from '@gaussian-splat/renderer';
 import { LADDER } from '../../packages/element/dist/pace/ladder.js';
-import { requestNodeAdapter } from '../lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { root } from '../lib/run.mjs';
 
 const SCENE = 'demo/scenes/skull.spz';
@@ -29,9 +30,9 @@ const device = await adapter.requestDevice(deviceDescriptor(adapter));
 const isProcessor = /swiftshader/i.test(`${adapter.info.architecture} ${adapter.info.description}`);
 const cloud = await readScene(new Uint8Array(readFileSync(join(root, SCENE))), { name: SCENE });
 const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
-// What `Renderer.create` finds there, without the minute that looking for it takes.
+// What `createRenderer` finds there, without the minute that looking for it takes.
 const ofProcessor = { rasterizer: 'quads', accumulation: 'rgba32float', threads: 'serial' };
-const renderer = isProcessor ? new Renderer(device, ofProcessor) : await Renderer.create(device);
+const renderer = isProcessor ? new Renderer(device, ofProcessor) : await createRenderer(device);
 const target = device.createTexture({ size: [WIDTH, HEIGHT], format: 'rgba8unorm', usage: 0x10 });
 
 /** A camera at a step of a turn around the scene, 0.5 degrees each, as near as to fill the height. */

@@ -7,6 +7,7 @@ import {
   checkManifest,
   GaussianBuffers,
   MemoryLedger,
+  packGaussians,
   packWithDetail,
   readPacked,
   Renderer,
@@ -56,6 +57,13 @@ test('a scene that has room for all its pages becomes the picture of the scene t
   }
   assert.ok(scene.progress.resident > 1);
   [streaming, loaded, scene, whole].forEach((owner) => owner.destroy());
+});
+
+test('a scene that is read back is what was uploaded', async () => {
+  const packed = packGaussians(cloud);
+  const scene = await GaussianBuffers.upload(await anyDevice(), packed);
+  assert.deepEqual(await readPacked(await anyDevice(), scene), packed);
+  scene.destroy();
 });
 
 test('a streamed scene is not read back as if it were whole', async () => {

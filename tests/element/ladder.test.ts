@@ -1,4 +1,4 @@
-/** The ladder of pictures in motion against what was measured of it (docs/frontier/ladder-*.json, written by `npm run frontier:ladder`). */
+/** The ladder of pictures in motion against what was measured of it (docs/frontier/ladder-*.json, written by `npm run lab:frontier:ladder`). */
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';

@@ -314,10 +314,15 @@ test('levels of detail are built once pictures have moved slowly for 1.5 s, rest
   context.mock.method(performance, 'now', () => now);
   let builds = 0;
   const detail = new DetailController({
-    detail: () => 'auto',
-    // Whoever builds asks for it; the scene here cannot be read, and that is said.
-    loader: () => (builds++, {} as SceneLoader),
-    ...{ memoryBudget: () => undefined, onChange: () => undefined, warn: () => undefined },
+    attributes: { detail: 'auto' },
+    services: {
+      // Whoever builds asks for it; the scene here cannot be read, and that is said.
+      get sceneLoader() {
+        builds++;
+        return {} as SceneLoader;
+      },
+    },
+    ...{ memoryBudget: undefined, splatsChanged: () => undefined, warn: () => undefined },
   });
   detail.update({ gaussians: { count: 60_000, pages: [] }, detail: {} } as unknown as GpuScene);
   const pass = (milliseconds: number): void => {

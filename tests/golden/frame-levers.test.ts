@@ -10,7 +10,7 @@ import {
   type RasterizerName,
 } from '@gaussian-splat/renderer';
 import { spanOf } from '../../packages/renderer/src/gpu/span-timer.js';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';

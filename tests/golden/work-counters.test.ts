@@ -17,7 +17,7 @@ import {
   type GaussianScene,
   type RendererOptions,
 } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { detailFolder } from '../support/detail-folder.js';
 import { writeTensors } from '../support/generator-tensors.js';
 import { cameraAt, room, thinned } from '../support/scenes.js';

@@ -1,6 +1,6 @@
 /** A device of Dawn in Node. Tests that use it run under `gpuEnvironment()` of scripts/lib. */
 import { chooseVariants } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { isFull } from './extent.js';
 
 const devices = new Map<string, Promise<GPUDevice>>();

@@ -18,7 +18,7 @@ export async function buildLevels(
   const { device, gaussians } = scene;
   const packed = await readPacked(device, gaussians, () => {
     signal.throwIfAborted();
-    // An economy frees them when it puts others in their place.
+    // A sequence frees them when it puts others in their place.
     if (scene.gaussians !== gaussians) throw new Error('other splats are on show');
   });
   signal.throwIfAborted();

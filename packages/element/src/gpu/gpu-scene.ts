@@ -54,8 +54,6 @@ export class GpuScene {
   #gaussians: OwnedGaussians;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
-  /** Called when the scene is destroyed. */
-  onDestroy: () => void = () => undefined;
   /** Called when the frame just drawn lacked something that the next one will have. */
   onIncomplete: () => void = () => undefined;
   /** Called with `out-of-memory/allocation` where a later frame than the first needs more memory than there is. */
@@ -129,13 +127,10 @@ export class GpuScene {
     return this.gaussians.pages.some(({ details }) => details !== undefined);
   }
 
-  /**
-   * Draws other splats from now on; levels that were built of those before are freed, and so are these.
-   * @param before `kept` where the ones hold the others
-   */
-  replaceGaussians(gaussians: OwnedGaussians, before: 'freed' | 'kept' = 'freed'): void {
+  /** Draws other splats from now on; levels that were built of those before are freed, and so are these. */
+  replaceGaussians(gaussians: OwnedGaussians): void {
     this.setLevels(undefined);
-    if (before === 'freed') this.#gaussians.destroy();
+    this.#gaussians.destroy();
     this.#gaussians = gaussians;
     this.#drawnSize = '';
     this.#filter?.invalidate();
@@ -281,7 +276,6 @@ export class GpuScene {
   destroy(): void {
     if (this.#destroyed) return;
     this.#destroyed = true;
-    this.onDestroy();
     this.setFilter(undefined);
     this.live?.close();
     this.#renderer.destroy();

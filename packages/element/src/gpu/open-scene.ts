@@ -136,7 +136,7 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
 }
 
 /**
- * A folder that `npm run detail` wrote is known by the name of its manifest, and so is streamed SOG, of which levels may be wanted or not.
+ * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, of which levels may be wanted or not.
  */
 export function isStreamed({ url, levels }: SceneRequest): boolean {
   return (

@@ -97,7 +97,7 @@ function parsed(bytes: Uint8Array, where: string): unknown {
   } catch (cause) {
     throw new GaussianSplatError('decode/header', {
       where,
-      expected: 'JSON that npm run detail wrote',
+      expected: 'JSON that gaussian-splat detail wrote',
       found: (cause as Error).message,
       remedy: 'check the address, or write the folder again',
       cause,
