@@ -1,5 +1,5 @@
 /**
- * The pace of moving pictures against many simulated GPUs, whose rungs win as little as on real ones, nothing at all or less than nothing: it comes to the truest rung
+ * The pace of moving pictures against many simulated GPUs, whose levels win as little as on real ones, nothing at all or less than nothing: it comes to the truest level
  * that is in time, or to one that is as fast as any, and turns at most once in five seconds.
  */
 import assert from 'node:assert/strict';
@@ -11,7 +11,7 @@ import { randomSource } from '../support/gpu.js';
 type Random = (from: number, to: number) => number;
 type Curve = readonly number[];
 
-/** What rungs take as multiples of the target, until a time in ms and after it. */
+/** What levels take as multiples of the target, until a time in ms and after it. */
 interface Load {
   readonly before: Curve;
   readonly after: Curve;
@@ -29,7 +29,7 @@ const RUN_MS = 30_000;
 const RUNS = 20;
 
 const times = (curve: Curve, load: number): Curve => curve.map((share) => share * load);
-/** What no rung makes faster. */
+/** What no level makes faster. */
 const floor = (least: number, load: number): Curve => COSTS.map((cost) => Math.max(least, load * cost));
 const withFixed = (share: number, load: number): Curve => COSTS.map((cost) => load * (share + (1 - share) * cost));
 /** Other work makes whole pictures longer. */
@@ -42,9 +42,9 @@ const stepped =
   (random: Random): Load =>
     step(times(curve, random(least, most)), times(curve, random(least, most)));
 
-/** Kinds of GPUs and loads, and how much longer than on the fastest rung frames may take where none is in time. */
+/** Kinds of GPUs and loads, and how much longer than on the fastest level frames may take where none is in time. */
 const kinds: Record<string, { readonly make: (random: Random) => Load; readonly excess?: number }> = {
-  'the lowest rungs take as long as one another, all too long': {
+  'the lowest levels take as long as one another, all too long': {
     make: (random) => {
       const least = random(1.02, 2.5);
       return always(floor(least, least * random(1, 3)));
@@ -68,7 +68,7 @@ const kinds: Record<string, { readonly make: (random: Random) => Load; readonly 
       return always(floor(least, least * random(1, 4)));
     },
   },
-  'no rung wins anything': {
+  'no level wins anything': {
     make: (random) =>
       always(
         times(
@@ -106,7 +106,7 @@ const kinds: Record<string, { readonly make: (random: Random) => Load; readonly 
   'a wide GPU, other work beside whole pictures': {
     make: (random) => step(disturbed(times(WIDE, random(0.3, 1.6))), disturbed(times(WIDE, random(0.3, 1.6)))),
   },
-  'a part that no rung makes cheaper': {
+  'a part that no level makes cheaper': {
     make: (random) => {
       const share = random(0, 0.7);
       return step(withFixed(share, random(0.3, 3)), withFixed(share, random(0.3, 3)));
@@ -167,7 +167,7 @@ Object.entries(kinds).forEach(([name, { make, excess = 1.081 }], k) => {
           );
       }
     }
-    assert.ok(Math.max(1, ...over) <= excess, `${Math.max(...over)} of what the fastest rung takes`);
+    assert.ok(Math.max(1, ...over) <= excess, `${Math.max(...over)} of what the fastest level takes`);
     console.log(`${name}: at worst ${Math.max(1, ...over).toFixed(2)} of the fastest level`);
   });
 });
@@ -188,7 +188,7 @@ test('a load that comes and goes: the pace learns to keep to the highest', () =>
   assert.ok(turnedTwice <= 2 * RUNS, `${turnedTwice} in ${RUNS} minutes`);
 });
 
-test('rungs that take something else every tenth of a second: two changes of direction in five seconds at most', () => {
+test('levels that take something else every tenth of a second: two changes of direction in five seconds at most', () => {
   let most = 0;
   for (let i = 0; i < RUNS; i++) {
     const random = within(70_000 + i);

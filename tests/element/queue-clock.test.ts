@@ -4,6 +4,7 @@ import { test, type TestContext } from 'node:test';
 import { QueueClock, type WorkTime } from '@gaussian-splat/renderer';
 import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
 import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
+import { LEVELS } from '../support/pace-gpu.js';
 
 const INTERVAL = 1000 / 60;
 /** Milliseconds until the GPU has got what is submitted, and until the page hears that it is done. */
@@ -139,6 +140,7 @@ async function turn(page: Page, work: number, looks = 0, onFrame: () => void = (
     frameBudget: () => Infinity,
     requestFrame: () => undefined,
     onPace: () => undefined,
+    levels: LEVELS,
   });
   let flying = 0;
   for (const end = page.now + 3_000; page.now < end;) {

@@ -9,10 +9,9 @@ import {
 } from '../../packages/element/src/controllers/pace-controller.js';
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import type { GpuScene } from '../../packages/element/src/gpu/gpu-scene.js';
-import { LADDER } from '../../packages/element/src/pace/ladder.js';
 import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
 import { waitForRest } from '../../packages/element/src/pace/rest.js';
-import { COSTS } from '../support/pace-gpu.js';
+import { COSTS, LEVELS } from '../support/pace-gpu.js';
 
 const INTERVAL = 1000 / 60;
 const PIXELS = 1e6;
@@ -26,6 +25,7 @@ const paceOf = (options: Partial<PaceOptions> = {}): PaceController =>
     frameBudget: () => Infinity,
     requestFrame: () => undefined,
     onPace: () => undefined,
+    levels: LEVELS,
     ...options,
   });
 
@@ -165,7 +165,7 @@ test('pictures that are small already are not made smaller, whatever they take',
     }
     return pace.plan({ now: 3000, pixels, hasChanged: true, goesOn: true }).level;
   };
-  const scaleOf = (level: number): number => LADDER[level].levers?.resolutionScale ?? 1;
+  const scaleOf = (level: number): number => LEVELS[level].levers?.resolutionScale ?? 1;
   for (const side of [32, 128, 256, 1024]) {
     pace.reset();
     const scale = scaleOf(levelOf(side ** 2));
@@ -194,7 +194,7 @@ test('an element of another size is measured anew: that fewer pixels won nothing
   move(20, 2e5, () => 18);
   assert.equal(pace.plan({ now, pixels: 2e5, hasChanged: true, goesOn: true }).level, 0, 'the small one is whole');
   assert.ok(move(1, 4e6, (level) => 20 * COSTS[level]) <= pace.targetMs, 'the large one is in time within a second');
-  // On the lowest rung that a small picture may have, where all of it is faster.
+  // On the lowest level that a small picture may have, where all of it is faster.
   move(5, 4e6, (level) => 20 * COSTS[level]);
   move(2, 4e6, (level) => 60 * COSTS[level]);
   const smallMs = [18, 18, 19, 24, 32];
@@ -218,12 +218,12 @@ test('an element that becomes smaller in motion shows as many pixels as before a
   };
   const [large, small] = [3072 * 1728, 1344 * 756];
   const before = move(3, large, (level) => 8 * COSTS[level]).at(-1)!;
-  assert.ok(COSTS[before] <= 1 / 8, LADDER[before].name);
-  // What an H200 took: a picture so small leaves it idle when it is made smaller still, and no rung spares enough for a climb.
+  assert.ok(COSTS[before] <= 1 / 8, LEVELS[before].name);
+  // What an H200 took: a picture so small leaves it idle when it is made smaller still, and no level spares enough for a climb.
   const taken = [0.76, 0.72, 0.7, 0.66, 0.62, 0.66, 0.8, 0.9, 0.96, 1.04];
   const [first, ...after] = move(8, small, (level) => taken[level]);
-  assert.ok(COSTS[first] * small <= COSTS[before] * large, `${LADDER[first].name}: more than before`);
-  assert.ok(COSTS[first - 1] * small > COSTS[before] * large, `${LADDER[first].name}: fewer than before`);
+  assert.ok(COSTS[first] * small <= COSTS[before] * large, `${LEVELS[first].name}: more than before`);
+  assert.ok(COSTS[first - 1] * small > COSTS[before] * large, `${LEVELS[first].name}: fewer than before`);
   assert.equal(after.at(-1), 0, after.join(' '));
   pace.stop();
 });

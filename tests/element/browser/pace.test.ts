@@ -64,7 +64,7 @@ describe('the pace of pictures', () => {
     }
     const [whole, paced] = [median(wholes), median(paceds)];
     await turnFor(auto, 500);
-    // A frame may just have been the last of its rung.
+    // A frame may just have been the last of its level.
     for (let i = 0; i < 10 && auto.stats?.pace.drawn !== auto.stats?.pace.moving; i++) await turnFor(auto, 100);
     const { pace, why } = auto.stats!;
     console.log(`${whole.toFixed(0)} ms a frame at full quality, ${paced.toFixed(0)} with ${pace.moving}`);
@@ -73,7 +73,7 @@ describe('the pace of pictures', () => {
     assertEqual(fixed.stats?.pace.drawn, 'whole', 'a page that chose a quality gets it');
     assertEqual(fixed.stats?.why, [], 'and nothing is done to it');
     assert(pace.moving !== 'whole' && pace.drawn === pace.moving, `drawn with ${pace.drawn}`);
-    // Where frames are too slow for long, a rung up is tried now and then.
+    // Where frames are too slow for long, a level up is tried now and then.
     assert(pace.reason === 'slow' || pace.reason === 'trial', `the reason is ${pace.reason}`);
     assert(why.length === 1 && why[0].includes(pace.moving), `says: ${why.join(' ')}`);
     assert(paced < 0.8 * whole, `${paced} ms instead of ${whole}`);

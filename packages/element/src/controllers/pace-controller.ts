@@ -1,6 +1,6 @@
 import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
-import { levelsFor, LADDER } from '../pace/ladder.js';
+import { levelsFor, LADDER, type Level } from '../pace/ladder.js';
 import { INITIAL_PACE, keepPace, quantile, resized, type Pace, type PaceReason } from '../pace/pace.js';
 import { waitForRest } from '../pace/rest.js';
 
@@ -61,6 +61,8 @@ export interface PaceOptions {
   readonly requestFrame: () => void;
   /** Called for each frame of a motion that was timed: whether such are drawn whole. */
   readonly onPace: (isWhole: boolean) => void;
+  /** Default: the element's. */
+  readonly levels?: readonly Level[];
 }
 
 /**
@@ -70,13 +72,15 @@ export interface PaceOptions {
 export class PaceController {
   readonly #options: PaceOptions;
   #pace: Pace = INITIAL_PACE;
-  #levels = LADDER;
+  readonly #all: readonly Level[];
+  /** Those that serve the image's size. */
+  #levels: readonly Level[];
   /** Of the pictures that the pace has measured. */
   #pixels = 0;
   /** How many sizes pictures have had: frames of another one come late. */
   #size = 0;
   #changedAt = -Infinity;
-  #drawn = LADDER[0];
+  #drawn: Level;
   /** What the last frame took, of those that are known. */
   #lastMs: number | null = null;
   /** What the last true image took, of those that are known. */
@@ -85,6 +89,8 @@ export class PaceController {
 
   constructor(options: PaceOptions) {
     this.#options = options;
+    this.#levels = this.#all = options.levels ?? LADDER;
+    this.#drawn = this.#all[0];
   }
 
   /** What a frame may take on the GPU, ms: what the page says, else a share of the display's interval, which elements that draw at the same time share. */
@@ -131,7 +137,7 @@ export class PaceController {
   }
 
   #fit(pixels: number): void {
-    const levels = levelsFor(pixels);
+    const levels = levelsFor(pixels, this.#all);
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
     if (!isOther && levels.length === this.#levels.length) return;
     this.#levels = levels;
@@ -164,7 +170,7 @@ export class PaceController {
     this.stop();
     this.#pace = INITIAL_PACE;
     this.#changedAt = -Infinity;
-    this.#drawn = LADDER[0];
+    this.#drawn = this.#all[0];
     this.#lastMs = null;
     this.#wholeMs = 0;
   }

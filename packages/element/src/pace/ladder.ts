@@ -21,7 +21,7 @@ function frameLeversOf({ depthKeyBits, transmittanceMin, alphaMin, visibleSets }
 }
 
 /**
- * Pixels, of those that are drawn, by which rungs may be off where there are levels of detail: next to nothing close up, and from afar less than fewer
+ * Pixels, of those that are drawn, by which levels may be off where there are levels of detail: next to nothing close up, and from afar less than fewer
  * pixels would cost (docs/decisions/0014).
  */
 const BALANCED_DETAIL = 0.5;
@@ -44,6 +44,6 @@ export const LADDER: readonly Level[] = [
 /** Fewest pixels that a level leaves: the parts of a smaller image have so many splats each that it takes the longer. */
 const LEAST_PIXELS = 8192;
 
-/** The levels that serve an image of so many pixels. */
-export const levelsFor = (pixels: number): readonly Level[] =>
-  LADDER.filter(({ scale }) => scale === 1 || scale ** 2 * pixels >= LEAST_PIXELS);
+/** Those of the levels that serve an image of so many pixels. */
+export const levelsFor = (pixels: number, levels: readonly Level[]): readonly Level[] =>
+  levels.filter(({ scale }) => scale === 1 || scale ** 2 * pixels >= LEAST_PIXELS);
