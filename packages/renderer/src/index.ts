@@ -8,6 +8,7 @@ export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussi
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 export type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
+export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
 export { packWithDetail } from './detail/pack-with-detail.js';

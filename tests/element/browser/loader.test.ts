@@ -9,6 +9,7 @@ import {
   show,
   showLoaded,
   until,
+  hurry,
 } from './support/harness.js';
 
 /** All workers that the page has started, and whether they were ended. */
@@ -24,6 +25,8 @@ window.Worker = class extends Worker {
     super.terminate();
   }
 };
+
+beforeEach(() => hurry(3));
 
 describe('the scene worker', () => {
   it('is one for all elements, ends when idle, and starts again', async () => {
