@@ -1,4 +1,4 @@
-import { QUALITIES, type FrameLevers, type Levers } from '@gaussian-splat/renderer';
+import { QUALITIES, type FrameLevers } from '@gaussian-splat/renderer';
 
 /** How frames in motion may be drawn. */
 export interface Level {
@@ -10,35 +10,30 @@ export interface Level {
   readonly scale: number;
 }
 
-/** Shares of the picture's width and height, each with about 0.7 of the pixels of the one before. */
-const SCALES = [0.84, 0.71, 0.59, 0.5, 0.42, 0.35, 0.25];
-/**
- * The levers of a quality that every frame gains by. An order that is kept spares most frames a sort, but those that make it anew take the longest, and a picture is in time if
- * those are (docs/decisions/0014).
- */
-function frameLeversOf({ depthKeyBits, transmittanceMin, alphaMin, visibleSets }: Levers): Partial<FrameLevers> {
-  return { depthKeyBits, transmittanceMin, alphaMin, visibleSets };
-}
+/** Shares of the image's width and height: each level has about half the pixels of the one before. */
+const SCALES = [0.71, 0.5, 0.35, 0.25];
 
 /**
  * Pixels, of those that are drawn, by which levels may be off where there are levels of detail: next to nothing close up, and from afar less than fewer
  * pixels would cost (docs/decisions/0014).
  */
-const BALANCED_DETAIL = 0.5;
-const FAST_DETAIL = 1;
+const [BALANCED_DETAIL, SMALLER_DETAIL] = [0.5, 1];
 
-const balanced = { ...frameLeversOf(QUALITIES.balanced), detail: BALANCED_DETAIL };
-const fast = { ...frameLeversOf(QUALITIES.fast), detail: FAST_DETAIL };
+const { depthKeyBits, transmittanceMin, visibleSets } = QUALITIES.balanced;
+const balanced: Partial<FrameLevers> = { depthKeyBits, transmittanceMin, visibleSets, detail: BALANCED_DETAIL };
 
 /**
- * All levels, from the whole image down: by what is lost, in dB, for each millisecond won. First the levers of the qualities `balanced` and `fast`, which
- * cost least, then pixels. Single objects, since the renderer knows levers by them.
+ * All levels, from the whole image down: the settings of the quality `balanced`, which lose least for what they win, then fewer pixels. Single objects, since
+ * the renderer knows settings by them. docs/frontier has the dB and the time of each.
  */
 export const LADDER: readonly Level[] = [
   { name: 'whole', levers: undefined, scale: 1 },
   { name: 'balanced', levers: balanced, scale: 1 },
-  { name: 'fast', levers: fast, scale: 1 },
-  ...SCALES.map((scale) => ({ name: `fast at ${scale}`, levers: { ...fast, resolutionScale: scale }, scale })),
+  ...SCALES.map((scale) => ({
+    name: `balanced at ${scale}`,
+    levers: { ...balanced, detail: SMALLER_DETAIL, resolutionScale: scale },
+    scale,
+  })),
 ];
 
 /** Fewest pixels that a level leaves: the parts of a smaller image have so many splats each that it takes the longer. */
