@@ -6,6 +6,9 @@ const TRIES = 4;
 /** What that takes is measured anew after so long, ms. */
 const VALID_MS = 60_000;
 
+/** Answers so soon after one another, ms, may have waited for the later one. */
+const TOGETHER_MS = 1;
+
 /** How long work kept the GPU, ms: one figure where the page's thread was free when it was done. */
 export interface WorkTime {
   /** When it was done, by the page's clock. */
@@ -26,6 +29,8 @@ export class QueueClock {
   #measuredAt = -Infinity;
   /** When what was submitted was last known to be done. */
   #last: Told = { now: -Infinity, since: -Infinity };
+
+  #previous: WorkTime | undefined;
 
   /** The one of a device. */
   static of(device: GPUDevice): QueueClock {
@@ -71,7 +76,14 @@ export class QueueClock {
     // No work takes less than none.
     this.#latency = Math.min(this.#latency, now - submitted);
     const atMost = this.spent(before.since, submitted, now);
-    return { doneAt: now, atLeast: Math.min(atMost, this.spent(before.now, submitted, since)), atMost };
+    const time = { doneAt: now, atLeast: Math.min(atMost, this.spent(before.now, submitted, since)), atMost };
+    const isTogether = before.now > submitted && now - before.now < TOGETHER_MS;
+    const previous = this.#previous;
+    this.#previous = time;
+    if (!isTogether) return time;
+    // The one before it has seemed to take the time of both.
+    const [atLeastBefore, atMostBefore] = [previous?.atLeast ?? 0, previous?.atMost ?? 0];
+    return { doneAt: now, atLeast: (atLeastBefore + time.atLeast) / 2, atMost: (atMostBefore + atMost) / 2 };
   }
 
   /**
