@@ -140,7 +140,7 @@ async function closenessOf(cloud: GaussianCloud, distances: readonly number[], o
   const scene = await StreamedGaussians.open(device, folder.manifest, { fetchPage: folder.fetchPage, arrivalMs: 0 });
   const [streaming, loaded] = [new Renderer(device, options), new Renderer(device, options)];
   // Pages come for whoever draws: quads are several times as fast here.
-  const fetching = new Renderer(device, { threads: 'serial', sort: 'serial', rasterizer: 'quads' });
+  const fetching = new Renderer(device, { threads: 'serial', rasterizer: 'quads' });
   const found: number[] = [];
   for (const distance of distances) {
     const camera = around(cloud, distance, distance);
