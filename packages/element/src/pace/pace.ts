@@ -58,6 +58,8 @@ const LATE = 1.05;
 const AS_FAST = 1.05;
 /** Frames are believed to take longer by so many times in a second at most: what grows faster is another tab, or the page, more often than the scene. */
 const GROWTH = Math.exp(2.8);
+/** Belief begins at this share of the target: a frame that seemed to take nothing would keep it low for long. */
+const LITTLE = 0.04;
 /** Milliseconds between two frames that count for this. */
 const LONGEST_STEP_MS = 100;
 /** After such a rest, ms, the clock of an idle GPU is low, for so long: frames say little. */
@@ -112,7 +114,7 @@ function observe(pace: Pace, { now, level, milliseconds }: FrameSample, { target
   // While the memory fills, the load is taken to be that of before the change.
   if (pace.recent.length < MEMORY && recent.length >= LEAST)
     measured = { ...measured, [level]: { share: quantile(recent, 0.5) / load, at: now, load } };
-  const believed = recent.length < LEAST ? pace.believed : Math.min(most, usual);
+  const believed = recent.length < LEAST ? pace.believed : Math.max(LITTLE * targetMs, Math.min(most, usual));
   return { ...pace, recent, movedAt, sampledAt: now, load, measured, believed };
 }
 

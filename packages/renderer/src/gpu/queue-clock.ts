@@ -6,6 +6,9 @@ const TRIES = 4;
 /** What that takes is measured anew after so long, ms. */
 const VALID_MS = 60_000;
 
+/** Answers so soon after one another, ms, may have waited for the later one. */
+const TOGETHER_MS = 1;
+
 /** How long work kept the GPU, ms: one figure where the page's thread was free when it was done. */
 export interface WorkTime {
   /** When it was done, by the page's clock. */
@@ -26,6 +29,8 @@ export class QueueClock {
   #measuredAt = -Infinity;
   /** When what was submitted was last known to be done. */
   #last: Told = { now: -Infinity, since: -Infinity };
+
+  #previousMs = 0;
 
   /** The one of a device. */
   static of(device: GPUDevice): QueueClock {
@@ -71,7 +76,12 @@ export class QueueClock {
     // No work takes less than none.
     this.#latency = Math.min(this.#latency, now - submitted);
     const atMost = this.spent(before.since, submitted, now);
-    return { doneAt: now, atLeast: Math.min(atMost, this.spent(before.now, submitted, since)), atMost };
+    const atLeast = Math.min(atMost, this.spent(before.now, submitted, since));
+    const previousMs = this.#previousMs;
+    this.#previousMs = atMost;
+    // Then the one before it has seemed to take the time of both.
+    const isTogether = before.now > submitted && now - before.now < TOGETHER_MS;
+    return { doneAt: now, atLeast, atMost: isTogether ? previousMs + atMost : atMost };
   }
 
   /**
