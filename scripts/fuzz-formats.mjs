@@ -3,10 +3,10 @@
  * refused by name, takes too long or too much memory ends the run and is named; the same seed makes it again.
  */
 import { parseArgs } from 'node:util';
-import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
+import { ensureDependencies, ensurePackages } from './lib/prepare.mjs';
 
 ensureDependencies();
-ensureBuilt();
+ensurePackages();
 const { register } = await import('tsx/esm/api');
 register();
 const { fuzzFormat, fuzzScenes } = await import('../tests/formats/support/fuzz.ts');

@@ -11,7 +11,6 @@ const IN_CHROMIUM = {
   soak: ['scripts/soak/run-soak.mjs'],
 };
 const IN_NODE = {
-  ladder: ['scripts/frontier/measure-ladder.mjs'],
   fuzz: ['--import', 'tsx', 'tests/stability/fuzz/run-fuzz.ts'],
   'detail-chart': ['scripts/charts/detail.mjs'],
   'sides-chart': ['scripts/charts/sides.mjs'],

@@ -19,7 +19,7 @@ import { shareDrawn, type DetailView } from '../support/detail-twin.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
-import { anyDevice } from '../support/node-device.js';
+import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { readRows } from '../support/read-rows.js';
 import { cameraAt } from '../support/scenes.js';
@@ -377,7 +377,4 @@ test('pages that come fade in: no picture differs by 40 dB from the one before; 
   assert.ok(faded.decibels >= 40 && popping.decibels < faded.decibels - 10);
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

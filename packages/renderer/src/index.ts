@@ -8,6 +8,7 @@ export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussi
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 export type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
+export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
 export { packWithDetail } from './detail/pack-with-detail.js';
@@ -44,3 +45,11 @@ export type { FrameStatistics } from './statistics.js';
 export type { Threads } from './stages/plan.js';
 export type { Variants } from './variants.js';
 export { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
+export {
+  joinShares,
+  packShare,
+  SHARE_SPLATS,
+  type JoinedShares,
+  type PackedShare,
+  type ShareFacts,
+} from './pack/shares.js';

@@ -13,7 +13,7 @@ import { writeStruct } from './gpu/struct.js';
 import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
-import { missingFormat, requireNotes, requireRequest, requireTextureSize } from './requirements.js';
+import { missingFormat, requireNotes, requireRequest, requireTarget, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -316,8 +316,10 @@ export class Renderer {
     const { width, height } = camera;
     if (!isTexture(target)) {
       if (targetFormat === undefined) throw missingFormat();
+      requireTarget(undefined, targetFormat, camera);
       return { view: target, format: targetFormat, isStorable: false, width, height };
     }
+    requireTarget(target, target.format, camera);
     let view = this.#views.get(target);
     if (view === undefined) this.#views.set(target, (view = target.createView(ONE_PICTURE)));
     const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;

@@ -1,7 +1,9 @@
+import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
-import { delay, DeviceLostError, isDeviceFailure, pageVisible, unrecoverable } from '../gpu/device-failures.js';
+import type * as comeBack from '../gpu/come-back.js';
+import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/device-failures.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
@@ -40,6 +42,16 @@ export interface SceneHost {
   emptied(): void;
   failed(error: ElementError): void;
   contextChanged(event: 'contextlost' | 'contextrestored'): void;
+}
+
+type DeviceBack = (typeof comeBack)['deviceBack'];
+
+/** Why no device is asked for any more, at first. */
+interface GivenUp {
+  readonly signal: AbortSignal;
+  readonly error: unknown;
+  readonly loss: GPUDeviceLostInfo | undefined;
+  readonly mayReturn: boolean;
 }
 
 /** So many failures in a row to bring a lost device back are final. */
@@ -208,6 +220,28 @@ export class SceneController implements ReactiveController {
     void this.#refine();
   }
 
+  /** No device comes, or none stays. The scene is loaded again once there is one, if it may be and nothing else is asked for. */
+  async #giveUp(request: SceneRequest, { signal: given, error, loss, mayReturn }: GivenUp): Promise<void> {
+    try {
+      const { deviceBack, unrecoverable } = await loadModule(
+        'the code for lost devices',
+        () => import('../gpu/come-back.js'),
+      );
+      if (given.aborted) return;
+      this.fail(unrecoverable(error, loss));
+      if (mayReturn) void this.#comeBack(request, deviceBack);
+    } catch (missing) {
+      if (!given.aborted) this.fail(missing);
+    }
+  }
+
+  async #comeBack(request: SceneRequest, deviceBack: DeviceBack): Promise<void> {
+    const lease = await deviceBack(this.#of.services.sharedDevice, this.#running.signal);
+    if (lease === undefined) return;
+    this.#error = null;
+    await this.#load(request).finally(() => lease.release());
+  }
+
   #tellRestored(): void {
     if (!this.#isContextLost) return;
     this.#isContextLost = false;
@@ -231,7 +265,11 @@ export class SceneController implements ReactiveController {
         if (error instanceof DeviceLostError) loss = error.info;
         this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
-        if (++failures >= MAX_FAILURES) return this.fail(unrecoverable(error, loss));
+        if (++failures >= MAX_FAILURES) {
+          // A scene that has cost one device after the other gets no more of them.
+          const mayReturn = !isNew && !(error instanceof DeviceLostError);
+          return this.#giveUp(request, { signal, error, loss, mayReturn });
+        }
         await delay(RETRY_DELAY_MS);
         if (signal.aborted) return;
       }

@@ -1,5 +1,5 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import type { FrameLevers } from '@gaussian-splat/renderer';
+import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
@@ -61,7 +61,7 @@ export class ViewController implements FrameClient {
   constructor(host: ViewHost) {
     this.#host = host;
     this.pace = new PaceController({
-      isOn: () => host.attributes.quality === 'auto' && (this.#scene?.isMeasurable ?? false),
+      isOn: () => host.attributes.quality === 'auto',
       scheduler: () => host.scheduler,
       frameBudget: () => host.attributes.frameBudget,
       requestFrame: () => this.requestFrame(),
@@ -174,7 +174,7 @@ export class ViewController implements FrameClient {
     const { levers } = plan;
     // Who has chosen a quality pays for no clock.
     const onTime =
-      this.#host.attributes.quality === 'auto' ? (spent: number) => this.pace.sample(plan, spent) : undefined;
+      this.#host.attributes.quality === 'auto' ? (time: WorkTime) => this.pace.sample(plan, time) : undefined;
     if (first !== undefined) {
       scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
       return;
@@ -190,7 +190,7 @@ export class ViewController implements FrameClient {
 
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
   #prepareSoon(scene: GpuScene, { target: { format } }: Frame): void {
-    if (scene.isPrepared || this.#host.attributes.quality !== 'auto' || !scene.isMeasurable) return;
+    if (scene.isPrepared || this.#host.attributes.quality !== 'auto') return;
     this.#preparing ??= setTimeout(() => {
       this.#preparing = undefined;
       if (this.#scene === scene) scene.prepare(MOVING_LEVERS, format);
