@@ -1,5 +1,6 @@
 import type { Attributes, DetailChoice } from '../attributes.js';
 import type { DetailLevers, GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
+import { LatestTask } from '../latest-task.js';
 import type { Services } from '../stage-host.js';
 
 /** Splats of a scene from which on levels are worth building unasked: below, what is slow is not the number of splats. */
@@ -29,7 +30,7 @@ export class DetailController {
   #own: DetailLevers = {};
   /** Splats whose levels are there, on their way, or not to be had. */
   #of: OwnedGaussians | undefined;
-  #running = new AbortController();
+  readonly #building = new LatestTask();
   #choice: DetailChoice = 'auto';
   #isPressed = false;
   /** How long pictures have moved with less than the whole, ms. */
@@ -49,7 +50,7 @@ export class DetailController {
     if (scene.hasOwnLevels) return;
     if (this.#choice === 'off') return this.#dismiss(scene);
     if (this.#of === scene.gaussians || !this.#isWorthIt(scene)) return;
-    void this.#build(scene);
+    this.#build(scene);
   }
 
   /** Tells of each picture in motion whether it was drawn whole. */
@@ -73,8 +74,7 @@ export class DetailController {
   }
 
   #stop(): void {
-    this.#running.abort();
-    this.#running = new AbortController();
+    this.#building.renew();
     this.#of = undefined;
   }
 
@@ -97,23 +97,24 @@ export class DetailController {
     return this.#isPressed && count >= LEAST_SPLATS && count <= MOST_SPLATS;
   }
 
-  async #build(scene: GpuScene): Promise<void> {
-    this.#stop();
+  #build(scene: GpuScene): void {
     const { gaussians } = scene;
     this.#of = gaussians;
-    const { signal } = this.#running;
-    try {
-      const { buildLevels } = await import('../detail/build-levels.js');
-      signal.throwIfAborted();
-      const levels = await buildLevels(scene, this.#host.services.sceneLoader, this.#host.memoryBudget, signal);
-      // A sequence may have put other splats in their place meanwhile.
-      if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
-      scene.setLevels(levels);
-      this.#host.splatsChanged();
-    } catch (error) {
-      if (signal.aborted || scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
-      const reason = error instanceof Error ? error.message : String(error);
-      this.#host.warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);
-    }
+    this.#building.run(
+      async (signal) => {
+        const { buildLevels } = await import('../detail/build-levels.js');
+        signal.throwIfAborted();
+        const levels = await buildLevels(scene, this.#host.services.sceneLoader, this.#host.memoryBudget, signal);
+        // A sequence may have put other splats in their place meanwhile.
+        if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
+        scene.setLevels(levels);
+        this.#host.splatsChanged();
+      },
+      (error) => {
+        if (scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
+        const reason = error instanceof Error ? error.message : String(error);
+        this.#host.warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);
+      },
+    );
   }
 }

@@ -7,6 +7,7 @@ import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/dev
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
+import { LatestTask } from '../latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
 import type { Services } from '../stage-host.js';
 import { timerMs } from '../attributes.js';
@@ -67,7 +68,7 @@ const MOST_SUBMISSIONS = 64;
 
 /**
  * Life of the element's scene: load, replace (the latest request wins), recover after the loss of the device, release.
- * Every request has its own AbortController; what still runs for an older one finds it aborted and does nothing.
+ * What still runs for an older request finds its signal aborted and does nothing.
  */
 export class SceneController implements ReactiveController {
   readonly #host: ReactiveControllerHost;
@@ -79,7 +80,7 @@ export class SceneController implements ReactiveController {
   /** What the scene on show was asked for by. */
   #shownRequest: SceneRequest | null = null;
   #request: SceneRequest | null = null;
-  #running = new AbortController();
+  readonly #running = new LatestTask();
   #releaseTimer: ReturnType<typeof setTimeout> | undefined;
   #waiters: (() => void)[] = [];
   /** A loss was told that no recovery has answered yet; another scene may do so. */
@@ -135,7 +136,7 @@ export class SceneController implements ReactiveController {
     if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
     if (this.isOther(request)) {
       const isSwap = this.#request !== null;
-      this.#abort();
+      this.#running.renew();
       this.#submissions = 1;
       this.#request = request;
       this.#error = null;
@@ -151,7 +152,7 @@ export class SceneController implements ReactiveController {
 
   /** Gives up: the scene cannot be drawn. */
   fail(error: unknown): void {
-    this.#abort();
+    this.#running.renew();
     const wasShown = this.#state === 'ready' || (this.#scene !== null && !this.isOutgoing);
     this.#drop(true);
     this.#error = toElementError(error);
@@ -197,8 +198,7 @@ export class SceneController implements ReactiveController {
     if (this.#state !== 'ready' || request === null || scene === null || scene.live || isStreamed(request)) return;
     const { shPrecision, shDegree } = scene.gaussians;
     if (request.sh === 'auto' || request.sh === shPrecision || shDegree === 0) return;
-    this.#abort();
-    const { signal } = this.#running;
+    const signal = this.#running.renew();
     try {
       await this.#open(request, signal, false, () => undefined);
     } catch {
@@ -208,9 +208,8 @@ export class SceneController implements ReactiveController {
 
   /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
   async #restore(request: SceneRequest, loss: GPUDeviceLostInfo): Promise<void> {
-    this.#abort();
+    const signal = this.#running.renew();
     this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
-    const { signal } = this.#running;
     this.#drop(false);
     if (!this.#isContextLost) this.#of.contextChanged('contextlost');
     this.#isContextLost = true;
@@ -330,14 +329,8 @@ export class SceneController implements ReactiveController {
     this.#spare(isPreview);
   }
 
-  /** Ends what runs, and leaves the picture alone. */
-  #abort(): void {
-    this.#running.abort();
-    this.#running = new AbortController();
-  }
-
   #clear(): void {
-    this.#abort();
+    this.#running.renew();
     this.#request = null;
     this.#drop(true);
     this.#error = null;
