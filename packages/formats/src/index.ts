@@ -14,3 +14,4 @@ export type { FileBytes } from './bytes.js';
 export { frameAt, framePath, parseSequence, type FramePattern, type SceneSequence } from './sequence.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { HEADER_BYTES, readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
+export { samplePreview } from './preview.js';

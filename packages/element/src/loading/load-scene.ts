@@ -2,6 +2,7 @@
 import { boundsOf, GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import {
   fetchScene,
+  HEADER_BYTES,
   isSequence,
   openPartAt,
   outOfMemory,
@@ -10,6 +11,7 @@ import {
   type LoadLimits,
 } from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
+import type { LargePly } from './large-ply.js';
 import type { PreviewSchedule } from './preview-schedule.js';
 import { ProgressSum } from './progress-sum.js';
 import type { LoadedScene, LoadedSequence, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
@@ -21,6 +23,21 @@ const PREVIEW_AFTER_MS = 300;
 /** Without the code of previews a scene comes all the same. */
 const none = (): undefined => undefined;
 
+/** What a load tells, and whom it asks. */
+export interface LoadListeners {
+  readonly onProgress: ProgressListener;
+  /** Absent: previews are not wanted. */
+  readonly onPreview?: PreviewListener | undefined;
+  /** Called before the thread is kept busy for a while, and while it is; with false when it has more time again. */
+  readonly onReading?: (isReading: boolean) => void;
+  /**
+   * Asks for other workers to share the packing with.
+   * @param most so many at most
+   * @param onHelper gets a way to each of them as soon as it is there
+   */
+  readonly askForHelp?: (most: number, onHelper: (port: MessagePort) => void) => void;
+}
+
 /**
  * Loads one scene, or the manifest of several. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's
  * reason once that is aborted.
@@ -28,9 +45,9 @@ const none = (): undefined => undefined;
 export async function loadScene(
   request: SceneRequest,
   signal: AbortSignal,
-  onProgress: ProgressListener,
-  onPreview?: PreviewListener,
+  listeners: LoadListeners,
 ): Promise<LoadedScene | LoadedSequence> {
+  const { onProgress, onPreview, onReading, askForHelp } = listeners;
   try {
     const { url, credentials } = request;
     const name = fileName(url);
@@ -48,12 +65,19 @@ export async function loadScene(
     let loading: Promise<PreviewSchedule> | undefined;
     const previews = (): Promise<PreviewSchedule> =>
       (loading ??= import('./preview-schedule.js').then(
-        (code) => new code.PreviewSchedule(name, signal, start, (cloud) => onPreview?.(pack(cloud))),
+        (code) => new code.PreviewSchedule(name, signal, start, (cloud) => onPreview?.(pack(cloud)), onReading),
       ));
+    const shared = askForHelp && new SharedReading(request, name, signal, listeners);
     const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
-      if (performance.now() - start >= PREVIEW_AFTER_MS) await (await previews().catch(none))?.onArrival(bytes, total);
+      // Of a PLY that is large there are previews of its own.
+      if (shared?.mayBeShared(bytes, total)) await (await shared.plyIn(bytes, total))?.onArrival(bytes);
+      else if (onPreview && performance.now() - start >= PREVIEW_AFTER_MS)
+        await (await previews().catch(none))?.onArrival(bytes, total);
     };
-    const bytes = await fetchScene(url, { ...options(), onArrival: onPreview && onArrival });
+    const bytes = await fetchScene(url, { ...options(), onArrival });
+    onReading?.(true);
+    const joined = await (await shared?.ply)?.finish(bytes);
+    if (joined) return joined;
     if (isSequence(bytes)) {
       const { parseSequence } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
       return parseSequence(bytes, name);
@@ -72,6 +96,7 @@ export async function loadScene(
       ...limits(),
     });
     signal.throwIfAborted();
+    onReading?.(true);
     if (cloud.levelRuns === undefined) return pack(cloud);
     const { packLevels } = await loadModule('the code that packs levels of detail', () => import('./pack-levels.js'));
     return packLevels(cloud, request.sh);
@@ -92,6 +117,40 @@ export const fileLimits = ({ maxBytes = Infinity, maxSeconds }: LoadLimits): Loa
   maxBytes: maxBytes / 2,
   maxSeconds,
 });
+
+/** Bytes of a PLY from which on several workers share its rows. */
+const LARGE_BYTES = 1 << 25;
+
+/** Finds out whether a file that is on its way is a PLY whose rows several workers can share. */
+class SharedReading {
+  readonly #of: readonly [name: string, request: SceneRequest, signal: AbortSignal, listeners: LoadListeners];
+  #isRefused = false;
+  /** Undefined for any other. */
+  ply: Promise<LargePly | undefined> | undefined;
+
+  constructor(request: SceneRequest, name: string, signal: AbortSignal, listeners: LoadListeners) {
+    this.#of = [name, request, signal, listeners];
+  }
+
+  /** True of large PLYs, but for those whose rows must be read in order, and where the page has set limits, which one reader keeps. */
+  mayBeShared(bytes: Uint8Array, total = 0): boolean {
+    const { maxSplats, maxBytes, maxSeconds } = this.#of[1].limits ?? {};
+    if ((maxSplats ?? maxBytes ?? maxSeconds) !== undefined) return false;
+    return total >= LARGE_BYTES && bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79 && !this.#isRefused;
+  }
+
+  async plyIn(bytes: Uint8Array, total = 0): Promise<LargePly | undefined> {
+    if (bytes.length >= HEADER_BYTES) this.ply ??= this.#open(bytes, total);
+    const ply = await this.ply;
+    this.#isRefused = this.ply !== undefined && ply === undefined;
+    return ply;
+  }
+
+  async #open(bytes: Uint8Array, total: number): Promise<LargePly | undefined> {
+    const { LargePly } = await loadModule('the code that shares the reading of PLY', () => import('./large-ply.js'));
+    return LargePly.open(bytes, total, ...this.#of);
+  }
+}
 
 /**
  * Last part of the URL's path: what people call the file, and whose extension tells formats without a signature. A `blob:`

@@ -10,6 +10,7 @@ const GROWTH = 1.6;
 export class PreviewSchedule {
   readonly #name: string;
   readonly #signal: AbortSignal;
+  readonly #onReading: ((isReading: boolean) => void) | undefined;
   readonly #show: (cloud: GaussianCloud) => void;
   readonly #start: number;
   #spentMs = 0;
@@ -20,9 +21,17 @@ export class PreviewSchedule {
   /**
    * @param start when the load began, ms
    * @param show packs and posts a preview
+   * @param onReading called before and after it is read
    */
-  constructor(name: string, signal: AbortSignal, start: number, show: (cloud: GaussianCloud) => void) {
+  constructor(
+    name: string,
+    signal: AbortSignal,
+    start: number,
+    show: (cloud: GaussianCloud) => void,
+    onReading?: (isReading: boolean) => void,
+  ) {
     this.#start = start;
+    this.#onReading = onReading;
     this.#name = name;
     this.#signal = signal;
     this.#show = show;
@@ -34,11 +43,13 @@ export class PreviewSchedule {
     const isDue = bytes.length >= this.#nextBytes && bytes.length !== total;
     if (!isDue || this.#spentMs > MAX_SHARE * elapsed) return;
     const began = performance.now();
+    this.#onReading?.(true);
     const cloud = await readPrefix(bytes, { name: this.#name, signal: this.#signal });
     if (cloud !== undefined) {
       this.#show(cloud);
       this.#shown = cloud.count;
     }
+    this.#onReading?.(false);
     this.#spentMs += performance.now() - began;
     this.#nextBytes = GROWTH * bytes.length;
   };
