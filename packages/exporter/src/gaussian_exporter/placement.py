@@ -123,8 +123,8 @@ def _of_file(model: onnx.ModelProto, opset: int, values: _Values) -> Iterator[Fi
             yield Finding("fallback", value.name, "shape", reason, "export fixed shapes", value.name)
         if values.types.get(value.name) == TensorProto.FLOAT16:
             reason = (
-                f"{value.name} is float16, which needs the device feature shader-f16 (Chromium hides it on NVIDIA under "
-                "Linux): without it the whole model runs on the CPU"
+                f"{value.name} is float16, which needs the device feature shader-f16 (Chromium hides it on NVIDIA "
+                "under Linux): without it the whole model runs on the CPU"
             )
             yield Finding("failure", value.name, "type", reason, "offer a float32 file, too", value.name)
 
@@ -177,7 +177,8 @@ def _types(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
 def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
     most = RULES["mostSplitOutputs"]
     if node.op_type == "Split" and len(node.output) > most:
-        reason = f"a Split into {len(node.output)} binds more buffers than a shader may, and the whole model runs on the CPU"
+        reason = f"a Split into {len(node.output)} binds more buffers than a shader may"
+        reason += ", and the whole model runs on the CPU"
         yield _of("failure", node, reason, f"split into at most {most}, or use Gather")
     if node.op_type == "Conv" and (channels := miscomputed_convolution(node, values.dims.get(node.input[1], []))):
         reason = f"WebGPU computes {channels[0]} channels to {channels[1]} wrongly, so the whole model runs on the CPU"
