@@ -52,7 +52,7 @@ def spacetime() -> Spacetime:
 def reference_of_spacetime(model: Spacetime, time: float) -> dict[str, Doubles]:
     """thirdparty/gaussian_splatting/renderer, train_ours_lite, with its basic function exp(-x^2)."""
     t = time - np.float64(model.centres)
-    motion = np.float64(model.motion)
+    motion: Any = np.float64(model.motion)
     at = model.positions + motion[:, 0:3] * t + motion[:, 3:6] * t * t + motion[:, 6:9] * t * t * t
     gate = np.exp(-((t / np.exp(np.float64(model.widths))) ** 2))
     return {
@@ -108,7 +108,7 @@ def reference_of_deform(model: Deform, time: float) -> dict[str, Doubles]:
     moment = code(np.array([[float(np.float32(time))]]), model.time_octaves)
     if model.time_network:
         moment = layer(model.time_network[1], np.maximum(layer(model.time_network[0], moment), 0))
-    place = code(np.float64(given.positions), 10)
+    place = code(given.positions.astype(np.float64), 10)
     codes = np.concatenate([place, np.repeat(moment, len(place), 0)], 1)
     x = codes
     for index, one in enumerate(model.layers):
@@ -169,8 +169,9 @@ def reference_of_4d(model: Gaussian4D, time: float) -> dict[str, Doubles]:
             cut = covariance(scale[None], model.rotations[i : i + 1])[0]
             sigma = scale_t
         else:
-            a, b, c, d = np.float64(model.rotations[i]) / np.linalg.norm(np.float64(model.rotations[i]))
-            p, q, r, s = np.float64(model.rotations_r[i]) / np.linalg.norm(np.float64(model.rotations_r[i]))
+            first: Any = np.float64(model.rotations[i]) / np.linalg.norm(np.float64(model.rotations[i]))
+            second: Any = np.float64(model.rotations_r[i]) / np.linalg.norm(np.float64(model.rotations_r[i]))
+            (a, b, c, d), (p, q, r, s) = first, second
             # Columns, as glm stores them.
             left = np.array([[a, -b, -c, -d], [b, a, -d, c], [c, d, a, -b], [d, -c, b, a]]).T
             right = np.array([[p, q, r, s], [-q, p, -s, r], [-r, s, p, -q], [-s, -r, q, p]]).T
@@ -262,7 +263,9 @@ def test_mip_splattings_filter_widens_and_fades(tmp_path: Path) -> None:
     found = read_cloud(write_ply(tmp_path / "a.ply", columns | {"filter_3D": width}))
     squared = np.exp(2 * np.float64(given.log_scales))
     assert error(np.exp(np.float64(found.log_scales)), np.sqrt(squared + 0.01)) < 1e-5
-    shares = np.sqrt(squared.prod(1) / (squared + 0.01).prod(1)) / (1 + np.exp(-np.float64(given.opacity_logits[:, 0])))
+    shares: Any = np.sqrt(squared.prod(1) / (squared + 0.01).prod(1)) / (
+        1 + np.exp(-np.float64(given.opacity_logits[:, 0]))
+    )
     assert error(1 / (1 + np.exp(-np.float64(found.opacity_logits[:, 0]))), shares) < 1e-5
 
 
@@ -312,8 +315,8 @@ def test_files_of_gsplat_and_nerfstudio(tmp_path: Path) -> None:
     # Without harmonics, colours are a sigmoid: what the page then shows of 0.5 + c Y is the same.
     state["_model.gauss_params.features_rest"] = torch.zeros(COUNT, 0, 3)
     torch.save({"pipeline": state}, file)
-    shown = 0.5 + 0.28209479177387814 * np.float64(read_cloud(file).sh[:, 0])
-    assert error(shown, 1 / (1 + np.exp(-np.float64(cloud(COUNT, 3).sh[:, 0])))) < 1e-6
+    shown: Any = 0.5 + 0.28209479177387814 * np.float64(read_cloud(file).sh[:, 0])
+    assert error(shown, 1 / (1 + np.exp(-cloud(COUNT, 3).sh[:, 0].astype(np.float64)))) < 1e-6
     torch.save({"splats": {**splats, "features": splats["means"]}}, file)
     with pytest.raises(ExportError, match=r"appearance optimisation"):
         read_cloud(file)

@@ -2,7 +2,7 @@
 import { Generator, type GeneratorOptions } from '@gaussian-splat/generator';
 import { acquireSession } from '@gaussian-splat/generator';
 import { assert, assertEqual } from '../../element/browser/support/harness.js';
-import { FIXTURES, makeDevice, numbersOf, ReadingSink, relativeError, runOnCpu } from './support.js';
+import { CAMERA, FIXTURES, makeDevice, numbersOf, ReadingSink, relativeError, runOnCpu } from './support.js';
 
 let device: GPUDevice;
 before(async () => (device = await makeDevice()));
@@ -47,6 +47,28 @@ for (const form of 'constant cast dequantized identity reshaped transposed strid
     generator.close();
   });
 }
+
+it('the place of a camera, -(R^T t), is what the file says it is, whatever the optimiser of the runtime makes of it', async () => {
+  const url = `${FIXTURES}spelled-eye.onnx`;
+  const c = Math.cos(1);
+  const s = Math.sin(1);
+  const worldToCamera = [c, 0, s, 1, 0, 1, 0, 2, -s, 0, c, 5, 0, 0, 0, 1] as const;
+  const eye = [-(c * 1 - s * 5), -2, -(s * 1 + c * 5)].map((x) => -0.1 * x);
+  const sink = new ReadingSink(device);
+  const generator = await Generator.open({ url }, device, { onError: reportError, compare: false });
+  generator.sink = sink;
+  for (const matrix of [CAMERA.worldToCamera, worldToCamera]) {
+    generator.request({ camera: { ...CAMERA, worldToCamera: matrix } });
+    await generator.idle;
+  }
+  const [rest, turned] = await Promise.all(
+    sink.runs.map(async ({ tensors }) => numbersOf(await tensors.positions, 'float32')),
+  );
+  // At the first camera R is 1, and the place is (0, 0, -4).
+  const moved = [0, 1, 2].map((i) => turned[i] - rest[i] + [0, 0, 0.4][i]);
+  for (const i of [0, 1, 2]) assert(Math.abs(moved[i] - eye[i]) < 1e-4, `${moved.join(' ')} is not ${eye.join(' ')}`);
+  generator.close();
+});
 
 it('what no list knows is found by the comparison: the model goes on on the CPU, with the reason, and what is on show is made anew', async () => {
   const url = `${FIXTURES}spelled-hidden.onnx`;

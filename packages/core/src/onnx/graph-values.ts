@@ -42,6 +42,8 @@ export class GraphValues {
   isFolded({ inputs, operator }: OnnxNode): boolean {
     // The runtime draws random numbers anew in every run.
     if (/^(Random|Bernoulli|Multinomial|Dropout)/.test(operator)) return false;
+    // Of a tensor of fixed shape the runtime knows it beforehand.
+    if (operator === 'Shape' && this.dimsOf(inputs[0])?.every((dim) => dim !== null)) return true;
     return operator === 'Constant' || (inputs.length > 0 && inputs.every((name) => name === '' || this.isConstant(name)));
   }
 
@@ -76,6 +78,11 @@ export class GraphValues {
       const axes = lists?.axes ?? this.#integersOf(inputs[1], depth);
       if (!from || !axes) return undefined;
       return operator === 'Unsqueeze' ? unsqueezed(from, axes) : squeezed(from, axes);
+    }
+    if (operator === 'Slice' || operator === 'Neg') return from?.map(() => null);
+    if (operator === 'Gather' && from) {
+      const index = this.dimsOf(inputs[1], depth);
+      return index && [...index, ...from.slice(1)].map(() => null);
     }
     // Operators of two arguments: weights that are scaled, or added to.
     if (['Mul', 'Add', 'Sub', 'Div'].includes(operator)) {

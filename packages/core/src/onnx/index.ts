@@ -14,6 +14,7 @@ export {
   gpuFindings,
   gpuNotes,
   miscomputedConvolutions,
+  misfusedProducts,
   uncastableTypes,
   type Convolution,
   type GpuFinding,

@@ -67,6 +67,21 @@ function convolutionOf({ inputs: [, weights], numbers, lists }: OnnxNode, values
   return { inputs: perGroup * group, outputs, kernel: sizes, strides: lists?.strides ?? sizes.map(() => 1), group };
 }
 
+/**
+ * Products that ONNX Runtime's optimiser makes another of (onnxruntime 1.30 and 1.31, CPU): a turned matrix times a vector, as in the place of a
+ * camera, loses its transposition when both become one operator. Sessions of such files are made without fusions.
+ */
+export function misfusedProducts(header: OnnxHeader): string[] {
+  const values = new GraphValues(header);
+  return header.nodes.filter((node) => isMisfused(node, values)).map(({ outputs }) => outputs[0]);
+}
+
+const isMisfused = ({ operator, inputs }: OnnxNode, values: GraphValues): boolean =>
+  operator === 'MatMul' &&
+  values.makerOf(inputs[0])?.operator === 'Transpose' &&
+  !values.isConstant(inputs[0]) &&
+  values.dimsOf(inputs[1])?.length === 1;
+
 /** Outputs that are the same in every run: they hang on constants alone. */
 export function constantOutputs(header: OnnxHeader): Set<string> {
   const values = new GraphValues(header);
@@ -193,6 +208,10 @@ const sizeRule: Rule = function* (node, _, values) {
       const reason = `WebGPU computes ${convolution.inputs} channels to ${convolution.outputs} wrongly, so the whole model runs on the CPU`;
       yield of('wrong', node, reason, 'pad the channels going in to a multiple of 4');
     }
+  }
+  if (isMisfused(node, values)) {
+    const reason = "ONNX Runtime's optimiser loses the transposition of a matrix times a vector, so pages load the file without fusions";
+    yield of('slow', node, reason, 'make the vector a matrix of one column: (R.T @ t[:, None])[:, 0]');
   }
   if (operator === 'CumSum') {
     const longest = Math.max(0, ...(values.dimsOf(inputs[0]) ?? []).map((size) => size ?? 0));

@@ -73,6 +73,7 @@ class _Values:
             # Operators of a foreign domain; what the file itself declares must do.
             graph = model.graph
         self.axis = _axis_of_instances(model)
+        self.makers = {name: node for node in graph.node for name in node.output}
         self.functions = {(function.domain, function.name) for function in model.functions}
         self.constants = {initializer.name for initializer in graph.initializer}
         self.constants |= {node.output[0] for node in graph.node if node.op_type == "Constant"}
@@ -92,12 +93,19 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
     found = list(_of_file(model, opset, values))
     for node in model.graph.node:
         # What hangs on constants alone is computed once, when the session is made.
-        if node.input and all(name in values.constants or not name for name in node.input):
+        if is_folded(node, values):
             values.constants.update(node.output)
             found += _of_constants(node, values)
             continue
         found += [finding for rule in _RULES for finding in rule(node, opset, values)]
     return [*found, *_of_copies(model, values)]
+
+
+def is_folded(node: onnx.NodeProto, values: _Values) -> bool:
+    """Whether a node is computed when the session is made: of constants, or the shape of a tensor of fixed shape."""
+    if node.op_type == "Shape" and None not in values.dims.get(node.input[0], [None]):
+        return True
+    return bool(node.input) and all(name in values.constants or not name for name in node.input)
 
 
 def _of_copies(model: onnx.ModelProto, values: _Values) -> Iterator[Finding]:
@@ -183,6 +191,11 @@ def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Findin
     if node.op_type == "Conv" and (channels := miscomputed_convolution(node, values.dims.get(node.input[1], []))):
         reason = f"WebGPU computes {channels[0]} channels to {channels[1]} wrongly, so the whole model runs on the CPU"
         yield _of("wrong", node, reason, "pad the channels going in to a multiple of 4")
+    maker = values.makers.get(node.input[0]) if node.op_type == "MatMul" else None
+    if maker is not None and maker.op_type == "Transpose" and len(values.dims.get(node.input[1], [0, 0])) == 1:
+        reason = "ONNX Runtime's optimiser loses the transposition of a matrix times a vector"
+        remedy = "make the vector a matrix of one column: (R.T @ t[:, None])[:, 0]"
+        yield _of("slow", node, f"{reason}, so pages load the file without fusions", remedy)
     if node.op_type == "CumSum":
         longest = max((size or 0 for size in values.dims.get(node.input[0], [])), default=0)
         if longest > RULES["longestCumSum"]:

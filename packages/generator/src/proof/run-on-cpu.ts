@@ -32,7 +32,14 @@ const SCRIPT = `onmessage = async ({ data: { script, wasm, run } }) => {
     ort.env.wasm.numThreads = 1;
     ort.env.wasm.wasmBinary = wasm;
     const { externalData, freeDimensionOverrides } = run;
-    const options = { executionProviders: ['wasm'], logSeverityLevel: 4, externalData, freeDimensionOverrides };
+    const options = {
+      executionProviders: ['wasm'],
+      // As the file says it: fusions have computed something else.
+      graphOptimizationLevel: 'basic',
+      logSeverityLevel: 4,
+      externalData,
+      freeDimensionOverrides,
+    };
     const session = await ort.InferenceSession.create(run.model, options);
     const feeds = {};
     for (const [name, { dtype, data, dims }] of Object.entries(run.feeds)) feeds[name] = new ort.Tensor(dtype, data, dims);

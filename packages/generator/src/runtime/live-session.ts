@@ -1,4 +1,4 @@
-import { ContractError } from '@gaussian-splat/core';
+import { ContractError, misfusedProducts } from '@gaussian-splat/core';
 import type { InferenceSession, Tensor } from 'onnxruntime-web/webgpu';
 import {
   elementsOf,
@@ -98,9 +98,12 @@ export class LiveSession {
       preferredOutputLocation: 'gpu-buffer',
       enableGraphCapture: kind === 'captured',
     };
+    // On the CPU, and where the runtime's fusions are known to compute something else, the graph runs as it is written.
+    const isFused = kind !== 'wasm' && misfusedProducts(model.header).length === 0;
     const session = await runtime.exclusive(() =>
       runtime.ort.InferenceSession.create(model.bytes, {
         ...options,
+        graphOptimizationLevel: isFused ? 'all' : 'basic',
         ...(kind === 'wasm' ? { executionProviders: ['wasm'] } : onGpu),
       }),
     );

@@ -53,7 +53,7 @@ def cloud_of_vertices(vertices: Vertices) -> Cloud:
 
 
 def usable_degree(rest: float, where: Path) -> None:
-    """Raises checkpoint/unsupported for harmonics of another degree than 0 to 3; `rest`: coefficients after the first."""
+    """Raises checkpoint/unsupported for harmonics of a degree above 3; `rest`: coefficients after the first."""
     if rest not in (0, 3, 8, 15):
         raise ExportError(
             "checkpoint/unsupported",
