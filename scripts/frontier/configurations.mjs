@@ -23,8 +23,6 @@ export const configurations = [
   { name: 'stop at 1/1000', tier: 'lever', options: { transmittanceMin: 1e-3 } },
   { name: 'stop at 1/255', tier: 'lever', options: { transmittanceMin: 1 / 255 } },
   { name: 'stop at 1/64', tier: 'lever', options: { transmittanceMin: 1 / 64 } },
-  { name: 'occluded below 1/100', tier: 'lever', options: { rasterizer: 'tiles', occludedBelow: 0.01 } },
-  { name: 'occluded below 1/10', tier: 'lever', options: { rasterizer: 'tiles', occludedBelow: 0.1 } },
   { name: 'alpha from 2/255', tier: 'lever', options: { alphaMin: 2 / 255 } },
   { name: 'alpha from 4/255', tier: 'lever', options: { alphaMin: 4 / 255 } },
   { name: 'alpha from 8/255', tier: 'lever', options: { alphaMin: 8 / 255 } },

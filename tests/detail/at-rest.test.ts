@@ -59,7 +59,7 @@ async function open(
 
 const target = async (): Promise<GPUTexture> =>
   (await anyDevice()).createTexture({ size: [lens.width, lens.height], format: 'rgba8unorm', usage: 0x10 });
-const renderer = async (): Promise<Renderer> => new Renderer(await anyDevice(), { threads: 'serial', sort: 'serial' });
+const renderer = async (): Promise<Renderer> => new Renderer(await anyDevice(), { threads: 'serial' });
 
 test('within a budget of splats and a pool that is full, a view at rest comes to rest', async () => {
   const places = [0, 1, 2, 3, 4, 5].map((k): Vector3 => [14 * (k % 3), 0, 14 * Math.floor(k / 3)]);

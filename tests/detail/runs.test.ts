@@ -98,7 +98,7 @@ test(
       );
     const [levels, finest] = await Promise.all([upload('all'), upload(3)]);
     assert.equal(levels.leafCount, 31_000);
-    const renderer = new Renderer(device, { threads: 'serial', sort: 'serial' });
+    const renderer = new Renderer(device, { threads: 'serial' });
     let last = Infinity;
     for (const distance of [2, 6, 18]) {
       const camera = cameraAt([distance, -distance / 2, 0], [0, -0.5, 0], { width: 96, height: 64, near: 0.01 });

@@ -21,7 +21,7 @@ import { countWork } from '../support/work-counters.js';
 
 const MIXES: readonly Partial<FrameLevers>[] = [
   { depthKeyBits: 16, resolutionScale: 0.6, shDegree: 0 },
-  { resolutionScale: 0.35, depthKeyBits: 16, alphaMin: 4 / 255, transmittanceMin: 0.05, occludedBelow: 0.1 },
+  { resolutionScale: 0.35, depthKeyBits: 16, alphaMin: 4 / 255, transmittanceMin: 0.05 },
 ];
 
 const size = { width: 144, height: 70 };
@@ -143,7 +143,7 @@ test('values that a lever does not know are refused', async () => {
   for (const levers of [...ofFrames, ...degrees, { visibleSets: 'yes' }]) {
     for (const use of refused(levers)) assert.throws(use, { code: 'argument/value' }, JSON.stringify(levers));
   }
-  const names = { rasterizer: 'tile', sort: 'quick', threads: 'many', accumulation: 'rgba8unorm' };
+  const names = { rasterizer: 'tile', threads: 'many', accumulation: 'rgba8unorm' };
   for (const [name, found] of Object.entries(names)) {
     assert.throws(() => new Renderer(device, { [name]: found }), { code: 'argument/value', found });
   }

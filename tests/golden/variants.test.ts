@@ -97,7 +97,6 @@ test('a device that is lost while variants are tried leaves the choice for its a
   ] as const) {
     entries.clear();
     if (isKnown) entries.set(key, kept);
-    // All ways to sort are tried where the adapter does not call itself a fallback.
     const device = await deviceLikeAny();
     const choosing = chooseVariants(device, { store });
     if (milliseconds > 0) await new Promise((resolve) => setTimeout(resolve, milliseconds));
@@ -132,7 +131,7 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
   const make = device.createComputePipeline.bind(device);
   device.createComputePipeline = (descriptor) => (pipelines++, make(descriptor));
   const begun = await startVariants(device, { store, quickMs: Infinity });
-  assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel', sort: 'shared8' });
+  assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' });
   assert.equal(new Renderer(device).levers.rasterizer, 'tiles');
   assert.equal(entries.size, 0, 'nothing that was not measured is kept');
   const atFirst = pipelines;

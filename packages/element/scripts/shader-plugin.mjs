@@ -13,7 +13,7 @@ export const SHADER_FILES = [
 ];
 
 /** What variants of shaders find by its text and replace: see `specialise` in packages/renderer/src/gpu/kernel.ts. */
-const keptNames = 'DIGIT_BITS DIGITS SUBGROUPS VOTE_WORDS Value VALUE_WORDS value bits word'.split(' ');
+const keptNames = 'Value VALUE_WORDS value bits word'.split(' ');
 export const REPLACED = { keptNames, keptLines: new RegExp(`^(const|alias) (${keptNames.join('|')})\\b`) };
 
 const PIECE = /^(export const (\w+Part) = )("(?:[^"\\]|\\.)*");$/gm;

@@ -40,7 +40,6 @@ export { SidedGaussians, type HeldScene } from './sided-gaussians.js';
 export { SIDES, sidesNear, type Surroundings } from './sides.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';
-export type { SortName } from './stages/sort.js';
 export type { Threads } from './stages/threads.js';
 export type { Variants } from './variants.js';
 export { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';

@@ -1,6 +1,5 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
-import { SORT_NAMES, type SortName } from './stages/sort.js';
 import type { Threads } from './stages/threads.js';
 
 /**
@@ -14,8 +13,6 @@ export interface Levers {
   readonly rasterizer: 'auto' | RasterizerName;
   /** How stages share their work; the image is the same. `auto`: see {@link Renderer.create}. */
   readonly threads: 'auto' | Threads;
-  /** How keys are sorted; the order is the same. `auto`: see {@link Renderer.create}. */
-  readonly sort: 'auto' | SortName;
   /**
    * Precision in which quads are blended and images kept. `auto`: see {@link Renderer.create}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
    * feature `float32-blendable`.
@@ -37,11 +34,8 @@ export interface Levers {
    */
   readonly sortAngle: number;
   /**
-   * Tiles leave out splats behind what took all pixels of their tiles to this transmittance or less in the last frame; 0 leaves out
-   * none. While the camera moves a tile can lack for one frame what has just come into sight.
+   * Where tiles end a pixel. Up to 1e-4, which scenes are trained with: before the splat that would leave it this transmittance or less. Above: behind that splat.
    */
-  readonly occludedBelow: number;
-  /** Tiles finish a pixel before the splat that would leave it this transmittance or less. */
   readonly transmittanceMin: number;
   /** A splat paints a pixel only with at least this alpha. */
   readonly alphaMin: number;
@@ -70,17 +64,18 @@ export interface Levers {
 
 const radians = (degrees: number): number => (degrees * Math.PI) / 180;
 
+/** The threshold of the trainers: INRIA's, gsplat's. */
+export const TRAINED_TRANSMITTANCE = 1e-4;
+
 /** The levers that leave nothing out: what scenes were trained with. */
 const EXACT: Levers = {
   rasterizer: 'auto',
   threads: 'auto',
-  sort: 'auto',
   accumulation: 'auto',
   depthKeyBits: 24,
   submissions: 1,
   sortAngle: 1e-7,
-  occludedBelow: 0,
-  transmittanceMin: 1e-4,
+  transmittanceMin: TRAINED_TRANSMITTANCE,
   alphaMin: 1 / 255,
   minContribution: 0,
   visibleSets: false,
@@ -134,7 +129,6 @@ export type FrameLevers = Pick<Levers, (typeof FRAME_LEVERS)[number]>;
 const FRAME_LEVERS = [
   'depthKeyBits',
   'sortAngle',
-  'occludedBelow',
   'transmittanceMin',
   'alphaMin',
   'minContribution',
@@ -148,7 +142,6 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
   submissions: [1, 256],
   sortAngle: [0, Math.PI],
   transmittanceMin: [0, 1],
-  occludedBelow: [0, 1],
   alphaMin: [1 / 255, 1],
   minContribution: [0, Infinity],
   detail: [0, 64],
@@ -161,7 +154,6 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
 const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
   rasterizer: ['auto', 'quads', 'tiles'],
   threads: ['auto', 'parallel', 'serial'],
-  sort: ['auto', ...SORT_NAMES],
   accumulation: ['auto', 'rgba16float', 'rgba32float'],
   depthKeyBits: [16, 24, 32],
   visibleSets: [false, true],

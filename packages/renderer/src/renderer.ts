@@ -11,7 +11,6 @@ import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
-import { Occlusion } from './occlusion.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
 import { missingFormat, requireNotes, requireRequest, requireTextureSize } from './requirements.js';
@@ -65,7 +64,6 @@ export class Renderer {
   readonly #stages: Stages;
   readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
-  readonly #occlusion: Occlusion;
   readonly #pacer: SubmissionPacer;
   readonly #onIncomplete: () => void;
   readonly #memory: GpuMemory;
@@ -87,13 +85,11 @@ export class Renderer {
     this.#stages = makeStages(device, this.levers);
     this.#compose = new ComposeStage(device);
     this.#rasterizer = makeRasterizer(device, this.levers);
-    this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
     this.#pacer = new SubmissionPacer(device);
     this.#resources = new FrameResources(device, {
       stages: this.#stages,
-      sort: this.levers.sort,
+      threads: this.levers.threads,
       rasterizer: this.#rasterizer,
-      occlusion: this.#occlusion,
       pairsAtOnce: () => this.#pacer.pairsAtOnce,
       onIncomplete: this.#onIncomplete,
     });
@@ -119,7 +115,7 @@ export class Renderer {
 
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
-    const parts = [this.#memory, this.#resources, this.#rasterizer, this.#occlusion, this.#accumulation?.texture];
+    const parts = [this.#memory, this.#resources, this.#rasterizer, this.#accumulation?.texture];
     return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
@@ -155,24 +151,24 @@ export class Renderer {
     const levers = this.#leversOf(request.levers);
     const detail = detailOf(request, levers);
     const drawn = scaled(camera, levers.resolutionScale);
-    const resources = this.#resources.fit(scenes, drawn, detail.splatBudget);
+    const resources = this.#resources.fit(scenes, detail.splatBudget);
     const { table, scratch, bindings, depthOrder, orderPolicy, monitor } = resources;
     table.update();
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined };
     const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
-    this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
     const own = { ...levers, ...detail };
-    table.look(drawn, own, isOrdered, this.#occlusion.tiles);
+    const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
+    table.look(drawn, pixelArea, own, isOrdered);
     const wishes = recordProjection(encoder, {
       stages: this.#stages,
       bindings,
       scratch,
       camera: drawn,
       levers: own,
-      occlusion: this.#occlusion,
       depthOrder: isOrdered ? depthOrder : undefined,
+      hasDetail: table.hasDetail,
       isBudgeted: detail.splatBudget > 0 && table.hasDetail,
       timer,
     });
@@ -199,7 +195,6 @@ export class Renderer {
       );
     }
     for (const wish of wishes) wish.read();
-    if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     orderPolicy.settle(occasion);
   }
 
@@ -218,9 +213,8 @@ export class Renderer {
    */
   async isComplete(): Promise<boolean> {
     if (this.#resources.current === undefined) return true;
-    const mayLack = this.#occlusion.mayLack;
     const { visible, overflow, pairs, pairOverflow } = await this.readStatistics();
-    return this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow)) && !mayLack;
+    return this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow));
   }
 
   /**
@@ -261,7 +255,6 @@ export class Renderer {
     this.#accumulation?.texture.destroy();
     this.#accumulation = undefined;
     this.#rasterizer.destroy();
-    this.#occlusion.destroy();
     this.#memory.destroy();
   }
 
@@ -326,7 +319,6 @@ export class Renderer {
     const known = this.#frameLevers.get(changes);
     if (known) return known;
     const made = leversOfFrame(this.levers, changes);
-    if (made.occludedBelow > 0 && this.#rasterizer.name === 'tiles') this.#occlusion.use();
     this.#frameLevers.set(changes, made);
     return made;
   }

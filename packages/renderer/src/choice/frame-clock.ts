@@ -1,19 +1,15 @@
-import { PassTimer } from '../gpu/pass-timer.js';
-
 /** Empty submissions of which the fastest tells how long a GPU with nothing to do takes to say so. */
 const TRIES = 4;
 
 /**
- * Times single frames: by the GPU's own clock where the device has the feature `timestamp-query`, else by waiting, less what waiting for
- * nothing takes. Browsers take milliseconds to say that a GPU is done, more than many a frame does.
+ * Times frames as a page waits for them: several in a row, the queue drained once, less what waiting for nothing takes. The time between a GPU's own timestamps
+ * leaves out what the browser does between passes, which can be most of a frame.
  */
 export class FrameClock {
-  readonly #device: GPUDevice;
-  readonly #timer: PassTimer | undefined;
+  readonly #queue: GPUQueue;
   readonly #latency: number;
 
   static async on(device: GPUDevice): Promise<FrameClock> {
-    if (device.features.has('timestamp-query')) return new FrameClock(device, new PassTimer(device), 0);
     let latency = Infinity;
     for (let i = 0; i < TRIES; i++) {
       const begin = performance.now();
@@ -21,28 +17,19 @@ export class FrameClock {
       await device.queue.onSubmittedWorkDone();
       latency = Math.min(latency, performance.now() - begin);
     }
-    return new FrameClock(device, undefined, latency);
+    return new FrameClock(device.queue, latency);
   }
 
-  private constructor(device: GPUDevice, timer: PassTimer | undefined, latency: number) {
-    this.#device = device;
-    this.#timer = timer;
+  private constructor(queue: GPUQueue, latency: number) {
+    this.#queue = queue;
     this.#latency = latency;
   }
 
-  /** Milliseconds of a frame that `draw` submits. */
-  async time(draw: (timer: PassTimer | undefined) => void): Promise<number> {
+  /** Milliseconds of each of `count` frames that `draw` submits. */
+  async time(count: number, draw: () => void): Promise<number> {
     const begin = performance.now();
-    draw(this.#timer);
-    await this.#device.queue.onSubmittedWorkDone();
-    const waited = performance.now() - begin - this.#latency;
-    const passes = (await this.#timer?.read())?.at(-1) ?? [];
-    const span = Math.max(...passes.map(({ end }) => end)) - Math.min(...passes.map((pass) => pass.begin));
-    // Some drivers hand out timestamps that stand still or run backwards.
-    return span > 0 ? span : waited;
-  }
-
-  destroy(): void {
-    this.#timer?.destroy();
+    for (let frame = 0; frame < count; frame++) draw();
+    await this.#queue.onSubmittedWorkDone();
+    return Math.max(0, performance.now() - begin - this.#latency) / count;
   }
 }
