@@ -75,7 +75,8 @@ export function countWork(device: GPUDevice): WorkCounter {
     after(encoder, 'beginRenderPass', (pass: GPURenderPassEncoder) => {
       work.renderPasses++;
       for (const name of ['draw', 'drawIndexed'] as const) after(pass, name, () => work.draws++);
-      for (const name of ['drawIndirect', 'drawIndexedIndirect'] as const) after(pass, name, () => work.indirectCalls++);
+      for (const name of ['drawIndirect', 'drawIndexedIndirect'] as const)
+        after(pass, name, () => work.indirectCalls++);
     });
   });
   return {

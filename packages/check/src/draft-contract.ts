@@ -28,7 +28,10 @@ export function draftContract(header: OnnxHeader): Draft {
   const outputs = draftOutputs(header, questions);
   const isOpen = header.outputs.some(({ dims }) => dims?.some((dim) => typeof dim !== 'number'));
   if (isOpen && outputs.layout !== 'image') questions.push('nMax: the most Gaussians that one run writes');
-  const name = header.name.split(/[/\\]/).at(-1)!.replace(/\.onnx$/i, '');
+  const name = header.name
+    .split(/[/\\]/)
+    .at(-1)!
+    .replace(/\.onnx$/i, '');
   return { contract: { version: 1, name, inputs, outputs, ...(isOpen ? { nMax: 100_000 } : {}) }, questions };
 }
 
@@ -75,7 +78,8 @@ function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBindi
   const packed = outputs.find((output) => [13, 22, 37, 58].includes(columns(output)));
   if (packed) {
     questions.push(`output ${packed.name}: position 3, covariance 6, colour, opacity 0..1, in this order?`);
-    const color = columns(packed) === 13 ? ({ color: 'rgb' } as const) : ({ color: 'sh', shOrder: 'coefficient-major' } as const);
+    const color =
+      columns(packed) === 13 ? ({ color: 'rgb' } as const) : ({ color: 'sh', shOrder: 'coefficient-major' } as const);
     return { layout: 'packed', gaussians: packed.name, ...color, opacityActivation: 'linear', ...counted };
   }
   const found: Record<string, string> = {};
@@ -92,7 +96,10 @@ function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBindi
   if (found.sh) delete found.colors;
   if (found.covariances) ['scales', 'rotations'].forEach((name) => delete found[name]);
   questions.push('opacityActivation: "linear" for 0..1, "logit" for numbers before the sigmoid?');
-  if (found.scales) questions.push('scaleActivation: "linear" for standard deviations, "log" for their logarithms? rotationOrder: wxyz or xyzw?');
+  if (found.scales)
+    questions.push(
+      'scaleActivation: "linear" for standard deviations, "log" for their logarithms? rotationOrder: wxyz or xyzw?',
+    );
   return {
     layout: 'split',
     positions: 'positions',

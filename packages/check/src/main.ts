@@ -47,7 +47,12 @@ function parse(args: readonly string[]) {
   return parseArgs({
     args: [...args],
     allowPositionals: true,
-    options: { contract: { type: 'string' }, run: { type: 'boolean' }, draft: { type: 'boolean' }, help: { type: 'boolean', short: 'h' } },
+    options: {
+      contract: { type: 'string' },
+      run: { type: 'boolean' },
+      draft: { type: 'boolean' },
+      help: { type: 'boolean', short: 'h' },
+    },
   });
 }
 

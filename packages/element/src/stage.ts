@@ -277,6 +277,7 @@ export class Stage {
       onPreview: ({ gaussians }) => this.#onPreview(gaussians.count),
       memoryBudget: () => this.#memoryBudget(),
       live: () => ({
+        element: this.#host,
         runtimeLocation: services().runtimeLocation,
         state: () => this.#live.state,
         ownsControls: () => !this.#live.post.isWanted,

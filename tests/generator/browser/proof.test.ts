@@ -10,7 +10,8 @@ beforeEach(() => localStorage.clear());
 
 const STATE = { timeSeconds: 1 };
 const until = async (isTrue: () => boolean, ms = 30_000): Promise<void> => {
-  for (const end = performance.now() + ms; !isTrue() && performance.now() < end;) await new Promise((go) => setTimeout(go, 20));
+  for (const end = performance.now() + ms; !isTrue() && performance.now() < end;)
+    await new Promise((go) => setTimeout(go, 20));
 };
 
 /** A generator at one second, what it said, and its sink. */

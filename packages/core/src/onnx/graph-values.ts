@@ -44,7 +44,9 @@ export class GraphValues {
     if (/^(Random|Bernoulli|Multinomial|Dropout)/.test(operator)) return false;
     // Of a tensor of fixed shape the runtime knows it beforehand.
     if (operator === 'Shape' && this.dimsOf(inputs[0])?.every((dim) => dim !== null)) return true;
-    return operator === 'Constant' || (inputs.length > 0 && inputs.every((name) => name === '' || this.isConstant(name)));
+    return (
+      operator === 'Constant' || (inputs.length > 0 && inputs.every((name) => name === '' || this.isConstant(name)))
+    );
   }
 
   makerOf(name: string): OnnxNode | undefined {
@@ -73,7 +75,8 @@ export class GraphValues {
     const from = this.dimsOf(inputs[0], depth);
     if (SAME_SHAPE.has(operator)) return from;
     if (operator === 'Reshape') return reshaped(from, this.#integersOf(inputs[1], depth));
-    if (operator === 'Transpose') return from && (lists?.perm ?? from.map((_, i) => from.length - 1 - i)).map((axis) => from[axis]);
+    if (operator === 'Transpose')
+      return from && (lists?.perm ?? from.map((_, i) => from.length - 1 - i)).map((axis) => from[axis]);
     if (operator === 'Unsqueeze' || operator === 'Squeeze') {
       const axes = lists?.axes ?? this.#integersOf(inputs[1], depth);
       if (!from || !axes) return undefined;
@@ -96,7 +99,9 @@ export class GraphValues {
     if (name === undefined || depth > 16) return undefined;
     const maker = this.#makers.get(name);
     const value: OnnxValue | undefined = this.#header.stored.get(name) ?? maker?.value;
-    return value?.integers ?? (maker?.operator === 'Identity' ? this.#integersOf(maker.inputs[0], depth + 1) : undefined);
+    return (
+      value?.integers ?? (maker?.operator === 'Identity' ? this.#integersOf(maker.inputs[0], depth + 1) : undefined)
+    );
   }
 
   #add(node: OnnxNode): void {
@@ -123,7 +128,8 @@ export class GraphValues {
   }
 }
 
-const dtypeOfNumber = (to: number | undefined): OnnxDtype | undefined => (to === undefined ? undefined : ONNX_DTYPES[to]);
+const dtypeOfNumber = (to: number | undefined): OnnxDtype | undefined =>
+  to === undefined ? undefined : ONNX_DTYPES[to];
 
 function reshaped(
   from: readonly (number | null)[] | undefined,

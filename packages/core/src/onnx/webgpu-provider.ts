@@ -56,10 +56,15 @@ export function miscomputedConvolutions(header: OnnxHeader): Convolution[] {
 function isMiscomputed({ inputs, outputs, kernel, strides, group }: Convolution): boolean {
   const isPointwise = [...kernel, ...strides].every((size) => size === 1);
   const isPlane = kernel.length === 1 || kernel.length === 2;
-  return group === 1 && isPlane && inputs > 3 && inputs % 3 === 0 && inputs % 4 !== 0 && outputs % 4 === 0 && !isPointwise;
+  return (
+    group === 1 && isPlane && inputs > 3 && inputs % 3 === 0 && inputs % 4 !== 0 && outputs % 4 === 0 && !isPointwise
+  );
 }
 
-function convolutionOf({ inputs: [, weights], numbers, lists }: OnnxNode, values: GraphValues): Convolution | undefined {
+function convolutionOf(
+  { inputs: [, weights], numbers, lists }: OnnxNode,
+  values: GraphValues,
+): Convolution | undefined {
   const [outputs, perGroup, ...kernel] = values.dimsOf(weights) ?? [];
   if (typeof outputs !== 'number' || typeof perGroup !== 'number' || kernel.includes(null)) return undefined;
   const group = numbers?.group ?? 1;
@@ -153,7 +158,13 @@ function* ofCopies({ inputs, outputs }: OnnxHeader, values: GraphValues): Iterab
     const operator = values.makerOf(tensor)?.operator ?? '';
     if (values.isConstant(tensor) || !(RULES.aliases as readonly string[]).includes(operator)) continue;
     const reason = `${tensor} is copied, which a recording of the commands does not repeat: it runs unrecorded`;
-    yield { kind: 'slow', operator, tensor, reason, remedy: 'let a kernel write it: add a zero that comes from an input' };
+    yield {
+      kind: 'slow',
+      operator,
+      tensor,
+      reason,
+      remedy: 'let a kernel write it: add a zero that comes from an input',
+    };
   }
 }
 
@@ -210,7 +221,8 @@ const sizeRule: Rule = function* (node, _, values) {
     }
   }
   if (isMisfused(node, values)) {
-    const reason = "ONNX Runtime's optimiser loses the transposition of a matrix times a vector, so pages load the file without fusions";
+    const reason =
+      "ONNX Runtime's optimiser loses the transposition of a matrix times a vector, so pages load the file without fusions";
     yield of('slow', node, reason, 'make the vector a matrix of one column: (R.T @ t[:, None])[:, 0]');
   }
   if (operator === 'CumSum') {

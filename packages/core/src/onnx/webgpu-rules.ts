@@ -10,7 +10,9 @@ export const WEBGPU_RULES = {
     GlobalMaxPool Greater GreaterOrEqual GridSample HardSigmoid HardSwish Identity InstanceNormalization LayerNormalization LeakyRelu Less
     LessOrEqual Log LpNormalization MatMul MaxPool Mul Neg Not Pad Pow RMSNormalization Range Reciprocal ReduceL1 ReduceL2 ReduceLogSum
     ReduceLogSumExp ReduceMax ReduceMean ReduceMin ReduceProd ReduceSum ReduceSumSquare Relu Reshape Resize ScatterElements ScatterND Shape
-    Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Tan Tanh ThresholdedRelu Tile TopK Transpose Unsqueeze Where`.split(/\s+/),
+    Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Tan Tanh ThresholdedRelu Tile TopK Transpose Unsqueeze Where`.split(
+      /\s+/,
+    ),
   /** What to write instead of operators that people use in generators. */
   instead: {
     Compress: 'keep every row and write opacity 0 into the dead ones',

@@ -45,7 +45,11 @@ export function compareParts(parts: readonly ComparedPart[], attributes: readonl
   return worst ?? { error: 0, where: 'nothing', share: 0 };
 }
 
-function compareAttribute(where: string, parts: readonly ComparedPart[], slice: AttributeSlice | undefined): Comparison {
+function compareAttribute(
+  where: string,
+  parts: readonly ComparedPart[],
+  slice: AttributeSlice | undefined,
+): Comparison {
   const pairs = parts.flatMap((part) => pairsOf(part, slice));
   const finite = pairs.map(([, expected]) => Math.abs(expected)).filter(Number.isFinite);
   const isAbsolute = slice?.activation === 'logit' || slice?.activation === 'log';
@@ -70,7 +74,10 @@ function differenceOf(found: number, expected: number): number {
 const sigmoid = (logit: number): number => 1 / (1 + Math.exp(-logit));
 
 /** The numbers of an attribute in a piece, found and expected. */
-function pairsOf({ dtype, start, found, expected }: ComparedPart, slice: AttributeSlice | undefined): [number, number][] {
+function pairsOf(
+  { dtype, start, found, expected }: ComparedPart,
+  slice: AttributeSlice | undefined,
+): [number, number][] {
   const [a, b] = [numbersOf(found, dtype), numbersOf(expected, dtype)];
   const pairs: [number, number][] = [];
   for (let i = 0; i < Math.min(a.length, b.length); i++) {
@@ -85,7 +92,9 @@ function pairsOf({ dtype, start, found, expected }: ComparedPart, slice: Attribu
 }
 
 function numbersOf(bytes: Uint8Array, dtype: ComparedPart['dtype']): ArrayLike<number> {
-  const { buffer, byteOffset, byteLength } = (bytes.byteOffset % 4 === 0 ? bytes : bytes.slice()) as Uint8Array<ArrayBuffer>;
+  const { buffer, byteOffset, byteLength } = (
+    bytes.byteOffset % 4 === 0 ? bytes : bytes.slice()
+  ) as Uint8Array<ArrayBuffer>;
   if (dtype === 'float16') return Array.from(new Uint16Array(buffer, byteOffset, byteLength >> 1), halfToNumber);
   const Numbers = dtype === 'int32' ? Int32Array : Float32Array;
   return new Numbers(buffer, byteOffset, byteLength >> 2);

@@ -8,7 +8,10 @@ import { runInWorker, type CpuRun } from './run-on-cpu.js';
 export interface Evidence {
   readonly feeds: CpuRun['feeds'];
   readonly dims: Readonly<Record<string, readonly number[]>>;
-  readonly parts: readonly (CpuRun['parts'][number] & { readonly dtype: ComparedPart['dtype']; readonly bytes: Uint8Array })[];
+  readonly parts: readonly (CpuRun['parts'][number] & {
+    readonly dtype: ComparedPart['dtype'];
+    readonly bytes: Uint8Array;
+  })[];
 }
 
 /** Bytes of weights and outputs up to which a model is compared: a worker holds them a second time. */
@@ -91,7 +94,8 @@ async function compare(model: GeneratorModel, evidence: Evidence, signal: AbortS
   );
   for (const [name, dims] of Object.entries(outputs.dims)) {
     // A row more or less is a threshold, not another result; but then nothing lies where it lay.
-    if (String(dims) !== String(evidence.dims[name])) return unknown(`it writes ${String(dims)} there, not ${String(evidence.dims[name])}`);
+    if (String(dims) !== String(evidence.dims[name]))
+      return unknown(`it writes ${String(dims)} there, not ${String(evidence.dims[name])}`);
   }
   const compared = parts.map(({ tensor, dtype, offset, bytes }, i): ComparedPart => {
     const start = offset / (dtype === 'float16' ? 2 : 4);

@@ -14,12 +14,17 @@ export interface Verdict {
 const VERSION = 'ort 1.30.0, 1';
 
 /** What a verdict is kept under: the bytes of the model, and the adapter. Undefined where a page may not digest. */
-export async function recordKey({ bytes, externalData }: GeneratorModel, device: GPUDevice): Promise<string | undefined> {
+export async function recordKey(
+  { bytes, externalData }: GeneratorModel,
+  device: GPUDevice,
+): Promise<string | undefined> {
   const { subtle } = (globalThis as { crypto?: Crypto }).crypto ?? {};
   if (subtle === undefined) return undefined;
   const parts = [bytes, ...externalData.map(({ data }) => data)];
   const digests = await Promise.all(parts.map((part) => subtle.digest('SHA-256', part as Uint8Array<ArrayBuffer>)));
-  const hex = digests.flatMap((digest) => Array.from(new Uint8Array(digest), (byte) => byte.toString(16).padStart(2, '0')));
+  const hex = digests.flatMap((digest) =>
+    Array.from(new Uint8Array(digest), (byte) => byte.toString(16).padStart(2, '0')),
+  );
   const { vendor = '', architecture = '', device: model = '', description = '' } = device.adapterInfo ?? {};
   return `gaussian-splat proof ${VERSION} ${[vendor, architecture, model, description].join(' ')} ${hex.join('')}`;
 }

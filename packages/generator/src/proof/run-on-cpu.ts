@@ -70,7 +70,10 @@ export function runInWorker({ script, wasm }: RuntimeSource, run: CpuRun, signal
       worker.terminate();
       finish();
     };
-    const timer = setTimeout(() => end(() => reject(new Error(`it took more than ${LIMIT_MS / 1000} s there`))), LIMIT_MS);
+    const timer = setTimeout(
+      () => end(() => reject(new Error(`it took more than ${LIMIT_MS / 1000} s there`))),
+      LIMIT_MS,
+    );
     signal.addEventListener('abort', () => end(() => reject(signal.reason as Error)), { once: true });
     worker.onerror = (event) => end(() => reject(new Error(event.message || 'this page lets no worker be started')));
     worker.onmessage = ({ data }: MessageEvent<CpuOutputs | { failure: string }>) =>

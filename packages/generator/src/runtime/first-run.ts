@@ -32,7 +32,10 @@ export async function readRun(
     });
   });
   const read = await readTensors(device, parts);
-  return { dims, parts: parts.map(({ tensor, dtype, offset, size }, i) => ({ tensor, dtype, offset, size, bytes: read[i] })) };
+  return {
+    dims,
+    parts: parts.map(({ tensor, dtype, offset, size }, i) => ({ tensor, dtype, offset, size, bytes: read[i] })),
+  };
 }
 
 /** True if two runs have written the same, as far as they were read. */

@@ -47,7 +47,12 @@ export class GeneratorSession {
    * @param isCompared whether what the first run writes on the GPU is compared with what the CPU writes
    * @throws GaussianSplatError `out-of-memory/buffer-limit` if an output is larger than the device's buffers.
    */
-  constructor(model: GeneratorModel, device: GPUDevice, onFallback: (reason: string) => void = () => undefined, isCompared = true) {
+  constructor(
+    model: GeneratorModel,
+    device: GPUDevice,
+    onFallback: (reason: string) => void = () => undefined,
+    isCompared = true,
+  ) {
     this.model = model;
     this.device = device;
     this.#onFallback = onFallback;
