@@ -69,6 +69,12 @@ function draftPose(name: string, sizes: readonly unknown[], questions: string[])
   return { role: 'pose', format: sizes.length === 2 && sizes[1] === 3 ? 'axis-angle' : 'parameters' };
 }
 
+/** Of [N, 3, K] and [N, K, 3]. */
+function shOrderOf(outputs: readonly OnnxTensor[], name: string): 'coefficient-major' | 'channel-major' {
+  const dims = outputs.find((output) => output.name === name)?.dims;
+  return dims?.length === 3 && dims[1] === 3 && dims[2] !== 3 ? 'channel-major' : 'coefficient-major';
+}
+
 function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBinding {
   const columns = ({ dims }: OnnxTensor): number => Number(dims?.at(-1) ?? 0);
   const [only] = outputs;
@@ -106,7 +112,7 @@ function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBindi
     opacities: 'opacities',
     ...found,
     ...(found.scales ? { scaleActivation: 'linear', rotationOrder: 'wxyz' } : {}),
-    ...(found.sh ? { shOrder: 'coefficient-major' } : {}),
+    ...(found.sh ? { shOrder: shOrderOf(outputs, found.sh) } : {}),
     opacityActivation: 'linear',
     ...counted,
   };
