@@ -1,4 +1,4 @@
-/** The work behind `npm run frontier`: collects in the browser, or takes what was collected elsewhere, and draws. */
+/** The work behind `npm run lab:frontier`: collects in the browser, or takes what was collected elsewhere, and draws. */
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -8,7 +8,7 @@ import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
 import { bytesASplat, hypervolume, nonDominated, passing, pointsOf, timeOf } from './front.mjs';
 
-const USAGE = `usage: npm run frontier -- [options]
+const USAGE = `usage: npm run lab:frontier -- [options]
 
   --size WxH        image size (default 480x270)
   --splats N        splats; 0, the default, is the scene as it is

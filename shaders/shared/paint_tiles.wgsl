@@ -15,7 +15,7 @@
 @group(0) @binding(4) var<storage, read> tile_bits: array<u32>;
 @group(0) @binding(5) var image: texture_storage_2d<rgba16float, write>;
 
-// True if the splat that would leave a pixel too little light is refused, as trainers do at 1/10,000; false if it is blended and the pixel ends behind it: at
+// True if the splat that would leave a pixel too little light is refused, as trainers do at REFUSED; false if it is blended and the pixel ends behind it: at
 // a higher threshold a refused splat is a hole, since an opaque one leaves 1/1,000 by itself.
 override refuses_last: bool = true;
 // True to write premultiplied colour over the background, false for colour and transmittance.
@@ -33,6 +33,8 @@ const BLOCK_COLUMNS = TILE / BLOCK_WIDTH;
 const BLOCK_ROWS = TILE / BLOCK_HEIGHT;
 const BLOCK_THREADS = BLOCK_WIDTH * BLOCK_HEIGHT;
 const BLOCKS = BLOCK_COLUMNS * BLOCK_ROWS;
+// Light that trainers leave a pixel at least.
+const REFUSED = 1e-4;
 // Where the splat lies that takes the place of a missing one, and log2 of its opacity.
 const NO_SPLAT = TILE_THREADS;
 const NO_POWER = -1e30;
@@ -184,10 +186,12 @@ fn blend(pixel: ptr<function, Pixel>, k: u32, brush: Brush, place: vec2f, least_
   let before = (*pixel).transmittance;
   let full_weight = before * alpha;
   let remaining = before - full_weight;
-  let ends = select(before, remaining, refuses_last) <= (*pixel).least;
+  let ends = remaining <= (*pixel).least;
+  var refuses = ends;
+  if (!refuses_last) { refuses = remaining <= REFUSED || is_finished(*pixel); }
   (*pixel).least = select((*pixel).least, FINISHED, ends);
-  let after = select(remaining, before, ends);
-  let weight = select(full_weight, 0.0, ends);
+  let after = select(remaining, before, refuses);
+  let weight = select(full_weight, 0.0, refuses);
   note_blend(k, weight, before, after, brush.blue);
   (*pixel).color += weight * vec3f(unpack2x16float(brush.red_green), blue_of(brush));
   (*pixel).transmittance = after;

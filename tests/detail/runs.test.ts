@@ -8,7 +8,7 @@ import { constants, DETAIL_NUMBERS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { shareDrawn } from '../support/detail-twin.js';
 import { psnr } from '../support/metrics.js';
-import { anyDevice } from '../support/node-device.js';
+import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
@@ -118,7 +118,4 @@ test(
   },
 );
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -10,11 +10,11 @@ import {
   type RasterizerName,
 } from '@gaussian-splat/renderer';
 import { spanOf } from '../../packages/renderer/src/gpu/span-timer.js';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
-import { asOnSwiftShader, serialDevice } from '../support/node-device.js';
+import { asOnSwiftShader, endNodeDevice, serialDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { countWork } from '../support/work-counters.js';
@@ -205,7 +205,4 @@ test('frames that are shorter than a step of the clock take nothing; clocks that
   assert.deepEqual(spans([1n, 90_000_000_000n]), [null]);
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

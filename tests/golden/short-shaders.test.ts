@@ -6,7 +6,7 @@ import { after, test } from 'node:test';
 import { fileURLToPath, pathToFileURL } from 'node:url';
 import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
 import * as stages from '@gaussian-splat/renderer/stages';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { endNodeDevice } from '../support/node-device.js';
 
 /** What this test needs of the plugin's own module and the others. */
@@ -98,7 +98,7 @@ function isField(tokens: readonly Token[], at: number, isInStruct: boolean): boo
 
 test('token by token they are the same but for names, each has one other, and two in a declaration stay two', () => {
   assert.equal(forms.short.length, forms.readable.length);
-  assert.ok(forms.readable.length > 45, `${forms.readable.length} stages`);
+  assert.ok(forms.readable.length > 40, `${forms.readable.length} stages`);
   const shortOf = new Map<string, string>();
   let [before, now] = [0, 0];
   forms.readable.forEach(({ name, code }, k) => {
@@ -132,7 +132,7 @@ test('token by token they are the same but for names, each has one other, and tw
   });
   for (const name of REPLACED.keptNames) assert.equal(shortOf.get(name) ?? name, name);
   console.log(`${shortOf.size} names; ${before} characters, ${now} short`);
-  assert.ok(shortOf.size > 900 && now < 0.6 * before);
+  assert.ok(shortOf.size > 700 && now < 0.6 * before);
 });
 
 test('bindings are where they were', () => {

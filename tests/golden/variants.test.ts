@@ -4,6 +4,7 @@ import { after, test } from 'node:test';
 import {
   capture,
   chooseVariants,
+  createRenderer,
   GaussianBuffers,
   packGaussians,
   Renderer,
@@ -11,7 +12,7 @@ import {
   type Variants,
 } from '@gaussian-splat/renderer';
 import { givesKnownAnswer, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { onlyInFull } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
@@ -77,7 +78,7 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
     const anew = await chooseVariants(device, { store });
     await assertSuits(device, anew);
     assert.deepEqual(JSON.parse(entries.get(key)!), anew, damage);
-    const renderer = await Renderer.create(device);
+    const renderer = await createRenderer(device);
     assert.equal(renderer.levers.threads, anew.threads);
     assert.equal(renderer.levers.rasterizer, anew.rasterizer);
     renderer.destroy();

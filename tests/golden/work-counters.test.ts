@@ -17,9 +17,10 @@ import {
   type GaussianScene,
   type RendererOptions,
 } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { detailFolder } from '../support/detail-folder.js';
 import { writeTensors } from '../support/generator-tensors.js';
+import { endNodeDevice } from '../support/node-device.js';
 import { cameraAt, room, thinned } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 import { countWork } from '../support/work-counters.js';
@@ -169,6 +170,5 @@ test('the counter sees what it is there to see', async () => {
 
 after(() => {
   if (process.env.UPDATE_WORK_COUNTERS) writeFileSync(file, `${JSON.stringify(found, null, 2)}\n`);
-  // Dawn keeps Node alive.
-  setImmediate(() => process.exit());
+  return endNodeDevice();
 });

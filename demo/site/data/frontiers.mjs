@@ -1,4 +1,4 @@
-/** The committed runs of `npm run frontier`: for each chart of docs/frontier what was measured, on what, and when. */
+/** The committed runs of `npm run lab:frontier`: for each chart of docs/frontier what was measured, on what, and when. */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { timeOf } from '../../../scripts/frontier/front.mjs';

@@ -66,7 +66,7 @@ async function draft(model: string): Promise<number> {
     const { contract, questions } = draftContract(header);
     await writeFile(path, `${JSON.stringify(contract, undefined, 2)}\n`, { flag: 'wx' });
     console.log([`wrote ${path}. To be decided:`, ...questions.map((question) => `  ${question}`)].join('\n'));
-    console.log(`Then: npm run check -- ${model} --run`);
+    console.log(`Then: npm run gaussian-splat -- check ${model} --run`);
     return 0;
   } catch (error) {
     const isThere = (error as { code?: string }).code === 'EEXIST';

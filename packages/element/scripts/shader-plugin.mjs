@@ -9,7 +9,6 @@ export const SHADER_FILES = [
   ...['shaders.js', 'live-shaders.js', 'streamed-shaders.js', 'quantized-shaders.js', 'probe-shaders.js'].map(
     (file) => folder('renderer') + file,
   ),
-  `${folder('economise')}shaders.js`,
 ];
 
 /** What variants of shaders find by its text and replace: see `specialise` in packages/renderer/src/gpu/kernel.ts. */

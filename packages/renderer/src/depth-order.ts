@@ -6,7 +6,7 @@ import type { FrameTimer } from './gpu/pass-timer.js';
 import type { PageTable } from './page-table.js';
 import { OrderKeysStage } from './stages/order-keys.js';
 import { SortStage } from './stages/sort.js';
-import type { Threads } from './stages/threads.js';
+import type { Threads } from './stages/plan.js';
 
 const KEY_BITS = 32;
 /** Times as far from a scene's origin, in depth, as a camera may have been for which an order was made that serves it: four bits of a depth's 24. */

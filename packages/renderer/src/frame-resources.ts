@@ -8,7 +8,7 @@ import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
-import type { Threads } from './stages/threads.js';
+import type { Threads } from './stages/plan.js';
 
 /** Room for pairs that the pacer learns from what one costs. */
 const TELLING_ROOM = 1 << 18;

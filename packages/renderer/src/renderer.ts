@@ -13,12 +13,11 @@ import { writeStruct } from './gpu/struct.js';
 import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
-import { missingFormat, requireNotes, requireRequest, requireTextureSize } from './requirements.js';
+import { missingFormat, requireNotes, requireRequest, requireTarget, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { copyCounts, readStatistics, type FrameStatistics } from './statistics.js';
-import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
 import { scaled } from './view.js';
 
@@ -96,16 +95,6 @@ export class Renderer {
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
-  }
-
-  /**
-   * A renderer whose `auto` levers have been decided on this device: variants that give a wrong image are ruled out by a known answer, the
-   * others are timed (see {@link chooseVariants}). The constructor decides by what has been chosen on the device before, or else takes
-   * `quads`, `rgba16float` and `parallel`, which work everywhere.
-   */
-  static async create(device: GPUDevice, options: RendererOptions = {}): Promise<Renderer> {
-    await chooseVariants(device);
-    return new Renderer(device, options);
   }
 
   /** Name of the rasterizer in use. */
@@ -327,8 +316,10 @@ export class Renderer {
     const { width, height } = camera;
     if (!isTexture(target)) {
       if (targetFormat === undefined) throw missingFormat();
+      requireTarget(undefined, targetFormat, camera);
       return { view: target, format: targetFormat, isStorable: false, width, height };
     }
+    requireTarget(target, target.format, camera);
     let view = this.#views.get(target);
     if (view === undefined) this.#views.set(target, (view = target.createView(ONE_PICTURE)));
     const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;

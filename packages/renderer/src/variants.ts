@@ -1,7 +1,7 @@
 import { perDevice } from './gpu/kernel.js';
 import type { Levers } from './levers.js';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
-import type { Threads } from './stages/threads.js';
+import type { Threads } from './stages/plan.js';
 
 /** What a renderer leaves to the device: all of them draw the same image, at different speeds. */
 export interface Variants {
@@ -16,6 +16,8 @@ export const SAFE: Variants = {
   accumulation: 'rgba16float',
   threads: 'parallel',
 };
+/** What is likely to suit a GPU. */
+export const LIKELY: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' };
 
 /** Variants known to suit a device, set by `chooseVariants`. */
 const known = (device: GPUDevice): { variants: Variants } => perDevice(device, 'variants', () => ({ variants: SAFE }));

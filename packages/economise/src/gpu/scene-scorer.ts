@@ -11,11 +11,9 @@ import {
   type StructLayout,
   type StructValues,
 } from '@gaussian-splat/renderer/stages';
-import { PRIOR_VIEWS } from '../colour-moments.js';
 import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
-import { MIN_LOOKS, UNSEEN_CONTRAST } from '../score.js';
-import { layouts } from './layouts.js';
-import { NO_VIEW } from './no-view.js';
+import { MIN_LOOKS, PRIOR_VIEWS, UNSEEN_CONTRAST } from '../score.js';
+import { layouts, NO_VIEW } from './layouts.js';
 import { readBack } from './read-back.js';
 import type { SceneParts } from './scene-parts.js';
 

@@ -2,21 +2,21 @@ import { loadModule } from '@gaussian-splat/core';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import type { PostRequest } from './post-view.js';
 
-export interface PostOptions {
+export interface PostHost {
   /** What a post-processor needs to know beyond its address. */
-  readonly request: () => Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
-  readonly requestFrame: () => void;
+  readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
+  requestFrame(): void;
 }
 
 /** Puts the post-processor of the attribute between the scene on show and the canvas. Until it is there, frames are shown as they are drawn. */
 export class PostController {
-  readonly #options: PostOptions;
+  readonly #host: PostHost;
   #urls: readonly string[] = [];
   #scene: GpuScene | null = null;
   #running = new AbortController();
 
-  constructor(options: PostOptions) {
-    this.#options = options;
+  constructor(host: PostHost) {
+    this.#host = host;
   }
 
   /** True where there is one, or will be. */
@@ -42,14 +42,14 @@ export class PostController {
     this.#running = new AbortController();
     const scene = this.#scene;
     if (scene === null) return;
-    if (scene.filter) this.#options.requestFrame();
+    if (scene.filter) this.#host.requestFrame();
     scene.setFilter(undefined);
     if (this.#urls.length > 0) void this.#load(scene, this.#running.signal);
   }
 
   async #load(scene: GpuScene, signal: AbortSignal): Promise<void> {
-    const { request, requestFrame } = this.#options;
-    const options = request();
+    const requestFrame = (): void => this.#host.requestFrame();
+    const options = this.#host.postRequest;
     try {
       const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
       if (signal.aborted) return;

@@ -54,6 +54,6 @@ const unusable = (where: string): ContractError =>
       where,
       expected: 'Gaussians that can be drawn',
       found: 'a run in which none can: all have numbers that are not finite, or no opacity',
-      remedy: 'npm run check -- MODEL --run says at which inputs; look there for a division by zero',
+      remedy: 'npm run gaussian-splat -- check MODEL --run says at which inputs; look there for a division by zero',
     },
   ]);

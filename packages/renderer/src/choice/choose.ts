@@ -1,9 +1,21 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
 import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
-import { remember, SAFE, type Variants } from '../variants.js';
+import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
 import { FrameClock } from './frame-clock.js';
 import { keyFor, pageStore, readChoice, writeChoice, type ChoiceStore } from './kept-choice.js';
-import { ANSWER_TARGET, FRAMES, isRight, timeFrames, type Trial } from './trials.js';
+import { ANSWER_TARGET, isRight, timeFrames, type Trial } from './trials.js';
+import type { RendererOptions } from '../frame-request.js';
+import { Renderer } from '../renderer.js';
+
+/**
+ * A renderer whose `auto` levers have been decided on this device: variants that give a wrong image are ruled out by a known answer, the
+ * others are timed (see {@link chooseVariants}). The constructor decides by what has been chosen on the device before, or else takes
+ * `quads`, `rgba16float` and `parallel`, which work everywhere.
+ */
+export async function createRenderer(device: GPUDevice, options: RendererOptions = {}): Promise<Renderer> {
+  await chooseVariants(device);
+  return new Renderer(device, options);
+}
 
 export interface ChoiceOptions {
   /** Default: the page's `localStorage` where there is one. null: nothing is kept. */
@@ -30,25 +42,8 @@ const choiceOf = (device: GPUDevice): Choice => perDevice(device, 'choice', () =
 /** GPUMapMode.READ, which Node has only where Dawn was loaded. */
 const MAP_READ = 1;
 
-/** Scenes of the trials: until one candidate is left, or the time is up. */
-const ROUNDS: readonly Trial[] = [
-  { splats: 4_000, width: 320, height: 180 },
-  { splats: 64_000, width: 1920, height: 1080 },
-];
-/** Milliseconds that all rounds may take, and how much longer than the last one the next is expected to be. */
-const BUDGET = 800;
-const GROWTH = 16;
-/** A candidate so much slower than the fastest, in a round that takes as long as is worth measuring, is out. */
-const HOPELESS = 1.5;
-const MEASURABLE = 1.5;
-
-/** What is likely to suit a GPU. */
-const LIKELY: Variants = { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' };
-/** What suits a processor in disguise: tiles are made of barriers, which it is worst at. Of float32 quads it has to convert nothing. */
-const SERIAL: Variants = { ...SAFE, threads: 'serial' };
-const PRECISE: Variants = { ...SERIAL, accumulation: 'rgba32float' };
-/** Milliseconds of the smallest trial that no GPU takes. */
-const NO_GPU_MS = 60;
+/** The smallest scene of the trials. */
+const SMALL: Trial = { splats: 4_000, width: 320, height: 180 };
 const QUICK_MS = 8;
 
 /**
@@ -74,7 +69,7 @@ async function start(device: GPUDevice, options: StartOptions, choice: Choice): 
 async function likelyMs(device: GPUDevice): Promise<number> {
   const clock = await FrameClock.on(device);
   // Into what the known answer was drawn into: nothing is compiled for this trial alone.
-  return timeFrames(device, LIKELY, ROUNDS[0], clock, ANSWER_TARGET);
+  return timeFrames(device, LIKELY, SMALL, clock, ANSWER_TARGET);
 }
 
 /**
@@ -90,7 +85,7 @@ export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): 
 async function choose(device: GPUDevice, options: ChoiceOptions): Promise<Variants> {
   const { store = pageStore(), pause = noPause, format } = options;
   const kept = readChoice(store, device);
-  const variants = kept !== undefined && (await isRight(device, kept, format)) ? kept : await probe(device, pause);
+  const variants = kept !== undefined && (await isRight(device, kept, format)) ? kept : await search(device, pause);
   // What a device answered while it was lost says nothing about the adapter, whose other devices would go by it.
   if (!(await isAlive(device))) return SAFE;
   remember(device, variants);
@@ -102,35 +97,10 @@ async function noPause(): Promise<void> {
   // Nothing else is to be done.
 }
 
-type Pause = () => Promise<void>;
-
-async function probe(device: GPUDevice, pause: Pause): Promise<Variants> {
-  const processors = device.features.has('float32-blendable') ? [SERIAL, PRECISE] : [SERIAL];
-  const likely = device.adapterInfo?.isFallbackAdapter ? processors : [LIKELY, SAFE];
-  const candidates = await rightOf(device, likely, pause);
-  const clock = await FrameClock.on(device);
-  // A processor that does not say that it is one.
-  if (likely !== processors && !(await isQuick(device, candidates, clock)))
-    candidates.push(...(await rightOf(device, processors, pause)));
-  if (candidates.length > 0) return chooseFastest(device, candidates, clock, pause);
-  for (const candidate of LAST_RESORTS) if (await isRight(device, candidate)) return candidate;
-  return giveUp(device);
-}
-
-/** However slow, if they are right: what was no candidate for its speed. */
-const LAST_RESORTS: readonly Variants[] = [LIKELY, SAFE, SERIAL, { ...LIKELY, threads: 'serial' }];
-
-async function rightOf(device: GPUDevice, candidates: readonly Variants[], pause: Pause): Promise<Variants[]> {
-  const right: Variants[] = [];
-  for (const candidate of candidates) {
-    await pause();
-    if (await isRight(device, candidate)) right.push(candidate);
-  }
-  return right;
-}
-
-async function isQuick(device: GPUDevice, [first]: readonly Variants[], clock: FrameClock): Promise<boolean> {
-  return first !== undefined && (await timeFrames(device, first, ROUNDS[0], clock)) < NO_GPU_MS;
+/** Loaded when it runs: most visits know what suits their device. */
+async function search(device: GPUDevice, pause: () => Promise<void>): Promise<Variants> {
+  const { searchVariants } = await loadModule('the code that tries variants', () => import('./search.js'));
+  return (await searchVariants(device, pause)) ?? giveUp(device);
 }
 
 /** A wrong picture is worse than none. A lost device draws none, and says so itself. */
@@ -156,28 +126,4 @@ async function isAlive(device: GPUDevice): Promise<boolean> {
   } finally {
     buffer.destroy();
   }
-}
-
-async function chooseFastest(
-  device: GPUDevice,
-  candidates: readonly Variants[],
-  clock: FrameClock,
-  pause: Pause,
-): Promise<Variants> {
-  let left = candidates.map((variants) => ({ variants, time: 0 }));
-  let spent = 0;
-  for (const round of ROUNDS) {
-    // Only what the GPU did counts: pipelines that had to be made first are of use later.
-    const last = FRAMES * left.reduce((sum, { time }) => sum + time, 0);
-    if (left.length === 1 || spent + GROWTH * last > BUDGET) break;
-    for (const candidate of left) {
-      await pause();
-      candidate.time = await timeFrames(device, candidate.variants, round, clock);
-    }
-    spent += FRAMES * left.reduce((sum, { time }) => sum + time, 0);
-    left.sort((a, b) => a.time - b.time);
-    const best = left[0].time;
-    left = left.filter(({ time }) => best < MEASURABLE || time <= HOPELESS * best);
-  }
-  return left[0].variants;
 }

@@ -25,7 +25,7 @@ export interface PageSource {
 /** Bytes of files that are kept: what is below a page is often wished for as soon as the page is there, and lies in the same file. */
 const KEPT_BYTES = 64e6;
 
-/** The pages of a folder that `npm run detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again. */
+/** The pages of a folder that `gaussian-splat detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again. */
 export function folderSource(
   manifest: DetailManifest,
   fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>,
@@ -55,7 +55,7 @@ function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBuff
     where,
     expected: `${length} bytes`,
     found: `${bytes.byteLength} bytes`,
-    remedy: 'upload the folder again, all files of it from one run of npm run detail',
+    remedy: 'upload the folder again, all files of it from one run of gaussian-splat detail',
   });
 }
 

@@ -3,7 +3,7 @@ import { BUFFER_USAGE, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.j
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
-import type { Threads } from '../stages/threads.js';
+import type { Threads } from '../stages/plan.js';
 import { TRAINED_TRANSMITTANCE } from '../levers.js';
 import type {
   AccumulationFormat,

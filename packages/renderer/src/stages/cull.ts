@@ -1,7 +1,7 @@
 import { constants, cullChunks, type cull } from '../generated/shaders.js';
 import { PACKED, type GeometryReading } from '../geometry-reading.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
-import type { Threads } from './threads.js';
+import type { Threads } from './plan.js';
 
 /** In which share each chunk of a page is drawn: 0 where it may hold no visible splat. */
 export class CullChunksStage {

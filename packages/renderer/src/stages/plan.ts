@@ -1,6 +1,11 @@
 import { plan, planSerial } from '../generated/shaders.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
-import type { Threads } from './threads.js';
+
+/**
+ * How a stage shares its work: `parallel`, one thread for each item, as GPUs want it; `serial`, a run of items for each thread and no
+ * barriers, for adapters that are a processor in disguise (SwiftShader, llvmpipe, WARP).
+ */
+export type Threads = 'parallel' | 'serial';
 
 const VECTOR_BYTES = 16;
 

@@ -1,6 +1,6 @@
 import { constants, thinCount, thinCountSerial, thinWrite, thinWriteSerial } from '../generated/shaders.js';
 import { kernelOf, type ComputeKernel } from '../gpu/kernel.js';
-import type { Threads } from './threads.js';
+import type { Threads } from './plan.js';
 
 /** What {@link ThinStage} works on. */
 export interface ThinBuffers {
