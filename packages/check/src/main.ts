@@ -1,13 +1,17 @@
 import { parseArgs } from 'node:util';
-import { describeFault, type ReportSection } from '@gaussian-splat/core';
+import { writeFile } from 'node:fs/promises';
+import { describeFault, readOnnxHeader, sidecarName, type ReportSection } from '@gaussian-splat/core';
+import { draftContract } from './draft-contract.js';
+import { openModel } from './model-location.js';
 import { checkModel, type CheckFault, type CheckReport } from './check-model.js';
 
-const USAGE = `Usage: gaussian-check MODEL [--contract CONTRACT.json] [--run]
+const USAGE = `Usage: gaussian-check MODEL [--contract CONTRACT.json] [--run] [--draft]
 
 Checks an ONNX file (a path or an address) against the Gaussian Generator contract.
 
   --contract FILE   the contract; otherwise the model's metadata, NAME.contract.json beside it, or its names
   --run             run the model on the CPU, too, and check its values
+  --draft           write the contract that the model lacks beside it, as NAME.contract.json, and say what to decide
 
 Exit status: 0 if it keeps the contract, 1 if not, 2 if the command is wrong.`;
 
@@ -33,6 +37,7 @@ export async function main(args: readonly string[]): Promise<number> {
     console.error(`Expected one model, found ${positionals.length}.\n\n${USAGE}`);
     return 2;
   }
+  if (values.draft) return draft(positionals[0]);
   const report = await checkModel(positionals[0], { contract: values.contract, run: values.run });
   console.log(formatReport(positionals[0], report, values.run ?? false));
   return report.faults.length > 0 ? 1 : 0;
@@ -42,8 +47,32 @@ function parse(args: readonly string[]) {
   return parseArgs({
     args: [...args],
     allowPositionals: true,
-    options: { contract: { type: 'string' }, run: { type: 'boolean' }, help: { type: 'boolean', short: 'h' } },
+    options: {
+      contract: { type: 'string' },
+      run: { type: 'boolean' },
+      draft: { type: 'boolean' },
+      help: { type: 'boolean', short: 'h' },
+    },
   });
+}
+
+/** Writes a contract beside the model, unless there is one. */
+async function draft(model: string): Promise<number> {
+  const path = sidecarName(model);
+  try {
+    const location = await openModel(model);
+    const header = await readOnnxHeader(location.source);
+    await location.close();
+    const { contract, questions } = draftContract(header);
+    await writeFile(path, `${JSON.stringify(contract, undefined, 2)}\n`, { flag: 'wx' });
+    console.log([`wrote ${path}. To be decided:`, ...questions.map((question) => `  ${question}`)].join('\n'));
+    console.log(`Then: npm run gaussian-splat -- check ${model} --run`);
+    return 0;
+  } catch (error) {
+    const isThere = (error as { code?: string }).code === 'EEXIST';
+    console.error(isThere ? `${path} is there already: delete it first.` : (error as Error).message);
+    return 1;
+  }
 }
 
 /** The report as text for a terminal. */

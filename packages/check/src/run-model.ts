@@ -58,6 +58,8 @@ async function createSession(ort: Runtime, location: ModelLocation, header: Onnx
   );
   return ort.InferenceSession.create(await location.bytes(), {
     executionProviders: ['wasm'],
+    // As the file says it: fusions have computed something else.
+    graphOptimizationLevel: 'basic',
     logSeverityLevel: 3,
     externalData,
   });

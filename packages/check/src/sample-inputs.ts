@@ -30,6 +30,9 @@ export interface Sample {
 const SAMPLE_ROWS = 16;
 const SAMPLE_PIXELS = 64;
 
+/** Shares of the time that are tried besides its ends and its middle. */
+const TIMES = [0.13, 0.25, 0.37, 0.62, 0.75, 0.89];
+
 /** Inputs, of one instance, for runs that reach the ends of what the contract declares: times and views at defaults, then controls. */
 export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
   const given = givenTensors(header, contract);
@@ -40,6 +43,12 @@ export function sampleInputs(header: OnnxHeader, contract: Contract): Sample[] {
     ['mid time, another view', stateAt(contract, 2, 0.5 * end)],
     ['last time, a third view', stateAt(contract, 4, end)],
   ];
+  if (Object.values(contract.inputs).some(({ role }) => role === 'time' || role === 'frame')) {
+    // No simple shares of a period: of a loop they would all be one state.
+    for (const [i, share] of TIMES.entries()) {
+      states.push([`${share} of the time`, stateAt(contract, 2 + i, share * end)]);
+    }
+  }
   if (Object.values(contract.inputs).some(({ role }) => role === 'control')) {
     states.push(['controls at least', stateAt(contract, 0, 0, 0)], ['controls at most', stateAt(contract, 0, 0, 1)]);
   }

@@ -208,6 +208,7 @@ export class Stage
 
   get liveRequest(): SceneHost['liveRequest'] {
     return {
+      element: this.element,
       runtimeLocation: this.services.runtimeLocation,
       state: () => this.#live.state,
       ownsControls: () => !this.#live.post.isWanted,

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gaussian_exporter.checkpoints.clouds import read_cloud
 from gaussian_exporter.checkpoints.ply import read_ply
 from gaussian_exporter.conformance import check_outputs
 from gaussian_exporter.contract import METADATA_KEY
 from gaussian_exporter.errors import ExportError
-from gaussian_exporter.families.classic import Cloud, export_classic, read_cloud
+from gaussian_exporter.families.classic import Cloud, export_classic
 from gaussian_exporter.outputs import Options
 
 from .running import FACTS, covariance, error, parts, run

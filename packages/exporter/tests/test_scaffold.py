@@ -92,7 +92,8 @@ def reference(model: Scaffold, camera: Doubles, resolution: float = 1) -> dict[s
         levels = model.levels
         level = [float(levels.levels[i, 0])] if levels is not None and levels.fed_to_networks else []
         if model.feature_bank is not None:
-            mix = np.exp(apply(model.feature_bank, np.array([*direction, *level])))
+            fed = level if levels is not None else [distance]
+            mix = np.exp(apply(model.feature_bank, np.array([*direction, *fed])))
             mix /= mix.sum()
             feature = np.tile(feature[::4], 4) * mix[0] + np.tile(feature[::2], 2) * mix[1] + feature * mix[2]
 
@@ -136,7 +137,7 @@ def test_k_comes_from_the_model() -> None:
 
 
 def test_feature_bank() -> None:
-    assert_matches(scaffold(feature_bank=layers(np.random.default_rng(5), 3, 8, 3)))
+    assert_matches(scaffold(feature_bank=layers(np.random.default_rng(5), 4, 8, 3)))
 
 
 def test_appearance_is_folded_into_a_bias() -> None:

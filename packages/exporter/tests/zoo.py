@@ -28,7 +28,7 @@ def every_family() -> dict[str, Case]:
     camera: dict[str, AnyArray] = {"camera_position": np.array([0.4, -0.3, -3.0], np.float32)}
     level = {"resolution_scale": np.ones(1, np.float32)}
     bank = test_scaffold.scaffold(
-        distance=("opacity",), feature_bank=test_scaffold.layers(rng, 3, 8, 3), appearance=np.ones(6, np.float32)
+        distance=("opacity",), feature_bank=test_scaffold.layers(rng, 4, 8, 3), appearance=np.ones(6, np.float32)
     )
     moving = test_hexplane.deformation(
         mask=test_hexplane.layers(rng, 12, 12, 1), opacity=test_hexplane.layers(rng, 12, 12, 1)

@@ -21,7 +21,8 @@ import torch
 
 from common import Views, device
 from gaussian_exporter.arrays import sigmoid
-from gaussian_exporter.families.classic import read_cloud, usable
+from gaussian_exporter.checkpoints.clouds import read_cloud
+from gaussian_exporter.families.classic import usable
 from rasterizer import Camera, Splats, covariances, picture
 
 SH_C0 = 0.28209479177387814

@@ -69,6 +69,7 @@ export class Generator {
   readonly #options: GeneratorOptions;
   readonly #runner: RunLoop<Wish> | Seat<InstanceWish>;
   #shown: Wish['inputs'] | undefined;
+  #asked: Wish | undefined;
   #runs = 0;
 
   private constructor(chain: Chain, options: GeneratorOptions) {
@@ -89,10 +90,15 @@ export class Generator {
     device: GPUDevice,
     options: GeneratorOptions = {},
   ): Promise<Generator> {
-    const chain = await Chain.open(source, device, options);
+    let generator: Generator | undefined;
+    const onFallback = (reason: string): void => {
+      options.onFallback?.(reason);
+      if (generator) generator.#askAgain();
+    };
+    const chain = await Chain.open(source, device, { ...options, onFallback });
     try {
       requireGaussians(chain.models.at(-1)!);
-      return new Generator(chain, options);
+      return (generator = new Generator(chain, options));
     } catch (error) {
       chain.release();
       throw error;
@@ -132,6 +138,18 @@ export class Generator {
   request(state: GeneratorState): void {
     if (this.#runner.isClosed) return;
     const inputs = this.#chain.bind(state);
+    this.#asked = { state, inputs };
+    this.#askFor(this.#asked);
+  }
+
+  /** What is on show was written by a session that is not to be trusted. */
+  #askAgain(): void {
+    this.#chain.forget();
+    this.#shown = undefined;
+    if (this.#asked !== undefined) this.#askFor(this.#asked);
+  }
+
+  #askFor({ state, inputs }: Wish): void {
     if (this.#runner instanceof RunLoop) this.#runner.request({ state, inputs });
     else this.#runner.request({ state, inputs: inputs[0] });
   }

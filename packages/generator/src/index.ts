@@ -21,6 +21,8 @@ export {
 export { sameInputs, type GpuTensor, type InputNumbers, type Inputs, type InputValue } from './input-value.js';
 export { PostProcessor, type FinishedPicture, type PictureInput, type PostProcessorOptions } from './post-processor.js';
 export { GeneratorSession } from './runtime/generator-session.js';
+export { compareParts, isDifferent, type ComparedPart, type Comparison } from './proof/compare.js';
+export type { Verdict } from './proof/record.js';
 export type { RunOutputs, SessionKind } from './runtime/live-session.js';
 export { isRuntimeRequested, setRunLimit, setRuntimeLocation } from './runtime/load-runtime.js';
 export { openModel, type GeneratorModel, type ModelSource } from './runtime/open-model.js';

@@ -71,9 +71,15 @@ export class PostProcessor {
     device: GPUDevice,
     options: PostProcessorOptions,
   ): Promise<PostProcessor> {
-    const chain = await Chain.open(source, device, options);
+    let post: PostProcessor | undefined;
+    const onFallback = (reason: string): void => {
+      // The next picture is made anew, even of the same frame.
+      if (post) post.#forget();
+      options.onFallback?.(reason);
+    };
+    const chain = await Chain.open(source, device, { ...options, onFallback });
     try {
-      return new PostProcessor(chain, options);
+      return (post = new PostProcessor(chain, options));
     } catch (error) {
       chain.release();
       throw error;
@@ -121,6 +127,11 @@ export class PostProcessor {
   close(): void {
     this.#loop.close();
     this.#chain.release(this.#loop.idle);
+  }
+
+  #forget(): void {
+    this.#shown = undefined;
+    this.#chain.forget();
   }
 
   #run({ inputs }: Wish): Promise<void> {

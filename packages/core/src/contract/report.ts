@@ -30,7 +30,7 @@ function fileRows(header: OnnxHeader): string[][] {
     ['versions', [`IR ${irVersion}`, ...[...opsets].map(([domain, version]) => `${domain} ${version}`)].join(', ')],
     ['operators', used.length > 40 ? `${used.slice(0, 40).join(', ')} and ${used.length - 40} more` : used.join(', ')],
   ];
-  for (const note of gpuNotes(header)) rows.push(['on the CPU', note]);
+  for (const note of gpuNotes(header)) rows.push(['on the GPU', note]);
   for (const { location, byteLength: length } of externalFiles) {
     rows.push(['external data', `${location}${length > 0 ? `, at least ${grouped(length)} bytes` : ''}`]);
   }

@@ -1,11 +1,21 @@
-import { ONNX_DTYPES, type ExternalFile, type OnnxDim, type OnnxDtype, type OnnxTensor } from './header.js';
+import {
+  ONNX_DTYPES,
+  type ExternalFile,
+  type OnnxDim,
+  type OnnxDtype,
+  type OnnxNode,
+  type OnnxTensor,
+  type OnnxValue,
+} from './header.js';
 import type { LoadedBytes } from './loaded-bytes.js';
 import { FieldCursor, type Span } from './protobuf.js';
 
 /** Longest name, in bytes, that is believed. */
 export const NAME_LIMIT = 65_536;
-/** Dimensions of the weights of a convolution over pictures: channels out and in, rows, columns. */
-const CONV_RANK = 4;
+/** Dimensions of a stored tensor that are kept; no rule asks about tensors of more. */
+const KEPT_RANK = 8;
+/** Bytes of a tensor of 64-bit integers that are read: shapes of reshaped tensors are that short. */
+const SHAPE_BYTES = 8 * KEPT_RANK;
 /** Most dimensions of a tensor that are believed. */
 const RANK_LIMIT = 64;
 /** Subgraphs within subgraphs, as `If` and `Loop` have them, before a file counts as hostile. */
@@ -17,17 +27,10 @@ export interface Harvest {
   readonly externalFiles: ExternalFile[];
   /** Names of initializers of the outermost graph. */
   readonly initializers: string[];
-  /** Names of the weights of convolutions. */
-  readonly convWeights: string[];
-  /** Shapes of weights that might be those of a convolution over pictures, by name. */
-  readonly kernels: Map<string, readonly number[]>;
-  /** Names of what casts read, and the element types that they write. */
-  readonly castInputs: string[];
-  readonly castTypes: OnnxDtype[];
-  /** Element types of initializers by name. */
-  readonly dtypes: Map<string, OnnxDtype>;
-  /** Most outputs of a `Split`. */
-  widestSplit: number;
+  /** Nodes of this level and below, in the order of the file. */
+  readonly nodes: OnnxNode[];
+  /** Stored tensors of any level, by name. */
+  readonly stored: Map<string, OnnxValue>;
   initializerBytes: number;
 }
 
@@ -35,12 +38,8 @@ export const emptyHarvest = (): Harvest => ({
   operators: [],
   externalFiles: [],
   initializers: [],
-  convWeights: [],
-  kernels: new Map(),
-  castInputs: [],
-  castTypes: [],
-  dtypes: new Map(),
-  widestSplit: 0,
+  nodes: [],
+  stored: new Map(),
   initializerBytes: 0,
 });
 
@@ -112,49 +111,55 @@ function readDim(bytes: LoadedBytes, span: Span): OnnxDim {
   return dim;
 }
 
-/** `NodeProto`: its operator, and whatever its attributes hold. */
+/** `NodeProto`: its operator, what it reads and writes, and whatever its attributes hold. */
 export function readNode(bytes: LoadedBytes, span: Span, harvest: Harvest, depth = 0): void {
   let operator = '';
   let domain = '';
+  let name = '';
   const inputs: string[] = [];
-  let outputs = 0;
-  let castTo = 0;
+  const outputs: string[] = [];
+  const attributes: NodeAttributes = {};
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
-    if (field.number === 1 && inputs.length < 2) inputs.push(field.text(NAME_LIMIT));
-    else if (field.number === 2) outputs++;
+    if (field.number === 1) inputs.push(field.text(NAME_LIMIT));
+    else if (field.number === 2) outputs.push(field.text(NAME_LIMIT));
+    else if (field.number === 3) name = field.text(NAME_LIMIT);
     else if (field.number === 4) operator = field.text(NAME_LIMIT);
     else if (field.number === 7) domain = field.text(NAME_LIMIT);
-    else if (field.number === 5 && field.isDelimited) castTo = readAttribute(bytes, field, harvest, depth) ?? castTo;
+    else if (field.number === 5 && field.isDelimited) readAttribute(bytes, field, harvest, attributes, depth);
   }
   const full = operatorName(domain, operator);
   harvest.operators.push(full);
-  if (full === 'Conv' && inputs.length > 1) harvest.convWeights.push(inputs[1]);
-  if (full === 'Split') harvest.widestSplit = Math.max(harvest.widestSplit, outputs);
-  if (full !== 'Cast') return;
-  harvest.castInputs.push(...inputs.slice(0, 1));
-  harvest.castTypes.push(ONNX_DTYPES[castTo] ?? 'unknown');
+  harvest.nodes.push({ name, operator: full, inputs, outputs, isInner: depth > 0, ...attributes });
 }
+
+type NodeAttributes = { -readonly [Key in 'numbers' | 'lists' | 'value']?: OnnxNode[Key] };
 
 /** `MatMul` in ONNX's own domain, `com.example:Name` elsewhere. */
 export function operatorName(domain: string, operator: string): string {
   return domain === '' || domain === 'ai.onnx' ? operator : `${domain}:${operator}`;
 }
 
-/** `AttributeProto`. @returns the whole number of the attribute `to`, which casts have */
-function readAttribute(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: number): number | undefined {
+/** `AttributeProto`: whole numbers, lists of them and tensors are kept; subgraphs are gathered. */
+function readAttribute(bytes: LoadedBytes, span: Span, harvest: Harvest, found: NodeAttributes, depth: number): void {
   let name = '';
   let whole: number | undefined;
+  let value: OnnxValue | undefined;
+  const list: number[] = [];
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
     if (field.number === 3 && field.isVarint) whole = field.value;
+    else if (field.number === 8 && field.isVarint && list.length < KEPT_RANK) list.push(field.value);
     if (!field.isDelimited) continue;
     if (field.number === 1) name = field.text(NAME_LIMIT);
-    else if (field.number === 5 || field.number === 10) readTensor(bytes, field, harvest);
+    else if (field.number === 5 || field.number === 10) value = readTensor(bytes, field, harvest).value;
+    else if (field.number === 8) list.push(...packedVarints(bytes, field, KEPT_RANK));
     else if (field.number === 22 || field.number === 23) readSparseTensor(bytes, field, harvest);
     else if (field.number === 6 || field.number === 11) readSubgraph(bytes, field, harvest, depth + 1);
   }
-  return name === 'to' ? whole : undefined;
+  if (whole !== undefined) found.numbers = { ...found.numbers, [name]: whole };
+  if (list.length > 0) found.lists = { ...found.lists, [name]: list };
+  if (value !== undefined && name === 'value') found.value = value;
 }
 
 function readSubgraph(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: number): void {
@@ -170,25 +175,59 @@ function readSubgraph(bytes: LoadedBytes, span: Span, harvest: Harvest, depth: n
   }
 }
 
-/** `TensorProto`: name, external files and size; the weights are passed over. */
-export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): string {
+/** `TensorProto`: name, type, shape, external files and size; the weights are passed over, but for shapes of other tensors. */
+export function readTensor(bytes: LoadedBytes, span: Span, harvest: Harvest): { name: string; value: OnnxValue } {
   let name = '';
   const entries = new Map<string, string>();
   const dims: number[] = [];
   let dtype: OnnxDtype = 'unknown';
+  let integers: number[] = [];
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
-    if (field.number === 1 && field.isVarint && dims.length <= CONV_RANK) dims.push(field.value);
+    if (field.number === 1 && field.isVarint && dims.length < KEPT_RANK) dims.push(field.value);
     else if (field.number === 2 && field.isVarint) dtype = ONNX_DTYPES[field.value] ?? 'unknown';
+    else if (field.number === 7 && field.isVarint && integers.length < KEPT_RANK) integers.push(field.value);
+    if (!field.isDelimited) continue;
+    if (field.number === 1) dims.push(...packedVarints(bytes, field, KEPT_RANK));
+    else if (field.number === 7) integers = packedVarints(bytes, field, KEPT_RANK);
     else if (field.number === 8) name = field.text(NAME_LIMIT);
-    else if (field.number === 13 && field.isDelimited) readEntry(bytes, field, entries, NAME_LIMIT);
+    else if (field.number === 9 && dtype === 'int64') integers = rawIntegers(bytes, field);
+    else if (field.number === 13) readEntry(bytes, field, entries, NAME_LIMIT);
   }
   harvest.initializerBytes += span.end - span.start;
   const location = entries.get('location');
-  if (dims.length === CONV_RANK) harvest.kernels.set(name, dims);
-  harvest.dtypes.set(name, dtype);
+  const isShape = dtype === 'int64' && dims.length <= 1 && integers.length > 0;
+  const value = { dtype, dims, ...(isShape ? { integers } : {}) };
+  harvest.stored.set(name, value);
   if (location !== undefined) harvest.externalFiles.push({ location, byteLength: externalEnd(entries) });
-  return name;
+  return { name, value };
+}
+
+/** Whole numbers in one field, one after the other; none where there are more than `most`. */
+function packedVarints(bytes: LoadedBytes, span: Span, most: number): number[] {
+  if (span.end - span.start > 10 * most) return [];
+  const numbers: number[] = [];
+  let at = span.start;
+  while (at < span.end && numbers.length <= most) {
+    let value = 0n;
+    let byte = 0x80;
+    for (let shift = 0n; byte >= 0x80 && at < span.end; shift += 7n) {
+      byte = bytes.byteAt(at++);
+      value |= BigInt(byte & 0x7f) << shift;
+    }
+    numbers.push(Number(BigInt.asIntN(64, value)));
+  }
+  return numbers.length > most ? [] : numbers;
+}
+
+/** `raw_data` of 64-bit integers, if it is short. */
+function rawIntegers(bytes: LoadedBytes, { start, end }: Span): number[] {
+  if (end - start > SHAPE_BYTES || (end - start) % 8 !== 0) return [];
+  return Array.from({ length: (end - start) / 8 }, (_, i) => {
+    let value = 0n;
+    for (let k = 0; k < 8; k++) value |= BigInt(bytes.byteAt(start + 8 * i + k)) << BigInt(8 * k);
+    return Number(BigInt.asIntN(64, value));
+  });
 }
 
 /** `SparseTensorProto`: values and indices are tensors; the first names the whole. */
@@ -197,7 +236,7 @@ export function readSparseTensor(bytes: LoadedBytes, span: Span, harvest: Harves
   const field = new FieldCursor(bytes, span);
   while (field.next()) {
     if (!field.isDelimited) continue;
-    if (field.number === 1) name = readTensor(bytes, field, harvest);
+    if (field.number === 1) name = readTensor(bytes, field, harvest).name;
     else if (field.number === 2) readTensor(bytes, field, harvest);
   }
   return name;
@@ -244,7 +283,7 @@ export function readFunction(bytes: LoadedBytes, span: Span, harvest: Harvest): 
   while (field.next()) {
     if (field.number === 1) name = field.text(NAME_LIMIT);
     else if (field.number === 10) domain = field.text(NAME_LIMIT);
-    else if (field.number === 7 && field.isDelimited) readNode(bytes, field, harvest);
+    else if (field.number === 7 && field.isDelimited) readNode(bytes, field, harvest, 1);
   }
   return operatorName(domain, name);
 }

@@ -49,13 +49,28 @@ export interface ExternalFile {
   readonly byteLength: number;
 }
 
-/** A convolution over pictures whose weights are in the file. */
-export interface Convolution {
-  /** Channels. */
-  readonly inputs: number;
-  readonly outputs: number;
-  /** Pixels of the kernel, down and across. */
-  readonly kernel: readonly [number, number];
+/** A tensor that lies in the file: its type and shape, and its numbers where it is the shape of another. */
+export interface OnnxValue {
+  readonly dtype: OnnxDtype;
+  readonly dims: readonly number[];
+  /** Of short vectors of int64. */
+  readonly integers?: readonly number[];
+}
+
+/** A node of the graph, without its weights. */
+export interface OnnxNode {
+  readonly name: string;
+  /** As in {@link OnnxHeader.operators}. */
+  readonly operator: string;
+  readonly inputs: readonly string[];
+  readonly outputs: readonly string[];
+  /** True within a subgraph or a function. */
+  readonly isInner: boolean;
+  /** Attributes that are whole numbers, and lists of some. */
+  readonly numbers?: Readonly<Record<string, number>>;
+  readonly lists?: Readonly<Record<string, readonly number[]>>;
+  /** Tensor of the attribute `value`, as `Constant` has it. */
+  readonly value?: OnnxValue;
 }
 
 /** What an ONNX file says about itself, without its weights. */
@@ -79,12 +94,12 @@ export interface OnnxHeader {
   readonly outputs: readonly OnnxTensor[];
   /** How often each operator occurs, subgraphs included: `MatMul`, or `com.example:Name` outside ONNX's own domain. */
   readonly operators: ReadonlyMap<string, number>;
-  /** One for each set of weights. */
-  readonly convolutions: readonly Convolution[];
-  /** Element types that casts turn into others, as far as they are known from initializers and inputs, or turn others into. */
-  readonly casts: ReadonlySet<OnnxDtype>;
-  /** Most outputs of one `Split`; 0 without any. */
-  readonly widestSplit: number;
+  /** All nodes in the file's order, those of subgraphs and functions before the node that holds them. */
+  readonly nodes: readonly OnnxNode[];
+  /** Tensors that lie in the file, by name. */
+  readonly stored: ReadonlyMap<string, OnnxValue>;
+  /** What the file says of results between its nodes. */
+  readonly values: ReadonlyMap<string, OnnxTensor>;
   /** Operators that the file itself defines, named as in {@link operators}. */
   readonly functions: ReadonlySet<string>;
   readonly externalFiles: readonly ExternalFile[];

@@ -1,13 +1,24 @@
 export { blobSource, bytesSource, type ByteSource } from './byte-source.js';
 export {
   describeTensor,
-  type Convolution,
   type ExternalFile,
   type OnnxDim,
   type OnnxDtype,
   type OnnxHeader,
+  type OnnxNode,
   type OnnxTensor,
+  type OnnxValue,
 } from './header.js';
-export { gpuNotes, miscomputedConvolutions, uncastableTypes } from './webgpu-provider.js';
+export {
+  constantOutputs,
+  gpuFindings,
+  gpuNotes,
+  miscomputedConvolutions,
+  misfusedProducts,
+  uncastableTypes,
+  type Convolution,
+  type GpuFinding,
+} from './webgpu-provider.js';
+export { WEBGPU_RULES } from './webgpu-rules.js';
 export { readOnnxHeader } from './read-onnx-header.js';
 export { openUrl, type UrlSource, type UrlSourceOptions } from './url-source.js';

@@ -13,7 +13,7 @@ import {
   readValueInfo,
   type Harvest,
 } from './graph-parts.js';
-import type { ExternalFile, Convolution, OnnxDtype, OnnxHeader, OnnxTensor } from './header.js';
+import type { ExternalFile, OnnxHeader, OnnxNode, OnnxTensor, OnnxValue } from './header.js';
 import { LoadedBytes, NotLoaded } from './loaded-bytes.js';
 import { FieldCursor } from './protobuf.js';
 
@@ -36,13 +36,10 @@ interface Draft {
   readonly operators: Map<string, number>;
   readonly functions: Set<string>;
   readonly initializers: Set<string>;
-  readonly convWeights: Set<string>;
-  readonly kernels: Map<string, readonly number[]>;
   readonly externalFiles: Map<string, ExternalFile>;
-  readonly castInputs: Set<string>;
-  readonly castTypes: Set<OnnxDtype>;
-  readonly dtypes: Map<string, OnnxDtype>;
-  widestSplit: number;
+  readonly nodes: OnnxNode[];
+  readonly stored: Map<string, OnnxValue>;
+  readonly values: Map<string, OnnxTensor>;
   initializerBytes: number;
 }
 
@@ -83,13 +80,10 @@ const emptyDraft = (): Draft => ({
   operators: new Map(),
   functions: new Set(),
   initializers: new Set(),
-  convWeights: new Set(),
-  kernels: new Map(),
   externalFiles: new Map(),
-  castInputs: new Set(),
-  castTypes: new Set(),
-  dtypes: new Map(),
-  widestSplit: 0,
+  nodes: [],
+  stored: new Map(),
+  values: new Map(),
   initializerBytes: 0,
 });
 
@@ -176,7 +170,7 @@ function readGraphField(bytes: LoadedBytes, field: FieldCursor, draft: Draft): v
       draft.graphName = field.text(NAME_LIMIT);
       break;
     case 5:
-      harvest.initializers.push(readTensor(bytes, field, harvest));
+      harvest.initializers.push(readTensor(bytes, field, harvest).name);
       break;
     case 15:
       harvest.initializers.push(readSparseTensor(bytes, field, harvest));
@@ -187,18 +181,19 @@ function readGraphField(bytes: LoadedBytes, field: FieldCursor, draft: Draft): v
     case 12:
       draft.outputs.push(readValueInfo(bytes, field));
       break;
+    case 13: {
+      const value = readValueInfo(bytes, field);
+      draft.values.set(value.name, value);
+      break;
+    }
   }
   keep(draft, harvest);
 }
 
 function keep(draft: Draft, harvest: Harvest): void {
   const { operators, initializers, externalFiles, initializerBytes } = harvest;
-  for (const name of harvest.convWeights) draft.convWeights.add(name);
-  for (const [name, dims] of harvest.kernels) draft.kernels.set(name, dims);
-  for (const name of harvest.castInputs) draft.castInputs.add(name);
-  for (const dtype of harvest.castTypes) draft.castTypes.add(dtype);
-  for (const [name, dtype] of harvest.dtypes) draft.dtypes.set(name, dtype);
-  draft.widestSplit = Math.max(draft.widestSplit, harvest.widestSplit);
+  draft.nodes.push(...harvest.nodes);
+  for (const [name, value] of harvest.stored) if (name !== '') draft.stored.set(name, value);
   for (const name of operators) draft.operators.set(name, (draft.operators.get(name) ?? 0) + 1);
   for (const name of initializers) draft.initializers.add(name);
   for (const { location, byteLength } of externalFiles) {
@@ -221,22 +216,13 @@ function headerOf(draft: Draft, { name, size }: ByteSource): OnnxHeader {
     optionalInputs: draft.inputs.map(({ name }) => name).filter((name) => draft.initializers.has(name)),
     outputs: draft.outputs,
     operators: draft.operators,
-    convolutions: [...draft.convWeights].flatMap((weights): Convolution[] => {
-      const [outputs, inputs, ...kernel] = draft.kernels.get(weights) ?? [];
-      return outputs === undefined ? [] : [{ inputs, outputs, kernel: kernel as [number, number] }];
-    }),
-    casts: castsOf(draft),
-    widestSplit: draft.widestSplit,
+    nodes: draft.nodes,
+    stored: draft.stored,
+    values: draft.values,
     functions: draft.functions,
     externalFiles: [...draft.externalFiles.values()],
     initializerBytes: draft.initializerBytes,
   };
-}
-
-/** Types that casts write, and those of initializers and inputs that they read. */
-function castsOf({ castInputs, castTypes, dtypes, inputs }: Draft): Set<OnnxDtype> {
-  const read = [...castInputs].map((name) => dtypes.get(name) ?? inputs.find((input) => input.name === name)?.dtype);
-  return new Set([...castTypes, ...read.filter((dtype) => dtype !== undefined)]);
 }
 
 function notOnnx(source: ByteSource, head: Uint8Array, cause?: GaussianSplatError): GaussianSplatError {

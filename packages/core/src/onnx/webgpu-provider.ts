@@ -1,76 +1,237 @@
-import type { Convolution, OnnxDtype, OnnxHeader } from './header.js';
-
-/**
- * Convolutions that ONNX Runtime's WebGPU provider computes wrongly, without a word (onnxruntime-web 1.30.0, and onnxruntime-webgpu 1.27.0 before
- * it; tests/generator/browser/provider.test.ts tries whether it still does): of 6, 9, 15, 18 ... channels, a multiple of 3 that is none of 4, to a multiple of 4, by a
- * kernel of more than one pixel.
- */
-export function miscomputedConvolutions({ convolutions }: OnnxHeader): Convolution[] {
-  return convolutions.filter(
-    ({ inputs, outputs, kernel }) =>
-      inputs > 3 && inputs % 3 === 0 && inputs % 4 !== 0 && outputs % 4 === 0 && Math.max(...kernel) > 1,
-  );
-}
+import { GraphValues } from './graph-values.js';
+import type { OnnxDtype, OnnxHeader, OnnxNode } from './header.js';
+import { WEBGPU_RULES as RULES } from './webgpu-rules.js';
 
 /** Types that no cast of onnxruntime-web's builds with WebGPU (1.30.0, JSPI and Asyncify) reads or writes, on the CPU either: no session can be made. */
 const UNCASTABLE: readonly OnnxDtype[] = ['uint16', 'int16', 'float64'];
 
+/**
+ * One reason why a file will not stay on the GPU (`fallback`), not run there (`failure`), compute other numbers there than on the CPU
+ * (`wrong`), or be slow.
+ */
+export interface GpuFinding {
+  readonly kind: 'fallback' | 'failure' | 'wrong' | 'slow';
+  /** The operator; `file`, `shape` or `type` where it is none. */
+  readonly operator: string;
+  /** The tensor that the node writes first, or that is meant. */
+  readonly tensor: string;
+  readonly reason: string;
+  readonly remedy: string;
+}
+
+/** A convolution whose weights are known. */
+export interface Convolution {
+  readonly inputs: number;
+  readonly outputs: number;
+  readonly kernel: readonly number[];
+  readonly strides: readonly number[];
+  readonly group: number;
+}
+
 /** Types among a file's casts that pages cannot cast. */
-export const uncastableTypes = ({ casts }: OnnxHeader): OnnxDtype[] => UNCASTABLE.filter((dtype) => casts.has(dtype));
+export function uncastableTypes(header: OnnxHeader): OnnxDtype[] {
+  const values = new GraphValues(header);
+  const used = new Set<OnnxDtype | undefined>();
+  for (const { operator, inputs, outputs } of header.nodes) {
+    if (operator !== 'Cast') continue;
+    used.add(values.dtypeOf(inputs[0])).add(values.dtypeOf(outputs[0]));
+  }
+  return UNCASTABLE.filter((dtype) => used.has(dtype));
+}
 
-/** Operators of ONNX itself that have a WebGPU kernel for float32, or none to need; measured with onnxruntime-webgpu 1.27.0, as packages/exporter has them. */
-const KERNELS = new Set(
-  `Abs Acos Acosh Add And ArgMax ArgMin Asin Asinh Atan Atanh AveragePool BatchNormalization Cast Ceil Clip Concat Constant Conv ConvTranspose Cos Cosh
-  CumSum DepthToSpace Div Einsum Elu Equal Erf Exp Expand Flatten Floor Gather GatherElements GatherND Gelu Gemm GlobalAveragePool GlobalMaxPool Greater
-  GreaterOrEqual GridSample HardSigmoid HardSwish Identity InstanceNormalization LayerNormalization LeakyRelu Less LessOrEqual Log LpNormalization MatMul
-  MaxPool Mul Neg Not Pad Pow RMSNormalization Range Reciprocal ReduceL1 ReduceL2 ReduceLogSum ReduceLogSumExp ReduceMax ReduceMean ReduceMin ReduceProd
-  ReduceSum ReduceSumSquare Relu Reshape Resize ScatterElements ScatterND Shape Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze Sub Tan Tanh
-  ThresholdedRelu Tile TopK Transpose Unsqueeze Where`.split(/\s+/),
-);
+/**
+ * Convolutions that ONNX Runtime's WebGPU provider computes wrongly, without a word (onnxruntime-web 1.30.0, onnxruntime-webgpu 1.27.0;
+ * tests/generator/browser/provider.test.ts tries whether it still does). The list saves the time of finding out: what a model writes on the
+ * GPU is compared with what it writes on the CPU in any case.
+ */
+export function miscomputedConvolutions(header: OnnxHeader): Convolution[] {
+  const values = new GraphValues(header);
+  return header.nodes.flatMap((node) => {
+    const convolution = node.operator === 'Conv' ? convolutionOf(node, values) : undefined;
+    return convolution && isMiscomputed(convolution) ? [convolution] : [];
+  });
+}
 
-/** What to write instead of operators that people use in generators. */
-const INSTEAD: Readonly<Record<string, string>> = {
-  Compress: 'keep every row and write opacity 0 into the dead ones',
-  NonZero: 'keep every row and write opacity 0 into the dead ones',
-  Round: 'write Floor(x + 0.5)',
-  Min: 'write Where or Clip',
-  Max: 'write Where, Relu or Clip',
-  Det: 'write the determinant out in Mul and Sub',
+/** One or two dimensions, one group; 6, 9, 15, 18 ... channels, a multiple of 3 that is none of 4, to a multiple of 4; not one pixel at a time. */
+function isMiscomputed({ inputs, outputs, kernel, strides, group }: Convolution): boolean {
+  const isPointwise = [...kernel, ...strides].every((size) => size === 1);
+  const isPlane = kernel.length === 1 || kernel.length === 2;
+  return (
+    group === 1 && isPlane && inputs > 3 && inputs % 3 === 0 && inputs % 4 !== 0 && outputs % 4 === 0 && !isPointwise
+  );
+}
+
+function convolutionOf(
+  { inputs: [, weights], numbers, lists }: OnnxNode,
+  values: GraphValues,
+): Convolution | undefined {
+  const [outputs, perGroup, ...kernel] = values.dimsOf(weights) ?? [];
+  if (typeof outputs !== 'number' || typeof perGroup !== 'number' || kernel.includes(null)) return undefined;
+  const group = numbers?.group ?? 1;
+  const sizes = lists?.kernel_shape ?? (kernel as number[]);
+  return { inputs: perGroup * group, outputs, kernel: sizes, strides: lists?.strides ?? sizes.map(() => 1), group };
+}
+
+/**
+ * Products that ONNX Runtime's optimiser makes another of (onnxruntime 1.30 and 1.31, CPU): a turned matrix times a vector, as in the place of a
+ * camera, loses its transposition when both become one operator. Sessions of such files are made without fusions.
+ */
+export function misfusedProducts(header: OnnxHeader): string[] {
+  const values = new GraphValues(header);
+  return header.nodes.filter((node) => isMisfused(node, values)).map(({ outputs }) => outputs[0]);
+}
+
+const isMisfused = ({ operator, inputs }: OnnxNode, values: GraphValues): boolean =>
+  operator === 'MatMul' &&
+  values.makerOf(inputs[0])?.operator === 'Transpose' &&
+  !values.isConstant(inputs[0]) &&
+  values.dimsOf(inputs[1])?.length === 1;
+
+/** Outputs that are the same in every run: they hang on constants alone. */
+export function constantOutputs(header: OnnxHeader): Set<string> {
+  const values = new GraphValues(header);
+  return new Set(header.outputs.map(({ name }) => name).filter((name) => values.isConstant(name)));
+}
+
+type Rule = (node: OnnxNode, opset: number, values: GraphValues, header: OnnxHeader) => Iterable<GpuFinding>;
+
+/** Everything that would keep a file from running wholly on the GPU with its commands recorded; none if nothing. The exporter's `gpu_findings` are these rules, too. */
+export function gpuFindings(header: OnnxHeader): GpuFinding[] {
+  const values = new GraphValues(header);
+  const opset = header.opsets.get('ai.onnx') ?? 0;
+  const found = [...ofFile(header, opset)];
+  for (const node of header.nodes) {
+    // What hangs on constants alone is computed once, when the session is made.
+    if (node.isInner || values.isFolded(node)) continue;
+    for (const rule of NODE_RULES) found.push(...rule(node, opset, values, header));
+  }
+  return [...found, ...ofCopies(header, values)];
+}
+
+/** The findings for people: sentences without a full stop. */
+export function gpuNotes(header: OnnxHeader): string[] {
+  const notes = gpuFindings(header).map(({ kind, operator, tensor, reason, remedy }) => {
+    const what = ['file', 'shape', 'type'].includes(operator) ? '' : `${operator} (${tensor}): `;
+    return `${kind}: ${what}${reason}; ${remedy}`;
+  });
+  // Of the same operator many times, once is enough.
+  return notes.filter((note, i) => notes.findIndex((other) => withoutTensor(other) === withoutTensor(note)) === i);
+}
+
+const withoutTensor = (note: string): string => note.replace(/ \([^)]*\):/, ':');
+
+/** The axis of instances is a number in every session. */
+function axisOfInstances({ metadata }: OnnxHeader): string | undefined {
+  try {
+    const contract = JSON.parse(metadata.get('gaussian_contract') ?? '{}') as { instances?: { axis?: string } };
+    return contract.instances?.axis;
+  } catch {
+    return undefined;
+  }
+}
+
+function* ofFile(header: OnnxHeader, opset: number): Iterable<GpuFinding> {
+  const { irVersion, inputs, outputs } = header;
+  const axis = axisOfInstances(header);
+  if (opset > RULES.newestOpset || irVersion > RULES.newestIr) {
+    const reason = `opset ${opset}, IR ${irVersion} are newer than ${RULES.newestOpset} and ${RULES.newestIr}`;
+    yield { kind: 'failure', operator: 'file', tensor: '', reason, remedy: `export opset ${RULES.exportOpset}` };
+  }
+  for (const { name: tensor, dims, dtype } of [...inputs, ...outputs]) {
+    if (!dims?.every((dim) => typeof dim === 'number' || (dim !== null && dim === axis))) {
+      const reason = `${tensor} has a symbolic or unknown size, so the graph cannot be recorded`;
+      yield { kind: 'fallback', operator: 'shape', tensor, reason, remedy: 'export fixed shapes' };
+    }
+    if (dtype === 'float16') {
+      const reason = `${tensor} is float16, which needs the device feature shader-f16 (Chromium hides it on NVIDIA under Linux): without it the whole model runs on the CPU`;
+      yield { kind: 'failure', operator: 'type', tensor, reason, remedy: 'offer a float32 file, too' };
+    }
+  }
+}
+
+/**
+ * Outputs that are another shape of a result: no kernel writes them. A file without inputs runs once and is none the worse for it; what is
+ * constant is read once, and the rest recorded.
+ */
+function* ofCopies({ inputs, outputs }: OnnxHeader, values: GraphValues): Iterable<GpuFinding> {
+  for (const { name: tensor } of inputs.length > 0 ? outputs : []) {
+    const operator = values.makerOf(tensor)?.operator ?? '';
+    if (values.isConstant(tensor) || !(RULES.aliases as readonly string[]).includes(operator)) continue;
+    const reason = `${tensor} is copied, which a recording of the commands does not repeat: it runs unrecorded`;
+    yield {
+      kind: 'slow',
+      operator,
+      tensor,
+      reason,
+      remedy: 'let a kernel write it: add a zero that comes from an input',
+    };
+  }
+}
+
+const of = (kind: GpuFinding['kind'], { operator, outputs }: OnnxNode, reason: string, remedy: string): GpuFinding => ({
+  kind,
+  operator: operator.slice(operator.lastIndexOf(':') + 1),
+  tensor: outputs[0] ?? '',
+  reason,
+  remedy,
+});
+
+const kernelRule: Rule = function* (node, opset, _, { functions }) {
+  const { operator } = node;
+  if (operator.includes(':')) {
+    if (functions.has(operator)) return;
+    const domain = operator.slice(0, operator.lastIndexOf(':'));
+    yield of('failure', node, `domain ${domain} is not part of ONNX`, 'write it in operators of ai.onnx');
+  } else if ((RULES.controlFlow as readonly string[]).includes(operator)) {
+    yield of('fallback', node, 'control flow ends the recording', 'unroll it');
+  } else if (!RULES.kernels.includes(operator)) {
+    const remedy = RULES.instead[operator] ?? 'write it in other operators';
+    yield of('fallback', node, 'WebGPU has no kernel for it: every run waits for the GPU in its midst', remedy);
+  } else if (operator === 'GridSample' && opset > RULES.gridSampleOpset) {
+    const reason = `WebGPU has kernels for it up to opset ${RULES.gridSampleOpset}: every run waits for the GPU in its midst`;
+    yield of('fallback', node, reason, `export opset ${RULES.exportOpset}`);
+  }
 };
 
-/** A `Split` binds a buffer for its input and one for each output; adapters have 10 for a shader, some of them. */
-const MOST_SPLIT_OUTPUTS = 9;
-/** The first opset whose GridSample has no kernel. */
-const GRID_SAMPLE_OPSET = 20;
+const typeRule: Rule = function* (node, _, values) {
+  const { operator, inputs, outputs } = node;
+  const isWide = (name: string): boolean => ['int64', 'float64'].includes(values.dtypeOf(name) ?? '');
+  let wide = [...inputs, ...outputs].filter((name) => name !== '' && !values.isConstant(name) && isWide(name));
+  // Indices of Gather and its kin may be int64, and a Cast may make them; anything else is arithmetic.
+  if ((RULES.makers as readonly string[]).includes(operator)) wide = wide.filter((name) => inputs.includes(name));
+  else if ((RULES.indexed as readonly string[]).includes(operator)) {
+    wide = wide.filter((name) => name === inputs[0] || name === outputs[0]);
+  }
+  if (wide.length === 0) return;
+  const reason = `${wide[0]} is ${values.dtypeOf(wide[0])}, for which WebGPU has no kernels`;
+  yield of('fallback', node, reason, 'compute in int32 and cast last, or bake the numbers');
+};
 
-/** One thing that takes work from the GPU, or the whole model: sentences for people, without a full stop. */
-export function gpuNotes(header: OnnxHeader): string[] {
-  const { operators, functions, opsets, widestSplit, inputs, outputs } = header;
-  const notes = [...operators.keys()]
-    .filter((name) => !KERNELS.has(name) && !name.includes(':') && !functions.has(name))
-    .map((name) => {
-      const remedy = INSTEAD[name] ?? 'write it in other operators';
-      return `WebGPU has no kernel for ${name}: unless all that it takes is constant, every run waits for the GPU in its midst; ${remedy}`;
-    });
-  if (operators.has('GridSample') && (opsets.get('ai.onnx') ?? 0) >= GRID_SAMPLE_OPSET) {
-    notes.push(
-      'WebGPU has kernels for GridSample up to opset 19: every run waits for the GPU in its midst; export opset 17',
-    );
+const sizeRule: Rule = function* (node, _, values) {
+  const { operator, inputs, outputs } = node;
+  if (operator === 'Split' && outputs.length > RULES.mostSplitOutputs) {
+    const reason = `a Split into ${outputs.length} binds more buffers than a shader may, and the whole model runs on the CPU`;
+    yield of('failure', node, reason, `split into at most ${RULES.mostSplitOutputs}, or use Gather`);
   }
-  if (widestSplit > MOST_SPLIT_OUTPUTS) {
-    notes.push(
-      `a Split into ${widestSplit} binds more buffers than a shader may, and the whole model runs on the CPU; split into ${MOST_SPLIT_OUTPUTS} at most, or use Gather`,
-    );
+  if (operator === 'Conv') {
+    const convolution = convolutionOf(node, values);
+    if (convolution && isMiscomputed(convolution)) {
+      const reason = `WebGPU computes ${convolution.inputs} channels to ${convolution.outputs} wrongly, so the whole model runs on the CPU`;
+      yield of('wrong', node, reason, 'pad the channels going in to a multiple of 4');
+    }
   }
-  for (const { inputs: from, outputs: to } of miscomputedConvolutions(header)) {
-    notes.push(
-      `WebGPU computes its convolution of ${from} channels to ${to} wrongly, so the whole model runs there: pad the channels going in to a multiple of 4`,
-    );
+  if (isMisfused(node, values)) {
+    const reason =
+      "ONNX Runtime's optimiser loses the transposition of a matrix times a vector, so pages load the file without fusions";
+    yield of('slow', node, reason, 'make the vector a matrix of one column: (R.T @ t[:, None])[:, 0]');
   }
-  if ([...inputs, ...outputs].some(({ dtype }) => dtype === 'float16')) {
-    notes.push(
-      'float16 tensors need the device feature shader-f16: without it, as in Chromium on Linux with NVIDIA, the whole model runs there; offer a float32 file, too',
-    );
+  if (operator === 'CumSum') {
+    const longest = Math.max(0, ...(values.dimsOf(inputs[0]) ?? []).map((size) => size ?? 0));
+    if (longest > RULES.longestCumSum) {
+      const reason = `over ${longest} elements it takes their square in steps`;
+      yield of('slow', node, reason, 'leave compaction to the renderer');
+    }
   }
-  return notes;
-}
+};
+
+const NODE_RULES: readonly Rule[] = [kernelRule, typeRule, sizeRule];

@@ -118,12 +118,8 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
     const starting = startVariants(lease.device, pictures()).catch(unlessWrong);
     starting.catch(ignore);
     const { openLiveModel } = await opening;
-    const { url, chain = [], contract, credentials } = request;
-    live = await openLiveModel(
-      { ...options.live(), url, chain, contract, credentials, memoryBudget },
-      lease.device,
-      signal,
-      (loaded, total) => onProgress(loaded, total, total && ((1 - WARM_UP) * loaded) / total),
+    live = await openLiveModel({ ...options.live(), ...request, memoryBudget }, lease.device, signal, (loaded, total) =>
+      onProgress(loaded, total, total && ((1 - WARM_UP) * loaded) / total),
     );
     await starting;
     beforeUpload(live.gaussians.byteLength);

@@ -47,12 +47,14 @@ export interface LiveModel extends Timeline {
 export interface LiveRequest {
   readonly url: string;
   /** Addresses of models that each take the Gaussians of the one before. */
-  readonly chain: readonly string[];
+  readonly chain?: readonly string[];
   /** Address of a contract, its JSON text, or the contract itself; null for that of the model or beside it. */
-  readonly contract: unknown;
+  readonly contract?: unknown;
   readonly credentials: RequestCredentials;
   /** Bytes of GPU memory that the Gaussians may take; undefined for no limit but the device's. */
   readonly memoryBudget: number | undefined;
+  /** The element that shows it: only code that is loaded for generators reads its attribute `compare`. */
+  readonly element: HTMLElement;
   /** Folder of the runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
   readonly state: () => LiveState;

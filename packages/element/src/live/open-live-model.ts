@@ -6,6 +6,7 @@ import { fetchBeside } from './fetch-beside.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
 import { StateReader } from './read-state.js';
+import { RunWatch } from './run-watch.js';
 import type { Contract, Vector3 } from '@gaussian-splat/core';
 import { parseUp } from '../camera/grammar.js';
 import type { SceneBounds } from '../camera/settings.js';
@@ -40,10 +41,19 @@ export async function openLiveModel(
   const generator = await Generator.open(await sourcesOf(request, signal), device, {
     signal,
     onProgress,
-    onFrame: ({ state }) => isOpen && listeners.onFrame(state.timeSeconds ?? 0),
+    onFrame: ({ state }) => {
+      if (isOpen) listeners.onFrame(state.timeSeconds ?? 0);
+      watch?.frameMade();
+    },
     onError: (error) => (isOpen ? listeners.onError(error) : (firstFailure = error)),
-    onFallback: listeners.onFallback,
+    // Anything but "off" is what it is without the attribute.
+    compare: request.element.getAttribute('compare')?.trim() !== 'off',
+    onFallback: (reason) => {
+      listeners.onFallback(reason);
+      listeners.onInput();
+    },
   });
+  let watch: RunWatch | undefined;
   // What nobody waits for any more need not run to its end.
   signal.addEventListener('abort', () => !isOpen && generator.close(), { once: true });
   let gaussians: DynamicGaussians | undefined;
@@ -72,7 +82,16 @@ export async function openLiveModel(
     const bounds = declared ?? (await live.readBounds!());
     signal.throwIfAborted();
     isOpen = true;
-    return { ...live, bounds };
+    watch = new RunWatch(gaussians, model.header.name, onError);
+    watch.frameMade();
+    return {
+      ...live,
+      bounds,
+      close: () => {
+        watch?.close();
+        live.close();
+      },
+    };
   } catch (error) {
     generator.close();
     pictures?.destroy();
@@ -113,7 +132,7 @@ function liveModel(
 
 /** The generator, and those that follow it in a chain. The contract that the page gives is the first one's. */
 async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<ModelSource[]> {
-  const { url, chain, credentials } = request;
+  const { url, chain = [], credentials } = request;
   const contract = await contractOf(request, signal);
   return [{ url, credentials, contract }, ...chain.map((next) => ({ url: next, credentials }))];
 }

@@ -1,1 +1,43 @@
-"""Trained Gaussian models to ONNX Gaussian Generators."""
+"""Trained Gaussian models, and PyTorch modules of your own, to ONNX Gaussian Generators."""
+
+from .module import (
+    ExportReport,
+    camera,
+    control,
+    export_module,
+    frame,
+    generator,
+    image,
+    image_output,
+    packed,
+    pose,
+    projection,
+    seed,
+    shape,
+    split,
+    time,
+    view,
+    view_projection,
+    viewport,
+)
+
+__all__ = [
+    "ExportReport",
+    "camera",
+    "control",
+    "export_module",
+    "frame",
+    "generator",
+    "image",
+    "image_output",
+    "packed",
+    "pose",
+    "projection",
+    "seed",
+    "shape",
+    "split",
+    "time",
+    "view",
+    "view_projection",
+    "viewport",
+]

@@ -13,8 +13,10 @@ from typing import cast, get_args
 import onnx
 
 from .checkpoints.avatar_file import read_avatar
+from .checkpoints.clouds import read_cloud
 from .checkpoints.files import existing
 from .checkpoints.hexplane_folder import read_hexplane
+from .checkpoints.moving import read_deformable, read_gaussian4d, read_spacetime
 from .checkpoints.networks import read_feed_forward, read_image_filter
 from .checkpoints.scaffold_folder import read_scaffold
 from .conformance import check_outputs
@@ -22,11 +24,14 @@ from .contract import Coordinates, DType, Facts, Json, Layout, Up, of_metadata
 from .cost import cost_of, report
 from .errors import ExportError
 from .families.avatar import PoseFormat, export_avatar
-from .families.classic import Colours, export_classic, read_cloud
+from .families.classic import Colours, export_classic
+from .families.deformable import export_deformable
 from .families.feed_forward import export_feed_forward
+from .families.gaussian4d import export_gaussian4d
 from .families.hexplane import export_hexplane
 from .families.image_filter import export_image_filter
 from .families.scaffold import export_scaffold
+from .families.spacetime import export_spacetime
 from .graph import Weights
 from .outputs import Options, refuse_instances, save
 from .placement import gpu_findings
@@ -78,7 +83,9 @@ def add_common(family: Command) -> None:
     facts.add_argument("--duration", type=float, help="seconds that time 0 to 1 plays")
     facts.add_argument("--fps", type=float)
     written = family.add_argument_group("output")
-    written.add_argument("--layout", choices=get_args(Layout), help="default: split; of classic packed, but for float16")
+    written.add_argument(
+        "--layout", choices=get_args(Layout), help="default: split; of classic packed, but for float16"
+    )
     written.add_argument("--weights", choices=get_args(Weights), default="float32", help="compact: in 16 bits")
     written.add_argument(
         "--instances", type=positive, help="most instances in one run: gives the file an axis for them"
@@ -145,6 +152,8 @@ def report_findings(model: onnx.ModelProto) -> None:
 
 def _classic_options(family: Command) -> None:
     family.add_argument("--colours", choices=get_args(Colours), default="sh", help="view: harmonics in the graph")
+    what = "properties of vertices that change nothing, separated by commas"
+    family.add_argument("--ignore", type=lambda text: text.split(","), default=[], metavar="NAMES", help=what)
 
 
 def _scaffold_options(family: Command) -> None:
@@ -160,7 +169,7 @@ def _no_options(family: Command) -> None:
 
 
 def _classic(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
-    return export_classic(read_cloud(given.checkpoint), facts, options, cast(Colours, given.colours))
+    return export_classic(read_cloud(given.checkpoint, given.ignore), facts, options, cast(Colours, given.colours))
 
 
 def _scaffold(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
@@ -169,6 +178,20 @@ def _scaffold(given: argparse.Namespace, facts: Facts, options: Options) -> onnx
 
 def _hexplane(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
     return export_hexplane(*read_hexplane(given.checkpoint), facts, options)
+
+
+def _spacetime(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    return export_spacetime(read_spacetime(given.checkpoint), facts, options)
+
+
+def _deformable(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    return export_deformable(*read_deformable(given.checkpoint), facts, options)
+
+
+def _gaussian4d(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
+    model = read_gaussian4d(given.checkpoint)
+    # What is played is known: the seconds of the training.
+    return export_gaussian4d(model, replace(facts, duration=facts.duration or model.end - model.start), options)
 
 
 def _avatar(given: argparse.Namespace, facts: Facts, options: Options) -> onnx.ModelProto:
@@ -209,9 +232,16 @@ def _image_filter(given: argparse.Namespace, facts: Facts, options: Options) -> 
 
 
 FAMILIES: dict[str, tuple[Callable[[Command], None], str, Export]] = {
-    "classic": (_classic_options, "3DGS: a PLY file, or the trainer's folder", _classic),
+    "classic": (
+        _classic_options,
+        "3DGS: a PLY file; a checkpoint of gsplat, nerfstudio or INRIA's trainer; or the trainer's folder",
+        _classic,
+    ),
     "scaffold": (_scaffold_options, "Scaffold-GS or Octree-GS: the trainer's folder", _scaffold),
     "hexplane": (_no_options, "4DGS: the folder of 4DGaussians", _hexplane),
+    "spacetime": (_no_options, "SpacetimeGaussians, lite: the trainer's folder, or its PLY file", _spacetime),
+    "deformable": (_no_options, "Deformable-3D-Gaussians: the trainer's folder", _deformable),
+    "4dgs": (_no_options, "4D Gaussian Splatting (4D covariances): chkpnt*.pth, cfg_args beside it", _gaussian4d),
     "avatar": (_avatar_options, "a skinned avatar: one .npz file", _avatar),
     "feed-forward": (
         _feed_forward_options,

@@ -8,7 +8,8 @@ ErrorCode = Literal[
     "checkpoint/unreadable",  # not the format it should be, truncated, or it holds more than data
     "checkpoint/incomplete",  # a known format without something the model needs
     "checkpoint/mismatch",  # two parts of a checkpoint contradict one another
-    "checkpoint/unsupported",  # a known model with a part that has no exporter
+    "checkpoint/unsupported",
+    "checkpoint/other-family",  # a known model with a part that has no exporter
     "argument/value",  # an option outside its range
     "graph/invalid",  # a graph that ONNX refuses
     "contract/violation",  # outputs or metadata that break the contract

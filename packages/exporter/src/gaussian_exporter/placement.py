@@ -9,49 +9,23 @@ each node.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from importlib.resources import files
+from typing import Any, Literal
 
 import onnx
 from onnx import TensorProto, helper
 
-from .graph import ALIASES, INSTANCES_AXIS
-from .pieces.convolution import is_wrong_on_webgpu
+from .contract import METADATA_KEY
+from .graph import ALIASES
 
-# Operators of ai.onnx with a float32 kernel. Control flow (If) has one too, but ends capture.
-_KERNEL_NAMES = """
-    Abs Acos Acosh Add And ArgMax ArgMin Asin Asinh Atan Atanh AveragePool BatchNormalization Cast Ceil Clip
-    Concat Conv ConvTranspose Cos Cosh CumSum DepthToSpace Div Einsum Elu Equal Erf Exp Expand Flatten Floor
-    Gather GatherElements GatherND Gelu Gemm GlobalAveragePool GlobalMaxPool Greater GreaterOrEqual GridSample
-    HardSigmoid HardSwish Identity InstanceNormalization LayerNormalization LeakyRelu Less LessOrEqual Log
-    LpNormalization MatMul MaxPool Mul Neg Not Pad Pow RMSNormalization Range Reciprocal ReduceL1 ReduceL2
-    ReduceLogSum ReduceLogSumExp ReduceMax ReduceMean ReduceMin ReduceProd ReduceSum ReduceSumSquare Relu
-    Reshape Resize ScatterElements ScatterND Shape Sigmoid Sin Sinh Slice Softmax Softplus Split Sqrt Squeeze
-    Sub Tan Tanh ThresholdedRelu Tile TopK Transpose Unsqueeze Where
-"""
-KERNELS = frozenset(_KERNEL_NAMES.split())
-INSTEAD = {
-    "Compress": "keep every row and write opacity 0 into the dead ones",
-    "NonZero": "keep every row and write opacity 0 into the dead ones",
-    "Round": "Floor(x + 0.5), or compare with a shifted number",
-    "Sign": "Where(x > 0, 1, -1)",
-    "Min": "Where(a < b, a, b), or Clip",
-    "Max": "Where(a > b, a, b), Relu or Clip",
-    "Or": "add masks as floats",
-    "Sum": "Add",
-    "Mean": "Add and Mul",
-    "PRelu": "LeakyRelu, or Where",
-    "LogSoftmax": "Log(Softmax(x))",
-    "SpaceToDepth": "Reshape and Transpose",
-    "Det": "write the determinant out in Mul and Sub",
-}
-NEWEST_OPSET = 26
-NEWEST_IR = 13
-# A Split binds its input, its outputs and nothing else: the adapter measured had 10 storage buffers for a shader.
-MOST_SPLIT_OUTPUTS = 9
-# CumSum lets each thread add up its whole prefix.
-LONGEST_CUMSUM = 4096
+# One rule set with the checker of pages and shells: packages/core/src/onnx/webgpu-rules.ts, of which this is the copy.
+RULES: dict[str, Any] = json.loads(files(__package__).joinpath("webgpu_rules.json").read_text())
+KERNELS = frozenset(RULES["kernels"])
+INSTEAD: dict[str, str] = RULES["instead"]
+_EXPORT = f"export opset {RULES['exportOpset']}"
 
 Kind = Literal["fallback", "failure", "wrong", "slow"]
 
@@ -66,15 +40,25 @@ class Finding:
     operator: str
     reason: str
     remedy: str
+    # What the node writes first, or the tensor that is meant.
+    tensor: str = ""
 
     def __str__(self) -> str:
         """One line for people."""
         return f"{self.kind}: {self.operator} '{self.node}': {self.reason}; {self.remedy}"
 
 
-def _size(dim: onnx.TensorShapeProto.Dimension) -> int | None:
+def _axis_of_instances(model: onnx.ModelProto) -> str | None:
+    for prop in model.metadata_props:
+        if prop.key == METADATA_KEY:
+            contract = json.loads(prop.value)
+            return str(contract["instances"]["axis"]) if "instances" in contract else None
+    return None
+
+
+def _size(dim: onnx.TensorShapeProto.Dimension, axis: str | None) -> int | None:
     """A size, or None where the file leaves it open. The axis of instances is a number in every session."""
-    if dim.dim_param == INSTANCES_AXIS:
+    if axis is not None and dim.dim_param == axis:
         return 1
     return dim.dim_value if dim.HasField("dim_value") else None
 
@@ -88,6 +72,9 @@ class _Values:
         except onnx.shape_inference.InferenceError:
             # Operators of a foreign domain; what the file itself declares must do.
             graph = model.graph
+        self.axis = _axis_of_instances(model)
+        self.makers = {name: node for node in graph.node for name in node.output}
+        self.functions = {(function.domain, function.name) for function in model.functions}
         self.constants = {initializer.name for initializer in graph.initializer}
         self.constants |= {node.output[0] for node in graph.node if node.op_type == "Constant"}
         self.types = {initializer.name: initializer.data_type for initializer in graph.initializer}
@@ -96,7 +83,7 @@ class _Values:
         for value in [*graph.input, *graph.value_info, *graph.output]:
             tensor = value.type.tensor_type
             self.types[value.name] = tensor.elem_type
-            self.dims[value.name] = [_size(d) for d in tensor.shape.dim]
+            self.dims[value.name] = [_size(d, self.axis) for d in tensor.shape.dim]
 
 
 def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
@@ -106,7 +93,7 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
     found = list(_of_file(model, opset, values))
     for node in model.graph.node:
         # What hangs on constants alone is computed once, when the session is made.
-        if node.input and all(name in values.constants or not name for name in node.input):
+        if is_folded(node, values):
             values.constants.update(node.output)
             found += _of_constants(node, values)
             continue
@@ -114,31 +101,45 @@ def gpu_findings(model: onnx.ModelProto) -> list[Finding]:
     return [*found, *_of_copies(model, values)]
 
 
+def is_folded(node: onnx.NodeProto, values: _Values) -> bool:
+    """Whether a node is computed when the session is made: of constants, or the shape of a tensor of fixed shape."""
+    if node.op_type == "Shape" and None not in values.dims.get(node.input[0], [None]):
+        return True
+    return bool(node.input) and all(name in values.constants or not name for name in node.input)
+
+
 def _of_copies(model: onnx.ModelProto, values: _Values) -> Iterator[Finding]:
-    """Outputs that no kernel writes. A file without inputs runs once and is none the worse for it."""
+    """Outputs that are another shape of a result: no kernel writes them. A file without inputs runs once and is none
+    the worse for it; what is constant is read once, and the rest recorded."""
     makers = {name: node for node in model.graph.node for name in node.output}
     for output in model.graph.output if model.graph.input else []:
         maker = makers.get(output.name)
-        operator = "constant" if maker is None or output.name in values.constants else maker.op_type
-        if operator in ALIASES or operator == "constant":
+        if maker is not None and output.name not in values.constants and maker.op_type in ALIASES:
             reason = f"{output.name} is copied, which a recording of the commands does not repeat: it runs unrecorded"
             remedy = "let a kernel write it: add a zero that comes from an input"
-            yield Finding("slow", maker.name if maker else output.name, operator, reason, remedy)
+            yield Finding("slow", maker.name, maker.op_type, reason, remedy, output.name)
 
 
 def _of_file(model: onnx.ModelProto, opset: int, values: _Values) -> Iterator[Finding]:
-    if opset > NEWEST_OPSET or model.ir_version > NEWEST_IR:
+    newest = RULES["newestOpset"], RULES["newestIr"]
+    if opset > newest[0] or model.ir_version > newest[1]:
         found = f"opset {opset}, IR {model.ir_version}"
-        yield Finding(
-            "failure", "", "file", f"{found} are newer than {NEWEST_OPSET} and {NEWEST_IR}", "export opset 17"
-        )
+        yield Finding("failure", "", "file", f"{found} are newer than {newest[0]} and {newest[1]}", _EXPORT)
     for value in [*model.graph.input, *model.graph.output]:
-        if value.name not in values.constants and None in values.dims.get(value.name, []):
-            reason = f"{value.name} has a symbolic or unknown size, so the graph cannot be captured"
-            yield Finding("fallback", value.name, "shape", reason, "export fixed shapes")
+        if value.name not in values.constants and not _is_fixed(value, values.axis):
+            reason = f"{value.name} has a symbolic or unknown size, so the graph cannot be recorded"
+            yield Finding("fallback", value.name, "shape", reason, "export fixed shapes", value.name)
         if values.types.get(value.name) == TensorProto.FLOAT16:
-            reason = f"{value.name} is float16, which needs shader-f16 (Chromium hides it on NVIDIA under Linux)"
-            yield Finding("failure", value.name, "type", reason, "offer a float32 file, too")
+            reason = (
+                f"{value.name} is float16, which needs the device feature shader-f16 (Chromium hides it on NVIDIA "
+                "under Linux): without it the whole model runs on the CPU"
+            )
+            yield Finding("failure", value.name, "type", reason, "offer a float32 file, too", value.name)
+
+
+def _is_fixed(value: onnx.ValueInfoProto, axis: str | None) -> bool:
+    tensor = value.type.tensor_type
+    return tensor.HasField("shape") and None not in [_size(dim, axis) for dim in tensor.shape.dim]
 
 
 def _of_constants(node: onnx.NodeProto, values: _Values) -> Iterator[Finding]:
@@ -148,48 +149,70 @@ def _of_constants(node: onnx.NodeProto, values: _Values) -> Iterator[Finding]:
         yield Finding("failure", node.name, "Cast", reason, "store uint8 (two of them for 16 bits), float16 or int32")
 
 
+def _of(kind: Kind, node: onnx.NodeProto, reason: str, remedy: str) -> Finding:
+    return Finding(kind, node.name or node.output[0], node.op_type, reason, remedy, node.output[0])
+
+
 def _kernel(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
     if node.domain not in ("", "ai.onnx"):
-        reason = f"domain {node.domain} is not part of ONNX"
-        yield Finding("failure", node.name, node.op_type, reason, "write it in operators of ai.onnx")
-    elif node.op_type in ("If", "Loop", "Scan"):
-        yield Finding("fallback", node.name, node.op_type, "control flow ends capture", "unroll it")
-    elif node.op_type not in KERNELS and node.op_type != "Constant":
+        if (node.domain, node.op_type) not in values.functions:
+            yield _of("failure", node, f"domain {node.domain} is not part of ONNX", "write it in operators of ai.onnx")
+    elif node.op_type in RULES["controlFlow"]:
+        yield _of("fallback", node, "control flow ends the recording", "unroll it")
+    elif node.op_type not in KERNELS:
         remedy = INSTEAD.get(node.op_type, "write it in other operators")
-        yield Finding("fallback", node.name, node.op_type, "no WebGPU kernel", remedy)
-    elif node.op_type == "GridSample" and opset >= 20:
-        yield Finding("fallback", node.name, node.op_type, "kernels end with opset 19", "export opset 17")
+        yield _of("fallback", node, "WebGPU has no kernel for it: every run waits for the GPU in its midst", remedy)
+    elif node.op_type == "GridSample" and opset > RULES["gridSampleOpset"]:
+        reason = f"WebGPU has kernels for it up to opset {RULES['gridSampleOpset']}"
+        yield _of("fallback", node, f"{reason}: every run waits for the GPU in its midst", _EXPORT)
 
 
 def _types(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
     handled = (TensorProto.INT64, TensorProto.DOUBLE)
-    used = [name for name in [*node.input, *node.output] if name not in values.constants]
+    used = [name for name in [*node.input, *node.output] if name and name not in values.constants]
     wide = [name for name in used if values.types.get(name) in handled]
     # Indices of Gather and its kin may be int64, and a Cast may make them; anything else is arithmetic.
-    if node.op_type in ("Cast", "ArgMax", "ArgMin", "TopK", "Shape"):
+    if node.op_type in RULES["makers"]:
         wide = [name for name in wide if name in node.input]
-    elif node.op_type in ("Gather", "GatherElements", "GatherND", "ScatterND", "ScatterElements"):
+    elif node.op_type in RULES["indexed"]:
         wide = [name for name in wide if name in (node.input[0], node.output[0])]
     if wide:
         kind = helper.tensor_dtype_to_np_dtype(values.types[wide[0]])
         remedy = "compute in int32 and cast last, or bake the numbers"
-        yield Finding("fallback", node.name, node.op_type, f"{wide[0]} is {kind}, without WebGPU kernels", remedy)
+        yield _of("fallback", node, f"{wide[0]} is {kind}, for which WebGPU has no kernels", remedy)
 
 
 def _sizes(node: onnx.NodeProto, opset: int, values: _Values) -> Iterator[Finding]:
-    if node.op_type == "Split" and len(node.output) > MOST_SPLIT_OUTPUTS:
-        reason = f"{len(node.output)} outputs need more storage buffers than a shader may bind"
-        yield Finding("failure", node.name, "Split", reason, f"split into at most {MOST_SPLIT_OUTPUTS}, or use Gather")
-    if node.op_type == "Conv" and len(values.dims.get(node.input[1], [])) == 4:
-        outputs, inputs, size = (side or 0 for side in values.dims[node.input[1]][:3])
-        if is_wrong_on_webgpu(inputs, outputs, size):
-            reason = f"{inputs} channels to {outputs} come out wrong (seen with onnxruntime-webgpu 1.27.0)"
-            yield Finding("wrong", node.name, "Conv", reason, "pad the channels going in to a multiple of 4")
+    most = RULES["mostSplitOutputs"]
+    if node.op_type == "Split" and len(node.output) > most:
+        reason = f"a Split into {len(node.output)} binds more buffers than a shader may"
+        reason += ", and the whole model runs on the CPU"
+        yield _of("failure", node, reason, f"split into at most {most}, or use Gather")
+    if node.op_type == "Conv" and (channels := miscomputed_convolution(node, values.dims.get(node.input[1], []))):
+        reason = f"WebGPU computes {channels[0]} channels to {channels[1]} wrongly, so the whole model runs on the CPU"
+        yield _of("wrong", node, reason, "pad the channels going in to a multiple of 4")
+    maker = values.makers.get(node.input[0]) if node.op_type == "MatMul" else None
+    if maker is not None and maker.op_type == "Transpose" and len(values.dims.get(node.input[1], [0, 0])) == 1:
+        reason = "ONNX Runtime's optimiser loses the transposition of a matrix times a vector"
+        remedy = "make the vector a matrix of one column: (R.T @ t[:, None])[:, 0]"
+        yield _of("slow", node, f"{reason}, so pages load the file without fusions", remedy)
     if node.op_type == "CumSum":
         longest = max((size or 0 for size in values.dims.get(node.input[0], [])), default=0)
-        if longest > LONGEST_CUMSUM:
+        if longest > RULES["longestCumSum"]:
             reason = f"over {longest} elements it takes their square in steps"
-            yield Finding("slow", node.name, "CumSum", reason, "leave compaction to the renderer")
+            yield _of("slow", node, reason, "leave compaction to the renderer")
+
+
+def miscomputed_convolution(node: onnx.NodeProto, dims: Sequence[int | None]) -> tuple[int, int] | None:
+    """Channels in and out of a convolution that the WebGPU provider computes wrongly: of one or two dimensions and one
+    group, of a multiple of 3 that is none of 4 to a multiple of 4, and not one pixel at a time. None for others."""
+    given = {attribute.name: helper.get_attribute_value(attribute) for attribute in node.attribute}
+    if len(dims) not in (3, 4) or given.get("group", 1) != 1 or None in dims:
+        return None
+    outputs, inputs, *kernel = (size or 0 for size in dims)
+    sizes = [*given.get("kernel_shape", kernel), *given.get("strides", [1])]
+    is_wrong = inputs > 3 and inputs % 3 == 0 and inputs % 4 != 0 and outputs % 4 == 0 and max(sizes) > 1
+    return (inputs, outputs) if is_wrong else None
 
 
 _RULES: list[Callable[[onnx.NodeProto, int, _Values], Iterator[Finding]]] = [_kernel, _types, _sizes]

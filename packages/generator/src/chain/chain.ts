@@ -97,6 +97,11 @@ export class Chain {
     }
   }
 
+  /** What its models wrote is not to be relied on any more: the next run asks all of them. */
+  forget(): void {
+    this.#ran.length = 0;
+  }
+
   /** Gives its models back. @param idle fulfils when the last run has ended: until then it may read what was handed over */
   release(idle: Promise<void> = Promise.resolve()): void {
     this.#endProgress();

@@ -6,6 +6,8 @@ import type { GeneratorState } from '../state.js';
 import type { LiveSession, RunOutputs, SessionKind } from './live-session.js';
 import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
+import { earlierVerdict, prove, type Evidence } from '../proof/prove.js';
+import type { Verdict } from '../proof/record.js';
 import { runFault, startSession } from './start-session.js';
 
 /** Runs that may fail one after the other before a model is given up, or, if it has run before, left alone for a while. */
@@ -24,6 +26,8 @@ export class GeneratorSession {
   readonly model: GeneratorModel;
   readonly device: GPUDevice;
   readonly #onFallback: (reason: string) => void;
+  readonly #isCompared: boolean;
+  readonly #end = new AbortController();
   readonly #oneInstance: OnnxHeader;
   #live: Promise<LiveSession> | undefined;
   #kind: SessionKind | undefined;
@@ -34,23 +38,41 @@ export class GeneratorSession {
   #hasBroken = false;
   #isLost = false;
   #isReleased = false;
+  /** Why the GPU is not used any more. */
+  #refusal: string | undefined;
+  #verdict: Verdict | undefined;
 
   /**
    * @param onFallback told once if the model has to run on the CPU
+   * @param isCompared whether what the first run writes on the GPU is compared with what the CPU writes
    * @throws GaussianSplatError `out-of-memory/buffer-limit` if an output is larger than the device's buffers.
    */
-  constructor(model: GeneratorModel, device: GPUDevice, onFallback: (reason: string) => void = () => undefined) {
+  constructor(
+    model: GeneratorModel,
+    device: GPUDevice,
+    onFallback: (reason: string) => void = () => undefined,
+    isCompared = true,
+  ) {
     this.model = model;
     this.device = device;
     this.#onFallback = onFallback;
+    this.#isCompared = isCompared;
     this.#oneInstance = oneInstance(model.header, model.contract);
     requireRoom(model, device);
-    void device.lost.then(() => (this.#isLost = true));
+    void device.lost.then(() => {
+      this.#isLost = true;
+      this.#end.abort();
+    });
   }
 
   /** How it runs; undefined until it has. */
   get kind(): SessionKind | undefined {
     return this.#kind;
+  }
+
+  /** What the comparison with the CPU has shown; undefined until it has, which is some seconds after the first run. */
+  get verdict(): Verdict | undefined {
+    return this.#verdict;
   }
 
   /**
@@ -77,7 +99,7 @@ export class GeneratorSession {
       outputs: outputs.map((output) => ({ ...output, most: output.most && output.most * count })),
       instances: count,
     };
-    return new GeneratorSession(model, this.device, this.#onFallback);
+    return new GeneratorSession(model, this.device, this.#onFallback, this.#isCompared);
   }
 
   /**
@@ -149,6 +171,7 @@ export class GeneratorSession {
   /** Lets go of the runtime's session. */
   async release(): Promise<void> {
     this.#isReleased = true;
+    this.#end.abort();
     const live = this.#live;
     this.#live = undefined;
     await live?.then(
@@ -161,16 +184,35 @@ export class GeneratorSession {
     const { model, device } = this;
     const requireLife = (): void => this.#requireLife();
     const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;
-    const live = await startSession({
+    if (this.#isCompared) this.#verdict ??= await earlierVerdict(model, device);
+    if (this.#verdict?.result === 'different') this.#refusal ??= this.#verdict.reason;
+    const { session, evidence } = await startSession({
       model,
       device,
       inputs,
       requireLife,
       onBreakage: () => (this.#hasBroken = true),
       onFallback,
+      refusal: this.#refusal,
+      keepsEvidence: this.#isCompared && this.#verdict === undefined,
     });
-    this.#kind = live.kind;
-    return live;
+    this.#kind = session.kind;
+    if (evidence) void this.#prove(evidence);
+    return session;
+  }
+
+  /** Once what the GPU writes turns out to be wrong, the model runs on the CPU: the next run starts there. */
+  async #prove(evidence: Evidence): Promise<void> {
+    const verdict = await prove(this.model, this.device, evidence, this.#end.signal);
+    if (this.#end.signal.aborted) return;
+    this.#verdict = verdict;
+    if (verdict.result !== 'different' || this.#kind === 'wasm') return;
+    this.#refusal = verdict.reason;
+    this.#kind = 'wasm';
+    const live = this.#live;
+    this.#live = undefined;
+    void live?.then((session) => session.release()).catch(() => undefined);
+    this.#onFallback(verdict.reason);
   }
 
   async #afterFailure(live: LiveSession, starting: Promise<LiveSession>, error: unknown): Promise<unknown> {

@@ -1,4 +1,4 @@
-import { ContractError } from '@gaussian-splat/core';
+import { ContractError, misfusedProducts } from '@gaussian-splat/core';
 import type { InferenceSession, Tensor } from 'onnxruntime-web/webgpu';
 import {
   elementsOf,
@@ -11,7 +11,7 @@ import {
 import { RuntimeGone, type Runtime } from './load-runtime.js';
 import type { ModelOutput } from './model-outputs.js';
 import type { GeneratorModel } from './open-model.js';
-import { readTensors } from './read-tensors.js';
+import { numbersOf } from './first-run.js';
 import { SessionBuffers } from './session-buffers.js';
 import { bufferBytes } from './tensor-bytes.js';
 
@@ -27,6 +27,15 @@ export interface RunOutputs {
   readonly rows: number;
 }
 
+/** An output that is the same in every run: it is there, and not asked for. */
+export interface FixedOutput {
+  readonly buffer: GPUBuffer;
+  readonly dims: readonly number[];
+}
+
+/** By the names of outputs. */
+export type FixedOutputs = Record<string, FixedOutput>;
+
 /** What the runtime would log comes with its errors, too. */
 const QUIET = { logSeverityLevel: 4 } as const;
 
@@ -40,9 +49,11 @@ export class LiveSession {
   /** Which dimension of an output counts rows. */
   readonly #rowAxis: 0 | 1;
   readonly #names: readonly string[];
+  readonly #fixed: Readonly<FixedOutputs>;
   readonly #buffers: SessionBuffers;
   readonly #feeds: Record<string, Tensor> = {};
   #hasFailed = false;
+  #isReleased = false;
   /** What a captured session writes to. */
   #written: readonly GPUBuffer[] = [];
 
@@ -52,6 +63,7 @@ export class LiveSession {
     session: InferenceSession,
     device: GPUDevice,
     { outputs, instances }: GeneratorModel,
+    fixed: Readonly<FixedOutputs>,
   ) {
     this.kind = kind;
     this.#runtime = runtime;
@@ -59,16 +71,22 @@ export class LiveSession {
     this.#device = device;
     this.#outputs = outputs;
     this.#rowAxis = instances === undefined ? 0 : 1;
-    this.#names = outputs.map(({ name }) => name);
+    // A run that is asked for nothing would compute nothing.
+    this.#fixed = outputs.every(({ name }) => name in fixed) ? {} : fixed;
+    this.#names = outputs.map(({ name }) => name).filter((name) => !(name in this.#fixed));
     this.#buffers = new SessionBuffers(device);
   }
 
-  /** @throws whatever the runtime says. */
+  /**
+   * @param fixed outputs that are never asked for; of a session that is made with them they are, and destroyed by it
+   * @throws whatever the runtime says.
+   */
   static async create(
     kind: SessionKind,
     runtime: Runtime,
     model: GeneratorModel,
     device: GPUDevice,
+    fixed: Readonly<FixedOutputs> = {},
   ): Promise<LiveSession> {
     const options: InferenceSession.SessionOptions = {
       ...QUIET,
@@ -80,13 +98,16 @@ export class LiveSession {
       preferredOutputLocation: 'gpu-buffer',
       enableGraphCapture: kind === 'captured',
     };
+    // On the CPU, and where the runtime's fusions are known to compute something else, the graph runs as it is written.
+    const isFused = kind !== 'wasm' && misfusedProducts(model.header).length === 0;
     const session = await runtime.exclusive(() =>
       runtime.ort.InferenceSession.create(model.bytes, {
         ...options,
+        graphOptimizationLevel: isFused ? 'all' : 'basic',
         ...(kind === 'wasm' ? { executionProviders: ['wasm'] } : onGpu),
       }),
     );
-    return new LiveSession(kind, runtime, session, device, model);
+    return new LiveSession(kind, runtime, session, device, model, fixed);
   }
 
   /** True after a run that failed. */
@@ -102,11 +123,14 @@ export class LiveSession {
   /**
    * Runs the model, and hands what it wrote to `use`, which must submit all its work before it returns. Nothing else of the runtime
    * runs in between.
-   * @throws what the runtime says, and then {@link hasFailed}; RuntimeGone if it never began; or what `use` throws.
+   * @throws what the runtime says, and then {@link hasFailed}; RuntimeGone if it never began, since the runtime or the session is gone; or what `use` throws.
    */
   async run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     try {
-      await this.#runtime.exclusive(() => this.#run(inputs, use));
+      await this.#runtime.exclusive(() => {
+        if (this.#isReleased) throw new RuntimeGone('the session was released');
+        return this.#run(inputs, use);
+      });
     } catch (error) {
       if (this.#runtime.isBroken && !(error instanceof RuntimeGone)) this.#hasFailed = true;
       throw error;
@@ -115,18 +139,23 @@ export class LiveSession {
 
   /** Lets go of everything. Never rejects: a session that has failed may not even be able to leave. */
   async release(): Promise<void> {
+    if (this.#isReleased) return;
+    this.#isReleased = true;
     await this.#runtime.exclusive(() => this.#session.release()).catch(() => undefined);
     this.#buffers.destroy();
     // The runtime leaves alone what a captured session has written to all the time.
     for (const buffer of this.#written) buffer.destroy();
+    for (const { buffer } of Object.values(this.#fixed)) buffer.destroy();
   }
 
   async #run(inputs: Inputs, use: (outputs: RunOutputs) => void): Promise<void> {
     const results = await this.#infer(inputs);
     if (this.kind === 'captured') this.#written = this.#names.flatMap((name) => gpuBufferOf(results[name]));
     try {
-      const dims = Object.fromEntries(this.#names.map((name) => [name, results[name].dims]));
-      use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(results, this.#outputs, this.#rowAxis) });
+      const dims = Object.fromEntries(
+        this.#outputs.map(({ name }) => [name, this.#fixed[name]?.dims ?? results[name].dims]),
+      );
+      use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(dims, this.#outputs, this.#rowAxis) });
     } finally {
       // Recycled for what is submitted later; a captured session writes the same buffers for ever.
       if (this.kind === 'webgpu') for (const name of this.#names) disposeGpu(results[name]);
@@ -148,7 +177,7 @@ export class LiveSession {
     const isRead = this.kind === 'wasm' || input.dtype === 'int64';
     if (isRead) {
       const { Tensor } = this.#runtime.ort;
-      const data = isOnGpu(input) ? await this.#readNumbers(input) : input.data;
+      const data = isOnGpu(input) ? await numbersOf(this.#device, input) : input.data;
       this.#feeds[name] = new Tensor(input.dtype, data as never, input.dims);
       return;
     }
@@ -169,17 +198,13 @@ export class LiveSession {
     return buffer;
   }
 
-  /** For a model on the CPU. The length of what is read back is that of whole words. */
-  async #readNumbers(input: GpuTensor): Promise<Float32Array | Int32Array | Uint16Array> {
-    const [{ buffer }] = await readTensors(this.#device, [{ buffer: input.buffer, size: wholeWords(bytesOf(input)) }]);
-    const length = elementsOf(input.dims);
-    if (input.dtype === 'float16') return new Uint16Array(buffer, 0, length);
-    return input.dtype === 'int32' ? new Int32Array(buffer, 0, length) : new Float32Array(buffer, 0, length);
-  }
-
   #buffersOf(results: Readonly<Record<string, Tensor>>): Record<string, GPUBuffer> {
     const tensors: Record<string, GPUBuffer> = {};
     for (const output of this.#outputs) {
+      if (output.name in this.#fixed) {
+        tensors[output.name] = this.#fixed[output.name].buffer;
+        continue;
+      }
       const tensor = results[output.name];
       tensors[output.name] =
         tensor.location === 'gpu-buffer' ? (tensor.gpuBuffer as GPUBuffer) : this.#upload(output, tensor);
@@ -201,7 +226,6 @@ function fixedDimensions({ contract, instances }: GeneratorModel): Record<string
   return instances === undefined ? undefined : { [contract.instances!.axis]: instances };
 }
 
-const wholeWords = (bytes: number): number => Math.ceil(bytes / 4) * 4;
 const bytesOf = ({ dtype, dims }: GpuTensor | InputNumbers): number => elementsOf(dims) * (dtype === 'float16' ? 2 : 4);
 
 const gpuBufferOf = (tensor: Tensor): GPUBuffer[] =>
@@ -212,19 +236,23 @@ function disposeGpu(tensor: Tensor): void {
 }
 
 /** Rows of all tensors of Gaussians, which must agree. */
-function rowsOf(results: Readonly<Record<string, Tensor>>, outputs: readonly ModelOutput[], axis: 0 | 1): number {
+function rowsOf(
+  dims: Readonly<Record<string, readonly number[]>>,
+  outputs: readonly ModelOutput[],
+  axis: 0 | 1,
+): number {
   const [first, ...others] = outputs.filter(({ kind }) => kind === 'gaussians').map(({ name }) => name);
   if (first === undefined) return 1;
-  const rows = results[first].dims[axis];
+  const rows = dims[first][axis];
   for (const tensor of others) {
-    if (results[tensor].dims[axis] === rows) continue;
+    if (dims[tensor][axis] === rows) continue;
     throw new ContractError([
       {
         code: 'contract/rows',
         tensor,
         where: `output ${tensor}`,
         expected: `${rows} rows, as ${first} has`,
-        found: `${results[tensor].dims[axis]} rows`,
+        found: `${dims[tensor][axis]} rows`,
         remedy: 'write as many rows of every attribute',
       },
     ]);

@@ -22,17 +22,26 @@ const FATAL = /\bAborted\(|unreachable|out of bounds|table index/;
 /** A call that never began, since an earlier one has broken this copy of the runtime: another copy would do it. */
 export class RuntimeGone extends Error {}
 
+export interface RuntimeSource {
+  /** Absolute address of the script. */
+  readonly script: string;
+  readonly wasm: ArrayBuffer;
+}
+
 /**
  * One loaded copy of ONNX Runtime. Its calls must never overlap: two runs at a time never settle, two creations refuse each other
  * for good. So there is one queue for everything.
  */
 export class Runtime {
   readonly ort: Ort;
+  /** Where it came from, for another copy in a worker. */
+  readonly source: RuntimeSource;
   #tail: Promise<unknown> = Promise.resolve();
   #breakage: unknown;
 
-  constructor(ort: Ort) {
+  constructor(ort: Ort, source: RuntimeSource) {
     this.ort = ort;
+    this.source = source;
   }
 
   /** True once this copy cannot be used any more; {@link loadRuntime} then loads another. */
@@ -120,7 +129,7 @@ async function load(): Promise<Runtime> {
   ort.env.logLevel = 'fatal';
   ort.env.wasm.numThreads = 1;
   ort.env.wasm.wasmBinary = wasmBinary.buffer;
-  return new Runtime(ort);
+  return new Runtime(ort, { script: new URL(script, globalThis.location?.href).href, wasm: wasmBinary.buffer });
 }
 
 /**

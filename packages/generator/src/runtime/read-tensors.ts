@@ -1,6 +1,8 @@
-/** The beginning of a buffer: a number of bytes that is a multiple of 4. */
+/** A piece of a buffer: its beginning and its bytes are multiples of 4. */
 export interface TensorPart {
   readonly buffer: GPUBuffer;
+  /** Default 0. */
+  readonly offset?: number;
   readonly size: number;
 }
 
@@ -11,7 +13,7 @@ export async function readTensors(device: GPUDevice, parts: readonly TensorPart[
   const staging = parts.map(({ size }) =>
     device.createBuffer({ label: 'gs.generator.read', size: Math.max(4, size), usage: 0x1 | 0x8 }),
   );
-  parts.forEach(({ buffer, size }, i) => encoder.copyBufferToBuffer(buffer, 0, staging[i], 0, size));
+  parts.forEach(({ buffer, offset = 0, size }, i) => encoder.copyBufferToBuffer(buffer, offset, staging[i], 0, size));
   device.queue.submit([encoder.finish()]);
   try {
     await Promise.all(staging.map((buffer) => buffer.mapAsync(0x1)));

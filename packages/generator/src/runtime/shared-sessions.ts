@@ -24,6 +24,11 @@ const devices = new WeakMap<GPUDevice, Map<string, Entry>>();
 export interface AcquireOptions extends Pick<FetchOptions, 'signal' | 'onProgress'> {
   /** The model runs on the CPU, because of the reason given. */
   readonly onFallback?: (reason: string) => void;
+  /**
+   * Whether what the first run writes on the GPU is compared with what the CPU writes: in a worker, when the page is idle, once for each model and
+   * adapter. Where they differ the model runs on the CPU from then on. Default true; of those who share a model the first one's word counts.
+   */
+  readonly compare?: boolean;
 }
 
 /**
@@ -68,7 +73,7 @@ export async function acquireSession(
   }
 }
 
-function open(source: ModelSource, device: GPUDevice, { onProgress }: AcquireOptions): Entry {
+function open(source: ModelSource, device: GPUDevice, { onProgress, compare }: AcquireOptions): Entry {
   const abort = new AbortController();
   const fallbackListeners: Entry['fallbackListeners'] = new Set();
   const onFallback = (reason: string): void => {
@@ -77,7 +82,7 @@ function open(source: ModelSource, device: GPUDevice, { onProgress }: AcquireOpt
   };
   let opened: GeneratorSession | undefined;
   const session = openModel(source, { onProgress, signal: abort.signal }).then(
-    (model) => (opened = new GeneratorSession(model, device, onFallback)),
+    (model) => (opened = new GeneratorSession(model, device, onFallback, compare)),
   );
   const hasGivenUp = (): boolean => opened?.hasGivenUp ?? false;
   const entry: Entry = { users: 0, abort, session, hasGivenUp, fallbackListeners, fallback: undefined };

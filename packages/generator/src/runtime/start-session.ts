@@ -1,13 +1,11 @@
-import { ContractError, miscomputedConvolutions, type ContractFault } from '@gaussian-splat/core';
-import { elementsOf, isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
-import { LiveSession, type RunOutputs, type SessionKind } from './live-session.js';
+import { ContractError, constantOutputs, miscomputedConvolutions, type ContractFault } from '@gaussian-splat/core';
+import { isOnGpu, type GpuTensor, type Inputs, type InputValue } from '../input-value.js';
+import type { Evidence } from '../proof/prove.js';
+import { copyOf, evidenceOf, isEqual, readRun, type WrittenRun } from './first-run.js';
+import { LiveSession, type FixedOutputs, type RunOutputs, type SessionKind } from './live-session.js';
 import { loadRuntime, RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
-import { readTensors, type TensorPart } from './read-tensors.js';
 import { TENSOR_USAGE } from './tensor-bytes.js';
-
-/** Bytes of each output in which runs are compared. */
-const COMPARED_BYTES = 65_536;
 
 export interface StartOptions {
   readonly model: GeneratorModel;
@@ -20,6 +18,16 @@ export interface StartOptions {
   readonly onBreakage: () => void;
   /** The model runs, but on the CPU; the reason is for people. */
   readonly onFallback: (reason: string) => void;
+  /** Why the GPU is not to be tried; undefined where it is. */
+  readonly refusal?: string;
+  /** Whether what the first run wrote on the GPU is to be kept for a comparison. */
+  readonly keepsEvidence?: boolean;
+}
+
+/** A session that has run, and what its first run on the GPU wrote, if that is to be compared. */
+export interface StartedSession {
+  readonly session: LiveSession;
+  readonly evidence?: Evidence;
 }
 
 /**
@@ -28,37 +36,51 @@ export interface StartOptions {
  * @throws ContractError `contract/run` if the model runs nowhere; GaussianSplatError `network/*` if the runtime cannot be had; RuntimeGone if
  * another model has broken the runtime meanwhile; what `requireLife` throws.
  */
-export async function startSession(options: StartOptions): Promise<LiveSession> {
-  const { model, device, onFallback } = options;
+export async function startSession(options: StartOptions): Promise<StartedSession> {
+  const { model, device, onFallback, refusal } = options;
   const refusals: string[] = [];
-  if (isHalfWithoutFeature(model, device)) {
+  if (refusal !== undefined) {
+    refusals.push(refusal);
+  } else if (isHalfWithoutFeature(model, device)) {
     refusals.push('webgpu: its float16 tensors need the device feature shader-f16, which this device does not have');
   } else if (miscomputedConvolutions(model.header).length > 0) {
     refusals.push(convolutionReason(model));
   } else {
-    const session = await startOnGpu(options, refusals);
-    if (session) return session;
+    const started = await startOnGpu(options, refusals);
+    if (started) return started;
   }
   const reason = refusals.join('; ');
   const started = await start('wasm', options, refusals);
   if (started === undefined) throw new ContractError([runFault(model, refusals.join('; '))]);
   onFallback(reason);
-  return started.session;
+  return { session: started.session };
 }
 
 /**
  * Recorded commands must write what commands made anew write, for other inputs than those that they were recorded with, too. Only
- * kernels are recorded: an output that is a constant, or a result in another shape, is copied in the first run and then no more.
+ * kernels are recorded: a result in another shape is copied in the first run and then no more. Outputs that are constants are not asked for
+ * again: what the first run wrote of them stays.
  */
-async function startOnGpu(options: StartOptions, refusals: string[]): Promise<LiveSession | undefined> {
-  const plain = await start('webgpu', options, refusals);
-  if (plain === undefined || !canBeRecorded(options.model)) return plain?.session;
+async function startOnGpu(options: StartOptions, refusals: string[]): Promise<StartedSession | undefined> {
+  const { model, device, keepsEvidence } = options;
+  const isRecordable = canBeRecorded(model);
+  const constants = isRecordable ? constantOutputs(model.header) : new Set<string>();
+  const fixed: FixedOutputs = {};
+  const plain = await start('webgpu', options, refusals, (outputs) => {
+    for (const { name } of model.outputs) if (constants.has(name)) fixed[name] = copyOf(device, name, outputs);
+  });
+  if (plain === undefined) return undefined;
+  const evidence = keepsEvidence ? await evidenceOf(device, options.inputs, plain.written) : undefined;
+  if (!isRecordable) return { session: plain.session, evidence };
   const others = otherInputs(options);
+  let session: LiveSession | undefined;
   try {
-    return await startRecorded(options, plain, { ...options, inputs: others.inputs }, refusals);
+    session = await startRecorded(options, plain, { ...options, inputs: others.inputs }, refusals, fixed);
   } finally {
     for (const buffer of others.buffers) buffer.destroy();
+    if (session?.kind !== 'captured') for (const { buffer } of Object.values(fixed)) buffer.destroy();
   }
+  return session && { session, evidence };
 }
 
 /** @param changed the same with other inputs */
@@ -67,6 +89,7 @@ async function startRecorded(
   plain: Started,
   changed: StartOptions,
   refusals: string[],
+  fixed: FixedOutputs,
 ): Promise<LiveSession | undefined> {
   const expected = await attempt(plain.session, changed, []);
   if (expected === undefined) {
@@ -75,7 +98,7 @@ async function startRecorded(
   }
   // One at a time: both would hold the weights.
   await plain.session.release();
-  const recorded = await start('captured', options, []);
+  const recorded = await start('captured', options, [], undefined, fixed);
   if (recorded && isEqual(recorded.written, plain.written)) {
     const replayed = await attempt(recorded.session, changed, []);
     if (replayed && isEqual(replayed, expected)) return recorded.session;
@@ -153,23 +176,29 @@ function filled(device: GPUDevice, { buffer, dtype }: GpuTensor): GPUBuffer {
 
 interface Started {
   readonly session: LiveSession;
-  /** The first bytes of each output of its first run. */
-  readonly written: readonly Uint8Array[];
+  /** What its first run wrote. */
+  readonly written: WrittenRun;
 }
 
-async function start(kind: SessionKind, options: StartOptions, refusals: string[]): Promise<Started | undefined> {
+async function start(
+  kind: SessionKind,
+  options: StartOptions,
+  refusals: string[],
+  onOutputs?: (outputs: RunOutputs) => void,
+  fixed?: FixedOutputs,
+): Promise<Started | undefined> {
   const { model, device, requireLife } = options;
   requireLife();
   const runtime = await loadRuntime();
   let session: LiveSession;
   try {
-    session = await LiveSession.create(kind, runtime, model, device);
+    session = await LiveSession.create(kind, runtime, model, device, fixed);
   } catch (error) {
     if (error instanceof RuntimeGone) throw error;
     refusals.push(`${kind}: ${messageOf(error)}`);
     return undefined;
   }
-  const written = await attempt(session, options, refusals);
+  const written = await attempt(session, options, refusals, onOutputs);
   if (written) return { session, written };
   await session.release();
   // Whatever broke the runtime would do so again: on the CPU, for one, what does not end would stop the page.
@@ -180,16 +209,18 @@ async function start(kind: SessionKind, options: StartOptions, refusals: string[
   return undefined;
 }
 
-/** One run, and the first bytes of what it wrote; undefined if it fails. @throws RuntimeGone, and then the session is released. */
+/** One run, and pieces of what it wrote; undefined if it fails. @throws RuntimeGone, and then the session is released. */
 async function attempt(
   session: LiveSession,
   { device, inputs, model }: StartOptions,
   refusals: string[],
-): Promise<Uint8Array[] | undefined> {
-  let reading: Promise<Uint8Array[]> = Promise.resolve([]);
+  onOutputs?: (outputs: RunOutputs) => void,
+): Promise<WrittenRun | undefined> {
+  let reading: Promise<WrittenRun> | undefined;
   try {
     await session.run(inputs, (outputs) => {
-      reading = readTensors(device, writtenParts(model, outputs));
+      reading = readRun(device, model, outputs);
+      onOutputs?.(outputs);
     });
     return await reading;
   } catch (error) {
@@ -203,14 +234,3 @@ async function attempt(
 }
 
 const messageOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
-
-/** What a run has written of each buffer, or the beginning of it; what lies behind is anybody's. More rows than declared are not there, and refused later. */
-function writtenParts({ outputs }: GeneratorModel, { tensors, dims }: RunOutputs): TensorPart[] {
-  return outputs.map(({ name, dtype }) => {
-    const size = elementsOf(dims[name]) * (dtype === 'float16' ? 2 : 4);
-    return { buffer: tensors[name], size: Math.min(COMPARED_BYTES, size - (size % 4), tensors[name].size) };
-  });
-}
-
-const isEqual = (a: readonly Uint8Array[], b: readonly Uint8Array[]): boolean =>
-  a.every((bytes, i) => bytes.length === b[i].length && bytes.every((byte, k) => byte === b[i][k]));

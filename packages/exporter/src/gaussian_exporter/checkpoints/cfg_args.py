@@ -6,6 +6,26 @@ from pathlib import Path
 from ..errors import ExportError
 
 
+def find_cfg_args(folder: Path) -> Path | None:
+    """The file beside a training: in the folder itself or, of one iteration's, up to two levels up."""
+    around = [folder, *folder.resolve().parents[:2]]
+    return next((path for each in around if (path := each / "cfg_args").is_file()), None)
+
+
+def require_cfg_args(folder: Path, why: str) -> dict[str, object]:
+    """Names and values. Raises checkpoint/incomplete where there is no file."""
+    path = find_cfg_args(folder)
+    if path is None:
+        raise ExportError(
+            "checkpoint/incomplete",
+            where=str(folder),
+            expected=f"cfg_args in it or up to two folders above it: {why}",
+            found="no such file",
+            remedy="copy the file that the trainer wrote into the training's folder",
+        )
+    return read_cfg_args(path)
+
+
 def read_cfg_args(path: Path) -> dict[str, object]:
     """Names and literal values. An absent file gives no names; values that are not literals are left out."""
     if not path.exists():

@@ -9,12 +9,13 @@ from ..errors import ExportError
 from ..families.classic import Cloud, cloud_of_vertices
 from ..families.hexplane import PLANES, Deformation
 from ..pieces.mlp import Linear
-from .cfg_args import read_cfg_args
+from .cfg_args import require_cfg_args
 from .files import existing, latest_iteration
+from .kinds import refuse_other_properties
 from .ply import read_ply
 from .torch_file import Weights, read_weights
 
-# The trainer's own defaults, which hold where cfg_args does not say otherwise.
+# The trainer's own defaults, which hold where a cfg_args does not say otherwise.
 _DEFAULTS = {"no_dx": False, "no_ds": False, "no_dr": False, "no_do": True, "no_dshs": True}
 _REFUSED = {
     "no_grid": "without its planes",
@@ -26,14 +27,17 @@ _REFUSED = {
 def read_hexplane(folder: Path) -> tuple[Cloud, Deformation]:
     """Reads the latest iteration."""
     point_cloud = latest_iteration(existing(folder, "the folder of a 4DGaussians training"))
-    settings = _DEFAULTS | read_cfg_args(folder / "cfg_args")
+    why = "it says which heads of the network are used (no_do, no_dshs), which no file of weights tells"
+    settings = _DEFAULTS | require_cfg_args(folder, why)
     for name, what in _REFUSED.items():
         if settings.get(name):
             raise _unsupported(folder, f"a model {what} ({name})")
     if settings.get("grid_pe"):
         raise _unsupported(folder, "a model with encoded plane features (grid_pe)")
     weights = read_weights(point_cloud / "deformation.pth")
-    cloud = cloud_of_vertices(read_ply(point_cloud / "point_cloud.ply"))
+    vertices = read_ply(point_cloud / "point_cloud.ply")
+    refuse_other_properties(vertices.names, vertices.path)
+    cloud = cloud_of_vertices(vertices)
     return cloud, deformation_of(weights.under("deformation_net"), settings)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import ExportError
 from ..families.scaffold import DistanceToLevel, Levels, Scaffold
-from .cfg_args import read_cfg_args
+from .cfg_args import find_cfg_args, read_cfg_args, require_cfg_args
 from .files import existing, latest_iteration
 from .ply import Vertices, read_ply
 from .torch_file import Weights, read_weights
@@ -24,7 +24,7 @@ def read_scaffold(folder: Path, appearance: int = 0) -> Scaffold:
     point_cloud = latest_iteration(existing(folder, "the folder of a Scaffold-GS or Octree-GS training"))
     vertices = read_ply(point_cloud / "point_cloud.ply")
     networks = read_networks(point_cloud)
-    settings = read_cfg_args(folder / "cfg_args")
+    settings = settings_of(folder, "level" in vertices.names)
     anchors = read_anchors(vertices)
     levels = read_levels(vertices, settings)
     return Scaffold(
@@ -41,6 +41,14 @@ def read_scaffold(folder: Path, appearance: int = 0) -> Scaffold:
         appearance=read_appearance(networks.get("appearance"), appearance),
         levels=levels,
     )
+
+
+def settings_of(folder: Path, has_levels: bool) -> dict[str, object]:
+    """cfg_args. Octree-GS cannot do without; of Scaffold-GS the shapes of the networks say the same."""
+    if has_levels:
+        return require_cfg_args(folder, "it says how distances become levels (dist2level, fork, add_level)")
+    path = find_cfg_args(folder)
+    return {} if path is None else read_cfg_args(path)
 
 
 def read_networks(folder: Path) -> dict[str, Weights]:

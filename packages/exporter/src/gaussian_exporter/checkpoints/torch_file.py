@@ -169,6 +169,10 @@ class Weights:
         found = {name[len(start) :]: value for name, value in self.tensors.items() if name.startswith(start)}
         return Weights(found, f"{self.where}: {prefix}")
 
+    def count(self) -> int:
+        """How many numbered layers there are."""
+        return len({name.split(".")[0] for name in self.tensors if name.split(".")[0].isdigit()})
+
     def linears(self) -> list[Linear]:
         """All linear layers of a Sequential, in the order of their numbers. At least one."""
         numbers = sorted({int(n.split(".")[0]) for n in self.tensors if n.split(".")[0].isdigit()})

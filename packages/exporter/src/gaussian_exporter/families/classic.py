@@ -12,8 +12,7 @@ import numpy as np
 import onnx
 
 from ..arrays import Floats, covariances, sigmoid
-from ..checkpoints.files import latest_iteration
-from ..checkpoints.ply import Vertices, read_ply
+from ..checkpoints.ply import Vertices
 from ..contract import Facts, camera_position
 from ..errors import ExportError
 from ..graph import Graph
@@ -36,34 +35,43 @@ class Cloud:
     sh: Floats
 
 
-def read_cloud(path: Path) -> Cloud:
-    """A PLY file in INRIA's layout, or the folder of a training with point_cloud/iteration_N/point_cloud.ply in it."""
-    if path.is_dir():
-        path = latest_iteration(path) / "point_cloud.ply"
-    return cloud_of_vertices(read_ply(path))
-
-
 def cloud_of_vertices(vertices: Vertices) -> Cloud:
     """INRIA's columns. Raises for harmonics of a degree other than 0 to 3."""
     dc = vertices.columns("f_dc_0", "f_dc_1", "f_dc_2")
     rest = vertices.numbered("f_rest_")
-    if rest.shape[1] not in (0, 9, 24, 45):
-        raise ExportError(
-            "checkpoint/unsupported",
-            where=str(vertices.path),
-            expected="0, 9, 24 or 45 properties f_rest_*",
-            found=str(rest.shape[1]),
-            remedy="harmonics are read up to degree 3",
-        )
+    usable_degree(rest.shape[1] / 3, vertices.path)
     # The file holds all of red's coefficients, then green's, then blue's.
     rest = rest.reshape(len(vertices), 3, -1).transpose(0, 2, 1)
-    return Cloud(
+    cloud = Cloud(
         vertices.columns("x", "y", "z"),
         vertices.columns("scale_0", "scale_1", "scale_2"),
         vertices.columns("rot_0", "rot_1", "rot_2", "rot_3"),
         vertices.columns("opacity"),
         np.concatenate([dc[:, None], rest], 1),
     )
+    return filtered(cloud, vertices.columns("filter_3D")) if "filter_3D" in vertices.names else cloud
+
+
+def usable_degree(rest: float, where: Path) -> None:
+    """Raises checkpoint/unsupported for harmonics of a degree above 3; `rest`: coefficients after the first."""
+    if rest not in (0, 3, 8, 15):
+        raise ExportError(
+            "checkpoint/unsupported",
+            where=str(where),
+            expected="1, 4, 9 or 16 coefficients of harmonics (0, 9, 24 or 45 properties f_rest_*)",
+            found=f"{rest + 1:g}",
+            remedy="harmonics are read up to degree 3",
+        )
+
+
+def filtered(cloud: Cloud, widths: Floats) -> Cloud:
+    """Mip-Splatting's Gaussians as they are drawn: no narrower than their cameras saw them, and as much fainter."""
+    squared = np.exp(2 * np.float64(cloud.log_scales))
+    wider = squared + np.float64(widths) ** 2
+    fainter = np.sqrt(squared.prod(1, keepdims=True) / wider.prod(1, keepdims=True))
+    opacity = np.clip(sigmoid(cloud.opacity_logits) * fainter, 1e-12, 1 - 1e-7)
+    logits = np.log(opacity) - np.log1p(-opacity)
+    return replace(cloud, log_scales=(0.5 * np.log(wider)).astype(np.float32), opacity_logits=logits.astype(np.float32))
 
 
 def usable(cloud: Cloud) -> Cloud:

@@ -67,6 +67,7 @@ class Scaffold:
 def export_scaffold(model: Scaffold, facts: Facts, options: Options | None = None) -> onnx.ModelProto:
     """A generator of M*k Gaussians, k consecutive rows for each anchor, from the camera's position."""
     check(model)
+    check_bank(model)
     options = options or Options()
     graph = Graph("scaffold" if model.levels is None else "octree", options.weights)
     camera = graph.input("camera_position", 3)
@@ -110,6 +111,22 @@ def check(model: Scaffold) -> None:
             )
 
 
+def check_bank(model: Scaffold) -> None:
+    """Raises checkpoint/mismatch where a feature bank takes other numbers than the trainers feed it."""
+    if model.feature_bank is None:
+        return
+    expected = 4 if model.levels is None else 3 + model.levels.fed_to_networks
+    first, last = model.feature_bank[0], model.feature_bank[-1]
+    if (first.inputs, last.outputs) != (expected, 3):
+        raise ExportError(
+            "checkpoint/mismatch",
+            where="the feature bank",
+            expected=f"{expected} inputs and 3 outputs",
+            found=f"{first.inputs} and {last.outputs}",
+            remedy="compare cfg_args (use_feat_bank, add_level) with the files",
+        )
+
+
 def decode(model: Scaffold, graph: Graph, seen: Tensor) -> dict[str, Tensor]:
     """The networks' outputs (M, ...), without their activations: opacity, colour, and of the covariance its scales and
     rotations apart. seen (M,4): direction and distance."""
@@ -119,8 +136,9 @@ def decode(model: Scaffold, graph: Graph, seen: Tensor) -> dict[str, Tensor]:
         known.append(graph.constant(levels.levels, "levels"))
     if model.feature_bank is not None:
         first, *rest = model.feature_bank
-        bank = [Linear(in_order(first.weight, 0, False), first.bias), *rest]
-        weights = mlp(graph.concat([*known[1:], seen], 1), bank, "bank", "Softmax")
+        # Scaffold-GS feeds direction and distance, Octree-GS the direction and, if any network has it, the level.
+        weight = in_order(first.weight, 0, levels is None)
+        weights = mlp(graph.concat([*known[1:], seen], 1), [Linear(weight, first.bias), *rest], "bank", "Softmax")
         known = [view_dependent(known[0], weights), *known[1:]]
     networks = {"opacity": model.opacity, "colour": without_appearance(model), "covariance": model.covariance}
     inner = {name: hidden(model, graph, known, seen, name, layers) for name, layers in networks.items()}

@@ -1,0 +1,140 @@
+"""Plain Gaussians as trainers leave them: PLY files, and checkpoints of gsplat, nerfstudio and INRIA's trainer."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import AnyArray, Floats, sigmoid
+from ..errors import ExportError, listed
+from ..families.classic import Cloud, cloud_of_vertices, usable_degree
+from .files import existing, latest_iteration
+from .kinds import other_family, refuse_neighbours, refuse_other_properties
+from .ply import read_ply
+from .torch_file import read_torch
+
+# Of harmonics of degree 0.
+_C0 = 0.28209479177387814
+_GSPLAT = ("means", "scales", "quats", "opacities", "sh0", "shN")
+_NERFSTUDIO = ("means", "scales", "quats", "opacities", "features_dc", "features_rest")
+# Entries of what INRIA's `capture` gives, the optimizer's state among them; fudan's 4DGS has more.
+_CAPTURED, _CAPTURED_4D = 12, 19
+
+
+def read_cloud(path: Path, ignored: Sequence[str] = ()) -> Cloud:
+    """A PLY file in INRIA's layout; a checkpoint of gsplat (.pt), nerfstudio (.ckpt) or INRIA's trainer (chkpnt*.pth);
+    or the folder of a training with one of them in it. `ignored`: properties of vertices that change nothing."""
+    path = newest_in(existing(path, "a PLY file, a checkpoint, or the folder of a training"))
+    with path.open("rb") as file:
+        is_archive = file.read(2) == b"PK"
+    if is_archive:
+        return cloud_of_checkpoint(path)
+    vertices = read_ply(path)
+    refuse_other_properties(vertices.names, path, ignored)
+    refuse_neighbours(path)
+    return cloud_of_vertices(vertices)
+
+
+def newest_in(path: Path) -> Path:
+    """The file of the last iteration in the folder of a training; a file itself."""
+    if not path.is_dir():
+        return path
+    for inside, pattern in (("ckpts", r"ckpt_(\d+)_rank0\.pt"), ("nerfstudio_models", r"step-(\d+)\.ckpt")):
+        found = [(int(m[1]), p) for p in (path / inside).glob("*") if (m := re.fullmatch(pattern, p.name))]
+        if found:
+            return max(found)[1]
+    return latest_iteration(path) / "point_cloud.ply"
+
+
+def cloud_of_checkpoint(path: Path) -> Cloud:
+    """Gaussians of a file of torch.save."""
+    content: Any = read_torch(path)
+    if isinstance(content, Mapping) and isinstance(content.get("splats"), Mapping):
+        return gsplat(path, content)
+    if isinstance(content, Mapping) and isinstance(content.get("pipeline"), Mapping):
+        return nerfstudio(path, content["pipeline"])
+    captured = captured_of(content)
+    if captured is not None and len(captured) == _CAPTURED_4D:
+        raise other_family(path, "4D Gaussian Splatting", "Gaussians of space and time", "run gaussian-export 4dgs")
+    if captured is not None and len(captured) == _CAPTURED:
+        return inria(path, captured)
+    raise unknown(path, content)
+
+
+def captured_of(content: object) -> Sequence[Any] | None:
+    """What `GaussianModel.capture` gave, of a file (captured, iteration)."""
+    is_pair = isinstance(content, (list, tuple)) and len(content) == 2 and isinstance(content[0], (list, tuple))
+    return content[0] if is_pair else None  # type: ignore[index]
+
+
+def unknown(path: Path, content: object) -> ExportError:
+    """The error of a file that no known trainer writes."""
+    names = [str(key) for key in content] if isinstance(content, Mapping) else [type(content).__name__]
+    return ExportError(
+        "checkpoint/other-family",
+        where=str(path),
+        expected="a checkpoint of gsplat, nerfstudio or INRIA's trainer",
+        found=f"a PyTorch file with {listed(names)}",
+        remedy="gaussian-export --help lists the families; a model of your own: gaussian_exporter.export_module",
+    )
+
+
+def gsplat(path: Path, content: Mapping[str, Any]) -> Cloud:
+    """gsplat's simple_trainer: {"splats": state_dict}, a file for each rank."""
+    ranks = [path]
+    match = re.fullmatch(r"(.*_rank)0(\.pt)", path.name)
+    while match and (more := path.with_name(f"{match[1]}{len(ranks)}{match[2]}")).exists():
+        ranks.append(more)
+    files = [content["splats"], *(read_torch(more)["splats"] for more in ranks[1:])]  # type: ignore[index]
+    if "features" in files[0]:
+        remedy = "train without app_opt: its colours come from a network that knows the training images"
+        raise other_family(path, "gsplat with appearance optimisation", "features in place of harmonics", remedy)
+    parts = {name: np.concatenate([table(path, file, name) for file in files]) for name in _GSPLAT}
+    sh = np.concatenate([parts["sh0"], parts["shN"]], 1)
+    return Cloud(parts["means"], parts["scales"], parts["quats"], parts["opacities"].reshape(-1, 1), degrees(path, sh))
+
+
+def nerfstudio(path: Path, pipeline: Mapping[str, Any]) -> Cloud:
+    """nerfstudio's splatfacto: the state of its pipeline. Without harmonics its colours go through a sigmoid."""
+    prefix = next((p for p in ("_model.gauss_params.", "_model.") if f"{p}means" in pipeline), None)
+    if prefix is None:
+        raise unknown(path, pipeline)
+    own = {name: table(path, pipeline, prefix + name) for name in _NERFSTUDIO}
+    dc = own["features_dc"].reshape(-1, 1, 3)
+    if own["features_rest"].shape[1] == 0:
+        dc = ((sigmoid(dc) - 0.5) / _C0).astype(np.float32)
+    sh = np.concatenate([dc, own["features_rest"].reshape(len(dc), -1, 3)], 1)
+    return Cloud(own["means"], own["scales"], own["quats"], own["opacities"].reshape(-1, 1), degrees(path, sh))
+
+
+def inria(path: Path, captured: Sequence[Any]) -> Cloud:
+    """INRIA's GaussianModel.capture: degree, places, harmonics, scales, rotations, opacities, and the optimizer."""
+    degree, positions, dc, rest, scales, rotations, opacities = captured[:7]
+    if scales.shape[1] != 3:
+        raise other_family(path, "2D Gaussian Splatting", f"{scales.shape[1]} scales a Gaussian", "train a 3D model")
+    # Harmonics above the active degree are not drawn yet.
+    sh = np.concatenate([dc, rest], 1)[:, : (int(degree) + 1) ** 2]
+    return Cloud(*(np.asarray(x, np.float32) for x in (positions, scales, rotations, opacities.reshape(-1, 1), sh)))
+
+
+def table(path: Path, tensors: Mapping[str, Any], name: str) -> Floats:
+    """A tensor of a state_dict as float32."""
+    if not isinstance(tensors.get(name), np.ndarray):
+        raise ExportError(
+            "checkpoint/incomplete",
+            where=str(path),
+            expected=f"a tensor '{name}'",
+            found=listed([str(key) for key in tensors]),
+            remedy="give the checkpoint as the trainer wrote it",
+        )
+    return np.asarray(tensors[name], np.float32)
+
+
+def degrees(path: Path, sh: AnyArray) -> Floats:
+    """Harmonics (N,K,3), refused where K is of no degree up to 3."""
+    usable_degree(sh.shape[1] - 1, path)
+    return np.asarray(sh, np.float32)

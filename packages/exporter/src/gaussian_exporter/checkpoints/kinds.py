@@ -1,0 +1,72 @@
+"""Which family a checkpoint is of, by what lies in it and beside it: what changes the meaning of the rest is never
+passed over."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import ExportError, listed
+
+# Properties of vertices that INRIA's layout has, or that say nothing about Gaussians.
+_PLAIN = re.compile(r"x|y|z|nx|ny|nz|f_dc_[0-2]|f_rest_\d+|opacity|scale_[0-2]|rot_[0-3]|filter_3D|red|green|blue")
+# A property that only one family writes: its name, and what to do.
+_BY_PROPERTY = {
+    "f_t_0": (
+        "SpacetimeGaussians, full",
+        "its features become colours in a network of each pixel: train its lite model",
+    ),
+    "trbf_center": ("SpacetimeGaussians", "run gaussian-export spacetime"),
+    "binding_0": (
+        "GaussianAvatars",
+        "its places are local to triangles of FLAME, which a page may not have: export a module that holds the mesh "
+        "(gaussian_exporter.export_module)",
+    ),
+    "f_anchor_feat_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
+    "f_offset_0": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
+}
+# A file or folder beside point_cloud.ply, or beside the folder point_cloud, that only one family leaves.
+_BY_NEIGHBOUR = {
+    "deformation.pth": ("4DGaussians", "run gaussian-export hexplane"),
+    "deform": ("Deformable-3D-Gaussians", "run gaussian-export deformable"),
+    "mlp_ckpt": ("GauHuman", "its network moves SMPL: export a module of it (gaussian_exporter.export_module)"),
+    "flame_param.npz": _BY_PROPERTY["binding_0"],
+    "opacity_mlp.pt": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
+    "checkpoints.pth": ("Scaffold-GS or Octree-GS", "run gaussian-export scaffold"),
+}
+
+
+def refuse_other_properties(names: Sequence[str], where: Path, ignored: Sequence[str] = ()) -> None:
+    """Raises checkpoint/other-family for vertex properties that plain Gaussians do not have."""
+    for name, (family, remedy) in _BY_PROPERTY.items():
+        if name in names:
+            raise other_family(where, family, f"the property {name}", remedy)
+    if "scale_0" in names and "scale_2" not in names:
+        remedy = "discs without a thickness are another rasterizer's; train with a 3D model"
+        raise other_family(where, "2D Gaussian Splatting", "two scales a Gaussian", remedy)
+    unknown = [name for name in names if not _PLAIN.fullmatch(name) and name not in ignored]
+    if unknown:
+        remedy = f"if it changes nothing: --ignore {','.join(unknown)}; if it does, it needs an exporter of its own"
+        raise other_family(where, "an unknown family", f"properties {listed(unknown)}", remedy)
+
+
+def refuse_neighbours(point_cloud: Path) -> None:
+    """Raises checkpoint/other-family where what lies beside a point cloud makes it more than that."""
+    # OUT/point_cloud/iteration_N/point_cloud.ply: beside the file, or beside the folder point_cloud.
+    for folder in (point_cloud.parent, point_cloud.parent.parent.parent):
+        is_training = folder == point_cloud.parent or (folder / "point_cloud").is_dir()
+        for name, (family, remedy) in _BY_NEIGHBOUR.items():
+            if is_training and (folder / name).exists():
+                raise other_family(point_cloud, family, f"{name} in {folder}", remedy)
+
+
+def other_family(where: Path, family: str, found: str, remedy: str) -> ExportError:
+    """The error of a checkpoint that another exporter reads, or none."""
+    return ExportError(
+        "checkpoint/other-family",
+        where=str(where),
+        expected="Gaussians as they are drawn",
+        found=f"{found}: a checkpoint of {family}",
+        remedy=remedy,
+    )

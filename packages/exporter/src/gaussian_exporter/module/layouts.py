@@ -1,0 +1,118 @@
+"""How a module's outputs are read: which tensor is what, and how its numbers are meant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ..contract import Json
+from ..errors import ExportError
+
+# In the order in which a module that returns a tuple gives them.
+ATTRIBUTES = ("positions", "covariances", "scales", "rotations", "colors", "sh", "opacities")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """`names` are those of the outputs in the file, in the module's order; `words` what the contract says besides."""
+
+    kind: Literal["split", "packed", "image"]
+    names: tuple[str, ...]
+    words: Json
+
+    def json(self) -> Json:
+        """The contract's `outputs`."""
+        if self.kind == "split":
+            return {"layout": "split", **{name: name for name in self.names}, **self.words}
+        return {"layout": self.kind, "gaussians" if self.kind == "packed" else "image": self.names[0], **self.words}
+
+
+def split(
+    *names: str,
+    scales: Literal["linear", "log"] = "linear",
+    opacities: Literal["linear", "logit"] = "linear",
+    rotations: Literal["wxyz", "xyzw"] = "wxyz",
+    sh: Literal["coefficient-major", "channel-major"] = "coefficient-major",
+    count: bool = False,
+) -> Layout:
+    """A tensor for each attribute: split("positions", "scales", "rotations", "colors", "opacities") in the order that
+    the module returns them (of a module that returns a dict, any). `scales="log"` and `opacities="logit"` for numbers
+    before their activation. Without names: those five."""
+    given = names or ("positions", "scales", "rotations", "colors", "opacities")
+    unknown = [name for name in given if name not in ATTRIBUTES]
+    if unknown:
+        raise ValueError(f"split() takes {', '.join(ATTRIBUTES)}; found {unknown[0]!r}")
+    words: Json = {"opacityActivation": opacities}
+    if "scales" in given:
+        words |= {"scaleActivation": scales, "rotationOrder": rotations}
+    if "sh" in given:
+        words["shOrder"] = sh
+    if count:
+        words["count"] = "count"
+    return Layout("split", (*given, "count") if count else given, words)
+
+
+def packed(
+    color: Literal["rgb", "sh"] = "rgb", opacities: Literal["linear", "logit"] = "linear", count: bool = False
+) -> Layout:
+    """One tensor [N,D]: position 3, covariance 6, colour 3 or harmonics, opacity 1."""
+    words: Json = {"color": color, "opacityActivation": opacities}
+    if color == "sh":
+        words["shOrder"] = "coefficient-major"
+    if count:
+        words["count"] = "count"
+    return Layout("packed", ("gaussians", "count") if count else ("gaussians",), words)
+
+
+def image_output() -> Layout:
+    """A post-processor: one picture [1,3,H,W] in 0..1."""
+    return Layout("image", ("processed",), {})
+
+
+def tensors_of(result: Any, layout: Layout) -> list[Any]:
+    """The module's tensors in the order of the layout."""
+    if hasattr(result, "_asdict"):
+        result = result._asdict()
+    if isinstance(result, dict):
+        missing = [name for name in layout.names if name not in result]
+        if missing:
+            raise _mismatch(f"a tensor {missing[0]!r} in the dict", ", ".join(map(str, result)))
+        return [result[name] for name in layout.names]
+    tensors = list(result) if isinstance(result, (tuple, list)) else [result]
+    if len(tensors) != len(layout.names):
+        raise _mismatch(f"{len(layout.names)} tensors ({', '.join(layout.names)})", str(len(tensors)))
+    return tensors
+
+
+def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
+    """The tensor in the contract's shape, where that is the same numbers: a leading 1 dropped, covariances as their
+    upper triangle, one scale a splat three times, colours without their alpha."""
+    if name == "count":
+        return tensor.reshape(1).to(torch.int32)
+    x = tensor.float() if tensor.dtype != torch.float32 else tensor
+    if layout.kind == "image":
+        return x[:, :3] if x.dim() == 4 else x[None, :3]
+    # Covariances may be matrices, harmonics have two axes behind the rows.
+    wide = {"sh": 3, "covariances": 3 if x.shape[-2:] == (3, 3) else 2}.get(name, 2)
+    while x.dim() > wide and x.shape[0] == 1:
+        x = x[0]
+    if name == "covariances" and x.dim() == 3:
+        upper = x.reshape(-1, 9)
+        return torch.stack([upper[:, i] for i in (0, 1, 2, 4, 5, 8)], -1)
+    if name == "scales" and (x.dim() == 1 or x.shape[-1] == 1):
+        return x.reshape(-1, 1).expand(-1, 3).clone()
+    if name == "colors" and x.shape[-1] == 4:
+        return x[:, :3]
+    if name == "opacities" and x.dim() == 1:
+        return x[:, None]
+    return x
+
+
+def _mismatch(expected: str, found: str) -> ExportError:
+    return ExportError(
+        "argument/value",
+        where="what the module returns",
+        expected=expected,
+        found=found,
+        remedy="name what it returns, in its order: outputs=split('positions', 'covariances', 'colors', 'opacities')",
+    )

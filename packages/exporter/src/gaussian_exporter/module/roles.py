@@ -1,0 +1,161 @@
+"""What an input of a module means: its role in the contract, its shape, and values to try it with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..arrays import AnyArray
+from ..contract import Json
+
+
+@dataclass(frozen=True)
+class Role:
+    """How a page feeds an input. `samples[0]` is its default; the others reach the ends of what it may be given."""
+
+    binding: Json
+    shape: tuple[int, ...]
+    samples: Sequence[AnyArray]
+
+    @property
+    def default(self) -> AnyArray:
+        """What the page gives until it says otherwise."""
+        return self.samples[0]
+
+
+def _floats(shape: tuple[int, ...], *values: object) -> list[AnyArray]:
+    return [np.broadcast_to(np.asarray(value, np.float32), shape).copy() for value in values]
+
+
+# No simple shares of a period: a loop would be tried in the same state again and again.
+_SHARES = (0.0, 0.131, 0.367, 0.618, 0.887, 1.0)
+
+
+def time(duration: float | None = None, normalized: bool = False, shape: Sequence[int] = (1,)) -> Role:
+    """Seconds or, with `normalized`, a share 0..1 of the duration, which must then be given. The model's own length of
+    time, if it has one, is the page's `duration`."""
+    if normalized and duration is None:
+        raise ValueError("time(normalized=True) needs duration=SECONDS")
+    unit = "normalized" if normalized else "seconds"
+    end = 1.0 if normalized else (duration or 1.0)
+    sizes = tuple(shape)
+    return Role(
+        {"role": "time", "unit": unit, "_duration": duration}, sizes, _floats(sizes, *(s * end for s in _SHARES))
+    )
+
+
+def control(
+    low: float,
+    high: float,
+    default: float | Sequence[float] | None = None,
+    *,
+    label: str | None = None,
+    step: float | None = None,
+    shape: Sequence[int] = (1,),
+) -> Role:
+    """A slider for people, `label` beside it. Default: 0 if that is within the range, else its middle."""
+    middle = 0.0 if low <= 0 <= high else (low + high) / 2
+    value = middle if default is None else default
+    named: Json = {"label": label} if label is not None else {}
+    stepped: Json = {"step": step} if step is not None else {}
+    plain = value if isinstance(value, (int, float)) else [float(x) for x in value]
+    binding: Json = {"role": "control", "range": [low, high], "default": plain, **stepped, **named}
+    sizes = tuple(shape)
+    rest = np.reshape(np.asarray(plain, np.float32), sizes) if isinstance(plain, list) else plain
+    return Role(binding, sizes, _floats(sizes, rest, low, high, low + 0.618 * (high - low)))
+
+
+def pose(
+    joints: int | Sequence[str],
+    parents: Sequence[int] | None = None,
+    *,
+    format: Literal["axis-angle", "quaternion", "parameters"] = "axis-angle",
+    rest: Sequence[float] | None = None,
+) -> Role:
+    """[J,3] axis-angle in radians, [J,4] quaternions w x y z, or [P] parameters; joints by name, or how many."""
+    count = joints if isinstance(joints, int) else len(joints)
+    width = {"axis-angle": 3, "quaternion": 4, "parameters": 1}[format]
+    sizes = (count,) if format == "parameters" else (count, width)
+    still = np.zeros(sizes, np.float32)
+    if format == "quaternion":
+        still[:, 0] = 1
+    if rest is not None:
+        still = np.asarray(rest, np.float32).reshape(sizes)
+    binding: Json = {"role": "pose", "format": format}
+    if format == "quaternion":
+        binding["quaternionOrder"] = "wxyz"
+    if not isinstance(joints, int):
+        binding["joints"] = list(joints)
+    if parents is not None:
+        binding["parents"] = [int(parent) for parent in parents]
+    binding["default"] = [float(x) for x in still.reshape(-1)]
+    rng = np.random.default_rng(0)
+    bent = [(still + size * rng.normal(size=sizes)).astype(np.float32) for size in (0.2, 0.6)]
+    return Role(binding, sizes, [still, *bent])
+
+
+def shape(count: int, names: Sequence[str] | None = None) -> Role:
+    """[count] coefficients of a body or an expression; zeros by default."""
+    binding: Json = {"role": "shape", "default": [0.0] * count}
+    if names is not None:
+        binding["names"] = list(names)
+    return Role(binding, (count,), _floats((count,), 0, np.linspace(-1, 1, count)))
+
+
+def camera() -> Role:
+    """[3]: the eye, in world units."""
+    return Role({"role": "camera_position"}, (3,), _floats((3,), [0, 0, -5], [3, -1, -4], [-2, 1.5, 5]))
+
+
+def _matrices() -> list[AnyArray]:
+    turned = np.eye(4, dtype=np.float32)
+    turned[:3, :3] = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+    found = [np.eye(4, dtype=np.float32), turned]
+    for matrix in found:
+        matrix[2, 3] = 5
+    return [matrix.copy() for matrix in found]
+
+
+def view(axes: str = "RDF", column_major: bool = False) -> Role:
+    """[4,4] world to camera; RDF is OpenCV's camera, RUB OpenGL's."""
+    order = "column-major" if column_major else "row-major"
+    matrices = [matrix.T.copy() if column_major else matrix for matrix in _matrices()]
+    return Role({"role": "view", "order": order, "axes": axes}, (4, 4), matrices)
+
+
+def projection(axes: str = "RDF") -> Role:
+    """[4,4] camera to clip space, depth 0..1."""
+    near, far = 0.1, 100.0
+    deep = [[1.5, 0, 0, 0], [0, -1.5, 0, 0], [0, 0, far / (far - near), -near * far / (far - near)], [0, 0, 1, 0]]
+    return Role({"role": "projection", "order": "row-major", "axes": axes}, (4, 4), _floats((4, 4), deep))
+
+
+def view_projection() -> Role:
+    """[4,4] world to clip space."""
+    whole = [projection().default @ matrix for matrix in _matrices()]
+    return Role({"role": "view_projection", "order": "row-major"}, (4, 4), whole)
+
+
+def viewport() -> Role:
+    """[2]: width and height in pixels."""
+    return Role({"role": "viewport"}, (2,), _floats((2,), [640, 480], [1920, 1080]))
+
+
+def image(width: int, height: int) -> Role:
+    """[1,3,H,W]: red, green and blue planes in 0..1, top row first."""
+    rng = np.random.default_rng(0)
+    pictures = [rng.random((1, 3, height, width)).astype(np.float32) for _ in range(2)]
+    return Role({"role": "image"}, (1, 3, height, width), pictures)
+
+
+def frame() -> Role:
+    """[1] int32: index of a frame."""
+    return Role({"role": "frame"}, (1,), [np.zeros(1, np.int32), np.ones(1, np.int32)])
+
+
+def seed() -> Role:
+    """[1] int32: seed of random numbers."""
+    return Role({"role": "seed"}, (1,), [np.zeros(1, np.int32), np.full(1, 7, np.int32)])

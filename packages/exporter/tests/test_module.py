@@ -1,0 +1,136 @@
+"""Modules of people, in one call: both of PyTorch's exporters, the contract, and what a page would do with the file."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+
+import gaussian_exporter as gs
+from gaussian_exporter.conformance import check_outputs
+from gaussian_exporter.errors import ExportError
+
+torch: Any = pytest.importorskip("torch")
+pytest.importorskip("onnxscript")
+COUNT = 64
+
+
+def contract_of(path: Path) -> Any:
+    props = {prop.key: prop.value for prop in onnx.load(path).metadata_props}
+    return json.loads(props["gaussian_contract"])
+
+
+class Ball(torch.nn.Module):  # type: ignore[misc]
+    """A time and a slider; scales and opacities that never change; one scale a splat; a batch of one."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        points = torch.randn(COUNT, 3, generator=torch.Generator().manual_seed(1))
+        self.register_buffer("points", torch.nn.functional.normalize(points, dim=-1))
+
+    def forward(self, t: Any, twist: Any) -> Any:
+        angle = twist * self.points[:, 1:2] * math.pi
+        x, y, z = self.points.split(1, -1)
+        turned = torch.cat([angle.cos() * x - angle.sin() * z, y, angle.sin() * x + angle.cos() * z], -1)
+        colours = torch.cat([self.points * 0.5 + 0.5, torch.ones(COUNT, 1)], -1)
+        rest = torch.tensor([1.0, 0, 0, 0]).repeat(COUNT, 1)
+        return (turned * (1 + 0.3 * t.sin()))[None], torch.full((COUNT,), 0.05), rest, colours, torch.ones(1, COUNT, 1)
+
+
+INPUTS = {"t": gs.time(duration=6.2832), "twist": gs.control(-1, 1, label="Twist")}
+
+
+def test_a_module_in_one_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report = gs.export_module(Ball(), INPUTS, out=tmp_path / "ball.onnx", license="MIT", attribution="A. Person")
+    assert max(report.errors.values()) < 1e-5 and report.findings == [] and report.exporter == "dynamo"
+    said = capsys.readouterr().out
+    assert "differs from PyTorch by" in said and '<gaussian-splat src="ball.onnx"' in said
+    model = onnx.load(tmp_path / "ball.onnx")
+    shapes = {o.name: [d.dim_value for d in o.type.tensor_type.shape.dim] for o in model.graph.output}
+    assert shapes == {
+        "positions": [COUNT, 3],
+        "scales": [COUNT, 3],
+        "rotations": [COUNT, 4],
+        "colors": [COUNT, 3],
+        "opacities": [COUNT, 1],
+    }
+    contract = contract_of(tmp_path / "ball.onnx")
+    assert contract["inputs"]["twist"] == {"role": "control", "range": [-1, 1], "default": 0.0, "label": "Twist"}
+    assert contract["inputs"]["t"] == {"role": "time", "unit": "seconds"} and contract["duration"] == 6.2832
+    assert contract["bounds"]["max"][1] > 1.2
+    assert check_outputs(model)["positions"].shape == (COUNT, 3)
+
+
+class Arm(torch.nn.Module):  # type: ignore[misc]
+    """The angle's length with a little added: PyTorch's own exporter drops that, and the rest pose becomes NaN."""
+
+    def forward(self, pose: Any) -> Any:
+        angle = pose[0].norm() + 1e-8
+        axis = pose[0] / angle
+        points = torch.linspace(-1, 1, 3 * COUNT).reshape(COUNT, 3)
+        cross = torch.linalg.cross(axis.expand_as(points), points)
+        return {
+            "positions": points * angle.cos() + cross * angle.sin(),
+            "covariances": (0.01 * torch.eye(3)).repeat(1, COUNT, 1, 1),
+            "colors": points * 0.5 + 0.5,
+            "opacities": torch.sigmoid(points[:, 0]),
+        }
+
+
+def test_the_exporter_that_computes_what_pytorch_computes_is_taken(tmp_path: Path) -> None:
+    layout = gs.split("positions", "covariances", "colors", "opacities")
+    report = gs.export_module(Arm(), {"pose": gs.pose(["hip"], [-1])}, layout, out=tmp_path / "arm.onnx", quiet=True)
+    assert max(report.errors.values()) < 1e-5
+    written = check_outputs(onnx.load(tmp_path / "arm.onnx"))
+    assert np.isfinite(written["positions"]).all() and written["covariances"].shape == (COUNT, 6)
+    assert contract_of(report.path)["inputs"]["pose"]["joints"] == ["hip"]
+
+
+class Eye(torch.nn.Module):  # type: ignore[misc]
+    """The place of the camera, -(R^T t), which ONNX Runtime's optimiser computes as -(R t)."""
+
+    def forward(self, view: Any) -> Any:
+        eye = -(view[:3, :3].T @ view[:3, 3])
+        points = torch.linspace(-1, 1, 3 * COUNT).reshape(COUNT, 3)
+        covariances = 0.01 * torch.tensor([1.0, 0, 0, 1, 0, 1]).repeat(COUNT, 1)
+        return torch.cat([points + 0.1 * eye, covariances, points * 0.5 + 0.5, torch.ones(COUNT, 1)], -1).reshape(
+            -1, 13
+        )
+
+
+def test_the_place_of_a_camera_survives_the_optimiser(tmp_path: Path) -> None:
+    report = gs.export_module(Eye(), {"view": gs.view()}, gs.packed(), out=tmp_path / "eye.onnx", quiet=True)
+    # The last operator only changes the shape: a kernel writes the output all the same.
+    assert max(report.errors.values()) < 1e-5 and report.findings == []
+
+
+def test_a_decorated_function_and_class(tmp_path: Path) -> None:
+    @gs.generator({"t": gs.time()}, gs.packed(), license="MIT")
+    def rows(t: Any) -> Any:
+        return torch.cat([torch.zeros(COUNT, 3), torch.ones(COUNT, 10) * 0.5], -1) * (1 + 0 * t)
+
+    report = rows.export(tmp_path / "rows.onnx", quiet=True)
+    assert contract_of(report.path)["license"] == "MIT"
+    decorated = gs.generator(INPUTS)(type("Ball2", (Ball,), {}))
+    assert decorated().export(tmp_path / "b.onnx", quiet=True).contract["name"] == "b"
+
+
+def test_what_does_not_fit_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"a role for each argument.*found t"):
+        gs.export_module(Ball(), {"t": gs.time()}, out=tmp_path / "x.onnx")
+    with pytest.raises(ExportError, match=r"expected 4 tensors .* found 5"):
+        layout = gs.split("positions", "covariances", "colors", "opacities")
+        gs.export_module(Ball(), INPUTS, layout, out=tmp_path / "x.onnx")
+
+    class Nan(Ball):
+        def forward(self, t: Any, twist: Any) -> Any:
+            first, *rest = super().forward(t, twist)
+            return (first / (t * 0), *rest)
+
+    with pytest.raises(ExportError, match=r"at its inputs' defaults.*expected finite numbers"):
+        gs.export_module(Nan(), INPUTS, out=tmp_path / "x.onnx")

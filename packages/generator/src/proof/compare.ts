@@ -1,0 +1,101 @@
+import { halfToNumber, type AttributeSlice } from '@gaussian-splat/core';
+
+/** A piece of an output that the same run wrote in two places. */
+export interface ComparedPart {
+  /** Name of the output. */
+  readonly tensor: string;
+  readonly dtype: 'float32' | 'float16' | 'int32';
+  /** Elements of the output before this piece. */
+  readonly start: number;
+  readonly found: Uint8Array;
+  readonly expected: Uint8Array;
+}
+
+export interface Comparison {
+  /** Largest difference of one attribute, as a share of its largest value. */
+  readonly error: number;
+  /** Where that is: an attribute, or a tensor. */
+  readonly where: string;
+  /** Share of that attribute's numbers that differ by more than is allowed. */
+  readonly share: number;
+}
+
+/** Differences beyond these are another result: kernels round otherwise, and SwiftShader's sines are right to 2e-4. */
+export const ALLOWED = { float32: 1e-3, float16: 8e-3, int32: 0 } as const;
+/** What may differ all the same: a row on the edge of a threshold falls to either side of it. */
+export const ALLOWED_SHARE = 1e-3;
+
+/** True where the two results cannot be roundings of one. */
+export const isDifferent = ({ share }: Comparison): boolean => share > ALLOWED_SHARE;
+
+/**
+ * Compares pieces of what a run wrote with what it should have written, attribute by attribute: a covariance is small beside a centre, and must
+ * be right, too.
+ * @param attributes where Gaussians lie in the outputs; none for a picture.
+ * @returns the attribute that is worst.
+ */
+export function compareParts(parts: readonly ComparedPart[], attributes: readonly AttributeSlice[] = []): Comparison {
+  const comparisons = [...new Set(parts.map(({ tensor }) => tensor))].flatMap((tensor) => {
+    const own = parts.filter((part) => part.tensor === tensor);
+    const slices = attributes.filter((slice) => slice.tensor === tensor);
+    if (slices.length === 0) return [compareAttribute(tensor, own, undefined)];
+    return slices.map((slice) => compareAttribute(slice.attribute, own, slice));
+  });
+  const worst = comparisons.sort((a, b) => b.share - a.share || b.error - a.error)[0];
+  return worst ?? { error: 0, where: 'nothing', share: 0 };
+}
+
+function compareAttribute(
+  where: string,
+  parts: readonly ComparedPart[],
+  slice: AttributeSlice | undefined,
+): Comparison {
+  const pairs = parts.flatMap((part) => pairsOf(part, slice));
+  const finite = pairs.map(([, expected]) => Math.abs(expected)).filter(Number.isFinite);
+  const isAbsolute = slice?.activation === 'logit' || slice?.activation === 'log';
+  const scale = isAbsolute ? 1 : finite.reduce((most, value) => Math.max(most, value), 0) || 1;
+  const allowed = ALLOWED[parts[0]?.dtype ?? 'float32'];
+  let error = 0;
+  let beyond = 0;
+  for (const [found, expected] of pairs) {
+    const difference = differenceOf(found, expected) / scale;
+    error = Math.max(error, difference);
+    if (difference > allowed) beyond++;
+  }
+  return { error, where, share: pairs.length > 0 ? beyond / pairs.length : 0 };
+}
+
+function differenceOf(found: number, expected: number): number {
+  if (Object.is(found, expected)) return 0;
+  const difference = Math.abs(found - expected);
+  return Number.isNaN(difference) ? Infinity : difference;
+}
+
+const sigmoid = (logit: number): number => 1 / (1 + Math.exp(-logit));
+
+/** The numbers of an attribute in a piece, found and expected. */
+function pairsOf(
+  { dtype, start, found, expected }: ComparedPart,
+  slice: AttributeSlice | undefined,
+): [number, number][] {
+  const [a, b] = [numbersOf(found, dtype), numbersOf(expected, dtype)];
+  const pairs: [number, number][] = [];
+  for (let i = 0; i < Math.min(a.length, b.length); i++) {
+    if (slice !== undefined) {
+      const column = (start + i) % slice.rowStride;
+      if (column < slice.offset || column >= slice.offset + slice.components) continue;
+    }
+    // Logits of 20 and 30 are the same opacity.
+    pairs.push(slice?.activation === 'logit' ? [sigmoid(a[i]), sigmoid(b[i])] : [a[i], b[i]]);
+  }
+  return pairs;
+}
+
+function numbersOf(bytes: Uint8Array, dtype: ComparedPart['dtype']): ArrayLike<number> {
+  const { buffer, byteOffset, byteLength } = (
+    bytes.byteOffset % 4 === 0 ? bytes : bytes.slice()
+  ) as Uint8Array<ArrayBuffer>;
+  if (dtype === 'float16') return Array.from(new Uint16Array(buffer, byteOffset, byteLength >> 1), halfToNumber);
+  const Numbers = dtype === 'int32' ? Int32Array : Float32Array;
+  return new Numbers(buffer, byteOffset, byteLength >> 2);
+}

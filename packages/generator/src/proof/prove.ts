@@ -1,0 +1,130 @@
+import { loadRuntime } from '../runtime/load-runtime.js';
+import type { GeneratorModel } from '../runtime/open-model.js';
+import { compareParts, isDifferent, type ComparedPart, type Comparison } from './compare.js';
+import { readRecord, recordKey, writeRecord, type Verdict } from './record.js';
+import { runInWorker, type CpuRun } from './run-on-cpu.js';
+
+/** A run on the GPU, with pieces of what it wrote. */
+export interface Evidence {
+  readonly feeds: CpuRun['feeds'];
+  readonly dims: Readonly<Record<string, readonly number[]>>;
+  readonly parts: readonly (CpuRun['parts'][number] & {
+    readonly dtype: ComparedPart['dtype'];
+    readonly bytes: Uint8Array;
+  })[];
+}
+
+/** Bytes of weights and outputs up to which a model is compared: a worker holds them a second time. */
+const MOST_BYTES = 512 * 2 ** 20;
+
+/** What draws random numbers of its own cannot be compared. */
+const IS_RANDOM = /^(Random|Bernoulli|Multinomial)/;
+
+interface Known {
+  readonly key: Promise<string | undefined>;
+  verdict: Promise<Verdict> | undefined;
+}
+
+/** By the bytes of a model: its sessions for other numbers of instances are the same computation. */
+const known = new WeakMap<GPUDevice, WeakMap<Uint8Array, Known>>();
+
+function knownOf(model: GeneratorModel, device: GPUDevice): Known {
+  const models = known.get(device) ?? new WeakMap<Uint8Array, Known>();
+  known.set(device, models);
+  let entry = models.get(model.bytes);
+  if (entry === undefined) {
+    entry = { key: recordKey(model, device).catch(() => undefined), verdict: undefined };
+    models.set(model.bytes, entry);
+  }
+  return entry;
+}
+
+/** The verdict of an earlier visit or session, if there is one. */
+export async function earlierVerdict(model: GeneratorModel, device: GPUDevice): Promise<Verdict | undefined> {
+  const entry = knownOf(model, device);
+  const kept = readRecord(await entry.key);
+  if (kept !== undefined) entry.verdict ??= Promise.resolve(kept);
+  return kept;
+}
+
+/**
+ * Compares what a model's first run wrote on the GPU with what the same run writes on the CPU. It waits until the page is idle, and runs in a
+ * worker. Never rejects.
+ */
+export function prove(
+  model: GeneratorModel,
+  device: GPUDevice,
+  evidence: Evidence,
+  signal: AbortSignal,
+): Promise<Verdict> {
+  const entry = knownOf(model, device);
+  entry.verdict ??= compare(model, evidence, signal).then(
+    async (verdict) => {
+      writeRecord(await entry.key, verdict);
+      return verdict;
+    },
+    (error: unknown): Verdict => {
+      entry.verdict = undefined;
+      const reason = `not compared with the CPU: ${error instanceof Error ? error.message : String(error)}`;
+      return { result: 'unknown', reason };
+    },
+  );
+  return entry.verdict;
+}
+
+async function compare(model: GeneratorModel, evidence: Evidence, signal: AbortSignal): Promise<Verdict> {
+  const { header, contract, instances } = model;
+  const unknown = (why: string): Verdict => ({ result: 'unknown', reason: `not compared with the CPU: ${why}` });
+  if ([...header.operators.keys()].some((name) => IS_RANDOM.test(name))) return unknown('it draws random numbers');
+  if (bytesOf(model) > MOST_BYTES) return unknown(`it takes more than ${MOST_BYTES} bytes`);
+  await idle();
+  signal.throwIfAborted();
+  const runtime = await loadRuntime();
+  const { feeds, parts } = evidence;
+  const outputs = await runInWorker(
+    runtime.source,
+    {
+      model: model.bytes,
+      externalData: model.externalData,
+      freeDimensionOverrides: instances === undefined ? undefined : { [contract.instances!.axis]: instances },
+      feeds,
+      parts: parts.map(({ tensor, offset, size }) => ({ tensor, offset, size })),
+    },
+    signal,
+  );
+  for (const [name, dims] of Object.entries(outputs.dims)) {
+    // A row more or less is a threshold, not another result; but then nothing lies where it lay.
+    if (String(dims) !== String(evidence.dims[name]))
+      return unknown(`it writes ${String(dims)} there, not ${String(evidence.dims[name])}`);
+  }
+  const compared = parts.map(({ tensor, dtype, offset, bytes }, i): ComparedPart => {
+    const start = offset / (dtype === 'float16' ? 2 : 4);
+    return { tensor, dtype, start, found: bytes, expected: outputs.parts[i] };
+  });
+  return verdictOf(compareParts(compared, model.layout?.attributes));
+}
+
+function verdictOf(comparison: Comparison): Verdict {
+  const { error, where, share } = comparison;
+  const figure = `${where} differ by up to ${error.toPrecision(2)} of the largest`;
+  if (!isDifferent(comparison)) return { result: 'same', error, reason: `as on the CPU: ${figure}` };
+  const percent = (100 * share).toPrecision(2);
+  return {
+    result: 'different',
+    error,
+    reason: `webgpu: computes other numbers than the CPU: ${figure}, ${percent} % of them by more than is rounding`,
+  };
+}
+
+function bytesOf({ bytes, externalData, outputs }: GeneratorModel): number {
+  const weights = externalData.reduce((sum, { data }) => sum + data.length, bytes.length);
+  return outputs.reduce((sum, { most = 0, dtype }) => sum + most * (dtype === 'float16' ? 2 : 4), weights);
+}
+
+/** When the page has nothing else to do, or after two seconds. */
+function idle(): Promise<unknown> {
+  return new Promise((resolve) => {
+    if (typeof requestIdleCallback === 'function') requestIdleCallback(resolve, { timeout: 2000 });
+    else setTimeout(resolve, 500);
+  });
+}

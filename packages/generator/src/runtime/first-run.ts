@@ -1,0 +1,75 @@
+import { elementsOf, isOnGpu, type GpuTensor, type Inputs } from '../input-value.js';
+import type { Evidence } from '../proof/prove.js';
+import type { FixedOutput, RunOutputs } from './live-session.js';
+import type { GeneratorModel } from './open-model.js';
+import { readTensors } from './read-tensors.js';
+import { TENSOR_USAGE } from './tensor-bytes.js';
+
+/** Bytes of a piece of an output in which runs are compared, and how many pieces at most, spread over the output. */
+const PIECE_BYTES = 65_536;
+const MOST_PIECES = 8;
+
+/** Pieces of what a run wrote. */
+export interface WrittenRun {
+  readonly dims: Readonly<Record<string, readonly number[]>>;
+  readonly parts: Evidence['parts'];
+}
+
+/** Reads pieces of what a run has written; what lies behind its rows is anybody's. */
+export async function readRun(
+  device: GPUDevice,
+  { outputs }: GeneratorModel,
+  { tensors, dims }: RunOutputs,
+): Promise<WrittenRun> {
+  const parts = outputs.flatMap(({ name: tensor, dtype }) => {
+    const bytes = elementsOf(dims[tensor]) * (dtype === 'float16' ? 2 : 4);
+    // More rows than declared are not there, and refused later.
+    const size = Math.min(bytes - (bytes % 4), tensors[tensor].size);
+    const pieces = Math.min(MOST_PIECES, Math.ceil(size / PIECE_BYTES));
+    return Array.from({ length: Math.max(1, pieces) }, (_, i) => {
+      const offset = pieces > 1 ? Math.floor(((size - PIECE_BYTES) * i) / (pieces - 1) / 4) * 4 : 0;
+      return { tensor, dtype, offset, size: Math.min(PIECE_BYTES, size), buffer: tensors[tensor] };
+    });
+  });
+  const read = await readTensors(device, parts);
+  return {
+    dims,
+    parts: parts.map(({ tensor, dtype, offset, size }, i) => ({ tensor, dtype, offset, size, bytes: read[i] })),
+  };
+}
+
+/** True if two runs have written the same, as far as they were read. */
+export const isEqual = ({ parts: a }: WrittenRun, { parts: b }: WrittenRun): boolean =>
+  a.length === b.length &&
+  a.every(({ bytes }, i) => bytes.length === b[i].bytes.length && bytes.every((byte, k) => byte === b[i].bytes[k]));
+
+/** A run, and what it was given, for a comparison elsewhere: inputs that are on the GPU are read. */
+export async function evidenceOf(device: GPUDevice, inputs: Inputs, { dims, parts }: WrittenRun): Promise<Evidence> {
+  const feeds = await Promise.all(
+    Object.entries(inputs).map(async ([name, value]) => {
+      const { dtype, dims: size } = value;
+      return [name, { dtype, dims: size, data: isOnGpu(value) ? await numbersOf(device, value) : value.data }] as const;
+    }),
+  );
+  return { feeds: Object.fromEntries(feeds), dims, parts };
+}
+
+/** Numbers of a tensor on the GPU; what is read is whole words. */
+export async function numbersOf(device: GPUDevice, input: GpuTensor): Promise<Float32Array | Int32Array | Uint16Array> {
+  const { buffer, dtype, dims } = input;
+  const length = elementsOf(dims);
+  const size = Math.ceil((length * (dtype === 'float16' ? 2 : 4)) / 4) * 4;
+  const [{ buffer: memory }] = await readTensors(device, [{ buffer, size }]);
+  if (dtype === 'float16') return new Uint16Array(memory, 0, length);
+  return dtype === 'int32' ? new Int32Array(memory, 0, length) : new Float32Array(memory, 0, length);
+}
+
+/** A copy of an output that never changes. */
+export function copyOf(device: GPUDevice, name: string, { tensors, dims }: RunOutputs): FixedOutput {
+  const { size } = tensors[name];
+  const buffer = device.createBuffer({ label: `gs.generator.${name}`, size, usage: TENSOR_USAGE });
+  const encoder = device.createCommandEncoder({ label: 'gs.generator.copy' });
+  encoder.copyBufferToBuffer(tensors[name], 0, buffer, 0, size);
+  device.queue.submit([encoder.finish()]);
+  return { buffer, dims: dims[name] };
+}
