@@ -67,9 +67,9 @@ export function headerWith(
     operators: new Map(),
     functions: new Set(),
     externalFiles: [],
-    convolutions: [],
-    casts: new Set(),
-    widestSplit: 0,
+    nodes: [],
+    stored: new Map(),
+    values: new Map(),
     initializerBytes: 0,
     ...rest,
   };

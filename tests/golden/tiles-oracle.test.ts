@@ -164,17 +164,18 @@ for (const [what, cameras, pauseMs] of [
     const gaussians = await GaussianBuffers.upload(device, packGaussians(crowd));
     let told = 0;
     const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => told++ });
-    const target = device.createTexture({ size: [320, 180], format: 'rgba16float', usage: 0x8 | 0x10 });
     const [before, after] = cameras.map(({ width, height, ...rest }) =>
       cameraAt([0, 0, 'far' in rest ? -2000 : -3], [0, 0, 0], { width, height }),
     );
+    const targetOf = ({ width, height }: Camera): GPUTexture =>
+      device.createTexture({ size: [width, height], format: 'rgba16float', usage: 0x8 | 0x10 });
     // The third frame of a view is not looked at for its number.
     for (let frame = 0; frame < 2; frame++) {
-      renderer.render({ gaussians, camera: before, target });
+      renderer.render({ gaussians, camera: before, target: targetOf(before) });
       assert.equal((await renderer.readStatistics()).pairOverflow, 0);
     }
     await pause(pauseMs);
-    renderer.render({ gaussians, camera: after, target });
+    renderer.render({ gaussians, camera: after, target: targetOf(after) });
     assert.ok((await renderer.readStatistics()).pairOverflow > 0);
     await pause(50);
     assert.equal(told, 1);

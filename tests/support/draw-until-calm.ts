@@ -14,7 +14,7 @@ export async function drawUntilCalm(
   detail: number,
 ): Promise<void> {
   const device = await anyDevice();
-  const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
+  const target = device.createTexture({ size: [camera.width, camera.height], format: 'rgba8unorm', usage: 0x10 });
   for (let [calm, frames] = [0, 0]; calm < CALM && frames < MOST_FRAMES; frames++) {
     const { resident } = scene.progress;
     renderer.render({ gaussians: scene, camera, target, detail });

@@ -5,7 +5,9 @@ import { assert, assertEqual } from '../../element/browser/support/harness.js';
 import { CAMERA, FIXTURES, makeDevice, numbersOf, ReadingSink, relativeError, runOnCpu } from './support.js';
 
 let device: GPUDevice;
-before(async () => (device = await makeDevice()));
+before(async () => {
+  device = await makeDevice();
+});
 beforeEach(() => localStorage.clear());
 
 const STATE = { timeSeconds: 1 };
