@@ -106,7 +106,8 @@ for (const isOne of [false, true]) {
         drawing[1].render({ gaussians: scene, camera: still, target: picture, detail: 0.3 });
       };
       if (isMoving) {
-        for (let frame = 0; frame < 60; frame++) {
+        // As many as pages take to be asked for, fetched and placed.
+        for (let frame = 0; frame < 240; frame++) {
           draw();
           await (await anyDevice()).queue.onSubmittedWorkDone();
           await pause(4);
