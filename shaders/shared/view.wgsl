@@ -24,6 +24,8 @@ struct View {
   sh_cap: u32,
   sh_encoding: u32,
   antialiased: u32,
+  // Variance in px² that the scene's low-pass filter adds to both screen axes.
+  dilation: f32,
   // Bits of a depth key: 32 for those of the float32 depth itself, fewer for a share of the visible range.
   key_bits: u32,
   // 1 if the survivors are listed in depth order already, so that they need no keys.

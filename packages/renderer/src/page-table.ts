@@ -112,7 +112,7 @@ export class PageTable {
     };
     let page = 0;
     for (const scene of this.#scenes) {
-      const values = cameraValues(camera, scene.origin);
+      const values = cameraValues(camera, scene.origin, scene.filterVariance);
       const own = {
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],

@@ -8,6 +8,7 @@ export class MaskScene implements GaussianScene {
   readonly shDegree: GaussianScene['shDegree'];
   readonly shPrecision: GaussianScene['shPrecision'];
   readonly antialiased: boolean;
+  readonly filterVariance: number | undefined;
   readonly origin: GaussianScene['origin'];
   readonly pages: readonly GaussianPage[];
   readonly #device: GPUDevice;
@@ -21,7 +22,7 @@ export class MaskScene implements GaussianScene {
       count: this.count,
       shDegree: this.shDegree,
       shPrecision: this.shPrecision,
-      antialiased: this.antialiased,
+      antialiased: this.antialiased, filterVariance: this.filterVariance,
       origin: this.origin,
     } = scene);
     this.#device = device;
