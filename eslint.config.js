@@ -10,7 +10,7 @@ const MAY_IMPORT = {
   generator: ['core'],
   check: ['core', 'generator'],
   economise: ['core', 'formats', 'renderer'],
-  element: ['core', 'economise', 'formats', 'generator', 'renderer'],
+  element: ['core', 'formats', 'generator', 'renderer'],
   react: ['element'],
 };
 

@@ -1,6 +1,6 @@
 /**
  * Tests in real Chromium with WebGPU, on SwiftShader: `npm test`, or after `npm run build`
- * `npx web-test-runner [--files tests/element/browser/lifecycle.test.ts]`. The environment variable CHROMIUM names the browser;
+ * `npx web-test-runner [--files tests/element/browser/lifecycle.test.ts]`; for high-density.test.ts with TEST_GROUP=dense. CHROMIUM names the browser;
  * GAUSSIAN_SPLAT_GPU=system takes the machine's own GPU instead of SwiftShader.
  */
 import { defaultReporter } from '@web/test-runner';
@@ -12,13 +12,18 @@ import { typescript } from './tests/element/browser/support/typescript.mjs';
 
 const otherOrigin = await startOtherOrigin();
 
-/** `npm run stability` runs whole recipes. */
+/** `npm run lab:stability` runs whole recipes. */
 const isFull = process.env.STABILITY === 'full';
 
 /** Chromium hides float16 in shaders on NVIDIA under Linux; elsewhere this does nothing. */
 const FLOAT16_FLAG = '--enable-dawn-features=vulkan_enable_f16_on_nvidia';
 
-const HIGH_DENSITY = 'tests/element/browser/high-density.test.ts';
+/** Pages that run at once. SwiftShader draws on the processor, but pages wait more than they draw; the groups are those of scripts/lib/test-files.mjs. */
+const CONCURRENCY = { timing: 1, concurrent: 2, dense: 1 };
+const group = process.env.TEST_GROUP ?? 'timing';
+/** Screens whose pixels are half as large. */
+const DENSE = 'tests/element/browser/high-density.test.ts';
+const named = process.env.TEST_FILES?.split(' ').filter(Boolean);
 
 export default {
   reporters: [
@@ -26,20 +31,18 @@ export default {
     slowestReporter(),
     countReporter(),
   ],
-  files: ['tests/**/browser/**/*.test.ts', `!${HIGH_DENSITY}`],
-  groups: [{ name: 'high-density', files: HIGH_DENSITY, browsers: [chromium(2)] }],
+  files: named ?? ['tests/**/browser/**/*.test.ts', `!${DENSE}`],
   rootDir: '.',
   // Without this condition Lit is its development build, which warns that it is.
   nodeResolve: { exportConditions: ['production', 'browser'] },
-  // SwiftShader draws on the CPU: two pages at once would only slow each other down.
-  concurrency: 1,
+  concurrency: CONCURRENCY[group],
   concurrentBrowsers: 1,
   browserStartTimeout: 60_000,
   testsFinishTimeout: isFull ? 1_800_000 : 240_000,
   testFramework: { config: { ui: 'bdd', timeout: isFull ? 900_000 : 60_000 } },
   testRunnerHtml: (framework) =>
-    `<!doctype html><html><body><script>STABILITY = ${JSON.stringify(process.env.STABILITY ?? 'fast')}</script><script type="module" src="${framework}"></script></body></html>`,
-  browsers: [chromium(1)],
+    `<!doctype html><html><body><script>STABILITY = ${JSON.stringify(process.env.STABILITY ?? 'fast')}; TESTS = ${JSON.stringify(process.env.TESTS ?? 'fast')}</script><script type="module" src="${framework}"></script></body></html>`,
+  browsers: [chromium(group === 'dense' ? 2 : 1)],
   middleware: [hostileServer(otherOrigin)],
   plugins: [typescript(), pageCommands()],
 };
@@ -78,7 +81,8 @@ function countReporter() {
       const broken = sessions.filter(
         ({ passed: fine, testResults }) => !fine && countOf(testResults).failed === 0,
       ).length;
-      for (const { testFile } of sessions.filter((session) => !session.passed)) console.log(`Failed: ${testFile}`);
+      for (const { testFile, testResults } of sessions.filter((session) => !session.passed))
+        console.log(`Failed: ${Math.max(1, countOf(testResults).failed)} of ${testFile}`);
       console.log(`Chromium: ${passed} passed, ${failed + broken} failed, ${skipped} skipped`);
     },
   };

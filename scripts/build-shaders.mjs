@@ -36,7 +36,6 @@ const ECONOMISE = 'economise';
 RARE[ECONOMISE] = [
   'economise_cut',
   'economise_lower',
-  'economise_mask',
   'economise_moments',
   'economise_score',
   'economise_take',

@@ -1,51 +1,76 @@
 /**
  * `npm run build`: shaders to typed constants, TypeScript to packages, the CDN bundle, what editors know of the element, and the demo as a static site.
- * `npm run build -- --element` ends with the CDN bundle: all that a page of one's own needs, in half of the time.
+ * `npm run build -- --element` ends with the CDN bundle: all that a page of one's own needs, in half of the time; `-- --packages` with the packages, which is what
+ * most tests of Node need.
  */
 import { copyFileSync, existsSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { writeAttributeRows } from '../packages/element/scripts/attributes.mjs';
 import { writeIntegrity } from '../packages/element/scripts/integrity.mjs';
 import { ensureDependencies, noteBuilt } from './lib/prepare.mjs';
-import { must, root } from './lib/run.mjs';
+import { must, mustSoon, root } from './lib/run.mjs';
 
 /** Scripts of pages, each beside its page. */
 const SCRIPTS = ['home.js', 'check/check.js', 'compare/compare.js', 'examples/examples.js', 'playground/playground.js'];
 
-const isWhole = !process.argv.includes('--element');
+const extent = ['element', 'packages'].find((name) => process.argv.includes(`--${name}`)) ?? 'whole';
 
 ensureDependencies();
 must(process.execPath, ['scripts/build-shaders.mjs']);
 must(process.execPath, ['node_modules/typescript/bin/tsc', '--build', ...projects()]);
-must(process.execPath, [
-  'node_modules/rollup/dist/bin/rollup',
-  '--config',
-  'packages/element/rollup.config.mjs',
-  '--silent',
-]);
 writeLicences();
-console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
-if (isWhole) {
-  const { bundleThreadScript } = await import('./lib/thread-script.mjs');
+if (extent !== 'element') await bundleThreads();
+if (extent !== 'packages') {
+  const others = extent === 'whole' ? buildBesideBundle() : undefined;
+  await bundleElement();
+  await others;
+  if (extent === 'whole') await buildPages();
+}
+noteBuilt(extent);
+
+/** The CDN bundle, which takes longest. */
+async function bundleElement() {
+  await mustSoon(process.execPath, [
+    'node_modules/rollup/dist/bin/rollup',
+    '--config',
+    'packages/element/rollup.config.mjs',
+    '--silent',
+  ]);
+  writeLicencesOfBundle();
+  console.log(`integrity of gaussian-splat.min.js: ${writeIntegrity()['gaussian-splat.min.js']}`);
+}
+
+/** The script of threads that commands start. */
+async function bundleThreads() {
+  const { bundleThreadScript } = await import('../packages/cli/src/lib/thread-script.mjs');
   await bundleThreadScript();
-  describeElement();
+}
+
+/** All that needs the packages, but not the bundle. */
+async function buildBesideBundle() {
+  await describeElement();
   await buildDemo();
 }
-noteBuilt(isWhole);
 
 /** The element's project refers to those of the packages that it is made of. */
 function projects() {
-  const names = isWhole
-    ? ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react']
-    : ['element'];
+  const names =
+    extent !== 'element'
+      ? ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react']
+      : ['element'];
   return names.map((name) => `packages/${name}`);
 }
 
-/** The bundle is without comments, and the licences of what is in it ask for their text. npm takes a licence from the package's own folder only. */
+/** npm takes a licence from the package's own folder only. */
 function writeLicences() {
   for (const name of readdirSync(join(root, 'packages'))) {
     const folder = join(root, 'packages', name);
     if (existsSync(join(folder, 'package.json'))) copyFileSync(join(root, 'LICENSE'), join(folder, 'LICENSE'));
   }
+}
+
+/** The bundle is without comments, and the licences of what is in it ask for their text. */
+function writeLicencesOfBundle() {
   const own = readFileSync(join(root, 'LICENSE'), 'utf8');
   const lit = readFileSync(join(root, 'node_modules/lit/LICENSE'), 'utf8');
   const text = `gaussian-splat\n\n${own}\n\nLit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js\n\n${lit}`;
@@ -55,20 +80,21 @@ function writeLicences() {
 }
 
 /** What editors and tools know of the element, from its sources. */
-function describeElement() {
+async function describeElement() {
   const analyzer = join(root, 'node_modules/@custom-elements-manifest/analyzer/cem.js');
   const config = 'custom-elements-manifest.config.mjs';
-  must(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], { cwd: join(root, 'packages/element') });
+  const cwd = join(root, 'packages/element');
+  await mustSoon(process.execPath, [analyzer, 'analyze', '--quiet', '--config', config], { cwd });
+  writeAttributeRows(JSON.parse(readFileSync(join(cwd, 'custom-elements.json'), 'utf8')));
 }
 
-/** demo/dist is the whole site: any static host can serve it. Pages by Eleventy, their scripts by esbuild, the apps by Vite. */
+/** Scripts and scenes of the site, but its pages: those of pages by esbuild, the apps by Vite. */
 async function buildDemo() {
   const from = join(root, 'demo');
   const to = join(root, 'demo/dist');
   rmSync(to, { recursive: true, force: true });
   const { writeSequence } = await import('../demo/site/sequence-scene.mjs');
   await writeSequence(join(to, 'scenes/knot'));
-  must(process.execPath, ['node_modules/@11ty/eleventy/cmd.cjs', '--quiet', '--config=demo/site/eleventy.config.mjs']);
   // Its packages were not there when this script started on a fresh clone.
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));
@@ -84,6 +110,22 @@ async function buildDemo() {
   });
   for (const app of ['react', 'vue']) {
     const config = join(from, app, 'vite.config.mjs');
-    must(process.execPath, ['node_modules/vite/bin/vite.js', 'build', '--config', config, '--logLevel', 'warn']);
+    await mustSoon(process.execPath, [
+      'node_modules/vite/bin/vite.js',
+      'build',
+      '--config',
+      config,
+      '--logLevel',
+      'warn',
+    ]);
   }
+}
+
+/** demo/dist is the whole site: any static host can serve it. Eleventy copies the bundle, and names its digests. */
+function buildPages() {
+  return mustSoon(process.execPath, [
+    'node_modules/@11ty/eleventy/cmd.cjs',
+    '--quiet',
+    '--config=demo/site/eleventy.config.mjs',
+  ]);
 }

@@ -1,5 +1,5 @@
 /**
- * `npm run firefox [-- --firefox PATH]`: the built element and site in Firefox (Debian's firefox-esr, or another by its path). First as it comes: where it has no
+ * `npm run lab:firefox [-- --firefox PATH]`: the built element and site in Firefox (Debian's firefox-esr, or another by its path). First as it comes: where it has no
  * WebGPU (Linux), every page must live on without. Then with WebGPU switched on (`dom.webgpu.enabled`; without a GPU that is Mesa's lavapipe, package
  * mesa-vulkan-drivers), against pictures of Chromium. After `npm run build`. Not part of `npm test`.
  */
@@ -11,7 +11,7 @@ import { PNG } from 'pngjs';
 import { findChromium, SWIFTSHADER_FLAGS } from './lib/chromium.mjs';
 import { FirefoxTab, launchFirefox } from './lib/firefox.mjs';
 import { root } from './lib/run.mjs';
-import { serve } from './lib/server.mjs';
+import { serve } from '../packages/cli/src/lib/server.mjs';
 
 const { values } = parseArgs({ options: { firefox: { type: 'string', default: 'firefox-esr' } } });
 const WEBGPU = { 'dom.webgpu.enabled': true, 'gfx.webgpu.ignore-blocklist': true };

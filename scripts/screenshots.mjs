@@ -1,5 +1,5 @@
 /**
- * `npm run screenshots [-- --only REGEX] [--out FOLDER] [--scheme light|dark] [--seconds 40] [--widths 390,1280] [--first] [--scenes]`: a picture of every page of
+ * `npm run lab:screenshots [-- --only REGEX] [--out FOLDER] [--scheme light|dark] [--seconds 40] [--widths 390,1280] [--first] [--scenes]`: a picture of every page of
  * the built site at 390 and 1280 CSS pixels, for people to look at. Scenes in the first screen get some seconds to appear; SwiftShader is slow. `--scenes` waits for
  * those below it, too; `--first` takes the first screen alone.
  */
@@ -9,7 +9,7 @@ import { parseArgs } from 'node:util';
 import { chromium } from 'playwright-core';
 import { findChromium, SWIFTSHADER_FLAGS } from './lib/chromium.mjs';
 import { root } from './lib/run.mjs';
-import { serve } from './lib/server.mjs';
+import { serve } from '../packages/cli/src/lib/server.mjs';
 
 /** A picture of a whole document would be too tall to look at. */
 const MOST_PIXELS_DOWN = 6000;

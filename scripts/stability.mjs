@@ -1,5 +1,5 @@
 /**
- * `npm run stability`: every row of the catalogue at full length, each in a process of its own, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
+ * `npm run lab:stability`: every row of the catalogue at full length, each in a process of its own, in Node and in Chromium. `-- PATTERN` runs the rows whose file name contains it;
  * `-- --peers` puts the peers through the rows that a page can; `-- --report` also writes docs/stability.md, its charts and figures.json, from which the demo takes its own;
  * `-- --merge FILE...` runs nothing and adds what was measured on another machine: its .cache/stability/runs.jsonl, or what the page POSTed.
  */

@@ -1,7 +1,7 @@
 /** `npm start`: installs and builds what is missing, then serves the demo. PORT chooses the port (default 8080). */
 import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
 import { root } from './lib/run.mjs';
-import { serve } from './lib/server.mjs';
+import { serve } from '../packages/cli/src/lib/server.mjs';
 
 ensureDependencies();
 ensureBuilt();

@@ -10,7 +10,7 @@ import { root, run } from './lib/run.mjs';
 /** Folders of tests that draw. */
 const FOLDERS = ['stages', 'golden', 'detail', 'economise', 'memory', 'stability'];
 /** Says which adapter the tests will have; fails where there is none. */
-const NAME_ADAPTER = `import { requestNodeAdapter } from './scripts/lib/node-gpu.mjs';
+const NAME_ADAPTER = `import { requestNodeAdapter } from './packages/cli/src/lib/node-gpu.mjs';
 const { vendor, architecture, device, description } = (await requestNodeAdapter()).info;
 console.log('Adapter: ' + [vendor, architecture, device, description].filter(Boolean).join(' '));
 process.exit();`;

@@ -1,4 +1,4 @@
-/** Sets copies of a scene side by side on its ground, as a PLY: a larger scene to time `npm run economise` with. See packages/economise/README.md. */
+/** Sets copies of a scene side by side on its ground, as a PLY: a larger scene to time `gaussian-splat economise` with. See packages/economise/README.md. */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { encodingsFor } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';

@@ -28,6 +28,10 @@ fn bin_rect(s: ProjectedSplat) -> u32 {
 @compute @workgroup_size(PREFIX_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let group = group_index(workgroup_id);
+  if (group * PREFIX_THREADS >= plan.visible) {
+    if (lane == 0u && group < view.splat_groups) { group_pairs[group] = 0u; }
+    return;
+  }
   let rank = group * PREFIX_THREADS + lane;
   var pairs = 0u;
   if (rank < plan.visible) {
@@ -36,5 +40,5 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     pairs = ((rect >> 16u) & 255u) * (rect >> 24u);
   }
   let sum = inclusive_sum(pairs, lane, PREFIX_THREADS);
-  if (lane == PREFIX_THREADS - 1u && group * PREFIX_THREADS < plan.visible) { group_pairs[group] = sum; }
+  if (lane == PREFIX_THREADS - 1u) { group_pairs[group] = sum; }
 }

@@ -32,6 +32,7 @@ fn owner_of(p: u32) -> u32 {
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let group = group_index(workgroup_id);
   let first_rank = group * PREFIX_THREADS;
+  if (first_rank >= plan.visible) { return; }
   var own = 0u;
   if (first_rank + lane < plan.visible) {
     let rect = rects[first_rank + lane];
@@ -39,7 +40,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   }
   ends[lane] = inclusive_sum(own, lane, PREFIX_THREADS);
   workgroupBarrier();
-  if (first_rank >= plan.visible) { return; }
   let base = group_pairs[group];
   let total = min(ends[PREFIX_THREADS - 1u], view.pair_capacity - min(base, view.pair_capacity));
   for (var p = lane; p < total; p += PREFIX_THREADS) {

@@ -48,6 +48,7 @@ fn touched_tiles(c: Coverage, bin: vec2u) -> u32 {
 @compute @workgroup_size(PROJECT_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let first = group_index(workgroup_id) * PROJECT_GROUP;
+  if (first >= pair_plan.visible) { return; }
   let i = first + lane;
   var mask = 0u;
   if (i < pair_plan.visible) {
@@ -58,7 +59,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   }
   masks[MASK_ROW * (lane / 32u) + lane % 32u] = mask;
   workgroupBarrier();
-  if (first >= pair_plan.visible) { return; }
   // Thread lane writes word lane of the group: of this tile, for these 32 pairs.
   let tile = lane / PAIR_WORDS;
   let row = MASK_ROW * (lane % PAIR_WORDS);

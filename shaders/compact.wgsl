@@ -4,11 +4,10 @@
 #import shared/group
 
 @group(0) @binding(0) var<uniform> view: View;
-@group(0) @binding(1) var<storage, read> chunk_list: array<u32>;
 // A bit for each splat, two vectors for a group.
-@group(0) @binding(2) var<storage, read> visible_bits: array<vec4u>;
-@group(0) @binding(3) var<storage, read> group_offsets: array<u32>;
-@group(0) @binding(4) var<storage, read_write> survivors: array<u32>;
+@group(0) @binding(1) var<storage, read> visible_bits: array<vec4u>;
+@group(0) @binding(2) var<storage, read> group_offsets: array<u32>;
+@group(0) @binding(3) var<storage, read_write> survivors: array<u32>;
 
 const VECTORS_PER_GROUP = WORDS_PER_GROUP / 4u;
 
@@ -19,7 +18,11 @@ fn bits_before(words: vec4u, end: i32) -> u32 {
 
 @compute @workgroup_size(CULL_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let group = view.first_group + chunk_list[view.first_group + workgroup_id.x];
+  let chunk = group_index(workgroup_id);
+  if (chunk * CULL_GROUP >= view.splat_count) { return; }
+  let group = view.first_group + chunk;
+  // No survivors, as of most groups of a scene that is seen from within.
+  if (group_offsets[group] == group_offsets[group + 1u]) { return; }
   let low = visible_bits[VECTORS_PER_GROUP * group];
   let high = visible_bits[VECTORS_PER_GROUP * group + 1u];
   let word = lane / 32u;

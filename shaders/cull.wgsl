@@ -1,4 +1,4 @@
-// Which splats of the chunks at hand paint anything: one thread per splat, one bit of `visible_bits` per splat, and the number
+// Which splats of the chunks that are drawn paint anything: one thread per splat, one bit of `visible_bits` per splat, and the number
 // of visible splats of each group of 256. Bits and counts, not atomic slots, so that compaction keeps the file's order and
 // equal depths never flicker.
 #import shared/visibility
@@ -7,11 +7,10 @@
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
-@group(0) @binding(2) var<storage, read> chunk_list: array<u32>;
-@group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
-@group(0) @binding(4) var<storage, read_write> group_counts: array<u32>;
-@group(0) @binding(5) var<storage, read_write> gathered: array<atomic<u32>>;
-@group(0) @binding(7) var<storage, read> chunk_shares: array<f32>;
+@group(0) @binding(2) var<storage, read_write> visible_bits: array<u32>;
+@group(0) @binding(3) var<storage, read_write> group_counts: array<u32>;
+@group(0) @binding(4) var<storage, read_write> gathered: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read> chunk_shares: array<f32>;
 
 var<workgroup> bits: array<atomic<u32>, WORDS_PER_GROUP>;
 var<workgroup> nearest_inverted: atomic<u32>;
@@ -19,9 +18,12 @@ var<workgroup> farthest: atomic<u32>;
 
 @compute @workgroup_size(CULL_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let chunk = chunk_list[view.first_group + workgroup_id.x];
+  let chunk = group_index(workgroup_id);
+  if (chunk * CULL_GROUP >= view.splat_count) { return; }
+  let group = view.first_group + chunk;
+  let share = chunk_shares[group];
+  if (share <= 0.0) { return; }
   let i = chunk * CULL_GROUP + lane;
-  let share = chunk_shares[view.first_group + chunk];
   if (i < view.splat_count && !is_turned_away(view, i)) {
     let found = gaussian_at(i);
     if (!is_usable(found)) {
@@ -36,7 +38,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     }
   }
   workgroupBarrier();
-  let group = view.first_group + chunk;
   if (lane < WORDS_PER_GROUP) { visible_bits[group * WORDS_PER_GROUP + lane] = atomicLoad(&bits[lane]); }
   if (lane == 0u) {
     var count = 0u;

@@ -1,21 +1,17 @@
-// Which chunks of a page may hold visible splats, and which of them are as fine as the view asks for: one thread for each chunk.
+// In which share each chunk of a page is drawn: 0 where it holds no visible splat, or is coarser or finer than the view asks for. One thread for each chunk.
 #import shared/chunk_visibility
 #import shared/detail
 #import shared/group
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> chunks: array<Chunk>;
-// Chunks to look into, in no particular order, from the page's first group on.
-@group(0) @binding(2) var<storage, read_write> chunk_list: array<u32>;
-// Indirect arguments of `cull` and `compact` for each page, three words; the first counts the chunks.
-@group(0) @binding(3) var<storage, read_write> chunk_args: array<atomic<u32>>;
-// Set to nothing.
-@group(0) @binding(4) var<storage, read_write> group_counts: array<u32>;
-@group(0) @binding(5) var<storage, read_write> visible_bits: array<u32>;
+// Set to nothing, and the bits of chunks that are not drawn.
+@group(0) @binding(2) var<storage, read_write> group_counts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
 // Of pages with levels of detail.
-@group(0) @binding(6) var<storage, read> details: array<ChunkDetail>;
-// Share in which each chunk is drawn, of the chunks that are; the last word is no chunk's: pixels that a budget makes chunks be off.
-@group(0) @binding(7) var<storage, read_write> chunk_shares: array<f32>;
+@group(0) @binding(4) var<storage, read> details: array<ChunkDetail>;
+// The last word is no chunk's: pixels that a budget makes chunks be off.
+@group(0) @binding(5) var<storage, read_write> chunk_shares: array<f32>;
 
 const CHUNK_THREADS = 64u;
 fn share_of(chunk: u32) -> f32 {
@@ -29,11 +25,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
   if (chunk * CULL_GROUP >= view.splat_count) { return; }
   let group = view.first_group + chunk;
   group_counts[group] = 0u;
-  let share = share_of(chunk);
-  if (share > 0.0 && may_be_visible(view, chunks[chunk])) {
-    chunk_shares[group] = share;
-    chunk_list[view.first_group + atomicAdd(&chunk_args[3u * view.page], 1u)] = chunk;
-  } else {
+  var share = share_of(chunk);
+  if (share <= 0.0 || !may_be_visible(view, chunks[chunk])) {
+    share = 0.0;
     for (var w = 0u; w < WORDS_PER_GROUP; w++) { visible_bits[group * WORDS_PER_GROUP + w] = 0u; }
   }
+  chunk_shares[group] = share;
 }

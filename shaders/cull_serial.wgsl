@@ -5,19 +5,20 @@
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> gaussians: array<StoredGaussian>;
-@group(0) @binding(2) var<storage, read> chunk_list: array<u32>;
-@group(0) @binding(3) var<storage, read_write> visible_bits: array<u32>;
+@group(0) @binding(2) var<storage, read_write> visible_bits: array<u32>;
 // Nothing at first.
-@group(0) @binding(4) var<storage, read_write> group_counts: array<atomic<u32>>;
-@group(0) @binding(5) var<storage, read_write> gathered: array<atomic<u32>>;
-@group(0) @binding(7) var<storage, read> chunk_shares: array<f32>;
+@group(0) @binding(3) var<storage, read_write> group_counts: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> gathered: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read> chunk_shares: array<f32>;
 
 @compute @workgroup_size(WORDS_PER_GROUP)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let chunk = chunk_list[view.first_group + workgroup_id.x];
+  let chunk = group_index(workgroup_id);
+  if (chunk * CULL_GROUP >= view.splat_count) { return; }
   let group = view.first_group + chunk;
-  let first = chunk * CULL_GROUP + lane * 32u;
   let share = chunk_shares[group];
+  if (share <= 0.0) { return; }
+  let first = chunk * CULL_GROUP + lane * 32u;
   var bits = 0u;
   var nearest = 0xffffffffu;
   var farthest = 0u;

@@ -4,11 +4,11 @@
 const NOTES_SPLATS = true;
 
 // Numbers of the splats by slot.
-@group(0) @binding(8) var<storage, read> survivors: array<u32>;
+@group(0) @binding(6) var<storage, read> survivors: array<u32>;
 // By number: bits of the largest weight, alpha times transmittance, that the splat has had in any pixel of any frame.
-@group(0) @binding(9) var<storage, read_write> contributions: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read_write> contributions: array<atomic<u32>>;
 // Camera depth, in world units, of the splat that leaves a pixel half transparent or less; 0 where none does.
-@group(0) @binding(10) var depths: texture_storage_2d<r32float, write>;
+@group(0) @binding(8) var depths: texture_storage_2d<r32float, write>;
 
 // Largest weight of each splat of the batch, and of the one that takes the place of a missing one.
 var<workgroup> weights: array<atomic<u32>, TILE_THREADS + 1u>;

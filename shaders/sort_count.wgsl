@@ -14,6 +14,7 @@ var<workgroup> histogram: array<atomic<u32>, DIGITS>;
 @compute @workgroup_size(SORT_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let block_id = group_index(workgroup_id);
+  if (block_id >= plan.sort_blocks) { return; }
   let first = block_id * SORT_BLOCK + lane;
   // All keys are on their way before the first is counted.
   var own: array<u32, SORT_BLOCK / SORT_THREADS>;
@@ -25,7 +26,5 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (first + r * SORT_THREADS < plan.visible) { atomicAdd(&histogram[digit_of(own[r], digit_pass.shift)], 1u); }
   }
   workgroupBarrier();
-  if (lane < DIGITS && block_id < plan.sort_blocks) {
-    counts[block_id * DIGITS + lane] = atomicLoad(&histogram[lane]);
-  }
+  counts[block_id * DIGITS + lane] = atomicLoad(&histogram[lane]);
 }

@@ -10,6 +10,7 @@ var<workgroup> ranked: array<u32, DIGITS>;
 @compute @workgroup_size(SORT_THREADS)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {
   let block_id = group_index(workgroup_id);
+  if (block_id >= plan.sort_blocks) { return; }
   let own_first = block_id * SORT_BLOCK + lane;
   var keys = items_at(own_first, SORT_THREADS);
   var places: Items;
@@ -41,9 +42,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     }
     workgroupBarrier();
   }
-  var count = 0u;
-  if (lane < DIGITS) { count = ranked[lane]; }
-  find_first_places(block_id, lane, count);
+  find_first_places(block_id, lane, ranked[lane]);
   for (var r = 0u; r < ITEMS; r++) { places[r] += first_in_block[digit_of(keys[r], digit_pass.shift)]; }
   write_items(block_id, lane, own_first, SORT_THREADS, &keys, &places);
 }

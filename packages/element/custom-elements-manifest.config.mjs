@@ -4,6 +4,7 @@
  */
 import { customElementJetBrainsPlugin } from 'custom-element-jet-brains-integration';
 import { customElementVsCodePlugin } from 'custom-element-vs-code-integration';
+import { tableOfAttributes } from './scripts/attributes.mjs';
 
 /** What people import is the compiled module. */
 const published = (path) => path?.replace(/^src\//, 'dist/').replace(/\.ts$/, '.js');
@@ -68,12 +69,13 @@ const isPublic = ({ name, privacy }) =>
 const files = { outdir: '.', packageJson: false };
 
 export default {
-  globs: ['src/index.ts', 'src/element.ts', 'src/viewing.ts', 'src/media.ts', 'src/properties.ts'],
+  globs: ['src/index.ts', 'src/element.ts', 'src/viewing.ts', 'src/media.ts', 'src/properties.ts', 'src/attributes.ts'],
   outdir: '.',
   litelement: true,
   packagejson: false,
   plugins: [
     typesOfSources,
+    tableOfAttributes(),
     publicOnly,
     customElementVsCodePlugin({ ...files, cssFileName: null, hideLogs: true }),
     customElementJetBrainsPlugin({ ...files, hideLogs: true }),

@@ -10,14 +10,21 @@ import { nodeResolve } from '@rollup/plugin-node-resolve';
 import terser from '@rollup/plugin-terser';
 import { minifyTemplateLiterals } from 'rollup-plugin-minify-template-literals';
 import { shortShaders } from './scripts/shader-plugin.mjs';
-import { shortPrivates } from './scripts/short-privates.mjs';
+import { transform } from 'esbuild';
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
+
+/** esbuild gives the private names of all classes the same few letters. Terser, which is better at all else, gives each its own. */
+const shortPrivates = {
+  name: 'short-privates',
+  renderChunk: (code) =>
+    transform(code, { format: 'esm', target: 'es2022', minifyIdentifiers: true, sourcemap: 'external' }),
+};
 
 const plugins = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
-  shortPrivates(),
+  shortPrivates,
   minifyTemplateLiterals({ include: [path('./dist/styles.js'), path('./dist/template.js')] }),
   // Statements compress better than what they can be joined to with commas. No property is read here for what its getter does.
   terser({

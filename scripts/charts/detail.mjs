@@ -1,5 +1,5 @@
 /**
- * `npm run detail:chart`: how many splats a frame takes for each that contributes, and how far its picture is from the whole one, at growing distances. Draws a
+ * `npm run lab:detail:chart`: how many splats a frame takes for each that contributes, and how far its picture is from the whole one, at growing distances. Draws a
  * scene exactly and from its levels of detail on Dawn, and prints a table for docs/decisions/0013.
  */
 import { readFileSync } from 'node:fs';
@@ -7,7 +7,7 @@ import { parseArgs } from 'node:util';
 import { boundsOf } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { GaussianBuffers, packGaussians, packWithDetail, Renderer } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cameraAt, decibels, draw, meanSquare, numbers } from './views.mjs';
 
 const { values } = parseArgs({

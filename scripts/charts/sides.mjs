@@ -1,5 +1,5 @@
 /**
- * `npm run sides:chart`: splats that a frame takes for each that shows, with and without visible sets, and how far its picture is from the whole one: views from all around
+ * `npm run lab:sides:chart`: splats that a frame takes for each that shows, with and without visible sets, and how far its picture is from the whole one: views from all around
  * a scene, at growing distances, none of them one that it was looked at from; with `--step DEGREES` views that follow one another on a circle. Prints a table for docs/decisions/0017.
  */
 import { readFileSync } from 'node:fs';
@@ -9,7 +9,7 @@ import { boundsOf } from '@gaussian-splat/core';
 import { lookAround } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cameraAt, decibels, draw, meanSquare, numbers } from './views.mjs';
 
 const { values, positionals } = parseArgs({

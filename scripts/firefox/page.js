@@ -1,4 +1,4 @@
-/** What the checks of `npm run firefox` do within a page. Everything answers with text or bytes, which any protocol carries. */
+/** What the checks of `npm run lab:firefox` do within a page. Everything answers with text or bytes, which any protocol carries. */
 const SIZE = 'display: block; width: 300px; height: 240px';
 
 const delay = (ms) => new Promise((resolve) => setTimeout(resolve, ms));

@@ -32,7 +32,6 @@ const styleOf = ({ font }) => `
   .quiet { fill: var(--quiet); }
   .grid { stroke: var(--line); }
   .own { fill: var(--own); } .peer { fill: var(--peer); }
-  .wall { fill: var(--ground); stroke-width: 2; } .own.wall { stroke: var(--own); } .peer.wall { stroke: var(--peer); }
   .front { fill: none; stroke: var(--own); stroke-width: 1.5; stroke-dasharray: 5 4; }
   .unnamed { opacity: 0.35; }
   .leader { stroke: var(--quiet); stroke-width: 0.7; }`;
@@ -145,8 +144,8 @@ function drawPoints(points, front, { x, y }, { width, height, margin, font, isSm
     { left: margin.left, right: width - margin.right, top: margin.top, bottom: height - margin.bottom, font },
   );
   const marks = points.map((point) => {
-    const kind = [point.peer ? 'peer' : 'own', point.clock === 'wall' && 'wall', !isNamed(point) && 'unnamed'];
-    const note = `${point.name}: ${point.ms.toFixed(2)} ms (${point.clock}), ${point.psnr.toFixed(1)} dB, worst pixel ${point.worst.toFixed(1)}/255, SSIM ${point.ssim.toFixed(4)}`;
+    const kind = [point.peer ? 'peer' : 'own', !isNamed(point) && 'unnamed'];
+    const note = `${point.name}: ${point.ms.toFixed(2)} ms, ${point.psnr.toFixed(1)} dB, worst pixel ${point.worst.toFixed(1)}/255, SSIM ${point.ssim.toFixed(4)}`;
     const circle = { class: kind.filter(Boolean).join(' '), cx: x(point.ms), cy: y(point.psnr), r: 5 };
     return tag('circle', circle, tag('title', {}, escape(note)));
   });
@@ -174,7 +173,7 @@ function wholeCaption({ environment, scene, reference, run, standard }) {
   const browser = /(?:Headless)?(?:Chrome|Firefox|Version)\/[\d.]+/.exec(userAgent)?.[0] ?? userAgent;
   const against = reference.kind === 'oracle' ? 'the float64 oracle' : 'our compute rasterizer in float32';
   return [
-    `Orange: ours (${versions.commit}); blue: PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}. Filled: GPU time, first pass to last; hollow: wall time, queue drained.`,
+    `Orange: ours (${versions.commit}); blue: PlayCanvas ${versions.playcanvas}, Spark ${versions.spark}. Milliseconds of a frame of 40 in a row, queue drained once.`,
     `Dashed: nothing else is both faster and truer; bold: those, and the qualities. ${scene.views} views of the path “${scene.path}”, covered pixels, against ${against}.`,
     `Scene ${scene.scene.split('/').at(-1)}, ${scene.antialiased ? 'antialiased' : 'classic'}; ${run.rounds} × ${run.frames} frames${standard ? ', each beside the default in turns' : ''}; ${browser}; ${date.slice(0, 10)}.`,
   ];
@@ -183,6 +182,6 @@ function wholeCaption({ environment, scene, reference, run, standard }) {
 function smallCaption({ environment }) {
   return [
     `Orange: ours, pale: single levers; blue: others. ${environment.date.slice(0, 10)}.`,
-    'Filled: GPU time; hollow: wall time.',
+    'Milliseconds of a frame of 40 in a row.',
   ];
 }

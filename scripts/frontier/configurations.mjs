@@ -1,7 +1,7 @@
 /**
  * What the chart of speed against accuracy compares, a line for each configuration: its name, what it aims at (`tier`), and
- * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail, `sides: true` makes visible sets,
- * `economy` leaves out what no view needs at so many dB) or in resolution scale. A line whose options the renderer does not have yet is left out of the chart and listed as such.
+ * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail, `sides: true` makes visible sets)
+ * or in resolution scale. A line whose options the renderer does not have yet is left out of the chart and listed as such.
  */
 export const configurations = [
   { name: 'default', tier: 'tier' },
@@ -20,11 +20,8 @@ export const configurations = [
   { name: 'sort every degree', tier: 'lever', options: { sortAngle: 0.0175 } },
   { name: 'sort every 2 degrees', tier: 'lever', options: { sortAngle: 0.035 } },
   { name: 'sort every 4 degrees', tier: 'lever', options: { sortAngle: 0.07 } },
-  { name: 'stop at 1/1000', tier: 'lever', options: { transmittanceMin: 1e-3 } },
-  { name: 'stop at 1/255', tier: 'lever', options: { transmittanceMin: 1 / 255 } },
+  { name: 'stop at 1/500', tier: 'lever', options: { transmittanceMin: 1 / 500 } },
   { name: 'stop at 1/64', tier: 'lever', options: { transmittanceMin: 1 / 64 } },
-  { name: 'occluded below 1/100', tier: 'lever', options: { rasterizer: 'tiles', occludedBelow: 0.01 } },
-  { name: 'occluded below 1/10', tier: 'lever', options: { rasterizer: 'tiles', occludedBelow: 0.1 } },
   { name: 'alpha from 2/255', tier: 'lever', options: { alphaMin: 2 / 255 } },
   { name: 'alpha from 4/255', tier: 'lever', options: { alphaMin: 4 / 255 } },
   { name: 'alpha from 8/255', tier: 'lever', options: { alphaMin: 8 / 255 } },
@@ -36,13 +33,11 @@ export const configurations = [
   { name: 'detail 1 px', tier: 'lever', options: { detail: 1 }, pack: { detail: true } },
   { name: 'detail 2 px', tier: 'lever', options: { detail: 2 }, pack: { detail: true } },
   { name: 'visible sets', tier: 'lever', options: { visibleSets: true }, pack: { sides: true } },
-  { name: 'economy at 57 dB', tier: 'lever', pack: { economy: 57 } },
-  { name: 'economy at 50 dB', tier: 'lever', pack: { economy: 50 } },
-  { name: 'economy at 44 dB', tier: 'lever', pack: { economy: 44 } },
   { name: 'balanced, visible sets', tier: 'lever', options: { quality: 'balanced' }, pack: { sides: true } },
-  { name: 'scale 0.9', tier: 'lever', options: { resolutionScale: 0.9 } },
-  { name: 'scale 0.75', tier: 'lever', options: { resolutionScale: 0.75 } },
-  { name: 'scale 0.5', tier: 'lever', options: { resolutionScale: 0.5 } },
+  ...[0.71, 0.5, 0.35, 0.25].map((resolutionScale) => ({
+    ...{ name: `balanced at ${resolutionScale}`, tier: 'lever' },
+    options: { quality: 'balanced', resolutionScale },
+  })),
   { name: 'PlayCanvas', tier: 'peer', peer: 'playcanvas' },
   { name: 'PlayCanvas, parity', tier: 'peer', peer: 'playcanvas', parity: true },
   { name: 'Spark', tier: 'peer', peer: 'spark' },

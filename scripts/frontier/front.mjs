@@ -38,15 +38,13 @@ export function hypervolume(points, reference = { ms: 16.6, psnr: 36 }) {
 }
 
 /**
- * Milliseconds a frame. Time is the GPU's span where timestamps exist, else the wall time with the queue drained, for renderers that sort on
- * the side until the image has its own order. Where a configuration was measured beside the default in turns, its time is the ratio of the two times
+ * Milliseconds a frame: of many in a row, the queue drained once, the same clock for all. Where a configuration was measured beside the default in turns, its time is the ratio of the two times
  * what the default took over the whole run: the clock of a GPU that changes within a run then changes nothing.
  */
 export function timeOf(result, standard) {
-  const kind = ['span', 'sortedWall', 'wall'].find((name) => result[name] !== undefined);
-  const common = standard?.[kind === 'span' ? 'span' : 'wall'];
-  const ratio = result.ratio?.[kind];
-  return { kind, ms: ratio && common ? ratio.p50 * common.p50 : result[kind].p50 };
+  const { burst, ratio } = result;
+  const common = standard?.burst;
+  return ratio?.burst && common ? ratio.burst.p50 * common.p50 : burst.p50;
 }
 
 /** Bytes of GPU memory for each splat of the scene as it is, whether a configuration leaves some out or adds coarser ones. */
@@ -58,13 +56,12 @@ export function bytesASplat({ bytes }, { splats }) {
 export function pointsOf({ results, standard, scene }) {
   return results
     .filter((result) => !result.error)
-    .map((result) => ({ ...result, time: timeOf(result, standard), bytes: bytesASplat(result, scene) }))
-    .map(({ configuration, quality, time, bytes }) => ({
+    .map((result) => ({ ...result, ms: timeOf(result, standard), bytes: bytesASplat(result, scene) }))
+    .map(({ configuration, quality, ms, bytes }) => ({
       name: configuration.name,
       tier: configuration.tier,
       peer: configuration.peer,
-      clock: time.kind === 'span' ? 'GPU' : 'wall',
-      ms: time.ms,
+      ms,
       // An image without any error at all has no finite PSNR; no chart needs more.
       psnr: Math.min(120, quality.psnr),
       worst: quality.worst,

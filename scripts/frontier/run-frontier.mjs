@@ -1,4 +1,4 @@
-/** The work behind `npm run frontier`: collects in the browser, or takes what was collected elsewhere, and draws. */
+/** The work behind `npm run lab:frontier`: collects in the browser, or takes what was collected elsewhere, and draws. */
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -8,7 +8,7 @@ import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
 import { bytesASplat, hypervolume, nonDominated, passing, pointsOf, timeOf } from './front.mjs';
 
-const USAGE = `usage: npm run frontier -- [options]
+const USAGE = `usage: npm run lab:frontier -- [options]
 
   --size WxH        image size (default 480x270)
   --splats N        splats; 0, the default, is the scene as it is
@@ -63,7 +63,7 @@ async function collect({ size, splats, path, distance, views, frames, rounds, on
     rounds,
     only,
     warmup: '2',
-    phases: 'gpu,wall',
+    phases: 'burst,wall,gpu',
   };
   const more = Object.fromEntries(new URLSearchParams(query));
   return runPage(
@@ -95,7 +95,7 @@ function describe(report) {
     const bytes = bytesASplat(result, report.scene)?.toFixed(1);
     const { name } = configuration;
     if (error) return `  ${name.padEnd(28)} left out: ${error.split('\n')[0]}`;
-    const time = timeOf(result, report.standard).ms.toFixed(2);
+    const time = timeOf(result, report.standard).toFixed(2);
     const numbers = `${time.padStart(9)} ms ${quality.psnr.toFixed(2).padStart(7)} dB  p99.9 ${quality.p999.toFixed(2)}  worst ${quality.worst.toFixed(1)}  SSIM ${quality.ssim.toFixed(4)}${bytes ? `  ${bytes} B` : ''}`;
     return `${front.has(name) ? '*' : ' '} ${name.padEnd(28)}${numbers}`;
   });

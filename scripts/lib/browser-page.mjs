@@ -3,7 +3,7 @@ import { basename, dirname, resolve, sep } from 'node:path';
 import { chromium } from 'playwright-core';
 import { findChromium, gpuFlags } from './chromium.mjs';
 import { root } from './run.mjs';
-import { serve } from './server.mjs';
+import { serve } from '../../packages/cli/src/lib/server.mjs';
 
 /** Exact timestamps: browsers round them to 100 µs unless told otherwise. */
 const MEASURING_FLAGS = ['--disable-dawn-features=timestamp_quantization'];

@@ -23,6 +23,12 @@ const ELEMENT = {
   sources: ['shaders', 'packages', 'scripts/build.mjs', 'package.json'],
 };
 
+/** The TypeScript of the packages alone: all that most tests of Node need. */
+const PACKAGES = {
+  stamp: '.cache/built-packages',
+  sources: ['shaders', 'packages', 'scripts', 'package.json', 'tsconfig.base.json'],
+};
+
 /** Builds everything unless nothing changed since the last build. */
 export function ensureBuilt() {
   if (!isBuilt({ ...WHOLE, sources: [...WHOLE.sources, ...AT_ROOT] })) build();
@@ -33,20 +39,28 @@ export function ensureElement() {
   if (!isBuilt(ELEMENT)) must(process.execPath, ['scripts/build.mjs', '--element']);
 }
 
+/** Builds the packages, without bundles and site, unless nothing changed since they were built. */
+export function ensurePackages() {
+  if (!isBuilt(PACKAGES)) must(process.execPath, ['scripts/build.mjs', '--packages']);
+}
+
 /** Builds shaders, packages, bundles and the demo. */
 export function build() {
   must(process.execPath, ['scripts/build.mjs']);
 }
 
-/** Notes that a build is done; a whole one holds the element, too. */
-export function noteBuilt(isWhole) {
+const STAMPS = { whole: [PACKAGES, WHOLE, ELEMENT], element: [ELEMENT], packages: [PACKAGES] };
+
+/** Notes that a build is done: `whole` holds the other two. */
+export function noteBuilt(extent) {
   mkdirSync(join(root, '.cache'), { recursive: true });
-  for (const { stamp } of isWhole ? [WHOLE, ELEMENT] : [ELEMENT]) writeFileSync(join(root, stamp), '');
+  for (const { stamp } of STAMPS[extent]) writeFileSync(join(root, stamp), '');
 }
 
 function isBuilt({ stamp, sources }) {
   const path = join(root, stamp);
-  if (!existsSync(path) || !existsSync(join(root, 'packages/element/cdn/gaussian-splat.min.js'))) return false;
+  const made = stamp === PACKAGES.stamp ? 'packages/react/dist/index.js' : 'packages/element/cdn/gaussian-splat.min.js';
+  if (!existsSync(path) || !existsSync(join(root, made))) return false;
   return statSync(path).mtimeMs >= Math.max(...sources.map(newestChange));
 }
 

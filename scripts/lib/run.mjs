@@ -1,5 +1,5 @@
 /** Child processes of the scripts: output passes through, a failure ends the script. */
-import { spawnSync } from 'node:child_process';
+import { spawn, spawnSync } from 'node:child_process';
 import { fileURLToPath } from 'node:url';
 
 export const root = fileURLToPath(new URL('../../', import.meta.url));
@@ -18,4 +18,13 @@ export function must(command, args, options) {
     console.error(`failed with status ${status}: ${command} ${args.join(' ')}`);
     process.exit(status);
   }
+}
+
+/** The same, while something else goes on: resolves when the command has ended. */
+export async function mustSoon(command, args, { cwd = root } = {}) {
+  const child = spawn(command, args, { cwd, stdio: 'inherit' });
+  const status = await new Promise((resolve, reject) => child.on('error', reject).on('close', resolve));
+  if (status === 0) return;
+  console.error(`failed with status ${status}: ${command} ${args.join(' ')}`);
+  process.exit(status ?? 1);
 }

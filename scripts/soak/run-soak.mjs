@@ -1,16 +1,16 @@
-/** The work behind `npm run soak`. */
+/** The work behind `npm run lab:soak`. */
 import { writeFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { chromium } from 'playwright-core';
 import { PNG } from 'pngjs';
 import { findChromium, gpuFlags } from '../lib/chromium.mjs';
 import { root } from '../lib/run.mjs';
-import { serve } from '../lib/server.mjs';
+import { serve } from '../../packages/cli/src/lib/server.mjs';
 import { residentBytes } from './processes.mjs';
 import { heapSlope } from './slope.mjs';
 import { summaryLine } from './summary.mjs';
 
-const USAGE = `usage: npm run soak -- [--minutes N (default 120)] [--seed S] [--out FILE] [--max-mib N (default 6144)]
+const USAGE = `usage: npm run lab:soak -- [--minutes N (default 120)] [--seed S] [--out FILE] [--max-mib N (default 6144)]
 
 Every five minutes a line that begins with "summary:" tells how far it has come, and FILE holds the report so far. Ends with an error once the
 browser's processes hold more memory than --max-mib together (on Linux, which tells).`;

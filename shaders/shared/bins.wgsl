@@ -1,7 +1,7 @@
 // Two scales of screen tiles. A bin is a block of 8 x 4 tiles of 16 x 16 pixels: splats are listed for each bin, in depth
 // order, and a mask of 32 bits says which of the bin's tiles each of them touches.
-#import shared/occlusion
-
+// Side of a tile, in pixels.
+const TILE = 16u;
 const BIN_COLUMNS = 8u;
 const BIN_ROWS = 4u;
 const TILES_PER_BIN = BIN_COLUMNS * BIN_ROWS;
@@ -26,12 +26,12 @@ struct BinView {
   background: vec4f,
   // Pairs of splat and bin that the buffers have room for. Pairs beyond it, the farthest, are left out.
   pair_capacity: u32,
+  // Groups of 256 splats that there is room for.
+  splat_groups: u32,
   // First tile, across and down, of the part of the image that is painted: a frame with much to do is painted part by part.
   first_tile: vec2u,
   // Least alpha that paints: ALPHA_MIN, or more as a lever.
   alpha_min: f32,
   // A pixel is finished before a splat that would take its transmittance to this or below.
   transmittance_min: f32,
-  // A pixel with this transmittance or less hides what lies behind from the next frame.
-  occluded_below: f32,
 }

@@ -1,12 +1,6 @@
 // Workgroup counts beyond 65,535 are dispatched in two dimensions.
 const MAX_GROUPS_X = 65535u;
 
-// Workgroups of a dispatch, across and down, for so many items.
-fn dispatch_grid(items: u32, items_per_group: u32) -> vec2u {
-  let groups = (items + items_per_group - 1u) / items_per_group;
-  return vec2u(min(groups, MAX_GROUPS_X), (groups + MAX_GROUPS_X - 1u) / MAX_GROUPS_X);
-}
-
 fn group_index(workgroup_id: vec3u) -> u32 {
   return workgroup_id.x + workgroup_id.y * MAX_GROUPS_X;
 }

@@ -13,13 +13,11 @@
 @group(0) @binding(3) var<storage, read> ranges: array<vec2u>;
 // Which pairs touch which tile: see tile_word.
 @group(0) @binding(4) var<storage, read> tile_bits: array<u32>;
-// How far one could see in each tile when the splats were culled, and how far one did see.
-@group(0) @binding(5) var<storage, read> occlusion: array<u32>;
-@group(0) @binding(6) var<storage, read_write> last_depths: array<u32>;
-@group(0) @binding(7) var image: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(5) var image: texture_storage_2d<rgba16float, write>;
 
-// True to note how far one sees in each tile.
-override notes_depth: bool = true;
+// True if the splat that would leave a pixel too little light is refused, as trainers do at REFUSED; false if it is blended and the pixel ends behind it: at
+// a higher threshold a refused splat is a hole, since an opaque one leaves 1/1,000 by itself.
+override refuses_last: bool = true;
 // True to write premultiplied colour over the background, false for colour and transmittance.
 override is_final: bool = false;
 // True if the image holds float16, and if it holds bytes. Neither: float32.
@@ -35,6 +33,8 @@ const BLOCK_COLUMNS = TILE / BLOCK_WIDTH;
 const BLOCK_ROWS = TILE / BLOCK_HEIGHT;
 const BLOCK_THREADS = BLOCK_WIDTH * BLOCK_HEIGHT;
 const BLOCKS = BLOCK_COLUMNS * BLOCK_ROWS;
+// Light that trainers leave a pixel at least.
+const REFUSED = 1e-4;
 // Where the splat lies that takes the place of a missing one, and log2 of its opacity.
 const NO_SPLAT = TILE_THREADS;
 const NO_POWER = -1e30;
@@ -53,7 +53,7 @@ struct Brush {
   power: f32,
   // float16
   red_green: u32,
-  // float32; where depths are noted blue and depth, as in ProjectedSplat
+  // float32; where notes are taken blue and depth, as in ProjectedSplat
   blue: u32,
 }
 
@@ -69,9 +69,6 @@ var<workgroup> brushes: array<Brush, TILE_THREADS + 1u>;
 var<workgroup> block_hits: array<atomic<u32>, BLOCKS * BATCH_WORDS>;
 var<workgroup> unfinished: atomic<u32>;
 var<workgroup> is_open: u32;
-// Bits of the depth of the splat that left the last pixel of the tile hardly transparent, and 1 if there are pixels that still are.
-var<workgroup> seen_depth: atomic<u32>;
-var<workgroup> is_transparent: atomic<u32>;
 
 fn pixel_in_tile(lane: u32) -> vec2u {
   let number = lane / BLOCK_THREADS;
@@ -155,17 +152,15 @@ fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
   let v_y = bitcast<f32>(s.paint.x) * BASE_2_AXIS;
   let v_x = -s.shape.w * v_y;
   let power = log2(bitcast<f32>(s.paint.w));
-  let blue = select(bitcast<u32>(splat_color(s).b), s.paint.z, keeps_depth());
+  let blue = select(bitcast<u32>(splat_color(s).b), s.paint.z, NOTES_SPLATS);
   brushes[k] = Brush(u_x, -u_x * center.x, v_x, v_y, -v_x * center.x - v_y * center.y, power, s.paint.y, blue);
 }
 
 struct Pixel {
   color: vec3f,
   transmittance: f32,
-  // Transmittance to which no splat may take the pixel; once one would have, or there is nothing to paint, FINISHED.
+  // Transmittance to which no splat may take the pixel, or behind which none is blended; once that has come, or there is nothing to paint, FINISHED.
   least: f32,
-  // Blue and depth of the last splat that was blended while the pixel was transparent.
-  last_seen: u32,
 }
 
 // No splat leaves more.
@@ -175,13 +170,8 @@ fn is_finished(pixel: Pixel) -> bool {
   return pixel.least >= FINISHED;
 }
 
-// Whether the depths of splats are needed here.
-fn keeps_depth() -> bool {
-  return notes_depth || NOTES_SPLATS;
-}
-
 fn blue_of(brush: Brush) -> f32 {
-  if (keeps_depth()) { return unpack2x16float(brush.blue).x; }
+  if (NOTES_SPLATS) { return unpack2x16float(brush.blue).x; }
   return bitcast<f32>(brush.blue);
 }
 
@@ -194,34 +184,17 @@ fn blend(pixel: ptr<function, Pixel>, k: u32, brush: Brush, place: vec2f, least_
   let reaches = power >= least_power;
   let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), reaches);
   let before = (*pixel).transmittance;
-  // The last one to be blended while the pixel is transparent is the one that ends it.
-  if (notes_depth) {
-    let is_seen = reaches && before > view.occluded_below && !is_finished(*pixel);
-    (*pixel).last_seen = select((*pixel).last_seen, brush.blue, is_seen);
-  }
   let full_weight = before * alpha;
   let remaining = before - full_weight;
   let ends = remaining <= (*pixel).least;
+  var refuses = ends;
+  if (!refuses_last) { refuses = remaining <= REFUSED || is_finished(*pixel); }
   (*pixel).least = select((*pixel).least, FINISHED, ends);
-  let after = select(remaining, before, ends);
-  let weight = select(full_weight, 0.0, ends);
+  let after = select(remaining, before, refuses);
+  let weight = select(full_weight, 0.0, refuses);
   note_blend(k, weight, before, after, brush.blue);
   (*pixel).color += weight * vec3f(unpack2x16float(brush.red_green), blue_of(brush));
   (*pixel).transmittance = after;
-}
-
-// Notes how far one sees through a pixel, and the first thread how far one saw in the tile. One that is transparent, or became opaque
-// only beyond the depth up to which its splats are complete, is opened. Has barriers.
-fn note_depth(tile: u32, lane: u32, is_seen_through: bool, last_seen: u32) {
-  atomicMax(&seen_depth, bitcast<u32>(depth_in(last_seen)));
-  if (is_seen_through) { atomicStore(&is_transparent, 1u); }
-  workgroupBarrier();
-  if (lane != 0u) { return; }
-  let depth = bitcast<f32>(atomicLoad(&seen_depth));
-  // The least and the greatest stand for all beyond them.
-  let is_code = depth > depth_in(0u) && depth < depth_in((DEPTH_LAST + NO_HALVES) << 16u);
-  let is_known = is_code && depth <= bitcast<f32>(occlusion[tile]);
-  last_depths[tile] = select(OPEN, bitcast<u32>(depth), is_known && atomicLoad(&is_transparent) == 0u);
 }
 
 // Storing may cut off what the image has no room for, which costs 5 dB. So what is stored is the nearest of the numbers that float16 can hold, in its
@@ -250,7 +223,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let tile_in_bin = in_bin.y * BIN_COLUMNS + in_bin.x;
   let range = ranges[bin.y * view.bins.x + bin.x];
 
-  var pixel = Pixel(vec3f(0.0), 1.0, select(view.transmittance_min, FINISHED, is_outside), 0u);
+  var pixel = Pixel(vec3f(0.0), 1.0, select(view.transmittance_min, FINISHED, is_outside));
   let least_power = log2(view.alpha_min);
   if (lane == 0u) { brushes[NO_SPLAT].power = NO_POWER; }
   // First word of the window and the one behind it, and how many of the pairs found in it have been painted.
@@ -307,9 +280,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
     if (lane == 0u) { is_open = atomicLoad(&unfinished); }
     if (workgroupUniformLoad(&is_open) == 0u) { break; }
   }
-  let is_seen_through = !is_finished(pixel) && pixel.transmittance > view.occluded_below;
-  let columns = (u32(view.viewport.x) + TILE - 1u) / TILE;
-  note_depth(tile.y * columns + tile.x, lane, is_seen_through, pixel.last_seen);
   if (is_outside) { return; }
   note_pixel(position);
   var result = vec4f(pixel.color, pixel.transmittance);

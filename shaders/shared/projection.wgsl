@@ -5,7 +5,7 @@
 #import shared/falloff
 #import shared/ellipse
 
-// Variance in px² of the classic low-pass filter; `View.dilation` has the one that the scene at hand was trained with.
+// Variance that the low-pass filter of 3D Gaussian Splatting adds, in px² of the frame that is shown.
 const DILATION = 0.3;
 // Least opacity compensation of an antialiased scene.
 const COMPENSATION_MIN = 0.005;
@@ -34,12 +34,12 @@ fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
 
   let xx = dot(row_x, row_x);
   let yy = dot(row_y, row_y);
-  let variance_x = xx + view.dilation;
+  let variance_x = xx + view.filter_variance;
   let inverse_sigma_x = inverseSqrt(variance_x);
   // By Cauchy-Binet the determinant before dilation is |row_x × row_y|², a sum of squares: no cancellation.
   let minors = cross(row_x * inverse_sigma_x, row_y);
   let own_variance_v = dot(minors, minors);
-  let variance_v = own_variance_v + view.dilation * ((xx + view.dilation) + yy) / variance_x;
+  let variance_v = own_variance_v + view.filter_variance * (variance_x + yy) / variance_x;
 
   var opacity = g.opacity;
   if (view.antialiased != 0u) {

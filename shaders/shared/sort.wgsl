@@ -7,8 +7,7 @@ struct SortPass {
 }
 
 const SORT_THREADS = 256u;
-// At most one digit a thread. Variants with digits of 4 bits replace both numbers.
-const DIGIT_BITS = 8u;
+// Values of a digit of 8 bits: one a thread.
 const DIGITS = 256u;
 
 fn digit_of(key: u32, shift: u32) -> u32 {

@@ -7,7 +7,7 @@
 const ITEMS = SORT_BLOCK / SORT_THREADS;
 alias Items = array<u32, ITEMS>;
 
-// What a variant counts in while it ranks; afterwards words on their way from one thread to another.
+// What is counted in while keys are ranked; afterwards words on their way from one thread to another.
 var<workgroup> exchange: array<atomic<u32>, SORT_BLOCK>;
 // For each digit the place in the block of the first key that has it, and what leads from a place in the block to that among all keys.
 var<workgroup> first_in_block: array<u32, DIGITS>;
@@ -15,16 +15,12 @@ var<workgroup> to_all: array<u32, DIGITS>;
 
 // Takes the number of the block's keys with digit `lane`. Ends with a barrier.
 fn find_first_places(block_id: u32, lane: u32, count: u32) {
-  let is_digit = lane < DIGITS;
-  let before = inclusive_sum(select(0u, count, is_digit), lane, DIGITS) - count;
-  var total = 0u;
-  if (is_digit) { total = digit_totals[lane]; }
+  let before = inclusive_sum(count, lane, DIGITS) - count;
+  let total = digit_totals[lane];
   let smaller = inclusive_sum(total, lane, DIGITS) - total;
-  if (is_digit) {
-    first_in_block[lane] = before;
-    // Keys with smaller digits, and keys with this digit in earlier blocks.
-    to_all[lane] = smaller + block_offsets[block_id * DIGITS + lane] - before;
-  }
+  first_in_block[lane] = before;
+  // Keys with smaller digits, and keys with this digit in earlier blocks.
+  to_all[lane] = smaller + block_offsets[block_id * DIGITS + lane] - before;
   workgroupBarrier();
 }
 

@@ -24,14 +24,12 @@ struct View {
   sh_cap: u32,
   sh_encoding: u32,
   antialiased: u32,
-  // Variance in px² that the scene's low-pass filter adds to both screen axes.
-  dilation: f32,
+  // Variance in px² that the low-pass filter adds to both screen axes.
+  filter_variance: f32,
   // Bits of a depth key: 32 for those of the float32 depth itself, fewer for a share of the visible range.
   key_bits: u32,
   // 1 if the survivors are listed in depth order already, so that they need no keys.
   is_ordered: u32,
-  // Tiles across and down of the depths beyond which nothing shows (shared/occlusion); 0 if there are none.
-  occlusion_tiles: vec2u,
   // Most that the camera's matrix stretches a vector: 1 unless it is more than a rotation and a translation.
   stretch: f32,
   // 1 if the page has levels of detail.

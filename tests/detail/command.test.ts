@@ -1,4 +1,4 @@
-/** `npm run detail`: what it writes is what readers expect, and what it cannot do it says at once. */
+/** `gaussian-splat detail`: what it writes is what readers expect, and what it cannot do it says at once. */
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import {
@@ -30,10 +30,14 @@ function sceneOf(splats: number): string {
 }
 
 function detail(...args: string[]): { status: number | null; text: string } {
-  const { status, stdout, stderr } = spawnSync(process.execPath, ['scripts/detail-scene.mjs', ...args], {
-    encoding: 'utf8',
-    timeout: 60_000,
-  });
+  const { status, stdout, stderr } = spawnSync(
+    process.execPath,
+    ['packages/cli/bin/gaussian-splat.mjs', 'detail', ...args],
+    {
+      encoding: 'utf8',
+      timeout: 60_000,
+    },
+  );
   return { status, text: stdout + stderr };
 }
 
@@ -104,7 +108,7 @@ test(
     assert.equal(readFileSync(join(own, 'pages', 'diary.txt'), 'utf8'), 'mine');
 
     const full = join(folder, 'full');
-    const command = `ulimit -f 8; exec "${process.execPath}" scripts/detail-scene.mjs "${sceneOf(3000)}" --out "${full}"`;
+    const command = `ulimit -f 8; exec "${process.execPath}" packages/cli/bin/gaussian-splat.mjs detail "${sceneOf(3000)}" --out "${full}"`;
     const { status, stderr } = spawnSync('bash', ['-c', command], { encoding: 'utf8' });
     assert.equal(status, 1, stderr);
     assert.match(stderr, /^EFBIG: file too large/m);

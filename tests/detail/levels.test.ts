@@ -21,7 +21,7 @@ import { heaps } from '../support/scenes/heaps.js';
 import { lodFolder, openLod, pick, type FetchPart } from '../support/lod-folder.js';
 import { psnr } from '../support/metrics.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
-import { anyDevice } from '../support/node-device.js';
+import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
@@ -241,7 +241,4 @@ test(
   },
 );
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

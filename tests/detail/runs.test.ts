@@ -8,7 +8,7 @@ import { constants, DETAIL_NUMBERS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { shareDrawn } from '../support/detail-twin.js';
 import { psnr } from '../support/metrics.js';
-import { anyDevice } from '../support/node-device.js';
+import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
@@ -98,7 +98,7 @@ test(
       );
     const [levels, finest] = await Promise.all([upload('all'), upload(3)]);
     assert.equal(levels.leafCount, 31_000);
-    const renderer = new Renderer(device, { threads: 'serial', sort: 'serial' });
+    const renderer = new Renderer(device, { threads: 'serial' });
     let last = Infinity;
     for (const distance of [2, 6, 18]) {
       const camera = cameraAt([distance, -distance / 2, 0], [0, -0.5, 0], { width: 96, height: 64, near: 0.01 });
@@ -118,7 +118,4 @@ test(
   },
 );
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -7,6 +7,7 @@ import {
   checkManifest,
   GaussianBuffers,
   MemoryLedger,
+  packGaussians,
   packWithDetail,
   readPacked,
   Renderer,
@@ -18,7 +19,7 @@ import { shareDrawn, type DetailView } from '../support/detail-twin.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
 import { drawUntilCalm } from '../support/draw-until-calm.js';
-import { anyDevice } from '../support/node-device.js';
+import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { readRows } from '../support/read-rows.js';
 import { cameraAt } from '../support/scenes.js';
@@ -56,6 +57,13 @@ test('a scene that has room for all its pages becomes the picture of the scene t
   }
   assert.ok(scene.progress.resident > 1);
   [streaming, loaded, scene, whole].forEach((owner) => owner.destroy());
+});
+
+test('a scene that is read back is what was uploaded', async () => {
+  const packed = packGaussians(cloud);
+  const scene = await GaussianBuffers.upload(await anyDevice(), packed);
+  assert.deepEqual(await readPacked(await anyDevice(), scene), packed);
+  scene.destroy();
 });
 
 test('a streamed scene is not read back as if it were whole', async () => {
@@ -369,7 +377,4 @@ test('pages that come fade in: no picture differs by 40 dB from the one before; 
   assert.ok(faded.decibels >= 40 && popping.decibels < faded.decibels - 10);
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

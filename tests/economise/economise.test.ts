@@ -12,26 +12,20 @@ import {
   type Vector3,
 } from '@gaussian-splat/core';
 import {
-  cpuPainter,
-  cpuScorer,
   dealtViewsAround,
   dealViews,
   decibels,
-  economical,
   economise,
   encodingsFor,
   meanSquare,
-  PaintedEvaluator,
-  parseEconomy,
   reduce,
-  scoreSplats,
-  Studio,
   viewsAround,
   viewsBetween,
 } from '@gaussian-splat/economise';
 import { readPrefix, readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { cpuPainter, cpuScorer, PaintedEvaluator, scoreSplats, Studio } from './twin/index.js';
 
 const SIZE = { width: 120, height: 80 };
 
@@ -297,24 +291,6 @@ test('a format that cannot reach the figure is refused with what it can', async 
   assert.throws(() => encodingsFor('a.obj'), /\.spz, \.glb, \.ply/);
   assert.throws(() => encodingsFor('a.glb', { antialiased: true }), /antialiasing: \.ply or \.spz/);
   for (const name of ['a.ply', 'a.spz']) assert.ok(encodingsFor(name, { antialiased: true }).length > 0);
-});
-
-test('the attribute: shares, and nothing else', async () => {
-  for (const [text, share] of [
-    ['0.6', 0.6],
-    [' 25% ', 0.25],
-    ['1', null],
-    ['0', null],
-    ['-0.5', null],
-    ['half', null],
-    [null, null],
-  ] as const) {
-    assert.equal(parseEconomy(text), share, String(text));
-  }
-  const scores = await scored;
-  assert.equal(economical(scene, scores, null).cloud.count, scene.count);
-  const some = economical(scene, scores, 0.4).cloud.count;
-  assert.ok(Math.abs(some - 0.4 * scene.count) < 2, `${some} splats`);
 });
 
 test('views are dealt out without sharing one', () => {

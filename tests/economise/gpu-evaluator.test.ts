@@ -3,7 +3,6 @@ import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import {
-  cpuScorer,
   dealtViewsAround,
   decibels,
   degreesOf,
@@ -11,11 +10,7 @@ import {
   GpuEvaluator,
   meanSquare,
   MergingEvaluator,
-  PaintedEvaluator,
   reduce,
-  scoreSplats,
-  Studio,
-  type ContributionScorer,
   type Cut,
   type Ranking,
   type Scores,
@@ -23,6 +18,7 @@ import {
 import { readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
+import { type ContributionScorer, cpuScorer, PaintedEvaluator, scoreSplats, Studio } from './twin/index.js';
 
 const SIZE = { width: 64, height: 48 };
 const COUNT = 900;

@@ -4,7 +4,7 @@ import { after, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import { dealtViewsAround, degreesOf, GpuEvaluator, type ReducedCloud } from '@gaussian-splat/economise';
 import { inline, type TaskPool } from '@gaussian-splat/economise/parts';
-import { ThreadPool } from '../../scripts/lib/thread-pool.mjs';
+import { ThreadPool } from '../../packages/cli/src/lib/thread-pool.mjs';
 import { assertSameCloud, assertSameNumbers } from '../formats/support/expect.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { boundsOf, lookAt, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { cpuScorer, decibels, lookAround, meanSquare, visibleSetsDecibels } from '@gaussian-splat/economise';
+import { decibels, lookAround, meanSquare, visibleSetsDecibels } from '@gaussian-splat/economise';
 import {
   capture,
   GaussianBuffers,
@@ -20,6 +20,7 @@ import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { serialDevice } from '../support/node-device.js';
 import { cameraAt } from '../support/scenes.js';
+import { cpuScorer } from './twin/index.js';
 
 const SIZE = 40;
 /** Half a step of 255. */

@@ -3,13 +3,11 @@ import assert from 'node:assert/strict';
 import { before, test } from 'node:test';
 import { boundsOf, type GaussianCloud } from '@gaussian-splat/core';
 import {
-  cpuPainter,
   dealtViewsAround,
   decibels,
   economise,
   meanSquare,
   MergingEvaluator,
-  PaintedEvaluator,
   reduce,
   type Cut,
   type ReducedCloud,
@@ -18,7 +16,8 @@ import { readScene } from '@gaussian-splat/formats';
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { covarianceOf } from '../support/generator-tensors.js';
 import { findMerges } from '../../packages/economise/src/merge/find-merges.js';
-import { ThreadPool } from '../../scripts/lib/thread-pool.mjs';
+import { ThreadPool } from '../../packages/cli/src/lib/thread-pool.mjs';
+import { cpuPainter, PaintedEvaluator } from './twin/index.js';
 
 const SIZE = { width: 120, height: 80 };
 const SPLATS = 600;

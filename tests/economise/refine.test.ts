@@ -2,15 +2,7 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { boundsOf, eyeOf, GaussianSplatError, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import {
-  cpuPainter,
-  dealtViewsAround,
-  decibels,
-  economise,
-  meanSquare,
-  PaintedEvaluator,
-  RefiningEvaluator,
-} from '@gaussian-splat/economise';
+import { dealtViewsAround, decibels, economise, meanSquare, RefiningEvaluator } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { Renderer } from '@gaussian-splat/renderer';
 import { CloudBuffers } from '../../packages/economise/src/gpu/cloud-buffers.js';
@@ -21,6 +13,7 @@ import { SceneFitter, USUAL_DESCENT } from '../../packages/economise/src/refine/
 import { smallCloud } from '../formats/support/small-cloud.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { seededRandom } from '../support/random.js';
+import { cpuPainter, PaintedEvaluator } from './twin/index.js';
 
 const SIZE = 32;
 const DEGREE = 1;

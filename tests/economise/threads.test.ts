@@ -10,8 +10,8 @@ import { inline } from '@gaussian-splat/economise/parts';
 import { readScene } from '@gaussian-splat/formats';
 import { readInParts } from '../../packages/economise/src/parts/read-in-parts.js';
 import { reduceInParts, reduceTo } from '../../packages/economise/src/reduce.js';
-import { startReading } from '../../scripts/lib/scene-in-parts.mjs';
-import { ThreadPool } from '../../scripts/lib/thread-pool.mjs';
+import { startReading } from '../../packages/cli/src/lib/scene-in-parts.mjs';
+import { ThreadPool } from '../../packages/cli/src/lib/thread-pool.mjs';
 import { assertSameCloud } from '../formats/support/expect.js';
 import { smallCloud } from '../formats/support/small-cloud.js';
 

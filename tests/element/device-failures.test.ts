@@ -2,7 +2,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { DeviceLostError, unrecoverable } from '../../packages/element/src/gpu/device-failures.js';
+import { unrecoverable } from '../../packages/element/src/gpu/come-back.js';
+import { DeviceLostError } from '../../packages/element/src/gpu/device-failures.js';
 
 test('a lost device is told of in the words of the browser, and what to do about it', () => {
   const info = { reason: 'unknown', message: 'DXGI_ERROR_DEVICE_HUNG.' } as GPUDeviceLostInfo;

@@ -14,7 +14,7 @@ import {
 } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { CameraController } from '../../packages/element/src/controllers/camera-controller.js';
-import { declaredBounds } from '../../packages/element/src/live/declared-bounds.js';
+import { declaredBounds } from '../../packages/element/src/live/open-live-model.js';
 import { settings } from '../support/camera-settings.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
 import { randomSource } from '../support/gpu.js';

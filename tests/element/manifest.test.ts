@@ -157,6 +157,14 @@ check('its keywords are those that the attributes take, the default first', asyn
   }
 });
 
+check('the table of README.md is what the build makes of it', async () => {
+  const { attributeRows } = (await import(`${folder}scripts/attributes.mjs`)) as {
+    attributeRows: (attributes: unknown) => string;
+  };
+  const readme = readFileSync(`${folder}README.md`, 'utf8');
+  assert.ok(readme.includes(`\n\n${attributeRows(element?.attributes)}\n\n`), 'npm run build writes it anew');
+});
+
 check('custom data and web-types name the same attributes', () => {
   const data = JSON.parse(readFileSync(`${folder}vscode.html-custom-data.json`, 'utf8')) as {
     tags: { name: string; attributes: (Named & { values?: Named[] })[] }[];

@@ -22,10 +22,7 @@ function framed(changes: Partial<RawAttributes> = {}): CameraController {
 
 function rotating(camera: CameraController): AutoRotateController {
   const controller = new AutoRotateController(host, {
-    mayTurn: () => true,
-    delayMs: () => 0,
-    radiansPerSecond: () => 100 * degrees,
-    turnBy: (theta) => camera.turnBy(theta),
+    ...{ camera, mayTurn: true, attributes: { autoRotateDelay: 0, rotationPerSecond: 100 * degrees } },
     requestFrame: () => undefined,
   });
   controller.start();
@@ -56,10 +53,7 @@ test('the prompt leaves the camera where it was, at a limit too', (t) => {
   for (const limits of [{}, { maxCameraOrbit: '2deg auto auto' }, { minCameraOrbit: '-1deg auto auto' }]) {
     const camera = framed(limits);
     const prompt = new PromptController(host, {
-      mayShow: () => true,
-      thresholdMs: () => 10,
-      wiggles: () => true,
-      turnBy: (theta) => camera.turnBy(theta),
+      ...{ camera, mayPrompt: true, promptWiggles: true, attributes: { interactionPromptThreshold: 10 } },
       requestFrame: () => undefined,
     });
     prompt.hostUpdated();

@@ -1,5 +1,5 @@
 /**
- * The pace of moving pictures against many simulated GPUs, whose rungs win as little as on real ones, nothing at all or less than nothing: it comes to the truest rung
+ * The pace of moving pictures against many simulated GPUs, whose levels win as little as on real ones, nothing at all or less than nothing: it comes to the truest level
  * that is in time, or to one that is as fast as any, and turns at most once in five seconds.
  */
 import assert from 'node:assert/strict';
@@ -11,7 +11,7 @@ import { randomSource } from '../support/gpu.js';
 type Random = (from: number, to: number) => number;
 type Curve = readonly number[];
 
-/** What rungs take as multiples of the target, until a time in ms and after it. */
+/** What levels take as multiples of the target, until a time in ms and after it. */
 interface Load {
   readonly before: Curve;
   readonly after: Curve;
@@ -29,7 +29,7 @@ const RUN_MS = 30_000;
 const RUNS = 20;
 
 const times = (curve: Curve, load: number): Curve => curve.map((share) => share * load);
-/** What no rung makes faster. */
+/** What no level makes faster. */
 const floor = (least: number, load: number): Curve => COSTS.map((cost) => Math.max(least, load * cost));
 const withFixed = (share: number, load: number): Curve => COSTS.map((cost) => load * (share + (1 - share) * cost));
 /** Other work makes whole pictures longer. */
@@ -42,12 +42,9 @@ const stepped =
   (random: Random): Load =>
     step(times(curve, random(least, most)), times(curve, random(least, most)));
 
-/** Kinds of GPUs and loads; how many runs of all may turn twice in five seconds, once each, and how much longer than on the fastest rung frames may take where none is in time. */
-const kinds: Record<
-  string,
-  { readonly make: (random: Random) => Load; readonly restless?: number; readonly excess?: number }
-> = {
-  'the lowest rungs take as long as one another, all too long': {
+/** Kinds of GPUs and loads, and how much longer than on the fastest level frames may take where none is in time. */
+const kinds: Record<string, { readonly make: (random: Random) => Load; readonly excess?: number }> = {
+  'the lowest levels take as long as one another, all too long': {
     make: (random) => {
       const least = random(1.02, 2.5);
       return always(floor(least, least * random(1, 3)));
@@ -71,7 +68,7 @@ const kinds: Record<
       return always(floor(least, least * random(1, 4)));
     },
   },
-  'no rung wins anything': {
+  'no level wins anything': {
     make: (random) =>
       always(
         times(
@@ -98,23 +95,22 @@ const kinds: Record<
       const [least, load] = [random(0.8, 2.5), random(1, 2)];
       return always(COSTS.map((cost, rung) => least * Math.max(1, load * cost) * growth ** Math.max(0, rung - from)));
     },
-    excess: 1.31,
+    excess: 1.32,
   },
-  'a step of an H200, close up': { make: stepped(STEEP, 0.3, 3), restless: 1 },
+  'a step of an H200, close up': { make: stepped(STEEP, 0.3, 3) },
   'a step of an H200, from afar': { make: stepped(FLAT, 0.3, 3) },
-  'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3), restless: 1 },
+  'a picture too small for the GPU': { make: stepped(SMALL, 0.5, 3) },
   'a wide GPU': { make: stepped(WIDE, 0.3, 1.6) },
-  'a wide GPU, too slow': { make: stepped(WIDE, 1.7, 4) },
+  // The lowest takes so much longer than the fastest.
+  'a wide GPU, too slow': { make: stepped(WIDE, 1.7, 4), excess: 1.09 },
   'a wide GPU, other work beside whole pictures': {
     make: (random) => step(disturbed(times(WIDE, random(0.3, 1.6))), disturbed(times(WIDE, random(0.3, 1.6)))),
-    restless: 1,
   },
-  'a part that no rung makes cheaper': {
+  'a part that no level makes cheaper': {
     make: (random) => {
       const share = random(0, 0.7);
       return step(withFixed(share, random(0.3, 3)), withFixed(share, random(0.3, 3)));
     },
-    restless: 1,
   },
 };
 
@@ -143,23 +139,23 @@ function draw(kind: (random: Random) => Load, seed: number): { frames: readonly 
   return { load, frames: run({ ...gpu, load: () => 1, shares }, RUN_MS).frames };
 }
 
-Object.entries(kinds).forEach(([name, { make, restless = 0, excess = 1.081 }], k) => {
+Object.entries(kinds).forEach(([name, { make, excess = 1.081 }], k) => {
   test(name, () => {
-    let turnedTwice = 0;
     const over: number[] = [];
     for (let i = 0; i < RUNS; i++) {
       const { frames, load } = draw(make, 1000 * (k + 1) + i);
-      const windows = restlessWindows(frames);
-      assert.ok(windows <= 1, `run ${i}: ${windows} times two changes of direction in five seconds`);
-      turnedTwice += windows;
+      // The step itself may turn the level.
+      const [early, late] = [frames.filter(({ at }) => at < load.at), frames.filter(({ at }) => at >= load.at)];
+      const windows = restlessWindows(early) + restlessWindows(late);
+      assert.equal(windows, 0, `run ${i}: ${windows} times two changes of direction in five seconds`);
       for (const [from, to, curve] of [
         [0, load.at, load.before],
         [load.at, RUN_MS, load.after],
       ] as const) {
         const best = Math.min(...curve);
         if (best <= 0.9) {
-          const late = p95(frames, from + 1_000, Math.min(to, from + 6_000));
-          assert.ok(late <= 1.12, `run ${i}: p95 is ${late} of the target`);
+          const slow = p95(frames, from + 1_000, Math.min(to, from + 6_000));
+          assert.ok(slow <= 1.12, `run ${i}: p95 is ${slow} of the target`);
         }
         const last = frames.filter(({ at }) => at >= to - 3_000 && at < to);
         if (best > 1.05 && to === RUN_MS)
@@ -171,11 +167,8 @@ Object.entries(kinds).forEach(([name, { make, restless = 0, excess = 1.081 }], k
           );
       }
     }
-    assert.ok(turnedTwice <= restless, `${turnedTwice} of ${RUNS} runs turn twice in five seconds`);
-    assert.ok(Math.max(1, ...over) <= excess, `${Math.max(...over)} of what the fastest rung takes`);
-    console.log(
-      `${name}: ${turnedTwice} of ${RUNS} runs turn twice in five seconds; at worst ${Math.max(1, ...over).toFixed(2)} of the fastest rung`,
-    );
+    assert.ok(Math.max(1, ...over) <= excess, `${Math.max(...over)} of what the fastest level takes`);
+    console.log(`${name}: at worst ${Math.max(1, ...over).toFixed(2)} of the fastest level`);
   });
 });
 
@@ -195,7 +188,7 @@ test('a load that comes and goes: the pace learns to keep to the highest', () =>
   assert.ok(turnedTwice <= 2 * RUNS, `${turnedTwice} in ${RUNS} minutes`);
 });
 
-test('rungs that take something else every tenth of a second: two changes of direction in five seconds at most', () => {
+test('levels that take something else every tenth of a second: two changes of direction in five seconds at most', () => {
   let most = 0;
   for (let i = 0; i < RUNS; i++) {
     const random = within(70_000 + i);

@@ -5,7 +5,7 @@ import fc from 'fast-check';
 import { DisplayInterval } from '../../packages/element/src/pace/display-interval.js';
 import { LADDER } from '../../packages/element/src/pace/ladder.js';
 import { INITIAL_PACE, keepPace } from '../../packages/element/src/pace/pace.js';
-import { COSTS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
+import { COSTS, LEVELS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
 
 const LOWEST = COSTS.length - 1;
 /** Where the dead band ends, and the noise of what is in it. */
@@ -75,7 +75,7 @@ test('a picture becomes so small that fewer pixels take longer than all: the tru
       26_000,
     );
     // The sixth takes 1.05 of what the lowest take, which is no longer by the law's tolerance.
-    assert.ok(frames.find(({ at }) => at > 8_000)!.level >= 5, 'the large one takes the lowest rungs');
+    assert.ok(frames.find(({ at }) => at > 8_000)!.level >= 5, 'the large one takes the lowest levels');
     const levels = frames.filter(({ at }) => at > 22_000).map(({ level }) => level);
     assert.ok(
       levels.every((level) => level === 0),
@@ -84,7 +84,7 @@ test('a picture becomes so small that fewer pixels take longer than all: the tru
   }
 });
 
-test('a rung down that makes frames longer is taken back at once, and the pace does not go there again for long', () => {
+test('a level down that makes frames longer is taken back at once, and the pace does not go there again for long', () => {
   for (const latency of [0, 1, 2, 3]) {
     const gpu = { hertz: 60, fixed: 0, shares: () => SMALL, noise: 0.06, spikes: 0, latency, seed: 12 };
     const { frames } = run({ ...gpu, load: (now) => (now < 2_000 ? 0.5 : 1.5) }, 8_000);
@@ -98,7 +98,7 @@ test('a rung down that makes frames longer is taken back at once, and the pace d
   }
 });
 
-test('where the first rungs win next to nothing and those far below much, these are found within a second', () => {
+test('where the first levels win next to nothing and those far below much, these are found within a second', () => {
   for (const won of [0, 0.02, 0.04]) {
     const first = [1, 1 - won, 1 - won, 1 - won];
     const shares = [...first, 0.87, 0.73, 0.63, 0.55, 0.52, 0.52];
@@ -113,7 +113,7 @@ test('where the first rungs win next to nothing and those far below much, these 
   }
 });
 
-test('where no rung wins anything the picture stays whole, or comes back to it at once and stays', () => {
+test('where no level wins anything the picture stays whole, or comes back to it at once and stays', () => {
   for (const [load, latency] of [
     [1.3, 0],
     [2.5, 2],
@@ -130,7 +130,7 @@ test('where no rung wins anything the picture stays whole, or comes back to it a
   }
 });
 
-test('rungs that are each a little dearer than the one below are not climbed one after the other where the lowest is too slow', () => {
+test('levels that are each a little dearer than the one below are not climbed one after the other where the lowest is too slow', () => {
   const shares = COSTS.map((_, level) => 1.04 ** (LOWEST - level));
   const gpu = { hertz: 60, fixed: 0, shares: () => shares, load: () => 1.2, noise: 0, spikes: 0, latency: 2, seed: 1 };
   const levels = run(gpu, 30_000).frames.map(({ at, level }) => (at < 1_000 ? LOWEST : level));
@@ -162,7 +162,7 @@ test('a fast GPU draws the true image, whatever the display, single slow frames 
   }
 });
 
-test('a GPU that is too slow for all comes to the lowest rung within few frames and stays', () => {
+test('a GPU that is too slow for all comes to the lowest level within few frames and stays', () => {
   const { frames } = run({ hertz: 60, load: () => 60, fixed: 0, noise: 0.1, spikes: 0, latency: 2, seed: 3 }, 60_000);
   const levels = frames.slice(6).map(({ level }) => level);
   assert.ok(levels.filter((level) => level === LOWEST).length > 0.95 * levels.length, levels.join(' '));
@@ -172,7 +172,7 @@ test('a GPU that is too slow for all comes to the lowest rung within few frames 
   );
 });
 
-test('a GPU that is far too slow, with much that no rung makes cheaper, turns at most once in five seconds', () => {
+test('a GPU that is far too slow, with much that no level makes cheaper, turns at most once in five seconds', () => {
   for (const load of [20, 40]) {
     for (const seed of [1, 2, 3]) {
       const gpu = { hertz: 60, load: () => load, fixed: 0.3, noise: 0.1, spikes: 0, latency: 2, seed };
@@ -185,8 +185,8 @@ test('a GPU that is far too slow, with much that no rung makes cheaper, turns at
   }
 });
 
-test('where the lowest rungs are no faster and still too slow, the level turns at most once in five seconds', () => {
-  // Two steps of an H200 (docs/benchmark.md), and pictures with a part that no rung makes cheaper.
+test('where the lowest levels are no faster and still too slow, the level turns at most once in five seconds', () => {
+  // Two steps of an H200 (docs/benchmark.md), and pictures with a part that no level makes cheaper.
   const measured = [
     [1, 0.93, 0.92, 0.88, 0.73, 0.58, 0.58, 0.58, 0.58, 0.59],
     [1, 0.99, 0.99, 0.97, 0.96, 0.95, 0.95, 0.96, 0.98, 1.04],
@@ -217,25 +217,25 @@ test('where the lowest rungs are no faster and still too slow, the level turns a
   assert.equal(restless, 0);
 });
 
-test('when the load is gone the true image comes back, one rung after the other', () => {
+test('when the load is gone the whole image comes back within a second, without a detour', () => {
   const load = (now: number): number => (now < 5_000 ? 4 : 0.2);
   const { frames } = run({ hertz: 60, load, fixed: 0.2, noise: 0.1, spikes: 0, latency: 2, seed: 4 }, 15_000);
   const after = frames.filter(({ at }) => at > 5_000);
   for (let k = 1; k < after.length; k++) {
-    assert.ok([0, 1].includes(after[k - 1].level - after[k].level), 'one rung at a time');
+    assert.ok(after[k].level <= after[k - 1].level, 'no way down');
   }
-  assert.ok(after.filter(({ at }) => at > 12_000).every(({ level }) => level === 0));
+  assert.ok(after.filter(({ at }) => at > 6_000).every(({ level }) => level === 0));
 });
 
-test('a rung that costs more than the ladder says is tried again once in two minutes', () => {
-  // The first rung down makes the frame more than twice as fast, though the ladder promises less.
+test('a level that costs more than the ladder says is tried again once in two minutes', () => {
+  // The first level down makes the frame more than twice as fast, though the ladder promises less.
   const targetMs = 13.3;
   let pace = INITIAL_PACE;
   const changes: number[] = [];
   for (let now = 0; now < 600_000; now += 16.7) {
     const { level } = pace;
     const milliseconds = targetMs * (level === 0 ? 1.3 : 0.5);
-    pace = keepPace(pace, { now, level, milliseconds }, { targetMs, costs: COSTS });
+    pace = keepPace(pace, { now, level, milliseconds }, { targetMs, levels: LEVELS });
     if (pace.level === 0 && level > 0) changes.push(now);
   }
   assert.ok(changes.length >= 3 && changes.length <= 5, changes.join(' '));
@@ -248,40 +248,41 @@ test('a rung that costs more than the ladder says is tried again once in two min
 
 test('frames of another level say nothing', () => {
   const pace = { ...INITIAL_PACE, level: 3 };
-  assert.equal(keepPace(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, costs: COSTS }), pace);
+  assert.equal(keepPace(pace, { now: 0, level: 0, milliseconds: 500 }, { targetMs: 13, levels: LEVELS }), pace);
 });
 
 test('what the true image took at rest is what the pace comes back to where less takes longer', () => {
   const targetMs = 13.3;
   let [pace, now] = [INITIAL_PACE, 0];
   const draw = (level: number, milliseconds: number): void => {
-    pace = keepPace(pace, { now: (now += 16.7), level, milliseconds }, { targetMs, costs: COSTS });
+    pace = keepPace(pace, { now: (now += 16.7), level, milliseconds }, { targetMs, levels: LEVELS });
   };
   const move = (seconds: number, shares: readonly number[], load: number): void => {
     for (const end = now + 1000 * seconds; now < end;) draw(pace.level, targetMs * load * shares[pace.level]);
   };
   move(8, COSTS, 2);
-  assert.ok(pace.level >= 4, `${pace.level}`);
-  // The element becomes small: all rungs are too slow, and the whole picture is the fastest.
+  assert.ok(pace.level >= 3, `${pace.level}`);
+  // The element becomes small: all levels are too slow, and the whole picture is the fastest.
   move(4, SMALL, 5);
   const { level } = pace;
-  assert.ok(level >= 4, `${level}`);
+  assert.ok(level > 4, `${level}`);
   draw(0, targetMs * 5);
   move(2, SMALL, 5);
-  assert.equal(pace.level, 0);
+  // Within 5 % of the fastest.
+  assert.ok(pace.level <= 1, `${pace.level}`);
   // At rest it took less than in motion: that was measured, and counts.
   move(8, COSTS, 2);
   const settled = pace.level;
-  assert.ok(settled >= 4, `${settled}`);
+  assert.ok(settled >= 3, `${settled}`);
   draw(0, targetMs * 0.5);
   move(6, COSTS, 2);
   assert.equal(pace.level, settled);
 });
 
-test('every rung costs less than the one above, and the last is the smallest picture', () => {
-  assert.equal(LADDER[0].levers, undefined);
-  COSTS.slice(1).forEach((cost, i) => assert.ok(cost < COSTS[i]));
+test("the element's levels: the whole image, then others by their names, whose scale is the one that is drawn", () => {
+  assert.deepEqual([LADDER[0].levers, LADDER[0].scale], [undefined, 1]);
   assert.equal(new Set(LADDER.map(({ name }) => name)).size, LADDER.length);
+  for (const { levers, scale } of LADDER.slice(1)) assert.equal(levers?.resolutionScale ?? 1, scale);
 });
 
 test('the display: refresh rates are found among late frames, and slow frames are not taken for a slow display', () => {

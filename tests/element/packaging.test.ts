@@ -49,7 +49,7 @@ test(
 
 /** What only some pages need, by words that nothing else says. */
 const ELSEWHERE: Readonly<Record<string, string>> = {
-  'manifests of streamed scenes': 'JSON that npm run detail wrote',
+  'manifests of streamed scenes': 'JSON that gaussian-splat detail wrote',
   'pages of streamed scenes': 'gs.wishes.staging',
   'the stage that notes their wishes': 'note_wishes',
   sequences: 'a path with {0001} in it',

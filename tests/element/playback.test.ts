@@ -8,10 +8,10 @@ function clock(loops = false): { playback: PlaybackController; events: PlaybackE
   const events: PlaybackEvent[] = [];
   let frames = 0;
   const playback = new PlaybackController({
-    loops: () => loops,
-    startTime: () => 0,
+    loops,
+    startTime: 0,
     requestFrame: () => frames++,
-    dispatch: (type) => events.push(type),
+    playbackEvent: (type) => events.push(type),
   });
   playback.setDuration(4);
   return { playback, events, frames: () => frames };

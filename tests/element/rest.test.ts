@@ -9,9 +9,9 @@ import {
 } from '../../packages/element/src/controllers/pace-controller.js';
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
 import type { GpuScene } from '../../packages/element/src/gpu/gpu-scene.js';
-import { LADDER } from '../../packages/element/src/pace/ladder.js';
 import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
 import { waitForRest } from '../../packages/element/src/pace/rest.js';
+import { COSTS, LEVELS } from '../support/pace-gpu.js';
 
 const INTERVAL = 1000 / 60;
 const PIXELS = 1e6;
@@ -25,8 +25,13 @@ const paceOf = (options: Partial<PaceOptions> = {}): PaceController =>
     frameBudget: () => Infinity,
     requestFrame: () => undefined,
     onPace: () => undefined,
+    levels: LEVELS,
     ...options,
   });
+
+/** What a frame took that began at a time, known exactly. */
+const took = (pace: PaceController, plan: Pick<FramePlan, 'level' | 'size'>, milliseconds: number, now: number): void =>
+  pace.sample(plan, { doneAt: now + milliseconds, atLeast: milliseconds, atMost: milliseconds });
 
 for (const wholeMs of [20, 100, 200, 214]) {
   test(`a true image of ${wholeMs} ms is on show 300 ms after rest, and not begun before 50 ms`, (context) => {
@@ -35,11 +40,10 @@ for (const wholeMs of [20, 100, 200, 214]) {
     const pace = paceOf({ requestFrame: () => (asked = true) });
     // A motion that is drawn whole at first, and soon no longer.
     let now = 1000;
-    context.mock.method(performance, 'now', () => now);
-    for (let frame = 0; frame < 20; frame++, now += INTERVAL) {
+    for (let frame = 0; frame < 60; frame++, now += INTERVAL) {
       const plan = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
       const { level } = plan;
-      pace.sample(plan, level === 0 ? wholeMs : 10);
+      took(pace, plan, level === 0 ? wholeMs : 10, now);
     }
     const plan = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: false });
     const { level } = plan;
@@ -80,7 +84,7 @@ test('what a frame may take is what the page says, else a share of the display t
       [5, true],
     ] as const) {
       pace.reset();
-      for (let frame = 0; frame < 4; frame++) pace.sample({ level: 0, size: 0 }, share * budget);
+      for (let now = 1000; now < 2000; now += INTERVAL) took(pace, { level: 0, size: 0 }, share * budget, now);
       assert.equal(pace.report.moving !== 'whole', falls, `${share} of ${budget} ms`);
     }
   }
@@ -117,7 +121,7 @@ test('an element that draws now and then leaves others all but their whole time;
       const plan = pace.plan({ now, pixels: PIXELS, hasChanged: true, goesOn: true });
       const { level } = plan;
       levels.push(level);
-      pace.sample(plan, 0.7 * 0.8 * INTERVAL * LADDER[level].cost);
+      took(pace, plan, 0.7 * 0.8 * INTERVAL * COSTS[level], now);
     },
   };
   const other = { drawFrame: ignored };
@@ -157,11 +161,11 @@ test('pictures that are small already are not made smaller, whatever they take',
     for (let now = 1000; now < 3000; now += INTERVAL) {
       const plan = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
       const { level } = plan;
-      pace.sample(plan, 1000 * LADDER[level].cost);
+      took(pace, plan, 1000 * COSTS[level], now);
     }
     return pace.plan({ now: 3000, pixels, hasChanged: true, goesOn: true }).level;
   };
-  const scaleOf = (level: number): number => LADDER[level].levers?.resolutionScale ?? 1;
+  const scaleOf = (level: number): number => LEVELS[level].levers?.resolutionScale ?? 1;
   for (const side of [32, 128, 256, 1024]) {
     pace.reset();
     const scale = scaleOf(levelOf(side ** 2));
@@ -174,9 +178,8 @@ test('pictures that are small already are not made smaller, whatever they take',
   );
 });
 
-test('an element of another size is measured anew: that fewer pixels won nothing of a small picture says nothing of a large one', (context) => {
+test('an element of another size is measured anew: that fewer pixels won nothing of a small picture says nothing of a large one', () => {
   let now = 1000;
-  context.mock.method(performance, 'now', () => now);
   const pace = paceOf();
   const move = (seconds: number, pixels: number, takes: (level: number) => number): number => {
     let last = 0;
@@ -184,28 +187,24 @@ test('an element of another size is measured anew: that fewer pixels won nothing
       const plan = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
       const { level } = plan;
       last = takes(level);
-      pace.sample(plan, last);
+      took(pace, plan, last, now);
     }
     return last;
   };
   move(20, 2e5, () => 18);
   assert.equal(pace.plan({ now, pixels: 2e5, hasChanged: true, goesOn: true }).level, 0, 'the small one is whole');
-  assert.ok(
-    move(1, 4e6, (level) => 20 * LADDER[level].cost) <= pace.targetMs,
-    'the large one is in time within a second',
-  );
-  // On the lowest rung that a small picture may have, where all of it is faster.
-  move(5, 4e6, (level) => 20 * LADDER[level].cost);
-  move(2, 4e6, (level) => 60 * LADDER[level].cost);
+  assert.ok(move(1, 4e6, (level) => 20 * COSTS[level]) <= pace.targetMs, 'the large one is in time within a second');
+  // On the lowest level that a small picture may have, where all of it is faster.
+  move(5, 4e6, (level) => 20 * COSTS[level]);
+  move(2, 4e6, (level) => 60 * COSTS[level]);
   const smallMs = [18, 18, 19, 24, 32];
   assert.ok(move(0.5, 17_000, (level) => smallMs[level]) < 32, 'the small one does not wait to be more of itself');
   assert.ok(move(2, 17_000, (level) => smallMs[level]) < 20, 'the small one comes back to what is faster');
   pace.stop();
 });
 
-test('an element that becomes smaller in motion shows as many pixels as before at once, not the few that the large one could afford', (context) => {
+test('an element that becomes smaller in motion shows as many pixels as before at once, not the few that the large one could afford', () => {
   let now = 1000;
-  context.mock.method(performance, 'now', () => now);
   const pace = paceOf();
   const move = (seconds: number, pixels: number, share: (level: number) => number): number[] => {
     const levels: number[] = [];
@@ -213,18 +212,18 @@ test('an element that becomes smaller in motion shows as many pixels as before a
       const plan = pace.plan({ now, pixels, hasChanged: true, goesOn: true });
       const { level } = plan;
       levels.push(level);
-      pace.sample(plan, pace.targetMs * share(level));
+      took(pace, plan, pace.targetMs * share(level), now);
     }
     return levels;
   };
   const [large, small] = [3072 * 1728, 1344 * 756];
-  const before = move(3, large, (level) => 8 * LADDER[level].cost).at(-1)!;
-  assert.ok(LADDER[before].cost <= 1 / 8, LADDER[before].name);
-  // What an H200 took: a picture so small leaves it idle when it is made smaller still, and no rung spares enough for a climb.
+  const before = move(3, large, (level) => 8 * COSTS[level]).at(-1)!;
+  assert.ok(COSTS[before] <= 1 / 8, LEVELS[before].name);
+  // What an H200 took: a picture so small leaves it idle when it is made smaller still, and no level spares enough for a climb.
   const taken = [0.76, 0.72, 0.7, 0.66, 0.62, 0.66, 0.8, 0.9, 0.96, 1.04];
-  const [first, ...after] = move(4, small, (level) => taken[level]);
-  assert.ok(LADDER[first].cost * small <= LADDER[before].cost * large, `${LADDER[first].name}: more than before`);
-  assert.ok(LADDER[first - 1].cost * small > LADDER[before].cost * large, `${LADDER[first].name}: fewer than before`);
+  const [first, ...after] = move(8, small, (level) => taken[level]);
+  assert.ok(COSTS[first] * small <= COSTS[before] * large, `${LEVELS[first].name}: more than before`);
+  assert.ok(COSTS[first - 1] * small > COSTS[before] * large, `${LEVELS[first].name}: fewer than before`);
   assert.equal(after.at(-1), 0, after.join(' '));
   pace.stop();
 });
@@ -237,7 +236,7 @@ test('a scene that changes in every other picture of the display is in motion in
   const frame = (hasChanged: boolean): number => {
     const plan = pace.plan({ now, pixels: PIXELS, hasChanged, goesOn: false });
     const { level } = plan;
-    pace.sample(plan, 100 * LADDER[level].cost);
+    took(pace, plan, 100 * COSTS[level], now);
     return level;
   };
   const levels: number[] = [];
@@ -268,7 +267,7 @@ test('a change that comes while the true image of a pause is drawn belongs to th
   let now = 1000;
   for (let k = 0; k < 30; k++, now += 50) {
     const frame = plan(now, true);
-    pace.sample(frame, frame.level === 0 ? 300 : 60);
+    took(pace, frame, frame.level === 0 ? 300 : 60, now);
   }
   context.mock.timers.tick(200);
   assert.equal(plan(now, false).level, 0, 'the true image is begun');
@@ -284,14 +283,14 @@ test('what was measured before the page chose a quality is not told, and not bel
   for (let now = 1000; now < 2000; now += INTERVAL) {
     const plan = pace.plan({ now, ...frame });
     const { level } = plan;
-    pace.sample(plan, 80 * LADDER[level].cost);
+    took(pace, plan, 80 * COSTS[level], now);
   }
   assert.ok(pace.report.moving !== 'whole' && pace.report.lastMs !== null);
   const late = pace.plan({ now: 1990, ...frame });
   isOn = false;
   assert.equal(pace.plan({ now: 2000, ...frame }).level, 0);
   // A frame of before is known only now.
-  pace.sample(late, 80);
+  took(pace, late, 80, 1990);
   const { drawn, moving, reason, frameMs, lastMs } = pace.report;
   assert.deepEqual([drawn, moving, reason, frameMs, lastMs], ['whole', 'whole', 'start', null, null]);
   pace.stop();
@@ -302,9 +301,9 @@ test('what a frame took that was drawn in another size says nothing', () => {
   const plan = (pixels: number): FramePlan => pace.plan({ now: 1000, pixels, hasChanged: true, goesOn: true });
   const before = plan(PIXELS);
   const after = plan(4 * PIXELS);
-  for (let frame = 0; frame < 4; frame++) pace.sample(before, 1000);
+  for (let now = 1000; now < 2000; now += INTERVAL) took(pace, before, 1000, now);
   assert.deepEqual([pace.report.moving, pace.report.lastMs], ['whole', null]);
-  for (let frame = 0; frame < 4; frame++) pace.sample(after, 1000);
+  for (let now = 1000; now < 2000; now += INTERVAL) took(pace, after, 1000, now);
   assert.notEqual(pace.report.moving, 'whole');
   pace.stop();
 });
@@ -315,10 +314,15 @@ test('levels of detail are built once pictures have moved slowly for 1.5 s, rest
   context.mock.method(performance, 'now', () => now);
   let builds = 0;
   const detail = new DetailController({
-    detail: () => 'auto',
-    // Whoever builds asks for it; the scene here cannot be read, and that is said.
-    loader: () => (builds++, {} as SceneLoader),
-    ...{ memoryBudget: () => undefined, onChange: () => undefined, warn: () => undefined },
+    attributes: { detail: 'auto' },
+    services: {
+      // Whoever builds asks for it; the scene here cannot be read, and that is said.
+      get sceneLoader() {
+        builds++;
+        return {} as SceneLoader;
+      },
+    },
+    ...{ memoryBudget: undefined, splatsChanged: () => undefined, warn: () => undefined },
   });
   detail.update({ gaussians: { count: 60_000, pages: [] }, detail: {} } as unknown as GpuScene);
   const pass = (milliseconds: number): void => {

@@ -89,4 +89,62 @@ test('a target with levels and layers: the first is drawn into', async () => {
   [target, staging, renderer, gaussians].forEach((thing) => thing.destroy());
 });
 
+/** Textures that cannot be drawn into, or not as they are. */
+const TARGETS: readonly (readonly [name: string, descriptor: Partial<GPUTextureDescriptor>])[] = [
+  ['several samples a pixel', { sampleCount: 4 }],
+  ['whole numbers', { format: 'rgba8uint' }],
+  ['depths', { format: 'depth24plus' }],
+  ['three dimensions', { dimension: '3d', size: [32, 24, 4], usage: 0x4 }],
+  ['another size', { size: [64, 48] }],
+  ['no usage that draws', { usage: 0x4 }],
+];
+
+test('targets that cannot be drawn into are refused by name, and the device hears nothing of them', async () => {
+  const device = await anyDevice();
+  const cloud = cloudOf([{ position: [0, 0, 0], scale: 0.3, opacity: 0.9, color: [1, 0, 0] }]);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const renderer = new Renderer(device);
+  device.pushErrorScope('validation');
+  for (const [name, descriptor] of TARGETS) {
+    const target = device.createTexture({ size: [32, 24], format: 'rgba8unorm', usage: 0x10, ...descriptor });
+    assert.throws(() => renderer.render({ gaussians, camera, target }), { code: 'argument/value' }, name);
+    target.destroy();
+  }
+  const view = device.createTexture({ size: [32, 24], format: 'rgba8uint', usage: 0x10 }).createView();
+  const asked = { gaussians, camera, target: view, targetFormat: 'rgba8uint' } as const;
+  assert.throws(() => renderer.render(asked), { code: 'argument/value' });
+  assert.equal(await device.popErrorScope(), null);
+  [renderer, gaussians].forEach((thing) => thing.destroy());
+});
+
+test('targets that encode what is written hold the same numbers as others', async () => {
+  const device = await anyDevice();
+  const cloud = cloudOf([
+    { position: [-0.3, 0, 0], scale: 0.3, opacity: 0.9, color: [0.9, 0.4, 0.05] },
+    { position: [0.4, 0.1, 0.2], scale: 0.4, opacity: 0.5, color: [0.02, 0.6, 1] },
+  ]);
+  const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const bytes = async (rasterizer: 'quads' | 'tiles', format: GPUTextureFormat): Promise<Uint8Array> => {
+    const renderer = new Renderer(device, { rasterizer });
+    const target = device.createTexture({ size: [32, 24], format, usage: 0x11 });
+    renderer.render({ gaussians, camera, target, background: [0.1, 0.2, 0.3, 1] });
+    const staging = device.createBuffer({ size: 256 * 24, usage: 0x9 });
+    const encoder = device.createCommandEncoder();
+    encoder.copyTextureToBuffer({ texture: target }, { buffer: staging, bytesPerRow: 256 }, [32, 24]);
+    device.queue.submit([encoder.finish()]);
+    await staging.mapAsync(0x1);
+    const found = new Uint8Array(staging.getMappedRange().slice(0));
+    [target, staging, renderer].forEach((thing) => thing.destroy());
+    return found;
+  };
+  for (const rasterizer of ['quads', 'tiles'] as const) {
+    const plain = await bytes(rasterizer, 'rgba8unorm');
+    const encoding = await bytes(rasterizer, 'rgba8unorm-srgb');
+    assert.ok(plain.some((byte) => byte > 200));
+    const worst = plain.reduce((most, byte, i) => Math.max(most, Math.abs(byte - encoding[i])), 0);
+    assert.ok(worst <= 1, `${rasterizer}: ${worst} steps of 255`);
+  }
+  gaussians.destroy();
+});
+
 after(endNodeDevice);

@@ -13,7 +13,7 @@ import {
   Renderer,
 } from '@gaussian-splat/renderer';
 import { psnr } from '../support/metrics.js';
-import { nodeDevice } from '../support/node-device.js';
+import { endNodeDevice, nodeDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
@@ -170,7 +170,4 @@ test('levels fade: at 1 % nearer a frame no picture differs by 55 dB from the on
   assert.ok(popping < faded - 3, `${popping} dB without a fade`);
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

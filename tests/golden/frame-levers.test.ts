@@ -10,18 +10,18 @@ import {
   type RasterizerName,
 } from '@gaussian-splat/renderer';
 import { spanOf } from '../../packages/renderer/src/gpu/span-timer.js';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
-import { asOnSwiftShader, serialDevice } from '../support/node-device.js';
+import { asOnSwiftShader, endNodeDevice, serialDevice } from '../support/node-device.js';
 import { readFrame } from '../support/read-frame.js';
 import { cameraAt } from '../support/scenes.js';
 import { countWork } from '../support/work-counters.js';
 
 const MIXES: readonly Partial<FrameLevers>[] = [
   { depthKeyBits: 16, resolutionScale: 0.6, shDegree: 0 },
-  { resolutionScale: 0.35, depthKeyBits: 16, alphaMin: 4 / 255, transmittanceMin: 0.05, occludedBelow: 0.1 },
+  { resolutionScale: 0.35, depthKeyBits: 16, alphaMin: 4 / 255, transmittanceMin: 0.05 },
 ];
 
 const size = { width: 144, height: 70 };
@@ -143,7 +143,7 @@ test('values that a lever does not know are refused', async () => {
   for (const levers of [...ofFrames, ...degrees, { visibleSets: 'yes' }]) {
     for (const use of refused(levers)) assert.throws(use, { code: 'argument/value' }, JSON.stringify(levers));
   }
-  const names = { rasterizer: 'tile', sort: 'quick', threads: 'many', accumulation: 'rgba8unorm' };
+  const names = { rasterizer: 'tile', threads: 'many', accumulation: 'rgba8unorm' };
   for (const [name, found] of Object.entries(names)) {
     assert.throws(() => new Renderer(device, { [name]: found }), { code: 'argument/value', found });
   }
@@ -205,7 +205,4 @@ test('frames that are shorter than a step of the clock take nothing; clocks that
   assert.deepEqual(spans([1n, 90_000_000_000n]), [null]);
 });
 
-// Dawn keeps Node alive.
-after(() => {
-  setImmediate(() => process.exit());
-});
+after(endNodeDevice);

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { GaussianCloud } from '@gaussian-splat/core';
 import type { RendererOptions } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { compareWithOracle } from '../support/compare.js';
 import { anyDevice, asOnSwiftShader, endNodeDevice } from '../support/node-device.js';

@@ -90,7 +90,7 @@ for (const dtype of ['float32', 'float16'] as const) {
         const gaussians = await DynamicGaussians.create(device, written.layout);
         gaussians.ingest(await uploadTensors(written), cloud.count);
         const renderer = new Renderer(device);
-        const camera = resized(cameras[0], 240);
+        const camera = resized(cameras[0], 160);
         const { pixels, mask } = await drawCloud(written.cloud, camera);
         const decibels = psnr(await capture(device, renderer, { gaussians, camera }), pixels, { mask, channels: 4 });
         console.log(`ingest ${one.shape} ${dtype} ${name}`.padEnd(45), `${decibels.toFixed(2)} dB`);
@@ -111,7 +111,7 @@ test('ingest, float16: needles and discs lose digits as covariances, by the form
   const device = await serialDevice();
   for (const make of [needles, edgeOnDiscs]) {
     const { name, cloud, cameras } = make();
-    const camera = resized(cameras[0], 240);
+    const camera = resized(cameras[0], 160);
     const found: Record<string, number> = {};
     for (const one of SPECS) {
       const spec = { ...one, dtype: 'float16' } as const;

@@ -37,7 +37,7 @@ function part(cloud: GaussianCloud, first: number, end: number): GaussianCloud {
 }
 
 for (const { make, frames } of [
-  // Two hundred of them, and turns between, are a row of `npm run stability`.
+  // Two hundred of them, and turns between, are a row of `npm run lab:stability`.
   { make: equalDepthPlane, frames: 5 },
   { make: room, frames: 8 },
 ]) {

@@ -57,7 +57,7 @@ async function notesOf(device: GPUDevice, cloud: GaussianCloud, cameras: readonl
 test('contributions are the largest weights that the oracle finds, over all frames; the image stays as it is', async () => {
   const device = await serialDevice();
   const { cloud, cameras } = room();
-  const views = cameras.slice(0, 2).map((camera) => resized(camera, 240));
+  const views = cameras.slice(0, 2).map((camera) => resized(camera, 160));
   const { weights, image, plain } = await notesOf(device, cloud, views);
   assert.deepEqual(Buffer.from(image.buffer), Buffer.from(plain.buffer));
   const oracles = views.map((camera) => renderOracle(cloud, camera, { rules: 'gsplat', mode: 'classic' }));
@@ -76,7 +76,7 @@ test('contributions are the largest weights that the oracle finds, over all fram
 test('depth is that of the splat at which a pixel becomes half transparent', async () => {
   const device = await serialDevice();
   const { cloud, cameras } = room();
-  const camera = resized(cameras[0], 240);
+  const camera = resized(cameras[0], 160);
   const { depths } = await notesOf(device, cloud, [camera]);
   const order = Array.from({ length: cloud.count }, (_, i) => i);
   const z = order.map((i) => toCamera(camera, worldPosition(cloud, i))[2]);

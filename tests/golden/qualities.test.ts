@@ -1,54 +1,118 @@
-/** Each quality keeps its figure, with either rasterizer, near and far: what `QUALITIES` promises. */
+/** Each quality keeps its figure, with either rasterizer, near and far, on captured scenes and on those that have what a setting acts on: what `QUALITIES` promises. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { capture, GaussianBuffers, packGaussians, QUALITIES, Renderer, type Quality } from '@gaussian-splat/renderer';
+import {
+  capture,
+  GaussianBuffers,
+  packGaussians,
+  Renderer,
+  type Quality,
+  type RendererOptions,
+} from '@gaussian-splat/renderer';
 import { readScene } from '@gaussian-splat/formats';
 import { readFileSync } from 'node:fs';
+import type { OracleImage } from '../oracle/blend.js';
 import { renderOracle } from '../oracle/oracle.js';
 import { closeness, describeCloseness } from '../support/compare.js';
 import { onlyInFull } from '../support/extent.js';
+import { psnr } from '../support/metrics.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
-import { cameraAt, room } from '../support/scenes.js';
+import { cameraAt, resized, room } from '../support/scenes.js';
+import { stressScenes } from '../support/scenes/stress.js';
 import { yawed } from '../stability/support/pictures.js';
 
-/** dB against the oracle, worst view. */
+/** dB against the oracle: of any scene, and of captured ones. */
 const LIMITS: Record<Quality, number> = { reference: 75, default: 59, balanced: 42, fast: 36 };
-/** Of the angle over which a quality keeps an order. */
-const NEARLY_ALL = 0.95;
-/** Radians that are no turn. */
-const STILL = 1e-3;
+const CAPTURED: Record<Quality, number> = { ...LIMITS, balanced: 50, fast: 44 };
+/** Of 1: what is seen. */
+const VISIBLE = 16 / 255;
+/** Share of a captured scene's pixels that may be off by that. */
+const MOST_VISIBLE = 0.001;
 
 const skull = await readScene(readFileSync(new URL('../../demo/scenes/skull.spz', import.meta.url)), {
   name: 'skull.spz',
 });
 
-const views: { name: string; cloud: GaussianCloud; camera: Camera }[] = [
-  { name: 'skull', cloud: skull, camera: cameraAt([0.6, -0.5, -1.2], [0, 0, 0], { width: 168, height: 112 }) },
+interface View {
+  readonly name: string;
+  readonly cloud: GaussianCloud;
+  readonly camera: Camera;
+  readonly isCaptured?: boolean;
+  /** Tiles take minutes where there is no GPU. */
+  readonly withoutTiles?: boolean;
+}
+
+const size = { width: 168, height: 112 };
+const views: View[] = [
+  { name: 'skull', cloud: skull, camera: cameraAt([0.6, -0.5, -1.2], [0, 0, 0], size), isCaptured: true },
+  { name: 'skull, near', cloud: skull, camera: cameraAt([0.25, -0.2, -0.5], [0, 0, 0], size), isCaptured: true },
   // Splats of less than a pixel: levers that go by area fail here.
-  { name: 'skull from afar', cloud: skull, camera: cameraAt([2, -1.5, -5], [0, 0, 0], { width: 168, height: 112 }) },
-  { name: 'room', cloud: room().cloud, camera: { ...room().cameras[0] } },
+  { name: 'skull from afar', cloud: skull, camera: cameraAt([2, -1.5, -5], [0, 0, 0], size), isCaptured: true },
+  { name: 'room', cloud: room().cloud, camera: resized(room().cameras[0], 240), withoutTiles: true },
+  ...stressScenes(),
 ];
 
-for (const { name, cloud, camera } of views) {
+/** The camera turned a little, so that a frame is sorted by the short keys. */
+const LITTLE = 0.01;
+
+/** Share of pixels of which a channel is off by what is seen, and the largest error of an alpha. */
+function visibleErrors(image: Float32Array, { color, transmittance }: OracleImage): { share: number; alpha: number } {
+  let [off, alpha] = [0, 0];
+  for (let i = 0; i < transmittance.length; i++) {
+    const errors = [0, 1, 2].map((k) => Math.abs(image[4 * i + k] - color[3 * i + k]));
+    const error = Math.abs(image[4 * i + 3] - (1 - transmittance[i]));
+    if (Math.max(error, ...errors) > VISIBLE) off++;
+    alpha = Math.max(alpha, error);
+  }
+  return { share: off / transmittance.length, alpha };
+}
+
+/** A frame of a camera that turns. */
+async function drawn(
+  device: GPUDevice,
+  options: RendererOptions,
+  gaussians: GaussianBuffers,
+  camera: Camera,
+): Promise<Float32Array> {
+  const renderer = new Renderer(device, options);
+  await capture(device, renderer, { gaussians, camera: yawed(camera, LITTLE) });
+  const image = await capture(device, renderer, { gaussians, camera });
+  renderer.destroy();
+  return image;
+}
+
+for (const { name, cloud, camera, isCaptured, withoutTiles } of views) {
   test(name, async () => {
     const device = await serialDevice();
     const mode = cloud.antialiased ? 'antialiased' : 'classic';
     const oracle = renderOracle(cloud, camera, { rules: 'gsplat', mode });
     for (const quality of Object.keys(LIMITS) as Quality[]) {
-      const sh = quality === 'reference' ? 'float16' : 'auto';
-      const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud, { sh }));
-      // The room is drawn with quads alone, but for the reference: tiles take minutes there without a GPU.
-      const rasterizers = quality === 'reference' ? ['tiles'] : name === 'room' ? ['quads'] : ['quads', 'tiles'];
+      // Made scenes are for what qualities leave out; what the others draw is held by `tiles-oracle` and `renderer-oracle`.
+      const isStress = !isCaptured && !withoutTiles;
+      if (isStress && (quality === 'reference' || quality === 'default')) continue;
+      const gaussians = await GaussianBuffers.upload(
+        device,
+        packGaussians(cloud, { sh: quality === 'reference' ? 'float16' : 'auto' }),
+      );
+      const rasterizers = quality === 'reference' ? ['tiles'] : withoutTiles ? ['quads'] : ['quads', 'tiles'];
       for (const rasterizer of rasterizers as ('quads' | 'tiles')[]) {
-        const renderer = new Renderer(device, { quality, rasterizer });
-        // The order is then as old as it gets.
-        const before = yawed(camera, NEARLY_ALL * QUALITIES[quality].sortAngle);
-        if (QUALITIES[quality].sortAngle > STILL) await capture(device, renderer, { gaussians, camera: before });
-        const close = closeness(await capture(device, renderer, { gaussians, camera }), oracle);
-        console.log(describeCloseness(`${name}, ${quality}, ${rasterizer}`, close));
-        assert.ok(close.psnr >= LIMITS[quality], `${name}, ${quality}, ${rasterizer}: ${close.psnr} dB`);
-        renderer.destroy();
+        const image = await drawn(device, { quality, rasterizer }, gaussians, camera);
+        const what = `${name}, ${quality}, ${rasterizer}`;
+        if (isStress && rasterizer === 'quads') {
+          // Quads never end a pixel, and add up rounding: how far that is from the trainers' rule is the default's affair (docs/stability.md, S20).
+          const whole = await drawn(device, { rasterizer }, gaussians, camera);
+          const decibels = psnr(image, whole, { channels: 4 });
+          assert.ok(decibels >= LIMITS[quality], `${what}: ${decibels} dB to the default`);
+          continue;
+        }
+        const close = closeness(image, oracle);
+        const { share, alpha } = visibleErrors(image, oracle);
+        const seen = `${(100 * share).toFixed(3)} % seen, alpha ${(255 * alpha).toFixed(1)}`;
+        console.log(describeCloseness(what, close), seen);
+        const least = (isCaptured ? CAPTURED : LIMITS)[quality];
+        assert.ok(close.psnr >= least, `${what}: ${close.psnr} dB`);
+        assert.ok(isCaptured ? share < MOST_VISIBLE : alpha <= VISIBLE, `${what}: ${seen}`);
       }
       gaussians.destroy();
     }

@@ -64,7 +64,7 @@ const camera = cameraAt([0, 0, -3.5], [0, 0, 0], { width: 160, height: 120 });
 /** A view that the camera has just turned to, so that short keys sort it. */
 async function drawTurning(device: GPUDevice, rasterizer: RasterizerName): Promise<[Float32Array, number]> {
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
-  const renderer = new Renderer(device, { rasterizer, threads: 'serial', sort: 'serial' });
+  const renderer = new Renderer(device, { rasterizer, threads: 'serial' });
   await readFrame(device, renderer, { gaussians, camera: turnedAway(camera) });
   const pixels = await readFrame(device, renderer, { gaussians, camera });
   const { visible } = await renderer.readStatistics();

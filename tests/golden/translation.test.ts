@@ -34,7 +34,7 @@ for (const make of [room, offCentre]) {
     test(`${make.name}, ${rasterizer}: no sort while the camera only moves, and the image is that of the oracle`, async () => {
       const device = await anyDevice();
       const { cloud, cameras } = make();
-      const start = resized(cameras[0], 240);
+      const start = resized(cameras[0], 160);
       const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
       const renderer = new Renderer(device, { rasterizer });
       for (const [i, step] of steps.entries()) {
@@ -92,7 +92,7 @@ test('sortAngle lets a camera turn that far before it sorts again, and takes the
 test('several scenes keep their common order while the camera moves', async () => {
   const device = await anyDevice();
   const { cloud, cameras } = room();
-  const start = resized(cameras[0], 240);
+  const start = resized(cameras[0], 160);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const other = offCentre();
   const second = await GaussianBuffers.upload(device, packGaussians(other.cloud));

@@ -4,6 +4,7 @@ import { after, test } from 'node:test';
 import {
   capture,
   chooseVariants,
+  createRenderer,
   GaussianBuffers,
   packGaussians,
   Renderer,
@@ -11,7 +12,7 @@ import {
   type Variants,
 } from '@gaussian-splat/renderer';
 import { givesKnownAnswer, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { onlyInFull } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
 import { endNodeDevice, nodeDevice } from '../support/node-device.js';
@@ -77,7 +78,7 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
     const anew = await chooseVariants(device, { store });
     await assertSuits(device, anew);
     assert.deepEqual(JSON.parse(entries.get(key)!), anew, damage);
-    const renderer = await Renderer.create(device);
+    const renderer = await createRenderer(device);
     assert.equal(renderer.levers.threads, anew.threads);
     assert.equal(renderer.levers.rasterizer, anew.rasterizer);
     renderer.destroy();
@@ -97,7 +98,6 @@ test('a device that is lost while variants are tried leaves the choice for its a
   ] as const) {
     entries.clear();
     if (isKnown) entries.set(key, kept);
-    // All ways to sort are tried where the adapter does not call itself a fallback.
     const device = await deviceLikeAny();
     const choosing = chooseVariants(device, { store });
     if (milliseconds > 0) await new Promise((resolve) => setTimeout(resolve, milliseconds));
@@ -132,7 +132,7 @@ test('a first picture is drawn with what is likely, if it is right and quick; wh
   const make = device.createComputePipeline.bind(device);
   device.createComputePipeline = (descriptor) => (pipelines++, make(descriptor));
   const begun = await startVariants(device, { store, quickMs: Infinity });
-  assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel', sort: 'shared8' });
+  assert.deepEqual(begun, { rasterizer: 'tiles', accumulation: 'rgba16float', threads: 'parallel' });
   assert.equal(new Renderer(device).levers.rasterizer, 'tiles');
   assert.equal(entries.size, 0, 'nothing that was not measured is kept');
   const atFirst = pipelines;

@@ -29,11 +29,15 @@ const inFolder = (...path: string[]): string => join(folder, ...path);
 
 /** As npm runs a script for somebody who is in the folder of the test. */
 function command(script: string, ...args: string[]): { status: number | null; text: string } {
-  const { status, stdout, stderr } = spawnSync(process.execPath, [`scripts/${script}.mjs`, ...args], {
-    cwd: root,
-    encoding: 'utf8',
-    env: { ...process.env, ...gpuEnvironment(), INIT_CWD: folder },
-  });
+  const { status, stdout, stderr } = spawnSync(
+    process.execPath,
+    ['packages/cli/bin/gaussian-splat.mjs', script, ...args],
+    {
+      cwd: root,
+      encoding: 'utf8',
+      env: { ...process.env, ...gpuEnvironment(), INIT_CWD: folder },
+    },
+  );
   return { status, text: stdout + stderr };
 }
 
@@ -65,7 +69,7 @@ function filesOfPage(scene: string): string[] {
   return files.filter((file) => file.includes('.') && file !== 'index.html').sort();
 }
 
-test('npm run page brings the files that a scene or a model names, and no others', () => {
+test('gaussian-splat page brings the files that a scene or a model names, and no others', () => {
   for (const name of ['link.onnx', 'link.contract.json', 'external.onnx', 'external.weights'])
     copyFileSync(fixturePath(name), inFolder(name));
   assert.deepEqual(filesOfPage('gltf/scene.gltf'), ['parts/a b.bin', 'scene.gltf']);
@@ -73,7 +77,7 @@ test('npm run page brings the files that a scene or a model names, and no others
   assert.deepEqual(filesOfPage('external.onnx'), ['external.onnx', 'external.weights']);
 });
 
-test('npm run page brings what descriptions in JSON name, and what these name, and no others', () => {
+test('gaussian-splat page brings what descriptions in JSON name, and what these name, and no others', () => {
   const write = (path: string, content: unknown): void => {
     mkdirSync(dirname(inFolder('json', path)), { recursive: true });
     writeFileSync(inFolder('json', path), typeof content === 'string' ? content : JSON.stringify(content));
@@ -105,7 +109,7 @@ test('npm run page brings what descriptions in JSON name, and what these name, a
   }
 });
 
-test('npm run page brings files, not links to them, and says what it cannot bring', () => {
+test('gaussian-splat page brings files, not links to them, and says what it cannot bring', () => {
   mkdirSync(inFolder('links', 'scene'), { recursive: true });
   writeFileSync(inFolder('links', 'real.ply'), 'ply');
   symlinkSync('../real.ply', inFolder('links', 'scene', 'a.ply'));
@@ -121,7 +125,7 @@ test('npm run page brings files, not links to them, and says what it cannot brin
   rmSync(inFolder('page'), { recursive: true });
 });
 
-test('npm run page takes a scene of several files from the folder of the page itself', () => {
+test('gaussian-splat page takes a scene of several files from the folder of the page itself', () => {
   mkdirSync(inFolder('mine'));
   writeFileSync(inFolder('mine', 'meta.json'), '{}');
   const { status, text } = command('page', 'mine/meta.json', 'mine', '--no-serve');
@@ -129,7 +133,7 @@ test('npm run page takes a scene of several files from the folder of the page it
   assert.match(readFileSync(inFolder('mine', 'index.html'), 'utf8'), /<gaussian-splat src="meta.json" alt="mine"/);
 });
 
-test('npm run page says in a sentence what it was asked wrongly', () => {
+test('gaussian-splat page says in a sentence what it was asked wrongly', () => {
   const wrong: readonly [RegExp, ...string[]][] = [
     [/scene and a folder are needed/, 'gltf/scene.gltf'],
     [/scene and a folder are needed/, 'gltf/scene.gltf', 'page', 'more'],
@@ -146,15 +150,15 @@ test('npm run page says in a sentence what it was asked wrongly', () => {
   }
 });
 
-test('npm run render draws a scene of several files', () => {
-  const { status, text } = command('render-image', 'gltf/scene.gltf', '--camera', 'camera.json', '--out', 'a.png');
+test('gaussian-splat render draws a scene of several files', () => {
+  const { status, text } = command('render', 'gltf/scene.gltf', '--camera', 'camera.json', '--out', 'a.png');
   assert.equal(status, 0, text);
   assert.match(text, /^gltf\/scene\.gltf: 6 splats/m);
 });
 
-test('npm run render does not write one picture over the other', () => {
+test('gaussian-splat render does not write one picture over the other', () => {
   const { status, text } = command(
-    'render-image',
+    'render',
     'gltf/scene.gltf',
     '--camera',
     'camera.json',
@@ -167,7 +171,7 @@ test('npm run render does not write one picture over the other', () => {
   assert.match(text, /--float: expected another file than that of --out/);
 });
 
-test('npm run render says in a sentence what it was asked wrongly', () => {
+test('gaussian-splat render says in a sentence what it was asked wrongly', () => {
   writeFileSync(inFolder('null.json'), 'null');
   writeFileSync(inFolder('views.json'), '{"views": 5}');
   const wrong: readonly [RegExp, scene: string, camera: string, out: string][] = [
@@ -184,14 +188,14 @@ test('npm run render says in a sentence what it was asked wrongly', () => {
     [/no such file .*none\.ply/, 'none.ply', 'camera.json', 'a.png'],
   ];
   for (const [sentence, scene, camera, out] of wrong) {
-    const { status, text } = command('render-image', scene, '--camera', camera, '--view', '0', '--out', out);
+    const { status, text } = command('render', scene, '--camera', camera, '--view', '0', '--out', out);
     assert.notEqual(status, 0, text);
     assert.match(text, sentence);
     assert.doesNotMatch(text, /\n\s+at /, 'no stack');
   }
 });
 
-test('npm run check reads paths as seen from where it was called', () => {
+test('gaussian-splat check reads paths as seen from where it was called', () => {
   const { status, text } = command('check', 'link.onnx');
   assert.equal(status, 0, text);
   assert.match(text, /keeps the contract/);

@@ -1,10 +1,12 @@
-/** Every page of the built site (of the documents one, unless SITE=full) in Chromium: nothing fails, nothing is missing, nothing is wider than a phone, axe finds nothing. */
+/** Pages of the built site (one of each layout, unless SITE=full) in Chromium: nothing fails, nothing is missing, nothing is wider than a phone, axe finds nothing. */
 import assert from 'node:assert/strict';
 import { after, before, describe, it } from 'node:test';
 import { addAxe, checkPage, violations } from './page-check.js';
 import { isBuilt, openSite, pagesOf, withCompass, withScenesToCome, type OpenSite, type Visit } from './support.js';
 
 const isFull = process.env.SITE === 'full';
+/** Pages that `npm test` opens, one of each layout; the laboratory opens all. */
+const DAILY = ['/check/', '/docs/', '/examples/', '/frontier/', '/reference/'];
 
 /** Pages that measure as soon as they are open are given next to nothing to measure. */
 const QUERIES: Readonly<Record<string, string>> = {
@@ -12,19 +14,14 @@ const QUERIES: Readonly<Record<string, string>> = {
   '/bench/stability.html': '?only=S7&peers=0',
   '/bench/generators.html': '?models=/fixtures/compass.ply',
 };
-/** Pages whose own tests do the same, while they are open: `checkPage`. */
-const ELSEWHERE = ['/', '/compare/', '/playground/', '/without-webgpu/'];
-/** The app of React stands for both: tests/frameworks drives them, and their pages have one layout. */
-const ALIKE = ['/vue/'];
 /** Pages whose scenes others test: theirs stay on their way here, which spares the processor that draws them. */
 const WITHOUT_SCENES = ['/examples/', '/react/', '/vue/'];
 
 /** The document whose colours stand for those of all. */
 const LONGEST = '/docs/packages/element/';
 const isDocument = (url: string): boolean => /^\/docs\/./.test(url);
-/** Documents have no scripts and one layout: `npm run test:site` opens all of them, `npm test` one that has everything. */
-const isVisited = (url: string): boolean =>
-  isFull || (isDocument(url) ? url === LONGEST : ![...ELSEWHERE, ...ALIKE].includes(url));
+/** Documents have no scripts and one layout: `npm run test:site` and the laboratory open all of them, `npm test` one that has everything. */
+const isVisited = (url: string): boolean => isFull || url === LONGEST || DAILY.includes(url);
 
 describe('every page of the site', { skip: isBuilt ? false : 'no site: npm run build' }, () => {
   let open: OpenSite;

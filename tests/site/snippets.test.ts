@@ -43,8 +43,7 @@ declare global {
   const contract: core.Contract;
   const boundsOf: typeof core.boundsOf;
   const gaussianLayout: typeof core.gaussianLayout;
-  const views: { readonly scored: Parameters<typeof economise.scoreSplats>[1] };
-  const { scoreSplats, cpuScorer, economical, parseEconomy, LiveMask }: typeof economise;
+  const views: economise.DealtViews;
   const gaussians: drawing.GaussianBuffers;
   const { DynamicGaussians }: typeof drawing;
   const generator: models.Generator;
@@ -52,11 +51,11 @@ declare global {
 }
 `;
 
-/** What `npm run page` makes of a scene whose name has to be written in another way in addresses and in HTML. */
+/** What `gaussian-splat page` makes of a scene whose name has to be written in another way in addresses and in HTML. */
 function makePage(folder: string): SpawnSyncReturns<string> {
   const scene = join(folder, '../mine & yours.ply');
   copyFileSync(join(root, 'tests/element/browser/fixtures/compass.ply'), scene);
-  return spawnSync(process.execPath, ['scripts/page.mjs', scene, folder, '--no-serve'], {
+  return spawnSync(process.execPath, ['packages/cli/bin/gaussian-splat.mjs', 'page', scene, folder, '--no-serve'], {
     cwd: root,
     encoding: 'utf8',
   });
@@ -145,7 +144,7 @@ describe('what documents tell people to write', { skip }, () => {
     assert.deepEqual(list.split(',').sort(), [...needed('react')].sort());
   });
 
-  it('npm run page makes a page, and leaves alone one that is there', () => {
+  it('gaussian-splat page makes a page, and leaves alone one that is there', () => {
     assert.match(made.index, /<script type="module" src="cdn\/gaussian-splat\.min\.js"><\/script>/);
     assert.match(made.index, /<gaussian-splat src="mine%20%26%20yours\.ply" alt="mine &amp; yours" camera-controls>/);
     const files = readdirSync(made.folder, { recursive: true }) as string[];
@@ -191,7 +190,7 @@ describe('what documents tell people to write', { skip }, () => {
 
   it('HTML shows a picture', { timeout: 200_000 }, async () => {
     const copied = snippets('html').filter(({ code }) => isFull || !code.includes('.onnx'));
-    const all = [...copied, { place: 'npm run page', language: 'html', code: made.index }];
+    const all = [...copied, { place: 'gaussian-splat page', language: 'html', code: made.index }];
     assert.ok(all.length > 5, `${all.length} snippets`);
     const open = await openSite();
     try {

@@ -57,7 +57,7 @@ export async function withScenesToCome(tab: Page): Promise<() => Promise<void>> 
 
 /** Serves the site and the scenes of the element's tests (`/fixtures/`), and starts the browser. */
 export async function openSite(): Promise<OpenSite> {
-  const { serve } = await scripts('server.mjs');
+  const { serve } = await scripts('../../packages/cli/src/lib/server.mjs');
   const { findChromium, SWIFTSHADER_FLAGS } = await scripts('chromium.mjs');
   const server = await (serve as (mounts: object) => Promise<Server>)({
     '/': site,

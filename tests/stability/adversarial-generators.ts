@@ -109,7 +109,7 @@ test('any sequence of runs', async () => {
       for (const thing of [renderer, gaussians, tensor, last]) thing.destroy();
       return count === 0;
     }),
-    { numRuns: sized(8, 300), seed: 24 },
+    { numRuns: sized(5, 300), seed: 24 },
   );
   holds('S24', 'bytes that differ from the last accepted run alone', differing, { atMost: 0, unit: 'bytes' });
   holds('S24', 'runs that were refused, by name', refused, { atLeast: 1, unit: 'runs' });

@@ -15,9 +15,9 @@ import assert from 'node:assert/strict';
 import {
   capture,
   chooseVariants,
+  createRenderer,
   GaussianBuffers,
   packGaussians,
-  Renderer,
   type Variants,
 } from '@gaussian-splat/renderer';
 import { givesKnownAnswer } from '@gaussian-splat/renderer/stages';
@@ -44,7 +44,7 @@ const FAULTS: readonly { name: string; fault: Miscompilation; expected: Partial<
 async function drawAsChosen(device: GPUDevice): Promise<number> {
   const { cloud, cameras } = offCentre();
   const camera = resized(cameras[0], 96);
-  const renderer = await Renderer.create(device);
+  const renderer = await createRenderer(device);
   const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
   const { psnr } = compareImage(await capture(device, renderer, { gaussians, camera }), truth(cloud, camera));
   renderer.destroy();
@@ -78,7 +78,7 @@ test('matrices transposed in every variant: an error, not a wrong picture', asyn
   ]);
   await assert.rejects(chooseVariants(device, { store: null }), { code: 'unsupported/wrong-image' });
   await assert.rejects(
-    Renderer.create(device),
+    createRenderer(device),
     { code: 'unsupported/wrong-image' },
     'and again, without a second probe',
   );

@@ -12,10 +12,10 @@ import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import fc from 'fast-check';
 import { GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
-import { scanBytes, ScanStage } from '@gaussian-splat/renderer/stages';
 import { cloudOf, repeat } from '../support/clouds.js';
 import { runCase } from '../support/gpu.js';
 import { nodeDevice } from '../support/node-device.js';
+import { scanOnGpu } from '../support/scan.js';
 import { cameraAt } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { THREADS } from './support/pictures.js';
@@ -44,13 +44,7 @@ test('prefix sums of any counts stop at the largest number', async () => {
         name: 'saturating scan',
         async run(bench) {
           for (const threads of ['parallel', 'serial'] as const) {
-            const stage = new ScanStage(device, threads);
-            const words = new Uint32Array(scanBytes(values.length) / 4);
-            words.set(values);
-            const buffer = bench.buffer(words);
-            const bindings = stage.bind({ values: buffer, scan: bench.uniform(values.length) });
-            bench.compute((pass) => stage.record(pass, bindings));
-            found.push(await bench.read(buffer, 4 * (values.length + 1)));
+            found.push(await scanOnGpu(bench, values, threads));
           }
         },
       });

@@ -1,5 +1,5 @@
 /**
- * Every case that `npm run fuzz` has found worth keeping: faults that were mended, and the lowest pictures with the cause of each.
+ * Every case that `npm run lab:fuzz` has found worth keeping: faults that were mended, and the lowest pictures with the cause of each.
  *
  * Who fails: nobody else publishes such a corpus.
  *

@@ -12,7 +12,7 @@
 import { test } from 'node:test';
 import assert from 'node:assert/strict';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { offCentre } from '../support/scenes.js';
 import { deviceWith } from './support/devices.js';
 import { compareImage, differingBytes, RASTERIZERS, resized, truth } from './support/pictures.js';

@@ -1,5 +1,8 @@
 /** How much is tested in Chromium: see `extent.ts`. web-test-runner.config.mjs says it to the pages. */
 export const isFull = (globalThis as { STABILITY?: string }).STABILITY === 'full';
 
-/** One of two sizes of a test: a part of it in `npm test`, all of it in `npm test -- --full` and `npm run stability`. */
+/** Whether the laboratory's breadth is tested: `npm run test:lab`. */
+export const isLab = isFull || ['lab', 'full'].includes((globalThis as { TESTS?: string }).TESTS ?? '');
+
+/** One of two sizes of a test: a part of it in `npm test`, all of it in `npm test -- --full` and `npm run lab:stability`. */
 export const sized = <T>(fast: T, full: T): T => (isFull ? full : fast);

@@ -1,8 +1,14 @@
 /**
- * How much is tested. `npm test` keeps to what tells faults apart within its 25 minutes on two cores; `npm test -- --full` also runs what repeats the
+ * How much is tested. `npm test` keeps to what tells faults apart within its eight minutes on two cores; `npm run test:lab` adds what only repeats or widens, and `npm test -- --full` also runs what repeats the
  * same check on more views, formats and sizes.
  */
 export const isFull = process.env.TESTS === 'full';
 
 /** For the options of a test that only the full run has. */
 export const onlyInFull: string | false = isFull ? false : 'runs in npm test -- --full';
+
+/** Whether the laboratory runs: once a day's work, and before a release. */
+export const isLab = isFull || process.env.TESTS === 'lab';
+
+/** For the options of a test that the daily run leaves to the laboratory. */
+export const onlyInLab: string | false = isLab ? false : 'runs in npm run test:lab';

@@ -1,6 +1,6 @@
 /** A device of Dawn in Node. Tests that use it run under `gpuEnvironment()` of scripts/lib. */
 import { chooseVariants } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { isFull } from './extent.js';
 
 const devices = new Map<string, Promise<GPUDevice>>();
@@ -47,10 +47,22 @@ function once(kind: string, request: () => Promise<GPUDevice>): Promise<GPUDevic
   return requested;
 }
 
+let isKept = false;
+
 /**
  * For `after` of every file that uses a device: Dawn keeps Node alive, and a process that ends while the GPU still works was seen to crash.
  */
 export async function endNodeDevice(): Promise<void> {
+  if (!isKept) await endDevices();
+}
+
+/** Where several files share this process, none of them ends the devices; the function returned does so for all. */
+export function keepNodeDevice(): () => Promise<void> {
+  isKept = true;
+  return endDevices;
+}
+
+async function endDevices(): Promise<void> {
   for (const device of await Promise.all(devices.values())) {
     await device.queue.onSubmittedWorkDone();
     device.destroy();

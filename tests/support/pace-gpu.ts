@@ -1,18 +1,29 @@
 /** Simulated GPUs under the pace of moving pictures, and what is asked of the levels that it chose. */
-import { LADDER } from '../../packages/element/src/pace/ladder.js';
+import type { Level } from '../../packages/element/src/pace/ladder.js';
 import { INITIAL_PACE, keepPace, quantile, type Pace } from '../../packages/element/src/pace/pace.js';
 import { randomSource } from './gpu.js';
 
-/** Of each rung, as the ladder says. */
-export const COSTS = LADDER.map(({ cost }) => cost);
+/** Levels that do not change with the element's. */
+export const LEVELS: readonly Level[] = [
+  { name: 'whole', levers: undefined, scale: 1 },
+  ...[1, 1, 0.84, 0.71, 0.59, 0.5, 0.42, 0.35, 0.25].map((scale, i) => ({
+    name: `level ${i + 1}`,
+    levers: { resolutionScale: scale },
+    scale,
+  })),
+];
+
+/** What the levels of a simulated GPU take unless it says otherwise, as shares of the whole image: all of it scales with pixels. */
+export const COSTS = LEVELS.map(({ scale }, level) => [1, 0.73][level] ?? 0.72 * scale ** 2);
+
 export interface Gpu {
   /** Pictures a second of the display. */
   readonly hertz: number;
   /** What the true image takes at a time in ms, as a multiple of the target. */
   readonly load: (now: number) => number;
-  /** Share of a frame that no rung makes cheaper. */
+  /** Share of a frame that no level makes cheaper. */
   readonly fixed: number;
-  /** What each rung takes at a time, as a share of the first; the ladder's costs unless given. */
+  /** What each level takes at a time, as a share of the first; COSTS unless given. */
   readonly shares?: (now: number) => readonly number[];
   /** Relative spread of times; and how many frames in a hundred take three times as long. */
   readonly noise: number;
@@ -43,7 +54,7 @@ export function run(gpu: Gpu, milliseconds: number): { frames: Frame[]; pace: Pa
   for (let at = 0; at < milliseconds; at += interval) {
     while (waiting.length > 0 && waiting[0].due <= at) {
       const { due, level, spent } = waiting.shift()!;
-      pace = keepPace(pace, { now: due, level, milliseconds: spent }, { targetMs, costs: COSTS });
+      pace = keepPace(pace, { now: due, level, milliseconds: spent }, { targetMs, levels: LEVELS });
     }
     if (gpu.moves?.(at) === false || free > at + interval) continue;
     const { level } = pace;

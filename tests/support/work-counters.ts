@@ -5,9 +5,10 @@ export interface Work {
   submits: number;
   computePasses: number;
   renderPasses: number;
-  /** Dispatches whose size the CPU knows, and those whose size the GPU finds. */
+  /** Dispatches whose size the CPU knows. */
   dispatches: number;
-  indirectDispatches: number;
+  /** Dispatches and draws whose size the GPU finds. */
+  indirectCalls: number;
   /** Workgroups of the dispatches whose size the CPU knows. */
   workgroups: number;
   draws: number;
@@ -38,7 +39,7 @@ const noWork = (): Work => ({
   computePasses: 0,
   renderPasses: 0,
   dispatches: 0,
-  indirectDispatches: 0,
+  indirectCalls: 0,
   workgroups: 0,
   draws: 0,
   buffersCreated: 0,
@@ -69,13 +70,13 @@ export function countWork(device: GPUDevice): WorkCounter {
         work.dispatches++;
         work.workgroups += x * (y ?? 1) * (z ?? 1);
       });
-      after(pass, 'dispatchWorkgroupsIndirect', () => work.indirectDispatches++);
+      after(pass, 'dispatchWorkgroupsIndirect', () => work.indirectCalls++);
     });
     after(encoder, 'beginRenderPass', (pass: GPURenderPassEncoder) => {
       work.renderPasses++;
-      for (const name of ['draw', 'drawIndexed', 'drawIndirect', 'drawIndexedIndirect'] as const) {
-        after(pass, name, () => work.draws++);
-      }
+      for (const name of ['draw', 'drawIndexed'] as const) after(pass, name, () => work.draws++);
+      for (const name of ['drawIndirect', 'drawIndexedIndirect'] as const)
+        after(pass, name, () => work.indirectCalls++);
     });
   });
   return {

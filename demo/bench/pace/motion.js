@@ -24,7 +24,7 @@ export async function move(stage, seconds, { speed, onFrame = () => undefined })
   return rows;
 }
 
-/** `span` is what a frame took, ms on the GPU, where one has become known since the last look; null where none has. */
+/** `span` is what a frame took, ms from when it could begin until the GPU was done, where one has become known since the last look; null where none has. */
 function readPace(element, lastOf) {
   const { moving, drawn, targetMs, lastMs } = element.stats?.pace ?? {};
   const isNew = lastMs !== null && lastOf.has(element) && lastMs !== lastOf.get(element);

@@ -147,7 +147,7 @@ export function readRun(query) {
     rounds: number('rounds', 3),
     frames: number('frames', 200),
     warmUp: number('warmup', 30),
-    phases: (query.get('phases') ?? 'gpu,wall,throughput').split(','),
+    phases: (query.get('phases') ?? 'burst,wall,gpu').split(','),
     report: query.get('report'),
   };
 }

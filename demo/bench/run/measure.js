@@ -10,18 +10,21 @@
 
 import { spanOf } from './summary.js';
 
-export const PHASES = ['gpu', 'wall', 'throughput'];
+export const PHASES = ['burst', 'wall', 'gpu'];
 
 /** Timed frames between two readings of timestamps, submitted without waiting for one another. */
 const READ_EVERY = 50;
-/** Frames that may be in flight when throughput is measured, and when a GPU is made to work. */
-const IN_FLIGHT = 2;
+/** Frames that are submitted in a row, the queue drained once behind them. */
+const IN_A_ROW = 40;
+/** Frames that may be in flight when a GPU is made to work. */
 const BUSY_IN_FLIGHT = 16;
+/** Empty submissions of which the fastest tells what waiting for nothing takes. */
+const EMPTY = 8;
 /** Milliseconds of work before a visit measures: GPUs that were idle run at a fraction of their clock. */
 const BUSY_MS = 400;
 
-/** Frames of a subject between two turns of the standard: short against changes of a GPU's clock. */
-const BURST = 10;
+/** Frames of a subject between two turns of the standard, where single frames are timed: short against changes of a GPU's clock. */
+const TURN = 10;
 
 /**
  * One visit to a subject: warm-up, then each phase over all cameras. Times in milliseconds.
@@ -34,22 +37,27 @@ export async function visit(subject, cameras, { warmUp, phases = PHASES, busyMs 
   if (subject.settle) await subject.settle(cameras[0]);
   const none = { own: [], others: [], ratios: [] };
   const time = (kind) => timeBeside(subject, standard, cameras, KINDS[kind]);
+  const inRows = phases.includes('burst') ? await time('burst') : none;
   const passes = phases.includes('gpu') && subject.readTimes ? await time('span') : none;
   const alone = phases.includes('wall') ? await time('wall') : none;
   const sorted = phases.includes('wall') && subject.settle ? await time('sortedWall') : none;
-  const throughput = phases.includes('throughput') ? [await timeStream(subject, cameras)] : [];
   const samples = {
+    bursts: inRows.own.map(({ burst }) => burst),
     passes: passes.own,
     wall: wallsOf(alone.own),
     sortedWall: wallsOf(sorted.own),
     cpu: alone.own.map(({ cpu }) => cpu),
-    throughput,
+    empty: phases.includes('wall') && subject.submitNothing ? [await timeNothing(subject)] : [],
   };
   if (!standard) return samples;
   return {
     ...samples,
-    ratios: { span: passes.ratios, wall: alone.ratios, sortedWall: sorted.ratios },
-    standard: { passes: passes.others, wall: wallsOf(alone.others) },
+    ratios: { burst: inRows.ratios, span: passes.ratios, wall: alone.ratios, sortedWall: sorted.ratios },
+    standard: {
+      bursts: inRows.others.map(({ burst }) => burst),
+      passes: passes.others,
+      wall: wallsOf(alone.others),
+    },
   };
 }
 
@@ -63,16 +71,22 @@ const meanSpan = (frames) => mean(frames.map(spanOf).filter((span) => span !== u
  * most frames and pay in some.
  */
 const KINDS = {
-  span: { ofSubject: timePasses, ofStandard: timePasses, mean: meanSpan },
-  wall: { ofSubject: timeFrames, ofStandard: timeFrames, mean: meanWall },
-  sortedWall: { ofSubject: timeSortedFrames, ofStandard: timeFrames, mean: meanWall },
+  burst: {
+    ofSubject: timeBurst,
+    ofStandard: timeBurst,
+    mean: (rows) => mean(rows.map(({ burst }) => burst)),
+    turn: IN_A_ROW,
+  },
+  span: { ofSubject: timePasses, ofStandard: timePasses, mean: meanSpan, turn: TURN },
+  wall: { ofSubject: timeFrames, ofStandard: timeFrames, mean: meanWall, turn: TURN },
+  sortedWall: { ofSubject: timeSortedFrames, ofStandard: timeFrames, mean: meanWall, turn: TURN },
 };
 
 /**
  * Bursts of a subject between bursts of a standard, if there is one, so that both see the same clock: a burst's ratio is that to the mean of the
  * standard's bursts before and after it.
  */
-async function timeBeside(subject, standard, cameras, { ofSubject, ofStandard, mean }) {
+async function timeBeside(subject, standard, cameras, { ofSubject, ofStandard, mean, turn }) {
   const [own, others, ratios] = [[], [], []];
   const turnOfStandard = async (some) => {
     const frames = await ofStandard(standard, some);
@@ -81,9 +95,9 @@ async function timeBeside(subject, standard, cameras, { ofSubject, ofStandard, m
   };
   if (!standard || (ofStandard === timePasses && !standard.readTimes))
     return { own: await ofSubject(subject, cameras), others, ratios };
-  let before = await turnOfStandard(cameras.slice(0, BURST));
-  for (let first = 0; first < cameras.length; first += BURST) {
-    const some = cameras.slice(first, first + BURST);
+  let before = await turnOfStandard(cameras.slice(0, turn));
+  for (let first = 0; first < cameras.length; first += turn) {
+    const some = cameras.slice(first, first + turn);
     const frames = await ofSubject(subject, some);
     own.push(...frames);
     const after = await turnOfStandard(some);
@@ -152,19 +166,32 @@ async function timeSortedFrames(subject, cameras) {
   return frames;
 }
 
-/** Milliseconds a frame with two frames in flight, until the queue is drained. */
-async function timeStream(subject, cameras) {
-  await subject.finish();
-  const flying = [];
-  const start = performance.now();
-  for (const camera of cameras) {
-    subject.draw(camera, false);
-    flying.push(subject.finish());
-    if (flying.length > IN_FLIGHT) await flying.shift();
+/** Milliseconds a frame of many in a row, the queue drained once: what a page that draws without a pause gets. */
+async function timeBurst(subject, cameras) {
+  const rows = [];
+  for (let first = 0; first < cameras.length; first += IN_A_ROW) {
+    const row = cameras.slice(first, first + IN_A_ROW);
+    await subject.finish();
+    const start = performance.now();
+    for (const camera of row) subject.draw(camera, false);
+    await subject.finish();
+    rows.push({ burst: (performance.now() - start) / row.length });
     await nextTask();
   }
-  await subject.finish();
-  return (performance.now() - start) / cameras.length;
+  return rows;
+}
+
+/** Milliseconds until a submission of nothing is done: part of every `wall`. */
+async function timeNothing(subject) {
+  let least = Infinity;
+  for (let i = 0; i < EMPTY; i++) {
+    const start = performance.now();
+    subject.submitNothing();
+    await subject.finish();
+    least = Math.min(least, performance.now() - start);
+    await nextTask();
+  }
+  return least;
 }
 
 /**

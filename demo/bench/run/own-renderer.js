@@ -35,6 +35,10 @@ export class OwnRenderer {
     this.#drawInto(this.#target, camera, timed ? this.#timer : undefined);
   }
 
+  submitNothing() {
+    this.#device.queue.submit([this.#device.createCommandEncoder({ label: 'bench.nothing' }).finish()]);
+  }
+
   finish() {
     return this.#device.queue.onSubmittedWorkDone();
   }

@@ -34,14 +34,23 @@ export function summarizeStages(frames) {
 function summarizeRatios(visits) {
   if (visits.every(({ ratios }) => ratios === undefined)) return undefined;
   const all = (name) => visits.flatMap(({ ratios }) => ratios?.[name] ?? []);
-  return { span: summarize(all('span')), wall: summarize(all('wall')), sortedWall: summarize(all('sortedWall')) };
+  return {
+    burst: summarize(all('burst')),
+    span: summarize(all('span')),
+    wall: summarize(all('wall')),
+    sortedWall: summarize(all('sortedWall')),
+  };
 }
 
 /** What the standard took over all visits to all subjects, as a result of its own. */
 export function summarizeStandard(results) {
   const all = (name) => results.flatMap(({ visits }) => visits.flatMap(({ standard }) => standard?.[name] ?? []));
   const spans = all('passes').map(spanOf);
-  return { span: summarize(spans.filter((span) => span !== undefined)), wall: summarize(all('wall')) };
+  return {
+    burst: summarize(all('bursts')),
+    span: summarize(spans.filter((span) => span !== undefined)),
+    wall: summarize(all('wall')),
+  };
 }
 
 /** All samples of a configuration over all rounds; undefined where nothing was measured. */
@@ -50,15 +59,17 @@ export function summarizeVisits(visits) {
   const frames = all('passes');
   const spans = frames.map(spanOf).filter((span) => span !== undefined);
   return {
+    burst: summarize(all('bursts')),
     span: summarize(spans),
     stages: frames.length > 0 ? summarizeStages(frames) : undefined,
     wall: summarize(all('wall')),
     sortedWall: summarize(all('sortedWall')),
-    throughput: summarize(all('throughput')),
+    empty: summarize(all('empty')),
     cpu: summarize(all('cpu')),
     ratio: summarizeRatios(visits),
     /** Medians of each round: how repeatable the figures are. */
     rounds: {
+      burst: visits.map((visit) => rounded(quantile(visit.bursts, 0.5))),
       span: visits.map((visit) =>
         rounded(
           quantile(

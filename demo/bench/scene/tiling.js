@@ -1,6 +1,6 @@
 /** Copies of a scene, as one cloud or straight to the GPU. */
 import { boundsOf } from '@gaussian-splat/core';
-import { LiveMask, lookAround } from '@gaussian-splat/economise';
+import { lookAround } from '@gaussian-splat/economise';
 import { GaussianBuffers, packGaussians, packWithDetail } from '@gaussian-splat/renderer';
 
 /** Splats in one upload: their harmonics stay well under the largest array that browsers allocate. */
@@ -42,12 +42,11 @@ export function tileCloud(cloud, copies) {
 
 /**
  * Uploads the copies, a few million splats at a time, without ever holding them all in memory.
- * @param pack options of packGaussians, and `detail`, `sides`, `economy`: levels of detail, visible sets, what no view needs at so many dB left out
+ * @param pack options of packGaussians, and `detail`, `sides`: levels of detail, visible sets
  * @returns {Promise<GaussianBuffers[]>} to be drawn together.
  */
 export async function uploadTiled(device, cloud, copies, pack = {}) {
   const whole = await uploadWhole(device, cloud, copies, pack);
-  if (pack.economy > 0) return withoutUnseen(device, boundsAround(cloud, copies), whole, pack.economy);
   return pack.sides ? withSides(device, boundsAround(cloud, copies), whole) : whole;
 }
 
@@ -73,17 +72,6 @@ async function withSides(device, around, uploads) {
   const sided = [];
   for (const upload of uploads) sided.push(await lookAround(device, upload, around));
   return sided;
-}
-
-/** What the element's `economy` leaves of it at so many dB, however long looking takes. */
-async function withoutUnseen(device, around, [whole, ...more], decibels) {
-  try {
-    if (more.length > 0) throw new RangeError('economy: expected splats that fit one upload');
-    const { packed } = await (await LiveMask.of(device, whole, around, { patienceMs: Infinity })).masked({ decibels });
-    return [await GaussianBuffers.upload(device, packed)];
-  } finally {
-    for (const upload of [whole, ...more]) upload.destroy();
-  }
 }
 
 /** A ball around all copies. */

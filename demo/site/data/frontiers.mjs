@@ -1,4 +1,4 @@
-/** The committed runs of `npm run frontier`: for each chart of docs/frontier what was measured, on what, and when. */
+/** The committed runs of `npm run lab:frontier`: for each chart of docs/frontier what was measured, on what, and when. */
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { timeOf } from '../../../scripts/frontier/front.mjs';
@@ -33,12 +33,11 @@ function adapterName({ vendor, architecture, description }) {
 
 function rowOf(result, standard) {
   const { configuration, quality, bytes } = result;
-  const { kind, ms } = timeOf(result, standard);
+  const ms = timeOf(result, standard);
   return {
     name: configuration.name,
     milliseconds: Number(ms.toPrecision(3)).toLocaleString('en'),
-    ratio: result.ratio?.[kind]?.p50.toFixed(2) ?? '',
-    clock: kind === 'span' ? 'GPU' : 'wall',
+    ratio: result.ratio?.burst?.p50.toFixed(2) ?? '',
     psnr: quality.psnr.toFixed(1),
     worst: quality.worst.toFixed(1),
     bytes: bytes?.perSplat.toFixed(0) ?? '',

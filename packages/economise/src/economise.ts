@@ -7,15 +7,32 @@ import { readInParts } from './parts/read-in-parts.js';
 import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
 import { cutCloud, searchRefined, type CutCloud, type Plan } from './refine/search-refined.js';
-import { Stopwatch } from './stopwatch.js';
 import { encodingsFor, type Encoding } from './write/index.js';
+
+/** Where the time goes. */
+export class Stopwatch {
+  readonly #seconds: Record<string, number> = {};
+  #last = performance.now();
+
+  /** Adds what has passed since the last lap to a kind of work. */
+  lap(work: string): void {
+    const now = performance.now();
+    this.#seconds[work] = (this.#seconds[work] ?? 0) + (now - this.#last) / 1000;
+    this.#last = now;
+  }
+
+  /** By the kind of work, s. */
+  get seconds(): Readonly<Record<string, number>> {
+    return { ...this.#seconds };
+  }
+}
 
 export interface EconomiseOptions {
   /** PSNR over the covered pixels of the held-out views that the written file must reach, dB. */
   readonly minDecibels: number;
   /** Name of the file to be written; its extension tells the format. */
   readonly name: string;
-  /** Looks at the cloud: `GpuEvaluator` where there is a GPU, else `PaintedEvaluator`. */
+  /** Looks at the cloud: `GpuEvaluator`, or one around it. */
   readonly evaluator: Evaluator;
   /** Does what comes in parts, of writing and reading the file again; default {@link inline}. */
   readonly pool?: TaskPool;

@@ -14,8 +14,7 @@ export interface CutFigures {
 }
 
 /**
- * Looks at a scene: says what its splats contribute, and how far pictures of what is left of it are from those of the whole. {@link PaintedEvaluator} does it in plain
- * code, with whatever draws pictures; {@link GpuEvaluator} on the GPU.
+ * Looks at a scene: says what its splats contribute, and how far pictures of what is left of it are from those of the whole. {@link GpuEvaluator} does it on the GPU.
  */
 export interface Evaluator {
   /** Looks at the scene in the scored views. To be called once, before all else. */

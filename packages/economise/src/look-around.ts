@@ -19,10 +19,9 @@ import {
   writeStruct,
 } from '@gaussian-splat/renderer/stages';
 import { noteSides, SIDE_GROUP, Side as layout } from './generated/shaders.js';
-import { NO_VIEW } from './gpu/no-view.js';
+import { NO_VIEW } from './gpu/layouts.js';
 import { PictureErrors } from './gpu/picture-errors.js';
 import { readBack } from './gpu/read-back.js';
-import { viewSizeOf, type ViewSize } from './live-mask.js';
 import { decibelsTogether } from './measure.js';
 import { viewsAround } from './views.js';
 
@@ -49,6 +48,21 @@ const HELD_OUT_SEED = 3;
 const COUNTS_BYTES = 16;
 const CHUNK = 256;
 const FLOAT_BYTES = 4;
+
+/** Pixels of the views that a figure is measured in. Fewer splats are larger, and seen as well in smaller ones: so many pixels for each, and at least a quarter of each side. */
+export interface ViewSize {
+  readonly width: number;
+  readonly height: number;
+}
+const LARGEST_VIEW: ViewSize = { width: 480, height: 270 };
+const VIEW_PIXELS_OF_SPLAT = 16;
+const LEAST_SCALE = 0.25;
+
+function viewSizeOf(count: number): ViewSize {
+  const { width, height } = LARGEST_VIEW;
+  const scale = Math.min(1, Math.max(LEAST_SCALE, Math.sqrt((VIEW_PIXELS_OF_SPLAT * count) / (width * height))));
+  return { width: Math.round(scale * width), height: Math.round(scale * height) };
+}
 
 export interface LookAroundOptions {
   readonly signal?: AbortSignal;

@@ -9,11 +9,10 @@ export const SHADER_FILES = [
   ...['shaders.js', 'live-shaders.js', 'streamed-shaders.js', 'quantized-shaders.js', 'probe-shaders.js'].map(
     (file) => folder('renderer') + file,
   ),
-  `${folder('economise')}shaders.js`,
 ];
 
 /** What variants of shaders find by its text and replace: see `specialise` in packages/renderer/src/gpu/kernel.ts. */
-const keptNames = 'DIGIT_BITS DIGITS SUBGROUPS VOTE_WORDS Value VALUE_WORDS value bits word'.split(' ');
+const keptNames = 'Value VALUE_WORDS value bits word'.split(' ');
 export const REPLACED = { keptNames, keptLines: new RegExp(`^(const|alias) (${keptNames.join('|')})\\b`) };
 
 const PIECE = /^(export const (\w+Part) = )("(?:[^"\\]|\\.)*");$/gm;

@@ -1,4 +1,10 @@
-/** Attributes of `<gaussian-splat>` that carry more than a word: their grammars and defaults, in one place. */
+/**
+ * The attributes of `<gaussian-splat>`, each in one place: its property's type, what Lit is told of it, its grammar, its default and what people read of it. The manifest
+ * for editors and the table in README.md are made from this file (`scripts/attributes.mjs`). Kinds are called without options where their type says all.
+ */
+import type { ShDegree } from '@gaussian-splat/core';
+import type { Quality } from '@gaussian-splat/renderer';
+import type { PropertyDeclaration, PropertyDeclarations } from 'lit';
 import {
   angleGrammar,
   fieldOfViewGrammar,
@@ -10,10 +16,12 @@ import {
   upGrammar,
   type AttributeGrammar,
 } from './camera/grammar.js';
-import { QUALITIES, type Quality } from '@gaussian-splat/renderer';
-import type { ShDegree } from '@gaussian-splat/core';
-import { timerMs } from './timer-ms.js';
 import type { CameraSettings } from './camera/settings.js';
+import type { Numbers } from './live/values.js';
+import type { SpokenStrings } from './words.js';
+
+/** As much of a wait, ms, as timers can: whatever is longer, `Infinity` too, they take for none at all. */
+export const timerMs = (wait: number): number => Math.min(wait, 2 ** 31 - 1);
 
 /** When loading starts: once the element is in sight, or as soon as it is in the page. */
 export type Loading = 'lazy' | 'eager';
@@ -42,136 +50,285 @@ export type InteractionPromptStyle = 'wiggle' | 'basic';
 /** What the camera does under a person's hands: turn around its target, or fly. */
 export type Navigation = 'orbit' | 'fly';
 
-/** An attribute's raw value: text, or what a property was given instead. */
-export type Raw = string | number | null | undefined;
-
-/** The properties read here, by their attributes' camel-case names. */
-export interface RawAttributes {
-  readonly crossorigin: Raw;
-  readonly loading: Raw;
-  readonly cameraOrbit: Raw;
-  readonly cameraTarget: Raw;
-  readonly fieldOfView: Raw;
-  readonly minCameraOrbit: Raw;
-  readonly maxCameraOrbit: Raw;
-  readonly minFieldOfView: Raw;
-  readonly maxFieldOfView: Raw;
-  readonly interpolationDecay: Raw;
-  readonly touchAction: Raw;
-  readonly up: Raw;
-  readonly maxPixelRatio: Raw;
-  readonly frameBudget: Raw;
-  readonly quality: Raw;
-  readonly maxShDegree: Raw;
-  readonly detail: Raw;
-  readonly reveal: Raw;
-  readonly navigation: Raw;
-  readonly autoRotateDelay: Raw;
-  readonly rotationPerSecond: Raw;
-  readonly interactionPrompt: Raw;
-  readonly interactionPromptStyle: Raw;
-  readonly interactionPromptThreshold: Raw;
+/** One attribute. Only types know `P`, of the property, and `V`, of what is read of it: never where the element takes the property as it is. */
+interface Attribute<P, V = never> {
+  readonly lit: PropertyDeclaration;
+  readonly grammar?: AttributeGrammar<V>;
+  readonly property?: P;
 }
 
-/** All of them, read. */
-export interface Attributes {
-  readonly credentials: RequestCredentials;
-  readonly loading: Loading;
-  readonly camera: CameraSettings;
-  /** Time constant of the camera's motion, ms. */
-  readonly interpolationDecay: number;
-  readonly touchAction: TouchAction;
-  /** Most drawn pixels for one CSS pixel. */
-  readonly maxPixelRatio: number;
-  /** Most that a picture in motion may take on the GPU, ms; infinite where the display says. */
-  readonly frameBudget: number;
-  /** The renderer's mix of accuracy and speed. */
-  readonly quality: QualityChoice;
-  /** Spherical harmonics above this degree are not evaluated. */
-  readonly maxShDegree: ShDegree;
-  readonly detail: DetailChoice;
-  readonly reveal: Reveal;
-  readonly navigation: Navigation;
-  /** Rest before the camera turns by itself, ms. */
-  readonly autoRotateDelay: number;
-  /** Radians. */
-  readonly rotationPerSecond: number;
-  readonly interactionPrompt: InteractionPrompt;
-  readonly interactionPromptStyle: InteractionPromptStyle;
-  /** Rest before the prompt is shown, ms. */
-  readonly interactionPromptThreshold: number;
-}
+/** Taken as it is written. */
+const text = <P = string | null>(): Attribute<P> => ({ lit: {} });
+/** On wherever it is written, but for `"false"`: what frameworks write that take it for an attribute with a value. */
+const flag = (): Attribute<boolean> => ({
+  lit: {
+    type: Boolean,
+    converter: { fromAttribute: (value: string | null): boolean => value !== null && value !== 'false' },
+  },
+});
+const read = <V, P = string | null>(grammar: AttributeGrammar<V>): Attribute<P, V> => ({ lit: {}, grammar });
+const number = <V>(grammar: AttributeGrammar<V>): Attribute<number | string | null, V> => ({ lit: {}, grammar });
+/** The first is the default. */
+const keyword = <V extends string>(words: readonly V[]): Attribute<V | null, V> => read(keywordGrammar(words));
+/** `''` is what the bare attribute gives. */
+const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> => read(keywordGrammar(words));
 
-const orbit = orbitGrammar('0deg 75deg auto');
-const orbitLimit = orbitGrammar('auto');
-const crossorigin = keywordGrammar(['anonymous', 'use-credentials']);
-const loading = keywordGrammar<Loading>(['lazy', 'eager']);
-const touchAction = keywordGrammar<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']);
-const quality = keywordGrammar<QualityChoice>(['auto', ...(Object.keys(QUALITIES) as Quality[])]);
-const maxShDegree = keywordGrammar(['3', '2', '1', '0']);
+const map = <A, B>(grammar: AttributeGrammar<A>, to: (value: A) => B): AttributeGrammar<B> => ({
+  ...grammar,
+  parse: (written) => {
+    const value = grammar.parse(written);
+    return value === null ? null : to(value);
+  },
+});
+const milliseconds = (fallback: number): AttributeGrammar<number> =>
+  map(numberGrammar(fallback, 0, 'milliseconds, 0 or more'), timerMs);
 /** The renderer's own limit. */
 const MOST_DETAIL_PIXELS = 64;
-const detail: AttributeGrammar<DetailChoice> = {
+const detailGrammar: AttributeGrammar<DetailChoice> = {
   expected: `auto, off, or at most ${MOST_DETAIL_PIXELS} pixels such as 1px`,
   fallback: 'auto',
-  parse: (text) => {
-    const word = text.trim().toLowerCase();
+  parse: (written) => {
+    const word = written.trim().toLowerCase();
     if (word === 'auto' || word === 'off') return word;
     const pixels = /^(\d+\.?\d*|\.\d+)px$/.test(word) ? parseFloat(word) : NaN;
     return pixels <= MOST_DETAIL_PIXELS ? pixels : null;
   },
 };
-const reveal = keywordGrammar<Reveal>(['auto', 'manual']);
-const navigation = keywordGrammar<Navigation>(['orbit', 'fly']);
-const interactionPrompt = keywordGrammar<InteractionPrompt>(['auto', 'none']);
-const interactionPromptStyle = keywordGrammar<InteractionPromptStyle>(['basic', 'wiggle']);
-const milliseconds = (fallback: number): AttributeGrammar<number> => {
-  const grammar = numberGrammar(fallback, 0, 'milliseconds, 0 or more');
-  return {
-    ...grammar,
-    parse: (text) => {
-      const value = grammar.parse(text);
-      return value === null ? null : timerMs(value);
-    },
-  };
+
+export const ATTRIBUTES = {
+  /**
+   * URL of the scene. The property takes a local file as well: `element.src = file`, a `File` or `Blob`, which the browser keeps until the page goes. An object URL of your own does well to have
+   * the name behind it, which tells a `.splat` for sure: `URL.createObjectURL(file) + '#' + encodeURIComponent(file.name)`.
+   */
+  src: text<string | Blob | null>(),
+  /**
+   * As of `<img>`: `use-credentials` sends cookies to other origins.
+   * @default `anonymous`
+   */
+  crossorigin: bareKeyword(['anonymous', 'use-credentials']),
+  /**
+   * Text alternative; empty for decoration.
+   * @default the host's `aria-label`, else "3D scene"
+   */
+  alt: text(),
+  /** URL of an image shown until the scene is. */
+  poster: text(),
+  /**
+   * `lazy` waits until the element is in sight, `eager` does not.
+   * @default `lazy`
+   */
+  loading: keyword<Loading>(['lazy', 'eager']),
+  /**
+   * `auto`: the poster gives way as soon as the scene can be drawn. `manual` keeps it, and a lazy scene unloaded, until a click on it or `dismissPoster()`.
+   * @default `auto`
+   */
+  reveal: keyword<Reveal>(['auto', 'manual']),
+  /** Lets people orbit, pan and zoom with mouse, touch and keyboard. */
+  cameraControls: flag(),
+  /**
+   * Theta, phi, radius: `deg` or `rad`; `m`, `cm`, `mm`, or `%` of the radius that frames the scene (all of a subject that stands alone, of others the 90 % of splats around the middle); `auto`, also
+   * for what is left out at the end. As in `<model-viewer>`, but for `calc()` and `env()`. Where the camera goes: see `getCameraOrbit()`.
+   * @default `0deg 75deg auto`
+   */
+  cameraOrbit: read(orbitGrammar('0deg 75deg auto')),
+  /**
+   * x y z in metres of viewer space (y up, right-handed); `auto` is the middle of the scene.
+   * @default `auto`
+   */
+  cameraTarget: read(targetGrammar),
+  /**
+   * Vertical angle, such as `45deg`.
+   * @default `auto` (45deg)
+   */
+  fieldOfView: read(fieldOfViewGrammar),
+  /**
+   * Least `camera-orbit`.
+   * @default `auto`: phi 22.5deg, radius 2 %
+   */
+  minCameraOrbit: read(orbitGrammar('auto')),
+  /**
+   * Greatest `camera-orbit`.
+   * @default `auto`: phi 157.5deg, radius 500 %
+   */
+  maxCameraOrbit: read(orbitGrammar('auto')),
+  /**
+   * Least `field-of-view`.
+   * @default `auto` (1deg)
+   */
+  minFieldOfView: read(fieldOfViewGrammar),
+  /**
+   * Greatest `field-of-view`.
+   * @default `auto` (160deg)
+   */
+  maxFieldOfView: read(fieldOfViewGrammar),
+  /**
+   * Time constant of the camera's motion in milliseconds. 0, or a wish for less motion, jumps.
+   * @default `50`
+   */
+  interpolationDecay: number(milliseconds(50)),
+  /**
+   * One-finger moves that stay the page's: `pan-y`, so that pages scroll, `pan-x`, `none`, `auto`, `manipulation`.
+   * @default `pan-y`
+   */
+  touchAction: keyword<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']),
+  /** Leaves the wheel and all that two fingers do to the page; keys do not zoom either. */
+  disableZoom: flag(),
+  /** Keeps the camera's target where it is. */
+  disablePan: flag(),
+  /** Keeps the camera's target where it is on a double click or a double tap, which otherwise pick the point to turn around. */
+  disableTap: flag(),
+  /**
+   * `orbit` turns around the target; `fly` looks around, and flies by W, A, S, D, Q and E, with Shift faster.
+   * @default `orbit`
+   */
+  navigation: keyword<Navigation>(['orbit', 'fly']),
+  /** Turns the camera around the scene while nobody touches it; not for people who want less motion, nor under the keyboard; visitors can stop it. */
+  autoRotate: flag(),
+  /**
+   * Rest before it turns, in milliseconds.
+   * @default `3000`
+   */
+  autoRotateDelay: number(milliseconds(3_000)),
+  /**
+   * How fast it turns, such as `30deg`.
+   * @default `5.625deg`
+   */
+  rotationPerSecond: read(angleGrammar('5.625deg')),
+  /**
+   * `auto` shows people who have not touched the scene that they can; `none` does not.
+   * @default `auto`
+   */
+  interactionPrompt: keyword<InteractionPrompt>(['auto', 'none']),
+  /**
+   * `basic` stands still; `wiggle` moves the camera to and fro once, which draws frames.
+   * @default `basic`
+   */
+  interactionPromptStyle: keyword<InteractionPromptStyle>(['basic', 'wiggle']),
+  /**
+   * Rest before the prompt is shown, in milliseconds.
+   * @default `3000`
+   */
+  interactionPromptThreshold: number(milliseconds(3_000)),
+  /**
+   * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`,
+   * `show` (`…` stands for `alt`), `loading`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
+   * @default English
+   */
+  a11y: text<SpokenStrings | string | null>(),
+  /**
+   * What points up in the scene's frame: an axis, `x`, `-x`, `y`, `-y` (trainers write y down), `z`, `-z`, or a direction such as `0.1 -1 0.2` for a capture that is tilted; the playground finds it from three points of the floor. A
+   * generator whose contract declares another axis has that one.
+   * @default `-y`
+   */
+  up: read(upGrammar),
+  /**
+   * Most drawn pixels for each CSS pixel.
+   * @default no limit
+   */
+  // Far below any ratio in use, so that 0 is refused but thumbnails of pixels are not.
+  maxPixelRatio: number(numberGrammar(Infinity, 1 / 64, 'drawn pixels for each CSS pixel, above 0')),
+  /**
+   * Milliseconds of the GPU that a picture in motion may take with `quality="auto"`, where the page draws other things, too; else 0.8 of the display's interval, shared by the elements that draw at the same time.
+   * @default the display's
+   */
+  frameBudget: number(numberGrammar(Infinity, 0.01, 'milliseconds, 0.01 or more')),
+  /**
+   * Accuracy against speed: `reference` (75 dB to the true image), `default` (59 dB, exact on a display), `balanced` (42 dB), `fast` (36 dB); `reference` fetches a scene again whose colours were rounded to 8 bits for the others; `auto` is `default` at
+   * rest and, in motion, as much of it as there is time for.
+   * @default `auto`
+   */
+  quality: keyword<QualityChoice>(['auto', 'default', 'reference', 'balanced', 'fast']),
+  /**
+   * Highest degree of spherical harmonics that colours are made of: 0, the same from everywhere, to 3. Whatever the file has beyond it is kept, but not evaluated.
+   * @default `3`
+   */
+  maxShDegree: number(map(keywordGrammar(['3', '2', '1', '0']), (degree) => Number(degree) as ShDegree)),
+  /**
+   * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every picture to be off by so many.
+   * @default `auto`
+   */
+  detail: read(detailGrammar),
+  /**
+   * Contract of a generator: a URL, its JSON, or as a property the object.
+   * @default in the model or beside it
+   */
+  contract: text<string | object | null>(),
+  /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */
+  chain: text(),
+  /** URL of a post-processor that makes the picture shown from the one drawn, or several with spaces between them. */
+  postprocess: text(),
+  /** Seconds: where the scene's time is put whenever this changes. See `currentTime` for where it is. */
+  time: text<number | string | null>(),
+  /**
+   * Pose of a generator, flattened or nested, as its contract declares it: text, a list, a typed array. A new pose is a new object.
+   * @default the rest pose
+   */
+  pose: text<Numbers | null>(),
+  /** Plays a scene that moves as soon as it is on show; not for people who want less motion; visitors can stop it. */
+  autoplay: flag(),
+  /** Starts again at the end. */
+  loop: flag(),
 };
-const interpolationDecay = milliseconds(50);
-const threeSeconds = milliseconds(3_000);
-const rotationPerSecond = angleGrammar('5.625deg');
-// Far below any ratio in use, so that 0 is refused but thumbnails of pixels are not.
-const maxPixelRatio = numberGrammar(Infinity, 1 / 64, 'drawn pixels for each CSS pixel, above 0');
-const frameBudget = numberGrammar(Infinity, 0.01, 'milliseconds, 0.01 or more');
+
+type Table = typeof ATTRIBUTES;
+type Grammars = {
+  [
+    K in keyof Table as Table[K] extends { grammar?: AttributeGrammar<infer V> }
+      ? [V] extends [never]
+        ? never
+        : K
+      : never
+  ]: Table[K];
+};
+
+/** The properties of all attributes. */
+export type AttributeProperties = {
+  -readonly [K in keyof Table]: Table[K] extends Attribute<infer P, unknown> ? P : never;
+};
+
+/** An attribute's raw value: text, or what a property was given instead. */
+export type Raw = string | number | null | undefined;
+
+/** The properties read here, by their attributes' camel-case names. */
+export type RawAttributes = { readonly [K in keyof Grammars]: Raw };
+
+/** All of them, read. */
+export type Attributes = {
+  readonly [K in keyof Grammars]: Grammars[K] extends { grammar?: AttributeGrammar<infer V> } ? V : never;
+} & { readonly camera: CameraSettings };
+
+const entries = Object.entries(ATTRIBUTES) as [keyof Table, Attribute<unknown, unknown>][];
+const attributeOf = (property: string): string => property.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`);
+
+/** Fetch's word for it. */
+export const credentialsOf = (crossorigin: Attributes['crossorigin']): RequestCredentials =>
+  crossorigin === 'use-credentials' ? 'include' : 'same-origin';
+
+/** What Lit is told of them. */
+export const declarations = (): PropertyDeclarations =>
+  Object.fromEntries(entries.map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
+
+/** The properties that are on or off. */
+export const flags = entries.filter(([, { lit }]) => lit.type === Boolean).map(([name]) => name);
 
 /** Reads all attributes; `warn` gets one sentence for each malformed one. */
 export function readAttributes(raw: RawAttributes, warn: (sentence: string) => void): Attributes {
-  const read = <T>(name: string, text: Raw, grammar: AttributeGrammar<T>): T =>
-    readAttribute(name, text, grammar, warn);
+  const values = Object.fromEntries(
+    entries.flatMap(([name, { grammar }]) =>
+      grammar ? [[name, readAttribute(attributeOf(name), raw[name as keyof Grammars], grammar, warn)]] : [],
+    ),
+  ) as unknown as Omit<Attributes, 'camera'>;
   return {
-    credentials: read('crossorigin', raw.crossorigin, crossorigin) === 'use-credentials' ? 'include' : 'same-origin',
-    loading: read('loading', raw.loading, loading),
-    interpolationDecay: read('interpolation-decay', raw.interpolationDecay, interpolationDecay),
-    touchAction: read('touch-action', raw.touchAction, touchAction),
-    maxPixelRatio: read('max-pixel-ratio', raw.maxPixelRatio, maxPixelRatio),
-    frameBudget: read('frame-budget', raw.frameBudget, frameBudget),
-    quality: read('quality', raw.quality, quality),
-    maxShDegree: Number(read('max-sh-degree', raw.maxShDegree, maxShDegree)) as ShDegree,
-    detail: read('detail', raw.detail, detail),
-    reveal: read('reveal', raw.reveal, reveal),
-    navigation: read('navigation', raw.navigation, navigation),
-    autoRotateDelay: read('auto-rotate-delay', raw.autoRotateDelay, threeSeconds),
-    rotationPerSecond: read('rotation-per-second', raw.rotationPerSecond, rotationPerSecond),
-    interactionPrompt: read('interaction-prompt', raw.interactionPrompt, interactionPrompt),
-    interactionPromptStyle: read('interaction-prompt-style', raw.interactionPromptStyle, interactionPromptStyle),
-    interactionPromptThreshold: read('interaction-prompt-threshold', raw.interactionPromptThreshold, threeSeconds),
+    ...values,
     camera: {
-      orbit: read('camera-orbit', raw.cameraOrbit, orbit),
-      target: read('camera-target', raw.cameraTarget, targetGrammar),
-      fieldOfView: read('field-of-view', raw.fieldOfView, fieldOfViewGrammar),
-      minOrbit: read('min-camera-orbit', raw.minCameraOrbit, orbitLimit),
-      maxOrbit: read('max-camera-orbit', raw.maxCameraOrbit, orbitLimit),
-      minFieldOfView: read('min-field-of-view', raw.minFieldOfView, fieldOfViewGrammar),
-      maxFieldOfView: read('max-field-of-view', raw.maxFieldOfView, fieldOfViewGrammar),
-      up: read('up', raw.up, upGrammar),
+      orbit: values.cameraOrbit,
+      target: values.cameraTarget,
+      fieldOfView: values.fieldOfView,
+      minOrbit: values.minCameraOrbit,
+      maxOrbit: values.maxCameraOrbit,
+      minFieldOfView: values.minFieldOfView,
+      maxFieldOfView: values.maxFieldOfView,
+      up: values.up,
     },
   };
 }

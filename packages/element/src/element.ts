@@ -1,5 +1,5 @@
 import { isServer, type PropertyValues, type TemplateResult } from 'lit';
-import { adoptStyles } from './adopt-styles.js';
+import { adoptStyles, styles } from './styles.js';
 import { readAttributes, type Attributes } from './attributes.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from './gpu/shared-device.js';
@@ -7,8 +7,8 @@ import { SceneLoader } from './loading/scene-loader.js';
 import type { LiveState } from './live/live-model.js';
 import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
 import { Stage } from './stage.js';
+import type { StageHost } from './stage-host.js';
 import type { SceneStats } from './stats.js';
-import { styles } from './styles.js';
 import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
 import { readSpokenStrings, type SpokenStrings } from './words.js';
@@ -131,7 +131,7 @@ export class GaussianSplatElement extends ViewingMethods {
     super();
     this.#attributes = this.#readAttributes();
     this.#internals = isServer ? null : this.attachInternals();
-    this.stage = this.#createStage();
+    this.stage = new Stage(this, GaussianSplatElement.#hostOf(this));
   }
 
   /** True while the scene is on show. */
@@ -269,30 +269,53 @@ export class GaussianSplatElement extends ViewingMethods {
     });
   }
 
-  #createStage(): Stage {
-    const part = <T extends HTMLElement>(selector: string): T | null => this.renderRoot?.querySelector<T>(selector);
-    return new Stage(this, {
-      attributes: () => this.#attributes,
-      input: () => ({
-        enabled: this.cameraControls,
-        zoom: !this.disableZoom,
-        pan: !this.disablePan,
-        touchAction: this.#attributes.touchAction,
-      }),
-      services: () => this.constructor as typeof GaussianSplatElement,
-      economy: () => this.economy || null,
-      loops: () => this.loop,
-      autoplays: () => this.autoplay,
-      startTime: () => (Number.isFinite(this.#startTime) ? this.#startTime : 0),
-      autoRotates: () => this.autoRotate,
-      retargets: () => !this.disableTap && !this.disablePan,
-      strings: () => this.#strings,
-      liveValues: () => this.#liveValues,
-      canvas: () => part<HTMLCanvasElement>('canvas') ?? null,
-      surface: () => part('#view') ?? null,
-      hotspotLayer: () => part('#hotspots') ?? null,
-      warn: (sentence) => this.#warn(sentence),
-    });
+  /** What the stage knows of an element. */
+  static #hostOf(element: GaussianSplatElement): StageHost {
+    const part = <T extends HTMLElement>(selector: string): T | null =>
+      element.renderRoot?.querySelector<T>(selector) ?? null;
+    return {
+      get attributes() {
+        return element.#attributes;
+      },
+      get input() {
+        const { cameraControls: enabled, disableZoom, disablePan } = element;
+        return { enabled, zoom: !disableZoom, pan: !disablePan, touchAction: element.#attributes.touchAction };
+      },
+      get services() {
+        return element.constructor as typeof GaussianSplatElement;
+      },
+      get loops() {
+        return element.loop;
+      },
+      get autoplays() {
+        return element.autoplay;
+      },
+      get startTime() {
+        return Number.isFinite(element.#startTime) ? element.#startTime : 0;
+      },
+      get autoRotates() {
+        return element.autoRotate;
+      },
+      get retargets() {
+        return !element.disableTap && !element.disablePan;
+      },
+      get strings() {
+        return element.#strings;
+      },
+      get liveValues() {
+        return element.#liveValues;
+      },
+      get canvas() {
+        return part<HTMLCanvasElement>('canvas');
+      },
+      get surface() {
+        return part('#view');
+      },
+      get hotspotLayer() {
+        return part('#hotspots');
+      },
+      warn: (sentence) => element.#warn(sentence),
+    };
   }
 
   /** The page's own words, where it has some. */

@@ -15,7 +15,7 @@ export type {
 export { GaussianSplatElement, type SceneStatistics } from './element.js';
 export type { SceneStats } from './stats.js';
 export type { PaceReport } from './controllers/pace-controller.js';
-export type { SettableProperties } from './settable.js';
+export type { SettableProperties } from './media.js';
 export type { PictureOptions } from './viewing.js';
 export type {
   InteractionPrompt,

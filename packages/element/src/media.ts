@@ -2,6 +2,16 @@ import { notPlayed } from './controllers/playback-controller.js';
 import { SplatProperties } from './properties.js';
 import type { Stage } from './stage.js';
 import { SceneTimeRanges } from './time-ranges.js';
+import type { LitElement } from 'lit';
+
+/**
+ * The properties that a page may set, for the typings of frameworks: those of the attributes, and of time `currentTime` and `playbackRate`.
+ * Methods and what can only be read (`error`, `duration`, ...) are left out: a framework that sets them throws.
+ */
+export type SettableProperties = Partial<
+  Pick<SplatProperties, Exclude<keyof SplatProperties, keyof LitElement>> &
+    Pick<MediaProperties, 'currentTime' | 'playbackRate'>
+>;
 
 /** What HTMLMediaElement.readyState says of a scene: nothing yet, or all there is. */
 const HAVE_NOTHING = 0;

@@ -3,8 +3,8 @@ import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';
 import { ScenePoint } from './camera/values.js';
 import type { CameraController } from './controllers/camera-controller.js';
+import type { SceneController } from './controllers/scene-controller.js';
 import { isGone } from './gpu/device-failures.js';
-import type { GpuScene } from './gpu/gpu-scene.js';
 
 /** A box in viewer space, its sides along the axes. */
 export interface SceneBox {
@@ -12,26 +12,26 @@ export interface SceneBox {
   readonly max: ScenePoint;
 }
 
-export interface QueryOptions {
+export interface QueryHost {
   readonly camera: CameraController;
-  readonly scene: () => GpuScene | null;
+  readonly scene: Pick<SceneController, 'scene'>;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
-  readonly drawnFrom: () => Camera | undefined;
+  readonly drawnFrom: Camera | undefined;
   readonly element: HTMLElement;
 }
 
 /** Questions about the scene on show: where it is, and what lies under a point of the page. */
 export class SceneQueries {
-  readonly #options: QueryOptions;
+  readonly #host: QueryHost;
 
-  constructor(options: QueryOptions) {
-    this.#options = options;
+  constructor(host: QueryHost) {
+    this.#host = host;
   }
 
   /** Box around nearly all of the scene; null while none is on show. */
   get box(): SceneBox | null {
-    const { camera, scene } = this.#options;
-    const bounds = scene()?.bounds;
+    const { camera, scene } = this.#host;
+    const bounds = scene.scene?.bounds;
     if (bounds === undefined) return null;
     const [a, b] = [toViewer(camera.viewerFrame, bounds.min), toViewer(camera.viewerFrame, bounds.max)];
     const corner = (pick: (p: number, q: number) => number): ScenePoint =>
@@ -45,8 +45,8 @@ export class SceneQueries {
    * @returns null beside the scene, where it is more transparent than not, or if the frame is gone meanwhile.
    */
   async positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
-    const { camera, scene, drawnFrom, element } = this.#options;
-    const [drawn, gpuScene] = [drawnFrom(), scene()];
+    const { camera, scene, drawnFrom: drawn, element } = this.#host;
+    const gpuScene = scene.scene;
     const { left, top, width, height } = element.getBoundingClientRect();
     if (drawn === undefined || gpuScene === null || element.clientWidth === 0) return null;
     // The page's pixels are the element's own, scaled by transforms and zooms around it.

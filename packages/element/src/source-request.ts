@@ -1,7 +1,7 @@
 /** From what an element's attributes say to addresses and requests. */
-import type { Attributes } from './attributes.js';
+import { credentialsOf, type Attributes } from './attributes.js';
 import type { SceneRequest } from './loading/protocol.js';
-import type { Source } from './stage-options.js';
+import type { Source } from './stage-host.js';
 
 /** A page's hand in every address; null or undefined for none. */
 export type UrlModifier = ((url: string) => string) | null | undefined;
@@ -35,14 +35,14 @@ export class Addresses {
   /** The scene that is asked for; null for none. */
   request(
     { src, contract, chain }: Source,
-    { credentials, quality, detail }: Pick<Attributes, 'credentials' | 'quality' | 'detail'>,
+    { crossorigin, quality, detail }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail'>,
     modifier: UrlModifier,
   ): SceneRequest | null {
     const [url] = this.#src.of(src ? [src] : [], modifier);
     if (url === undefined) return null;
     return {
       url,
-      credentials,
+      credentials: credentialsOf(crossorigin),
       sh: quality === 'reference' ? 'float16' : 'auto',
       levels: typeof detail === 'number' && detail > 0,
       contract,

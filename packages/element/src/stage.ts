@@ -1,38 +1,52 @@
 import type { Camera } from '@gaussian-splat/core';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import type { ReactiveControllerHost } from 'lit';
-import { Behaviours } from './behaviours.js';
+import { Behaviours, type BehaviourHost } from './behaviours.js';
+import type { CameraAction } from './camera/gestures.js';
 import { CameraController } from './controllers/camera-controller.js';
-import { DetailController } from './controllers/detail-controller.js';
-import { EconomyController } from './controllers/economy-controller.js';
-import { HotspotController } from './controllers/hotspot-controller.js';
+import { DetailController, type DetailHost } from './controllers/detail-controller.js';
+import { HotspotController, type HotspotHost } from './controllers/hotspot-controller.js';
+import { InputController, type InputHost } from './controllers/input-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
-import { PlaybackController } from './controllers/playback-controller.js';
+import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
 import { PrintController } from './controllers/print-controller.js';
-import { InputController } from './controllers/input-controller.js';
-import { RevealController } from './controllers/reveal-controller.js';
-import { SceneController } from './controllers/scene-controller.js';
-import { SourceController } from './controllers/source-controller.js';
+import { RevealController, type RevealHost } from './controllers/reveal-controller.js';
+import { SceneController, type Entrance, type SceneHost } from './controllers/scene-controller.js';
 import { SizeController } from './controllers/size-controller.js';
-import { ViewController } from './controllers/view-controller.js';
+import { SourceController, type SourceHost } from './controllers/source-controller.js';
+import { ViewController, type ViewHost } from './controllers/view-controller.js';
 import { VisibilityController } from './controllers/visibility-controller.js';
+import { ElementCore } from './element-core.js';
+import type { ElementError } from './errors.js';
+import type { CameraChangeSource } from './events.js';
 import { isGone } from './gpu/device-failures.js';
-import { FrameScheduler } from './gpu/frame-scheduler.js';
-import type { GaussianSplatEventMap } from './events.js';
-import { defaultMemoryBudget } from './gpu/memory-budget.js';
-import { LiveWiring } from './live/live-wiring.js';
-import { SceneQueries } from './scene-queries.js';
+import type { GpuScene } from './gpu/gpu-scene.js';
+import { LiveWiring, type LiveHost } from './live/live-wiring.js';
+import { SceneQueries, type QueryHost } from './scene-queries.js';
+import type { Source, StageHost } from './stage-host.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
-import type { Source, StageOptions } from './stage-options.js';
-import { windowOf } from './window-of.js';
 
 /**
  * All that goes on behind the element's attributes and markup: scene, camera, size, sight and input, and who of them
- * tells whom. Fires the element's events.
+ * tells whom. Fires the element's events. It is the host of all controllers: each of them says in an interface of its own what it asks of it.
  */
-export class Stage {
+export class Stage
+  extends ElementCore
+  implements
+    ViewHost,
+    SceneHost,
+    SourceHost,
+    DetailHost,
+    RevealHost,
+    HotspotHost,
+    PlaybackHost,
+    InputHost,
+    BehaviourHost,
+    QueryHost,
+    LiveHost
+{
   readonly camera: CameraController;
   readonly scene: SceneController;
-  readonly economy: EconomyController;
   readonly detail: DetailController;
   readonly playback: PlaybackController;
   readonly reveal: RevealController;
@@ -41,89 +55,40 @@ export class Stage {
   readonly queries: SceneQueries;
   /** Share of the loading that is done, 0..1; null while it is not known. */
   progress: number | null = null;
-  readonly #host: ReactiveControllerHost & HTMLElement;
-  readonly #options: StageOptions;
+  readonly size: SizeController;
+  /** The camera of the last frame, in its pixels; undefined before there is one. */
+  drawnFrom: Camera | undefined;
   readonly #visibility: VisibilityController;
-  readonly #size: SizeController;
   readonly #view: ViewController;
   readonly #live: LiveWiring;
   readonly #source: SourceController;
-  #drawnFrom: Camera | undefined;
   #counts: ReadCounts | undefined;
   /** Bytes that have arrived, and how many there are. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
-  constructor(host: ReactiveControllerHost & HTMLElement, options: StageOptions) {
-    this.#host = host;
-    this.#options = options;
-    this.camera = new CameraController(options.attributes().camera, () => this.#view.requestFrame());
-    this.#visibility = new VisibilityController(host, () => this.#onVisibility());
-    this.#size = new SizeController(host, options.canvas, () => this.#onSize());
-    this.playback = new PlaybackController({
-      loops: options.loops,
-      startTime: options.startTime,
-      requestFrame: () => this.#view.requestFrame(),
-      dispatch: (type) => {
-        this.#dispatch(new Event(type));
-        // Custom states tell of them, too.
-        if (type === 'play' || type === 'pause') host.requestUpdate();
-      },
-    });
-    this.#view = this.#createView();
-    this.#live = new LiveWiring({
-      ...options,
-      playback: this.playback,
-      requestFrame: () => this.#view.requestFrame(),
-      dispatch: (event) => this.#dispatch(event),
-    });
-    this.scene = this.#createScene();
-    this.#source = new SourceController({
-      ...options,
-      isInSight: () => this.#visibility.isVisible && this.reveal.mayReveal,
-      isConnected: () => host.isConnected,
-      want: (request, mayStart) => this.scene.want(request, mayStart),
-      isOther: (request) => this.scene.isOther(request),
-    });
-    this.economy = new EconomyController({
-      economy: options.economy,
-      memoryBudget: () => this.#memoryBudget(),
-      onChange: () => this.#onOtherSplats(),
-      warn: options.warn,
-    });
-    this.detail = new DetailController({
-      detail: () => options.attributes().detail,
-      loader: () => options.services().sceneLoader,
-      memoryBudget: () => this.#memoryBudget(),
-      onChange: () => this.#onOtherSplats(),
-      warn: options.warn,
-    });
-    this.reveal = new RevealController(host, {
-      mode: () => options.attributes().reveal,
-      isReady: () => this.scene.state === 'ready' || this.scene.isPreview,
-      onDismissed: () => this.#onRevealed(),
-    });
-    this.behaviours = this.#createBehaviours();
-    this.hotspots = new HotspotController(host, {
-      layer: options.hotspotLayer,
-      viewerFrame: () => this.camera.viewerFrame,
-      scale: () => this.camera.bounds.radius,
-      probe: async (points) => (await this.scene.scene?.probe(points)) ?? [],
-      warn: options.warn,
-    });
-    new PrintController(host, () => this.drawNow());
-    this.queries = new SceneQueries({
-      camera: this.camera,
-      scene: () => this.scene.scene,
-      drawnFrom: () => this.#drawnFrom,
-      element: host,
-    });
-    new InputController(host, options.surface, options.input, {
-      act: (action) => this.behaviours.act(action),
-      pick: (x, y) => void this.#retarget(x, y),
-      toggleMotion: () => this.#toggleMotion(),
-    });
+  constructor(element: ReactiveControllerHost & HTMLElement, host: StageHost) {
+    super(element, host);
+    this.camera = new CameraController(host.attributes.camera, () => this.requestFrame());
+    this.#visibility = new VisibilityController(element, () => this.#onVisibility());
+    this.size = new SizeController(
+      element,
+      () => host.canvas,
+      () => this.#onSize(),
+    );
+    this.playback = new PlaybackController(this);
+    this.#view = new ViewController(this);
+    this.#live = new LiveWiring(this);
+    this.scene = new SceneController(element, this);
+    this.#source = new SourceController(this);
+    this.detail = new DetailController(this);
+    this.reveal = new RevealController(element, this);
+    this.behaviours = new Behaviours(element, this);
+    this.hotspots = new HotspotController(element, this);
+    new PrintController(element, () => this.drawNow());
+    this.queries = new SceneQueries(this);
+    new InputController(element, this);
     const onPageVisibility = (): void => this.playback.suspend();
-    host.addController({
+    element.addController({
       hostConnected: () => {
         document.addEventListener('visibilitychange', onPageVisibility);
         // Put back after a while, an eager element loads again though nothing has come into sight.
@@ -151,12 +116,11 @@ export class Stage {
   get stats(): SceneStats | null {
     const { scene } = this.scene;
     if (scene === null) return null;
-    const { quality } = this.#options.attributes();
+    const { quality } = this.attributes;
     return statsOf(scene, {
       quality,
       pace: this.#view.pace.report,
       counts: this.#counts,
-      economy: this.economy.report,
       isPreview: this.scene.isPreview,
     });
   }
@@ -164,7 +128,7 @@ export class Stage {
   /** Asks the GPU for the counts of the picture on show. */
   async updateStats(): Promise<SceneStats | null> {
     const { scene } = this.scene;
-    const camera = this.#drawnFrom;
+    const camera = this.drawnFrom;
     if (scene === null || camera === undefined) return this.stats;
     try {
       const counts = await scene.readCounts(camera);
@@ -187,7 +151,7 @@ export class Stage {
   reload(): void {
     this.scene.want(null, false);
     this.#source.renew();
-    this.#host.requestUpdate();
+    this.element.requestUpdate();
   }
 
   /** Whether a source asks for another scene than the one that is shown or loaded. */
@@ -205,7 +169,7 @@ export class Stage {
   prepareToPlay(): void {
     this.#source.needNow(true);
     if (!this.reveal.mayReveal) this.reveal.dismiss();
-    this.#host.requestUpdate();
+    this.element.requestUpdate();
   }
 
   /** Asks for a frame: a changed attribute may concern the picture, for example its pixel ratio. */
@@ -218,179 +182,190 @@ export class Stage {
     this.#view.renewCanvas();
   }
 
-  #createView(): ViewController {
-    const { attributes, canvas } = this.#options;
-    return new ViewController({
-      scheduler: () => FrameScheduler.of(windowOf(this.#host)),
-      camera: this.camera,
-      size: this.#size,
-      canvasOf: canvas,
-      isVisible: () => this.#visibility.isVisible,
-      maxPixelRatio: () => attributes().maxPixelRatio,
-      frameBudget: () => attributes().frameBudget,
-      rendering: () => ({ quality: attributes().quality, shDegree: attributes().maxShDegree }),
-      decayMs: () => (prefersReducedMotion() ? 0 : attributes().interpolationDecay),
-      beforeFrame: (now) => this.behaviours.advance(now),
-      afterFrame: (camera) => {
-        this.#drawnFrom = camera;
-        this.hotspots.frameDrawn(camera);
-      },
-      onFrame: (scene, camera, now) => {
-        // The last picture of a scene whose place another will take stays as it is.
-        if (!this.scene.isOutgoing) this.#live.advance(scene, camera, now);
-      },
-      onCameraChange: (source) => {
-        this.behaviours.announcer.cameraMoved();
-        this.#dispatch(new CustomEvent('camera-change', { detail: { source } }));
-      },
-      onPace: (isWhole) => this.detail.notePace(isWhole),
-      onError: (error) => this.scene.fail(error),
-    });
+  // What the controllers ask.
+
+  get isVisible(): boolean {
+    return this.#visibility.isVisible;
   }
 
-  #createScene(): SceneController {
-    const { services } = this.#options;
-    return new SceneController(this.#host, {
-      device: () => services().sharedDevice,
-      loader: () => services().sceneLoader,
-      releaseDelayMs: () => services().releaseDelay,
-      show: (scene, entrance) => {
-        this.#counts = undefined;
-        if (entrance === 'new') this.camera.frame(scene.bounds);
-        if (entrance === 'whole') this.camera.refine(scene.bounds);
-        this.playback.setDuration(scene.live?.duration ?? NaN);
-        this.#live.post.attach(scene);
-        return this.#view.show(scene);
+  /** Somebody would see the scene. */
+  get isInSight(): boolean {
+    return this.isVisible && this.reveal.mayReveal;
+  }
+
+  /** The scene is on show, in sight, and no poster covers it. */
+  get isOnShow(): boolean {
+    return !this.reveal.isCovered && this.isVisible;
+  }
+
+  get hasPicture(): boolean {
+    return this.scene.state === 'ready' || this.scene.isPreview;
+  }
+
+  get wantsPreviews(): boolean {
+    return this.isVisible;
+  }
+
+  get liveRequest(): SceneHost['liveRequest'] {
+    return {
+      runtimeLocation: this.services.runtimeLocation,
+      state: () => this.#live.state,
+      ownsControls: () => !this.#live.post.isWanted,
+      camera: (bounds) => {
+        if (bounds) this.camera.frame(bounds);
+        return this.camera.view(...FIRST_SIZE);
       },
-      hide: (clear) => {
-        this.#live.post.attach(null);
-        this.playback.suspend();
-        if (!clear) return this.#view.pause();
-        this.playback.empty();
-        this.#drawnFrom = undefined;
-        this.hotspots.forget();
-        this.#view.clear();
-      },
-      frameUrl: (url) => this.#options.services().urlModifier?.(url) ?? url,
-      loops: this.#options.loops,
-      wantsPreviews: () => this.#visibility.isVisible,
-      onPreview: ({ gaussians }) => this.#onPreview(gaussians.count),
-      memoryBudget: () => this.#memoryBudget(),
-      live: () => ({
-        runtimeLocation: services().runtimeLocation,
-        state: () => this.#live.state,
-        ownsControls: () => !this.#live.post.isWanted,
-        camera: (bounds) => {
-          if (bounds) this.camera.frame(bounds);
-          return this.camera.view(...FIRST_SIZE);
-        },
-        listeners: this.#live.listeners,
-      }),
-      onProgress: (...progress) => this.#onProgress(...progress),
-      onStart: () => this.#dispatch(new Event('loadstart')),
-      onLoad: (url) => this.#onLoad(url),
-      onEmptied: () => {
-        this.#source.needNow(false);
-        this.progress = null;
-        this.playback.empty();
-        this.playback.stopWaits();
-        this.#dispatch(new Event('emptied'));
-      },
-      onError: (error) => {
-        this.progress = null;
-        this.#dispatch(new CustomEvent('error', { detail: error }));
-      },
-      onContext: (type) => this.#dispatch(new Event(type)),
-    });
+      listeners: this.#live.listeners,
+    };
   }
 
-  #memoryBudget(): number | undefined {
-    return this.#options.services().memoryBudget ?? defaultMemoryBudget();
+  async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
+    return (await this.scene.scene?.probe(points)) ?? [];
   }
 
-  #createBehaviours(): Behaviours {
-    const { attributes, autoRotates, autoplays, strings, surface, input } = this.#options;
-    return new Behaviours(this.#host, this.camera, {
-      attributes,
-      hasControls: () => input().enabled,
-      autoRotates,
-      autoplays,
-      playback: this.playback,
-      strings,
-      isOnShow: () => !this.reveal.isCovered && this.#visibility.isVisible,
-      surface,
-      requestFrame: () => this.#view.requestFrame(),
-    });
+  // What they tell.
+
+  beforeFrame(now: number): void {
+    this.behaviours.advance(now);
   }
 
-  #onLoad(url: string): void {
-    for (const type of ['loadeddata', 'canplay'] as const) this.#dispatch(new Event(type));
-    this.#dispatch(new CustomEvent('load', { detail: { url } }));
+  advanceScene(scene: GpuScene, camera: Camera, now: number): void {
+    // The last picture of a scene whose place another will take stays as it is.
+    if (!this.scene.isOutgoing) this.#live.advance(scene, camera, now);
   }
 
-  #onUpdate(): void {
-    this.reveal.settle();
-    const whole = this.scene.state === 'ready' ? this.scene.scene : null;
-    this.economy.update(whole);
-    this.detail.update(whole);
+  afterFrame(camera: Camera): void {
+    this.drawnFrom = camera;
+    this.hotspots.frameDrawn(camera);
   }
 
-  #onOtherSplats(): void {
+  cameraChanged(source: CameraChangeSource): void {
+    this.behaviours.announcer.cameraMoved();
+    this.dispatch(new CustomEvent('camera-change', { detail: { source } }));
+  }
+
+  /** Other splats are drawn of the scene on show. */
+  splatsChanged(): void {
     this.#counts = undefined;
     this.#view.requestFrame();
-    this.#host.requestUpdate();
+    this.element.requestUpdate();
   }
 
-  #onPreview(splats: number): void {
-    this.#host.requestUpdate();
-    this.#dispatch(new CustomEvent('preview', { detail: { splats } }));
-    this.#onProgress(...this.#bytes);
+  notePace(isWhole: boolean): void {
+    this.detail.notePace(isWhole);
   }
 
-  #onRevealed(): void {
-    this.#dispatch(new Event('poster-dismissed'));
+  drawingFailed(error: unknown): void {
+    this.scene.fail(error);
+  }
+
+  playbackEvent(type: PlaybackEvent): void {
+    this.dispatch(new Event(type));
+    // Custom states tell of them, too.
+    if (type === 'play' || type === 'pause') this.element.requestUpdate();
+  }
+
+  show(scene: GpuScene, entrance: Entrance): Promise<void> {
+    this.#counts = undefined;
+    if (entrance === 'new') this.camera.frame(scene.bounds);
+    if (entrance === 'whole') this.camera.refine(scene.bounds);
+    this.playback.setDuration(scene.live?.duration ?? NaN);
+    this.#live.post.attach(scene);
+    return this.#view.show(scene);
+  }
+
+  hide(clear: boolean): void {
+    this.#live.post.attach(null);
+    this.playback.suspend();
+    if (!clear) return this.#view.pause();
+    this.playback.empty();
+    this.drawnFrom = undefined;
+    this.hotspots.forget();
+    this.#view.clear();
+  }
+
+  loadStarted(): void {
+    this.dispatch(new Event('loadstart'));
+  }
+
+  progressed(loaded: number, total: number | undefined, share = total ? loaded / total : undefined): void {
+    this.#bytes = [loaded, total];
+    this.progress = share === undefined ? null : Math.min(1, share);
+    this.element.requestUpdate();
+    const lengthComputable = total !== undefined;
+    this.dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));
+  }
+
+  previewShown({ gaussians }: GpuScene): void {
+    this.element.requestUpdate();
+    this.dispatch(new CustomEvent('preview', { detail: { splats: gaussians.count } }));
+    this.progressed(...this.#bytes);
+  }
+
+  loaded(url: string): void {
+    for (const type of ['loadeddata', 'canplay'] as const) this.dispatch(new Event(type));
+    this.dispatch(new CustomEvent('load', { detail: { url } }));
+  }
+
+  emptied(): void {
+    this.#source.needNow(false);
+    this.progress = null;
+    this.playback.empty();
+    this.playback.stopWaits();
+    this.dispatch(new Event('emptied'));
+  }
+
+  failed(error: ElementError): void {
+    this.progress = null;
+    this.dispatch(new CustomEvent('error', { detail: error }));
+  }
+
+  contextChanged(type: 'contextlost' | 'contextrestored'): void {
+    this.dispatch(new Event(type));
+  }
+
+  posterDismissed(): void {
+    this.dispatch(new Event('poster-dismissed'));
     const mayPlay = this.playback.canPlay && this.playback.paused && !prefersReducedMotion();
-    if (this.#options.autoplays() && mayPlay && !this.behaviours.motion.isHeld) this.playback.play();
+    if (this.autoplays && mayPlay && !this.behaviours.motion.isHeld) this.playback.play();
+  }
+
+  act(action: CameraAction): void {
+    this.behaviours.act(action);
+  }
+
+  pick(clientX: number, clientY: number): void {
+    void this.queries.positionFromPoint(clientX, clientY).then((point) => {
+      if (point !== null && this.retargets) this.behaviours.aimAt([point.x, point.y, point.z]);
+    });
   }
 
   /** The space bar, for all that moves. A player's controls around the element have keys of their own. */
-  #toggleMotion(): boolean {
+  toggleMotion(): boolean {
     if (this.behaviours.motion.toggle()) return true;
-    if (!this.playback.canPlay || this.#host.slot === 'media') return false;
+    if (!this.playback.canPlay || this.element.slot === 'media') return false;
     if (this.playback.paused) this.playback.play();
     else this.playback.pause();
     return true;
   }
 
-  async #retarget(clientX: number, clientY: number): Promise<void> {
-    const point = await this.queries.positionFromPoint(clientX, clientY);
-    if (point !== null && this.#options.retargets()) this.behaviours.aimAt([point.x, point.y, point.z]);
+  #onUpdate(): void {
+    this.reveal.settle();
+    this.detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
   }
 
   #onVisibility(): void {
     this.#source.request();
     if (!this.#visibility.isVisible) this.playback.suspend();
-    this.#dispatch(new CustomEvent('model-visibility', { detail: { visible: this.#visibility.isVisible } }));
-    this.#host.requestUpdate();
+    this.dispatch(new CustomEvent('model-visibility', { detail: { visible: this.#visibility.isVisible } }));
+    this.element.requestUpdate();
     this.#view.requestFrame();
   }
 
   #onSize(): void {
     // Without a size, in a closed tab for one, there is no shape to follow.
-    if (!this.#size.isEmpty) this.camera.setAspect(this.#size.aspect);
+    if (!this.size.isEmpty) this.camera.setAspect(this.size.aspect);
     this.#view.requestFrame();
-  }
-
-  #onProgress(loaded: number, total: number | undefined, share = total ? loaded / total : undefined): void {
-    this.#bytes = [loaded, total];
-    this.progress = share === undefined ? null : Math.min(1, share);
-    this.#host.requestUpdate();
-    const lengthComputable = total !== undefined;
-    this.#dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));
-  }
-
-  #dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void {
-    this.#host.dispatchEvent(event);
   }
 }
 

@@ -1,5 +1,4 @@
 import type { QualityChoice } from './attributes.js';
-import type { EconomyReport } from './controllers/economy-controller.js';
 import type { PaceReport } from './controllers/pace-controller.js';
 import type { GpuScene } from './gpu/gpu-scene.js';
 
@@ -11,10 +10,6 @@ export interface SceneStats {
   readonly isPreview: boolean;
   /** Of these, left out because a value was not usable. */
   readonly dropped: number;
-  /** Of these, left out of all pictures because the attribute `economy` asks for it. */
-  readonly spared: number;
-  /** dB to the whole scene in views around it that had no say, Infinity where they show no difference; null unless `economy` asks for a figure or for `views`. */
-  readonly decibels: number | null;
   /** Splats on the GPU, those of levels of detail included; of a streamed scene those for which there is room. */
   readonly inMemory: number;
   /**
@@ -49,21 +44,18 @@ export interface StatsContext {
   readonly quality: QualityChoice;
   readonly pace: PaceReport;
   readonly counts: ReadCounts | undefined;
-  readonly economy: EconomyReport;
   readonly isPreview: boolean;
 }
 
 /** Puts together what is known without asking the GPU. */
-export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPreview }: StatsContext): SceneStats {
+export function statsOf(scene: GpuScene, { quality, pace, counts, isPreview }: StatsContext): SceneStats {
   const { gaussians } = scene;
   const dropped = gaussians.droppedCount ?? 0;
   const merged = scene.levels === undefined ? 0 : scene.levels.count - gaussians.count;
   const detail = { splats: merged, pixels: scene.detail.detail ?? 0 };
   return {
     isPreview,
-    modelled: (gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped + economy.spared,
-    spared: economy.spared,
-    decibels: economy.decibels,
+    modelled: (gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
     dropped,
     inMemory: gaussians.count + merged,
     detail,
@@ -75,8 +67,6 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, economy, isPre
     why: [
       ...whyPreview(isPreview),
       ...whyDropped(dropped),
-      ...whySpared(economy),
-      ...whyByView(economy),
       ...whyDetail(quality, detail),
       ...whyPace(quality, pace),
       ...whyLeft(counts?.left ?? 0),
@@ -90,24 +80,6 @@ function whyPreview(isPreview: boolean): string[] {
 
 function whyDropped(dropped: number): string[] {
   return dropped > 0 ? [`${dropped} splats of the file have values that cannot be drawn.`] : [];
-}
-
-function whySpared({ spared, decibels }: EconomyReport): string[] {
-  if (spared === 0) return [];
-  return [`${spared} splats that contribute least to views around the scene are left out${figureOf(decibels)}.`];
-}
-
-function whyByView({ byView, decibels }: EconomyReport): string[] {
-  if (!byView) return [];
-  const figure = figureOf(decibels);
-  return [
-    `Pictures that are drawn with less than the whole leave out splats that do not show from their side${figure}.`,
-  ];
-}
-
-function figureOf(decibels: number | null): string {
-  if (decibels === null) return '';
-  return decibels === Infinity ? ', without a trace' : `: ${decibels.toFixed(1)} dB to the whole scene`;
 }
 
 function whyDetail(quality: QualityChoice, { splats, pixels }: SceneStats['detail']): string[] {

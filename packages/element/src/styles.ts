@@ -1,4 +1,13 @@
-import { css } from 'lit';
+import { css, type CSSResult } from 'lit';
+
+/** Gives a shadow tree a style sheet of its own document: those of other documents are refused there. A document without a window shows nothing, and gets none. */
+export function adoptStyles(root: ShadowRoot, { cssText }: CSSResult): void {
+  const { defaultView } = root.ownerDocument;
+  if (defaultView === null) return;
+  const sheet = new (defaultView as Window & typeof globalThis).CSSStyleSheet();
+  sheet.replaceSync(cssText);
+  root.adoptedStyleSheets = [sheet];
+}
 
 /**
  * Size and containment as an image has them; everything that a page may want to change is a custom property or a part. `hidden` counts whatever

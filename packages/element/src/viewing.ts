@@ -3,6 +3,9 @@ import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
 import type { SceneBox } from './scene-queries.js';
 
+/** Why there is no picture of a device that is lost. */
+const LOST = 'The GPU device was lost before the picture was drawn: take it again after the event contextrestored';
+
 /** A picture to take. */
 export interface PictureOptions {
   /** Default `image/png`. */
@@ -95,7 +98,10 @@ export abstract class ViewingMethods extends MediaProperties {
    */
   async toBlob({ mimeType = 'image/png', qualityArgument }: PictureOptions = {}): Promise<Blob> {
     const canvas = this.#drawnCanvas();
+    const { scene } = this.stage.scene;
     const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, mimeType, qualityArgument));
+    // A device that was lost before it had drawn leaves an empty picture, and says so later.
+    if (scene && (await scene.wasLost())) throw new DOMException(LOST, 'InvalidStateError');
     if (blob === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
     return blob;
   }

@@ -5,7 +5,7 @@
 import type { HTMLAttributes, PublicProps } from 'vue';
 import type { GaussianSplatElement } from './element.js';
 import type { GaussianSplatEventMap } from './events.js';
-import type { SettableProperties } from './settable.js';
+import type { SettableProperties } from './media.js';
 
 /** `camera-change` as Vue names its listeners: `onCameraChange`. */
 type ListenerName<Type extends string> = Type extends `${infer Head}-${infer Tail}`

@@ -11,3 +11,4 @@ export type { FileBytes } from './bytes.js';
 export { frameAt, parseSequence, type SceneSequence } from './sequence.js';
 export type { OpenPart, SceneFormat, SceneFormatName, SceneReader, SceneSource, SplatRange } from './scene-format.js';
 export { HEADER_BYTES, readSplats, splatRanges, type SplatRanges } from './splat-ranges.js';
+export { samplePreview } from './preview.js';

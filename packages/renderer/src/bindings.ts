@@ -8,9 +8,8 @@ import type { Scratch } from './scratch.js';
 import { CompactStage } from './stages/compact.js';
 import { CullChunksStage, CullStage } from './stages/cull.js';
 import { DetailBudgetStage } from './stages/detail-budget.js';
-import { PlanStage } from './stages/plan.js';
+import { PlanStage, scanBytes } from './stages/plan.js';
 import { ProjectStage } from './stages/project.js';
-import { scanBytes, ScanStage } from './stages/scan.js';
 import { SortStage } from './stages/sort.js';
 import { thinBlocks, ThinStage } from './stages/thin.js';
 import type { Variants } from './variants.js';
@@ -20,7 +19,6 @@ import { constants } from './generated/shaders.js';
 export interface Stages {
   readonly detailBudget: DetailBudgetStage;
   readonly cullChunks: CullChunksStage;
-  readonly scan: ScanStage;
   readonly plan: PlanStage;
   readonly compact: CompactStage;
   readonly thin: ThinStage;
@@ -34,7 +32,7 @@ interface ReadingStages {
   readonly project: ProjectStage;
 }
 
-export function makeStages(device: GPUDevice, { threads, sort }: Pick<Variants, 'threads' | 'sort'>): Stages {
+export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threads'>): Stages {
   const readingStages = (kind?: GeometryReading): ReadingStages => ({
     cull: new CullStage(device, threads, kind),
     project: new ProjectStage(device, kind),
@@ -43,11 +41,10 @@ export function makeStages(device: GPUDevice, { threads, sort }: Pick<Variants, 
   return {
     detailBudget: new DetailBudgetStage(device),
     cullChunks: new CullChunksStage(device),
-    scan: new ScanStage(device, threads),
-    plan: new PlanStage(device),
+    plan: new PlanStage(device, threads),
     compact: new CompactStage(device),
     thin: new ThinStage(device, threads),
-    sort: new SortStage(device, sort),
+    sort: new SortStage(device, threads),
     reading: (kind) => (kind ? readingStages(kind) : packed),
   };
 }
@@ -69,8 +66,6 @@ interface PageBindings {
 export interface FrameBuffers {
   readonly table: PageTable;
   readonly scratch: Scratch;
-  /** How far one sees: see {@link Occlusion}. */
-  readonly occlusion: GPUBuffer;
 }
 
 /** Everything that the stages before the rasterizer are bound to, for one page table and one capacity. */
@@ -78,30 +73,24 @@ export class FrameBindings {
   readonly pages: readonly PageBindings[];
   readonly detailAllow: GPUBindGroup;
   /** Of the survivors in the file's order. */
-  readonly scan: GPUBindGroup;
   readonly plan: GPUBindGroup;
   readonly #sorts = new Map<number, ReturnType<SortStage['bind']>>();
-  readonly #device: GPUDevice;
   readonly #stages: Stages;
-  readonly #table: PageTable;
   readonly #scratch: Scratch;
   readonly #memory: GpuMemory;
   readonly #ordered: {
     blockOffsets: GPUBuffer;
     thin: GPUBuffer;
-    scan: GPUBuffer;
     limits: GPUBuffer;
     ranges: GPUBuffer;
   };
   #thinned: { order: GPUBuffer; thin: ReturnType<ThinStage['bind']>; plan: GPUBindGroup } | undefined;
 
-  constructor(device: GPUDevice, stages: Stages, { table, scratch, occlusion }: FrameBuffers) {
-    this.#device = device;
+  constructor(device: GPUDevice, stages: Stages, { table, scratch }: FrameBuffers) {
     this.#stages = stages;
-    this.#table = table;
     this.#scratch = scratch;
     const memory = (this.#memory = new GpuMemory(device));
-    this.pages = bindPages(stages, table, scratch, occlusion);
+    this.pages = bindPages(stages, table, scratch);
     const { groupOffsets, plan } = scratch;
     const count = table.pages.length;
     const { storage, uniform } = BUFFER_USAGE;
@@ -115,10 +104,9 @@ export class FrameBindings {
       detail_counts: scratch.detailCounts,
       chunk_shares: scratch.chunkShares,
     });
-    this.scan = stages.scan.bind({ values: groupOffsets, scan: constant('scan.length', groups) });
     this.plan = stages.plan.bind({
       limits: constant('plan.limits', count, scratch.capacity, groups),
-      offsets: groupOffsets,
+      values: groupOffsets,
       page_ranges: ranges(
         'plan.page_groups',
         table.pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]),
@@ -130,7 +118,6 @@ export class FrameBindings {
     this.#ordered = {
       blockOffsets: memory.buffer('gs.thin.block_offsets', scanBytes(blocks), storage),
       thin: constant('thin.length', length),
-      scan: constant('thin.blocks', blocks),
       limits: constant('thin.limits', count, scratch.capacity, blocks),
       ranges: ranges(
         'thin.page_ranges',
@@ -159,19 +146,13 @@ export class FrameBindings {
     if (order === undefined) throw new Error('the order must be recorded first');
     if (this.#thinned?.order === order) return this.#thinned;
     const { visibleBits, order: buffers, plan } = this.#scratch;
-    const { blockOffsets, thin, scan, limits, ranges } = this.#ordered;
+    const { blockOffsets, thin, limits, ranges } = this.#ordered;
     this.#thinned = {
       order,
-      thin: this.#stages.thin.bind({ thin, scan, order, visibleBits, blockOffsets, survivors: buffers[0] }),
-      plan: this.#stages.plan.bind({ limits, offsets: blockOffsets, page_ranges: ranges, plan }),
+      thin: this.#stages.thin.bind({ thin, order, visibleBits, blockOffsets, survivors: buffers[0] }),
+      plan: this.#stages.plan.bind({ limits, values: blockOffsets, page_ranges: ranges, plan }),
     };
     return this.#thinned;
-  }
-
-  /** Resets what the first stage counts up. */
-  reset(): void {
-    const args = Uint32Array.from({ length: 3 * this.#table.pages.length }, (_, i) => (i % 3 === 0 ? 0 : 1));
-    this.#device.queue.writeBuffer(this.#scratch.chunkArgs, 0, args);
   }
 
   destroy(): void {
@@ -179,20 +160,8 @@ export class FrameBindings {
   }
 }
 
-function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion: GPUBuffer): PageBindings[] {
-  const {
-    chunkList,
-    chunkArgs,
-    chunkShares,
-    detailCounts,
-    visibleBits,
-    groupOffsets,
-    gathered,
-    plan,
-    splats,
-    keys,
-    order,
-  } = scratch;
+function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBindings[] {
+  const { chunkShares, detailCounts, visibleBits, groupOffsets, gathered, plan, splats, keys, order } = scratch;
   // The sort needs its first order buffer only after `project` has read the survivors from it.
   const survivors = order[0];
   return table.pages.map((page, i) => {
@@ -203,7 +172,7 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
     // Something must be bound where there are no levels of detail and no visible sets; it is not looked at.
     const details = page.details ?? page.chunks;
     const seenFrom = page.seenFrom ?? page.chunks;
-    const chunk = { view, chunk_list: chunkList, visible_bits: visibleBits };
+    const chunk = { view, visible_bits: visibleBits };
     return {
       reading,
       splatCount: page.count,
@@ -215,7 +184,6 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
       cullChunks: stages.cullChunks.bind({
         ...chunk,
         chunks: page.chunks,
-        chunk_args: chunkArgs,
         group_counts: groupOffsets,
         chunk_shares: chunkShares,
         details,
@@ -225,7 +193,6 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch, occlusion
         gaussians,
         group_counts: groupOffsets,
         gathered,
-        occlusion,
         chunk_shares: chunkShares,
         seen_from: seenFrom,
       }),

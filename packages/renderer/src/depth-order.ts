@@ -1,11 +1,12 @@
 import { dot, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { constants, layouts } from './generated/shaders.js';
-import { BUFFER_USAGE, dispatchGrid } from './gpu/kernel.js';
+import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { PageTable } from './page-table.js';
 import { OrderKeysStage } from './stages/order-keys.js';
-import { SortStage, type SortName } from './stages/sort.js';
+import { SortStage } from './stages/sort.js';
+import type { Threads } from './stages/plan.js';
 
 const KEY_BITS = 32;
 /** Times as far from a scene's origin, in depth, as a camera may have been for which an order was made that serves it: four bits of a depth's 24. */
@@ -44,10 +45,10 @@ export class DepthOrder {
   /** Needed while sorting only. */
   #working: Working | undefined;
 
-  constructor(device: GPUDevice, table: PageTable, sort: SortName) {
+  constructor(device: GPUDevice, table: PageTable, threads: Threads) {
     this.#device = device;
     this.#table = table;
-    this.#sort = new SortStage(device, sort);
+    this.#sort = new SortStage(device, threads);
     this.#memory = new GpuMemory(device);
     this.length = CULL_GROUP * table.groups;
   }
@@ -82,7 +83,7 @@ export class DepthOrder {
     this.#writePlan(plan);
     const pass = encoder.beginComputePass({ label: 'gs.order', timestampWrites: timer?.timestampWrites('order') });
     this.#table.pages.forEach(({ count }, page) => keys[page].stage.record(pass, keys[page].bindings, count));
-    this.#sort.record(pass, sort, plan);
+    this.#sort.record(pass, sort, this.length);
     pass.end();
     this.#axis = axisOf(camera);
     this.#depths = depthsOf(this.#table.origins, camera);
@@ -105,10 +106,10 @@ export class DepthOrder {
 
   /** Buffers to sort in, and what the stages are bound to. */
   #makeWorking(order: GPUBuffer): Working {
-    const { storage, copyDestination, indirect } = BUFFER_USAGE;
+    const { storage, copyDestination } = BUFFER_USAGE;
     const memory = new GpuMemory(this.#device);
     const buffer = (name: string, bytes: number): GPUBuffer =>
-      memory.buffer(`gs.order.${name}`, bytes, storage | copyDestination | indirect);
+      memory.buffer(`gs.order.${name}`, bytes, storage | copyDestination);
     const blocks = this.#blocks;
     const keys = [buffer('keys_a', 4 * this.length), buffer('keys_b', 4 * this.length)] as const;
     const plan = buffer('plan', layouts.Plan.size + layouts.PagePlan.size);
@@ -132,15 +133,10 @@ export class DepthOrder {
   }
 
   #writePlan(plan: GPUBuffer): void {
-    const blocks = this.#blocks;
     const words = new Uint32Array(layouts.Plan.size / 4);
-    const { visible, sort_blocks, sort_x, sort_y, sort_z } = layouts.Plan.fields;
-    const [columns, rows] = dispatchGrid(blocks);
+    const { visible, sort_blocks } = layouts.Plan.fields;
     words[visible.offset / 4] = this.length;
-    words[sort_blocks.offset / 4] = blocks;
-    words[sort_x.offset / 4] = columns;
-    words[sort_y.offset / 4] = rows;
-    words[sort_z.offset / 4] = 1;
+    words[sort_blocks.offset / 4] = this.#blocks;
     this.#device.queue.writeBuffer(plan, 0, words);
   }
 }

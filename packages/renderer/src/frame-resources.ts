@@ -1,16 +1,14 @@
-import type { Camera } from '@gaussian-splat/core';
 import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityMemory, type Capacity } from './capacity-memory.js';
 import { CapacityMonitor, initialCapacity, LEAST_CAPACITY } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
 import type { GaussianScene } from './gaussian-scene.js';
-import type { Occlusion } from './occlusion.js';
 import { OrderPolicy } from './order-policy.js';
 import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
-import type { SortName } from './stages/sort.js';
+import type { Threads } from './stages/plan.js';
 
 /** Room for pairs that the pacer learns from what one costs. */
 const TELLING_ROOM = 1 << 18;
@@ -29,9 +27,8 @@ export interface Resources {
 
 export interface ResourceOptions {
   readonly stages: Stages;
-  readonly sort: SortName;
+  readonly threads: Threads;
   readonly rasterizer: Rasterizer;
-  readonly occlusion: Occlusion;
   /** Pairs of splat and bin that are painted in one submission. */
   readonly pairsAtOnce: () => number;
   /** A frame lacked room, and the next one has it. */
@@ -71,17 +68,16 @@ export class FrameResources {
   }
 
   /**
-   * What a frame is drawn with: allocates where the scenes, the image's size or the wished room are other ones than before.
+   * What a frame is drawn with: allocates where the scenes or the wished room are other ones than before.
    * @param splatBudget most splats that the frame draws; 0 for no limit
    */
-  fit(scenes: readonly GaussianScene[], camera: Camera, splatBudget: number): Resources {
+  fit(scenes: readonly GaussianScene[], splatBudget: number): Resources {
     this.#roomFor(splatBudget);
-    const mustRebind = this.#options.occlusion.fit(camera);
     const current = this.#current;
     if (current?.table.holds(scenes)) {
       // The monitor has asked for other room.
       const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
-      return mustRebind || hasOtherRoom ? this.#rebind(current.table) : current;
+      return hasOtherRoom ? this.#rebind(current.table) : current;
     }
     this.release();
     const table = new PageTable(this.#device, [...scenes]);
@@ -98,7 +94,6 @@ export class FrameResources {
     bindings?.destroy();
     depthOrder?.release();
     monitor?.destroy();
-    this.#options.occlusion.forget();
     this.#current = undefined;
   }
 
@@ -136,9 +131,9 @@ export class FrameResources {
 
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
   #rebind(table: PageTable): Resources {
-    const { stages, sort, occlusion } = this.#options;
+    const { stages, threads } = this.#options;
     const capacity = this.#capacity!;
-    const depthOrder = this.#current?.depthOrder ?? new DepthOrder(this.#device, table, sort);
+    const depthOrder = this.#current?.depthOrder ?? new DepthOrder(this.#device, table, threads);
     const orderPolicy = this.#current?.orderPolicy ?? new OrderPolicy(table, depthOrder);
     const kept = this.#current?.scratch.capacity === capacity.visible ? this.#current.scratch : undefined;
     if (kept === undefined) this.#current?.scratch.destroy();
@@ -152,18 +147,16 @@ export class FrameResources {
     const scratch = kept ?? new Scratch(this.#device, { visible, groups: table.groups, pages }, spareBytes);
     this.#bindRasterizer(scratch, capacity);
     this.#hasOtherPairs = false;
-    const bindings = new FrameBindings(this.#device, stages, { table, scratch, occlusion: occlusion.depths });
+    const bindings = new FrameBindings(this.#device, stages, { table, scratch });
     const monitor = this.#watch(table, capacity);
     this.#current = { table, scratch, bindings, depthOrder, orderPolicy, monitor };
     return this.#current;
   }
 
   #bindRasterizer({ plan, splats, order, keys, spare }: Scratch, { visible, pairs }: Capacity): void {
-    const { rasterizer, occlusion } = this.#options;
-    rasterizer.bind({
+    this.#options.rasterizer.bind({
       plan,
       splats,
-      occlusion,
       spare,
       survivors: order[0],
       orders: { sorted: order[0], identity: keys[0] },

@@ -4,7 +4,6 @@ import type { DepthOrder } from './depth-order.js';
 import type { Wishes, WishLevers } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { Levers } from './levers.js';
-import type { Occlusion } from './occlusion.js';
 import type { Scratch } from './scratch.js';
 
 /** What the stages before the rasterizer need, bound and allocated beforehand. */
@@ -14,9 +13,10 @@ export interface Frame {
   readonly scratch: Scratch;
   readonly camera: Camera;
   readonly levers: WishLevers & Pick<Levers, 'depthKeyBits'>;
-  readonly occlusion: Occlusion;
   /** An order of all splats that serves the camera; without it the visible splats are sorted. */
   readonly depthOrder?: DepthOrder;
+  /** Whether a page has levels of detail. */
+  readonly hasDetail: boolean;
   /** Whether to keep the splats that are looked at within `Levers.splatBudget`. */
   readonly isBudgeted: boolean;
   readonly timer?: FrameTimer;
@@ -29,20 +29,22 @@ export interface Frame {
  */
 export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wishes[] {
   const { scratch, bindings, timer } = frame;
-  bindings.reset();
   const wishes = wishesDue(frame);
   for (const wish of wishes) wish.begin(encoder);
   encoder.clearBuffer(scratch.gathered);
-  encoder.clearBuffer(scratch.detailCounts);
+  if (frame.isBudgeted) encoder.clearBuffer(scratch.detailCounts);
   // What the last budget allowed.
-  encoder.clearBuffer(scratch.chunkShares, scratch.chunkShares.size - 4);
+  else if (frame.hasDetail) encoder.clearBuffer(scratch.chunkShares, scratch.chunkShares.size - 4);
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
-  frame.occlusion.record(pass);
   if (frame.isBudgeted) keepWithinBudget(pass, frame);
   cull(pass, frame);
   if (frame.depthOrder) listInDepthOrder(pass, frame, frame.depthOrder);
   else listInFileOrder(pass, frame);
-  bindings.pages.forEach(({ reading, project }, page) => reading.project.record(pass, project, scratch.plan, page));
+  for (const { reading, project, splatCount } of bindings.pages) {
+    // In depth order the survivors of all pages are mixed.
+    const most = frame.depthOrder ? scratch.capacity : Math.min(scratch.capacity, splatCount);
+    reading.project.record(pass, project, most);
+  }
   noteWishes(pass, frame, wishes);
   pass.end();
   for (const wish of wishes) wish.copy(encoder);
@@ -71,15 +73,14 @@ function noteWishes(pass: GPUComputePassEncoder, { bindings }: Frame, due: reado
 }
 
 /** Finds the visible splats: whole chunks first, then one by one. */
-function cull(pass: GPUComputePassEncoder, { stages, bindings, scratch }: Frame): void {
+function cull(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
   for (const { cullChunks, splatCount } of bindings.pages) stages.cullChunks.record(pass, cullChunks, splatCount);
-  bindings.pages.forEach(({ reading, cull: bound }, i) => reading.cull.record(pass, bound, scratch.chunkArgs, i));
+  for (const { reading, cull: bound, splatCount } of bindings.pages) reading.cull.record(pass, bound, splatCount);
 }
 
-function listInFileOrder(pass: GPUComputePassEncoder, { stages, bindings, scratch }: Frame): void {
-  stages.scan.record(pass, bindings.scan);
+function listInFileOrder(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
   stages.plan.record(pass, bindings.plan);
-  bindings.pages.forEach(({ compact }, page) => stages.compact.record(pass, compact, scratch.chunkArgs, page));
+  for (const { compact, splatCount } of bindings.pages) stages.compact.record(pass, compact, splatCount);
 }
 
 function listInDepthOrder(pass: GPUComputePassEncoder, { stages, bindings }: Frame, depthOrder: DepthOrder): void {
@@ -92,6 +93,6 @@ function listInDepthOrder(pass: GPUComputePassEncoder, { stages, bindings }: Fra
 /** Orders the projected splats from near to far, equal depths in the file's order. */
 function sort(encoder: GPUCommandEncoder, { stages, bindings, scratch, levers, timer }: Frame): void {
   const pass = encoder.beginComputePass({ label: 'gs.sort', timestampWrites: timer?.timestampWrites('sort') });
-  stages.sort.record(pass, bindings.sort(levers.depthKeyBits), scratch.plan);
+  stages.sort.record(pass, bindings.sort(levers.depthKeyBits), scratch.capacity);
   pass.end();
 }

@@ -34,6 +34,7 @@ export class GaussianBuffers implements GaussianScene {
   readonly version = 0;
   readonly #memory: GpuMemory;
   readonly #reservation: Reservation;
+  readonly #contents: readonly Content[];
 
   private constructor(device: GPUDevice, packed: PackedGaussians, memoryBudget?: number) {
     ({
@@ -51,7 +52,7 @@ export class GaussianBuffers implements GaussianScene {
     this.#reservation = MemoryLedger.of(device).reserve(whatOf(packed), bytes, memoryBudget);
     this.#memory = new GpuMemory(device);
     try {
-      this.pages = uploadPages(device, packed, this.#memory);
+      ({ pages: this.pages, contents: this.#contents } = makePages(device, packed, this.#memory));
     } catch (error) {
       this.destroy();
       throw error;
@@ -59,7 +60,7 @@ export class GaussianBuffers implements GaussianScene {
   }
 
   /**
-   * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for.
+   * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for, and so much at a time that the thread can do other things between.
    * @throws GaussianSplatError `out-of-memory/budget`, before anything is allocated, if the scene is larger than `memoryBudget` or than what the
    * device's {@link MemoryLedger} has left for all scenes; `out-of-memory/allocation` if the device has no room.
    */
@@ -68,7 +69,9 @@ export class GaussianBuffers implements GaussianScene {
     packed: PackedGaussians,
     { memoryBudget }: UploadOptions = {},
   ): Promise<GaussianBuffers> {
-    return withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, memoryBudget));
+    const made = await withMemoryCheck(device, whatOf(packed), () => new GaussianBuffers(device, packed, memoryBudget));
+    await writeInTurns(device, made.#contents);
+    return made;
   }
 
   /** Bytes of GPU memory held. */
@@ -84,7 +87,17 @@ export class GaussianBuffers implements GaussianScene {
 
 const whatOf = ({ count }: PackedGaussians): string => `scene of ${count} splats`;
 
-function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemory): GaussianPage[] {
+/** What a buffer is to hold. */
+interface Content {
+  readonly buffer: GPUBuffer;
+  readonly words: Uint32Array<ArrayBuffer>;
+}
+
+function makePages(
+  device: GPUDevice,
+  packed: PackedGaussians,
+  memory: GpuMemory,
+): { pages: GaussianPage[]; contents: Content[] } {
   const shStride = shWords(packed.shDegree, packed.shPrecision);
   const chunks = new Uint32Array(packed.chunks.buffer, packed.chunks.byteOffset, packed.chunks.length);
   const capacity = pageCapacity(device, 4 * Math.max(GEOMETRY_WORDS, shStride));
@@ -92,10 +105,14 @@ function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemo
   const details =
     packed.details && new Uint32Array(packed.details.buffer, packed.details.byteOffset, packed.details.length);
   const pages: GaussianPage[] = [];
+  const contents: Content[] = [];
   for (let first = 0; first < packed.count; first += capacity) {
     const end = Math.min(first + capacity, packed.count);
-    const part = (label: string, words: Uint32Array, stride: number, from = first, to = end): GPUBuffer =>
-      memory.buffer(label, 4 * stride * (to - from), usage, words.subarray(stride * from, stride * to));
+    const part = (label: string, words: Uint32Array, stride: number, from = first, to = end): GPUBuffer => {
+      const buffer = memory.buffer(label, 4 * stride * (to - from), usage);
+      contents.push({ buffer, words: words.subarray(stride * from, stride * to) as Uint32Array<ArrayBuffer> });
+      return buffer;
+    };
     const [firstChunk, endChunk] = [first / constants.CULL_GROUP, Math.ceil(end / constants.CULL_GROUP)];
     pages.push({
       count: end - first,
@@ -105,7 +122,36 @@ function uploadPages(device: GPUDevice, packed: PackedGaussians, memory: GpuMemo
       details: details && part('gs.gaussians.details', details, DETAIL_NUMBERS, firstChunk, endChunk),
     });
   }
-  return pages;
+  return { pages, contents };
+}
+
+/** Words that are handed to the GPU at once: 4 MB, some milliseconds. */
+const WORDS_AT_ONCE = 1 << 20;
+
+async function writeInTurns({ queue }: GPUDevice, contents: readonly Content[]): Promise<void> {
+  let left = WORDS_AT_ONCE;
+  for (const { buffer, words } of contents)
+    for (let first = 0; first < words.length;) {
+      if (left === 0) {
+        await turn();
+        left = WORDS_AT_ONCE;
+      }
+      const count = Math.min(left, words.length - first);
+      queue.writeBuffer(buffer, 4 * first, words, first, count);
+      [first, left] = [first + count, left - count];
+    }
+}
+
+/** Lets other tasks have the thread. Timers would wait long where the page is hidden. */
+function turn(): Promise<void> {
+  const { port1, port2 } = new MessageChannel();
+  return new Promise((resolve) => {
+    port1.onmessage = () => {
+      port1.close();
+      resolve();
+    };
+    port2.postMessage(null);
+  });
 }
 
 /** Splats in a page of so many bytes a splat: what the limits allow, in whole chunks, of which one dispatch takes a row. */

@@ -1,4 +1,5 @@
 export { capture } from './capture.js';
+export { createRenderer } from './choice/choose.js';
 export { chooseVariants, startVariants, type ChoiceOptions, type StartOptions } from './choice/choose.js';
 export type { ChoiceStore } from './choice/kept-choice.js';
 export type { ProbeAnswer, ProbePoint } from './depth-probe.js';
@@ -7,6 +8,7 @@ export { DynamicGaussians, type DynamicGaussiansOptions } from './dynamic-gaussi
 export { GaussianBuffers, type UploadOptions } from './gaussian-buffers.js';
 export type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
+export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
 export { packWithDetail } from './detail/pack-with-detail.js';
@@ -29,7 +31,7 @@ export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './
 export { levelSource, packLevelPage } from './detail/level-source.js';
 export { checkManifest, type DetailManifest } from './detail/manifest.js';
 export { packedOrder, packGaussians, type PackedGaussians, type PackOptions } from './pack/pack.js';
-export { readPacked, selectPacked } from './pack/packed-scene.js';
+export { readPacked } from './pack/packed-scene.js';
 export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, NotedFrame, RasterizerName } from './rasterizers/rasterizer.js';
 export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
@@ -40,7 +42,14 @@ export { SidedGaussians, type HeldScene } from './sided-gaussians.js';
 export { SIDES, sidesNear, type Surroundings } from './sides.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';
-export type { SortName } from './stages/sort.js';
-export type { Threads } from './stages/threads.js';
+export type { Threads } from './stages/plan.js';
 export type { Variants } from './variants.js';
 export { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
+export {
+  joinShares,
+  packShare,
+  SHARE_SPLATS,
+  type JoinedShares,
+  type PackedShare,
+  type ShareFacts,
+} from './pack/shares.js';

@@ -1,7 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterizer.js';
-import { SORT_NAMES, type SortName } from './stages/sort.js';
-import type { Threads } from './stages/threads.js';
+import type { Threads } from './stages/plan.js';
 
 /**
  * Everything that trades accuracy for speed, one lever each. docs/frontier has what each costs and saves.
@@ -9,15 +8,13 @@ import type { Threads } from './stages/threads.js';
 export interface Levers {
   /**
    * How splats become pixels: `quads` by the GPU's own rasterizer and blending, `tiles` by compute shaders, front to back
-   * in float32 and with an end where nothing behind can be seen. `auto`: see {@link Renderer.create}.
+   * in float32 and with an end where nothing behind can be seen. `auto`: see {@link createRenderer}.
    */
   readonly rasterizer: 'auto' | RasterizerName;
-  /** How stages share their work; the image is the same. `auto`: see {@link Renderer.create}. */
+  /** How stages share their work; the image is the same. `auto`: see {@link createRenderer}. */
   readonly threads: 'auto' | Threads;
-  /** How keys are sorted; the order is the same. `auto`: see {@link Renderer.create}. */
-  readonly sort: 'auto' | SortName;
   /**
-   * Precision in which quads are blended and images kept. `auto`: see {@link Renderer.create}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
+   * Precision in which quads are blended and images kept. `auto`: see {@link createRenderer}. `rgba32float` takes twice the memory and bandwidth, and quads then need the
    * feature `float32-blendable`.
    */
   readonly accumulation: 'auto' | AccumulationFormat;
@@ -37,11 +34,8 @@ export interface Levers {
    */
   readonly sortAngle: number;
   /**
-   * Tiles leave out splats behind what took all pixels of their tiles to this transmittance or less in the last frame; 0 leaves out
-   * none. While the camera moves a tile can lack for one frame what has just come into sight.
+   * Where tiles end a pixel. Up to 1e-4, which scenes are trained with: before the splat that would leave it this transmittance or less. Above: behind that splat.
    */
-  readonly occludedBelow: number;
-  /** Tiles finish a pixel before the splat that would leave it this transmittance or less. */
   readonly transmittanceMin: number;
   /** A splat paints a pixel only with at least this alpha. */
   readonly alphaMin: number;
@@ -68,19 +62,18 @@ export interface Levers {
   readonly resolutionScale: number;
 }
 
-const radians = (degrees: number): number => (degrees * Math.PI) / 180;
+/** The threshold of the trainers: INRIA's, gsplat's. */
+export const TRAINED_TRANSMITTANCE = 1e-4;
 
 /** The levers that leave nothing out: what scenes were trained with. */
 const EXACT: Levers = {
   rasterizer: 'auto',
   threads: 'auto',
-  sort: 'auto',
   accumulation: 'auto',
   depthKeyBits: 24,
   submissions: 1,
   sortAngle: 1e-7,
-  occludedBelow: 0,
-  transmittanceMin: 1e-4,
+  transmittanceMin: TRAINED_TRANSMITTANCE,
   alphaMin: 1 / 255,
   minContribution: 0,
   visibleSets: false,
@@ -95,9 +88,8 @@ const EXACT: Levers = {
 export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
 
 /**
- * What each quality means. The figures are the least PSNR against the float64 reference image that each is held to:
- * `reference` 75 dB, `default` 59 dB (no error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB. The last two can fall below
- * theirs from within a captured subject, where what an old order puts the wrong way round fills the picture.
+ * What each quality means. The figures are the least PSNR against the float64 reference image that each is held to, on scenes of any kind (captured, opaque, faint, thin; `npm test -- qualities`):
+ * `reference` 75 dB, `default` 59 dB (no error survives the rounding to 8 bits), `balanced` 42 dB, `fast` 36 dB; captured scenes keep 50 and 44 dB with the last two.
  */
 export const QUALITIES: Readonly<Record<Quality, Levers>> = {
   reference: {
@@ -110,17 +102,13 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
   balanced: {
     ...EXACT,
     depthKeyBits: 16,
-    sortAngle: radians(2),
-    transmittanceMin: 1 / 500,
-    alphaMin: 1.1 / 255,
+    transmittanceMin: 1 / 256,
     visibleSets: true,
   },
   fast: {
     ...EXACT,
     depthKeyBits: 16,
-    sortAngle: radians(4),
-    transmittanceMin: 1 / 200,
-    alphaMin: 1.25 / 255,
+    transmittanceMin: 1 / 128,
     visibleSets: true,
   },
 };
@@ -134,7 +122,6 @@ export type FrameLevers = Pick<Levers, (typeof FRAME_LEVERS)[number]>;
 const FRAME_LEVERS = [
   'depthKeyBits',
   'sortAngle',
-  'occludedBelow',
   'transmittanceMin',
   'alphaMin',
   'minContribution',
@@ -148,7 +135,6 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
   submissions: [1, 256],
   sortAngle: [0, Math.PI],
   transmittanceMin: [0, 1],
-  occludedBelow: [0, 1],
   alphaMin: [1 / 255, 1],
   minContribution: [0, Infinity],
   detail: [0, 64],
@@ -161,7 +147,6 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
 const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
   rasterizer: ['auto', 'quads', 'tiles'],
   threads: ['auto', 'parallel', 'serial'],
-  sort: ['auto', ...SORT_NAMES],
   accumulation: ['auto', 'rgba16float', 'rgba32float'],
   depthKeyBits: [16, 24, 32],
   visibleSets: [false, true],

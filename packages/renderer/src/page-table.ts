@@ -92,18 +92,20 @@ export class PageTable {
     return scenes.length === this.#scenes.length && scenes.every((scene, i) => scene === this.#scenes[i]);
   }
 
-  /** Points every page at a camera, for the commands that are submitted next. */
+  /**
+   * Points every page at a camera, for the commands that are submitted next.
+   * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
+   */
   look(
     camera: Camera,
+    pixelArea: number,
     { shDegree, depthKeyBits, detail, detailFade, splatBudget, alphaMin, minContribution, visibleSets }: Levers,
     isOrdered: boolean,
-    occlusionTiles: readonly [number, number],
   ): void {
     const shared = {
       sh_cap: shDegree,
       key_bits: depthKeyBits,
       is_ordered: isOrdered ? 1 : 0,
-      occlusion_tiles: occlusionTiles,
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
@@ -112,7 +114,8 @@ export class PageTable {
     };
     let page = 0;
     for (const scene of this.#scenes) {
-      const values = cameraValues(camera, scene.origin, scene.filterVariance);
+      // The same filter whatever the frame is drawn at: in larger pixels it has less variance.
+      const values = cameraValues(camera, scene.origin, (scene.filterVariance ?? constants.DILATION) * pixelArea);
       const own = {
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],

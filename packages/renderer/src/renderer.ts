@@ -11,15 +11,13 @@ import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
-import { Occlusion } from './occlusion.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
-import { missingFormat, requireNotes, requireRequest, requireTextureSize } from './requirements.js';
+import { missingFormat, requireNotes, requireRequest, requireTarget, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
 import { copyCounts, readStatistics, type FrameStatistics } from './statistics.js';
-import { chooseVariants } from './choice/choose.js';
 import { settle, type Variants } from './variants.js';
 import { scaled } from './view.js';
 
@@ -65,7 +63,6 @@ export class Renderer {
   readonly #stages: Stages;
   readonly #compose: ComposeStage;
   readonly #rasterizer: Rasterizer;
-  readonly #occlusion: Occlusion;
   readonly #pacer: SubmissionPacer;
   readonly #onIncomplete: () => void;
   readonly #memory: GpuMemory;
@@ -87,29 +84,17 @@ export class Renderer {
     this.#stages = makeStages(device, this.levers);
     this.#compose = new ComposeStage(device);
     this.#rasterizer = makeRasterizer(device, this.levers);
-    this.#occlusion = new Occlusion(device, this.levers.occludedBelow > 0 && this.#rasterizer.name === 'tiles');
     this.#pacer = new SubmissionPacer(device);
     this.#resources = new FrameResources(device, {
       stages: this.#stages,
-      sort: this.levers.sort,
+      threads: this.levers.threads,
       rasterizer: this.#rasterizer,
-      occlusion: this.#occlusion,
       pairsAtOnce: () => this.#pacer.pairsAtOnce,
       onIncomplete: this.#onIncomplete,
     });
     this.#memory = new GpuMemory(device);
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
-  }
-
-  /**
-   * A renderer whose `auto` levers have been decided on this device: variants that give a wrong image are ruled out by a known answer, the
-   * others are timed (see {@link chooseVariants}). The constructor decides by what has been chosen on the device before, or else takes
-   * `quads`, `rgba16float` and `parallel`, which work everywhere.
-   */
-  static async create(device: GPUDevice, options: RendererOptions = {}): Promise<Renderer> {
-    await chooseVariants(device);
-    return new Renderer(device, options);
   }
 
   /** Name of the rasterizer in use. */
@@ -119,7 +104,7 @@ export class Renderer {
 
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
-    const parts = [this.#memory, this.#resources, this.#rasterizer, this.#occlusion, this.#accumulation?.texture];
+    const parts = [this.#memory, this.#resources, this.#rasterizer, this.#accumulation?.texture];
     return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
@@ -155,24 +140,24 @@ export class Renderer {
     const levers = this.#leversOf(request.levers);
     const detail = detailOf(request, levers);
     const drawn = scaled(camera, levers.resolutionScale);
-    const resources = this.#resources.fit(scenes, drawn, detail.splatBudget);
+    const resources = this.#resources.fit(scenes, detail.splatBudget);
     const { table, scratch, bindings, depthOrder, orderPolicy, monitor } = resources;
     table.update();
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined };
     const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
-    this.#occlusion.prepare(encoder, drawn, table.version, levers.occludedBelow > 0);
     const own = { ...levers, ...detail };
-    table.look(drawn, own, isOrdered, this.#occlusion.tiles);
+    const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
+    table.look(drawn, pixelArea, own, isOrdered);
     const wishes = recordProjection(encoder, {
       stages: this.#stages,
       bindings,
       scratch,
       camera: drawn,
       levers: own,
-      occlusion: this.#occlusion,
       depthOrder: isOrdered ? depthOrder : undefined,
+      hasDetail: table.hasDetail,
       isBudgeted: detail.splatBudget > 0 && table.hasDetail,
       timer,
     });
@@ -199,7 +184,6 @@ export class Renderer {
       );
     }
     for (const wish of wishes) wish.read();
-    if (this.#occlusion.mayLack) queueMicrotask(this.#onIncomplete);
     orderPolicy.settle(occasion);
   }
 
@@ -218,9 +202,8 @@ export class Renderer {
    */
   async isComplete(): Promise<boolean> {
     if (this.#resources.current === undefined) return true;
-    const mayLack = this.#occlusion.mayLack;
     const { visible, overflow, pairs, pairOverflow } = await this.readStatistics();
-    return this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow)) && !mayLack;
+    return this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow));
   }
 
   /**
@@ -261,7 +244,6 @@ export class Renderer {
     this.#accumulation?.texture.destroy();
     this.#accumulation = undefined;
     this.#rasterizer.destroy();
-    this.#occlusion.destroy();
     this.#memory.destroy();
   }
 
@@ -326,7 +308,6 @@ export class Renderer {
     const known = this.#frameLevers.get(changes);
     if (known) return known;
     const made = leversOfFrame(this.levers, changes);
-    if (made.occludedBelow > 0 && this.#rasterizer.name === 'tiles') this.#occlusion.use();
     this.#frameLevers.set(changes, made);
     return made;
   }
@@ -335,8 +316,10 @@ export class Renderer {
     const { width, height } = camera;
     if (!isTexture(target)) {
       if (targetFormat === undefined) throw missingFormat();
+      requireTarget(undefined, targetFormat, camera);
       return { view: target, format: targetFormat, isStorable: false, width, height };
     }
+    requireTarget(target, target.format, camera);
     let view = this.#views.get(target);
     if (view === undefined) this.#views.set(target, (view = target.createView(ONE_PICTURE)));
     const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;

@@ -1,6 +1,7 @@
 /** What a renderer asks of its device and of those who call it, and the errors that say so. */
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import type { FrameRequest } from './frame-request.js';
+import { TEXTURE_USAGE } from './gpu/kernel.js';
 import type { AccumulationFormat, Rasterizer } from './rasterizers/rasterizer.js';
 
 export function missingFormat(): GaussianSplatError {
@@ -21,6 +22,36 @@ export function requireTextureSize(device: GPUDevice, { width, height }: Camera)
     found: `${width}x${height}`,
     remedy: 'draw a smaller image, or several parts of it by moving cx and cy',
   });
+}
+
+/** What a target's texture must be, by the property that says it. */
+const TARGET: readonly (readonly [property: keyof GPUTexture, expected: unknown])[] = [
+  ['sampleCount', 1],
+  ['dimension', '2d'],
+];
+
+/**
+ * @param target texture to draw into; of a view nothing is known but the format
+ * @throws GaussianSplatError `argument/value` for one that cannot be drawn into, or of another size than the camera's image
+ */
+export function requireTarget(target: GPUTexture | undefined, format: string, { width, height }: Camera): void {
+  if (/depth|stencil|[us]int|snorm$|^(bc|etc|eac|astc)/.test(format))
+    throw missing(
+      'targetFormat',
+      'a format that colours can be drawn into: rgba8unorm, bgra8unorm, rgba16float, …',
+      format,
+    );
+  if (target === undefined) return;
+  const wrong = TARGET.find(([property, expected]) => target[property] !== expected);
+  if (wrong) throw missing('target', `a texture of ${wrong[0]} ${String(wrong[1])}`, target[wrong[0]]);
+  if ((target.usage & TEXTURE_USAGE.renderAttachment) === 0)
+    throw missing('target', 'a texture with the usage RENDER_ATTACHMENT', `usage ${target.usage}`);
+  if (target.width !== width || target.height !== height)
+    throw missing(
+      'target',
+      `a texture of ${width} x ${height} pixels, as the camera says`,
+      `${target.width} x ${target.height}`,
+    );
 }
 
 export function requireNotes({ name, takesNotes }: Rasterizer): void {

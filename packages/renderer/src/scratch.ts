@@ -1,7 +1,7 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
-import { scanBytes } from './stages/scan.js';
+import { scanBytes } from './stages/plan.js';
 
 /** How much the buffers between the stages must hold. */
 export interface ScratchSize {
@@ -13,25 +13,12 @@ export interface ScratchSize {
 }
 
 const { size: PLAN_SIZE } = layouts.Plan;
-const { size: PAGE_PLAN_SIZE, fields: pagePlanFields } = layouts.PagePlan;
-
-/** Byte offsets of the indirect arguments within the plan. */
-export const planOffsets = {
-  sort: layouts.Plan.fields.sort_x.offset,
-  /** One thread a visible splat, 256 to a workgroup. */
-  visible: layouts.Plan.fields.visible_x.offset,
-  quads: layouts.Plan.fields.quad_indices.offset,
-  project: (page: number): number => PLAN_SIZE + page * PAGE_PLAN_SIZE + pagePlanFields.project_x.offset,
-};
+const { size: PAGE_PLAN_SIZE } = layouts.PagePlan;
 
 /** The buffers that carry a frame from stage to stage. Their size follows the scene, never the camera. */
 export class Scratch {
   /** Splats that may be visible at once. Survivors beyond it are not drawn, and counted in `Plan.overflow`. */
   readonly capacity: number;
-  /** Chunks that may be visible, page by page. */
-  readonly chunkList: GPUBuffer;
-  /** Indirect arguments of `cull` and `compact`, three words a page. */
-  readonly chunkArgs: GPUBuffer;
   /** Share in which each chunk is drawn, and behind them, in the last word, the pixels of error that a budget asks for. */
   readonly chunkShares: GPUBuffer;
   /** See shaders/shared/detail_counts.wgsl. */
@@ -59,21 +46,18 @@ export class Scratch {
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
     const memory = new GpuMemory(device);
     this.#memory = memory;
-    const { storage, copyDestination, copySource, indirect } = BUFFER_USAGE;
+    const { storage, copyDestination, copySource } = BUFFER_USAGE;
     this.capacity = visible;
-    const buffer = (name: string, bytes: number, usage = storage | copySource | copyDestination): GPUBuffer =>
-      memory.buffer(`gs.${name}`, bytes, usage);
+    const buffer = (name: string, bytes: number): GPUBuffer =>
+      memory.buffer(`gs.${name}`, bytes, storage | copySource | copyDestination);
     const perSplat = (name: string): GPUBuffer => buffer(name, 4 * this.capacity);
-    const planUsage = storage | indirect | copySource | copyDestination;
     try {
-      this.chunkList = buffer('cull_chunks.chunk_list', 4 * groups);
-      this.chunkArgs = buffer('cull_chunks.args', 12 * pages, planUsage);
       this.chunkShares = buffer('cull_chunks.shares', 4 * (groups + 1));
       this.detailCounts = buffer('detail.counts', 4 * constants.DETAIL_COUNTS);
       this.visibleBits = buffer('cull.visible_bits', 4 * constants.WORDS_PER_GROUP * groups);
-      this.groupOffsets = buffer('scan.group_offsets', scanBytes(groups));
+      this.groupOffsets = buffer('cull.group_offsets', scanBytes(groups));
       this.gathered = buffer('cull.gathered', 4 * constants.GATHERED_WORDS);
-      this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages), planUsage);
+      this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages));
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
       this.#keys = perSplat('sort.keys');
       this.#order = perSplat('sort.order');

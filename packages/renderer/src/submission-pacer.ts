@@ -1,4 +1,5 @@
 import { perDevice } from './gpu/kernel.js';
+import { QueueClock } from './gpu/queue-clock.js';
 
 /**
  * Milliseconds that one submission is meant to keep the GPU. Drivers stop what runs for long (two seconds on Windows) and the device is lost with it:
@@ -25,11 +26,11 @@ class DeviceCost {
  * bin that there is room for: a bound that holds however the camera jumps. What a pair costs is measured at the frames whose counts are read back anyway.
  */
 export class SubmissionPacer {
-  readonly #queue: GPUQueue;
+  readonly #clock: QueueClock;
   readonly #cost: DeviceCost;
 
   constructor(device: GPUDevice) {
-    this.#queue = device.queue;
+    this.#clock = QueueClock.of(device);
     this.#cost = perDevice(device, 'submission cost', () => new DeviceCost());
   }
 
@@ -50,7 +51,7 @@ export class SubmissionPacer {
 
   /** Times the submissions of one frame; call it before the first of them. */
   watch(): SubmissionWatch {
-    return new SubmissionWatch(this.#queue);
+    return new SubmissionWatch(this.#clock);
   }
 
   /** Takes note of how many pairs a watched frame has painted. */
@@ -64,12 +65,12 @@ export class SubmissionPacer {
 
 /** When the submissions of one frame were done. Nothing waits for it. */
 export class SubmissionWatch {
-  readonly #queue: GPUQueue;
+  readonly #clock: QueueClock;
   readonly #submitted: number[] = [];
   readonly #done: Promise<number>[] = [];
 
-  constructor(queue: GPUQueue) {
-    this.#queue = queue;
+  constructor(clock: QueueClock) {
+    this.#clock = clock;
     // What was handed over before this frame.
     this.note();
   }
@@ -77,7 +78,7 @@ export class SubmissionWatch {
   /** Call it after each submission. */
   note(): void {
     this.#submitted.push(performance.now());
-    this.#done.push(this.#queue.onSubmittedWorkDone().then(() => performance.now()));
+    this.#done.push(this.#clock.done().then(({ now }) => now));
   }
 
   /**
@@ -86,7 +87,7 @@ export class SubmissionWatch {
    */
   async painting(): Promise<number[]> {
     const done = await Promise.all(this.#done).catch(() => []);
-    const times = done.slice(1).map((now, i) => now - Math.max(done[i], this.#submitted[i + 1]));
+    const times = done.slice(1).map((now, i) => this.#clock.spent(done[i], this.#submitted[i + 1], now));
     return times.length > 1 ? times.slice(1) : times;
   }
 }

@@ -22,7 +22,6 @@ export type CameraValues = Omit<
   | 'antialiased'
   | 'key_bits'
   | 'is_ordered'
-  | 'occlusion_tiles'
   | 'has_detail'
   | 'detail'
   | 'detail_fade'
@@ -58,7 +57,7 @@ export function cameraValues(camera: Camera, origin: Vector3, variance: number =
     near,
     far: Math.min(far, MAX_FLOAT32),
     stretch: stretchOf(worldToCamera),
-    dilation: variance,
+    filter_variance: variance,
   };
 }
 

@@ -13,6 +13,7 @@ import {
   showLoaded,
   submits,
   until,
+  hurry,
 } from './support/harness.js';
 import { isRed, screenOf } from './support/screen.js';
 
@@ -31,6 +32,9 @@ function eyeOf(element: GaussianSplatElement): number[] {
 
 const distance = (a: readonly number[], b: readonly number[]): number =>
   Math.hypot(...a.map((value, axis) => value - b[axis]));
+
+/** Much of what is tested here comes after a rest, or must not come. */
+beforeEach(() => hurry(3));
 
 afterEach(async () => {
   await resetMouse();

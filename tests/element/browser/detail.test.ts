@@ -1,7 +1,7 @@
 /** Levels of detail of plain files: built when asked for or when the GPU is too slow, drawn as far as the page allows, and gone without a trace. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, atRest, claimFault, delay, frames, showLoaded, until } from './support/harness.js';
+import { assert, assertEqual, atRest, claimFault, frames, showLoaded, until } from './support/harness.js';
 
 const ball = (splats: number): string => `/net/ball/red.splat?ms=0&n=${splats}`;
 
@@ -80,21 +80,6 @@ describe('levels of detail of a plain file', () => {
     const decibels = 10 * Math.log10(255 ** 2 / error);
     console.log(`the picture at rest: ${decibels.toFixed(1)} dB to that before the turn`);
     assert(decibels > 50, `${decibels} dB`);
-  }).timeout(120_000);
-
-  it('splats that an economy takes away while levels are built of them are read no further: no word of it, and all is back without either', async () => {
-    const element = await showLoaded({ src: ball(600), detail: '4px', economy: '60%' });
-    await until(() => element.stats?.spared === 240 && hasLevels(element), 'both', 60_000);
-    for (let k = 0; k < 16; k++) {
-      element.detail = k % 2 === 0 ? '3px' : 'off';
-      element.economy = k % 3 === 0 ? null : '50%';
-      await delay(20 * (k % 4));
-    }
-    [element.detail, element.economy] = ['off', null];
-    await until(() => element.stats?.spared === 0 && !hasLevels(element), 'neither');
-    const other = await showLoaded({ src: ball(600) });
-    assertEqual(element.stats!.bytes.scene, other.stats!.bytes.scene, 'bytes');
-    assert((await pictureOf(element)) === (await pictureOf(other)), 'the whole picture again');
   }).timeout(120_000);
 
   it('a word that is none is said, and means auto', async () => {

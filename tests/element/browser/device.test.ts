@@ -224,6 +224,80 @@ describe('the loss of the device', () => {
     }
   });
 
+  it('is followed by a picture once the browser has a device again, without a reload', async () => {
+    const original = GaussianSplatElement.sharedDevice;
+    let refusals = 0;
+    GaussianSplatElement.sharedDevice = new SharedDevice(async () => {
+      if (refusals > 0) {
+        refusals--;
+        throw new Error('not now');
+      }
+      const adapter = await navigator.gpu.requestAdapter();
+      assert(adapter, 'an adapter');
+      return adapter.requestDevice();
+    });
+    try {
+      const element = await showLoaded();
+      const before = await screenOf(element);
+      const seen: string[] = [];
+      for (const type of ['contextlost', 'contextrestored', 'error', 'load'])
+        element.addEventListener(type, () => seen.push(type));
+      refusals = 3;
+      devices[devices.length - 1].destroy();
+      await nextEvent(element, 'error');
+      assertEqual(element.error?.reason, 'device-lost/unrecoverable');
+      await nextEvent(element, 'load', 40_000);
+      await frames();
+      assertEqual([...seen].sort(), ['contextlost', 'contextrestored', 'error', 'load'], 'events');
+      assertEqual([element.loaded, element.error], [true, null], 'loaded');
+      assertEqual((await screenOf(element)).differences(before), 0, 'differing colour values');
+      // What was set to another scene, or to none, asks no more.
+      refusals = 3;
+      devices[devices.length - 1].destroy();
+      await nextEvent(element, 'error');
+      element.src = null;
+      await delay(8_000);
+      assertEqual(refusals, 1, 'requests that were left');
+    } finally {
+      GaussianSplatElement.sharedDevice = original;
+    }
+  });
+
+  it('leaves no empty picture: toBlob() has the picture, or says why not', async () => {
+    const element = await showLoaded();
+    const size = async (blob: Blob): Promise<number> => {
+      const { width, height } = await createImageBitmap(blob);
+      return width * height;
+    };
+    const opaque = async (blob: Blob): Promise<number> => {
+      const bitmap = await createImageBitmap(blob);
+      const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d')!;
+      context.drawImage(bitmap, 0, 0);
+      const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+      return data.filter((value, i) => i % 4 === 3 && value > 0).length;
+    };
+    const whole = await element.toBlob();
+    const expected = await opaque(whole);
+    assert(expected > 0 && (await size(whole)) > 0, 'a picture');
+    for (let i = 0; i < 3; i++) {
+      const restored = nextEvent(element, 'contextrestored');
+      devices[devices.length - 1].destroy();
+      let pictures = 0;
+      for (let k = 0; k < 3; k++) {
+        const blob = await element
+          .toBlob()
+          .catch((error: DOMException) => assertEqual(error.name, 'InvalidStateError'));
+        if (!blob) continue;
+        pictures++;
+        assertEqual(await opaque(blob), expected, 'pixels that are not empty');
+      }
+      assert(pictures < 3, 'the loss was noticed');
+      await restored;
+      await frames();
+    }
+    assertEqual(await opaque(await element.toBlob()), expected, 'pixels in the end');
+  });
+
   it('that comes with every first frame is an error too, not a loop', async () => {
     const original = GaussianSplatElement.sharedDevice;
     let requests = 0;
@@ -279,6 +353,15 @@ describe('without WebGPU', () => {
       });
     });
   }
+
+  it('an adapter that never comes is an error', async () => {
+    await withGpu({ ...navigator.gpu, requestAdapter: () => new Promise(() => undefined) }, async () => {
+      const element = show({ src: COMPASS });
+      await nextEvent(element, 'error', 30_000);
+      assertEqual(element.error?.reason, 'unsupported/no-adapter');
+      assert(/no answer within 20 s/.test(element.error?.message ?? ''), element.error?.message ?? '');
+    });
+  });
 
   it('not a byte of the scene is fetched', async () => {
     await withGpu(undefined, async () => {

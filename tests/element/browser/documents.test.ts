@@ -1,7 +1,7 @@
 /** Elements in other documents than the page's: frames, and those that are gone. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, COMPASS, delay, showLoaded, submits } from './support/harness.js';
+import { assert, assertEqual, COMPASS, delay, showLoaded, submits, hurry } from './support/harness.js';
 
 const canvasOf = (element: GaussianSplatElement): HTMLCanvasElement => {
   const canvas = element.shadowRoot?.querySelector('canvas');
@@ -12,6 +12,8 @@ const canvasSize = (element: GaussianSplatElement): [number, number] => [
   canvasOf(element).width,
   canvasOf(element).height,
 ];
+
+beforeEach(() => hurry(3));
 
 describe('another document', () => {
   it('an element that is moved into a frame keeps its looks and its picture', async () => {

@@ -304,16 +304,6 @@ describe('properties', () => {
     await element.updateComplete;
     assert(element.loaded, 'the scene is still there');
   });
-
-  it('economy without a value is no economy, in silence', async () => {
-    const element = await showLoaded({ economy: '' });
-    await delay(300);
-    // By then it would have been spoken of, and the harness refuses warnings.
-    element.economy = '60%';
-    await until(() => (element.stats?.spared ?? 0) > 0, 'economy');
-    element.economy = '';
-    await until(() => element.stats?.spared === 0, 'the whole scene');
-  });
 });
 
 describe('paper', () => {

@@ -45,7 +45,7 @@ async function withReleaseDelay(ms: number, work: () => Promise<void>): Promise<
 
 describe('a long life', () => {
   it('elements that come and go by the hundred leave the GPU and the heap as they were, on one device', async () => {
-    // 100, or what `npm run lives` asks for.
+    // 100, or what `npm run lab:lives` asks for.
     const cycles = Number(await (await fetch('/net/soak-cycles')).text());
     await withReleaseDelay(0, async () => {
       // It keeps the device, so that what the device owns for all is not counted as coming and going.

@@ -9,6 +9,7 @@ import {
   show,
   showLoaded,
   until,
+  hurry,
 } from './support/harness.js';
 
 /** All workers that the page has started, and whether they were ended. */
@@ -24,6 +25,8 @@ window.Worker = class extends Worker {
     super.terminate();
   }
 };
+
+beforeEach(() => hurry(3));
 
 describe('the scene worker', () => {
   it('is one for all elements, ends when idle, and starts again', async () => {
@@ -53,9 +56,10 @@ describe('the scene worker', () => {
   });
 
   it('answers also where something fails that nobody foresaw', async () => {
-    const nothing = null as unknown as Parameters<typeof loader.openBoxes>[0];
+    const nothing = { type: 'boxes', request: null } as unknown as Parameters<typeof loader.ask>[0];
     const loader = GaussianSplatElement.sceneLoader;
-    const failed = loader.openBoxes(nothing, new AbortController().signal, () => undefined).catch((error) => error);
+    const never = () => Promise.reject(new Error('on the page'));
+    const failed = loader.ask(nothing, new AbortController().signal, never).catch((error) => error);
     const error: unknown = await Promise.race([failed, delay(10_000)]);
     assert(error instanceof Error && /decode\/corrupt/.test(error.message), `an error with a name: ${String(error)}`);
   });

@@ -11,6 +11,7 @@ import {
   show,
   showLoaded,
   until,
+  hurry,
 } from './support/harness.js';
 
 const eventsOf = (element: GaussianSplatElement): string[] => {
@@ -19,6 +20,8 @@ const eventsOf = (element: GaussianSplatElement): string[] => {
     element.addEventListener(type, () => seen.push(type));
   return seen;
 };
+
+beforeEach(() => hurry(3));
 
 describe('the address of the page', () => {
   const here = location.href;

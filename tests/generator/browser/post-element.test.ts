@@ -12,6 +12,7 @@ import {
   show,
   showLoaded,
   until,
+  hurry,
 } from '../../element/browser/support/harness.js';
 import { screenOf, type Rgb } from '../../element/browser/support/screen.js';
 import { calls, FIXTURES, RUNTIME } from './support.js';
@@ -49,6 +50,8 @@ async function untilLight(
     await delay(100);
   }
 }
+
+beforeEach(() => hurry(3));
 
 describe('a post-processor in the element', () => {
   for (const [name, src] of [

@@ -1,6 +1,6 @@
 /** Devices of Dawn other than the common one: with features and limits of choice, or with a compiler that errs. */
 import { deviceDescriptor } from '@gaussian-splat/renderer';
-import { requestNodeAdapter } from '../../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../../packages/cli/src/lib/node-gpu.mjs';
 import { miscompile, type Miscompilation } from '../../support/miscompilation.js';
 
 let full: Promise<GPUDevice> | undefined;

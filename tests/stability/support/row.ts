@@ -2,9 +2,9 @@
 import assert from 'node:assert/strict';
 import { appendFileSync } from 'node:fs';
 import { test, type TestContext } from 'node:test';
-import { requestNodeAdapter } from '../../../scripts/lib/node-gpu.mjs';
+import { requestNodeAdapter } from '../../../packages/cli/src/lib/node-gpu.mjs';
 
-/** True under `npm run stability`: whole recipes. `npm test` runs a part of each. */
+/** True under `npm run lab:stability`: whole recipes. `npm test` runs a part of each. */
 export const isFull = process.env.STABILITY === 'full';
 
 /** One of two sizes of a recipe. */

@@ -12,8 +12,5 @@ export function planFor(count: number): Uint32Array {
   const { fields } = layouts.Plan;
   plan[fields.visible.offset / 4] = count;
   plan[fields.sort_blocks.offset / 4] = blocks;
-  plan[fields.sort_x.offset / 4] = Math.min(blocks, constants.MAX_GROUPS_X);
-  plan[fields.sort_y.offset / 4] = Math.ceil(blocks / constants.MAX_GROUPS_X);
-  plan[fields.sort_z.offset / 4] = 1;
   return plan;
 }

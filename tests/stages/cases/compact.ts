@@ -1,4 +1,12 @@
-import { CompactStage, constants, cullGroups, layouts, PlanStage, writeStruct } from '@gaussian-splat/renderer/stages';
+import {
+  CompactStage,
+  constants,
+  cullGroups,
+  layouts,
+  PlanStage,
+  scanBytes,
+  writeStruct,
+} from '@gaussian-splat/renderer/stages';
 import { check, checkEqual, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
 
 const { CULL_GROUP, WORDS_PER_GROUP } = constants;
@@ -49,19 +57,13 @@ async function compactBits(
     const place = { splat_count: count, page, first_group: firstGroups[page] };
     writeStruct(layouts.View, { ...zeros, ...place }, bytes);
     const view = bench.uniform(...new Uint32Array(bytes));
-    // All chunks of the page, listed backwards: their order must not matter.
-    const groups = cullGroups(count);
-    const list = new Uint32Array(firstGroups[page] + groups);
-    for (let chunk = 0; chunk < groups; chunk++) list[firstGroups[page] + chunk] = groups - 1 - chunk;
-    const args = bench.buffer(Uint32Array.of(...new Array<number>(3 * page).fill(0), groups, 1, 1));
     const bindings = stage.bind({
       view,
-      chunk_list: bench.buffer(list),
       visible_bits: bitBuffer,
       group_offsets: offsetBuffer,
       survivors,
     });
-    bench.compute((pass) => stage.record(pass, bindings, args, page));
+    bench.compute((pass) => stage.record(pass, bindings, count));
   });
   return bench.read(survivors, 4 * capacity);
 }
@@ -81,34 +83,34 @@ function randomFlags(count: number, share: number, seed: number): boolean[] {
 
 async function checkPlan(bench: Bench, pages: readonly boolean[][], capacity: number): Promise<void> {
   const { offsets, firstGroups } = flagsToBits(pages);
+  const groups = firstGroups[pages.length];
   const planSize = layouts.Plan.size + layouts.PagePlan.size * pages.length;
-  const plan = bench.buffer(planSize);
-  const stage = new PlanStage(bench.device);
-  const bindings = stage.bind({
-    limits: bench.uniform(pages.length, capacity, firstGroups[pages.length]),
-    offsets: bench.buffer(offsets),
-    page_ranges: bench.buffer(Uint32Array.from(pages.flatMap((_, p) => [firstGroups[p], firstGroups[p + 1]]))),
-    plan,
-  });
-  bench.compute((pass) => stage.record(pass, bindings));
-  const words = await bench.read(plan, planSize);
+  const counts = new Uint32Array(scanBytes(groups) / 4);
+  for (let group = 0; group < groups; group++) counts[group] = offsets[group + 1] - offsets[group];
   const total = survivorsTwin(pages).length;
   const visible = Math.min(total, capacity);
-  const field = (name: keyof typeof layouts.Plan.fields): number => words[layouts.Plan.fields[name].offset / 4];
-  checkEqual([field('visible'), field('overflow')], [visible, total - visible], 'visible and overflow');
-  checkEqual(
-    [field('sort_x'), field('sort_y'), field('sort_z')],
-    [Math.ceil(visible / constants.SORT_BLOCK), visible > 0 ? 1 : 0, 1],
-    'sort',
-  );
-  checkEqual([field('quad_instances')], [Math.ceil(visible / constants.QUAD_BATCH)], 'quad instances');
-  let first = 0;
-  pages.forEach((flags, page) => {
-    const own = Math.max(0, Math.min(flags.filter(Boolean).length, visible - first));
-    const at = (layouts.Plan.size + layouts.PagePlan.size * page) / 4;
-    checkEqual(words.subarray(at, at + 3), [first, own, Math.ceil(own / constants.PROJECT_GROUP)], `page ${page}`);
-    first += own;
-  });
+  for (const threads of ['parallel', 'serial'] as const) {
+    const plan = bench.buffer(planSize);
+    const stage = new PlanStage(bench.device, threads);
+    const bindings = stage.bind({
+      limits: bench.uniform(pages.length, capacity, groups),
+      values: bench.buffer(counts),
+      page_ranges: bench.buffer(Uint32Array.from(pages.flatMap((_, p) => [firstGroups[p], firstGroups[p + 1]]))),
+      plan,
+    });
+    bench.compute((pass) => stage.record(pass, bindings));
+    const words = await bench.read(plan, planSize);
+    const field = (name: keyof typeof layouts.Plan.fields): number => words[layouts.Plan.fields[name].offset / 4];
+    checkEqual([field('visible'), field('overflow')], [visible, total - visible], 'visible and overflow');
+    checkEqual([field('sort_blocks')], [Math.ceil(visible / constants.SORT_BLOCK)], 'blocks of the sort');
+    let first = 0;
+    pages.forEach((flags, page) => {
+      const own = Math.max(0, Math.min(flags.filter(Boolean).length, visible - first));
+      const at = (layouts.Plan.size + layouts.PagePlan.size * page) / 4;
+      checkEqual(words.subarray(at, at + 2), [first, own], `page ${page}`);
+      first += own;
+    });
+  }
 }
 
 const shares = [0, 0.01, 0.3, 1];
@@ -136,7 +138,7 @@ export const compactCases: StageCase[] = [
     },
   },
   {
-    name: 'plan: counts, indirect arguments and pages follow the survivors',
+    name: 'plan: counts and pages follow the survivors',
     run: async (bench) => {
       for (const share of shares) {
         await checkPlan(

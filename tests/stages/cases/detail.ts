@@ -19,7 +19,7 @@ import { WITHOUT_LEVERS } from './view.js';
 const NOT_WRITTEN = -1;
 
 interface Cut {
-  /** Of each chunk; {@link NOT_WRITTEN} for those that are not looked into. */
+  /** Of each chunk; 0 for those that are not drawn. */
   readonly shares: Float32Array;
   readonly listed: ReadonlySet<number>;
   /** Pixels that the budget allows. */
@@ -40,11 +40,10 @@ async function cutOnGpu(
   const initial = new Float32Array(groups + 1).fill(NOT_WRITTEN);
   initial[groups] = 0;
   const shares = bench.buffer(new Uint32Array(initial.buffer));
-  const [list, args] = [bench.buffer(4 * groups), bench.buffer(Uint32Array.of(0, 1, 1))];
   const counts = bench.buffer(4 * constants.DETAIL_COUNTS);
   const [stage, budgetStage] = [new CullChunksStage(device), new DetailBudgetStage(device)];
   const bindings = stage.bind({
-    ...{ view: uniform, chunks, details, chunk_shares: shares, chunk_list: list, chunk_args: args },
+    ...{ view: uniform, chunks, details, chunk_shares: shares },
     group_counts: bench.buffer(4 * groups),
     visible_bits: bench.buffer(4 * constants.WORDS_PER_GROUP * groups),
   });
@@ -58,10 +57,9 @@ async function cutOnGpu(
     stage.record(pass, bindings, packed.count);
   });
   const found = new Float32Array((await bench.read(shares)).buffer);
-  const [count] = await bench.read(args);
   return {
     shares: found,
-    listed: new Set((await bench.read(list)).subarray(0, count)),
+    listed: new Set(Array.from({ length: groups }, (_, chunk) => chunk).filter((chunk) => found[chunk] > 0)),
     allowed: found[groups],
   };
 }
@@ -74,7 +72,7 @@ function viewWords(packed: PackedGaussians, { camera, allowed, fade }: DetailVie
     {
       ...cameraValues(camera, origin),
       ...{ splat_count: count, page: 0, first_group: 0, antialiased: 0, key_bits: 24, is_ordered: 0 },
-      ...{ sh_degree: shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[shPrecision], occlusion_tiles: [0, 0] },
+      ...{ sh_degree: shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[shPrecision] },
       ...{ ...WITHOUT_LEVERS, has_detail: 1, detail: allowed, detail_fade: fade, splat_budget: budget },
     },
     bytes,

@@ -2,7 +2,6 @@ import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
 import { detailCases } from './detail.js';
 import { ingestCases } from './ingest.js';
-import { occlusionCases } from './occlusion.js';
 import { orderCases } from './order.js';
 import { probeCases } from './probe.js';
 import { projectionCases } from './projection.js';
@@ -18,7 +17,6 @@ export const stageCases: readonly StageCase[] = [
   ...compactCases,
   ...detailCases,
   ...orderCases,
-  ...occlusionCases,
   ...probeCases,
   ...sidesCases,
   ...sortCases,

@@ -5,6 +5,7 @@ import {
   cullGroups,
   layouts,
   OrderKeysStage,
+  PlanStage,
   scanBytes,
   thinBlocks,
   ThinStage,
@@ -44,14 +45,21 @@ async function checkThin(
   const stage = new ThinStage(bench.device, threads);
   const bindings = stage.bind({
     thin: bench.uniform(length, 0, 0, 0),
-    scan: bench.uniform(blocks, 0, 0, 0),
     order: bench.buffer(order),
     visibleBits: bench.buffer(bits),
     blockOffsets,
     survivors,
   });
+  const planStage = new PlanStage(bench.device, threads);
+  const planning = planStage.bind({
+    values: blockOffsets,
+    limits: bench.uniform(1, capacity, blocks),
+    page_ranges: bench.buffer(Uint32Array.of(0, blocks)),
+    plan: bench.buffer(layouts.Plan.size + layouts.PagePlan.size),
+  });
   bench.compute((pass) => {
     stage.recordCount(pass, bindings, length);
+    planStage.record(pass, planning);
     stage.recordWrite(pass, bindings, length);
   });
   const expected = Array.from(order).filter((i) => flags[i]);
@@ -99,7 +107,6 @@ export const orderCases: readonly StageCase[] = [
         antialiased: 0,
         key_bits: 32,
         is_ordered: 1,
-        occlusion_tiles: [0, 0],
       };
       const firstGroup = 2;
       const page = { splat_count: packed.count, page: 0, first_group: firstGroup };

@@ -28,27 +28,24 @@ import {
 } from '../../support/scenes.js';
 import { WITHOUT_LEVERS } from './view.js';
 
-const { CULL_GROUP, WORDS_PER_GROUP, PROJECT_GROUP } = constants;
+const { CULL_GROUP, WORDS_PER_GROUP } = constants;
 
 /** What `cull` leaves out although it is in view. */
 export interface LeftOut {
-  /** Depths beyond which nothing shows, of tiles across and down. */
-  readonly tiles: readonly [number, number];
-  readonly depths: Uint32Array;
   /** Visible sets: the sides of the view, and those of each splat. */
   readonly sides?: readonly number[];
   readonly seenFrom?: Uint32Array;
   readonly threads?: Threads;
 }
 
-const NOTHING: LeftOut = { tiles: [0, 0], depths: new Uint32Array(1) };
+const NOTHING: LeftOut = {};
 
 /** Everything that `cull` and `project` read, on the GPU. */
 function uploadScene(
   bench: Bench,
   packed: PackedGaussians,
   camera: Camera,
-  { tiles, sides = WITHOUT_LEVERS.sides }: LeftOut = NOTHING,
+  { sides = WITHOUT_LEVERS.sides }: LeftOut = NOTHING,
 ): { view: GPUBuffer; gaussians: GPUBuffer; sh: GPUBuffer; chunks: GPUBuffer } {
   const bytes = new ArrayBuffer(layouts.View.size);
   const page = { splat_count: packed.count, page: 0, first_group: 0 };
@@ -56,7 +53,6 @@ function uploadScene(
     antialiased: packed.antialiased ? 1 : 0,
     key_bits: 32,
     is_ordered: 0,
-    occlusion_tiles: tiles,
     ...WITHOUT_LEVERS,
     sides,
   };
@@ -82,9 +78,8 @@ export async function cullOnGpu(
   // What `cull` does not write must come from `cull_chunks`: garbage would show.
   const bits = bench.buffer(new Uint32Array(WORDS_PER_GROUP * groups).fill(0xffffffff));
   const counts = bench.buffer(new Uint32Array(groups).fill(0xffffffff));
-  const chunkArgs = bench.buffer(Uint32Array.of(0, 1, 1));
   const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
-  const shared = { view, chunk_list: bench.buffer(4 * groups), visible_bits: bits, group_counts: counts };
+  const shared = { view, visible_bits: bits, group_counts: counts };
   const shares = bench.buffer(4 * (groups + 1));
   const [chunkStage, stage] = [new CullChunksStage(bench.device), new CullStage(bench.device, leftOut.threads)];
   const chunkBindings = chunkStage.bind({
@@ -92,23 +87,24 @@ export async function cullOnGpu(
     chunks,
     details: chunks,
     chunk_shares: shares,
-    chunk_args: chunkArgs,
   });
   const bindings = stage.bind({
-    ...{ ...shared, gaussians, gathered, occlusion: bench.buffer(leftOut.depths) },
+    ...{ ...shared, gaussians, gathered },
     chunk_shares: shares,
     seen_from: leftOut.seenFrom ? bench.buffer(leftOut.seenFrom) : gaussians,
   });
   bench.compute((pass) => {
     chunkStage.record(pass, chunkBindings, packed.count);
-    stage.record(pass, bindings, chunkArgs, 0);
+    stage.record(pass, bindings, packed.count);
   });
   const [words, groupCounts, counters] = [await bench.read(bits), await bench.read(counts), await bench.read(gathered)];
   const visible = Array.from({ length: packed.count }, (_, i) => ((words[Math.floor(i / 32)] >>> (i % 32)) & 1) === 1);
   const expected = new Uint32Array(groups);
   visible.forEach((flag, i) => (expected[Math.floor(i / CULL_GROUP)] += flag ? 1 : 0));
   checkEqual(groupCounts, expected, 'group counts');
-  return { visible, unusable: counters[constants.UNUSABLE], chunksSeen: (await bench.read(chunkArgs))[0] };
+  const drawn = new Float32Array((await bench.read(shares)).buffer).subarray(0, groups);
+  const chunksSeen = drawn.filter((share) => share > 0).length;
+  return { visible, unusable: counters[constants.UNUSABLE], chunksSeen };
 }
 
 /** The twin: does a splat reach the centre of a pixel? `margin` in pixels widens (or narrows) its box. */
@@ -170,7 +166,7 @@ export async function projectOnGpu(
   const { view, gaussians, sh } = uploadScene(bench, packed, camera);
   const { count } = packed;
   const plan = new Uint32Array((layouts.Plan.size + layouts.PagePlan.size) / 4);
-  plan.set([0, count, Math.ceil(count / PROJECT_GROUP), 1, 1], layouts.Plan.size / 4);
+  plan.set([0, count], layouts.Plan.size / 4);
   const planBuffer = bench.buffer(plan);
   const splats = bench.buffer(layouts.ProjectedSplat.size * count);
   const keys = bench.buffer(4 * count);
@@ -189,7 +185,7 @@ export async function projectOnGpu(
     keys,
     chunk_shares,
   });
-  bench.compute((pass) => stage.record(pass, bindings, planBuffer, 0));
+  bench.compute((pass) => stage.record(pass, bindings, count + 1000));
   return { splats: await bench.read(splats), keys: await bench.read(keys) };
 }
 

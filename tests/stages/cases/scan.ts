@@ -1,5 +1,6 @@
-import { constants, scanBytes, ScanStage } from '@gaussian-splat/renderer/stages';
+import { constants } from '@gaussian-splat/renderer/stages';
 import { checkEqual, randomSource, type Bench, type StageCase } from '../../support/gpu.js';
+import { scanOnGpu } from '../../support/scan.js';
 
 /** The twin: exclusive prefix sums modulo 2^32, and behind them the total. */
 function scanTwin(values: Uint32Array): Uint32Array {
@@ -10,14 +11,7 @@ function scanTwin(values: Uint32Array): Uint32Array {
 
 async function checkScan(bench: Bench, values: Uint32Array): Promise<void> {
   for (const threads of ['parallel', 'serial'] as const) {
-    const stage = new ScanStage(bench.device, threads);
-    const words = new Uint32Array(scanBytes(values.length) / 4);
-    words.set(values);
-    const buffer = bench.buffer(words);
-    const bindings = stage.bind({ values: buffer, scan: bench.uniform(values.length) });
-    bench.compute((pass) => stage.record(pass, bindings));
-    const sums = (await bench.read(buffer)).subarray(0, values.length + 1);
-    checkEqual(sums, scanTwin(values), `${threads} prefix sums`);
+    checkEqual(await scanOnGpu(bench, values, threads), scanTwin(values), `${threads} prefix sums`);
   }
 }
 

@@ -19,20 +19,18 @@ function randomSets(count: number): { seenFrom: Uint32Array; sidesOf: (readonly 
   return { seenFrom, sidesOf };
 }
 
-const NOTHING_HIDDEN = { tiles: [0, 0] as const, depths: new Uint32Array(1) };
-
 export const sidesCases: readonly StageCase[] = (['parallel', 'serial'] as const).map((threads) => ({
   name: `cull, ${threads}: of what is visible, what shows from a side of the view stays; without sides all of it`,
   run: async (bench) => {
     const { cloud, cameras } = thinned(room(), 3000);
     const packed = packGaussians(cloud);
     const { seenFrom, sidesOf } = randomSets(packed.count);
-    const all = await cullOnGpu(bench, packed, cameras[0], { ...NOTHING_HIDDEN, threads });
+    const all = await cullOnGpu(bench, packed, cameras[0], { threads });
     // Of one word, of the last bit of each, and of all words.
     for (const near of [[3], [31, 63, 95, 127], SIDES.map((_, side) => side).filter((side) => side % 3 === 0)]) {
       const sides = [0, 0, 0, 0];
       for (const side of near) sides[side >>> 5] = (sides[side >>> 5] | (1 << (side & 31))) >>> 0;
-      const some = await cullOnGpu(bench, packed, cameras[0], { ...NOTHING_HIDDEN, threads, sides, seenFrom });
+      const some = await cullOnGpu(bench, packed, cameras[0], { threads, sides, seenFrom });
       let kept = 0;
       sidesOf.forEach((own, i) => {
         const expected = all.visible[i] && own.some((side) => near.includes(side));
@@ -41,7 +39,7 @@ export const sidesCases: readonly StageCase[] = (['parallel', 'serial'] as const
       });
       check(kept > 0 && kept < sidesOf.length, 'nothing or everything was kept: the case tests nothing');
     }
-    const none = await cullOnGpu(bench, packed, cameras[0], { ...NOTHING_HIDDEN, threads, seenFrom });
+    const none = await cullOnGpu(bench, packed, cameras[0], { threads, seenFrom });
     all.visible.forEach((flag, i) => check(none.visible[i] === flag, `splat ${i}, without sides`));
   },
 }));

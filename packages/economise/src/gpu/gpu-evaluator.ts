@@ -1,13 +1,12 @@
 import type { GaussianCloud } from '@gaussian-splat/core';
 import { Renderer } from '@gaussian-splat/renderer';
 import { isOfPlanes, rareKernelOf } from '@gaussian-splat/renderer/stages';
-import type { LoweredColours } from '../colour-moments.js';
 import type { CutFigures, Evaluator, JudgedViews } from '../evaluator.js';
 import * as shaders from '../generated/shaders.js';
 import { stayingInOrder } from '../order.js';
 import { inline, poolFor, type TaskPool } from '../parts/task-pool.js';
 import { reduceInParts, writtenOrder, type Cut, type ReducedCloud } from '../reduce.js';
-import type { Ranking, Scores } from '../score.js';
+import type { LoweredColours, Ranking, Scores } from '../score.js';
 import type { DealtViews } from '../views.js';
 import { CloudBuffers } from './cloud-buffers.js';
 import { CutScene } from './cut-scene.js';

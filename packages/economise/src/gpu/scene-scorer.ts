@@ -11,11 +11,9 @@ import {
   type StructLayout,
   type StructValues,
 } from '@gaussian-splat/renderer/stages';
-import { PRIOR_VIEWS } from '../colour-moments.js';
 import { economiseLower, economiseMoments, economiseScore, SCORE_GROUP } from '../generated/shaders.js';
-import { MIN_LOOKS, UNSEEN_CONTRAST } from '../score.js';
-import { layouts } from './layouts.js';
-import { NO_VIEW } from './no-view.js';
+import { MIN_LOOKS, PRIOR_VIEWS, UNSEEN_CONTRAST } from '../score.js';
+import { layouts, NO_VIEW } from './layouts.js';
 import { readBack } from './read-back.js';
 import type { SceneParts } from './scene-parts.js';
 
@@ -138,7 +136,11 @@ export class SceneScorer {
     const { parts, gaussians } = this.#scene;
     const bytes = new ArrayBuffer(VIEW_STRIDE * parts.length * this.#views.length);
     this.#views.forEach((camera, k) => {
-      const values = { ...NO_VIEW, ...cameraValues(camera, gaussians.origin, gaussians.filterVariance), antialiased: +gaussians.antialiased };
+      const values = {
+        ...NO_VIEW,
+        ...cameraValues(camera, gaussians.origin, gaussians.filterVariance),
+        antialiased: +gaussians.antialiased,
+      };
       parts.forEach(({ page }, p) => {
         const at = VIEW_STRIDE * (parts.length * k + p);
         writeStruct(rendererLayouts.View, { ...values, splat_count: page.count }, bytes, at);

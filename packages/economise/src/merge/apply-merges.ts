@@ -2,7 +2,7 @@ import { quaternionOfMatrix, shCoefficientCount, symmetricEigen, type GaussianCl
 import { splatRows } from '@gaussian-splat/renderer/stages';
 import { splatsOf, type ReducedCloud } from '../reduce.js';
 import type { Merges } from './find-merges.js';
-import { writeRow } from './splat-row.js';
+import { writeRow } from './pair-costs.js';
 
 const { joinMoments, ROW, X, XX, XY, XZ, Y, YY, YZ, Z, ZZ } = splatRows;
 const NOWHERE = -1;

@@ -1,8 +1,19 @@
 import { shCoefficientCount, type Camera, type GaussianCloud } from '@gaussian-splat/core';
-import { splatRows } from '@gaussian-splat/renderer/stages';
-import { DILATION } from '../cpu-project.js';
-import { writeRow } from './splat-row.js';
+import { splatRows, scaleRotationFactor } from '@gaussian-splat/renderer/stages';
+import { DILATION } from './project.js';
 import { AMPLITUDE, SEEN, seenSplats, U, UU, UV, V, VV } from './seen-splats.js';
+
+const root = new Float64Array(6);
+
+/** Puts centre and covariance of a splat into its row, laid out as the renderer lays out splats that it merges. @param rows [N, ROW] */
+export function writeRow(cloud: GaussianCloud, i: number, rows: Float64Array): void {
+  const p = splatRows.ROW * i;
+  scaleRotationFactor(cloud, i, root);
+  splatRows.covarianceOf(root, 0, rows, p);
+  rows[p + splatRows.X] = cloud.positions[3 * i];
+  rows[p + splatRows.Y] = cloud.positions[3 * i + 1];
+  rows[p + splatRows.Z] = cloud.positions[3 * i + 2];
+}
 
 const { joinMoments, MASS, ROW, X, Y, Z } = splatRows;
 /** Squared difference of a splat's colour to what lies behind it, a channel: the mean of captured scenes. */

@@ -1,5 +1,5 @@
 import type { Camera, GaussianCloud } from '@gaussian-splat/core';
-import { factors, project } from '../cpu-project.js';
+import { factors, project } from './project.js';
 
 /** Numbers of a splat in a view. */
 export const SEEN = 6;

@@ -17,8 +17,7 @@ import {
   SCREEN_BYTES,
   SCREEN_NUMBERS,
 } from '../generated/shaders.js';
-import { layouts } from '../gpu/layouts.js';
-import { NO_VIEW } from '../gpu/no-view.js';
+import { layouts, NO_VIEW } from '../gpu/layouts.js';
 import type { PictureErrors } from '../gpu/picture-errors.js';
 import { mean } from '../measure.js';
 import type { RefinedScene } from './refined-scene.js';

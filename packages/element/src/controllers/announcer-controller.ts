@@ -2,11 +2,11 @@ import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { viewSentence, type ViewName } from '../camera/spoken.js';
 import type { SpokenStrings } from '../words.js';
 
-export interface AnnouncerOptions {
-  readonly viewName: () => ViewName;
-  readonly strings: () => SpokenStrings;
+export interface AnnouncerHost {
+  readonly viewName: ViewName;
+  readonly strings: SpokenStrings;
   /** True while a person has the keyboard on the picture. */
-  readonly isFocused: () => boolean;
+  readonly isFocused: boolean;
 }
 
 /** Least time between two announcements, ms: a screen reader that is interrupted all the time says nothing. */
@@ -15,14 +15,14 @@ const INTERVAL_MS = 700;
 /** Says where the camera has gone, to people who move it by keyboard and cannot see it: while it has the focus, and not too often. */
 export class AnnouncerController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
-  readonly #options: AnnouncerOptions;
+  readonly #of: AnnouncerHost;
   #text = '';
   #spoken: ViewName | undefined;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(host: ReactiveControllerHost & HTMLElement, options: AnnouncerOptions) {
+  constructor(host: ReactiveControllerHost & HTMLElement, of: AnnouncerHost) {
     this.#host = host;
-    this.#options = options;
+    this.#of = of;
     host.addController(this);
   }
 
@@ -45,21 +45,21 @@ export class AnnouncerController implements ReactiveController {
 
   /** The camera is somewhere else. */
   cameraMoved(): void {
-    if (this.#timer !== undefined || !this.#options.isFocused()) return;
+    if (this.#timer !== undefined || !this.#of.isFocused) return;
     this.#timer = setTimeout(this.#speak, INTERVAL_MS);
   }
 
   readonly #speak = (): void => {
     this.#timer = undefined;
-    const name = this.#options.viewName();
-    if (!this.#options.isFocused() || name === this.#spoken) return;
+    const name = this.#of.viewName;
+    if (!this.#of.isFocused || name === this.#spoken) return;
     this.#spoken = name;
-    this.#say(viewSentence(name, this.#options.strings()));
+    this.#say(viewSentence(name, this.#of.strings));
   };
 
   /** The picture's name and keys are read on focus; only moves are news. */
   readonly #onFocus = (): void => {
-    this.#spoken = this.#options.viewName();
+    this.#spoken = this.#of.viewName;
   };
 
   readonly #onBlur = (): void => {

@@ -1,6 +1,7 @@
-import type { DetailChoice } from '../attributes.js';
+import type { Attributes, DetailChoice } from '../attributes.js';
 import type { DetailLevers, GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
-import type { SceneLoader } from '../loading/scene-loader.js';
+import { LatestTask } from '../latest-task.js';
+import type { Services } from '../stage-host.js';
 
 /** Splats of a scene from which on levels are worth building unasked: below, what is slow is not the number of splats. */
 const LEAST_SPLATS = 50_000;
@@ -11,25 +12,25 @@ const PATIENCE_MS = 1_500;
 /** Time between two frames of one motion, ms: what is longer is a rest, and does not count. */
 const LONGEST_GAP_MS = 1_000;
 
-export interface DetailOptions {
-  /** The attribute. */
-  readonly detail: () => DetailChoice;
-  readonly loader: () => SceneLoader;
-  readonly memoryBudget: () => number | undefined;
+/** What the controller needs of its element. */
+export interface DetailHost {
+  readonly attributes: Pick<Attributes, 'detail'>;
+  readonly services: Pick<Services, 'sceneLoader'>;
+  readonly memoryBudget: number | undefined;
   /** Another picture is due. */
-  readonly onChange: () => void;
-  readonly warn: (sentence: string) => void;
+  splatsChanged(): void;
+  warn(sentence: string): void;
 }
 
 /** Sees to levels of detail: built when the page asks for them, or when pictures in motion cannot be drawn whole; and drawn as far as the page allows. */
 export class DetailController {
-  readonly #options: DetailOptions;
+  readonly #host: DetailHost;
   #scene: GpuScene | null = null;
   /** What a streamed scene came with. */
   #own: DetailLevers = {};
   /** Splats whose levels are there, on their way, or not to be had. */
   #of: OwnedGaussians | undefined;
-  #running = new AbortController();
+  readonly #building = new LatestTask();
   #choice: DetailChoice = 'auto';
   #isPressed = false;
   /** How long pictures have moved with less than the whole, ms. */
@@ -37,19 +38,19 @@ export class DetailController {
   /** When the last picture in motion was told of. */
   #noted = 0;
 
-  constructor(options: DetailOptions) {
-    this.#options = options;
+  constructor(host: DetailHost) {
+    this.#host = host;
   }
 
   /** Looks at the scene that is on show whole, or null for none, and at the attribute. Safe to call as often as one likes. */
   update(scene: GpuScene | null): void {
     if (scene !== this.#scene) this.#begin(scene);
     if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
-    this.#allow(scene, this.#options.detail());
+    this.#allow(scene, this.#host.attributes.detail);
     if (scene.hasOwnLevels) return;
     if (this.#choice === 'off') return this.#dismiss(scene);
     if (this.#of === scene.gaussians || !this.#isWorthIt(scene)) return;
-    void this.#build(scene);
+    this.#build(scene);
   }
 
   /** Tells of each picture in motion whether it was drawn whole. */
@@ -73,8 +74,7 @@ export class DetailController {
   }
 
   #stop(): void {
-    this.#running.abort();
-    this.#running = new AbortController();
+    this.#building.renew();
     this.#of = undefined;
   }
 
@@ -84,7 +84,7 @@ export class DetailController {
     this.#choice = choice;
     const pixels = choice === 'auto' ? this.#own.detail : choice === 'off' ? 0 : choice;
     scene.setDetail({ ...this.#own, detail: pixels });
-    this.#options.onChange();
+    this.#host.splatsChanged();
   }
 
   #dismiss(scene: GpuScene): void {
@@ -97,24 +97,24 @@ export class DetailController {
     return this.#isPressed && count >= LEAST_SPLATS && count <= MOST_SPLATS;
   }
 
-  async #build(scene: GpuScene): Promise<void> {
-    this.#stop();
+  #build(scene: GpuScene): void {
     const { gaussians } = scene;
     this.#of = gaussians;
-    const { signal } = this.#running;
-    const { loader, memoryBudget, onChange, warn } = this.#options;
-    try {
-      const { buildLevels } = await import('../detail/build-levels.js');
-      signal.throwIfAborted();
-      const levels = await buildLevels(scene, loader(), memoryBudget(), signal);
-      // An economy may have put other splats in their place meanwhile.
-      if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
-      scene.setLevels(levels);
-      onChange();
-    } catch (error) {
-      if (signal.aborted || scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
-      const reason = error instanceof Error ? error.message : String(error);
-      warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);
-    }
+    this.#building.run(
+      async (signal) => {
+        const { buildLevels } = await import('../detail/build-levels.js');
+        signal.throwIfAborted();
+        const levels = await buildLevels(scene, this.#host.services.sceneLoader, this.#host.memoryBudget, signal);
+        // A sequence may have put other splats in their place meanwhile.
+        if (scene.isDestroyed || scene.gaussians !== gaussians) return levels?.destroy();
+        scene.setLevels(levels);
+        this.#host.splatsChanged();
+      },
+      (error) => {
+        if (scene.isLost || scene.isDestroyed || scene.gaussians !== gaussians) return;
+        const reason = error instanceof Error ? error.message : String(error);
+        this.#host.warn(`<gaussian-splat>: the scene has no levels of detail, since building them failed: ${reason}`);
+      },
+    );
   }
 }

@@ -1,13 +1,15 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import type { CameraController } from './camera-controller.js';
 import { MAX_MOVER_STEP_MS, type Mover } from './mover.js';
 
-export interface FlyOptions {
-  readonly enabled: () => boolean;
-  readonly surface: () => HTMLElement | null;
-  /** World units that count as one: the size of the scene. */
-  readonly scale: () => number;
-  readonly moveBy: (right: number, up: number, forward: number) => void;
-  readonly requestFrame: () => void;
+export interface FlyHost {
+  /** World units that count as one are the size of the scene. */
+  readonly camera: Pick<CameraController, 'bounds'>;
+  readonly surface: HTMLElement | null;
+  readonly mayFly: boolean;
+  /** A person's keys move the camera. */
+  flyBy(right: number, up: number, forward: number): void;
+  requestFrame(): void;
 }
 
 type Direction = readonly [right: number, up: number, forward: number];
@@ -29,20 +31,20 @@ const FIRST_STEP_MS = 50;
 
 /** Flies while keys are held: W and S, A and D, Q and E; with Shift faster. */
 export class FlyController implements ReactiveController, Mover {
-  readonly #options: FlyOptions;
+  readonly #of: FlyHost;
   readonly #held = new Map<string, Direction>();
   #isFast = false;
   #lastStep: number | undefined;
   #listening: AbortController | undefined;
 
-  constructor(host: ReactiveControllerHost, options: FlyOptions) {
-    this.#options = options;
+  constructor(host: ReactiveControllerHost, of: FlyHost) {
+    this.#of = of;
     host.addController(this);
   }
 
   hostUpdated(): void {
-    const surface = this.#options.surface();
-    if (!this.#options.enabled() || surface === null) return this.hostDisconnected();
+    const surface = this.#of.surface;
+    if (!this.#of.mayFly || surface === null) return this.hostDisconnected();
     if (this.#listening !== undefined) return;
     this.#listening = new AbortController();
     const { signal } = this.#listening;
@@ -67,8 +69,8 @@ export class FlyController implements ReactiveController, Mover {
   }
 
   #move([right, up, forward]: Direction, stepMs: number): void {
-    const way = (this.#options.scale() * SPEED * (this.#isFast ? FAST : 1) * stepMs) / 1000;
-    if (way > 0) this.#options.moveBy(way * right, way * up, way * forward);
+    const way = (this.#of.camera.bounds.radius * SPEED * (this.#isFast ? FAST : 1) * stepMs) / 1000;
+    if (way > 0) this.#of.flyBy(way * right, way * up, way * forward);
   }
 
   readonly #onDown = (event: KeyboardEvent): void => {
@@ -79,7 +81,7 @@ export class FlyController implements ReactiveController, Mover {
     // A short press may be over before the next frame.
     if (!event.repeat) this.#move(direction, FIRST_STEP_MS);
     this.#held.set(event.code, direction);
-    this.#options.requestFrame();
+    this.#of.requestFrame();
   };
 
   readonly #onUp = (event: KeyboardEvent): void => {

@@ -2,19 +2,18 @@ import type { Camera } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { parsePoint } from '../camera/grammar.js';
-import { toScene, type ViewerFrame } from '../camera/orbit.js';
+import { toScene } from '../camera/orbit.js';
 import { project } from '../camera/projection.js';
 import { ScenePoint } from '../camera/values.js';
+import type { CameraController } from './camera-controller.js';
 
-export interface HotspotOptions {
+export interface HotspotHost {
+  readonly camera: Pick<CameraController, 'viewerFrame' | 'bounds'>;
   /** Holds a box for each of {@link HotspotController.names}, in their order, once it is rendered. */
-  readonly layer: () => HTMLElement | null;
-  readonly viewerFrame: () => ViewerFrame;
-  /** World units: the size of the scene. */
-  readonly scale: () => number;
+  readonly hotspotLayer: HTMLElement | null;
   /** Looks into the last frame. Rejects if it is gone. */
-  readonly probe: (points: readonly ProbePoint[]) => Promise<readonly ProbeAnswer[]>;
-  readonly warn: (sentence: string) => void;
+  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
+  warn(sentence: string): void;
 }
 
 /** A label of the page at a point of the scene, as `queryHotspot` gives it. */
@@ -56,7 +55,7 @@ const PROBE_INTERVAL_MS = 100;
 /** Keeps children with `slot="hotspot-…"` at their points of the scene, and fades those that cannot be seen. */
 export class HotspotController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
-  readonly #options: HotspotOptions;
+  readonly #of: HotspotHost;
   #hotspots = new Map<string, Hotspot>();
   #observer: MutationObserver | undefined;
   #camera: Camera | undefined;
@@ -65,9 +64,9 @@ export class HotspotController implements ReactiveController {
   #isProbing = false;
   #isStale = false;
 
-  constructor(host: ReactiveControllerHost & HTMLElement, options: HotspotOptions) {
+  constructor(host: ReactiveControllerHost & HTMLElement, of: HotspotHost) {
     this.#host = host;
-    this.#options = options;
+    this.#of = of;
     host.addController(this);
   }
 
@@ -138,7 +137,7 @@ export class HotspotController implements ReactiveController {
     const read = (name: string, text: string | undefined): Point | null => {
       const point = text === undefined ? null : parsePoint(text);
       if (text !== undefined && point === null)
-        this.#options.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in metres, found "${text}".`);
+        this.#of.warn(`<gaussian-splat> ${slot}: ${name} expects "x y z" in metres, found "${text}".`);
       return point;
     };
     const position = read('data-position', dataset.position);
@@ -149,7 +148,7 @@ export class HotspotController implements ReactiveController {
 
   /** Moves the boxes to where the last frame has their points, and hides those that are in no frame. */
   #place(): void {
-    const boxes = this.#options.layer()?.children;
+    const boxes = this.#of.hotspotLayer?.children;
     [...this.#hotspots.values()].forEach((hotspot, i) => {
       const box = boxes?.[i] as HTMLElement | undefined;
       if (box === undefined) return;
@@ -166,7 +165,7 @@ export class HotspotController implements ReactiveController {
     hotspot.depth = 0;
     if (camera === undefined || hotspot.position === null) return;
     const { clientWidth, clientHeight } = this.#host;
-    const { x, y, depth } = project(camera, toScene(this.#options.viewerFrame(), hotspot.position));
+    const { x, y, depth } = project(camera, toScene(this.#of.camera.viewerFrame, hotspot.position));
     hotspot.x = (x * clientWidth) / camera.width;
     hotspot.y = (y * clientHeight) / camera.height;
     hotspot.depth = depth > camera.near ? depth : 0;
@@ -175,7 +174,7 @@ export class HotspotController implements ReactiveController {
 
   #facesCamera({ position, normal }: Hotspot, { worldToCamera: m }: Camera): boolean {
     if (normal === null || position === null) return true;
-    const frame = this.#options.viewerFrame();
+    const frame = this.#of.camera.viewerFrame;
     const [n, p] = [toScene(frame, normal), toScene(frame, position)];
     // In the camera's axes the eye is at 0, so the way from the eye to the point is the point itself.
     const row = (r: number, v: Point, w: number): number =>
@@ -219,13 +218,13 @@ export class HotspotController implements ReactiveController {
     const camera = this.#camera;
     const asked = [...this.#hotspots.values()].filter(({ depth }) => depth > 0);
     if (camera === undefined || asked.length === 0) return;
-    const margin = IN_FRONT * this.#options.scale();
+    const margin = IN_FRONT * this.#of.camera.bounds.radius;
     const points = asked.map(({ x, y, depth }) => ({
       x: (x * camera.width) / clientWidth,
       y: (y * camera.height) / clientHeight,
       depth: depth - margin,
     }));
-    const answers = await this.#options.probe(points);
+    const answers = await this.#of.probe(points);
     answers.forEach(({ transmittance }, i) => (asked[i].isOccluded = transmittance < HIDDEN_BELOW));
     this.#place();
   }

@@ -21,13 +21,17 @@ export interface InputOptions {
   readonly touchAction: string;
 }
 
-/** What the controller tells. */
-export interface InputListener {
-  readonly act: (action: CameraAction) => void;
+/** Who hears of it. */
+export interface InputHost {
+  /** The element that is dragged and focused, once it is rendered. */
+  readonly surface: HTMLElement | null;
+  /** Read after every update of the element. */
+  readonly input: InputOptions;
+  act(action: CameraAction): void;
   /** A double click or a double tap, in CSS pixels of the page. */
-  readonly pick: (clientX: number, clientY: number) => void;
+  pick(clientX: number, clientY: number): void;
   /** The space bar; false if it means nothing here. */
-  readonly toggleMotion: () => boolean;
+  toggleMotion(): boolean;
 }
 
 const LEFT_BUTTON = 0;
@@ -42,9 +46,7 @@ interface Pointer extends Point {
 
 /** Listens to mouse, pen, touch, wheel and keys on the picture, and turns them into camera actions. */
 export class InputController implements ReactiveController {
-  readonly #listener: InputListener;
-  readonly #options: () => InputOptions;
-  readonly #surfaceOf: () => HTMLElement | null;
+  readonly #of: InputHost;
   readonly #pointers = new Map<number, Pointer>();
   readonly #doubleTap = new DoubleTap();
   /** The last pointer was a finger: whether its second tap is a double click, too, differs from browser to browser, and it counts once. */
@@ -55,19 +57,8 @@ export class InputController implements ReactiveController {
   #listening: AbortController | undefined;
   #wheel: AbortController | undefined;
 
-  /**
-   * @param surfaceOf the element that is dragged and focused, once it is rendered.
-   * @param options read after every update of the host.
-   */
-  constructor(
-    host: ReactiveControllerHost,
-    surfaceOf: () => HTMLElement | null,
-    options: () => InputOptions,
-    listener: InputListener,
-  ) {
-    this.#surfaceOf = surfaceOf;
-    this.#options = options;
-    this.#listener = listener;
+  constructor(host: ReactiveControllerHost, of: InputHost) {
+    this.#of = of;
     host.addController(this);
   }
 
@@ -84,9 +75,9 @@ export class InputController implements ReactiveController {
   }
 
   #sync(): void {
-    this.#surface = this.#surfaceOf();
+    this.#surface = this.#of.surface;
     if (this.#surface === null) return;
-    const { enabled, zoom, touchAction } = this.#options();
+    const { enabled, zoom, touchAction } = this.#of.input;
     this.#surface.style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
     if (!enabled) return this.#stop();
     this.#listening ??= this.#listen(this.#surface);
@@ -168,7 +159,7 @@ export class InputController implements ReactiveController {
   /** Finds out whose a finger is; its drag counts from here on, so that the camera does not jump. */
   #decide(pointerId: number, from: Pointer, to: Point): void {
     if (Math.hypot(to.x - from.x, to.y - from.y) < TOUCH_SLOP) return;
-    const owner = isCameraDrag(this.#options().touchAction, from, to) ? 'camera' : 'page';
+    const owner = isCameraDrag(this.#of.input.touchAction, from, to) ? 'camera' : 'page';
     this.#pointers.set(pointerId, { ...from, ...to, owner });
   }
 
@@ -183,7 +174,7 @@ export class InputController implements ReactiveController {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     if (event.key === ' ') {
       // Held down it scrolls no page, either.
-      this.#toggles = event.repeat ? this.#toggles : this.#listener.toggleMotion();
+      this.#toggles = event.repeat ? this.#toggles : this.#of.toggleMotion();
       if (this.#toggles) event.preventDefault();
       return;
     }
@@ -196,7 +187,7 @@ export class InputController implements ReactiveController {
   };
 
   #pick({ clientX, clientY }: MouseEvent): void {
-    this.#listener.pick(clientX, clientY);
+    this.#of.pick(clientX, clientY);
   }
 
   readonly #onWheel = (event: WheelEvent): void => {
@@ -206,24 +197,24 @@ export class InputController implements ReactiveController {
 
   /** The right button pans, so it opens no menu. */
   readonly #onContextMenu = (event: Event): void => {
-    if (this.#options().pan) event.preventDefault();
+    if (this.#of.input.pan) event.preventDefault();
   };
 
   /** Two fingers move the camera, also where one finger scrolls the page; without zoom they are the page's, whose own zoom some people need. */
   readonly #onTouchMove = (event: TouchEvent): void => {
-    if (event.touches.length > 1 && event.cancelable && this.#options().zoom) event.preventDefault();
+    if (event.touches.length > 1 && event.cancelable && this.#of.input.zoom) event.preventDefault();
   };
 
   #movePair(from: readonly [Point, Point], to: readonly [Point, Point], height: number): void {
-    if (!this.#options().zoom) return;
+    if (!this.#of.input.zoom) return;
     for (const action of pinchOf(from, to, height)) this.#perform(action);
   }
 
   /** Passes an action on; false if the page does not allow it. */
   #perform(action: CameraAction): boolean {
-    const { zoom, pan } = this.#options();
+    const { zoom, pan } = this.#of.input;
     if ((action.type === 'zoom' && !zoom) || (action.type === 'pan' && !pan)) return false;
-    this.#listener.act(action);
+    this.#of.act(action);
     return true;
   }
 }

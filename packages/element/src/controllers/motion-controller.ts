@@ -1,17 +1,17 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import { prefersReducedMotion } from './mover.js';
 import type { PlaybackController } from './playback-controller.js';
 
-export interface MotionOptions {
+export interface MotionHost {
   /** The page asks the camera to turn by itself. */
-  readonly rotates: () => boolean;
+  readonly autoRotates: boolean;
   /** The page asks a scene that moves to play by itself. */
-  readonly autoplays: () => boolean;
+  readonly autoplays: boolean;
   /** There is a picture to be seen that could move. */
-  readonly isOnShow: () => boolean;
-  readonly prefersReducedMotion: () => boolean;
+  readonly isOnShow: boolean;
   readonly playback: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'>;
   /** Lets the camera turn at once. */
-  readonly startTurning: () => void;
+  startTurning(): void;
 }
 
 /**
@@ -20,12 +20,12 @@ export interface MotionOptions {
  */
 export class MotionController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
-  readonly #options: MotionOptions;
+  readonly #of: MotionHost;
   #isHeld = false;
 
-  constructor(host: ReactiveControllerHost & HTMLElement, options: MotionOptions) {
+  constructor(host: ReactiveControllerHost & HTMLElement, of: MotionHost) {
     this.#host = host;
-    this.#options = options;
+    this.#of = of;
     host.addController(this);
   }
 
@@ -36,8 +36,8 @@ export class MotionController implements ReactiveController {
 
   /** What the visitor's switch does now; `none` where nothing moves by itself, and in a player, which has a button of its own. */
   get switch(): 'none' | 'pause' | 'play' {
-    if (!this.#options.isOnShow() || this.#host.slot === 'media' || !(this.#canTurn || this.#canPlay)) return 'none';
-    const isPlaying = this.#canPlay && !this.#options.playback.paused;
+    if (!this.#of.isOnShow || this.#host.slot === 'media' || !(this.#canTurn || this.#canPlay)) return 'none';
+    const isPlaying = this.#canPlay && !this.#of.playback.paused;
     return isPlaying || (this.#canTurn && !this.#isHeld) ? 'pause' : 'play';
   }
 
@@ -46,25 +46,23 @@ export class MotionController implements ReactiveController {
     const action = this.switch;
     if (action === 'none') return false;
     this.#isHeld = action === 'pause';
-    const { playback, startTurning } = this.#options;
-    if (this.#canPlay) playback[action]();
-    if (action === 'play') startTurning();
+    if (this.#canPlay) this.#of.playback[action]();
+    if (action === 'play') this.#of.startTurning();
     this.#host.requestUpdate();
     return true;
   }
 
   /** Attributes that are taken away and set again are the page's word, later than the visitor's. */
   hostUpdated(): void {
-    const { rotates, autoplays } = this.#options;
-    if (!rotates() && !autoplays()) this.#isHeld = false;
+    if (!this.#of.autoRotates && !this.#of.autoplays) this.#isHeld = false;
   }
 
   get #canTurn(): boolean {
-    return this.#options.rotates() && !this.#options.prefersReducedMotion();
+    return this.#of.autoRotates && !prefersReducedMotion();
   }
 
   /** Also for people who want less motion, for whom nothing plays by itself: they may want this. */
   get #canPlay(): boolean {
-    return this.#options.autoplays() && this.#options.playback.canPlay;
+    return this.#of.autoplays && this.#of.playback.canPlay;
   }
 }

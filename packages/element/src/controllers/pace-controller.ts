@@ -1,10 +1,10 @@
-import type { FrameLevers } from '@gaussian-splat/renderer';
+import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
-import { LADDER, rungsFor } from '../pace/ladder.js';
+import { levelsFor, LADDER, type Level } from '../pace/ladder.js';
 import { INITIAL_PACE, keepPace, quantile, resized, type Pace, type PaceReason } from '../pace/pace.js';
 import { waitForRest } from '../pace/rest.js';
 
-/** Share of the display's interval that frames may take on the GPU: the page and its compositor need the rest. */
+/** Share of the display's interval that frames may take: the page and its compositor need the rest. */
 const SHARE_OF_INTERVAL = 0.8;
 /** A change so soon after another, ms, belongs to the same motion. */
 const MOTION_MS = 150;
@@ -12,14 +12,12 @@ const MOTION_MS = 150;
 const FRAMES_OF_MOTION = 2;
 const LONGEST_PAUSE_MS = 2_000;
 
-/** Pictures of so many times the pixels are others: what rungs take is measured anew. */
+/** Images of so many times the pixels are others: what levels take is measured anew. */
 const OTHER_SIZE = 1.25;
-
-const COSTS = LADDER.map(({ cost }) => cost);
 
 /** How a frame is to be drawn. */
 export interface FramePlan {
-  /** Rung of the ladder; 0 is the true image. */
+  /** Number of the level; 0 is the whole image. */
   readonly level: number;
   readonly levers: Partial<FrameLevers> | undefined;
   /** Number of the size that pictures have. */
@@ -40,15 +38,15 @@ export interface FrameOccasion {
 
 /** What the controller says about itself. */
 export interface PaceReport {
-  /** Name of the rung that the last frame was drawn on; `whole` is the true image. */
+  /** Name of the level that the last frame was drawn with; `whole` is the image at rest. */
   readonly drawn: string;
-  /** Name of the rung for pictures in motion. */
+  /** Name of the level of frames in motion. */
   readonly moving: string;
   /** Why: see {@link PaceReason}. */
   readonly reason: PaceReason;
-  /** Median of the last frames on that rung, ms on the GPU; null while there are none. */
+  /** Median of the last frames on that level, ms: from when a frame could begin until its work was done; null while there are none. */
   readonly frameMs: number | null;
-  /** The last frame that was timed, at rest or in motion, ms on the GPU; null while there is none, and with a chosen quality. */
+  /** The last frame that was timed, at rest or in motion, ms; null while there is none, and with a chosen quality. */
   readonly lastMs: number | null;
   /** What a frame may take, ms. */
   readonly targetMs: number;
@@ -63,6 +61,8 @@ export interface PaceOptions {
   readonly requestFrame: () => void;
   /** Called for each frame of a motion that was timed: whether such are drawn whole. */
   readonly onPace: (isWhole: boolean) => void;
+  /** Default: the element's. */
+  readonly levels?: readonly Level[];
 }
 
 /**
@@ -72,21 +72,25 @@ export interface PaceOptions {
 export class PaceController {
   readonly #options: PaceOptions;
   #pace: Pace = INITIAL_PACE;
-  #rungs = LADDER.length;
+  readonly #all: readonly Level[];
+  /** Those that serve the image's size. */
+  #levels: readonly Level[];
   /** Of the pictures that the pace has measured. */
   #pixels = 0;
   /** How many sizes pictures have had: frames of another one come late. */
   #size = 0;
   #changedAt = -Infinity;
-  #drawn = 0;
+  #drawn: Level;
   /** What the last frame took, of those that are known. */
-  #lastMs = 0;
+  #lastMs: number | null = null;
   /** What the last true image took, of those that are known. */
   #wholeMs = 0;
   #restTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(options: PaceOptions) {
     this.#options = options;
+    this.#levels = this.#all = options.levels ?? LADDER;
+    this.#drawn = this.#all[0];
   }
 
   /** What a frame may take on the GPU, ms: what the page says, else a share of the display's interval, which elements that draw at the same time share. */
@@ -101,11 +105,11 @@ export class PaceController {
     const { level, reason, recent } = this.#pace;
     const frameMs = recent.length > 0 ? quantile(recent, 0.5) : null;
     return {
-      drawn: LADDER[this.#drawn].name,
-      moving: LADDER[level].name,
+      drawn: this.#drawn.name,
+      moving: this.#levels[level].name,
       reason,
       frameMs,
-      lastMs: this.#lastMs || null,
+      lastMs: this.#lastMs,
       targetMs: this.targetMs,
     };
   }
@@ -119,24 +123,25 @@ export class PaceController {
     this.#fit(pixels);
     const pause = Math.max(
       MOTION_MS,
-      Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * Math.max(this.#lastMs, this.#wholeMs)),
+      Math.min(LONGEST_PAUSE_MS, FRAMES_OF_MOTION * Math.max(this.#lastMs ?? 0, this.#wholeMs)),
     );
     // Between two changes of one motion (a sequence of fewer pictures than the display's) what is drawn for other reasons is a part of it, until rest is due.
     const isMotion = hasChanged ? goesOn || now - this.#changedAt < pause : this.#restTimer !== undefined;
     if (hasChanged) this.#changedAt = now;
     const level = isMotion ? this.#pace.level : 0;
-    this.#drawn = level;
+    this.#drawn = this.#levels[level];
     if (hasChanged || level === 0) this.stop();
     const { displayInterval } = this.#options.scheduler();
     if (level > 0) this.#restTimer ??= setTimeout(this.#rest, waitForRest(this.#wholeMs, displayInterval));
-    return { level, levers: LADDER[level].levers, size: this.#size };
+    return { level, levers: this.#drawn.levers, size: this.#size };
   }
 
   #fit(pixels: number): void {
-    this.#rungs = rungsFor(pixels);
+    const levels = levelsFor(pixels, this.#all);
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
-    if (!isOther && this.#pace.level < this.#rungs) return;
-    this.#pace = resized(this.#pace, pixels / this.#pixels, this.#rungs, COSTS);
+    if (!isOther && levels.length === this.#levels.length) return;
+    this.#levels = levels;
+    this.#pace = resized(this.#pace, pixels / this.#pixels, this.#levels);
     this.#pixels = pixels;
     this.#size++;
   }
@@ -147,12 +152,15 @@ export class PaceController {
   };
 
   /** What a frame took that was drawn by a plan. */
-  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, milliseconds: number): void {
+  sample({ level, size }: Pick<FramePlan, 'level' | 'size'>, { doneAt, atLeast, atMost }: WorkTime): void {
     if (!this.#options.isOn() || size !== this.#size) return;
+    const { targetMs } = this;
+    // What is in time at most, or too slow at least, is known well enough.
+    if (atMost > targetMs && atLeast <= targetMs && atLeast < atMost) return;
+    const milliseconds = atMost > targetMs ? atLeast : atMost;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
-    const sample = { now: performance.now(), level, milliseconds };
-    this.#pace = keepPace(this.#pace, sample, { targetMs: this.targetMs, costs: COSTS.slice(0, this.#rungs) });
+    this.#pace = keepPace(this.#pace, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
     const isWhole = this.#pace.level === 0;
     if (isWhole || level > 0) this.#options.onPace(isWhole);
   }
@@ -162,8 +170,8 @@ export class PaceController {
     this.stop();
     this.#pace = INITIAL_PACE;
     this.#changedAt = -Infinity;
-    this.#drawn = 0;
-    this.#lastMs = 0;
+    this.#drawn = this.#all[0];
+    this.#lastMs = null;
     this.#wholeMs = 0;
   }
 

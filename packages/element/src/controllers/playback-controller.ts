@@ -15,13 +15,13 @@ export type PlaybackEvent =
   | 'canplay'
   | 'emptied';
 
-export interface PlaybackOptions {
-  readonly loops: () => boolean;
+export interface PlaybackHost {
+  readonly loops: boolean;
   /** Seconds at which a scene begins. */
-  readonly startTime: () => number;
+  readonly startTime: number;
   /** Asks for a frame: while it plays, or after a seek. */
-  readonly requestFrame: () => void;
-  readonly dispatch: (type: PlaybackEvent) => void;
+  requestFrame(): void;
+  playbackEvent(type: PlaybackEvent): void;
 }
 
 /** Between two timeupdate events while it plays, ms: as browsers have it for video. */
@@ -29,7 +29,7 @@ const UPDATE_INTERVAL_MS = 250;
 
 /** The clock of a scene that moves, with the words and events of HTMLMediaElement. It is asked for the time once a frame. */
 export class PlaybackController {
-  readonly #options: PlaybackOptions;
+  readonly #host: PlaybackHost;
   #time = 0;
   /** Where the next scene begins, if somebody has said so: HTML's default playback start position. */
   #nextStart: number | undefined;
@@ -44,8 +44,8 @@ export class PlaybackController {
   readonly #waits = new Set<(reason: DOMException) => void>();
   #pauses = 0;
 
-  constructor(options: PlaybackOptions) {
-    this.#options = options;
+  constructor(host: PlaybackHost) {
+    this.#host = host;
   }
 
   /** Seconds; NaN while there is no scene that moves, Infinity for one without an end. */
@@ -65,7 +65,7 @@ export class PlaybackController {
 
   /** Where the next scene begins. */
   get nextStart(): number {
-    return this.#nextStart ?? Math.max(0, this.#options.startTime());
+    return this.#nextStart ?? Math.max(0, this.#host.startTime);
   }
 
   /** Seeks: events follow once the frame of that time is on show. Before there is a scene this is where it starts. */
@@ -79,8 +79,8 @@ export class PlaybackController {
     this.#time = Math.min(this.#duration, Math.max(0, seconds));
     this.#hasEnded = false;
     this.#seekTarget = this.#time;
-    this.#options.dispatch('seeking');
-    this.#options.requestFrame();
+    this.#host.playbackEvent('seeking');
+    this.#host.requestFrame();
   }
 
   /** The next scene that moves begins there. A scene that is on show and stays is sought there by {@link keepScene}. */
@@ -116,8 +116,8 @@ export class PlaybackController {
     // While it stood there were no ticks.
     if (this.#rate === 0) this.suspend();
     this.#rate = rate;
-    this.#options.dispatch('ratechange');
-    this.#options.requestFrame();
+    this.#host.playbackEvent('ratechange');
+    this.#host.requestFrame();
   }
 
   play(): void {
@@ -125,11 +125,11 @@ export class PlaybackController {
     this.#isPaused = false;
     const isReverse = this.#rate < 0;
     // From the other end, as browsers have it for video.
-    if (this.#hasEnded || (!this.#options.loops() && this.#time === (isReverse ? 0 : this.#duration)))
+    if (this.#hasEnded || (!this.#host.loops && this.#time === (isReverse ? 0 : this.#duration)))
       this.currentTime = isReverse && Number.isFinite(this.#duration) ? this.#duration : 0;
-    this.#options.dispatch('play');
+    this.#host.playbackEvent('play');
     this.#lastTick = undefined;
-    this.#options.requestFrame();
+    this.#host.requestFrame();
   }
 
   /** How often it was told to {@link pause}. */
@@ -159,8 +159,8 @@ export class PlaybackController {
   #rest(): void {
     if (this.#isPaused) return;
     this.#isPaused = true;
-    this.#options.dispatch('timeupdate');
-    this.#options.dispatch('pause');
+    this.#host.playbackEvent('timeupdate');
+    this.#host.playbackEvent('pause');
   }
 
   /** The scene is there, or is there again; NaN: it does not move. */
@@ -171,24 +171,24 @@ export class PlaybackController {
       this.#nextStart = undefined;
     }
     this.#duration = seconds;
-    this.#options.dispatch('durationchange');
-    this.#options.dispatch('loadedmetadata');
-    this.#options.requestFrame();
+    this.#host.playbackEvent('durationchange');
+    this.#host.playbackEvent('loadedmetadata');
+    this.#host.requestFrame();
   }
 
   /** Moves on to the moment of a frame. @param now requestAnimationFrame's clock, ms */
   tick(now: number): void {
     if (this.#isPaused || Number.isNaN(this.#duration)) return;
-    if (this.#lastTick === undefined) this.#options.dispatch('playing');
+    if (this.#lastTick === undefined) this.#host.playbackEvent('playing');
     const elapsed = this.#lastTick === undefined ? 0 : (now - this.#lastTick) / 1000;
     this.#lastTick = now;
     this.#advance(elapsed * this.#rate);
     if (this.#isPaused) return;
     if (now - this.#lastUpdate >= UPDATE_INTERVAL_MS) {
       this.#lastUpdate = now;
-      this.#options.dispatch('timeupdate');
+      this.#host.playbackEvent('timeupdate');
     }
-    if (this.#rate !== 0) this.#options.requestFrame();
+    if (this.#rate !== 0) this.#host.requestFrame();
   }
 
   /** A pause of the picture is not time that passes: nothing is drawn until the next tick. */
@@ -204,15 +204,15 @@ export class PlaybackController {
     this.#hasEnded = false;
     this.suspend();
     this.#rest();
-    if (couldPlay) this.#options.dispatch('durationchange');
+    if (couldPlay) this.#host.playbackEvent('durationchange');
   }
 
   /** The frame of a time is on show. */
   frameShown(seconds: number): void {
     if (this.#seekTarget === undefined || seconds !== this.#seekTarget) return;
     this.#seekTarget = undefined;
-    this.#options.dispatch('timeupdate');
-    this.#options.dispatch('seeked');
+    this.#host.playbackEvent('timeupdate');
+    this.#host.playbackEvent('seeked');
   }
 
   #advance(seconds: number): void {
@@ -222,7 +222,7 @@ export class PlaybackController {
     const isWithin = this.#rate < 0 ? next > 0 && next <= this.#duration : next >= 0 && next < this.#duration;
     if (isWithin) {
       this.#time = next;
-    } else if (this.#options.loops() && Number.isFinite(this.#duration) && this.#duration > 0) {
+    } else if (this.#host.loops && Number.isFinite(this.#duration) && this.#duration > 0) {
       this.#time = next - this.#duration * Math.floor(next / this.#duration);
     } else {
       this.#end(this.#rate < 0 ? 0 : this.#duration);
@@ -233,8 +233,8 @@ export class PlaybackController {
     this.#time = time;
     this.#isPaused = true;
     this.#hasEnded = true;
-    for (const type of ['timeupdate', 'pause', 'ended'] as const) this.#options.dispatch(type);
-    this.#options.requestFrame();
+    for (const type of ['timeupdate', 'pause', 'ended'] as const) this.#host.playbackEvent(type);
+    this.#host.requestFrame();
   }
 }
 

@@ -1,16 +1,16 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import type { Attributes } from '../attributes.js';
+import type { CameraController } from './camera-controller.js';
 import type { Mover } from './mover.js';
 
-export interface PromptOptions {
+export interface PromptHost {
+  readonly attributes: Pick<Attributes, 'interactionPromptThreshold'>;
+  readonly camera: Pick<CameraController, 'turnBy'>;
   /** True where a prompt makes sense: the scene is on show, and people can move it. */
-  readonly mayShow: () => boolean;
-  /** Rest before it is shown, ms. */
-  readonly thresholdMs: () => number;
+  readonly mayPrompt: boolean;
   /** Whether the camera moves to and fro with it. */
-  readonly wiggles: () => boolean;
-  /** Returns how far the limits let it. */
-  readonly turnBy: (theta: number) => number;
-  readonly requestFrame: () => void;
+  readonly promptWiggles: boolean;
+  requestFrame(): void;
 }
 
 /** How far the camera goes to either side, radians. */
@@ -28,15 +28,15 @@ export function wiggleAt(elapsedMs: number): number {
 /** Shows people who have not touched the scene that they can. */
 export class PromptController implements ReactiveController, Mover {
   readonly #host: ReactiveControllerHost;
-  readonly #options: PromptOptions;
+  readonly #of: PromptHost;
   #state: 'idle' | 'waiting' | 'shown' | 'done' = 'idle';
   #timer: ReturnType<typeof setTimeout> | undefined;
   #start: number | undefined;
   #turned = 0;
 
-  constructor(host: ReactiveControllerHost, options: PromptOptions) {
+  constructor(host: ReactiveControllerHost, of: PromptHost) {
     this.#host = host;
-    this.#options = options;
+    this.#of = of;
     host.addController(this);
   }
 
@@ -45,7 +45,7 @@ export class PromptController implements ReactiveController, Mover {
   }
 
   hostUpdated(): void {
-    const mayShow = this.#options.mayShow();
+    const mayShow = this.#of.mayPrompt;
     if (mayShow && this.#state === 'idle') this.#wait();
     else if (!mayShow && (this.#state === 'waiting' || this.#state === 'shown')) this.reset();
   }
@@ -65,11 +65,11 @@ export class PromptController implements ReactiveController, Mover {
   }
 
   advance(now: number): boolean {
-    if (this.#state !== 'shown' || !this.#options.wiggles()) return false;
+    if (this.#state !== 'shown' || !this.#of.promptWiggles) return false;
     this.#start ??= now;
     const elapsed = now - this.#start;
     const turned = wiggleAt(elapsed);
-    if (turned !== this.#turned) this.#turned += this.#options.turnBy(turned - this.#turned);
+    if (turned !== this.#turned) this.#turned += this.#of.camera.turnBy(turned - this.#turned);
     return elapsed < WIGGLE_MS;
   }
 
@@ -79,8 +79,8 @@ export class PromptController implements ReactiveController, Mover {
       this.#start = undefined;
       this.#turned = 0;
       this.#set('shown');
-      if (this.#options.wiggles()) this.#options.requestFrame();
-    }, this.#options.thresholdMs());
+      if (this.#of.promptWiggles) this.#of.requestFrame();
+    }, this.#of.attributes.interactionPromptThreshold);
   }
 
   #set(state: 'idle' | 'shown' | 'done'): void {

@@ -1,34 +1,34 @@
 import type { ReactiveControllerHost } from 'lit';
-import type { Reveal } from '../attributes.js';
+import type { Attributes } from '../attributes.js';
 
-export interface RevealOptions {
-  readonly mode: () => Reveal;
+export interface RevealHost {
+  readonly attributes: Pick<Attributes, 'reveal'>;
   /** True once there is a picture to reveal. */
-  readonly isReady: () => boolean;
-  readonly onDismissed: () => void;
+  readonly hasPicture: boolean;
+  posterDismissed(): void;
 }
 
 /** Whether the poster covers the scene: until the scene is there, or until the page or a person dismisses it. */
 export class RevealController {
   readonly #host: ReactiveControllerHost;
-  readonly #options: RevealOptions;
+  readonly #of: RevealHost;
   /** What was asked for by a method or a click; until then the attribute decides. */
   #wish: 'dismissed' | 'shown' | undefined;
   #wasCovered = true;
 
-  constructor(host: ReactiveControllerHost, options: RevealOptions) {
+  constructor(host: ReactiveControllerHost, of: RevealHost) {
     this.#host = host;
-    this.#options = options;
+    this.#of = of;
   }
 
   /** The scene may be seen; a lazy one may therefore be loaded. */
   get mayReveal(): boolean {
-    return this.#wish === undefined ? this.#options.mode() === 'auto' : this.#wish === 'dismissed';
+    return this.#wish === undefined ? this.#of.attributes.reveal === 'auto' : this.#wish === 'dismissed';
   }
 
   /** The poster covers the scene. */
   get isCovered(): boolean {
-    return !this.mayReveal || !this.#options.isReady();
+    return !this.mayReveal || !this.#of.hasPicture;
   }
 
   dismiss(): void {
@@ -46,6 +46,6 @@ export class RevealController {
     const isCovered = this.isCovered;
     const isGone = this.#wasCovered && !isCovered;
     this.#wasCovered = isCovered;
-    if (isGone) this.#options.onDismissed();
+    if (isGone) this.#of.posterDismissed();
   }
 }

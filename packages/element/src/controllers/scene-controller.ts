@@ -1,14 +1,16 @@
+import { loadModule } from '@gaussian-splat/core';
 import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
-import { delay, DeviceLostError, isDeviceFailure, pageVisible, unrecoverable } from '../gpu/device-failures.js';
+import type * as comeBack from '../gpu/come-back.js';
+import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/device-failures.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
 import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
-import type { SharedDevice } from '../gpu/shared-device.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
+import { LatestTask } from '../latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
-import type { SceneLoader } from '../loading/scene-loader.js';
-import { timerMs } from '../timer-ms.js';
+import type { Services } from '../stage-host.js';
+import { timerMs } from '../attributes.js';
 
 /** `waiting`: there is a scene to load, but the element is not in sight yet. */
 export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';
@@ -17,33 +19,39 @@ export type SceneState = 'empty' | 'waiting' | 'loading' | 'ready' | 'failed';
 export type Entrance = 'new' | 'whole' | 'again';
 
 /** What the controller needs of its element, and what it tells it. */
-export interface SceneOptions {
-  readonly device: () => SharedDevice;
-  readonly loader: () => SceneLoader;
-  /** How long a removed element keeps its scene, ms: moving it within the page costs nothing. */
-  readonly releaseDelayMs: () => number;
-  /** Shows a scene; fulfils once its first frame is drawn. */
-  readonly show: (scene: GpuScene, entrance: Entrance) => Promise<void>;
-  /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
-  readonly hide: (clear: boolean) => void;
-  /** Address of a frame of a sequence as it is fetched. */
-  readonly frameUrl: (url: string) => string;
-  readonly loops: () => boolean;
+export interface SceneHost {
+  readonly services: Services;
+  /** Whether a sequence begins again at its end. */
+  readonly loops: boolean;
   /** Whether anybody would see what there is of a scene while it loads. */
-  readonly wantsPreviews: () => boolean;
-  /** A preview of the scene is on show. */
-  readonly onPreview: (preview: GpuScene) => void;
+  readonly wantsPreviews: boolean;
   /** Bytes of GPU memory that the scene may take. */
-  readonly memoryBudget: () => number | undefined;
+  readonly memoryBudget: number | undefined;
   /** What a generator needs to know beyond the request. */
-  readonly live: OpenOptions['live'];
-  readonly onProgress: ProgressListener;
-  readonly onStart: () => void;
-  readonly onLoad: (url: string) => void;
+  readonly liveRequest: ReturnType<OpenOptions['live']>;
+  /** Shows a scene; fulfils once its first frame is drawn. */
+  show(scene: GpuScene, entrance: Entrance): Promise<void>;
+  /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
+  hide(clear: boolean): void;
+  /** A preview of the scene is on show. */
+  previewShown(preview: GpuScene): void;
+  loadStarted(): void;
+  progressed(...progress: Parameters<ProgressListener>): void;
+  loaded(url: string): void;
   /** There is no scene any more, or another is wanted in its place. */
-  readonly onEmptied: () => void;
-  readonly onError: (error: ElementError) => void;
-  readonly onContext: (event: 'contextlost' | 'contextrestored') => void;
+  emptied(): void;
+  failed(error: ElementError): void;
+  contextChanged(event: 'contextlost' | 'contextrestored'): void;
+}
+
+type DeviceBack = (typeof comeBack)['deviceBack'];
+
+/** Why no device is asked for any more, at first. */
+interface GivenUp {
+  readonly signal: AbortSignal;
+  readonly error: unknown;
+  readonly loss: GPUDeviceLostInfo | undefined;
+  readonly mayReturn: boolean;
 }
 
 /** So many failures in a row to bring a lost device back are final. */
@@ -60,11 +68,11 @@ const MOST_SUBMISSIONS = 64;
 
 /**
  * Life of the element's scene: load, replace (the latest request wins), recover after the loss of the device, release.
- * Every request has its own AbortController; what still runs for an older one finds it aborted and does nothing.
+ * What still runs for an older request finds its signal aborted and does nothing.
  */
 export class SceneController implements ReactiveController {
   readonly #host: ReactiveControllerHost;
-  readonly #options: SceneOptions;
+  readonly #of: SceneHost;
   #state: SceneState = 'empty';
   #error: ElementError | null = null;
   #scene: GpuScene | null = null;
@@ -72,7 +80,7 @@ export class SceneController implements ReactiveController {
   /** What the scene on show was asked for by. */
   #shownRequest: SceneRequest | null = null;
   #request: SceneRequest | null = null;
-  #running = new AbortController();
+  readonly #running = new LatestTask();
   #releaseTimer: ReturnType<typeof setTimeout> | undefined;
   #waiters: (() => void)[] = [];
   /** A loss was told that no recovery has answered yet; another scene may do so. */
@@ -80,9 +88,9 @@ export class SceneController implements ReactiveController {
   /** Grows with every loss of the device: a frame that ran too long for the driver may have been the cause. */
   #submissions = 1;
 
-  constructor(host: ReactiveControllerHost, options: SceneOptions) {
+  constructor(host: ReactiveControllerHost, of: SceneHost) {
     this.#host = host;
-    this.#options = options;
+    this.#of = of;
     host.addController(this);
   }
 
@@ -128,12 +136,12 @@ export class SceneController implements ReactiveController {
     if (request === null) return this.#state === 'empty' ? undefined : this.#clear();
     if (this.isOther(request)) {
       const isSwap = this.#request !== null;
-      this.#abort();
+      this.#running.renew();
       this.#submissions = 1;
       this.#request = request;
       this.#error = null;
       this.#setState('waiting');
-      if (isSwap) this.#options.onEmptied();
+      if (isSwap) this.#of.emptied();
     } else if (request.sh !== this.#request?.sh) {
       if (!this.isOutgoing) this.#shownRequest = request;
       this.#request = request;
@@ -144,13 +152,13 @@ export class SceneController implements ReactiveController {
 
   /** Gives up: the scene cannot be drawn. */
   fail(error: unknown): void {
-    this.#abort();
+    this.#running.renew();
     const wasShown = this.#state === 'ready' || (this.#scene !== null && !this.isOutgoing);
     this.#drop(true);
     this.#error = toElementError(error);
     this.#setState('failed');
-    if (wasShown) this.#options.onEmptied();
-    this.#options.onError(this.#error);
+    if (wasShown) this.#of.emptied();
+    this.#of.failed(this.#error);
   }
 
   hostConnected(): void {
@@ -161,7 +169,7 @@ export class SceneController implements ReactiveController {
 
   hostDisconnected(): void {
     this.#spare(true);
-    this.#releaseTimer = setTimeout(() => this.want(null, false), timerMs(this.#options.releaseDelayMs()));
+    this.#releaseTimer = setTimeout(() => this.want(null, false), timerMs(this.#of.services.releaseDelay));
   }
 
   async #load(request: SceneRequest): Promise<void> {
@@ -171,15 +179,15 @@ export class SceneController implements ReactiveController {
     let total: number | undefined;
     const report: ProgressListener = (nextLoaded, nextTotal, share) => {
       [loaded, total] = [nextLoaded, nextTotal];
-      if (!signal.aborted) this.#options.onProgress(loaded, total, share);
+      if (!signal.aborted) this.#of.progressed(loaded, total, share);
     };
-    this.#options.onStart();
+    this.#of.loadStarted();
     report(0, undefined);
     await this.#attempt(request, signal, true, report);
     if (signal.aborted || this.#scene === null) return;
     if (loaded !== total) report(loaded, loaded);
     this.#setState('ready');
-    this.#options.onLoad(request.url);
+    this.#of.loaded(request.url);
     this.#tellRestored();
     void this.#refine();
   }
@@ -190,8 +198,7 @@ export class SceneController implements ReactiveController {
     if (this.#state !== 'ready' || request === null || scene === null || scene.live || isStreamed(request)) return;
     const { shPrecision, shDegree } = scene.gaussians;
     if (request.sh === 'auto' || request.sh === shPrecision || shDegree === 0) return;
-    this.#abort();
-    const { signal } = this.#running;
+    const signal = this.#running.renew();
     try {
       await this.#open(request, signal, false, () => undefined);
     } catch {
@@ -201,11 +208,10 @@ export class SceneController implements ReactiveController {
 
   /** Brings the scene back, unnoticed but for a pair of events, after its device was lost. */
   async #restore(request: SceneRequest, loss: GPUDeviceLostInfo): Promise<void> {
-    this.#abort();
+    const signal = this.#running.renew();
     this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
-    const { signal } = this.#running;
     this.#drop(false);
-    if (!this.#isContextLost) this.#options.onContext('contextlost');
+    if (!this.#isContextLost) this.#of.contextChanged('contextlost');
     this.#isContextLost = true;
     await pageVisible(signal);
     if (!signal.aborted) await this.#attempt(request, signal, false, () => undefined, loss);
@@ -214,10 +220,32 @@ export class SceneController implements ReactiveController {
     void this.#refine();
   }
 
+  /** No device comes, or none stays. The scene is loaded again once there is one, if it may be and nothing else is asked for. */
+  async #giveUp(request: SceneRequest, { signal: given, error, loss, mayReturn }: GivenUp): Promise<void> {
+    try {
+      const { deviceBack, unrecoverable } = await loadModule(
+        'the code for lost devices',
+        () => import('../gpu/come-back.js'),
+      );
+      if (given.aborted) return;
+      this.fail(unrecoverable(error, loss));
+      if (mayReturn) void this.#comeBack(request, deviceBack);
+    } catch (missing) {
+      if (!given.aborted) this.fail(missing);
+    }
+  }
+
+  async #comeBack(request: SceneRequest, deviceBack: DeviceBack): Promise<void> {
+    const lease = await deviceBack(this.#of.services.sharedDevice, this.#running.signal);
+    if (lease === undefined) return;
+    this.#error = null;
+    await this.#load(request).finally(() => lease.release());
+  }
+
   #tellRestored(): void {
     if (!this.#isContextLost) return;
     this.#isContextLost = false;
-    this.#options.onContext('contextrestored');
+    this.#of.contextChanged('contextrestored');
   }
 
   /** Opens and shows a scene, again if the device is lost meanwhile. Afterwards there is a scene, or an error. */
@@ -237,7 +265,11 @@ export class SceneController implements ReactiveController {
         if (error instanceof DeviceLostError) loss = error.info;
         this.#submissions = Math.min(MOST_SUBMISSIONS, SUBMISSIONS_GROWTH * this.#submissions);
         this.#drop(false);
-        if (++failures >= MAX_FAILURES) return this.fail(unrecoverable(error, loss));
+        if (++failures >= MAX_FAILURES) {
+          // A scene that has cost one device after the other gets no more of them.
+          const mayReturn = !isNew && !(error instanceof DeviceLostError);
+          return this.#giveUp(request, { signal, error, loss, mayReturn });
+        }
         await delay(RETRY_DELAY_MS);
         if (signal.aborted) return;
       }
@@ -245,8 +277,8 @@ export class SceneController implements ReactiveController {
   }
 
   async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
-    const { device, loader, show, live, memoryBudget, wantsPreviews, frameUrl, loops } = this.#options;
-    const onPreview = isNew && wantsPreviews() ? (preview: GpuScene) => this.#showPreview(preview) : undefined;
+    const { services, memoryBudget, wantsPreviews } = this.#of;
+    const onPreview = isNew && wantsPreviews ? (preview: GpuScene) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
       if (signal.aborted) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
@@ -255,21 +287,17 @@ export class SceneController implements ReactiveController {
     };
     this.#spare(true);
     const scene = await openGpuScene(request, {
-      ...{ device: device(), loader: loader(), frameUrl, loops },
-      ...{
-        signal,
-        onProgress,
-        onPreview,
-        beforeUpload,
-        live,
-        memoryBudget: memoryBudget(),
-        submissions: this.#submissions,
-      },
+      device: services.sharedDevice,
+      loader: services.sceneLoader,
+      frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
+      loops: () => this.#of.loops,
+      live: () => this.#of.liveRequest,
+      ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
     }).finally(() => this.#spare(false));
     if (signal.aborted) return scene.destroy();
     const entrance = !isNew ? 'again' : this.#isPreview ? 'whole' : 'new';
     this.#replace(scene, false);
-    await Promise.race([show(scene, entrance), scene.lost]);
+    await Promise.race([this.#of.show(scene, entrance), scene.lost]);
     if (signal.aborted) return;
     if (scene.isLost) throw new DeviceLostError(await scene.lost);
     this.#host.requestUpdate();
@@ -284,8 +312,8 @@ export class SceneController implements ReactiveController {
   #showPreview(preview: GpuScene): void {
     const entrance = this.#isPreview ? 'whole' : 'new';
     this.#replace(preview, true);
-    void this.#options.show(preview, entrance).then(
-      () => this.#scene === preview && this.#options.onPreview(preview),
+    void this.#of.show(preview, entrance).then(
+      () => this.#scene === preview && this.#of.previewShown(preview),
       // The whole scene will say what is wrong.
       () => undefined,
     );
@@ -301,19 +329,13 @@ export class SceneController implements ReactiveController {
     this.#spare(isPreview);
   }
 
-  /** Ends what runs, and leaves the picture alone. */
-  #abort(): void {
-    this.#running.abort();
-    this.#running = new AbortController();
-  }
-
   #clear(): void {
-    this.#abort();
+    this.#running.renew();
     this.#request = null;
     this.#drop(true);
     this.#error = null;
     this.#setState('empty');
-    this.#options.onEmptied();
+    this.#of.emptied();
   }
 
   /** Whether the scene on show may be dropped where others lack its memory: the element is gone, or another scene is to take its place. */
@@ -327,7 +349,7 @@ export class SceneController implements ReactiveController {
   readonly #giveBack = (): void => (this.#releaseTimer ? this.#clear() : this.#drop(false));
 
   #drop(clear: boolean): void {
-    if (this.#scene !== null || clear) this.#options.hide(clear);
+    if (this.#scene !== null || clear) this.#of.hide(clear);
     if (this.#scene === null) return;
     MemoryLedger.of(this.#scene.device).spare.delete(this.#giveBack);
     this.#scene.destroy();

@@ -1,30 +1,29 @@
 import type { Attributes } from '../attributes.js';
 import type { SceneRequest } from '../loading/protocol.js';
 import { Addresses } from '../source-request.js';
-import type { Services, Source } from '../stage-options.js';
+import type { Services, Source } from '../stage-host.js';
+import type { SceneController } from './scene-controller.js';
 
-export interface SourceOptions {
-  readonly attributes: () => Attributes;
-  readonly services: () => Services;
+export interface SourceHost {
+  readonly attributes: Attributes;
+  readonly services: Services;
+  readonly scene: Pick<SceneController, 'want' | 'isOther'>;
   /** Somebody would see the scene. */
-  readonly isInSight: () => boolean;
+  readonly isInSight: boolean;
   /** Whether an element is in the page: those that are not ask for nothing. */
-  readonly isConnected: () => boolean;
-  readonly want: (request: SceneRequest | null, mayStart: boolean) => void;
-  /** Whether a request is for another scene than the last one that was wanted. */
-  readonly isOther: (request: SceneRequest | null) => boolean;
+  readonly isConnected: boolean;
 }
 
 /** What the attributes ask for, and whether it may be loaded yet. */
 export class SourceController {
-  readonly #options: SourceOptions;
+  readonly #host: SourceHost;
   #source: Source = { src: null, contract: null, chain: null, postprocess: null };
   #addresses = new Addresses();
   /** A script plays the scene, or waits to: it is loaded wherever it is. */
   #isWanted = false;
 
-  constructor(options: SourceOptions) {
-    this.#options = options;
+  constructor(host: SourceHost) {
+    this.#host = host;
   }
 
   /** Called after every update; only changes act. */
@@ -45,23 +44,23 @@ export class SourceController {
 
   /** Asks for the scene of now, and for its bytes if it is time. */
   request(): void {
-    const { attributes, isInSight, isConnected, want } = this.#options;
-    const mayStart = attributes().loading === 'eager' || this.#isWanted || isInSight();
-    if (isConnected()) want(this.#requestOf(this.#source), mayStart);
+    const { attributes, isInSight, isConnected, scene } = this.#host;
+    const mayStart = attributes.loading === 'eager' || this.#isWanted || isInSight;
+    if (isConnected) scene.want(this.#requestOf(this.#source), mayStart);
   }
 
   /** Whether a source asks for another scene than the one that is shown or loaded. */
   isOther(source: Source): boolean {
-    return this.#options.isOther(this.#requestOf(source));
+    return this.#host.scene.isOther(this.#requestOf(source));
   }
 
   /** Addresses of the post-processors that the last source names. */
   get postprocess(): readonly string[] {
-    return this.#addresses.postprocess(this.#source.postprocess, this.#options.services().urlModifier);
+    return this.#addresses.postprocess(this.#source.postprocess, this.#host.services.urlModifier);
   }
 
   #requestOf(source: Source): SceneRequest | null {
-    const { attributes, services } = this.#options;
-    return this.#addresses.request(source, attributes(), services().urlModifier);
+    const { attributes, services } = this.#host;
+    return this.#addresses.request(source, attributes, services.urlModifier);
   }
 }

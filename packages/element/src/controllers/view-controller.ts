@@ -1,9 +1,9 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import type { FrameLevers } from '@gaussian-splat/renderer';
-import type { QualityChoice } from '../attributes.js';
+import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
+import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
-import type { GpuScene, Rendering } from '../gpu/gpu-scene.js';
+import type { GpuScene } from '../gpu/gpu-scene.js';
 import type { Frame } from '../live/frame-filter.js';
 import { LADDER } from '../pace/ladder.js';
 import type { CameraController } from './camera-controller.js';
@@ -11,31 +11,27 @@ import { PaceController } from './pace-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
-export interface ViewOptions {
-  readonly scheduler: () => FrameScheduler;
+export interface ViewHost {
+  readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'maxPixelRatio' | 'frameBudget'>;
   readonly camera: CameraController;
   readonly size: SizeController;
-  readonly canvasOf: () => HTMLCanvasElement | null;
+  readonly scheduler: FrameScheduler;
+  readonly canvas: HTMLCanvasElement | null;
   /** False where nobody would see a frame. */
-  readonly isVisible: () => boolean;
-  readonly maxPixelRatio: () => number;
-  /** Most that a picture in motion may take on the GPU, ms; infinite where the display says. */
-  readonly frameBudget: () => number;
-  /** How its frames are drawn. */
-  readonly rendering: () => Omit<Rendering, 'quality'> & { readonly quality: QualityChoice };
+  readonly isVisible: boolean;
   /** Time constant of the camera's motion, ms. */
-  readonly decayMs: () => number;
+  readonly decayMs: number;
   /** Called once a frame before the camera steps: what moves it by itself does so now. */
-  readonly beforeFrame: (now: number) => void;
-  /** Called once a frame, after it was submitted, with the camera that it is drawn from. */
-  readonly afterFrame: (camera: Camera) => void;
+  beforeFrame(now: number): void;
   /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
-  readonly onFrame: (scene: GpuScene, camera: Camera, now: number) => void;
-  readonly onCameraChange: (source: CameraChangeSource) => void;
+  advanceScene(scene: GpuScene, camera: Camera, now: number): void;
+  /** Called once a frame, after it was submitted, with the camera that it is drawn from. */
+  afterFrame(camera: Camera): void;
+  cameraChanged(source: CameraChangeSource): void;
   /** Called for each frame of a motion that was timed: whether such are drawn whole. */
-  readonly onPace: (isWhole: boolean) => void;
+  notePace(isWhole: boolean): void;
   /** Drawing has failed for good. */
-  readonly onError: (error: unknown) => void;
+  drawingFailed(error: unknown): void;
 }
 
 interface Settle {
@@ -53,7 +49,7 @@ const PREPARE_AFTER_MS = 300;
 export class ViewController implements FrameClient {
   /** What frames in motion are drawn with. */
   readonly pace: PaceController;
-  readonly #options: ViewOptions;
+  readonly #host: ViewHost;
   #scene: GpuScene | null = null;
   #context: GPUCanvasContext | null = null;
   #configured: GPUDevice | null = null;
@@ -62,20 +58,20 @@ export class ViewController implements FrameClient {
   #drawnVersion = 0;
   #preparing: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(options: ViewOptions) {
-    this.#options = options;
+  constructor(host: ViewHost) {
+    this.#host = host;
     this.pace = new PaceController({
-      isOn: () => options.rendering().quality === 'auto' && (this.#scene?.isMeasurable ?? false),
-      scheduler: options.scheduler,
-      frameBudget: options.frameBudget,
+      isOn: () => host.attributes.quality === 'auto',
+      scheduler: () => host.scheduler,
+      frameBudget: () => host.attributes.frameBudget,
       requestFrame: () => this.requestFrame(),
-      onPace: options.onPace,
+      onPace: (isWhole) => host.notePace(isWhole),
     });
   }
 
   /** Asks for a frame, if one would be seen. Free to call often. */
   requestFrame(): void {
-    if (this.#isDrawable) this.#options.scheduler().request(this);
+    if (this.#isDrawable) this.#host.scheduler.request(this);
   }
 
   /**
@@ -85,7 +81,7 @@ export class ViewController implements FrameClient {
   show(scene: GpuScene): Promise<void> {
     this.#scene = scene;
     scene.onIncomplete = () => this.requestFrame();
-    scene.onError = (error) => this.#scene === scene && this.#options.onError(error);
+    scene.onError = (error) => this.#scene === scene && this.#host.drawingFailed(error);
     this.pace.reset();
     return new Promise((resolve, reject) => {
       this.#first = { resolve, reject };
@@ -98,7 +94,7 @@ export class ViewController implements FrameClient {
     this.#scene = null;
     this.#first = undefined;
     this.pace.stop();
-    this.#options.scheduler().cancel(this);
+    this.#host.scheduler.cancel(this);
   }
 
   /** Stops drawing and clears the canvas. */
@@ -110,7 +106,7 @@ export class ViewController implements FrameClient {
 
   /** Puts another canvas in the place of one whose document has lost its window: that one never shows a picture again. */
   renewCanvas(): void {
-    const canvas = this.#options.canvasOf();
+    const canvas = this.#host.canvas;
     canvas?.replaceWith(canvas.cloneNode());
     this.#context = null;
     this.#configured = null;
@@ -120,22 +116,22 @@ export class ViewController implements FrameClient {
     const scene = this.#scene;
     // It may have left the viewport since it asked.
     if (scene === null || !this.#isDrawable) return;
-    const { camera, decayMs, onCameraChange, onError } = this.#options;
+    const { camera } = this.#host;
     const pixels = this.#pixelsOf(scene);
     // Without a size nothing is drawn; the observer of the size asks again when there is one.
     if (pixels === null) return this.#finishUnseen();
-    this.#options.beforeFrame(now);
-    const source = camera.step(now, decayMs());
+    this.#host.beforeFrame(now);
+    const source = camera.step(now, this.#host.decayMs);
     try {
       const request = this.#frameRequest(scene, pixels);
-      this.#options.onFrame(scene, request.camera, now);
+      this.#host.advanceScene(scene, request.camera, now);
       this.#render(scene, request, now, source !== null);
-      this.#options.afterFrame(request.camera);
+      this.#host.afterFrame(request.camera);
     } catch (error) {
-      return onError(error);
+      return this.#host.drawingFailed(error);
     }
     if (camera.isMoving) this.requestFrame();
-    if (source !== null) onCameraChange(source);
+    if (source !== null) this.#host.cameraChanged(source);
   }
 
   /**
@@ -144,7 +140,7 @@ export class ViewController implements FrameClient {
    */
   drawNow(): HTMLCanvasElement | null {
     const scene = this.#scene;
-    const canvas = this.#options.canvasOf();
+    const canvas = this.#host.canvas;
     if (scene === null || scene.isLost || this.#first !== undefined || canvas === null) return null;
     const pixels = this.#pixelsOf(scene);
     if (pixels === null) return null;
@@ -155,14 +151,14 @@ export class ViewController implements FrameClient {
 
   /** There is a scene, and somebody sees it or waits for its first frame. A document without a window, as of a frame that was taken away, shows none. */
   get #isDrawable(): boolean {
-    const { canvasOf, isVisible } = this.#options;
-    if (this.#scene?.isLost !== false || canvasOf()?.ownerDocument.defaultView === null) return false;
-    return this.#first !== undefined || isVisible();
+    const { canvas, isVisible } = this.#host;
+    if (this.#scene?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
+    return this.#first !== undefined || isVisible;
   }
 
   /** null where there is no size. */
   #pixelsOf({ device }: GpuScene): PixelSize | null {
-    return this.#options.size.pixelSize(this.#options.maxPixelRatio(), device.limits.maxTextureDimension2D);
+    return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, device.limits.maxTextureDimension2D);
   }
 
   #render(scene: GpuScene, request: Frame, now: number, cameraMoved: boolean): void {
@@ -173,12 +169,12 @@ export class ViewController implements FrameClient {
     const hasChanged = first === undefined && (cameraMoved || version !== this.#drawnVersion);
     this.#drawnVersion = version;
     const pixels = request.camera.width * request.camera.height;
-    const goesOn = this.#options.camera.isMoving;
+    const goesOn = this.#host.camera.isMoving;
     const plan = this.pace.plan({ now, pixels, hasChanged, goesOn });
     const { levers } = plan;
     // Who has chosen a quality pays for no clock.
     const onTime =
-      this.#options.rendering().quality === 'auto' ? (spent: number) => this.pace.sample(plan, spent) : undefined;
+      this.#host.attributes.quality === 'auto' ? (time: WorkTime) => this.pace.sample(plan, time) : undefined;
     if (first !== undefined) {
       scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
       return;
@@ -194,7 +190,7 @@ export class ViewController implements FrameClient {
 
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
   #prepareSoon(scene: GpuScene, { target: { format } }: Frame): void {
-    if (scene.isPrepared || this.#options.rendering().quality !== 'auto' || !scene.isMeasurable) return;
+    if (scene.isPrepared || this.#host.attributes.quality !== 'auto') return;
     this.#preparing ??= setTimeout(() => {
       this.#preparing = undefined;
       if (this.#scene === scene) scene.prepare(MOVING_LEVERS, format);
@@ -202,12 +198,12 @@ export class ViewController implements FrameClient {
   }
 
   #applyRendering(scene: GpuScene): void {
-    const { quality, shDegree } = this.#options.rendering();
+    const { quality, maxShDegree: shDegree } = this.#host.attributes;
     scene.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree });
   }
 
   #finishUnseen(): void {
-    if (!this.#options.size.isEmpty) return;
+    if (!this.#host.size.isEmpty) return;
     this.#first?.resolve();
     this.#first = undefined;
   }
@@ -220,14 +216,14 @@ export class ViewController implements FrameClient {
     if (canvas.height !== height) canvas.height = height;
     const texture = context.getCurrentTexture();
     return {
-      camera: this.#options.camera.view(width, height),
+      camera: this.#host.camera.view(width, height),
       target: texture,
     };
   }
 
   /** The canvas's context, set up for the device. Premultiplied alpha lets the page show through. */
   #contextFor(device: GPUDevice): GPUCanvasContext {
-    const context = (this.#context ??= this.#options.canvasOf()?.getContext('webgpu') ?? null);
+    const context = (this.#context ??= this.#host.canvas?.getContext('webgpu') ?? null);
     if (context === null) throw noContext();
     if (this.#configured !== device) {
       const format = navigator.gpu.getPreferredCanvasFormat();

@@ -1,5 +1,5 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
-import { windowOf } from '../window-of.js';
+import { windowOf } from './size-controller.js';
 
 /**
  * More than nothing must be visible: with a threshold of 0 an element that only touches the viewport's edge would

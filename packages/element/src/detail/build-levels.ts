@@ -1,11 +1,12 @@
 /** Loaded only where levels of detail are asked for, or the GPU is too slow without. */
-import { DetailedGaussians, readPacked } from '@gaussian-splat/renderer';
+import { DetailedGaussians, readPacked, type PackedLevels } from '@gaussian-splat/renderer';
 import type { GpuScene } from '../gpu/gpu-scene.js';
+import { buffersOf } from '../loading/buffers-of.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
 /**
- * Builds levels of detail of the splats that a scene has on the GPU, in the worker, and puts them beside these. undefined where there are none to be had: see
- * `SceneLoader.buildLevels`.
+ * Builds levels of detail of the splats that a scene has on the GPU, in the worker, and puts them beside these. undefined for a scene
+ * that is too small to have any, and where the page refuses workers.
  * @param memoryBudget bytes of GPU memory that the scene and its levels may take together; undefined for no limit but the device's
  * @throws GaussianSplatError `out-of-memory/*`, or the signal's reason
  */
@@ -18,11 +19,14 @@ export async function buildLevels(
   const { device, gaussians } = scene;
   const packed = await readPacked(device, gaussians, () => {
     signal.throwIfAborted();
-    // An economy frees them when it puts others in their place.
+    // A sequence frees them when it puts others in their place.
     if (scene.gaussians !== gaussians) throw new Error('other splats are on show');
   });
   signal.throwIfAborted();
-  const levels = await loader.buildLevels(packed, signal);
+  // Its arrays are the worker's afterwards. The page's own thread would stand still for seconds.
+  const nothing = async (): Promise<undefined> => undefined;
+  const transfer = buffersOf(packed);
+  const levels = await loader.ask<PackedLevels | undefined>({ type: 'levels', packed }, signal, nothing, { transfer });
   if (levels === undefined) return undefined;
   const left = memoryBudget === undefined ? undefined : memoryBudget - gaussians.byteLength;
   const detailed = await DetailedGaussians.upload(device, gaussians, levels, { memoryBudget: left });

@@ -21,26 +21,6 @@ export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
   return error.family === 'device-lost' || (!isNew && error.family === 'unsupported');
 }
 
-/** @param loss what the browser said of the device that was lost, where it has. */
-export function unrecoverable(cause: unknown, loss?: GPUDeviceLostInfo): GaussianSplatError {
-  const said = loss && ` (reason "${loss.reason}": ${loss.message.replace(/\.$/, '') || 'nothing more is known'})`;
-  const lost = `a device that was lost${said ?? ''}`;
-  const why = cause instanceof GaussianSplatError ? `${cause.where}: ${cause.found}` : String(cause);
-  const isLoss = isDeviceFailure(cause, true);
-  // Chromium refuses a page that has lost two devices within a short time any other, until it is loaded again.
-  const reload = isLoss ? 'reload the page' : 'reload the page, to which the browser may refuse the GPU until then';
-  return new GaussianSplatError('device-lost/unrecoverable', {
-    where: 'GPU device',
-    expected: 'a device that stays long enough to draw the scene',
-    found: isLoss ? lost : `${lost}, and no other in its place (${why})`,
-    remedy:
-      loss?.reason === 'destroyed'
-        ? "a script of this page called the device's destroy(): leave that, or let SharedDevice's function request a new device each time"
-        : `${reload}; if it happens again, use a smaller scene or update the graphics driver`,
-    cause,
-  });
-}
-
 /** How long it takes at most until a lost device says so, ms: its buffers fail before. */
 const LOSS_MS = 200;
 

@@ -1,5 +1,6 @@
 import { GaussianSplatError, loadModule, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
+  QueueClock,
   Renderer,
   type FrameRequest,
   type GaussianScene,
@@ -7,12 +8,12 @@ import {
   type ProbeAnswer,
   type ProbePoint,
   type Quality,
+  type WorkTime,
 } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { Timeline } from '../live/live-model.js';
 import type { ReadCounts } from '../stats.js';
-import { FrameMeter } from './frame-meter.js';
 import type { DeviceLease } from './shared-device.js';
 
 /** How much detail is drawn of a scene that has levels of it. */
@@ -53,8 +54,6 @@ export class GpuScene {
   #gaussians: OwnedGaussians;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
-  /** Called when the scene is destroyed. */
-  onDestroy: () => void = () => undefined;
   /** Called when the frame just drawn lacked something that the next one will have. */
   onIncomplete: () => void = () => undefined;
   /** Called with `out-of-memory/allocation` where a later frame than the first needs more memory than there is. */
@@ -64,7 +63,7 @@ export class GpuScene {
   #filter: FrameFilter | undefined;
   readonly #submissions: number;
   readonly #lease: DeviceLease;
-  readonly #meter: FrameMeter;
+  readonly #clock: QueueClock;
   #detail: DetailLevers;
   #levels: OwnedLevels | undefined;
   #destroyed = false;
@@ -86,17 +85,13 @@ export class GpuScene {
     this.bounds = bounds;
     this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
-    this.#meter = new FrameMeter(lease.device, () => !live && !this.#filter);
+    this.#clock = QueueClock.of(lease.device);
+    if (live) this.#clock.isShared = true;
   }
 
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
   get frameBytes(): number {
     return this.#renderer.byteLength + (this.#filter?.byteLength ?? 0);
-  }
-
-  /** True if it can be told how long frames take. */
-  get isMeasurable(): boolean {
-    return this.#meter.isAble;
   }
 
   /** Its splats. */
@@ -132,13 +127,10 @@ export class GpuScene {
     return this.gaussians.pages.some(({ details }) => details !== undefined);
   }
 
-  /**
-   * Draws other splats from now on; levels that were built of those before are freed, and so are these.
-   * @param before `kept` where the ones hold the others
-   */
-  replaceGaussians(gaussians: OwnedGaussians, before: 'freed' | 'kept' = 'freed'): void {
+  /** Draws other splats from now on; levels that were built of those before are freed, and so are these. */
+  replaceGaussians(gaussians: OwnedGaussians): void {
     this.setLevels(undefined);
-    if (before === 'freed') this.#gaussians.destroy();
+    this.#gaussians.destroy();
     this.#gaussians = gaussians;
     this.#drawnSize = '';
     this.#filter?.invalidate();
@@ -155,6 +147,14 @@ export class GpuScene {
   /** Fulfils when the device is lost. */
   get lost(): Promise<GPUDeviceLostInfo> {
     return this.#lease.lost;
+  }
+
+  /** Whether the device was lost before all that was submitted was done. */
+  async wasLost(): Promise<boolean> {
+    await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
+    // The loss is told a little later.
+    await new Promise((resolve) => setTimeout(resolve));
+    return this.isLost;
   }
 
   get isDestroyed(): boolean {
@@ -180,6 +180,7 @@ export class GpuScene {
   setFilter(filter: FrameFilter | undefined): void {
     this.#filter?.close();
     this.#filter = filter;
+    if (filter) this.#clock.isShared = true;
     this.#drawnSize = '';
   }
 
@@ -207,9 +208,9 @@ export class GpuScene {
 
   /**
    * Encodes and submits one frame.
-   * @param onTime gets milliseconds that the frame kept the GPU, some frames later; not every frame is timed
+   * @param onTime gets how long the frame kept the GPU, some frames later
    */
-  render(frame: Frame, onTime?: (milliseconds: number) => void): void {
+  render(frame: Frame, onTime?: (time: WorkTime) => void): void {
     const size = sizeOf(frame);
     if (size === this.#drawnSize) return this.#renderOnce(frame, onTime);
     this.#drawnSize = size;
@@ -218,8 +219,9 @@ export class GpuScene {
     });
   }
 
-  #renderOnce(frame: Frame, onTime: ((milliseconds: number) => void) | undefined): void {
-    if (onTime) this.#meter.measure((timer) => this.#draw({ ...frame, timer }), onTime);
+  #renderOnce(frame: Frame, onTime: ((time: WorkTime) => void) | undefined): void {
+    // A lost device has been noticed elsewhere.
+    if (onTime) this.#clock.time(() => this.#draw(frame)).then(onTime, () => undefined);
     else this.#draw(frame);
   }
 
@@ -244,6 +246,8 @@ export class GpuScene {
     const error = await this.#withRefusal(() => this.#draw(frame));
     if (error !== null) throw outOfMemory('first frame', error);
     await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
+    // The GPU has nothing to do now. Nobody waits for it.
+    this.#clock.calibrate().catch(() => undefined);
   }
 
   /** Fulfils with what the device says if memory was lacking for some work. */
@@ -280,10 +284,8 @@ export class GpuScene {
   destroy(): void {
     if (this.#destroyed) return;
     this.#destroyed = true;
-    this.onDestroy();
     this.setFilter(undefined);
     this.live?.close();
-    this.#meter.destroy();
     this.#renderer.destroy();
     this.#levels?.destroy();
     this.#gaussians.destroy();

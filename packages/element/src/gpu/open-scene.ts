@@ -35,7 +35,7 @@ export interface OpenOptions {
 /** Opens what is asked for; what its device is served best with is looked for later. Rejects with GaussianSplatError or the signal's reason. */
 export async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
   // Known at once, and then not a byte is fetched.
-  assertWebGpu();
+  await assertWebGpu();
   const open = isGenerator(request) ? openLiveScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
   const scene = await open(request, options);
   chooseAtRest(scene.device);
@@ -136,7 +136,7 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
 }
 
 /**
- * A folder that `npm run detail` wrote is known by the name of its manifest, and so is streamed SOG, of which levels may be wanted or not.
+ * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, of which levels may be wanted or not.
  */
 export function isStreamed({ url, levels }: SceneRequest): boolean {
   return (

@@ -1,15 +1,8 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
-import { GaussianSplatError, partUrl } from '@gaussian-splat/core';
-import { fetchScene } from '@gaussian-splat/formats';
-import {
-  checkManifest,
-  levelSource,
-  MemoryLedger,
-  StreamedGaussians,
-  type PoolOptions,
-} from '@gaussian-splat/renderer';
+import { partUrl } from '@gaussian-splat/core';
+import { levelSource, MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
-import type { SceneLoader } from '../loading/scene-loader.js';
+import type { Here, SceneLoader } from '../loading/scene-loader.js';
 import type { DetailLevers } from './gpu-scene.js';
 import { isHandheld } from './memory-budget.js';
 
@@ -73,34 +66,32 @@ type Open = (
 ) => Promise<StreamedGaussians>;
 
 const openPages: Open = async ({ url, credentials }, device, { loader, signal, onProgress }, pool) => {
-  const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, onProgress });
-  const manifest = checkManifest(parsed(bytes, url), url);
+  const file = { url, credentials };
+  const manifest = await loader.ask(
+    { type: 'manifest', request: file },
+    signal,
+    ({ openManifest }) => openManifest(file, signal, onProgress),
+    { onProgress },
+  );
   return StreamedGaussians.open(device, manifest, {
     ...pool,
-    fetchPage: (file, aborted) => loader.fetchFile({ url: partUrl(file, url).href, credentials }, aborted),
+    fetchPage: (page, aborted) => loader.fetchFile({ url: partUrl(page, url).href, credentials }, aborted),
   });
 };
 
 const openBoxes: Open = async (request, device, { loader, signal, onProgress }, pool) => {
-  const { levels, runs } = await loader.openBoxes(request, signal, onProgress);
+  const { levels, runs } = await loader.ask(
+    { type: 'boxes', request },
+    signal,
+    ({ openBoxes }) => openBoxes(request, signal, onProgress),
+    { onProgress },
+  );
   const { credentials } = request;
   const source = levelSource(levels, async (page, aborted) => {
     const run = runs[page.box][page.level];
-    return new Uint32Array(await loader.readBox({ run, page, scene: levels.scene, credentials }, aborted));
+    const box = { run, page, scene: levels.scene, credentials };
+    const here = ({ readBox }: Here): Promise<ArrayBuffer> => readBox(box, aborted);
+    return new Uint32Array(await loader.ask({ type: 'box', request: box }, aborted, here));
   });
   return StreamedGaussians.openSource(device, source, pool);
 };
-
-function parsed(bytes: Uint8Array, where: string): unknown {
-  try {
-    return JSON.parse(new TextDecoder().decode(bytes));
-  } catch (cause) {
-    throw new GaussianSplatError('decode/header', {
-      where,
-      expected: 'JSON that npm run detail wrote',
-      found: (cause as Error).message,
-      remedy: 'check the address, or write the folder again',
-      cause,
-    });
-  }
-}

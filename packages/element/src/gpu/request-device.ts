@@ -1,23 +1,15 @@
-import { GaussianSplatError } from '@gaussian-splat/core';
+import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
+import type * as reasons from './no-device.js';
 
-/** Throws the reason, if there is one, why this page has no WebGPU at all. */
-export function assertWebGpu(): void {
+/** Why this page has no device, for people. */
+export const why = async (reason: (of: typeof reasons) => GaussianSplatError): Promise<GaussianSplatError> =>
+  reason(await loadModule('what is to be said of a page without a GPU', () => import('./no-device.js')));
+
+/** Rejects with the reason, if there is one, why this page has no WebGPU at all. */
+export async function assertWebGpu(): Promise<void> {
   if (typeof navigator !== 'undefined' && 'gpu' in navigator && navigator.gpu) return;
-  if (globalThis.isSecureContext === false) {
-    throw new GaussianSplatError('unsupported/insecure-context', {
-      where: 'this page',
-      expected: 'a secure context, since browsers offer WebGPU in no other',
-      found: `the insecure address ${globalThis.location?.origin ?? '(none)'}`,
-      remedy: 'serve the page over https, or from localhost',
-    });
-  }
-  throw new GaussianSplatError('unsupported/no-webgpu', {
-    where: 'this browser',
-    expected: 'WebGPU (navigator.gpu)',
-    found: 'none',
-    remedy: 'use a current Chrome, Edge, Safari or Firefox with WebGPU switched on',
-  });
+  throw await why(({ noWebGpu }) => noWebGpu());
 }
 
 /** What models on the same device can use where it is there; float16 models need the first. */
@@ -44,25 +36,12 @@ function withGeneratorNeeds(adapter: GPUAdapter, descriptor: GPUDeviceDescriptor
 
 /** A GPU device with the limits that the renderer can use. Throws GaussianSplatError `unsupported/*`. */
 export async function requestGpuDevice(): Promise<GPUDevice> {
-  assertWebGpu();
+  await assertWebGpu();
   const adapter = await navigator.gpu.requestAdapter({ powerPreference: 'high-performance' });
-  if (adapter === null) {
-    throw new GaussianSplatError('unsupported/no-adapter', {
-      where: 'this browser',
-      expected: 'a graphics adapter for WebGPU',
-      found: 'none',
-      remedy: 'switch on hardware acceleration in the browser settings, or update the graphics driver',
-    });
-  }
+  if (adapter === null) throw await why(({ noAdapter }) => noAdapter());
   try {
     return await adapter.requestDevice(withGeneratorNeeds(adapter, deviceDescriptor(adapter)));
   } catch (error) {
-    throw new GaussianSplatError('unsupported/limits', {
-      where: 'the graphics adapter',
-      expected: 'a device within the limits that the adapter itself reports',
-      found: error instanceof Error ? error.message : String(error),
-      remedy: 'update the graphics driver or the browser',
-      cause: error,
-    });
+    throw await why(({ noLimits }) => noLimits(error));
   }
 }

@@ -1,5 +1,8 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { requestGpuDevice } from './request-device.js';
+import { requestGpuDevice, why } from './request-device.js';
+
+/** How long a device is waited for, ms. */
+const ANSWER_MS = 20_000;
 
 /** A share in the page's GPU device. */
 export interface DeviceLease {
@@ -93,7 +96,8 @@ export class SharedDevice {
     try {
       session = await opening;
     } catch (error) {
-      throw error instanceof GaussianSplatError ? error : noDevice(error);
+      if (error instanceof GaussianSplatError) throw error;
+      throw await why(({ noDevice }) => noDevice(error));
     }
     // Its last user may have closed it while we waited.
     if (session.isClosed) return this.acquire();
@@ -111,20 +115,28 @@ export class SharedDevice {
   }
 
   async #start(): Promise<DeviceSession> {
-    return new DeviceSession(await this.#request(), this.#keepDevice);
+    return new DeviceSession(await this.#answer(), this.#keepDevice);
+  }
+
+  /** A browser whose GPU process hangs never answers. */
+  async #answer(): Promise<GPUDevice> {
+    let isLate = false;
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const asked = Promise.resolve(this.#request());
+    const silence = new Promise<never>((_, reject) => {
+      timer = setTimeout(() => {
+        isLate = true;
+        reject(new Error(`no answer within ${ANSWER_MS / 1000} s`));
+      }, ANSWER_MS);
+    });
+    asked.then(
+      (device) => isLate && !this.#keepDevice && device.destroy(),
+      () => undefined,
+    );
+    return Promise.race([asked, silence]).finally(() => clearTimeout(timer));
   }
 
   #forget(opening: Promise<DeviceSession>): void {
     if (this.#session === opening) this.#session = null;
   }
-}
-
-function noDevice(cause: unknown): GaussianSplatError {
-  return new GaussianSplatError('unsupported/no-adapter', {
-    where: 'the graphics adapter',
-    expected: 'a WebGPU device',
-    found: cause instanceof Error ? cause.message : String(cause),
-    remedy: 'reload the page, or update the graphics driver',
-    cause,
-  });
 }

@@ -1,64 +1,70 @@
 import type { Camera } from '@gaussian-splat/core';
+import { credentialsOf } from '../attributes.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import { toElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import type { GpuScene } from '../gpu/gpu-scene.js';
-import type { StageOptions } from '../stage-options.js';
+import type { StageHost } from '../stage-host.js';
 import type { LiveListeners, LiveState } from './live-model.js';
-import { PostController } from './post-controller.js';
+import { PostController, type PostHost } from './post-controller.js';
 
 /** Whom the models of an element meet. */
-export interface LiveWiringOptions extends Pick<StageOptions, 'attributes' | 'services' | 'liveValues'> {
+export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'liveValues'> {
   readonly playback: PlaybackController;
-  readonly requestFrame: () => void;
-  readonly dispatch: (event: GaussianSplatEventMap[keyof GaussianSplatEventMap]) => void;
+  requestFrame(): void;
+  dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
 
 /** What the models of an element, a generator and a post-processor, are told and whom they tell. */
-export class LiveWiring {
+export class LiveWiring implements PostHost {
   readonly post: PostController;
-  readonly #options: LiveWiringOptions;
+  readonly #host: LiveHost;
   #lastFault = '';
 
-  constructor(options: LiveWiringOptions) {
-    this.#options = options;
-    const { attributes, services, requestFrame } = options;
-    this.post = new PostController({
-      requestFrame,
-      request: () => ({
-        credentials: attributes().credentials,
-        runtimeLocation: services().runtimeLocation,
-        state: () => this.state,
-        onError: (error) => this.#fail(error),
-        onFallback: (reason) => this.#fallBack(reason),
-      }),
-    });
+  constructor(host: LiveHost) {
+    this.#host = host;
+    this.post = new PostController(this);
+  }
+
+  get postRequest(): PostHost['postRequest'] {
+    const { attributes, services } = this.#host;
+    return {
+      credentials: credentialsOf(attributes.crossorigin),
+      runtimeLocation: services.runtimeLocation,
+      state: () => this.state,
+      onError: (error) => this.#fail(error),
+      onFallback: (reason) => this.#fallBack(reason),
+    };
+  }
+
+  requestFrame(): void {
+    this.#host.requestFrame();
   }
 
   /** What the page says about the models at this time. */
   get state(): LiveState {
-    return { ...this.#options.liveValues(), timeSeconds: this.#options.playback.currentTime };
+    return { ...this.#host.liveValues, timeSeconds: this.#host.playback.currentTime };
   }
 
   get listeners(): LiveListeners {
-    const { requestFrame, playback } = this.#options;
+    const { playback } = this.#host;
     return {
       onFrame: (timeSeconds) => {
         this.#lastFault = '';
-        requestFrame();
+        this.requestFrame();
         playback.frameShown(timeSeconds);
       },
       onShown: (timeSeconds) => playback.frameShown(timeSeconds),
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
-      onInput: requestFrame,
+      onInput: () => this.requestFrame(),
     };
   }
 
   /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
   advance({ live }: GpuScene, camera: Camera, now: number): void {
     if (live === undefined) return;
-    this.#options.playback.tick(now);
+    this.#host.playback.tick(now);
     try {
       live.request(this.state, camera);
     } catch (error) {
@@ -72,10 +78,10 @@ export class LiveWiring {
     // The loss of the device has events of its own.
     if (error.code === 'device-lost' || error.message === this.#lastFault) return;
     this.#lastFault = error.message;
-    this.#options.dispatch(new CustomEvent('generator-error', { detail: error }));
+    this.#host.dispatch(new CustomEvent('generator-error', { detail: error }));
   }
 
   #fallBack(reason: string): void {
-    this.#options.dispatch(new CustomEvent('generator-fallback', { detail: { reason } }));
+    this.#host.dispatch(new CustomEvent('generator-fallback', { detail: { reason } }));
   }
 }

@@ -1,22 +1,23 @@
 import { loadModule } from '@gaussian-splat/core';
 import type { GpuScene } from '../gpu/gpu-scene.js';
+import { LatestTask } from '../latest-task.js';
 import type { PostRequest } from './post-view.js';
 
-export interface PostOptions {
+export interface PostHost {
   /** What a post-processor needs to know beyond its address. */
-  readonly request: () => Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
-  readonly requestFrame: () => void;
+  readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
+  requestFrame(): void;
 }
 
 /** Puts the post-processor of the attribute between the scene on show and the canvas. Until it is there, frames are shown as they are drawn. */
 export class PostController {
-  readonly #options: PostOptions;
+  readonly #host: PostHost;
   #urls: readonly string[] = [];
   #scene: GpuScene | null = null;
-  #running = new AbortController();
+  readonly #opening = new LatestTask();
 
-  constructor(options: PostOptions) {
-    this.#options = options;
+  constructor(host: PostHost) {
+    this.#host = host;
   }
 
   /** True where there is one, or will be. */
@@ -38,38 +39,32 @@ export class PostController {
   }
 
   #open(): void {
-    this.#running.abort();
-    this.#running = new AbortController();
+    this.#opening.renew();
     const scene = this.#scene;
     if (scene === null) return;
-    if (scene.filter) this.#options.requestFrame();
+    if (scene.filter) this.#host.requestFrame();
     scene.setFilter(undefined);
-    if (this.#urls.length > 0) void this.#load(scene, this.#running.signal);
+    if (this.#urls.length === 0) return;
+    const options = this.#host.postRequest;
+    this.#opening.run((signal) => this.#load(scene, options, signal), options.onError);
   }
 
-  async #load(scene: GpuScene, signal: AbortSignal): Promise<void> {
-    const { request, requestFrame } = this.#options;
-    const options = request();
-    try {
-      const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
-      if (signal.aborted) return;
-      const onError = (error: unknown): void => (signal.aborted ? undefined : options.onError(error));
-      const view = await PostView.open(
-        {
-          ...options,
-          urls: this.#urls,
-          signal,
-          others: () => scene.live?.settable ?? [],
-          onError,
-          onChange: requestFrame,
-        },
-        scene.device,
-      );
-      if (signal.aborted || scene.isDestroyed) return view.close();
-      scene.setFilter(view);
-      requestFrame();
-    } catch (error) {
-      if (!signal.aborted) options.onError(error);
-    }
+  async #load(scene: GpuScene, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
+    const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
+    if (signal.aborted) return;
+    const view = await PostView.open(
+      {
+        ...options,
+        urls: this.#urls,
+        signal,
+        others: () => scene.live?.settable ?? [],
+        onError: (error) => (signal.aborted ? undefined : options.onError(error)),
+        onChange: () => this.#host.requestFrame(),
+      },
+      scene.device,
+    );
+    if (signal.aborted || scene.isDestroyed) return view.close();
+    scene.setFilter(view);
+    this.#host.requestFrame();
   }
 }

@@ -33,7 +33,7 @@ function outOfMemory(cause: unknown): GaussianSplatError {
     where: 'levels of detail',
     expected: 'memory enough to build them',
     found: cause instanceof Error ? cause.message : String(cause),
-    remedy: 'use a smaller scene, or write it with npm run detail',
+    remedy: 'use a smaller scene, or write it with gaussian-splat detail',
     cause,
   });
 }

@@ -1,13 +1,36 @@
 /** Fetching, reading and packing one scene: what runs in the worker, or on the page where workers are refused. */
 import { boundsOf, GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
-import { fetchScene, isSequence, openPartAt, readScene, type FetchSceneOptions } from '@gaussian-splat/formats';
+import {
+  fetchScene,
+  HEADER_BYTES,
+  isSequence,
+  openPartAt,
+  readScene,
+  type FetchSceneOptions,
+} from '@gaussian-splat/formats';
 import { packGaussians } from '@gaussian-splat/renderer';
+import type { LargePly } from './large-ply.js';
 import { PreviewSchedule } from './preview-schedule.js';
 import { ProgressSum } from './progress-sum.js';
 import type { LoadedScene, LoadedSequence, PreviewListener, ProgressListener, SceneRequest } from './protocol.js';
 
 /** Milliseconds between two progress reports: chunks may arrive by the thousand. */
 const PROGRESS_INTERVAL_MS = 50;
+
+/** What a load tells, and whom it asks. */
+export interface LoadListeners {
+  readonly onProgress: ProgressListener;
+  /** Absent: previews are not wanted. */
+  readonly onPreview?: PreviewListener | undefined;
+  /** Called before the thread is kept busy for a while, and while it is; with false when it has more time again. */
+  readonly onReading?: (isReading: boolean) => void;
+  /**
+   * Asks for other workers to share the packing with.
+   * @param most so many at most
+   * @param onHelper gets a way to each of them as soon as it is there
+   */
+  readonly askForHelp?: (most: number, onHelper: (port: MessagePort) => void) => void;
+}
 
 /**
  * Loads one scene, or the manifest of several. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's
@@ -16,9 +39,9 @@ const PROGRESS_INTERVAL_MS = 50;
 export async function loadScene(
   request: SceneRequest,
   signal: AbortSignal,
-  onProgress: ProgressListener,
-  onPreview?: PreviewListener,
+  listeners: LoadListeners,
 ): Promise<LoadedScene | LoadedSequence> {
+  const { onProgress, onPreview, onReading, askForHelp } = listeners;
   try {
     const { url, credentials } = request;
     const name = fileName(url);
@@ -28,8 +51,17 @@ export async function loadScene(
       packed: packGaussians(cloud, { sh: request.sh }),
       bounds: boundsOf(cloud),
     });
-    const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
-    const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });
+    const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)), onReading);
+    const shared = askForHelp && new SharedReading(request, name, signal, listeners);
+    const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
+      // Of a PLY that is large there are previews of its own.
+      if (shared?.mayBeShared(bytes, total)) await (await shared.plyIn(bytes, total))?.onArrival(bytes);
+      else await previews?.onArrival(bytes, total);
+    };
+    const bytes = await fetchScene(url, { ...options(), onArrival });
+    onReading?.(true);
+    const joined = await (await shared?.ply)?.finish(bytes);
+    if (joined) return joined;
     if (isSequence(bytes)) {
       const { sequenceOf } = await loadModule('the code that reads sequences', () => import('./sequence-of.js'));
       return sequenceOf(bytes, name, url);
@@ -39,12 +71,45 @@ export async function loadScene(
     const level = request.levels ? 'all' : 0;
     const cloud = await readScene(bytes, { name, signal, openPart, level, onPreview: previews?.onPreview });
     signal.throwIfAborted();
+    onReading?.(true);
     if (cloud.levelRuns === undefined) return pack(cloud);
     const { packLevels } = await loadModule('the code that packs levels of detail', () => import('./pack-levels.js'));
     return packLevels(cloud, request.sh);
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(request.url));
+  }
+}
+
+/** Bytes of a PLY from which on several workers share its rows. */
+const LARGE_BYTES = 1 << 25;
+
+/** Finds out whether a file that is on its way is a PLY whose rows several workers can share. */
+class SharedReading {
+  readonly #of: readonly [name: string, request: SceneRequest, signal: AbortSignal, listeners: LoadListeners];
+  #isRefused = false;
+  /** Undefined for any other. */
+  ply: Promise<LargePly | undefined> | undefined;
+
+  constructor(request: SceneRequest, name: string, signal: AbortSignal, listeners: LoadListeners) {
+    this.#of = [name, request, signal, listeners];
+  }
+
+  /** True of large PLYs, but for those whose rows must be read in order. */
+  mayBeShared(bytes: Uint8Array, total = 0): boolean {
+    return total >= LARGE_BYTES && bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79 && !this.#isRefused;
+  }
+
+  async plyIn(bytes: Uint8Array, total = 0): Promise<LargePly | undefined> {
+    if (bytes.length >= HEADER_BYTES) this.ply ??= this.#open(bytes, total);
+    const ply = await this.ply;
+    this.#isRefused = this.ply !== undefined && ply === undefined;
+    return ply;
+  }
+
+  async #open(bytes: Uint8Array, total: number): Promise<LargePly | undefined> {
+    const { LargePly } = await loadModule('the code that shares the reading of PLY', () => import('./large-ply.js'));
+    return LargePly.open(bytes, total, ...this.#of);
   }
 }
 

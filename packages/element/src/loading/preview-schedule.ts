@@ -12,6 +12,7 @@ const GROWTH = 1.6;
 export class PreviewSchedule {
   readonly #name: string;
   readonly #signal: AbortSignal;
+  readonly #onReading: ((isReading: boolean) => void) | undefined;
   readonly #show: (cloud: GaussianCloud) => void;
   readonly #start = performance.now();
   #spentMs = 0;
@@ -19,8 +20,17 @@ export class PreviewSchedule {
   /** Splats of the last preview. */
   #shown = 0;
 
-  /** @param show packs and posts a preview. */
-  constructor(name: string, signal: AbortSignal, show: (cloud: GaussianCloud) => void) {
+  /**
+   * @param show packs and posts a preview
+   * @param onReading called before and after it is read
+   */
+  constructor(
+    name: string,
+    signal: AbortSignal,
+    show: (cloud: GaussianCloud) => void,
+    onReading?: (isReading: boolean) => void,
+  ) {
+    this.#onReading = onReading;
     this.#name = name;
     this.#signal = signal;
     this.#show = show;
@@ -32,11 +42,13 @@ export class PreviewSchedule {
     const isDue = elapsed >= FIRST_AFTER_MS && bytes.length >= this.#nextBytes && bytes.length !== total;
     if (!isDue || this.#spentMs > MAX_SHARE * elapsed) return;
     const began = performance.now();
+    this.#onReading?.(true);
     const cloud = await readPrefix(bytes, { name: this.#name, signal: this.#signal });
     if (cloud !== undefined) {
       this.#show(cloud);
       this.#shown = cloud.count;
     }
+    this.#onReading?.(false);
     this.#spentMs += performance.now() - began;
     this.#nextBytes = GROWTH * bytes.length;
   };

@@ -1,14 +1,7 @@
 /** What the page and the scene worker say to each other. */
 import type { Bounds, ErrorData } from '@gaussian-splat/core';
 import type { SogRun } from '@gaussian-splat/formats';
-import type {
-  LevelPage,
-  LevelScene,
-  PackedGaussians,
-  PackedLevels,
-  ShPrecision,
-  StreamedScene,
-} from '@gaussian-splat/renderer';
+import type { LevelPage, LevelScene, PackedGaussians, ShPrecision, StreamedScene } from '@gaussian-splat/renderer';
 
 /** A file to fetch. */
 export interface FileRequest {
@@ -71,21 +64,36 @@ export type PreviewListener = (preview: LoadedScene) => void;
  */
 export type ProgressListener = (loaded: number, total: number | undefined, share?: number) => void;
 
+/** What a worker may be asked for; every request gets a number, and one `answer` or `error`. */
+export type WorkerRequest =
+  | { readonly type: 'load'; readonly request: SceneRequest; readonly wantsPreviews: boolean }
+  | { readonly type: 'levels'; readonly packed: PackedGaussians }
+  | { readonly type: 'file'; readonly request: FileRequest }
+  | { readonly type: 'manifest'; readonly request: FileRequest }
+  | { readonly type: 'boxes'; readonly request: SceneRequest }
+  | { readonly type: 'box'; readonly request: BoxRequest };
+
 export type PageMessage =
-  | { readonly type: 'load'; readonly id: number; readonly request: SceneRequest; readonly wantsPreviews: boolean }
-  | { readonly type: 'levels'; readonly id: number; readonly packed: PackedGaussians }
-  | { readonly type: 'file'; readonly id: number; readonly request: FileRequest }
-  | { readonly type: 'boxes'; readonly id: number; readonly request: SceneRequest }
-  | { readonly type: 'box'; readonly id: number; readonly request: BoxRequest }
-  | { readonly type: 'cancel'; readonly id: number };
+  | (WorkerRequest & { readonly id: number })
+  | { readonly type: 'cancel'; readonly id: number }
+  /** Is answered by `pong`. */
+  | { readonly type: 'ping' }
+  /** A way to another worker that packs splats. */
+  | { readonly type: 'helper'; readonly id: number; readonly port: MessagePort }
+  /** Pack what comes through the port. */
+  | { readonly type: 'pack'; readonly port: MessagePort };
 
 export type WorkerMessage =
+  /** The script runs. */
   | { readonly type: 'ready' }
+  | { readonly type: 'pong' }
+  /** From now on it reads for a request, and may not answer for long. */
+  | { readonly type: 'reading'; readonly id: number }
+  /** It has read for a request, or nothing is done for it any more. */
+  | { readonly type: 'rested'; readonly id: number }
+  /** Other workers could share the packing for a request: so many at most. */
+  | { readonly type: 'help'; readonly id: number; readonly most: number }
   | { readonly type: 'progress'; readonly id: number; readonly loaded: number; readonly total: number | undefined }
   | { readonly type: 'preview'; readonly id: number; readonly scene: LoadedScene }
-  | { readonly type: 'sequence'; readonly id: number; readonly sequence: LoadedSequence }
-  | { readonly type: 'scene'; readonly id: number; readonly scene: LoadedScene }
-  | { readonly type: 'levels'; readonly id: number; readonly levels: PackedLevels | undefined }
-  | { readonly type: 'file'; readonly id: number; readonly bytes: ArrayBuffer }
-  | { readonly type: 'boxes'; readonly id: number; readonly boxes: LoadedBoxes }
+  | { readonly type: 'answer'; readonly id: number; readonly answer: unknown }
   | { readonly type: 'error'; readonly id: number; readonly error: ErrorData };

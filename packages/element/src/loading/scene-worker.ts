@@ -3,18 +3,20 @@
  * {@link loadScene} and the others itself; then nothing here listens.
  */
 import { loadModule } from '@gaussian-splat/core';
+import type { DetailManifest } from '@gaussian-splat/renderer';
 import { buffersOf } from './buffers-of.js';
 import { fetchFile } from './fetch-file.js';
 import { loadScene, named } from './load-scene.js';
 import type * as boxes from './lod-boxes.js';
 import type {
   BoxRequest,
+  FileRequest,
   LoadedBoxes,
   PageMessage,
-  PreviewListener,
   ProgressListener,
   SceneRequest,
   WorkerMessage,
+  WorkerRequest,
 } from './protocol.js';
 
 export { fetchFile, loadScene };
@@ -31,26 +33,47 @@ export const openBoxes = async (
 export const readBox = async (request: BoxRequest, signal: AbortSignal): Promise<ArrayBuffer> =>
   (await loadBoxCode()).readBox(request, signal);
 
+export const openManifest = async (
+  request: FileRequest,
+  signal: AbortSignal,
+  onProgress: ProgressListener,
+): Promise<DetailManifest> => {
+  const code = await loadModule('the code that streams scenes', () => import('./open-manifest.js'));
+  return code.openManifest(request, signal, onProgress);
+};
+
 /** The part of a worker's global scope that is used here; TypeScript's page types do not know it. */
 interface WorkerScope {
   postMessage(message: WorkerMessage, transfer?: Transferable[]): void;
   addEventListener(type: 'message', listener: (event: MessageEvent<PageMessage>) => void): void;
 }
 
-function serve(scope: WorkerScope): void {
-  const running = new Map<number, AbortController>();
+/** What came of a request, and its buffers, which change threads. */
+type Answer = readonly [answer: unknown, transfer?: ArrayBuffer[]];
 
-  /** Does what a message asks for, and answers: with an error, too, that nobody has named. For what was called off nobody waits. */
-  async function answer(id: number, work: (signal: AbortSignal) => Promise<void>): Promise<void> {
-    const abort = new AbortController();
-    running.set(id, abort);
-    try {
-      await work(abort.signal);
-    } catch (error) {
-      if (!abort.signal.aborted) scope.postMessage({ type: 'error', id, error: named(error, 'scene worker').toData() });
-    } finally {
-      running.delete(id);
-    }
+/** What is done for one request. */
+interface Work {
+  readonly abort: AbortController;
+  /** Gets the ways to other workers, one after the other. */
+  onHelper?: (port: MessagePort) => void;
+}
+
+function serve(scope: WorkerScope): void {
+  const running = new Map<number, Work>();
+
+  async function load(id: number, work: Work, message: Extract<WorkerRequest, { type: 'load' }>): Promise<Answer> {
+    const scene = await loadScene(message.request, work.abort.signal, {
+      onProgress: progressOf(id),
+      onPreview: message.wantsPreviews
+        ? (preview) => scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview.packed))
+        : undefined,
+      onReading: (isReading) => scope.postMessage({ type: isReading ? 'reading' : 'rested', id }),
+      askForHelp: (most, onHelper) => {
+        work.onHelper = onHelper;
+        scope.postMessage({ type: 'help', id, most });
+      },
+    });
+    return [scene, 'frames' in scene ? [] : buffersOf(scene.packed)];
   }
 
   const progressOf =
@@ -58,46 +81,56 @@ function serve(scope: WorkerScope): void {
     (loaded, total) =>
       scope.postMessage({ type: 'progress', id, loaded, total });
 
-  const load = ({ id, request, wantsPreviews }: Extract<PageMessage, { type: 'load' }>): Promise<void> =>
-    answer(id, async (signal) => {
-      const onPreview: PreviewListener = (preview) =>
-        scope.postMessage({ type: 'preview', id, scene: preview }, buffersOf(preview.packed));
-      const scene = await loadScene(request, signal, progressOf(id), wantsPreviews ? onPreview : undefined);
-      if (signal.aborted) return;
-      if ('frames' in scene) scope.postMessage({ type: 'sequence', id, sequence: scene });
-      else scope.postMessage({ type: 'scene', id, scene }, buffersOf(scene.packed));
-    });
+  async function buildLevels(
+    { packed }: Extract<WorkerRequest, { type: 'levels' }>,
+    signal: AbortSignal,
+  ): Promise<Answer> {
+    const { levelsInTurns } = await loadModule(
+      'the code that builds levels of detail',
+      () => import('./levels-in-turns.js'),
+    );
+    const levels = await levelsInTurns(packed, signal);
+    return [levels, levels ? buffersOf(levels, levels.coarser) : []];
+  }
 
-  /** Of a streamed scene: the reading of a response costs its thread more than all else that a page of it does. */
-  const bring = (id: number, bytesOf: (signal: AbortSignal) => Promise<ArrayBuffer>): Promise<void> =>
-    answer(id, async (signal) => {
-      const bytes = await bytesOf(signal);
-      scope.postMessage({ type: 'file', id, bytes }, [bytes]);
-    });
+  /** Of streamed scenes: the reading of a response costs its thread more than all else that a page of it does. */
+  const whole = async (bytes: Promise<ArrayBuffer>): Promise<Answer> => [await bytes, [await bytes]];
 
-  const open = ({ id, request }: Extract<PageMessage, { type: 'boxes' }>): Promise<void> =>
-    answer(id, async (signal) => {
-      const boxes = await openBoxes(request, signal, progressOf(id));
-      scope.postMessage({ type: 'boxes', id, boxes }, buffersOf(boxes.levels));
-    });
+  async function answerTo(id: number, work: Work, message: WorkerRequest): Promise<Answer> {
+    const { signal } = work.abort;
+    if (message.type === 'load') return load(id, work, message);
+    if (message.type === 'file') return whole(fetchFile(message.request, signal));
+    // From here on the readers are at work.
+    scope.postMessage({ type: 'reading', id });
+    if (message.type === 'levels') return buildLevels(message, signal);
+    if (message.type === 'box') return whole(readBox(message.request, signal));
+    if (message.type === 'manifest') return [await openManifest(message.request, signal, progressOf(id))];
+    const opened = await openBoxes(message.request, signal, progressOf(id));
+    return [opened, buffersOf(opened.levels)];
+  }
 
-  const buildLevels = ({ id, packed }: Extract<PageMessage, { type: 'levels' }>): Promise<void> =>
-    answer(id, async (signal) => {
-      const { levelsInTurns } = await loadModule(
-        'the code that builds levels of detail',
-        () => import('./levels-in-turns.js'),
-      );
-      const levels = await levelsInTurns(packed, signal);
-      scope.postMessage({ type: 'levels', id, levels }, levels ? buffersOf(levels, levels.coarser) : []);
-    });
+  /** Does what a message asks for, and answers: with an error, too, that nobody has named. For what was called off nobody waits. */
+  async function run(id: number, message: WorkerRequest): Promise<void> {
+    const work: Work = { abort: new AbortController() };
+    const { signal } = work.abort;
+    running.set(id, work);
+    try {
+      const [answer, transfer] = await answerTo(id, work, message);
+      if (!signal.aborted) scope.postMessage({ type: 'answer', id, answer }, transfer);
+    } catch (error) {
+      if (!signal.aborted) scope.postMessage({ type: 'error', id, error: named(error, 'scene worker').toData() });
+    } finally {
+      running.delete(id);
+      scope.postMessage({ type: 'rested', id });
+    }
+  }
 
   scope.addEventListener('message', ({ data }) => {
-    if (data.type === 'load') void load(data);
-    else if (data.type === 'levels') void buildLevels(data);
-    else if (data.type === 'file') void bring(data.id, (signal) => fetchFile(data.request, signal));
-    else if (data.type === 'box') void bring(data.id, (signal) => readBox(data.request, signal));
-    else if (data.type === 'boxes') void open(data);
-    else running.get(data.id)?.abort();
+    if (data.type === 'ping') scope.postMessage({ type: 'pong' });
+    else if (data.type === 'cancel') running.get(data.id)?.abort.abort();
+    else if (data.type === 'helper') running.get(data.id)?.onHelper?.(data.port);
+    else if (data.type === 'pack') void import('./pack-shares.js').then(({ packShares }) => packShares(data.port));
+    else void run(data.id, data);
   });
   scope.postMessage({ type: 'ready' });
 }

@@ -4,6 +4,7 @@ import {
   checkContract,
   ContractError,
   gaussianLayout,
+  GaussianSplatError,
   openUrl,
   readOnnxHeader,
   resolveContract,
@@ -98,6 +99,20 @@ async function contractOf(source: ModelSource, header: OnnxHeader, request: Fetc
   return resolveContract({ header, sidecar });
 }
 
+/** Files of weights that a model may have: exporters write one, or one for each large tensor where they are told so. */
+const MOST_FILES = 256;
+/** And how many of them are fetched at a time: other requests of the page have their turn. */
+const FILES_AT_ONCE = 4;
+
+function tooManyFiles({ name, externalFiles }: OnnxHeader): GaussianSplatError {
+  return new GaussianSplatError('decode/unsupported', {
+    where: name,
+    expected: `at most ${MOST_FILES} files of weights beside a model`,
+    found: String(externalFiles.length),
+    remedy: 'write the weights into one file: onnx.save_model(model, path, save_as_external_data=True)',
+  });
+}
+
 async function fetchExternal(
   source: ModelSource,
   header: OnnxHeader,
@@ -105,13 +120,18 @@ async function fetchExternal(
   request: FetchOptions,
   reports: readonly ProgressListener[],
 ): Promise<GeneratorModel['externalData']> {
-  const files = await Promise.all(
-    header.externalFiles.map(async ({ location: path, byteLength: expected }, i) => {
+  if (header.externalFiles.length > MOST_FILES) throw tooManyFiles(header);
+  const files: { path: string; data: Uint8Array<ArrayBuffer> | undefined }[] = [];
+  let next = 0;
+  const fetchSome = async (): Promise<void> => {
+    for (let i = next++; i < header.externalFiles.length; i = next++) {
+      const { location: path, byteLength: expected } = header.externalFiles[i];
       const address = partUrl(path, new URL(source.url, globalThis.location?.href)).href;
       const options = { ...request, expected, onProgress: reports[i], mayBeMissing: true } as const;
-      return { path, data: await fetchBytes(address, options) };
-    }),
-  );
+      files[i] = { path, data: await fetchBytes(address, options) };
+    }
+  };
+  await Promise.all(Array.from({ length: FILES_AT_ONCE }, fetchSome));
   const found = files.filter(
     (file): file is { path: string; data: Uint8Array<ArrayBuffer> } => file.data !== undefined,
   );

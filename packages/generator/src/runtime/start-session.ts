@@ -91,7 +91,7 @@ export function runFault({ header }: GeneratorModel, found: string): ContractFau
     where: header.name,
     expected: 'a model that ONNX Runtime runs',
     found: found.slice(0, 1000),
-    remedy: 'run it in a shell (npm run check -- MODEL --run), and mend or simplify what the runtime refuses',
+    remedy: 'run it in a shell (gaussian-splat check MODEL --run), and mend or simplify what the runtime refuses',
   };
 }
 

@@ -1,48 +1,24 @@
-import { PassTimer } from '../gpu/pass-timer.js';
+import { QueueClock } from '../gpu/queue-clock.js';
 
-/** Empty submissions of which the fastest tells how long a GPU with nothing to do takes to say so. */
-const TRIES = 4;
-
-/**
- * Times single frames: by the GPU's own clock where the device has the feature `timestamp-query`, else by waiting, less what waiting for
- * nothing takes. Browsers take milliseconds to say that a GPU is done, more than many a frame does.
- */
+/** Times frames of which several are drawn in a row, the queue drained once. */
 export class FrameClock {
-  readonly #device: GPUDevice;
-  readonly #timer: PassTimer | undefined;
-  readonly #latency: number;
+  readonly #clock: QueueClock;
 
   static async on(device: GPUDevice): Promise<FrameClock> {
-    if (device.features.has('timestamp-query')) return new FrameClock(device, new PassTimer(device), 0);
-    let latency = Infinity;
-    for (let i = 0; i < TRIES; i++) {
-      const begin = performance.now();
-      device.queue.submit([device.createCommandEncoder({ label: 'gs.probe' }).finish()]);
-      await device.queue.onSubmittedWorkDone();
-      latency = Math.min(latency, performance.now() - begin);
-    }
-    return new FrameClock(device, undefined, latency);
+    const clock = QueueClock.of(device);
+    await clock.calibrate();
+    return new FrameClock(clock);
   }
 
-  private constructor(device: GPUDevice, timer: PassTimer | undefined, latency: number) {
-    this.#device = device;
-    this.#timer = timer;
-    this.#latency = latency;
+  private constructor(clock: QueueClock) {
+    this.#clock = clock;
   }
 
-  /** Milliseconds of a frame that `draw` submits. */
-  async time(draw: (timer: PassTimer | undefined) => void): Promise<number> {
+  /** Milliseconds of each of `count` frames that `draw` submits. */
+  async time(count: number, draw: () => void): Promise<number> {
     const begin = performance.now();
-    draw(this.#timer);
-    await this.#device.queue.onSubmittedWorkDone();
-    const waited = performance.now() - begin - this.#latency;
-    const passes = (await this.#timer?.read())?.at(-1) ?? [];
-    const span = Math.max(...passes.map(({ end }) => end)) - Math.min(...passes.map((pass) => pass.begin));
-    // Some drivers hand out timestamps that stand still or run backwards.
-    return span > 0 ? span : waited;
-  }
-
-  destroy(): void {
-    this.#timer?.destroy();
+    for (let frame = 0; frame < count; frame++) draw();
+    const { now } = await this.#clock.done();
+    return Math.max(0, now - begin - this.#clock.latency) / count;
   }
 }

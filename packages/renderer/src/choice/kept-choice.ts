@@ -1,4 +1,3 @@
-import { canSort, SORT_NAMES } from '../stages/sort.js';
 import type { Variants } from '../variants.js';
 
 /** Where a choice is kept between visits: `localStorage`, or anything like it. */
@@ -8,7 +7,7 @@ export interface ChoiceStore {
 }
 
 /** Changes whenever a variant does, so that old choices are made anew. */
-const VERSION = 3;
+const VERSION = 4;
 
 /** What a choice is kept under: the adapter and what it can do. */
 export function keyFor(device: GPUDevice): string {
@@ -30,17 +29,14 @@ export function pageStore(): ChoiceStore | null {
 /** The choice of an earlier visit; undefined where there is none that this device can have. */
 export function readChoice(store: ChoiceStore | null, device: GPUDevice): Variants | undefined {
   try {
-    const { rasterizer, accumulation, threads, sort } = JSON.parse(
+    const { rasterizer, accumulation, threads } = JSON.parse(
       store?.getItem(keyFor(device)) ?? '{}',
     ) as Partial<Variants>;
     const isKnown =
       (rasterizer === 'quads' || rasterizer === 'tiles') &&
       (accumulation === 'rgba16float' || accumulation === 'rgba32float') &&
-      (threads === 'parallel' || threads === 'serial') &&
-      sort !== undefined &&
-      SORT_NAMES.includes(sort) &&
-      canSort(device, sort);
-    return isKnown ? { rasterizer, accumulation, threads, sort } : undefined;
+      (threads === 'parallel' || threads === 'serial');
+    return isKnown ? { rasterizer, accumulation, threads } : undefined;
   } catch {
     return undefined;
   }

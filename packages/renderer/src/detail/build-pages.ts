@@ -3,7 +3,7 @@ import { constants } from '../generated/shaders.js';
 import { packedOrder } from '../pack/pack.js';
 import { recentred } from '../pack/recentre.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
-import { choosePrecision, type ShPrecision } from '../pack/sh.js';
+import { choosePrecision, noiseIn, type ShPrecision } from '../pack/sh.js';
 import { levelsAbove } from './build-levels.js';
 import { boundLevel, detailRows, leafErrors, parentErrors, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
 import { pageLayout, type DetailManifest } from './manifest.js';
@@ -56,9 +56,17 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
   const cloud = recentred(given);
   const kept = packedOrder(cloud);
   const { antialiased, filterVariance, origin } = cloud;
-  const shPrecision = choosePrecision(cloud, kept);
+  const shPrecision = choosePrecision(noiseIn(cloud), kept);
   const leaves = leavesOf(cloud, kept, geometry);
-  const facts = { splats: kept.length, shPrecision, geometry, antialiased, filterVariance, origin, bounds: boundsOf(given) };
+  const facts = {
+    splats: kept.length,
+    shPrecision,
+    geometry,
+    antialiased,
+    filterVariance,
+    origin,
+    bounds: boundsOf(given),
+  };
   return { ...treeOf([leaves, ...levelsAbove(leaves)], geometry), ...facts };
 }
 

@@ -3,7 +3,7 @@ import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { usableIndices, type PackOptions } from '../pack/pack.js';
 import { mortonOrder } from '../pack/morton.js';
 import { recentred } from '../pack/recentre.js';
-import { choosePrecision } from '../pack/sh.js';
+import { choosePrecision, noiseIn } from '../pack/sh.js';
 import type { StreamedScene } from './page-source.js';
 import { joinSlots, packRun, type PackedRun } from './pack-run.js';
 import { errorsOfSpacings, spacingOf } from './run-errors.js';
@@ -58,7 +58,7 @@ export function layOutLevels(
   const usable = usableIndices(cloud);
   const { sh = 'auto' } = options;
   const { shDegree, antialiased, filterVariance, origin } = cloud;
-  const shPrecision = sh === 'auto' ? choosePrecision(cloud, usable) : sh;
+  const shPrecision = sh === 'auto' ? choosePrecision(noiseIn(cloud), usable) : sh;
   const bounds = boundsWithin(coarsest, boxes.length);
   const kept = keptOfNodes(cloud, usable, boxes.length);
   const format = { shDegree, shPrecision, geometry: 'quantized' } as const;

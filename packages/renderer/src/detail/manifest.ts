@@ -99,7 +99,7 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
       where: `${where}, ${path}`,
       expected,
       found: shown(found),
-      remedy: 'write the folder again with npm run detail',
+      remedy: 'write the folder again with gaussian-splat detail',
     });
   };
   const { format, version, splats, shDegree, shPrecision, geometry, antialiased, origin, bounds } = manifest;

@@ -4,7 +4,7 @@ import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS, packKept, usableIndices, type PackedGaussians, type PackOptions } from '../pack/pack.js';
 import { recentred } from '../pack/recentre.js';
 import { mortonOrder } from '../pack/morton.js';
-import { choosePrecision, shWords, type ShPrecision } from '../pack/sh.js';
+import { choosePrecision, noiseIn, shWords, type ShPrecision } from '../pack/sh.js';
 import { detailRows, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
 import { packFiller } from './pack-level.js';
 import { errorsOfSpacings, spacingOf } from './run-errors.js';
@@ -30,7 +30,7 @@ export function packLevelRuns(given: GaussianCloud, options: PackOptions = {}): 
   const usable = usableIndices(cloud);
   const { sh = 'auto' } = options;
   const droppedCount = cloud.droppedCount + cloud.count - usable.length;
-  return { ...packRuns(cloud, usable, sh === 'auto' ? choosePrecision(cloud, usable) : sh), droppedCount };
+  return { ...packRuns(cloud, usable, sh === 'auto' ? choosePrecision(noiseIn(cloud), usable) : sh), droppedCount };
 }
 
 function packRuns(

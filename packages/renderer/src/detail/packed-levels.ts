@@ -5,8 +5,20 @@ import { shWords } from '../pack/sh.js';
 import { buildLevelsAbove } from './build-levels.js';
 import { boundLevel, detailRows, DETAIL_NUMBERS, leafErrors, parentErrors, type ChunkErrors } from './chunk-detail.js';
 import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
-import { packedLeaves } from './packed-leaves.js';
-import { chunksOf, type SplatLevel } from './splat-level.js';
+import { chunksOf, type SplatLevel, FACTOR_NUMBERS, type LevelSource } from './splat-level.js';
+import { shReader, unpackSplat } from '../pack/unpack.js';
+
+/** The splats of a packed scene as the finest level: what made it, file or generator, need not be there any more. */
+export function packedLeaves(packed: PackedGaussians): LevelSource {
+  const { count, geometry, shDegree, antialiased, filterVariance = constants.DILATION } = packed;
+  const positions = new Float32Array(3 * count);
+  const factors = new Float32Array(FACTOR_NUMBERS * count);
+  const opacities = new Float32Array(count);
+  for (let i = 0; i < count; i++) unpackSplat(geometry, i, positions, factors, opacities);
+  const dilation = antialiased ? 0 : filterVariance;
+  const spreads = new Float32Array(count);
+  return { count, positions, factors, opacities, spreads, shDegree, dilation, readSh: shReader(packed) };
+}
 
 const { CULL_GROUP } = constants;
 

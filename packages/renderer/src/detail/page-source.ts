@@ -5,7 +5,8 @@ import { listPages, type PageList } from './page-list.js';
 import type { SlotWords } from './slot-words.js';
 
 /** What is known of a streamed scene before any page of it has come. */
-export type StreamedScene = PageFormat & Pick<DetailManifest, 'splats' | 'antialiased' | 'filterVariance' | 'origin' | 'bounds'>;
+export type StreamedScene = PageFormat &
+  Pick<DetailManifest, 'splats' | 'antialiased' | 'filterVariance' | 'origin' | 'bounds'>;
 
 /** A streamed scene, and where its pages come from. */
 export interface PageSource {
@@ -25,7 +26,7 @@ export interface PageSource {
 /** Bytes of files that are kept: what is below a page is often wished for as soon as the page is there, and lies in the same file. */
 const KEPT_BYTES = 64e6;
 
-/** The pages of a folder that `npm run detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again. */
+/** The pages of a folder that `gaussian-splat detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again. */
 export function folderSource(
   manifest: DetailManifest,
   fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>,
@@ -55,7 +56,7 @@ function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBuff
     where,
     expected: `${length} bytes`,
     found: `${bytes.byteLength} bytes`,
-    remedy: 'upload the folder again, all files of it from one run of npm run detail',
+    remedy: 'upload the folder again, all files of it from one run of gaussian-splat detail',
   });
 }
 

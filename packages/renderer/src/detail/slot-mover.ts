@@ -1,9 +1,27 @@
 import type { Vector3 } from '@gaussian-splat/core';
 import { layouts } from '../generated/shaders.js';
 import type { GaussianPage } from '../gaussian-scene.js';
-import { BUFFER_USAGE } from '../gpu/kernel.js';
+import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
-import { MoveSlotsStage } from '../stages/move-slots.js';
+import { moveQuantizedSlots } from '../generated/quantized-shaders.js';
+import { moveSlots } from '../generated/streamed-shaders.js';
+
+/** Moves the splats of slots: see shaders/move_slots.wgsl, and for quantized geometry shaders/move_quantized_slots.wgsl. */
+export class MoveSlotsStage {
+  readonly #kernel: ComputeKernel<typeof moveSlots | typeof moveQuantizedSlots>;
+
+  constructor(device: GPUDevice, geometry?: 'quantized') {
+    this.#kernel = kernelOf(device, geometry ? moveQuantizedSlots : moveSlots);
+  }
+
+  bind(resources: Resources<typeof moveSlots>): GPUBindGroup {
+    return this.#kernel.bind(resources);
+  }
+
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, slots: number): void {
+    this.#kernel.dispatchGrid(pass, bindings, slots, 1);
+  }
+}
 
 /** Slots that are moved in one submission. */
 const MOST_MOVES = 256;

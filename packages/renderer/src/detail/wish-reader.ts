@@ -1,11 +1,30 @@
 import type { Camera, Vector3 } from '@gaussian-splat/core';
 import type { NotedPage, Wishes, WishLevers } from '../gaussian-scene.js';
-import { BUFFER_USAGE } from '../gpu/kernel.js';
+import { BUFFER_USAGE, kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
-import { NoteWishesStage } from '../stages/note-wishes.js';
 import { cameraValues } from '../view.js';
 import { CameraMotion } from './camera-motion.js';
 import { MOST_VIEWS, SeenViews } from './seen-views.js';
+import { constants } from '../generated/shaders.js';
+import { noteWishes } from '../generated/streamed-shaders.js';
+import { cullGroups } from '../stages/cull.js';
+
+/** Which pages of a streamed scene a view asks for. */
+export class NoteWishesStage {
+  readonly #kernel: ComputeKernel<typeof noteWishes>;
+
+  constructor(device: GPUDevice) {
+    this.#kernel = kernelOf(device, noteWishes);
+  }
+
+  bind(resources: Resources<typeof noteWishes>): GPUBindGroup {
+    return this.#kernel.bind(resources);
+  }
+
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
+    this.#kernel.dispatch(pass, bindings, Math.ceil(cullGroups(splatCount) / constants.WISH_THREADS));
+  }
+}
 
 /** Frames between two looks at what is wished for: of a camera that rests, and of one that moves. Both odd, for two views that are drawn in turn. */
 const INTERVAL = 5;

@@ -133,12 +133,6 @@ export class ComputeKernel<S extends ShaderDescription> {
     pass.setBindGroup(0, bindGroup);
     pass.dispatchWorkgroups(...dispatchGrid(groups));
   }
-
-  dispatchIndirect(pass: GPUComputePassEncoder, bindGroup: GPUBindGroup, buffer: GPUBuffer, offset: number): void {
-    pass.setPipeline(this.#pipeline);
-    pass.setBindGroup(0, bindGroup);
-    pass.dispatchWorkgroupsIndirect(buffer, offset);
-  }
 }
 
 /** Pipelines that are being made beside one another. */
@@ -163,7 +157,7 @@ export async function madeTogether(device: GPUDevice, prepare: () => void): Prom
 /** WebGPU's default limit of workgroups in one dimension (`MAX_GROUPS_X` in the shaders). */
 const MAX_GROUPS = 65535;
 
-/** Workgroups across and down for a number of them: `dispatch_grid` of shaders/shared/group.wgsl. */
+/** Workgroups across and down for a number of them: the inverse of `group_index` of shaders/shared/group.wgsl. */
 export function dispatchGrid(groups: number): [columns: number, rows: number] {
   return [Math.min(groups, MAX_GROUPS), Math.ceil(groups / MAX_GROUPS)];
 }
@@ -180,7 +174,6 @@ export const BUFFER_USAGE = {
   index: 0x10,
   uniform: 0x40,
   storage: 0x80,
-  indirect: 0x100,
 } as const;
 export const TEXTURE_USAGE = {
   copySource: 0x1,

@@ -5,11 +5,15 @@ import { constants, layouts } from '../generated/shaders.js';
 export const CHUNK_NUMBERS = layouts.Chunk.size / 4;
 const { CULL_GROUP, ALPHA_MIN } = constants;
 
-/**
- * Bounds of each run of 256 splats: the box of their centres, and the farthest that any of them reaches with an alpha of at
- * least 1/255 along its longest axis.
- */
-export function boundChunks({ positions, scales, opacities }: GaussianCloud, kept: Uint32Array): Float32Array {
+/** How far a splat reaches from its centre with an alpha of at least 1/255 along its longest axis, world units. */
+export function reachOf({ scales, opacities }: Pick<GaussianCloud, 'scales' | 'opacities'>, i: number): number {
+  const longest = Math.max(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]);
+  return longest * Math.sqrt(2 * Math.log(Math.max(1, Math.min(1, opacities[i]) / ALPHA_MIN)));
+}
+
+/** Bounds of each run of 256 splats: the box of their centres, and the farthest that any of them reaches. */
+export function boundChunks(cloud: GaussianCloud, kept: Uint32Array): Float32Array {
+  const { positions } = cloud;
   const chunks = new Float32Array(CHUNK_NUMBERS * Math.ceil(kept.length / CULL_GROUP));
   for (let first = 0, at = 0; first < kept.length; first += CULL_GROUP, at += CHUNK_NUMBERS) {
     const low = [Infinity, Infinity, Infinity];
@@ -21,9 +25,7 @@ export function boundChunks({ positions, scales, opacities }: GaussianCloud, kep
         if (x < low[axis]) low[axis] = x;
         if (x > high[axis]) high[axis] = x;
       }
-      const longest = Math.max(scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]);
-      const radius = Math.sqrt(2 * Math.log(Math.max(1, Math.min(1, opacities[i]) / ALPHA_MIN)));
-      reach = Math.max(reach, longest * radius);
+      reach = Math.max(reach, reachOf(cloud, i));
     }
     chunks.set([...low, reach, ...high, 0], at);
   }

@@ -16,10 +16,11 @@ const LEAST_COUNT = 1024;
  * file's order.
  * @param positions [3 N] world units
  * @param kept indices of splats; not changed
+ * @param samples so many of them tell how the curve lies
  */
-export function mortonOrder(positions: Float32Array, kept: Uint32Array): Uint32Array {
+export function mortonOrder(positions: Float32Array, kept: Uint32Array, samples = SAMPLE): Uint32Array {
   if (kept.length < LEAST_COUNT) return kept;
-  const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis));
+  const axes = [0, 1, 2].map((axis) => sampleAxis(positions, kept, axis, samples));
   if (axes.some(isFlat)) return kept;
   const codes = new Uint32Array(kept.length);
   for (let k = 0; k < kept.length; k++) codes[k] = mortonCode(positions, 3 * kept[k], axes);
@@ -55,8 +56,8 @@ export interface Axis {
 }
 
 /** What some of the splats say of an axis. */
-export function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number): Axis {
-  const count = Math.min(SAMPLE, kept.length);
+export function sampleAxis(positions: Float32Array, kept: Uint32Array, axis: number, samples = SAMPLE): Axis {
+  const count = Math.min(samples, kept.length);
   const sample = Float32Array.from({ length: count }, (_, k) => {
     const i = kept[Math.floor((k * kept.length) / count)];
     return positions[3 * i + axis];

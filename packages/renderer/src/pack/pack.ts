@@ -11,7 +11,7 @@ import { boundChunks } from './chunks.js';
 import { scaleRotationFactor } from './factor.js';
 import { mortonOrder } from './morton.js';
 import { recentred } from './recentre.js';
-import { choosePrecision, packSh, SH_PRECISION, type ShPrecision } from './sh.js';
+import { choosePrecision, noiseIn, packSh, SH_PRECISION, type ShPrecision } from './sh.js';
 
 /** How {@link packGaussians} lays out a cloud. */
 export interface PackOptions {
@@ -72,7 +72,7 @@ export function packGaussians(given: GaussianCloud, options: PackOptions = {}): 
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   if (asked !== 'auto' && !Object.hasOwn(SH_PRECISION, asked)) throw unknownPrecision(asked);
-  const shPrecision = asked === 'auto' ? choosePrecision(cloud, kept) : asked;
+  const shPrecision = asked === 'auto' ? choosePrecision(noiseIn(cloud), kept) : asked;
   const facts = { count: kept.length, shDegree, shPrecision, antialiased, filterVariance, origin, droppedCount };
   return { ...facts, ...packKept(cloud, kept, shPrecision) };
 }

@@ -7,8 +7,6 @@ import { GEOMETRY_WORDS, type PackedGaussians } from './pack.js';
 import { shWords } from './sh.js';
 
 const { CULL_GROUP } = constants;
-/** Place of the reach in a chunk: see `boundChunks`. */
-const REACH = 3;
 
 const notWhole = (): GaussianSplatError =>
   new GaussianSplatError('argument/value', {
@@ -72,59 +70,4 @@ async function readPages(
     at += words;
   }
   return all;
-}
-
-/**
- * Some splats of a packed scene, in their order.
- * @param slots numbers of the splats that stay, ascending
- * @param pause called now and then: what it waits for is the page's turn
- */
-export async function selectPacked(
-  packed: PackedGaussians,
-  slots: Uint32Array,
-  pause: () => Promise<void> = () => Promise.resolve(),
-): Promise<PackedGaussians> {
-  const stride = shWords(packed.shDegree, packed.shPrecision);
-  const geometry = new Uint32Array(GEOMETRY_WORDS * slots.length);
-  const sh = new Uint32Array(stride * slots.length);
-  const chunks = new Float32Array(CHUNK_NUMBERS * Math.ceil(slots.length / CULL_GROUP));
-  const positions = new Float32Array(geometry.buffer);
-  for (let first = 0; first < slots.length; first += CULL_GROUP) {
-    const part = slots.subarray(first, first + CULL_GROUP);
-    part.forEach((slot, i) => {
-      copyWords(packed.geometry, GEOMETRY_WORDS * slot, geometry, GEOMETRY_WORDS * (first + i), GEOMETRY_WORDS);
-      copyWords(packed.sh, stride * slot, sh, stride * (first + i), stride);
-    });
-    chunks.set(boundsOf(packed, part, positions, first), (CHUNK_NUMBERS * first) / CULL_GROUP);
-    if ((first / CULL_GROUP) % CHUNKS_AT_ONCE === CHUNKS_AT_ONCE - 1) await pause();
-  }
-  return { ...packed, count: slots.length, geometry, sh, chunks };
-}
-
-/** Chunks between two pauses: a millisecond or so. */
-const CHUNKS_AT_ONCE = 32;
-
-function copyWords(from: Uint32Array, start: number, to: Uint32Array, at: number, count: number): void {
-  for (let k = 0; k < count; k++) to[at + k] = from[start + k];
-}
-
-/** A chunk: the box of its centres, and a reach that is none too small: the largest of the chunks that the splats come from. */
-function boundsOf(
-  { chunks }: PackedGaussians,
-  slots: Uint32Array,
-  positions: Float32Array,
-  first: number,
-): readonly number[] {
-  const low = [Infinity, Infinity, Infinity];
-  const high = [-Infinity, -Infinity, -Infinity];
-  let reach = 0;
-  slots.forEach((slot, i) => {
-    for (let axis = 0; axis < 3; axis++) {
-      const x = positions[GEOMETRY_WORDS * (first + i) + axis];
-      low[axis] = Math.min(low[axis], x);
-      high[axis] = Math.max(high[axis], x);
-    }
-    reach = Math.max(reach, chunks[CHUNK_NUMBERS * Math.floor(slot / CULL_GROUP) + REACH]);
-  });
-  return [...low, reach, ...high, 0];
 }

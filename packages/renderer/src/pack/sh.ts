@@ -25,43 +25,66 @@ const INT8_PART_DB = 50;
 const PART = 256;
 const PART_SAMPLES = 8;
 
+/** What rounding to `int8` does to the colour of a splat, as a variance. */
+export type NoiseOf = (splat: number) => number;
+
+/** {@link NoiseOf} the splats of a cloud. */
+export const noiseIn =
+  ({ sh, shDegree }: Pick<GaussianCloud, 'sh' | 'shDegree'>): NoiseOf =>
+  (splat) =>
+    shNoise(sh, splat * 3 * shCoefficientCount(shDegree), shDegree);
+
 /**
  * `int8` where it is precise enough, in the scene as a whole and in each of its parts: coefficients are rounded to within s / 254, s the scale of their band, evenly spread; seen from a
  * random direction, band b adds up to a variance of (s / 127)² / 12 · (2b + 1) / 4π.
  */
-export function choosePrecision(cloud: GaussianCloud, kept: Uint32Array): ShPrecision {
+export function choosePrecision(noiseOf: NoiseOf, kept: Uint32Array): ShPrecision {
   const parts = Math.max(1, Math.round(kept.length / PART));
   let sum = 0;
   let worst = 0;
   for (let part = 0; part < parts; part++) {
-    const [first, end] = [part, part + 1].map((k) => Math.floor((k * kept.length) / parts));
-    const variance = meanVariance(cloud, kept, first, end);
+    const first = Math.floor((part * kept.length) / parts);
+    const end = Math.floor(((part + 1) * kept.length) / parts);
+    const variance = meanNoise(noiseOf, kept, first, end);
     sum += variance;
     worst = Math.max(worst, variance);
   }
   return sum / parts <= 10 ** (-INT8_NOISE_DB / 10) && worst <= 10 ** (-INT8_PART_DB / 10) ? 'int8' : 'float16';
 }
 
-/** What rounding to `int8` does to the colour of a splat of a part, in the mean of some. */
-function meanVariance({ sh, shDegree }: GaussianCloud, kept: Uint32Array, first: number, end: number): number {
-  const numbers = 3 * shCoefficientCount(shDegree);
+/** The noise of a splat of a part, in the mean of some. */
+function meanNoise(noiseOf: NoiseOf, kept: Uint32Array, first: number, end: number): number {
   const step = Math.max(1, Math.floor((end - first) / PART_SAMPLES));
-  let variance = 0;
+  let noise = 0;
   let samples = 0;
-  for (let k = first; k < end; k += step, samples++) {
-    let at = kept[k] * numbers + 3;
-    for (let band = 1; band <= shDegree; band++) {
-      const scale = 2 ** (Math.ceil(SCALE_STEPS * Math.log2(largestOf(sh, at, 3 * (2 * band + 1)))) / SCALE_STEPS);
-      variance += ((scale / 127) ** 2 / 12) * ((2 * band + 1) / (4 * Math.PI));
-      at += 3 * (2 * band + 1);
-    }
+  for (let k = first; k < end; k += step, samples++) noise += noiseOf(kept[k]);
+  return noise / Math.max(1, samples);
+}
+
+/** Eighths of an octave that magnitudes have, nearly always. */
+const POWERS = Float64Array.from({ length: 512 }, (_, k) => 2 ** ((k - 256) / SCALE_STEPS));
+
+/** 2 to so many eighths. */
+const powerOf = (eighths: number): number => POWERS[eighths + 256] ?? 2 ** (eighths / SCALE_STEPS);
+
+function shNoise(sh: Float32Array, first: number, shDegree: ShDegree): number {
+  let noise = 0;
+  let at = first + 3;
+  for (let band = 1; band <= shDegree; band++) {
+    const size = 3 * (2 * band + 1);
+    const scale = powerOf(Math.ceil(SCALE_STEPS * Math.log2(largestOf(sh, at, size))));
+    noise += ((scale / 127) ** 2 / 12) * ((2 * band + 1) / (4 * Math.PI));
+    at += size;
   }
-  return variance / Math.max(1, samples);
+  return noise;
 }
 
 function largestOf(sh: Float32Array, first: number, count: number): number {
   let largest = 0;
-  for (let k = 0; k < count; k++) largest = Math.max(largest, Math.abs(sh[first + k]));
+  for (let k = first; k < first + count; k++) {
+    const size = Math.abs(sh[k]);
+    if (size > largest) largest = size;
+  }
   return largest;
 }
 
@@ -93,25 +116,32 @@ function packHalf({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
   return new Uint32Array(halves.buffer);
 }
 
+/** What a coefficient is multiplied by to get its code, for each code of a scale. */
+const PER_UNIT = Float64Array.from({ length: MAX_CODE + 1 }, (_, code) =>
+  code === 0 ? 0 : 127 / 2 ** (code / SCALE_STEPS - SCALE_BIAS),
+);
+
 function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Array {
   const numbers = 3 * shCoefficientCount(shDegree);
   const words = new Uint32Array(kept.length * shWords(shDegree, 'int8'));
   const bytes = new Uint8Array(words.buffer);
   const halves = new Uint16Array(words.buffer);
   const stride = 4 * shWords(shDegree, 'int8');
-  const codes = new Uint8Array(3 * BAND_SIZES[2]);
   let at = 0;
-  for (const i of kept) {
-    for (let channel = 0; channel < 3; channel++) halves[at / 2 + channel] = halfBits(sh[i * numbers + channel]);
-    let first = i * numbers + 3;
+  for (let k = 0; k < kept.length; k++) {
+    const splat = kept[k] * numbers;
+    for (let channel = 0; channel < 3; channel++) halves[at / 2 + channel] = halfBits(sh[splat + channel]);
+    let first = splat + 3;
     let code = at + FIRST_CODE_BYTE;
     for (let band = 0; band < shDegree; band++) {
       const size = 3 * BAND_SIZES[band];
-      bytes[at + SCALE_BYTES[band]] = packBand(sh, first, size, codes);
+      const scaleCode = scaleCodeOf(largestOf(sh, first, size));
+      const perUnit = PER_UNIT[scaleCode];
       // Degree 1 has nine codes and room for eight: the last takes the place of the scale of band 2.
       const behind = Math.min(size, stride - (code - at));
-      for (let k = 0; k < behind; k++) bytes[code + k] = codes[k];
-      if (behind < size) bytes[at + SCALE_BYTES[1]] = codes[behind];
+      for (let n = 0; n < behind; n++) bytes[code + n] = codeOf(sh[first + n] * perUnit);
+      if (behind < size) bytes[at + SCALE_BYTES[1]] = codeOf(sh[first + behind] * perUnit);
+      bytes[at + SCALE_BYTES[band]] = scaleCode;
       first += size;
       code += size;
     }
@@ -120,15 +150,14 @@ function packInt8({ sh, shDegree }: GaussianCloud, kept: Uint32Array): Uint32Arr
   return words;
 }
 
-/** Makes the codes of the `size` coefficients from `first` on and returns the code of their scale; 0 means all zeros. */
-function packBand(sh: Float32Array, first: number, size: number, codes: Uint8Array): number {
-  const largest = largestOf(sh, first, size);
+/** A share of the scale, in 1/127, to the nearest; the last of halves goes up. */
+function codeOf(value: number): number {
+  return Math.floor(Math.min(127, Math.max(-127, value)) + 0.5);
+}
+
+/** The code of a scale for coefficients of that size; 0 means all zeros. */
+function scaleCodeOf(largest: number): number {
   // The small number: a magnitude that is a step itself must not be lifted to the next by a rounding of the logarithm.
   const steps = largest > 0 ? Math.ceil(SCALE_STEPS * (Math.log2(largest) + SCALE_BIAS) - 1e-6) : 0;
-  const scaleCode = Math.min(MAX_CODE, Math.max(0, steps));
-  const perUnit = scaleCode === 0 ? 0 : 127 / 2 ** (scaleCode / SCALE_STEPS - SCALE_BIAS);
-  for (let k = 0; k < size; k++) {
-    codes[k] = Math.round(Math.min(127, Math.max(-127, sh[first + k] * perUnit)));
-  }
-  return scaleCode;
+  return Math.min(MAX_CODE, Math.max(0, steps));
 }

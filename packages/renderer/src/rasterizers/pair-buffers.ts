@@ -2,7 +2,7 @@
 import { constants, layouts } from '../generated/shaders.js';
 import { BUFFER_USAGE } from '../gpu/kernel.js';
 import type { GpuMemory } from '../gpu/memory.js';
-import { scanBytes } from '../stages/scan.js';
+import { scanBytes } from '../stages/plan.js';
 import type { RasterizerInputs, Room } from './rasterizer.js';
 
 const { PREFIX_THREADS, PROJECT_GROUP, SORT_BLOCK, DIGITS } = constants;
@@ -34,9 +34,9 @@ export function pairBuffers(
   memory: GpuMemory,
   { capacity, pairCapacity, spare }: Pick<RasterizerInputs, 'capacity' | 'pairCapacity' | 'spare'>,
 ): PairBuffers {
-  const { storage, copyDestination, copySource, indirect } = BUFFER_USAGE;
+  const { storage, copyDestination, copySource } = BUFFER_USAGE;
   const buffer = (name: string, bytes: number): GPUBuffer =>
-    memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination | indirect);
+    memory.buffer(`gs.bin.${name}`, bytes, storage | copySource | copyDestination);
   const pairs = wholeGroups(pairCapacity);
   return {
     rects: spare[0],

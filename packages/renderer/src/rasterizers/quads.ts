@@ -1,8 +1,11 @@
-import { constants as shaderConstants, layouts, rasterizeQuads } from '../generated/shaders.js';
+import { constants, layouts, rasterizeQuads } from '../generated/shaders.js';
 import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
-import { planOffsets } from '../scratch.js';
 import type { AccumulationFormat, OrderKind, Painting, Rasterizer, RasterizerInputs, Slice } from './rasterizer.js';
+
+const { QUAD_BATCH } = constants;
+/** Two triangles. */
+const INDICES_PER_QUAD = 6;
 
 type Program = ShaderProgram<typeof rasterizeQuads>;
 
@@ -17,7 +20,7 @@ export class QuadsRasterizer implements Rasterizer {
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.RasterView.size);
   #bindings: Readonly<Record<OrderKind, GPUBindGroup>> | undefined;
-  #plan: GPUBuffer | undefined;
+  #capacity = 0;
 
   constructor(device: GPUDevice, format: AccumulationFormat) {
     this.#device = device;
@@ -50,8 +53,8 @@ export class QuadsRasterizer implements Rasterizer {
     return 0;
   }
 
-  bind({ plan, splats, orders }: RasterizerInputs): void {
-    this.#plan = plan;
+  bind({ plan, splats, orders, capacity }: RasterizerInputs): void {
+    this.#capacity = capacity;
     const bindTo = (order: GPUBuffer): GPUBindGroup =>
       this.#program.bind({ raster: this.#uniform, plan, splats, order });
     this.#bindings = {
@@ -89,13 +92,14 @@ export class QuadsRasterizer implements Rasterizer {
       ],
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    if (this.#plan !== undefined && this.#bindings !== undefined) {
+    if (this.#bindings !== undefined) {
       // The image may be a part of the texture.
       pass.setViewport(0, 0, width, height, 0, 1);
       pass.setPipeline(this.#pipeline());
       pass.setBindGroup(0, this.#bindings[order]);
       pass.setIndexBuffer(this.#indices, 'uint16');
-      pass.drawIndexedIndirect(this.#plan, planOffsets.quads);
+      // As many as there is room for: the vertices of those that are not there lie outside.
+      pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(this.#capacity / QUAD_BATCH));
     }
     pass.end();
   }
@@ -130,11 +134,8 @@ function makePipeline(device: GPUDevice, program: Program, format: AccumulationF
 /** Two triangles for each quad of a batch: corners 0, 1, 2 and 2, 1, 3. */
 function makeIndices(device: GPUDevice): GPUBuffer {
   const indices = Uint16Array.from(
-    { length: shaderConstants.QUAD_BATCH * shaderConstants.INDICES_PER_QUAD },
-    (_, i) => {
-      const quad = Math.floor(i / shaderConstants.INDICES_PER_QUAD);
-      return 4 * quad + [0, 1, 2, 2, 1, 3][i % shaderConstants.INDICES_PER_QUAD];
-    },
+    { length: QUAD_BATCH * INDICES_PER_QUAD },
+    (_, i) => 4 * Math.floor(i / INDICES_PER_QUAD) + [0, 1, 2, 2, 1, 3][i % INDICES_PER_QUAD],
   );
   const buffer = device.createBuffer({
     label: 'gs.rasterize.indices',

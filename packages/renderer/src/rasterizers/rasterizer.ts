@@ -12,14 +12,12 @@ export type OrderKind = 'sorted' | 'identity';
 
 /** What every rasterizer reads. */
 export interface RasterizerInputs {
-  /** `Plan`: how many splats there are to draw, and indirect arguments. */
+  /** `Plan`: how many splats there are to draw. */
   readonly plan: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
   readonly orders: Readonly<Record<OrderKind, GPUBuffer>>;
-  /** How far one sees in each tile, and where to write how far one saw: see `Occlusion`. */
-  readonly occlusion: { readonly depths: GPUBuffer; readonly lastDepths: GPUBuffer };
   /** Numbers of the visible splats by slot, for frames whose order is `identity`. */
   readonly survivors: GPUBuffer;
   /** Of at least {@link Rasterizer.spareBytes} each: nobody else's once splats are in order, until the next frame. */
@@ -74,7 +72,7 @@ export interface NotedFrame {
 }
 
 /** Levers that rasterizers know. */
-export type PaintingLevers = Pick<Levers, 'alphaMin' | 'transmittanceMin' | 'occludedBelow'>;
+export type PaintingLevers = Pick<Levers, 'alphaMin' | 'transmittanceMin'>;
 
 /** One frame to draw. */
 export interface Painting {

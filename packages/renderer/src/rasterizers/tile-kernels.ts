@@ -1,19 +1,10 @@
 /** The pipelines of the rasterizer `tiles`. */
-import {
-  binCount,
-  binEmit,
-  binIndex,
-  binPlan,
-  rasterizeTiles,
-  rasterizeTilesNoting,
-  scan,
-} from '../generated/shaders.js';
+import { binCount, binEmit, binIndex, binPlan, rasterizeTiles, rasterizeTilesNoting } from '../generated/shaders.js';
 import { ComputeKernel, kernelOf, perDevice, storingInto } from '../gpu/kernel.js';
 
 /** Those that list splats for bins: the same whatever the image. */
 export interface ListingKernels {
   readonly count: ComputeKernel<typeof binCount>;
-  readonly scan: ComputeKernel<typeof scan>;
   readonly plan: ComputeKernel<typeof binPlan>;
   readonly emit: ComputeKernel<typeof binEmit>;
   readonly index: ComputeKernel<typeof binIndex>;
@@ -22,7 +13,6 @@ export interface ListingKernels {
 export function listingKernels(device: GPUDevice): ListingKernels {
   return {
     count: kernelOf(device, binCount),
-    scan: kernelOf(device, scan),
     plan: kernelOf(device, binPlan),
     emit: kernelOf(device, binEmit),
     index: kernelOf(device, binIndex),
@@ -37,16 +27,17 @@ export interface RasterizeVariant {
   readonly format: GPUTextureFormat;
   readonly isFinal: boolean;
   readonly isNoting: boolean;
-  readonly notesDepth: boolean;
+  /** See `transmittanceMin` of the levers. */
+  readonly refusesLast: boolean;
 }
 
 /** The pipeline for a variant; made once for each device. */
 export function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
-  const { format, isFinal, isNoting, notesDepth } = variant;
+  const { format, isFinal, isNoting, refusesLast } = variant;
   const shader = isNoting ? (rasterizeTilesNoting as unknown as typeof rasterizeTiles) : rasterizeTiles;
   const [writesHalf, writesBytes] = [format === 'rgba16float', format.endsWith('8unorm')];
   const constants = {
-    ...{ notes_depth: +notesDepth, is_final: +isFinal },
+    ...{ refuses_last: +refusesLast, is_final: +isFinal },
     ...{ writes_half: +writesHalf, writes_bytes: +writesBytes },
   };
   const key = `${shader.name} ${format} ${JSON.stringify(constants)}`;

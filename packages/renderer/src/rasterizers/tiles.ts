@@ -2,8 +2,9 @@ import { constants, layouts, type rasterizeTilesNoting } from '../generated/shad
 import { BUFFER_USAGE, TEXTURE_USAGE, type ComputeKernel } from '../gpu/kernel.js';
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
-import { planOffsets } from '../scratch.js';
-import { sortedIn, SortStage, type SortBindings, type SortName } from '../stages/sort.js';
+import { sortedIn, SortStage, type SortBindings } from '../stages/sort.js';
+import type { Threads } from '../stages/plan.js';
+import { TRAINED_TRANSMITTANCE } from '../levers.js';
 import type {
   AccumulationFormat,
   FrameNotes,
@@ -21,7 +22,9 @@ import { pairBuffers, spareBytesOf, type PairBuffers } from './pair-buffers.js';
 import { listingKernels, rasterizeKernel, type ListingKernels, type RasterizeKernel } from './tile-kernels.js';
 import { sliceOfTiles } from './tile-slice.js';
 
-const { BIN_WIDTH, BIN_HEIGHT, TILE } = constants;
+const { BIN_WIDTH, BIN_HEIGHT, PREFIX_THREADS, PROJECT_GROUP, TILE } = constants;
+
+const groupsOf = (splats: number): number => Math.ceil(splats / PREFIX_THREADS);
 
 /** Bins across and down of an image, and the bits of a bin's number. */
 interface Grid {
@@ -35,7 +38,6 @@ interface GridBindings {
   readonly grid: Grid;
   readonly ranges: GPUBuffer;
   readonly listing: Readonly<Record<OrderKind, { readonly count: GPUBindGroup; readonly emit: GPUBindGroup }>>;
-  readonly scan: GPUBindGroup;
   readonly plan: GPUBindGroup;
   readonly sort: SortBindings;
   readonly index: GPUBindGroup;
@@ -49,6 +51,9 @@ const STORABLE_WITH_FEATURE: GPUTextureFormat = 'bgra8unorm';
 
 /** Numbers of bins that are kept bound. */
 const MAX_GRIDS = 12;
+
+/** At the threshold that scenes are trained with, the splat that would go below it is refused; at higher ones it is the last that is blended. */
+const refusesLast = ({ transmittanceMin }: PaintingLevers): boolean => transmittanceMin <= TRAINED_TRANSMITTANCE;
 
 const TRANSPARENT = [0, 0, 0, 0] as const;
 
@@ -70,7 +75,6 @@ export class TilesRasterizer implements Rasterizer {
   readonly #sort: SortStage;
   readonly #view: GPUBuffer;
   readonly #viewBytes = new ArrayBuffer(layouts.BinView.size);
-  readonly #scanLength: GPUBuffer;
   #inputs: RasterizerInputs | undefined;
   #buffers: PairBuffers | undefined;
   /** By the number of bins across and down: pictures in motion may have fewer pixels. */
@@ -79,15 +83,14 @@ export class TilesRasterizer implements Rasterizer {
   #nowhere: Required<FrameNotes> | undefined;
   #noted: NotedFrame | undefined;
 
-  constructor(device: GPUDevice, accumulation: AccumulationFormat, sort: SortName) {
+  constructor(device: GPUDevice, accumulation: AccumulationFormat, threads: Threads) {
     this.#device = device;
     this.#accumulation = accumulation;
     this.#memory = new GpuMemory(device);
     this.#kernels = listingKernels(device);
-    this.#sort = new SortStage(device, sort, 'given');
+    this.#sort = new SortStage(device, threads, 'given');
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#view = this.#memory.buffer('gs.rasterize.view', layouts.BinView.size, usage);
-    this.#scanLength = this.#memory.buffer('gs.rasterize.scan_length', 16, usage);
   }
 
   get byteLength(): number {
@@ -115,11 +118,10 @@ export class TilesRasterizer implements Rasterizer {
     this.#release();
     this.#inputs = inputs;
     this.#buffers = pairBuffers(this.#memory, inputs);
-    this.#device.queue.writeBuffer(this.#scanLength, 0, Uint32Array.of(this.#buffers.groupPairs.size / 4 - 1));
   }
 
   prepare(levers: PaintingLevers, format: GPUTextureFormat): void {
-    const variant = { notesDepth: levers.occludedBelow > 0, isNoting: false };
+    const variant = { isNoting: false, refusesLast: refusesLast(levers) };
     if (this.finishes(format)) rasterizeKernel(this.#device, { ...variant, format, isFinal: true }).prepare();
     rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false }).prepare();
   }
@@ -127,22 +129,20 @@ export class TilesRasterizer implements Rasterizer {
   /** Lists the splats for the bins. */
   prepareFrame(encoder: GPUCommandEncoder, { surface, order, levers, background, timer }: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
-    const { plan } = this.#inputs;
     const buffers = this.#buffers;
     const bound = this.#gridFor(surface, this.#inputs, buffers);
     this.#writeView(surface, bound.grid, [0, 0], levers, background);
-    encoder.clearBuffer(buffers.groupPairs);
-    encoder.clearBuffer(bound.ranges);
 
-    const { count, scan: scanKernel, plan: planKernel, emit, index } = this.#kernels;
+    const { count, plan, emit, index } = this.#kernels;
     const listing = bound.listing[order];
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
-    count.dispatchIndirect(bin, listing.count, plan, planOffsets.visible);
-    scanKernel.dispatch(bin, bound.scan, 1);
-    planKernel.dispatch(bin, bound.plan, 1);
-    emit.dispatchIndirect(bin, listing.emit, plan, planOffsets.visible);
-    this.#sort.record(bin, bound.sort, buffers.plan);
-    index.dispatchIndirect(bin, bound.index, buffers.plan, planOffsets.visible);
+    // As many as there is room for: groups beyond the splats and pairs that are there end at once.
+    const groups = groupsOf(this.#inputs.capacity);
+    count.dispatch(bin, listing.count, groups);
+    plan.dispatch(bin, bound.plan, 1);
+    emit.dispatch(bin, listing.emit, groups);
+    this.#sort.record(bin, bound.sort, this.#inputs.pairCapacity);
+    index.dispatch(bin, bound.index, Math.ceil(this.#inputs.pairCapacity / PROJECT_GROUP));
     bin.end();
   }
 
@@ -163,7 +163,7 @@ export class TilesRasterizer implements Rasterizer {
       format,
       isFinal: background !== undefined,
       isNoting: notes !== undefined,
-      notesDepth: levers.occludedBelow > 0,
+      refusesLast: refusesLast(levers),
     });
     const image = notes
       ? this.#bindNoting(kernel, bound, surface.view, notes)
@@ -211,8 +211,8 @@ export class TilesRasterizer implements Rasterizer {
     ranges: GPUBuffer,
   ): Omit<GridBindings, 'grid' | 'ranges'> {
     const view = this.#view;
-    const sorted = sortedIn(this.#sort.name, bits);
-    const { count, scan: scanKernel, plan: planKernel, emit, index } = this.#kernels;
+    const sorted = sortedIn(bits);
+    const { count, plan: planKernel, emit, index } = this.#kernels;
     const listing = (order: GPUBuffer): GridBindings['listing'][OrderKind] => {
       const shared = { view, plan, order, rects, group_pairs: groupPairs };
       return {
@@ -225,8 +225,7 @@ export class TilesRasterizer implements Rasterizer {
         sorted: listing(orders.sorted),
         identity: listing(orders.identity),
       },
-      scan: scanKernel.bind({ values: groupPairs, scan: this.#scanLength }),
-      plan: planKernel.bind({ view, group_pairs: groupPairs, pair_plan: pairPlan }),
+      plan: planKernel.bind({ values: groupPairs, view, pair_plan: pairPlan, ranges }),
       sort: this.#sort.bind({ plan: pairPlan, keys: bins, values: pairs, digitCounts, digitTotals }, bits),
       index: index.bind({
         ...{ view, splats, pair_plan: pairPlan },
@@ -248,9 +247,9 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #painted(bound: GridBindings, image: GPUTextureView) {
-    const { splats, occlusion } = this.#inputs!;
+    const { splats } = this.#inputs!;
     const { pairs, bins } = this.#buffers!;
-    const sorted = sortedIn(this.#sort.name, bound.grid.bits);
+    const sorted = sortedIn(bound.grid.bits);
     return {
       view: this.#view,
       splats,
@@ -258,8 +257,6 @@ export class TilesRasterizer implements Rasterizer {
       ranges: bound.ranges,
       // Once the pairs are sorted, what they were sorted from is free.
       tile_bits: bins[1 - sorted]!,
-      occlusion: occlusion.depths,
-      last_depths: occlusion.lastDepths,
       image,
     };
   }
@@ -291,13 +288,14 @@ export class TilesRasterizer implements Rasterizer {
     { width, height }: Surface,
     { columns, rows }: Grid,
     first_tile: readonly [number, number],
-    { alphaMin, transmittanceMin, occludedBelow }: PaintingLevers,
+    { alphaMin, transmittanceMin }: PaintingLevers,
     background: Painting['background'] = TRANSPARENT,
   ): void {
-    const pair_capacity = this.#inputs!.pairCapacity;
-    const image = { viewport: [width, height], bins: [columns, rows], pair_capacity, background, first_tile };
-    const ends = { alpha_min: alphaMin, transmittance_min: transmittanceMin, occluded_below: occludedBelow };
-    writeStruct(layouts.BinView, { ...image, ...ends }, this.#viewBytes);
+    const { capacity, pairCapacity } = this.#inputs!;
+    const room = { pair_capacity: pairCapacity, splat_groups: groupsOf(capacity) };
+    const image = { viewport: [width, height], bins: [columns, rows], background, first_tile };
+    const ends = { alpha_min: alphaMin, transmittance_min: transmittanceMin };
+    writeStruct(layouts.BinView, { ...room, ...image, ...ends }, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
 }

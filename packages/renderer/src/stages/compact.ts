@@ -1,4 +1,5 @@
 import { compact } from '../generated/shaders.js';
+import { cullGroups } from './cull.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
 
 /** Lists the survivors of a page in the file's order. */
@@ -13,8 +14,7 @@ export class CompactStage {
     return this.#kernel.bind(resources);
   }
 
-  /** @param chunkArgs indirect arguments as `CullChunksStage` leaves them, three words a page */
-  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, chunkArgs: GPUBuffer, page: number): void {
-    this.#kernel.dispatchIndirect(pass, bindings, chunkArgs, 12 * page);
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
+    this.#kernel.dispatch(pass, bindings, cullGroups(splatCount));
   }
 }

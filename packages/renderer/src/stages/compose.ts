@@ -79,7 +79,10 @@ export class ComposeStage {
         label: `gs.compose.${format}`,
         layout: pipelineLayout,
         vertex: { module, entryPoint: 'vertex' },
-        fragment: { module, entryPoint: 'fragment', targets: [{ format }] },
+        fragment: {
+          ...{ module, entryPoint: 'fragment', targets: [{ format }] },
+          constants: { is_encoding: Number(format.endsWith('-srgb')) },
+        },
         primitive: { topology: 'triangle-list' },
       }),
     );

@@ -1,9 +1,9 @@
 import { constants, cullChunks, type cull } from '../generated/shaders.js';
 import { PACKED, type GeometryReading } from '../geometry-reading.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
-import type { Threads } from './threads.js';
+import type { Threads } from './plan.js';
 
-/** Which chunks of a page may hold visible splats. */
+/** In which share each chunk of a page is drawn: 0 where it may hold no visible splat. */
 export class CullChunksStage {
   readonly #kernel: ComputeKernel<typeof cullChunks>;
 
@@ -20,7 +20,7 @@ export class CullChunksStage {
   }
 }
 
-/** Which splats of the listed chunks paint anything, and how many of each group of 256. */
+/** Which splats of the chunks that are drawn paint anything, and how many of each group of 256. */
 export class CullStage {
   readonly #kernel: ComputeKernel<GeometryReading['cull'] | GeometryReading['cullSerial']>;
 
@@ -32,9 +32,8 @@ export class CullStage {
     return this.#kernel.bind(resources);
   }
 
-  /** @param chunkArgs indirect arguments as {@link CullChunksStage} leaves them, three words a page */
-  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, chunkArgs: GPUBuffer, page: number): void {
-    this.#kernel.dispatchIndirect(pass, bindings, chunkArgs, 12 * page);
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void {
+    this.#kernel.dispatch(pass, bindings, cullGroups(splatCount));
   }
 }
 

@@ -1,7 +1,6 @@
-import type { project } from '../generated/shaders.js';
+import { constants, type project } from '../generated/shaders.js';
 import { PACKED, type GeometryReading } from '../geometry-reading.js';
 import { kernelOf, type ComputeKernel, type Resources } from '../gpu/kernel.js';
-import { planOffsets } from '../scratch.js';
 
 /** Screen ellipse, colour and depth key of the survivors of a page. */
 export class ProjectStage {
@@ -15,7 +14,8 @@ export class ProjectStage {
     return this.#kernel.bind(resources);
   }
 
-  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, plan: GPUBuffer, page: number): void {
-    this.#kernel.dispatchIndirect(pass, bindings, plan, planOffsets.project(page));
+  /** @param most splats that may be visible: groups beyond those that are end at once */
+  record(pass: GPUComputePassEncoder, bindings: GPUBindGroup, most: number): void {
+    this.#kernel.dispatch(pass, bindings, Math.ceil(most / constants.PROJECT_GROUP));
   }
 }

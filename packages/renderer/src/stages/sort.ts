@@ -7,22 +7,14 @@ import {
   sortScanSerial,
   sortScatter,
   sortScatterSerial,
-  sortScatterSubgroups,
 } from '../generated/shaders.js';
-import {
-  BUFFER_USAGE,
-  kernelOf,
-  perDevice,
-  specialise,
-  type ComputeKernel,
-  type ShaderDescription,
-} from '../gpu/kernel.js';
+import { BUFFER_USAGE, kernelOf, perDevice, type ComputeKernel } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
-import { planOffsets } from '../scratch.js';
+import type { Threads } from './plan.js';
 
 /** The buffers that {@link SortStage} works on. */
 export interface SortBuffers {
-  /** `Plan`: how many keys there are, and the indirect arguments. */
+  /** `Plan`: how many keys there are. */
   readonly plan: GPUBuffer;
   /** The keys lie in the first. Passes go back and forth between the two: see {@link sortedIn}. */
   readonly keys: readonly [GPUBuffer, GPUBuffer];
@@ -39,51 +31,24 @@ interface SortPass {
   readonly scatter: GPUBindGroup;
 }
 
-const { DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP, SORT_BLOCK, SORT_THREADS } = constants;
+const { DIGITS, DIGITS_PER_GROUP, DIGITS_PER_SERIAL_GROUP } = constants;
 const MAX_KEY_BITS = 32;
-
-/**
- * How keys are sorted; the result is the same. `shared8` and `shared4` rank keys by bitmaps in workgroup memory, with digits of 8 or 4 bits;
- * `subgroup8` and `subgroup4` by votes of subgroups; `serial` has one thread for a block of keys.
- */
-export type SortName = 'shared8' | 'shared4' | 'subgroup8' | 'subgroup4' | 'serial';
-
-export const SORT_NAMES: readonly SortName[] = ['shared8', 'shared4', 'subgroup8', 'subgroup4', 'serial'];
-
-const digitBits = (name: SortName): 4 | 8 => (name.endsWith('4') ? 4 : 8);
+const DIGIT_BITS = Math.log2(DIGITS);
 
 /** Passes that keys of so many bits take. */
-const passCount = (name: SortName, keyBits: number): number => Math.max(1, Math.ceil(keyBits / digitBits(name)));
-
-/** Subgroups that a workgroup of the sort can have on a device. */
-function subgroupsOf(device: GPUDevice): number {
-  const least = device.adapterInfo?.subgroupMinSize ?? 4;
-  return SORT_THREADS / Math.max(4, least);
-}
-
-/** Words with a bit for each thread of a subgroup. */
-function voteWordsOf(device: GPUDevice): number {
-  return Math.ceil((device.adapterInfo?.subgroupMaxSize ?? 128) / 32);
-}
-
-/** True if the device has what the variant needs: for votes, room for the counts of all subgroups where a block of keys lies later. */
-export function canSort(device: GPUDevice, name: SortName): boolean {
-  if (!name.startsWith('subgroup')) return true;
-  return device.features.has('subgroups') && 2 ** digitBits(name) * subgroupsOf(device) <= SORT_BLOCK;
-}
+const passCount = (keyBits: number): number => Math.max(1, Math.ceil(keyBits / DIGIT_BITS));
 
 /** What moves along with a key: its index, or a word of the caller's. */
 export type SortValues = 'indices' | 'given';
 
 /** Which of the two buffers of keys, and of given words, holds the result for keys of so many bits: the first (0) or the second (1). */
-export const sortedIn = (name: SortName, keyBits: number): 0 | 1 => (passCount(name, keyBits) % 2 === 0 ? 0 : 1);
+export const sortedIn = (keyBits: number): 0 | 1 => (passCount(keyBits) % 2 === 0 ? 0 : 1);
 
 /**
  * Stable least-significant-digit radix sort of keys of up to 32 bits: for each digit a pass of count, scan, scatter.
  * Counts are reduced and scanned between dispatches, so no workgroup ever waits for another.
  */
 export class SortStage {
-  readonly name: SortName;
   readonly #moving: SortValues;
   readonly #count: ComputeKernel<typeof sortCount> | ComputeKernel<typeof sortCountSerial>;
   readonly #scan: ComputeKernel<typeof sortScan> | ComputeKernel<typeof sortScanSerial>;
@@ -91,23 +56,19 @@ export class SortStage {
   readonly #scatter: ComputeKernel<typeof sortScatter> | ComputeKernel<typeof sortScatterSerial>;
   readonly #passUniforms: readonly GPUBuffer[];
 
-  constructor(device: GPUDevice, name: SortName = 'shared8', moving: SortValues = 'indices') {
-    this.name = name;
+  constructor(device: GPUDevice, threads: Threads = 'parallel', moving: SortValues = 'indices') {
     this.#moving = moving;
-    const isSerial = name === 'serial';
-    const bits = digitBits(name);
-    this.#count = isSerial ? kernelOf(device, sortCountSerial) : kernelOf(device, withDigits(sortCount, bits));
-    this.#scan = isSerial ? kernelOf(device, sortScanSerial) : kernelOf(device, withDigits(sortScan, bits));
-    this.#scanGroups = Math.ceil(2 ** bits / (isSerial ? DIGITS_PER_SERIAL_GROUP : DIGITS_PER_GROUP));
-    this.#scatter = kernelOf(device, scatterShader(device, name)) as ComputeKernel<typeof sortScatter>;
-    this.#passUniforms = perDevice(device, `sort passes ${moving} ${bits}`, () =>
-      makePassUniforms(device, moving, bits),
-    );
+    const isSerial = threads === 'serial';
+    this.#count = isSerial ? kernelOf(device, sortCountSerial) : kernelOf(device, sortCount);
+    this.#scan = isSerial ? kernelOf(device, sortScanSerial) : kernelOf(device, sortScan);
+    this.#scanGroups = Math.ceil(DIGITS / (isSerial ? DIGITS_PER_SERIAL_GROUP : DIGITS_PER_GROUP));
+    this.#scatter = isSerial ? kernelOf(device, sortScatterSerial) : kernelOf(device, sortScatter);
+    this.#passUniforms = perDevice(device, `sort passes ${moving}`, () => makePassUniforms(device, moving));
   }
 
   /** @param keyBits how many of the lowest bits of a key count; the others must be 0 or are ignored. */
   bind({ plan, keys, values, digitCounts, digitTotals }: SortBuffers, keyBits = MAX_KEY_BITS): readonly SortPass[] {
-    const passes = passCount(this.name, keyBits);
+    const passes = passCount(keyBits);
     return this.#passUniforms.slice(0, passes).map((uniform, index) => {
       const [from, to] = index % 2 === 0 ? [0, 1] : [1, 0];
       const valuesTo = this.#moving === 'given' ? to : (passes - 1 - index) % 2;
@@ -128,38 +89,21 @@ export class SortStage {
     });
   }
 
-  record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], plan: GPUBuffer): void {
+  /** @param most keys that there may be: blocks beyond those that are end at once */
+  record(pass: GPUComputePassEncoder, bindings: readonly SortPass[], most: number): void {
+    const blocks = Math.ceil(most / constants.SORT_BLOCK);
     for (const { count, scan, scatter } of bindings) {
-      this.#count.dispatchIndirect(pass, count, plan, planOffsets.sort);
+      this.#count.dispatch(pass, count, blocks);
       this.#scan.dispatch(pass, scan, this.#scanGroups);
-      this.#scatter.dispatchIndirect(pass, scatter, plan, planOffsets.sort);
+      this.#scatter.dispatch(pass, scatter, blocks);
     }
   }
 }
 
 export type SortBindings = ReturnType<SortStage['bind']>;
 
-function scatterShader(device: GPUDevice, name: SortName): ShaderDescription {
-  if (name === 'serial') return sortScatterSerial;
-  const bits = digitBits(name);
-  if (!name.startsWith('subgroup')) return withDigits(sortScatter, bits);
-  const replaced = { SUBGROUPS: [8, subgroupsOf(device)], VOTE_WORDS: [4, voteWordsOf(device)] };
-  let sized: ShaderDescription = sortScatterSubgroups;
-  for (const [name, [usual, own]] of Object.entries(replaced)) {
-    sized = specialise(sized, `${own}`, `const ${name} = ${usual}u`, `const ${name} = ${own}u`);
-  }
-  const { code, ...rest } = withDigits(sized, bits);
-  return { ...rest, code: `enable subgroups;\n${code}` };
-}
-
-function withDigits<S extends ShaderDescription>(shader: S, bits: 4 | 8): S {
-  if (bits === 8) return shader;
-  const narrower = specialise(shader, '4 bits', 'const DIGIT_BITS = 8u', `const DIGIT_BITS = ${bits}u`);
-  return specialise(narrower, 'digits', 'const DIGITS = 256u', `const DIGITS = ${2 ** bits}u`);
-}
-
-function makePassUniforms(device: GPUDevice, moving: SortValues, bits: number): GPUBuffer[] {
-  return Array.from({ length: MAX_KEY_BITS / bits }, (_, index) => {
+function makePassUniforms(device: GPUDevice, moving: SortValues): GPUBuffer[] {
+  return Array.from({ length: MAX_KEY_BITS / DIGIT_BITS }, (_, index) => {
     const buffer = device.createBuffer({
       label: `gs.sort.pass_${index}`,
       size: 16,
@@ -167,7 +111,7 @@ function makePassUniforms(device: GPUDevice, moving: SortValues, bits: number): 
       mappedAtCreation: true,
     });
     const makesIndices = index === 0 && moving === 'indices';
-    const values = { shift: index * bits, makes_indices: makesIndices ? 1 : 0 };
+    const values = { shift: index * DIGIT_BITS, makes_indices: makesIndices ? 1 : 0 };
     writeStruct(layouts.SortPass, values, buffer.getMappedRange());
     buffer.unmap();
     return buffer;

@@ -1,19 +1,16 @@
 import { constants, thinCount, thinCountSerial, thinWrite, thinWriteSerial } from '../generated/shaders.js';
 import { kernelOf, type ComputeKernel } from '../gpu/kernel.js';
-import { ScanStage } from './scan.js';
-import type { Threads } from './threads.js';
+import type { Threads } from './plan.js';
 
 /** What {@link ThinStage} works on. */
 export interface ThinBuffers {
   /** Uniform: length of the order, a multiple of four. */
   readonly thin: GPUBuffer;
-  /** Uniform: blocks of the order, see {@link thinBlocks}. */
-  readonly scan: GPUBuffer;
   /** Numbers of splats. */
   readonly order: GPUBuffer;
   /** One bit for each splat. */
   readonly visibleBits: GPUBuffer;
-  /** Receives, for each block of the order, how many visible splats come before it, and behind the last how many there are. */
+  /** For each block of the order how many splats are visible; `plan` makes these how many come before it. */
   readonly blockOffsets: GPUBuffer;
   /** Receives the numbers of the visible splats, in the order. */
   readonly survivors: GPUBuffer;
@@ -21,36 +18,31 @@ export interface ThinBuffers {
 
 interface ThinBindings {
   readonly count: GPUBindGroup;
-  readonly scan: GPUBindGroup;
   readonly write: GPUBindGroup;
 }
 
 /** Thins an order of all splats to the visible ones. */
 export class ThinStage {
   readonly #count: ComputeKernel<typeof thinCount> | ComputeKernel<typeof thinCountSerial>;
-  readonly #scan: ScanStage;
   readonly #write: ComputeKernel<typeof thinWrite> | ComputeKernel<typeof thinWriteSerial>;
   readonly #blocksPerGroup: number;
 
   constructor(device: GPUDevice, threads: Threads = 'parallel') {
     const isSerial = threads === 'serial';
     this.#count = isSerial ? kernelOf(device, thinCountSerial) : kernelOf(device, thinCount);
-    this.#scan = new ScanStage(device, threads);
     this.#write = isSerial ? kernelOf(device, thinWriteSerial) : kernelOf(device, thinWrite);
     this.#blocksPerGroup = isSerial ? constants.BLOCKS_PER_SERIAL_GROUP : 1;
   }
 
-  bind({ thin, scan, order, visibleBits, blockOffsets, survivors }: ThinBuffers): ThinBindings {
+  bind({ thin, order, visibleBits, blockOffsets, survivors }: ThinBuffers): ThinBindings {
     return {
       count: this.#count.bind({ thin, order, visible_bits: visibleBits, block_counts: blockOffsets }),
-      scan: this.#scan.bind({ values: blockOffsets, scan }),
       write: this.#write.bind({ thin, order, visible_bits: visibleBits, block_offsets: blockOffsets, survivors }),
     };
   }
 
   recordCount(pass: GPUComputePassEncoder, bindings: ThinBindings, length: number): void {
     this.#count.dispatch(pass, bindings.count, this.#groups(length));
-    this.#scan.record(pass, bindings.scan);
   }
 
   recordWrite(pass: GPUComputePassEncoder, bindings: ThinBindings, length: number): void {

@@ -26,6 +26,16 @@ const ACTIONS = {
     return (await devtools(page, 'Runtime.getHeapUsage')).usedSize;
   },
 
+  /** Ends the browser's GPU process as a crash would. */
+  'kill-gpu-process': async (page) => {
+    const browser = await page.context().browser().newBrowserCDPSession();
+    const { processInfo } = await browser.send('SystemInfo.getProcessInfo');
+    await browser.detach();
+    const gpu = processInfo.find(({ type }) => type === 'GPU');
+    if (gpu) process.kill(gpu.id, 'SIGKILL');
+    return gpu !== undefined;
+  },
+
   /** The picture that the browser composes for a rectangle in CSS pixels: a PNG as base64. */
   screenshot: async (page, clip) => (await page.screenshot({ clip })).toString('base64'),
 };

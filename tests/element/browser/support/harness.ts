@@ -14,7 +14,36 @@ export function assertEqual<T>(actual: T, expected: T, what = 'value'): void {
   assert(a === e, `${what}: expected ${e}, found ${a}`);
 }
 
+/** Waits by the page's clock: see {@link hurry}. */
 export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** The clocks as they were: limits of tests are by these. */
+const real = {
+  now: performance.now.bind(performance),
+  setTimeout: globalThis.setTimeout.bind(globalThis),
+  requestAnimationFrame: globalThis.requestAnimationFrame.bind(globalThis),
+};
+/** The page's time is `shown` when the real one is `since`, and goes `speed` times as fast. It never goes back: what outlives a test has seen it. */
+const pageTime = { since: 0, shown: 0, speed: 1 };
+const shownAt = (now: number): number => pageTime.shown + pageTime.speed * (now - pageTime.since);
+
+/**
+ * Lets the page's clock go faster until the test ends, for tests of what comes after a while or stays away: timers, `performance.now` and the times of frames agree,
+ * so that an element lives through a second in a part of one. Transitions of CSS and requests take as long as ever.
+ */
+export function hurry(speed: number): void {
+  const now = real.now();
+  Object.assign(pageTime, { since: now, shown: shownAt(now), speed });
+  performance.now = () => shownAt(real.now());
+  Object.assign(globalThis, {
+    setTimeout: (callback: () => void, ms = 0) => real.setTimeout(callback, ms / pageTime.speed),
+    requestAnimationFrame: (callback: FrameRequestCallback) =>
+      real.requestAnimationFrame((time) => callback(shownAt(time))),
+  });
+}
+afterEach(() => {
+  if (pageTime.speed !== 1) hurry(1);
+});
 
 /** Fulfils two frames later: by then everything that a frame brings about has happened. */
 export async function frames(count = 2): Promise<void> {
@@ -23,17 +52,17 @@ export async function frames(count = 2): Promise<void> {
 
 /** Waits until a condition holds. */
 export async function until(condition: () => boolean, what: string, limitMs = 20_000): Promise<void> {
-  const end = performance.now() + limitMs;
+  const end = real.now() + limitMs;
   while (!condition()) {
-    assert(performance.now() < end, `waited ${limitMs} ms for ${what}`);
-    await delay(10);
+    assert(real.now() < end, `waited ${limitMs} ms for ${what}`);
+    await new Promise((resolve) => real.setTimeout(resolve, 10));
   }
 }
 
 /** The next event of a type, or a failure after a while. */
 export function nextEvent<T extends Event>(target: EventTarget, type: string, limitMs = 20_000): Promise<T> {
   return new Promise((resolve, reject) => {
-    const timer = setTimeout(() => reject(new Error(`no event ${type} within ${limitMs} ms`)), limitMs);
+    const timer = real.setTimeout(() => reject(new Error(`no event ${type} within ${limitMs} ms`)), limitMs);
     target.addEventListener(
       type,
       (event) => {

@@ -11,6 +11,7 @@ import { DEVELOPMENT_APP, developmentScript, plainApp } from './apps.mjs';
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
 const fixtures = fileURLToPath(new URL('../fixtures/', import.meta.url));
 const generators = join(root, 'tests/fixtures/generators');
+const attackCases = join(root, '../shared/cases/attack');
 const sharedData = join(root, '../shared/data');
 
 /** Answers under /net/; everything else is left to the test runner's own server, unless a test has it be lost. */
@@ -53,6 +54,42 @@ const ANSWERS = {
   hold(context, file) {
     held = { file, ms: Number(context.query.ms) };
     context.status = 204;
+  },
+
+  /** A PLY of `n` splats of degree 3, 248 bytes each, in pieces of 4 MB over `ms` milliseconds: a cube of noise, some of it of no use. */
+  'large-ply'(context) {
+    const { n = 200_000, ms = 0 } = context.query;
+    const { header, block } = largePly(Number(n));
+    const length = header.length + 248 * Number(n);
+    context.type = 'application/octet-stream';
+    context.set('Content-Length', String(length));
+    context.body = Readable.from(
+      (async function* pieces() {
+        yield header;
+        for (let left = 248 * Number(n); left > 0; left -= block.length) {
+          await delay((Number(ms) * block.length) / length);
+          yield block.subarray(0, Math.min(left, block.length));
+        }
+      })(),
+    );
+  },
+
+  /** A PLY of 200,000 splats, of which a part is missing. */
+  'short-ply'(context) {
+    const { header, block } = largePly(200_000);
+    context.body = Buffer.concat([header, ...Array.from({ length: 9 }, () => block)]);
+  },
+
+  /** Files that cost more than they weigh, where they are there. */
+  attack(context, name) {
+    const path = join(attackCases, normalize(`/${name}`));
+    context.status = existsSync(path) ? 200 : 404;
+    context.body = existsSync(path) ? readFileSync(path) : 'absent';
+  },
+
+  /** Never answered. */
+  never(context) {
+    context.respond = false;
   },
 
   html(context) {
@@ -357,4 +394,26 @@ function ball(count, colour, size = Math.max(0.05, 2 / Math.sqrt(count))) {
     bytes.set([...colour, 220, 255, 128, 128, 128], at + 24);
   }
   return bytes;
+}
+
+/** A PLY's header, and rows that it repeats. */
+function largePly(count) {
+  const rest = Array.from({ length: 45 }, (_, i) => `f_rest_${i}`);
+  const names =
+    `x y z nx ny nz f_dc_0 f_dc_1 f_dc_2 ${rest.join(' ')} opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3`.split(
+      ' ',
+    );
+  const properties = names.map((name) => `property float ${name}`).join('\n');
+  const header = `ply\nformat binary_little_endian 1.0\nelement vertex ${count}\n${properties}\nend_header\n`;
+  const rows = 16_911;
+  const values = new Float32Array(names.length * rows);
+  let seed = 1;
+  const random = () => (seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0) / 2 ** 31 - 1;
+  for (let row = 0; row < rows; row++) {
+    const at = names.length * row;
+    for (let k = 0; k < names.length; k++) values[at + k] = random() * (k < 3 ? 2 : k >= 9 && k < 54 ? 0.1 : 1);
+    for (let k = 55; k < 58; k++) values[at + k] -= 4;
+    if (row % 1000 === 0) values[at] = NaN;
+  }
+  return { header: Buffer.from(header), block: Buffer.from(values.buffer) };
 }

@@ -1,0 +1,20 @@
+#!/usr/bin/env node
+/** `gaussian-splat COMMAND ...`: each command is a module of src/, which reads the arguments after its name. */
+const COMMANDS = {
+  render: 'one frame of a scene as PNG or float32, without a browser',
+  page: 'a folder with a page that shows a scene, for any static host',
+  detail: 'a scene as a folder that is streamed from static hosting',
+  economise: 'a smaller scene that keeps to a figure in dB',
+  check: 'whether an ONNX generator keeps its contract',
+};
+
+const [command] = process.argv.splice(2, 1);
+if (command in COMMANDS) await import(`../src/${command}.mjs`);
+else {
+  const lines = Object.entries(COMMANDS).map(([name, text]) => `  ${name.padEnd(10)} ${text}`);
+  const usage = `usage: gaussian-splat COMMAND ..., or gaussian-splat COMMAND --help\n\n${lines.join('\n')}`;
+  const isAsked = command === undefined || ['--help', '-h', 'help'].includes(command);
+  if (isAsked) console.log(usage);
+  else console.error(`expected a command, found "${command}"\n\n${usage}`);
+  process.exitCode = isAsked ? 0 : 2;
+}

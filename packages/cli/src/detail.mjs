@@ -1,0 +1,186 @@
+/** The work behind `gaussian-splat detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
+import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { dirname, join, resolve } from 'node:path';
+import { parseArgs } from 'node:util';
+import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
+import { readScene } from '@gaussian-splat/formats';
+import { buildDetailTree, cutPages, manifestOf, packPage, treeOfCopies } from '@gaussian-splat/renderer';
+import { writeWhole } from './lib/output-file.mjs';
+import { readWhole } from './lib/read-whole.mjs';
+
+const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
+
+  --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/detail-pages.md describes them
+  --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
+  --exact         centres, shapes and opacities as float32 keeps them; default: quantized, in half of the bytes, 66 dB and more from that
+  --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
+  --spacing LEN   world units between copies; default: 2.5 times the radius of the scene
+`;
+
+class UsageError extends Error {}
+
+/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
+const from = process.env.INIT_CWD ?? process.cwd();
+
+function parseOptions(args) {
+  const text = { type: 'string' };
+  let parsed;
+  try {
+    parsed = parseArgs({
+      args,
+      allowPositionals: true,
+      options: {
+        out: text,
+        degree: text,
+        tile: text,
+        spacing: text,
+        exact: { type: 'boolean' },
+        help: { type: 'boolean' },
+      },
+    });
+  } catch (error) {
+    throw new UsageError(error.message);
+  }
+  const { values, positionals } = parsed;
+  if (values.help) return undefined;
+  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
+  if (values.out === undefined) throw new UsageError('--out is missing');
+  const out = resolve(from, values.out);
+  const scene = resolve(from, positionals[0]);
+  if (existsSync(scene) && statSync(scene).isDirectory())
+    throw new UsageError(`${positionals[0]} is a folder, no scene`);
+  if (existsSync(out) && !statSync(out).isDirectory()) throw new UsageError(`--out: ${values.out} is no folder`);
+  if (existsSync(out) && !isEmpty(out) && !isUnfinished(out)) throw new UsageError(`--out: ${values.out} is not empty`);
+  const tile = /^([1-9]\d{0,3})x([1-9]\d{0,3})$/.exec(values.tile ?? '1x1');
+  if (tile === null) throw new UsageError(`--tile: expected AxB such as 24x24, found "${values.tile}"`);
+  const spacing = values.spacing === undefined ? undefined : Number(values.spacing);
+  // All coordinates are float32.
+  const farthest = Math.fround(Math.max(tile[1], tile[2]) * (spacing ?? 1));
+  if (spacing !== undefined && !(spacing > 0 && farthest < Infinity))
+    throw new UsageError(`--spacing: expected a length, found "${values.spacing}"`);
+  if (!/^[0-3]$/.test(values.degree ?? '3'))
+    throw new UsageError(`--degree: expected 0 to 3, found "${values.degree}"`);
+  const degree = Number(values.degree ?? 3);
+  return {
+    scene,
+    out,
+    degree,
+    geometry: values.exact ? undefined : 'quantized',
+    columns: Number(tile[1]),
+    rows: Number(tile[2]),
+    spacing,
+  };
+}
+
+const isEmpty = (folder) => readdirSync(folder).length === 0;
+
+/** True for what an earlier run left that was ended before it was done: pages of ours, and no manifest, which is written last. */
+function isUnfinished(folder) {
+  const pages = join(folder, 'pages');
+  if (readdirSync(folder).join() !== 'pages' || !statSync(pages).isDirectory()) return false;
+  return readdirSync(pages).every((name) => /^(scene|top|part)-\d{5,}\.bin$/.test(name));
+}
+
+/** A cloud without the harmonics above a degree. */
+function upTo(degree, cloud) {
+  if (cloud.shDegree <= degree) return cloud;
+  const [all, kept] = [3 * shCoefficientCount(cloud.shDegree), 3 * shCoefficientCount(degree)];
+  const sh = new Float32Array(kept * cloud.count);
+  for (let i = 0; i < cloud.count; i++) sh.set(cloud.sh.subarray(all * i, all * i + kept), kept * i);
+  return { ...cloud, shDegree: degree, sh };
+}
+
+/** Where the copies stand, along a Z-order curve so that neighbours have one parent. */
+function placesOf(columns, rows, spacing) {
+  const interleaved = (x, y) => {
+    let code = 0n;
+    for (let bit = 0n; bit < 12n; bit++) {
+      code |= ((BigInt(x) >> bit) & 1n) << (2n * bit);
+      code |= ((BigInt(y) >> bit) & 1n) << (2n * bit + 1n);
+    }
+    return Number(code);
+  };
+  return Array.from({ length: columns * rows }, (_, i) => [i % columns, Math.floor(i / columns)])
+    .sort((a, b) => interleaved(...a) - interleaved(...b))
+    .map(([x, y]) => [(x - (columns - 1) / 2) * spacing, 0, (y - (rows - 1) / 2) * spacing]);
+}
+
+/** Writes the pages of a tree and returns what the manifest says of it. */
+function writeTree(out, name, tree, pages) {
+  const fileOf = (p) => `pages/${name}-${String(p).padStart(5, '0')}.bin`;
+  let bytes = 0;
+  pages.forEach((page, p) => {
+    const words = packPage(tree, page);
+    writeFileSync(join(out, fileOf(p)), new Uint8Array(words.buffer));
+    bytes += words.byteLength;
+  });
+  return { manifest: manifestOf(tree, pages, fileOf), bytes };
+}
+
+/** The copies and the tree above them: the pages of the copies are those of one tree. */
+function writeCopies(out, tree, places) {
+  const above = treeOfCopies(tree, places);
+  const abovePages = cutPages(above);
+  const top = writeTree(out, 'top', above, abovePages);
+  const part = writeTree(out, 'part', tree, cutPages(tree, false));
+  const placeOf = new Map();
+  abovePages.forEach(({ holds }, page) =>
+    holds.forEach(([level, copy], chunk) => level === 0 && placeOf.set(copy, [page, chunk])),
+  );
+  const copies = places.map((translate, copy) => ({ tree: 1, translate, parent: placeOf.get(copy) }));
+  return {
+    manifest: {
+      ...top.manifest,
+      trees: [...top.manifest.trees, ...part.manifest.trees],
+      instances: [...top.manifest.instances, ...copies],
+    },
+    bytes: top.bytes + part.bytes,
+  };
+}
+
+/** Pages first, then the manifest that names them: a folder without one is no scene. Where writing fails no pages stay. */
+function writeFolder(out, writePages) {
+  const pages = join(out, 'pages');
+  if (existsSync(out) && isUnfinished(out)) rmSync(pages, { recursive: true });
+  mkdirSync(pages, { recursive: true });
+  try {
+    const written = writePages();
+    writeWhole(join(out, 'detail.json'), JSON.stringify(written.manifest));
+    return written;
+  } catch (error) {
+    rmSync(pages, { recursive: true, force: true });
+    throw error;
+  }
+}
+
+async function main({ scene, out, degree, geometry, columns, rows, spacing }) {
+  const openPart = (path) => readWhole(join(dirname(scene), path));
+  const cloud = upTo(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
+  const start = performance.now();
+  const tree = buildDetailTree(cloud, { geometry });
+  const built = performance.now();
+  const isTiled = columns * rows > 1;
+  if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
+  const places = isTiled ? placesOf(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : [];
+  const { manifest, bytes } = writeFolder(out, () =>
+    isTiled ? writeCopies(out, tree, places) : writeTree(out, 'scene', tree, cutPages(tree)),
+  );
+  const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
+  const files = manifest.trees.reduce((sum, t) => sum + t.pages.length, 0);
+  const unusable = cloud.droppedCount > 0 ? `, ${cloud.droppedCount} unusable ones of the file left out,` : '';
+  console.log(
+    `${manifest.splats} splats${unusable} in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB); levels in ` +
+      `${((built - start) / 1000).toFixed(1)} s, pages in ${((performance.now() - built) / 1000).toFixed(1)} s: ${join(out, 'detail.json')}`,
+  );
+}
+
+try {
+  const options = parseOptions(process.argv.slice(2));
+  if (options === undefined) console.log(USAGE);
+  else await main(options);
+} catch (error) {
+  if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
+  else if (error instanceof GaussianSplatError || error.syscall !== undefined) console.error(error.message);
+  else console.error(error);
+  process.exitCode = error instanceof UsageError ? 2 : 1;
+}

@@ -1,0 +1,206 @@
+/** The work behind `gaussian-splat economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
+import { statSync } from 'node:fs';
+import { resolve } from 'node:path';
+import { parseArgs } from 'node:util';
+import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
+import {
+  dealtViewsAround,
+  dealViews,
+  economise,
+  encodingsFor,
+  GpuEvaluator,
+  MergingEvaluator,
+  RefiningEvaluator,
+  viewsBetween,
+} from '@gaussian-splat/economise';
+import { inline } from '@gaussian-splat/economise/parts';
+import { deviceDescriptor } from '@gaussian-splat/renderer';
+import { requestNodeAdapter } from './lib/node-gpu.mjs';
+import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
+import { readJson } from './lib/read-json.mjs';
+import { startReading } from './lib/scene-in-parts.mjs';
+import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
+
+const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [options]
+
+  --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
+  --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
+  --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
+                  ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
+                  Larger ones are drawn with 1600 pixels a side
+  --scored N      without --views: views around the subject to score splats in, 24 to 2000 (default 216); the more, the nearer fewer bands of colour come
+  --threads N     that share what comes in parts: reading a large PLY, writing a GLB and reading it again, 1 to 64 (default: one for each processor, at most 16)
+  --merge         merges splats that look like one, too: more go at the same figure, for several times the seconds
+  --refine        fits the splats that stay to pictures of the whole scene, on the GPU, and drops more where that helps
+  --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
+`;
+
+class UsageError extends Error {}
+
+/** Whether the file system says it: ENOENT, EACCES, ENOSPC. Its sentence is enough for people. */
+const isOfFiles = ({ code }) => /^E[A-Z]+$/.test(code);
+
+/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
+const from = process.env.INIT_CWD ?? process.cwd();
+
+function parseOptions(args) {
+  const text = { type: 'string' };
+  let parsed;
+  try {
+    parsed = parseArgs({
+      args,
+      allowPositionals: true,
+      options: {
+        'min-db': text,
+        out: text,
+        views: text,
+        report: text,
+        scored: { ...text, default: '216' },
+        threads: { ...text, default: String(usualThreads()) },
+        merge: { type: 'boolean', default: false },
+        refine: { type: 'boolean', default: false },
+        help: { type: 'boolean' },
+      },
+    });
+  } catch (error) {
+    throw new UsageError(error.message);
+  }
+  const { values, positionals } = parsed;
+  if (values.help) return undefined;
+  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
+  const minDecibels = Number(values['min-db']);
+  if (!(minDecibels >= 10 && minDecibels <= 100)) throw new UsageError('--min-db: expected a number from 10 to 100');
+  if (values.out === undefined) throw new UsageError('--out is missing');
+  const { merge, refine } = values;
+  const [scene, out, views, report] = [positionals[0], values.out, values.views, values.report].map(
+    (path) => path && resolve(from, path),
+  );
+  checkFiles({ scene, out, views, report });
+  const scored = Number(values.scored);
+  if (!(Number.isInteger(scored) && scored >= 24 && scored <= 2000))
+    throw new UsageError(`--scored: expected a whole number from 24 to 2000, found "${values.scored}"`);
+  const threads = Number(values.threads);
+  if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
+    throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
+  return { scene, out, minDecibels, views, report, scored, threads, merge, refine };
+}
+
+/** All that can be said of files before the work. */
+function checkFiles({ scene, out, views, report }) {
+  encodingsFor(out);
+  for (const [option, path] of Object.entries({ out, report })) {
+    if (path === undefined) continue;
+    const other = (file) => new UsageError(`--${option}: expected another file than ${file}, which is never changed`);
+    if (isSameFile(path, scene)) throw other('SCENE');
+    if (views && isSameFile(path, views)) throw other('that of --views');
+    const obstacle = obstacleTo(path);
+    if (obstacle) throw new UsageError(`--${option}: ${obstacle}`);
+  }
+  if (report && isSameFile(report, out)) throw new UsageError('--report: expected another file than that of --out');
+}
+
+function parseViews(path) {
+  try {
+    const views = readJson(path)?.views;
+    if (Array.isArray(views)) return views;
+  } catch (error) {
+    if (!(error instanceof SyntaxError)) throw error;
+    throw new UsageError(`--views: ${path} is no JSON: ${error.message}`);
+  }
+  throw new UsageError(
+    `--views: expected {views: [{width, height, K, worldToCamera}, ...]}, found no list "views" in ${path}`,
+  );
+}
+
+/** Longest side of a view, px: what captures are trained at. Larger pictures take gigabytes, or are beyond what a GPU draws. */
+const LARGEST_SIDE = 1600;
+
+/** The same view in fewer pixels, where it has too many. */
+function atMostLargest(camera) {
+  const share = LARGEST_SIDE / Math.max(camera.width, camera.height);
+  if (share >= 1) return camera;
+  const [width, height] = [camera.width, camera.height].map((side) => Math.max(1, Math.round(share * side)));
+  const [x, y] = [width / camera.width, height / camera.height];
+  return { ...camera, width, height, fx: x * camera.fx, fy: y * camera.fy, cx: x * camera.cx, cy: y * camera.cy };
+}
+
+/** undefined without a path. */
+function readViews(path) {
+  if (path === undefined) return undefined;
+  const views = parseViews(path);
+  const cameras = views.map((view, k) => cameraFromCalibration(view, `${path}, view ${k}`));
+  const drawn = cameras.map(atMostLargest);
+  const smaller = drawn.filter((camera, k) => camera !== cameras[k]).length;
+  if (smaller > 0) console.log(`views        ${smaller} of ${views.length} in fewer pixels, ${LARGEST_SIDE} a side`);
+  const dealt = dealViews(drawn);
+  if (dealt.heldOut.length > 0) return { ...dealt, scored: [...dealt.scored, ...viewsBetween(dealt.scored)] };
+  throw new UsageError(`--views: expected 8 views or more, found ${views.length}`);
+}
+
+async function openDevice() {
+  const adapter = await requestNodeAdapter({ isTrusted: true });
+  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  const { vendor, architecture, device: model, description } = adapter.info;
+  const slow = /swiftshader/i.test(description) ? ', which is no GPU: large scenes take long' : '';
+  console.log(`adapter      ${[vendor, architecture, model, description].filter(Boolean).join(' ')}${slow}`);
+  return device;
+}
+
+async function main({ scene, out, minDecibels, views: viewsFile, report, scored, threads, merge, refine }) {
+  const begun = performance.now();
+  const seconds = () => (performance.now() - begun) / 1000;
+  // What is wrong with it is said before the work.
+  const ownViews = readViews(viewsFile);
+  // The file and the driver take their time at the same time.
+  const pool = threads > 1 ? new ThreadPool(threads) : inline;
+  const { cloud: reading } = await startReading(scene, pool);
+  reading.catch(() => undefined);
+  const device = await openDevice();
+  GpuEvaluator.prepare(device);
+  const opened = seconds();
+  const cloud = await reading;
+  // What this format has no place for is told before a picture is drawn.
+  encodingsFor(out, cloud);
+  // What is left of it when the device is there.
+  const read = seconds() - opened;
+  const views = ownViews ?? dealtViewsAround(boundsOf(cloud), { scored });
+  const measuring = await GpuEvaluator.create(device, cloud, views, { pool });
+  const mostError = 10 ** (-minDecibels / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
+  const merging = { views: views.scored, mostError, pool };
+  const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
+  const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
+  const prepare = seconds() - read;
+  const result = await economise(cloud, {
+    ...{ minDecibels, name: out, evaluator, pool },
+    onStep: (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`),
+  });
+  writeWhole(out, result.bytes);
+  const { splats, coefficients } = result;
+  const spent = { read, prepare, ...result.seconds, total: seconds() };
+  const share = ({ before, after }) => `${((100 * after) / Math.max(1, before)).toFixed(1)} %`;
+  const [oldBytes, newBytes] = [statSync(scene).size, result.bytes.length];
+  const times = Object.entries(spent).map(([work, time]) => `${work} ${time.toFixed(2)}`);
+  const unusable = cloud.droppedCount > 0 ? `; ${cloud.droppedCount} unusable ones of the file left out` : '';
+  console.log(`
+asked        ${minDecibels.toFixed(2)} dB
+found        ${result.decibels.toFixed(2)} dB in ${result.heldOutViews} held-out views together, ${result.worstDecibels.toFixed(2)} dB in the worst
+splats       ${splats.after} of ${splats.before} (${share(splats)})${unusable}
+SH numbers   ${coefficients.after} of ${coefficients.before} (${share(coefficients)}); splats by degree ${result.degrees.join(', ')}
+bytes        ${newBytes} of ${oldBytes} (${share({ before: oldBytes, after: newBytes })}); ${result.encoding}
+seconds      ${times.join(', ')}`);
+  const figures = { ...result, bytes: newBytes, minDecibels, seconds: spent };
+  if (report) writeWhole(report, JSON.stringify(figures, null, 2));
+}
+
+try {
+  const options = parseOptions(process.argv.slice(2));
+  if (options === undefined) console.log(USAGE);
+  else await main(options);
+  // Dawn keeps Node alive.
+  process.exit(0);
+} catch (error) {
+  if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
+  else if (error instanceof GaussianSplatError || isOfFiles(error)) console.error(error.message);
+  else console.error(error);
+  process.exit(error instanceof UsageError ? 2 : 1);
+}

@@ -1,0 +1,46 @@
+/** Loaded only by pages that have no GPU device: what people read there. */
+import { GaussianSplatError } from '@gaussian-splat/core';
+
+export function noWebGpu(): GaussianSplatError {
+  if (globalThis.isSecureContext === false) {
+    return new GaussianSplatError('unsupported/insecure-context', {
+      where: 'this page',
+      expected: 'a secure context, since browsers offer WebGPU in no other',
+      found: `the insecure address ${globalThis.location?.origin ?? '(none)'}`,
+      remedy: 'serve the page over https, or from localhost',
+    });
+  }
+  return new GaussianSplatError('unsupported/no-webgpu', {
+    where: 'this browser',
+    expected: 'WebGPU (navigator.gpu)',
+    found: 'none',
+    remedy: 'use a current Chrome, Edge, Safari or Firefox with WebGPU switched on',
+  });
+}
+
+export const noAdapter = (): GaussianSplatError =>
+  new GaussianSplatError('unsupported/no-adapter', {
+    where: 'this browser',
+    expected: 'a graphics adapter for WebGPU',
+    found: 'none',
+    remedy: 'switch on hardware acceleration in the browser settings, or update the graphics driver',
+  });
+
+export const noLimits = (error: unknown): GaussianSplatError =>
+  new GaussianSplatError('unsupported/limits', {
+    where: 'the graphics adapter',
+    expected: 'a device within the limits that the adapter itself reports',
+    found: error instanceof Error ? error.message : String(error),
+    remedy: 'update the graphics driver or the browser',
+    cause: error,
+  });
+
+/** Of a page's own device, or of a browser that does not answer. */
+export const noDevice = (cause: unknown): GaussianSplatError =>
+  new GaussianSplatError('unsupported/no-adapter', {
+    where: 'the graphics adapter',
+    expected: 'a WebGPU device',
+    found: cause instanceof Error ? cause.message : String(cause),
+    remedy: 'reload the page, or update the graphics driver',
+    cause,
+  });

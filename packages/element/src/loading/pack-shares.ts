@@ -1,0 +1,48 @@
+/** Loaded by workers that read and pack shares of a large PLY. */
+import { readPrefix, samplePreview } from '@gaussian-splat/formats';
+import { packShare, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer';
+import type { GaussianCloud, ShDegree, Vector3 } from '@gaussian-splat/core';
+import { buffersOf } from './buffers-of.js';
+
+/** Rows of a PLY to be packed. */
+export interface ShareRequest {
+  readonly share: number;
+  /** A PLY: the file's header, and these rows alone. */
+  readonly bytes: Uint8Array<ArrayBuffer>;
+  readonly shPrecision: ShPrecision;
+}
+
+/** What became of them. */
+export interface ShareAnswer {
+  readonly share: number;
+  /** Undefined where none of the rows can be drawn, or they could not be read. */
+  readonly packed?: PackedShare;
+  /** Some of the splats. */
+  readonly preview?: GaussianCloud;
+  readonly shDegree?: ShDegree;
+  readonly antialiased?: boolean;
+  readonly origin?: Vector3;
+}
+
+/** Reads and packs some rows. Never throws for what is in them. */
+export async function packRows({ share, bytes, shPrecision }: ShareRequest): Promise<ShareAnswer> {
+  const cloud = await readPrefix(bytes, { name: 'share.ply' });
+  if (cloud === undefined) return { share };
+  const { shDegree, antialiased, origin } = cloud;
+  return {
+    ...{ share, shDegree, antialiased, origin },
+    packed: packShare(cloud, shPrecision),
+    preview: samplePreview(cloud),
+  };
+}
+
+/** Packs what comes through a port until the worker is ended. */
+export function packShares(port: MessagePort): void {
+  port.addEventListener('message', ({ data }: MessageEvent<ShareRequest>) => {
+    // Who waits for the answer does the work again where none comes.
+    const answer = (answer: ShareAnswer): void =>
+      port.postMessage(answer, answer.packed ? buffersOf(answer.packed, answer.preview ?? {}) : []);
+    packRows(data).then(answer, () => answer({ share: data.share }));
+  });
+  port.start();
+}

@@ -1,0 +1,72 @@
+import type { GaussianCloud } from '@gaussian-splat/core';
+
+/** Downloads that are over sooner need no preview. */
+const FIRST_AFTER_MS = 300;
+/** Each preview shows this many times as many shares as the one before. */
+const GROWTH = 2;
+/** Splats of a preview at most: it must be there at once. */
+const MOST_SPLATS = 50_000;
+/** Previews may take this share of the time since the load began. */
+const MAX_SHARE = 0.1;
+
+/** Previews of a scene of which some shares have been read: some of their splats, larger to stand for the rest. */
+export class PartPreviews {
+  readonly #show: (cloud: GaussianCloud) => void;
+  readonly #parts: (GaussianCloud | undefined)[];
+  readonly #start = performance.now();
+  #spentMs = 0;
+  #there = 0;
+  #due = 1;
+
+  /** @param shares of the scene. @param show packs and posts a preview */
+  constructor(shares: number, show: (cloud: GaussianCloud) => void) {
+    this.#show = show;
+    this.#parts = new Array<undefined>(shares);
+  }
+
+  add(share: number, part: GaussianCloud): void {
+    if (this.#parts[share] === undefined) this.#there++;
+    this.#parts[share] = part;
+  }
+
+  forget(): void {
+    this.#parts.fill(undefined);
+    this.#there = 0;
+  }
+
+  showIfDue(): void {
+    const began = performance.now();
+    const elapsed = began - this.#start;
+    const isDue = elapsed >= FIRST_AFTER_MS && this.#there >= this.#due && this.#spentMs <= MAX_SHARE * elapsed;
+    if (!isDue || this.#there === this.#parts.length) return;
+    this.#show(thinned(this.#parts.filter((part) => part !== undefined)));
+    this.#due = GROWTH * this.#there;
+    this.#spentMs += performance.now() - began;
+  }
+}
+
+/** One cloud of several, with no more than {@link MOST_SPLATS}: every so many-th, larger. */
+function thinned(parts: readonly GaussianCloud[]): GaussianCloud {
+  const all = parts.reduce((sum, { count }) => sum + count, 0);
+  const step = Math.ceil(all / MOST_SPLATS);
+  const picked = parts.map(({ count }) => Math.ceil(count / step));
+  const count = picked.reduce((sum, n) => sum + n, 0);
+  const take = (name: 'positions' | 'scales' | 'rotations' | 'opacities' | 'sh', size: number): Float32Array => {
+    const values = new Float32Array(size * count);
+    let to = 0;
+    parts.forEach((part, p) => {
+      for (let i = 0; i < picked[p]; i++) for (let k = 0; k < size; k++) values[to++] = part[name][size * step * i + k];
+    });
+    return values;
+  };
+  const larger = Math.sqrt(step);
+  return {
+    ...parts[0],
+    ...{ count, droppedCount: 0 },
+    positions: take('positions', 3),
+    scales: take('scales', 3).map((scale) => scale * larger),
+    rotations: take('rotations', 4),
+    opacities: take('opacities', 1),
+    sh: take('sh', 3),
+  };
+}

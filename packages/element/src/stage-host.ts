@@ -1,0 +1,49 @@
+import type { Attributes } from './attributes.js';
+import type { SpokenStrings } from './words.js';
+import type { InputOptions } from './controllers/input-controller.js';
+import type { SharedDevice } from './gpu/shared-device.js';
+import type { LiveState } from './live/live-model.js';
+import type { SceneLoader } from './loading/scene-loader.js';
+
+/** What elements share. */
+export interface Services {
+  readonly sharedDevice: SharedDevice;
+  readonly sceneLoader: SceneLoader;
+  /** How long a removed element keeps its scene, ms. */
+  readonly releaseDelay: number;
+  /** Bytes of GPU memory that one scene may take; null for what suits the device. */
+  readonly memoryBudget: number | null;
+  /** Folder of ONNX Runtime's files; null for the one beside the bundle. */
+  readonly runtimeLocation: string | null;
+  /** Rewrites the addresses of scenes before they are fetched. */
+  readonly urlModifier: ((url: string) => string) | null;
+}
+
+/** What is to be shown, as the element's attributes have it. */
+export interface Source {
+  readonly src: string | Blob | null;
+  readonly contract: unknown;
+  /** URLs with spaces between them. */
+  readonly chain: string | null;
+  readonly postprocess: string | null;
+}
+
+/** What the stage knows of its element, as of now: its attributes and the parts of its shadow tree, once they are rendered. */
+export interface StageHost {
+  readonly attributes: Attributes;
+  readonly input: InputOptions;
+  readonly services: Services;
+  readonly loops: boolean;
+  readonly autoplays: boolean;
+  /** The attribute `time`, in seconds; 0 without. */
+  readonly startTime: number;
+  readonly autoRotates: boolean;
+  /** A double click or a double tap picks the point to turn around. */
+  readonly retargets: boolean;
+  readonly strings: SpokenStrings;
+  readonly liveValues: Omit<LiveState, 'timeSeconds'>;
+  readonly canvas: HTMLCanvasElement | null;
+  readonly surface: HTMLElement | null;
+  readonly hotspotLayer: HTMLElement | null;
+  warn(sentence: string): void;
+}

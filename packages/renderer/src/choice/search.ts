@@ -1,0 +1,77 @@
+/** The search for what a device is served best with: a second of trials, once for each adapter and origin. */
+import { LIKELY, SAFE, type Variants } from '../variants.js';
+import { FrameClock } from './frame-clock.js';
+import { FRAMES, isRight, timeFrames, type Trial } from './trials.js';
+
+/** Scenes of the trials: until one candidate is left, or the time is up. */
+const ROUNDS: readonly Trial[] = [
+  { splats: 4_000, width: 320, height: 180 },
+  { splats: 64_000, width: 1920, height: 1080 },
+];
+/** Milliseconds that all rounds may take, and how much longer than the last one the next is expected to be. */
+const BUDGET = 800;
+const GROWTH = 16;
+/** A candidate so much slower than the fastest, in a round that takes as long as is worth measuring, is out. */
+const HOPELESS = 1.5;
+const MEASURABLE = 1.5;
+
+/** What suits a processor in disguise: tiles are made of barriers, which it is worst at. Of float32 quads it has to convert nothing. */
+const SERIAL: Variants = { ...SAFE, threads: 'serial' };
+const PRECISE: Variants = { ...SERIAL, accumulation: 'rgba32float' };
+/** Milliseconds of the smallest trial that no GPU takes. */
+const NO_GPU_MS = 60;
+type Pause = () => Promise<void>;
+
+/** The fastest variants that draw the right image on a device; undefined where none does. */
+export async function searchVariants(device: GPUDevice, pause: Pause): Promise<Variants | undefined> {
+  const processors = device.features.has('float32-blendable') ? [SERIAL, PRECISE] : [SERIAL];
+  const likely = device.adapterInfo?.isFallbackAdapter ? processors : [LIKELY, SAFE];
+  const candidates = await rightOf(device, likely, pause);
+  const clock = await FrameClock.on(device);
+  // A processor that does not say that it is one.
+  if (likely !== processors && !(await isQuick(device, candidates, clock)))
+    candidates.push(...(await rightOf(device, processors, pause)));
+  if (candidates.length > 0) return chooseFastest(device, candidates, clock, pause);
+  for (const candidate of LAST_RESORTS) if (await isRight(device, candidate)) return candidate;
+  return undefined;
+}
+
+/** However slow, if they are right: what was no candidate for its speed. */
+const LAST_RESORTS: readonly Variants[] = [LIKELY, SAFE, SERIAL, { ...LIKELY, threads: 'serial' }];
+
+async function rightOf(device: GPUDevice, candidates: readonly Variants[], pause: Pause): Promise<Variants[]> {
+  const right: Variants[] = [];
+  for (const candidate of candidates) {
+    await pause();
+    if (await isRight(device, candidate)) right.push(candidate);
+  }
+  return right;
+}
+
+async function isQuick(device: GPUDevice, [first]: readonly Variants[], clock: FrameClock): Promise<boolean> {
+  return first !== undefined && (await timeFrames(device, first, ROUNDS[0], clock)) < NO_GPU_MS;
+}
+
+async function chooseFastest(
+  device: GPUDevice,
+  candidates: readonly Variants[],
+  clock: FrameClock,
+  pause: Pause,
+): Promise<Variants> {
+  let left = candidates.map((variants) => ({ variants, time: 0 }));
+  let spent = 0;
+  for (const round of ROUNDS) {
+    // Only what the GPU did counts: pipelines that had to be made first are of use later.
+    const last = FRAMES * left.reduce((sum, { time }) => sum + time, 0);
+    if (left.length === 1 || spent + GROWTH * last > BUDGET) break;
+    for (const candidate of left) {
+      await pause();
+      candidate.time = await timeFrames(device, candidate.variants, round, clock);
+    }
+    spent += FRAMES * left.reduce((sum, { time }) => sum + time, 0);
+    left.sort((a, b) => a.time - b.time);
+    const best = left[0].time;
+    left = left.filter(({ time }) => best < MEASURABLE || time <= HOPELESS * best);
+  }
+  return left[0].variants;
+}

@@ -1,9 +1,0 @@
-/** `npm run check -- MODEL [--contract CONTRACT.json] [--run]`: the conformance checker of packages/check. */
-import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
-
-ensureDependencies();
-ensureBuilt();
-// npm runs scripts in the repository's root, wherever it was called.
-process.chdir(process.env.INIT_CWD ?? '.');
-const { main } = await import('../packages/check/dist/index.js');
-process.exit(await main(process.argv.slice(2)));

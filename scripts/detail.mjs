@@ -1,7 +1,0 @@
-/** `npm run detail`: writes a scene as a folder that is streamed from static hosting. See scripts/detail-scene.mjs. */
-import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
-import { run } from './lib/run.mjs';
-
-ensureDependencies();
-ensureBuilt();
-process.exit(run(process.execPath, ['scripts/detail-scene.mjs', ...process.argv.slice(2)]));

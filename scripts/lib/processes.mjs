@@ -1,0 +1,45 @@
+/** Child processes of the tests: several at once, what each prints kept apart. */
+import { spawn } from 'node:child_process';
+import { constants, setPriority } from 'node:os';
+import { root } from './run.mjs';
+
+/**
+ * Runs a command and returns what it printed, without colours, and its exit status. What runs `beside` something else takes what that leaves of the
+ * processors, and its output is shown when it has ended, in one piece.
+ */
+export function runAsync(command, args, { env = {}, isBeside = false } = {}) {
+  const child = spawn(command, args, {
+    cwd: root,
+    env: { ...process.env, ...env },
+    stdio: ['ignore', 'pipe', isBeside ? 'pipe' : 'inherit'],
+  });
+  if (isBeside) giveWay(child.pid);
+  const chunks = [];
+  const keep = (chunk) => {
+    chunks.push(chunk);
+    if (!isBeside) process.stdout.write(chunk);
+  };
+  child.stdout.on('data', keep);
+  child.stderr?.on('data', keep);
+  return new Promise((resolve) => {
+    const end = (status) => {
+      const text = Buffer.concat(chunks).toString();
+      if (isBeside) process.stdout.write(text);
+      resolve({ text: withoutColours(text), status: status ?? 1 });
+    };
+    child.on('error', () => end(1)).on('close', end);
+  });
+}
+
+/** As little of the processors as a process can ask for. */
+function giveWay(pid) {
+  try {
+    setPriority(pid, constants.priority.PRIORITY_LOW);
+  } catch {
+    // A system that does not let it: then it runs as the rest does.
+  }
+}
+
+function withoutColours(text) {
+  return text.replace(/\u001b\[[0-9;]*[A-Za-z]/g, '');
+}

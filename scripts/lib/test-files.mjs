@@ -1,0 +1,98 @@
+/** Which test files there are, and which run where: this is the one place that knows. Paths are relative to the root, with slashes. */
+import { readdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { root } from './run.mjs';
+
+/**
+ * The laboratory: tools that look for fewer splats or measure others, in all their breadth. `npm run test:lab` runs these; `npm test` keeps
+ * a smoke test of each tool and every behaviour of the product.
+ */
+const LABORATORY = [
+  /^tests\/economise\/(?!command|live-mask)/,
+  /^tests\/bench\/(scene|pages)/,
+  /^tests\/frameworks\/browser\/(react-strict|vue)/,
+  /^tests\/site\/(compare|cost-card|playground)/,
+  /^tests\/generator\/browser\/examples\/(plant|walker)/,
+];
+/** Tests in Chromium that look at what happens in time: no other page runs beside them. */
+const TIMING = [
+  'tests/element/browser/behaviours.test.ts',
+  'tests/element/browser/input.test.ts',
+  'tests/element/browser/lifecycle.test.ts',
+  'tests/element/browser/meanwhile.test.ts',
+  'tests/element/browser/pace.test.ts',
+  'tests/element/browser/previews.test.ts',
+  'tests/generator/browser/element.test.ts',
+  'tests/generator/browser/instances.test.ts',
+  'tests/generator/browser/orbit.test.ts',
+];
+/** Runs in a browser of its own, whose screen is dense. */
+const DENSE = 'tests/element/browser/high-density.test.ts';
+/** Files of Node that take the device of tests/support share a process, and so the device and what it has compiled. */
+const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
+/** What changes shaders for the whole process, or the shared device for good. */
+const OWN_PROCESS = ['tests/golden/frame-levers.test.ts', 'tests/golden/short-shaders.test.ts'];
+const TAKES_DEVICE = /from '[./]*support\/(node-device|read-rows|draw-until-calm|work-counters)\.js'/;
+
+/** Where the tests of each package are; those of demo and documents are the site's. */
+export const TESTS_OF = {
+  core: ['contract', 'onnx'],
+  formats: ['formats'],
+  renderer: ['stages', 'golden', 'detail', 'memory', 'oracle', 'stability'],
+  generator: ['generator'],
+  check: ['check'],
+  economise: ['economise'],
+  cli: ['packages'],
+  element: ['element', 'packages'],
+  react: ['frameworks'],
+  site: ['site'],
+};
+
+/** All test files, by where they run. */
+export function testFiles() {
+  const all = filesIn('tests').filter((file) => file.endsWith('.test.ts'));
+  const [browser, node] = [all.filter(inBrowser), all.filter((file) => !inBrowser(file))];
+  return { browser, node };
+}
+
+export const isLaboratory = (file) => LABORATORY.some((pattern) => pattern.test(file));
+
+/** Whether some tests of a file are the laboratory's (`onlyInLab` of tests/support/extent.ts). */
+export const hasBreadth = (file) =>
+  /\bonlyInLab\b|\bisLab\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
+
+/** Files of Node: those that can share a device, and those that have a process each. */
+export function byProcess(files) {
+  const shares = (file) =>
+    SHARES_DEVICE.test(file) &&
+    !OWN_PROCESS.includes(file) &&
+    TAKES_DEVICE.test(readFileSync(join(root, file), 'utf8'));
+  return { sharing: files.filter(shares), alone: files.filter((file) => !shares(file)) };
+}
+
+/** Files of Chromium by group, in the order in which the groups run. */
+export function byGroup(files) {
+  return {
+    timing: files.filter((file) => TIMING.includes(file)),
+    concurrent: files.filter((file) => !TIMING.includes(file) && file !== DENSE),
+    dense: files.filter((file) => file === DENSE),
+  };
+}
+
+/** How much has to be built for some tests: the packages alone, or the site, too. */
+export function buildFor(files) {
+  return files.some((file) => inBrowser(file) || /^tests\/(check|element|frameworks|packages|site)\//.test(file))
+    ? 'whole'
+    : 'packages';
+}
+
+function inBrowser(file) {
+  return file.includes('/browser/');
+}
+
+function filesIn(folder) {
+  return readdirSync(join(root, folder), { withFileTypes: true }).flatMap((entry) => {
+    const path = `${folder}/${entry.name}`;
+    return entry.isDirectory() ? filesIn(path) : [path];
+  });
+}

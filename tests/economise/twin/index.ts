@@ -1,0 +1,6 @@
+/** What the economiser does on the GPU, in plain code. */
+export { PaintedEvaluator } from './painted-evaluator.js';
+export { Studio } from './painter.js';
+export { cpuPainter, cpuScorer } from './raster.js';
+export { scoreSplats } from './score.js';
+export type { ContributionScorer } from './scorer.js';

@@ -1,0 +1,123 @@
+/** A large PLY, whose rows several workers read and pack while they arrive. */
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import type { PackedGaussians } from '@gaussian-splat/renderer';
+import type * as sceneWorker from '../../../packages/element/src/loading/scene-worker.js';
+import { assert, assertEqual, nextEvent, show, showLoaded } from './support/harness.js';
+
+const SPLATS = 200_000;
+const FILE = `/net/large-ply/scene.ply?n=${SPLATS}`;
+const request = (url: string) =>
+  ({ url: new URL(url, location.href).href, credentials: 'same-origin', sh: 'auto' }) as const;
+const signal = new AbortController().signal;
+const ignore = (): void => undefined;
+
+type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
+const original = GaussianSplatElement.sceneLoader;
+const Loader = original.constructor as new (spawn: () => Worker) => SceneLoader;
+const SCRIPT = '/packages/element/dist/loading/scene-worker.js';
+
+const isSame = (a: ArrayBufferView, b: ArrayBufferView): boolean => {
+  const [x, y] = [a, b].map((view) => new Uint32Array(view.buffer, view.byteOffset, view.byteLength / 4));
+  return x.length === y.length && x.every((word, i) => word === y[i]);
+};
+
+function assertSame(found: PackedGaussians, expected: PackedGaussians): void {
+  for (const name of ['geometry', 'sh', 'chunks'] as const)
+    assert(isSame(found[name], expected[name]), `${name} differ`);
+  const facts = ({ count, shDegree, shPrecision, origin, droppedCount }: PackedGaussians): unknown => [
+    count,
+    shDegree,
+    shPrecision,
+    origin,
+    droppedCount,
+  ];
+  assertEqual(facts(found), facts(expected), 'facts');
+}
+
+describe('a large PLY', () => {
+  let expected: PackedGaussians;
+  before(async () => {
+    // By one thread, which has nobody to ask.
+    const { loadScene } = (await import(SCRIPT)) as typeof sceneWorker;
+    const whole = await loadScene(request(FILE), signal, { onProgress: ignore });
+    assert('packed' in whole, 'a scene');
+    expected = whole.packed;
+    assertEqual(expected.droppedCount, Math.ceil(SPLATS / 16_911) * 17 - 3, 'splats that are of no use');
+  });
+  afterEach(() => {
+    GaussianSplatElement.sceneLoader = original;
+  });
+
+  it('is packed by several workers to the byte as by one, with previews before', async () => {
+    const spawned: Worker[] = [];
+    const loader = new Loader(() => {
+      const worker = new Worker(SCRIPT, { type: 'module' });
+      spawned.push(worker);
+      return worker;
+    });
+    const previews: number[] = [];
+    const start = performance.now();
+    const scene = await loader.load(request(`${FILE}&ms=2500`), signal, ignore, ({ packed }) => {
+      console.log(`preview of ${packed.count} after ${(performance.now() - start).toFixed(0)} ms`);
+      previews.push(packed.count);
+    });
+    assert(spawned.length > 1, `${spawned.length} workers`);
+    assert(previews.length > 0 && previews[0] < SPLATS, 'a preview');
+    assertSame(scene.packed, expected);
+  });
+
+  it('is packed also where helpers die in the middle of it', async () => {
+    const spawned: Worker[] = [];
+    const loader = new Loader(() => {
+      const worker = new Worker(SCRIPT, { type: 'module' });
+      spawned.push(worker);
+      return worker;
+    });
+    let isKilled = false;
+    const scene = await loader.load(request(`${FILE}&ms=2500`), signal, (loaded) => {
+      if (loaded < 20e6 || isKilled) return;
+      isKilled = true;
+      for (const helper of spawned.slice(1)) helper.terminate();
+    });
+    assert(isKilled && spawned.length > 1, 'helpers were there');
+    assertSame(scene.packed, expected);
+  });
+
+  it('is packed also where no helper comes', async () => {
+    let isFirst = true;
+    const loader = new Loader(() => {
+      const script = isFirst ? SCRIPT : '/net/status/404';
+      isFirst = false;
+      return new Worker(script, { type: 'module' });
+    });
+    const scene = await loader.load(request(FILE), signal, ignore);
+    assertSame(scene.packed, expected);
+  });
+
+  it('that is cut short is an error with a name', async () => {
+    const element = show({ src: '/net/short-ply/scene.ply' });
+    await element.ready;
+    assertEqual(element.error?.reason, 'decode/truncated');
+  });
+
+  it('is seen in part early, and never keeps the page from its work for long', async () => {
+    await showLoaded();
+    let longest = 0;
+    const observer = new PerformanceObserver((list) => {
+      for (const { duration } of list.getEntries()) longest = Math.max(longest, duration);
+    });
+    observer.observe({ entryTypes: ['longtask'] });
+    const element = show({ src: `${FILE}&ms=4000` });
+    const start = performance.now();
+    await nextEvent(element, 'preview');
+    const first = performance.now() - start;
+    await element.ready;
+    assert(element.loaded, element.error?.message ?? 'loaded');
+    console.log(
+      `preview after ${first.toFixed(0)} ms, all after ${(performance.now() - start).toFixed(0)} ms; longest task ${longest.toFixed(0)} ms`,
+    );
+    observer.disconnect();
+    assertEqual(element.statistics?.splats, expected.count, 'splats');
+    assert(first < 4_000, `a preview after ${first.toFixed(0)} ms`);
+  });
+});

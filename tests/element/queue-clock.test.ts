@@ -1,0 +1,178 @@
+/** The clock of frames against a simulated page: one thread, a queue that is told late, other work on it; and what the controller makes of it. */
+import assert from 'node:assert/strict';
+import { test, type TestContext } from 'node:test';
+import { QueueClock, type WorkTime } from '@gaussian-splat/renderer';
+import { PaceController } from '../../packages/element/src/controllers/pace-controller.js';
+import type { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
+import { LEVELS } from '../support/pace-gpu.js';
+
+const INTERVAL = 1000 / 60;
+/** Milliseconds until the GPU has got what is submitted, and until the page hears that it is done. */
+const [THERE, BACK] = [0.8, 1.5];
+
+/** A page whose clock runs by what it does, and its GPU. */
+class Page {
+  /** Clocks do not run back. */
+  static #started = 0;
+  now = (Page.#started += 100_000);
+  #free = 0;
+  #seen = 0;
+  #tasks: { at: number; run: () => void; id: number }[] = [];
+  #id = 0;
+
+  constructor(context: TestContext) {
+    context.mock.method(performance, 'now', () => this.now);
+    context.mock.method(globalThis, 'setTimeout', ((run: () => void, ms = 0) => this.#after(ms, run)) as never);
+    context.mock.method(globalThis, 'clearTimeout', ((id: number) => {
+      this.#tasks = this.#tasks.filter((task) => task.id !== id);
+    }) as never);
+  }
+
+  readonly device = {
+    createCommandEncoder: () => ({ finish: () => ({}) }),
+    queue: {
+      submit: () => this.work(0),
+      onSubmittedWorkDone: () =>
+        new Promise<void>((resolve) => {
+          // The browser answers when it has looked at all that it was sent.
+          const answer = (): unknown => (this.#seen + BACK > this.now ? this.#after(1, answer) : resolve());
+          this.#after(Math.max(0, this.#free - this.now) + BACK, answer);
+        }),
+    },
+  } as unknown as GPUDevice;
+
+  /** Submits so much work, ms, at which the browser looks for so long first. */
+  work(milliseconds: number, looks = 0): void {
+    this.#seen = Math.max(this.#seen, this.now + THERE) + looks;
+    this.#free = Math.max(this.#free, this.#seen) + milliseconds;
+  }
+
+  /** The thread is busy. */
+  block(milliseconds: number): void {
+    this.now += milliseconds;
+  }
+
+  /** Runs what is due until a time. */
+  async until(time: number): Promise<void> {
+    for (;;) {
+      this.#tasks.sort((a, b) => a.at - b.at || a.id - b.id);
+      if (!(this.#tasks[0]?.at <= time)) break;
+      const { at, run } = this.#tasks.shift()!;
+      this.now = Math.max(this.now, at);
+      run();
+      // What waits for it.
+      await new Promise(setImmediate);
+    }
+    this.now = Math.max(this.now, time);
+  }
+
+  async clock(): Promise<QueueClock> {
+    const clock = QueueClock.of(this.device);
+    const calibrated = clock.calibrate();
+    await this.until(this.now + 50);
+    await calibrated;
+    assert.ok(Math.abs(clock.latency - THERE - BACK) < 1e-6, `${clock.latency} ms`);
+    return clock;
+  }
+
+  #after(milliseconds: number, run: () => void): number {
+    this.#tasks.push({ at: this.now + milliseconds, run, id: ++this.#id });
+    return this.#id;
+  }
+}
+
+test('a frame takes what its work takes: alone, behind others, and behind the work of somebody else on the queue', async (context) => {
+  const page = new Page(context);
+  const clock = await page.clock();
+  const times: WorkTime[] = [];
+  const frame = (ms: number): void => void clock.time(() => page.work(ms)).then((time) => void times.push(time));
+  frame(0.6);
+  await page.until(page.now + 50);
+  // Faster than it can do them.
+  for (let k = 0; k < 4; k++) {
+    frame(40);
+    await page.until(page.now + INTERVAL);
+  }
+  await page.until(page.now + 300);
+  // A generator's run.
+  clock.isShared = true;
+  page.work(30);
+  frame(5);
+  await page.until(page.now + 100);
+  const expected = [0.6, 40, 40, 40, 40, 5];
+  assert.equal(times.length, expected.length);
+  times.forEach(({ atLeast, atMost }, k) => {
+    assert.ok(
+      Math.abs(atLeast - expected[k]) < 0.1 && Math.abs(atMost - expected[k]) < 0.1,
+      `${k}: ${atLeast} ${atMost}`,
+    );
+  });
+});
+
+test('a frame that is told of late, since the thread was busy, took something between what it can have and what it seems to', async (context) => {
+  const page = new Page(context);
+  const clock = await page.clock();
+  for (const work of [0.6, 8, 25, 60]) {
+    for (const [before, blocked] of [
+      [0, 40],
+      [5, 30],
+    ]) {
+      let found: WorkTime | undefined;
+      void clock.time(() => page.work(work)).then((time) => (found = time));
+      await page.until(page.now + before);
+      page.block(blocked);
+      await page.until(page.now + 200);
+      const { atLeast, atMost } = found!;
+      assert.ok(atLeast <= work + 0.1 && atMost >= work - 0.1, `${work} ms: ${atLeast} to ${atMost}`);
+      const done = work + THERE + BACK;
+      const isLate = done > before && done < before + blocked;
+      assert.equal(atMost - atLeast > 2, isLate, `${work} ms, busy from ${before} on: ${atLeast} to ${atMost}`);
+    }
+  }
+});
+
+/** Turns for three seconds. @returns the level at the end */
+async function turn(page: Page, work: number, looks = 0, onFrame: () => void = () => undefined): Promise<string> {
+  const clock = await page.clock();
+  const pace = new PaceController({
+    isOn: () => true,
+    scheduler: () => ({ displayInterval: INTERVAL, clients: 1 }) as FrameScheduler,
+    frameBudget: () => Infinity,
+    requestFrame: () => undefined,
+    onPace: () => undefined,
+    levels: LEVELS,
+  });
+  let flying = 0;
+  for (const end = page.now + 3_000; page.now < end;) {
+    const next = page.now + INTERVAL;
+    // As browsers do, no more than two.
+    if (flying < 2) {
+      const plan = pace.plan({ now: page.now, pixels: 2e6, hasChanged: true, goesOn: true });
+      flying++;
+      void clock
+        .time(() => {
+          const share = (plan.levers?.resolutionScale ?? 1) ** 2;
+          page.work(work * share, looks * share);
+        })
+        .then((time) => {
+          flying--;
+          pace.sample(plan, time);
+        });
+      onFrame();
+    }
+    await page.until(next);
+  }
+  await page.until(page.now + 1_000);
+  pace.stop();
+  return pace.report.moving;
+}
+
+test('a GPU that works for 1 ms and whose frames take 20, since the browser looks at them for long, is drawn with less', async (context) => {
+  assert.notEqual(await turn(new Page(context), 1, 19), 'whole');
+  assert.notEqual(await turn(new Page(context), 20), 'whole');
+});
+
+test('a page that is busy for 30 ms in every frame is no slow GPU', async (context) => {
+  const page = new Page(context);
+  assert.equal(await turn(page, 0.6, 0, () => page.block(30)), 'whole');
+});
