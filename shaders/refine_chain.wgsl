@@ -89,10 +89,10 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
 
   // The covariance on the screen is B Bᵀ; here B⁻¹ = (x, 0; lean, y).
   let bare = vec3f(dot(row_x, row_x), dot(row_x, row_y), dot(row_y, row_y));
-  let variance_x = bare.x + DILATION;
+  let variance_x = bare.x + view.filter_variance;
   let minors = cross(row_x, row_y);
   let bare_determinant = dot(minors, minors);
-  let determinant = bare_determinant + DILATION * (variance_x + bare.z);
+  let determinant = bare_determinant + view.filter_variance * (variance_x + bare.z);
   let x = inverseSqrt(variance_x);
   let y = sqrt(variance_x / determinant);
   let lean = -bare.y / variance_x * y;
@@ -104,7 +104,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   if (view.antialiased != 0u && bare_determinant > COMPENSATION_MIN * COMPENSATION_MIN * determinant) {
     // The opacity grows with the root of the ratio of both determinants.
     by_covariance += 0.5 * seen[3] * (vec3f(bare.z, -bare.y, bare.x) / bare_determinant
-      - vec3f(bare.z + DILATION, -bare.y, variance_x) / determinant);
+      - vec3f(bare.z + view.filter_variance, -bare.y, variance_x) / determinant);
   }
   let by_row_x = 2.0 * (by_covariance.x * row_x + by_covariance.y * row_y);
   let by_row_y = 2.0 * (by_covariance.y * row_x + by_covariance.z * row_y);

@@ -17,6 +17,16 @@ export interface LevelRun {
   readonly level: number;
 }
 
+/** What a file says about itself beside its numbers. */
+export interface CloudHints {
+  /** The direction of the cloud's frame that points up, of length 1. */
+  readonly up?: Vector3;
+  /** The tool that wrote the file, in its own words. */
+  readonly generator?: string;
+  /** What was left out or may look wrong, and why: a sentence each, for people. */
+  readonly warnings?: readonly string[];
+}
+
 /**
  * Gaussians on the CPU, activated and ready to draw; every format is read into this one shape.
  *
@@ -44,6 +54,13 @@ export interface GaussianCloud {
   readonly shDegree: ShDegree;
   /** True if the scene was trained with opacity compensation for the screen-space dilation (Mip-Splatting style). */
   readonly antialiased: boolean;
+  /**
+   * Variance in px² of the screen-space low-pass filter that the scene was trained with. Undefined: 0.3, which INRIA's and gsplat's trainers have, with compensation
+   * and without; Mip-Splatting and Brush's mip mode have 0.1.
+   */
+  readonly filterVariance?: number | undefined;
+  /** What the file says about itself. */
+  readonly hints?: CloudHints | undefined;
   /** Where a file has levels of detail of its own: all splats in runs, of which one of each node is to be drawn. Undefined: all splats are. */
   readonly levelRuns?: readonly LevelRun[];
   /** Number of splats of the source that were left out because a value was not usable; see {@link keepUsable}. */

@@ -209,8 +209,8 @@ class Onlooker {
 
   /** Adds the side to the sets of what the picture that was drawn last shows. */
   #note(side: number, camera: Camera, isWidest: boolean): void {
-    const { origin, antialiased } = this.#sided;
-    const view = { ...NO_VIEW, ...cameraValues(camera, origin), antialiased: +antialiased };
+    const { origin, antialiased, filterVariance } = this.#sided;
+    const view = { ...NO_VIEW, ...cameraValues(camera, origin, filterVariance), antialiased: +antialiased };
     const own = { bit: (1 << (side & 31)) >>> 0, word: side >>> 5, least_weight: LEAST_WEIGHT, is_widest: +isWidest };
     const bytes = new ArrayBuffer(Math.max(viewLayout.size, layout.size));
     for (const { count, view: viewBuffer, side: sideBuffer } of this.#pages) {

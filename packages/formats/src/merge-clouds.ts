@@ -20,6 +20,8 @@ export function mergeClouds(parts: readonly CloudPart[], source: Pick<SceneSourc
   );
   merged.origin = largest?.cloud.origin ?? [0, 0, 0];
   merged.antialiased = parts.some(({ cloud }) => cloud.antialiased);
+  merged.filterVariance = parts.find(({ cloud }) => cloud.antialiased)?.cloud.filterVariance;
+  merged.hints = largest?.cloud.hints;
   let at = 0;
   for (const part of parts) {
     copyPart(part, merged, at);

@@ -24,6 +24,8 @@ import { ingestValues, TensorPlaces } from './tensor-places.js';
 export interface DynamicGaussiansOptions {
   /** True if the model was trained with opacity compensation for the dilation. Default false. */
   readonly antialiased?: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   /** Bytes of GPU memory that the scene may take; default no limit but the device's. */
   readonly memoryBudget?: number;
 }
@@ -58,6 +60,8 @@ export class DynamicGaussians implements GaussianScene {
   readonly shDegree: ShDegree;
   readonly shPrecision = 'float16';
   readonly antialiased: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   readonly origin = ORIGIN;
   readonly pages: readonly DynamicPage[];
   readonly layout: GaussianLayout;
@@ -78,6 +82,7 @@ export class DynamicGaussians implements GaussianScene {
     this.count = layout.capacity;
     this.shDegree = layout.shDegree ?? 0;
     this.antialiased = options.antialiased ?? false;
+    this.filterVariance = options.filterVariance;
     const bytes = layout.capacity * bytesPerSplat(this.shDegree, this.shPrecision);
     this.#reservation = MemoryLedger.of(device).reserve(whatOf(layout), bytes, options.memoryBudget);
     this.#stage = new IngestStage(device);

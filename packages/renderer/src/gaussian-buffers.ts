@@ -22,6 +22,8 @@ export class GaussianBuffers implements GaussianScene {
   readonly shPrecision: ShPrecision;
   /** True if the scene was trained with opacity compensation; the renderer follows. */
   readonly antialiased: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   /** World position, in float64, that the positions on the GPU are relative to. */
   readonly origin: Vector3;
   /** Splats of the finest level, if there are levels of detail. */
@@ -40,6 +42,7 @@ export class GaussianBuffers implements GaussianScene {
       shDegree: this.shDegree,
       shPrecision: this.shPrecision,
       antialiased: this.antialiased,
+      filterVariance: this.filterVariance,
       origin: this.origin,
       droppedCount: this.droppedCount,
       leafCount: this.leafCount,

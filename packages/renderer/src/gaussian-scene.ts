@@ -51,6 +51,8 @@ export interface GaussianScene {
   readonly shPrecision: ShPrecision;
   /** True if the scene was trained with opacity compensation; the renderer follows. */
   readonly antialiased: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   /** World position, in float64, that the positions on the GPU are relative to. */
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];

@@ -114,13 +114,12 @@ export class PageTable {
     };
     let page = 0;
     for (const scene of this.#scenes) {
-      const values = cameraValues(camera, scene.origin);
+      // The same filter whatever the frame is drawn at: in larger pixels it has less variance.
+      const values = cameraValues(camera, scene.origin, (scene.filterVariance ?? constants.DILATION) * pixelArea);
       const own = {
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],
         antialiased: scene.antialiased ? 1 : 0,
-        // The same filter whatever the frame is drawn at: in larger pixels it has less variance.
-        filter_variance: constants.DILATION * pixelArea,
       };
       const near = visibleSets && scene.around ? sidesNear(camera, scene.around) : ALL_SIDES;
       for (const { count, details, seenFrom } of scene.pages) {

@@ -58,6 +58,10 @@ export class SequenceGaussians implements GaussianScene {
     return this.#frame.antialiased;
   }
 
+  get filterVariance(): number | undefined {
+    return this.#frame.filterVariance;
+  }
+
   get origin(): Vector3 {
     return this.#frame.origin;
   }

@@ -79,6 +79,10 @@ export class SidedGaussians<S extends HeldScene = HeldScene> implements Gaussian
   get antialiased(): boolean {
     return this.whole.antialiased;
   }
+
+  get filterVariance(): number | undefined {
+    return this.whole.filterVariance;
+  }
   get origin(): Vector3 {
     return this.whole.origin;
   }

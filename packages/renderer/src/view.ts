@@ -1,5 +1,5 @@
 import { eyeOf, multiply, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
-import type { layouts } from './generated/shaders.js';
+import { constants, type layouts } from './generated/shaders.js';
 import type { StructValues } from './gpu/struct.js';
 
 /** Part of the half field of view that the Jacobian's clamp allows beyond the image: INRIA's 1.3 is 1 + this. */
@@ -20,7 +20,6 @@ export type CameraValues = Omit<
   | 'sh_cap'
   | 'sh_encoding'
   | 'antialiased'
-  | 'filter_variance'
   | 'key_bits'
   | 'is_ordered'
   | 'has_detail'
@@ -35,8 +34,9 @@ export type CameraValues = Omit<
 /**
  * A camera as the shaders want it. The origin is folded into the matrix in float64, so that scenes a million units from
  * the world's origin keep their float32 digits.
+ * @param variance what the scene's low-pass filter adds, in px²
  */
-export function cameraValues(camera: Camera, origin: Vector3): CameraValues {
+export function cameraValues(camera: Camera, origin: Vector3, variance: number = constants.DILATION): CameraValues {
   const { width, height, fx, fy, cx, cy, near, far, worldToCamera } = camera;
   const toOrigin = [1, 0, 0, origin[0], 0, 1, 0, origin[1], 0, 0, 1, origin[2], 0, 0, 0, 1];
   const rows = multiply(worldToCamera, toOrigin);
@@ -57,6 +57,7 @@ export function cameraValues(camera: Camera, origin: Vector3): CameraValues {
     near,
     far: Math.min(far, MAX_FLOAT32),
     stretch: stretchOf(worldToCamera),
+    filter_variance: variance,
   };
 }
 

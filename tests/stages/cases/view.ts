@@ -2,7 +2,6 @@ import { constants } from '@gaussian-splat/renderer/stages';
 
 /** What a `View` says of levers where none is set, and of a page without levels of detail. */
 export const WITHOUT_LEVERS = {
-  filter_variance: constants.DILATION,
   has_detail: 0,
   detail: 0,
   detail_fade: 0,

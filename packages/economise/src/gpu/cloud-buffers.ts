@@ -30,13 +30,20 @@ export class CloudBuffers implements GaussianScene {
   readonly shDegree: ShDegree;
   readonly shPrecision = 'float16';
   readonly antialiased: boolean;
+  readonly filterVariance: number | undefined;
   readonly origin: GaussianScene['origin'];
   readonly version = 0;
   readonly pages: readonly GaussianPage[];
   readonly #memory: GpuMemory;
 
   private constructor(device: GPUDevice, cloud: GaussianCloud, memory: GpuMemory, pageSplats: number) {
-    ({ count: this.count, shDegree: this.shDegree, antialiased: this.antialiased, origin: this.origin } = cloud);
+    ({
+      count: this.count,
+      shDegree: this.shDegree,
+      antialiased: this.antialiased,
+      filterVariance: this.filterVariance,
+      origin: this.origin,
+    } = cloud);
     this.#memory = memory;
     const most = pageCapacity(device, 4 * Math.max(...Object.values(widthsOf(cloud.shDegree))));
     const capacity = Math.min(most, CULL_GROUP * Math.max(1, Math.floor(pageSplats / CULL_GROUP)));

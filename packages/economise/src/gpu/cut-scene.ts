@@ -67,6 +67,10 @@ export class CutScene implements GaussianScene {
   get antialiased(): boolean {
     return this.#scene.gaussians.antialiased;
   }
+
+  get filterVariance(): number | undefined {
+    return this.#scene.gaussians.filterVariance;
+  }
   get origin(): GaussianScene['origin'] {
     return this.#scene.gaussians.origin;
   }

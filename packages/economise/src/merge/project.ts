@@ -39,7 +39,7 @@ export function factors({ count, rotations, scales }: GaussianCloud): Float32Arr
 
 /** The splats of a cloud that a camera may see; `roots` are its {@link factors}. */
 export function project(cloud: GaussianCloud, roots: Float32Array, camera: Camera): Projected {
-  const { count, positions, opacities, origin, antialiased } = cloud;
+  const { count, positions, opacities, origin, antialiased, filterVariance = DILATION } = cloud;
   const { fx, fy, cx, cy, width, height, near, far, worldToCamera: m } = camera;
   const source = new Uint32Array(count);
   const depths = new Float32Array(count);
@@ -68,7 +68,7 @@ export function project(cloud: GaussianCloud, roots: Float32Array, camera: Camer
       yy += v * v;
     }
     const exact = Math.max(0, xx * yy - xy * xy);
-    [xx, yy] = [xx + DILATION, yy + DILATION];
+    [xx, yy] = [xx + filterVariance, yy + filterVariance];
     const determinant = xx * yy - xy * xy;
     const opacity = opacities[i] * (antialiased ? Math.sqrt(exact / determinant) : 1);
     if (!(opacity >= ALPHA_MIN) || !(determinant > 0)) continue;

@@ -11,6 +11,7 @@ export interface PartRead {
   /** Splats that can be drawn; they stand together at the beginning of the part's places. */
   readonly count: number;
   readonly antialiased: boolean;
+  readonly filterVariance: number | undefined;
 }
 
 /** Reads a part of a file block by block into columns, the places of the part's splats there being their numbers in the file. */
@@ -20,14 +21,16 @@ export async function readBlocks(
   read: (block: Part) => Promise<GaussianCloud | undefined>,
 ): Promise<PartRead> {
   let [count, antialiased] = [0, false];
+  let filterVariance: number | undefined;
   for (let at = first; at < end; at += BLOCK) {
     const cloud = await read({ first: at, end: Math.min(end, at + BLOCK) });
     if (cloud === undefined) continue;
     putCloud(cloud, to, first + count);
     count += cloud.count;
     antialiased ||= cloud.antialiased;
+    filterVariance ??= cloud.filterVariance;
   }
-  return { count, antialiased };
+  return { count, antialiased, filterVariance };
 }
 
 /** Reads a part of a file that lies in memory. */

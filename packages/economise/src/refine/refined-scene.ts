@@ -47,6 +47,7 @@ export class RefinedScene implements GaussianScene {
   readonly shDegree: GaussianScene['shDegree'];
   readonly shPrecision = 'float16';
   readonly antialiased: boolean;
+  readonly filterVariance: number | undefined;
   readonly origin: GaussianScene['origin'];
   readonly pages: readonly GaussianPage[];
   readonly parts: readonly RefinedPart[];
@@ -68,7 +69,13 @@ export class RefinedScene implements GaussianScene {
     this.#memory = memory;
     this.#cloud = cloud;
     this.#ingest = new IngestStage(device);
-    ({ count: this.count, shDegree: this.shDegree, antialiased: this.antialiased, origin: this.origin } = cloud);
+    ({
+      count: this.count,
+      shDegree: this.shDegree,
+      antialiased: this.antialiased,
+      filterVariance: this.filterVariance,
+      origin: this.origin,
+    } = cloud);
     const { storage, copyDestination } = BUFFER_USAGE;
     const parts: RefinedPart[] = [];
     let first = 0;

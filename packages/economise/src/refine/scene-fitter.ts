@@ -194,13 +194,13 @@ export class SceneFitter {
 
   /** `View` and `RefineView` of each view and part. */
   #writeViews(): [GPUBuffer, GPUBuffer] {
-    const { parts, origin, antialiased, shDegree } = this.#scene;
+    const { parts, origin, antialiased, filterVariance, shDegree } = this.#scene;
     const { exhibits, covered } = this.#errors;
     const places = parts.length * exhibits.length;
     const [views, small] = [VIEW_STRIDE, SMALL_STRIDE].map((stride) => new ArrayBuffer(stride * places));
     exhibits.forEach(({ camera }, k) => {
       const values = {
-        ...{ ...NO_VIEW, ...cameraValues(camera, origin) },
+        ...{ ...NO_VIEW, ...cameraValues(camera, origin, filterVariance) },
         ...{ antialiased: +antialiased, sh_degree: shDegree },
       };
       const weight = covered[k] > 0 ? (camera.width * camera.height) / covered[k] : 0;

@@ -66,12 +66,21 @@ export function sphereCloud(count: number, size: number): GaussianCloud {
 
 /** What `packGaussians` makes of spheres, all of which can be drawn: every page carries this, and its checks of strangers' clouds only where files are read. */
 export function packSpheres(cloud: GaussianCloud, shPrecision: ShPrecision): PackedGaussians {
-  const { count, shDegree, antialiased, origin, droppedCount } = cloud;
+  const { count, shDegree, antialiased, filterVariance, origin, droppedCount } = cloud;
   const order = mortonOrder(
     cloud.positions,
     new Uint32Array(count).map((_, i) => i),
   );
-  return { count, shDegree, shPrecision, antialiased, origin, droppedCount, ...packKept(cloud, order, shPrecision) };
+  return {
+    count,
+    shDegree,
+    shPrecision,
+    antialiased,
+    filterVariance,
+    origin,
+    droppedCount,
+    ...packKept(cloud, order, shPrecision),
+  };
 }
 
 /** The image in float64, front to back: spheres have closed forms where other splats need matrices. */

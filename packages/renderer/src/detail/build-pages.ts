@@ -36,6 +36,8 @@ export interface DetailTree {
   readonly shPrecision: ShPrecision;
   readonly geometry?: 'quantized';
   readonly antialiased: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
 }
@@ -53,10 +55,18 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
   validateCloud(given);
   const cloud = recentred(given);
   const kept = packedOrder(cloud);
-  const { antialiased, origin } = cloud;
+  const { antialiased, filterVariance, origin } = cloud;
   const shPrecision = choosePrecision(noiseIn(cloud), kept);
   const leaves = leavesOf(cloud, kept, geometry);
-  const facts = { splats: kept.length, shPrecision, geometry, antialiased, origin, bounds: boundsOf(given) };
+  const facts = {
+    splats: kept.length,
+    shPrecision,
+    geometry,
+    antialiased,
+    filterVariance,
+    origin,
+    bounds: boundsOf(given),
+  };
   return { ...treeOf([leaves, ...levelsAbove(leaves)], geometry), ...facts };
 }
 
@@ -160,7 +170,7 @@ export function manifestOf(
   pages: readonly BuiltPage[],
   fileOf: (page: number) => string,
 ): DetailManifest {
-  const { splats, shPrecision, geometry, antialiased, origin, bounds, levels } = tree;
+  const { splats, shPrecision, geometry, antialiased, filterVariance, origin, bounds, levels } = tree;
   return {
     ...{
       format: 'gaussian-splat-detail',
@@ -168,7 +178,7 @@ export function manifestOf(
       splats,
       shDegree: levels[0].shDegree,
     },
-    ...{ shPrecision, ...(geometry && { geometry }), antialiased, origin, bounds },
+    ...{ shPrecision, ...(geometry && { geometry }), antialiased, filterVariance, origin, bounds },
     trees: [
       {
         pages: pages.map(({ chunks, upper, parent }, p) => ({

@@ -18,6 +18,8 @@ export class DetailedGaussians implements GaussianScene {
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   /** Its visible sets are of its own splats; coarser ones are drawn from all sides. */
   readonly around: GaussianScene['around'];
@@ -34,6 +36,7 @@ export class DetailedGaussians implements GaussianScene {
       shDegree: this.shDegree,
       shPrecision: this.shPrecision,
       antialiased: this.antialiased,
+      filterVariance: this.filterVariance,
       origin: this.origin,
       around: this.around,
     } = leaves);

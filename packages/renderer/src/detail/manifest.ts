@@ -53,6 +53,8 @@ export interface DetailManifest {
   /** How centres, shapes and opacities are stored: {@link packQuantizedChunk}. Default: as `PackedGaussian`, in twice the bytes. */
   readonly geometry?: 'quantized';
   readonly antialiased: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly trees: readonly Tree[];
@@ -110,6 +112,10 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
   const kind = version === 1 ? undefined : 'quantized';
   if (geometry !== kind) fail('geometry', kind ?? 'nothing in version 1', geometry, 'decode/unsupported');
   if (typeof antialiased !== 'boolean') fail('antialiased', 'true or false', antialiased);
+  const { filterVariance } = manifest;
+  if (filterVariance !== undefined && !(filterVariance >= 0 && filterVariance <= 1)) {
+    fail('filterVariance', 'a variance of 0 to 1 px², or nothing', filterVariance);
+  }
   if (!isVector(origin)) fail('origin', '3 numbers', origin);
   const hasBounds = isVector(bounds?.min) && isVector(bounds.max) && isVector(bounds.center);
   if (!hasBounds || !Number.isFinite(bounds?.radius)) fail('bounds', 'min, max, center and radius', bounds);

@@ -40,10 +40,10 @@ function packRuns(
 ): Omit<PackedGaussians, 'droppedCount'> {
   const runs = keptRuns(cloud, usable);
   const count = CULL_GROUP * runs.reduce((sum, { kept }) => sum + chunksOf(kept.length), 0);
-  const { shDegree, antialiased, origin } = cloud;
+  const { shDegree, antialiased, filterVariance, origin } = cloud;
   const stride = shWords(shDegree, shPrecision);
   const packed = {
-    ...{ count, shDegree, shPrecision, antialiased, origin },
+    ...{ count, shDegree, shPrecision, antialiased, filterVariance, origin },
     geometry: new Uint32Array(GEOMETRY_WORDS * count),
     sh: new Uint32Array(stride * count),
     chunks: new Float32Array((CHUNK_NUMBERS * count) / CULL_GROUP),

@@ -67,8 +67,8 @@ export function leafLevel(cloud: GaussianCloud, kept: Uint32Array): SplatLevel {
     for (let n = 0; n < FACTOR_NUMBERS; n++) factors[FACTOR_NUMBERS * k + n] = factor[n];
     opacities[k] = Math.min(1, Math.max(0, cloud.opacities[i]));
   }
-  const { sh, shDegree, antialiased } = cloud;
-  const dilation = antialiased ? 0 : constants.DILATION;
+  const { sh, shDegree, antialiased, filterVariance = constants.DILATION } = cloud;
+  const dilation = antialiased ? 0 : filterVariance;
   const spreads = new Float32Array(count);
   const readSh = gatherer(sh, shNumbers(shDegree), kept);
   return { count, positions, factors, opacities, sh, shOrder: kept, shDegree, dilation, spreads, readSh };

@@ -81,6 +81,8 @@ export class StreamedGaussians implements GaussianScene {
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly pages: readonly GaussianPage[];
@@ -105,8 +107,14 @@ export class StreamedGaussians implements GaussianScene {
 
   private constructor(device: GPUDevice, source: PageSource, options: PoolOptions) {
     const { scene, list } = source;
-    const { shDegree, shPrecision, antialiased, origin, bounds } = scene;
-    [this.shDegree, this.shPrecision, this.antialiased, this.origin] = [shDegree, shPrecision, antialiased, origin];
+    const { shDegree, shPrecision, antialiased, filterVariance, origin, bounds } = scene;
+    [this.shDegree, this.shPrecision, this.antialiased, this.filterVariance, this.origin] = [
+      shDegree,
+      shPrecision,
+      antialiased,
+      filterVariance,
+      origin,
+    ];
     this.bounds = bounds;
     this.leafCount = scene.splats;
     this.#source = source;

@@ -31,6 +31,8 @@ export interface PackedGaussians {
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   readonly antialiased: boolean;
+  /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
+  readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly droppedCount: number;
   /** [N, 8] words: `PackedGaussian` of shaders/shared/packed_gaussian.wgsl. */
@@ -65,13 +67,13 @@ const FIRST_VISIBLE = Math.ceil(bits[0] / 16);
 export function packGaussians(given: GaussianCloud, options: PackOptions = {}): PackedGaussians {
   validateCloud(given);
   const cloud = recentred(given);
-  const { shDegree, antialiased, origin } = cloud;
+  const { shDegree, antialiased, filterVariance, origin } = cloud;
   const kept = packedOrder(cloud);
   const droppedCount = cloud.droppedCount + cloud.count - kept.length;
   const asked = options.sh ?? 'auto';
   if (asked !== 'auto' && !Object.hasOwn(SH_PRECISION, asked)) throw unknownPrecision(asked);
   const shPrecision = asked === 'auto' ? choosePrecision(noiseIn(cloud), kept) : asked;
-  const facts = { count: kept.length, shDegree, shPrecision, antialiased, origin, droppedCount };
+  const facts = { count: kept.length, shDegree, shPrecision, antialiased, filterVariance, origin, droppedCount };
   return { ...facts, ...packKept(cloud, kept, shPrecision) };
 }
 

@@ -26,7 +26,7 @@ export async function readPacked(
   scene: GaussianScene,
   check: () => void = () => undefined,
 ): Promise<PackedGaussians> {
-  const { shDegree, shPrecision, antialiased, origin, pages, wishes } = scene;
+  const { shDegree, shPrecision, antialiased, filterVariance, origin, pages, wishes } = scene;
   if (wishes) throw notWhole();
   const stride = shWords(shDegree, shPrecision);
   const read = (name: 'geometry' | 'sh' | 'chunks', words: (count: number) => number): Promise<Uint32Array> =>
@@ -41,7 +41,7 @@ export async function readPacked(
   const count = geometry.length / GEOMETRY_WORDS;
   const droppedCount = (scene as { droppedCount?: number }).droppedCount ?? 0;
   return {
-    ...{ count, shDegree, shPrecision, antialiased, origin, droppedCount, geometry, sh },
+    ...{ count, shDegree, shPrecision, antialiased, filterVariance, origin, droppedCount, geometry, sh },
     chunks: new Float32Array(chunks.buffer),
   };
 }
