@@ -37,7 +37,13 @@ export class CloudBuffers implements GaussianScene {
   readonly #memory: GpuMemory;
 
   private constructor(device: GPUDevice, cloud: GaussianCloud, memory: GpuMemory, pageSplats: number) {
-    ({ count: this.count, shDegree: this.shDegree, antialiased: this.antialiased, filterVariance: this.filterVariance, origin: this.origin } = cloud);
+    ({
+      count: this.count,
+      shDegree: this.shDegree,
+      antialiased: this.antialiased,
+      filterVariance: this.filterVariance,
+      origin: this.origin,
+    } = cloud);
     this.#memory = memory;
     const most = pageCapacity(device, 4 * Math.max(...Object.values(widthsOf(cloud.shDegree))));
     const capacity = Math.min(most, CULL_GROUP * Math.max(1, Math.floor(pageSplats / CULL_GROUP)));

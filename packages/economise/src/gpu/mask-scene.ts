@@ -22,7 +22,8 @@ export class MaskScene implements GaussianScene {
       count: this.count,
       shDegree: this.shDegree,
       shPrecision: this.shPrecision,
-      antialiased: this.antialiased, filterVariance: this.filterVariance,
+      antialiased: this.antialiased,
+      filterVariance: this.filterVariance,
       origin: this.origin,
     } = scene);
     this.#device = device;

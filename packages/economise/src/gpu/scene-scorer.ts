@@ -138,7 +138,11 @@ export class SceneScorer {
     const { parts, gaussians } = this.#scene;
     const bytes = new ArrayBuffer(VIEW_STRIDE * parts.length * this.#views.length);
     this.#views.forEach((camera, k) => {
-      const values = { ...NO_VIEW, ...cameraValues(camera, gaussians.origin, gaussians.filterVariance), antialiased: +gaussians.antialiased };
+      const values = {
+        ...NO_VIEW,
+        ...cameraValues(camera, gaussians.origin, gaussians.filterVariance),
+        antialiased: +gaussians.antialiased,
+      };
       parts.forEach(({ page }, p) => {
         const at = VIEW_STRIDE * (parts.length * k + p);
         writeStruct(rendererLayouts.View, { ...values, splat_count: page.count }, bytes, at);

@@ -45,5 +45,11 @@ export async function gatherParts(
   );
   if (kept.count === 0) return undefined;
   const antialiased = read.some((part) => part.antialiased);
-  return { ...kept, origin: [0, 0, 0], antialiased, filterVariance: read.find((part) => part.filterVariance !== undefined)?.filterVariance, droppedCount: count - kept.count };
+  return {
+    ...kept,
+    origin: [0, 0, 0],
+    antialiased,
+    filterVariance: read.find((part) => part.filterVariance !== undefined)?.filterVariance,
+    droppedCount: count - kept.count,
+  };
 }

@@ -69,7 +69,13 @@ export class RefinedScene implements GaussianScene {
     this.#memory = memory;
     this.#cloud = cloud;
     this.#ingest = new IngestStage(device);
-    ({ count: this.count, shDegree: this.shDegree, antialiased: this.antialiased, filterVariance: this.filterVariance, origin: this.origin } = cloud);
+    ({
+      count: this.count,
+      shDegree: this.shDegree,
+      antialiased: this.antialiased,
+      filterVariance: this.filterVariance,
+      origin: this.origin,
+    } = cloud);
     const { storage, copyDestination } = BUFFER_USAGE;
     const parts: RefinedPart[] = [];
     let first = 0;

@@ -26,7 +26,7 @@ export async function loadScene(
     const options = (): FetchSceneOptions => ({ mode: 'cors', credentials, signal, onProgress: progress.add() });
     const pack = (cloud: GaussianCloud): LoadedScene => ({
       packed: packGaussians(cloud, { sh: request.sh }),
-      bounds: boundsOf(cloud),
+      bounds: { ...boundsOf(cloud), up: cloud.hints?.up },
     });
     const previews = onPreview && new PreviewSchedule(name, signal, (cloud) => onPreview(pack(cloud)));
     const bytes = await fetchScene(url, { ...options(), onArrival: previews?.onArrival });

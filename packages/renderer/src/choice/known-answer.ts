@@ -71,7 +71,16 @@ export function packSpheres(cloud: GaussianCloud, shPrecision: ShPrecision): Pac
     cloud.positions,
     new Uint32Array(count).map((_, i) => i),
   );
-  return { count, shDegree, shPrecision, antialiased, filterVariance, origin, droppedCount, ...packKept(cloud, order, shPrecision) };
+  return {
+    count,
+    shDegree,
+    shPrecision,
+    antialiased,
+    filterVariance,
+    origin,
+    droppedCount,
+    ...packKept(cloud, order, shPrecision),
+  };
 }
 
 /** The image in float64, front to back: spheres have closed forms where other splats need matrices. */

@@ -58,7 +58,15 @@ export function buildDetailTree(given: GaussianCloud, { geometry }: DetailTreeOp
   const { antialiased, filterVariance, origin } = cloud;
   const shPrecision = choosePrecision(cloud, kept);
   const leaves = leavesOf(cloud, kept, geometry);
-  const facts = { splats: kept.length, shPrecision, geometry, antialiased, filterVariance, origin, bounds: boundsOf(given) };
+  const facts = {
+    splats: kept.length,
+    shPrecision,
+    geometry,
+    antialiased,
+    filterVariance,
+    origin,
+    bounds: boundsOf(given),
+  };
   return { ...treeOf([leaves, ...levelsAbove(leaves)], geometry), ...facts };
 }
 

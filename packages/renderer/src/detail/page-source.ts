@@ -5,7 +5,8 @@ import { listPages, type PageList } from './page-list.js';
 import type { SlotWords } from './slot-words.js';
 
 /** What is known of a streamed scene before any page of it has come. */
-export type StreamedScene = PageFormat & Pick<DetailManifest, 'splats' | 'antialiased' | 'filterVariance' | 'origin' | 'bounds'>;
+export type StreamedScene = PageFormat &
+  Pick<DetailManifest, 'splats' | 'antialiased' | 'filterVariance' | 'origin' | 'bounds'>;
 
 /** A streamed scene, and where its pages come from. */
 export interface PageSource {

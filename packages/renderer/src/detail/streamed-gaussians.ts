@@ -108,7 +108,13 @@ export class StreamedGaussians implements GaussianScene {
   private constructor(device: GPUDevice, source: PageSource, options: PoolOptions) {
     const { scene, list } = source;
     const { shDegree, shPrecision, antialiased, filterVariance, origin, bounds } = scene;
-    [this.shDegree, this.shPrecision, this.antialiased, this.filterVariance, this.origin] = [shDegree, shPrecision, antialiased, filterVariance, origin];
+    [this.shDegree, this.shPrecision, this.antialiased, this.filterVariance, this.origin] = [
+      shDegree,
+      shPrecision,
+      antialiased,
+      filterVariance,
+      origin,
+    ];
     this.bounds = bounds;
     this.leafCount = scene.splats;
     this.#source = source;

@@ -16,7 +16,13 @@ export function treeOfCopies(tree: DetailTree, places: readonly Vector3[]): Deta
   return {
     ...treeOf(levels, tree.geometry, errorsOfCopies(tree.errors[top], places)),
     splats: tree.splats * places.length,
-    ...{ shPrecision: tree.shPrecision, geometry: tree.geometry, antialiased: tree.antialiased, filterVariance: tree.filterVariance, origin: tree.origin },
+    ...{
+      shPrecision: tree.shPrecision,
+      geometry: tree.geometry,
+      antialiased: tree.antialiased,
+      filterVariance: tree.filterVariance,
+      origin: tree.origin,
+    },
     bounds: boundsAround(tree.bounds, places, radius),
   };
 }

@@ -1,0 +1,101 @@
+/** What the header of a PLY says beside its numbers. Loaded only for files that have comments, or properties that change what the others mean. */
+import { GaussianSplatError, normalize, type Vector3 } from '@gaussian-splat/core';
+import type { DraftCloud } from '../cloud.js';
+import type { PlyHeader } from './header.js';
+
+/** Variance in px² with which Mip-Splatting and Brush's mip mode train. */
+export const MIP_VARIANCE = 0.1;
+
+/** Text of the comments that follow a key such as `Vertical Axis:`; the last one wins, as in the tools that write them. */
+function valueOf(comments: readonly string[], key: RegExp): string | undefined {
+  return comments
+    .map((text) => key.exec(text.trim()))
+    .findLast((match) => match !== null)?.[1]
+    .trim()
+    .toLowerCase();
+}
+
+/** Sets what the comments of a header tell: filter, up, and the tool that wrote the file. */
+export function readComments(cloud: DraftCloud, comments: readonly string[]): void {
+  const mode = valueOf(comments, /^splatrendermode\s*:\s*(.*)$/i);
+  if (mode !== undefined) cloud.antialiased = mode === 'mip';
+  else if (valueOf(comments, /^antialiased\s*[:=]?\s*(\S*)$/i) === '1') cloud.antialiased = true;
+  const variance = Number(valueOf(comments, /^filter_variance\s*[:=]?\s*(\S+)$/i) ?? NaN);
+  if (variance >= 0 && variance <= 1) cloud.filterVariance = variance;
+  // gsplat's trainer compensates for 0.3.
+  else if (mode === 'mip' && !comments.some((text) => /gsplat/i.test(text))) cloud.filterVariance = MIP_VARIANCE;
+  const generator = valueOf(comments, /^((?:generated|exported|created) .*)$/i);
+  const up = upOf(comments);
+  if (up) cloud.hints = { ...cloud.hints, up };
+  if (generator !== undefined) cloud.hints = { ...cloud.hints, generator };
+}
+
+/** nerfstudio writes `Vertical Axis: z` for +z; Brush writes the direction, or an axis, which it reads as the one that points down. */
+function upOf(comments: readonly string[]): Vector3 | undefined {
+  const text = valueOf(comments, /^vertical\s+axis\s*:\s*(.*)$/i);
+  if (text === undefined) return undefined;
+  const axis = /^([+-]?)([xyz])$/.exec(text);
+  if (axis) {
+    const isBrush = comments.some((comment) => /\bbrush\b/i.test(comment) || /^\s*Vertical axis/.test(comment));
+    const sign = axis[1] === '-' || (axis[1] === '' && isBrush) ? -1 : 1;
+    return ['x', 'y', 'z'].map((name) => (name === axis[2] ? sign : 0)) as unknown as Vector3;
+  }
+  const numbers = text.split(/[\s,]+/).map(Number);
+  const size = Math.hypot(...numbers);
+  return numbers.length === 3 && size > 0 && Number.isFinite(size)
+    ? normalize(numbers as unknown as Vector3)
+    : undefined;
+}
+
+/**
+ * What Mip-Splatting draws: Gaussians that its 3D smoothing filter has widened, as pale as they are wider (Yu et al. 2024, section 4.1; `create_fused_ply` of its code does
+ * the same). Its training keeps them apart from the filter.
+ */
+export function fuseFilter(cloud: DraftCloud, filter: Float32Array): void {
+  const { count, scales, opacities } = cloud;
+  cloud.antialiased = true;
+  cloud.filterVariance ??= MIP_VARIANCE;
+  for (let i = 0; i < count; i++) {
+    let share = 1;
+    for (let k = 3 * i; k < 3 * i + 3; k++) {
+      const wide = Math.hypot(scales[k], filter[i]);
+      share *= wide > 0 ? scales[k] / wide : 1;
+      scales[k] = wide;
+    }
+    opacities[i] *= share;
+  }
+}
+
+/** Kinds of splats that are no plain ones though their names may be the same: told by a name that no other kind has. */
+const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; readonly remedy: string }[] = [
+  {
+    mark: /^(trbf_center|motion_\d+|omega_\d+)$/,
+    found: 'SpacetimeGaussians, which move and whose f_dc_* are plain colours',
+    remedy: 'export each moment as a PLY of its own and show them as a sequence',
+  },
+  {
+    mark: /^(f_anchor_feat_\d+|f_offset_\d+)$/,
+    found: 'anchors of Scaffold-GS, from which a network makes splats for each view',
+    remedy: 'export its network as a generator, or bake the splats of one view into a PLY',
+  },
+  {
+    mark: /^codebook_centers$/,
+    found: 'splats as reduced-3dgs compresses them',
+    remedy: 'save the scene without quantisation, or unpack it with the tools of reduced-3dgs, and give that PLY',
+  },
+];
+
+/** Throws `decode/unsupported` where names tell that the numbers mean something else than in a PLY of plain splats. */
+export function refuseOtherMeanings(where: string, { elements }: PlyHeader): void {
+  const names = elements.flatMap(({ name, properties }) => [name, ...properties.map((property) => property.name)]);
+  for (const { mark, found, remedy } of OTHER_MEANINGS) {
+    const told = names.filter((name) => mark.test(name));
+    if (told.length === 0) continue;
+    throw new GaussianSplatError('decode/unsupported', {
+      where: `${where}, PLY header`,
+      expected: 'plain Gaussian splats',
+      found: `${found} (${told.slice(0, 3).join(', ')})`,
+      remedy,
+    });
+  }
+}
