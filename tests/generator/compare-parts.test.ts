@@ -5,7 +5,11 @@ import type { AttributeSlice } from '@gaussian-splat/core';
 import { compareParts, isDifferent, type ComparedPart } from '@gaussian-splat/generator';
 
 const ROWS = 2000;
-const slice = (attribute: 'positions' | 'covariances' | 'opacities', offset: number, components: number): AttributeSlice => ({
+const slice = (
+  attribute: 'positions' | 'covariances' | 'opacities',
+  offset: number,
+  components: number,
+): AttributeSlice => ({
   attribute,
   tensor: 'g',
   offset,
@@ -32,12 +36,36 @@ const part = (found: Float32Array, expected: Float32Array, start = 0): ComparedP
 const changed = (change: (value: number, i: number) => number): Float32Array => rows().map(change);
 
 test('roundings, and a row that falls to the other side of a threshold, are no difference', () => {
-  const rounded = compareParts([part(changed((x) => x * (1 + 3e-4)), rows())], SLICES);
+  const rounded = compareParts(
+    [
+      part(
+        changed((x) => x * (1 + 3e-4)),
+        rows(),
+      ),
+    ],
+    SLICES,
+  );
   assert.ok(!isDifferent(rounded) && rounded.error < 1e-3, JSON.stringify(rounded));
-  const flipped = compareParts([part(changed((x, i) => (i < 10 ? 0 : x)), rows())], SLICES);
+  const flipped = compareParts(
+    [
+      part(
+        changed((x, i) => (i < 10 ? 0 : x)),
+        rows(),
+      ),
+    ],
+    SLICES,
+  );
   assert.ok(!isDifferent(flipped) && flipped.error > 0.1, JSON.stringify(flipped));
   // Both are opacity 1.
-  const opaque = compareParts([part(changed((x, i) => (i % 10 === 9 && x > 20 ? 2 * x : x)), rows())], SLICES);
+  const opaque = compareParts(
+    [
+      part(
+        changed((x, i) => (i % 10 === 9 && x > 20 ? 2 * x : x)),
+        rows(),
+      ),
+    ],
+    SLICES,
+  );
   assert.ok(!isDifferent(opaque), JSON.stringify(opaque));
 });
 

@@ -17,12 +17,19 @@ const USAGE = `usage: gaussian-splat render SCENE --camera CAMERA.json --out IMA
   --out FILE           8-bit PNG, alpha not premultiplied
   --float FILE         width*height*4 little-endian float32, premultiplied RGBA, row by row from the top
   --view NAME          the view of that name (or number) in a file of several
-  --mode MODE          classic or antialiased; default: what the scene file says
+  --filter NAME        classic, antialiased (0.3 px² with compensation) or mip (0.1 px²); default: what the scene file says.
+                       --mode is another name of it
   --raster NAME        auto (default), quads or tiles
   --accumulation NAME  precision in which splats are blended: rgba16float (what the element shows), rgba32float, or
                        auto (default): rgba32float where the device can blend it, since no frame rate is at stake
   --background R,G,B   0..1; default: transparent
 `;
+
+const FILTERS = {
+  classic: { antialiased: false, filterVariance: undefined },
+  antialiased: { antialiased: true, filterVariance: undefined },
+  mip: { antialiased: true, filterVariance: 0.1 },
+};
 
 class UsageError extends Error {}
 
@@ -41,6 +48,7 @@ function parseOptions(args) {
         out: text,
         float: text,
         view: text,
+        filter: text,
         mode: text,
         raster: { ...text, default: 'auto' },
         accumulation: { ...text, default: 'auto' },
@@ -56,7 +64,8 @@ function parseOptions(args) {
   if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
   if (values.camera === undefined) throw new UsageError('--camera is missing');
   if (values.out === undefined && values.float === undefined) throw new UsageError('--out or --float is missing');
-  oneOf('--mode', values.mode, [undefined, 'classic', 'antialiased']);
+  values.filter ??= values.mode;
+  oneOf('--filter', values.filter, [undefined, 'classic', 'antialiased', 'mip']);
   oneOf('--raster', values.raster, ['auto', 'quads', 'tiles']);
   oneOf('--accumulation', values.accumulation, ['auto', 'rgba16float', 'rgba32float']);
   return { ...values, scene: positionals[0], background: parseBackground(values.background) };
@@ -138,7 +147,7 @@ async function render(options) {
   checkFiles(options);
   const camera = readCamera(options.camera, options.view);
   const cloud = await readSceneFile(options.scene);
-  const antialiased = options.mode === undefined ? cloud.antialiased : options.mode === 'antialiased';
+  const { antialiased, filterVariance } = options.filter === undefined ? cloud : FILTERS[options.filter];
 
   const adapter = await requestNodeAdapter();
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
@@ -146,7 +155,7 @@ async function render(options) {
   device.addEventListener('uncapturederror', ({ error }) => validationErrors.push(error.message));
   const accumulation = chooseAccumulation(options.accumulation, device);
   const renderer = new Renderer(device, { rasterizer: options.raster, accumulation });
-  const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased }));
+  const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased, filterVariance }));
   const pixels = await capture(device, renderer, { gaussians, camera, background: options.background });
   const statistics = await renderer.readStatistics();
   if (validationErrors.length > 0) throw new Error(`WebGPU: ${validationErrors.join('\n')}`);

@@ -23,8 +23,6 @@ export interface CloudHints {
   readonly up?: Vector3;
   /** The tool that wrote the file, in its own words. */
   readonly generator?: string;
-  /** What was left out or may look wrong, and why: a sentence each, for people. */
-  readonly warnings?: readonly string[];
 }
 
 /**

@@ -36,7 +36,15 @@ export type { SceneLimits } from './loading/protocol.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 
 const CONFIGURABLE = [
-  ...(['runtimeLocation', 'workerLocation', 'urlModifier', 'releaseDelay', 'sharedDevice', 'memoryBudget', 'sceneLimits'] as const),
+  ...([
+    'runtimeLocation',
+    'workerLocation',
+    'urlModifier',
+    'releaseDelay',
+    'sharedDevice',
+    'memoryBudget',
+    'sceneLimits',
+  ] as const),
 ] as const;
 
 /** What a page may put into `globalThis.GaussianSplatElement` before this module runs: statics of the class. */

@@ -74,6 +74,15 @@ function unsignedKind(bytes: Uint8Array): ForeignKind {
 const UNREAD_EXTENSIONS: ReadonlyMap<string, string> = new Map([
   ['.rad', 'a .rad scene'],
   ['.lcc', 'an LCC scene'],
+  ['.lcc2', 'an LCC2 scene'],
+  ['.splatv', 'a .splatv scene, which moves'],
+  ['.usd', 'a USD scene'],
+  ['.usda', 'a USD scene'],
+  ['.usdc', 'a USD scene'],
+  ['.usdz', 'a USDZ scene'],
+  ['.pt', 'a checkpoint of PyTorch'],
+  ['.npz', 'arrays of NumPy'],
+  ['.slpk', 'an I3S scene'],
 ]);
 
 /** What an ONNX file begins with: field 1 (IR version) and then field 2 (producer) or 7 (graph) of its protobuf. */
@@ -91,8 +100,8 @@ export function diagnose(
   expected: string = A_SCENE,
 ): GaussianSplatError {
   const signed = foreignName(bytes);
-  if (signed) return refusal(SIGNED_KINDS[signed], name, bytes, expected);
   const known = UNREAD_EXTENSIONS.get(extension);
+  if (signed && !(signed === 'json' && known)) return refusal(SIGNED_KINDS[signed], name, bytes, expected);
   return known === undefined ? refusal(unsignedKind(bytes), name, bytes) : refusal(unread(known), name, undefined);
 }
 

@@ -46,7 +46,7 @@ export async function readSplats(file: FileBytes, range: SplatRange, name: strin
   const bytes = plainBytes(file, name);
   const source = { bytes, name, range, budget: new LoadBudget(bytes.length) };
   const format = findFormat(bytes, name, '')?.name;
-  if (format === 'ply') return keepUsable((await import('./ply/row-range.js')).readPlyRange(source));
+  if (format === 'ply') return keepUsable(await (await import('./ply/row-range.js')).readPlyRange(source));
   if (format === 'gltf') return keepUsable(await (await import('./readers/gltf.js')).readGltf(source));
   throw new GaussianSplatError('argument/value', {
     where: name,

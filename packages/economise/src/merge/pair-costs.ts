@@ -38,6 +38,7 @@ export interface PairState {
   /** Of a view, the mean of all. */
   readonly pixels: number;
   readonly antialiased: boolean;
+  readonly filterVariance: number;
 }
 
 /**
@@ -51,7 +52,7 @@ export function pairState(
   views: readonly Camera[],
   allocate: (byteLength: number) => ArrayBufferLike,
 ): PairState {
-  const { count, antialiased } = cloud;
+  const { count, antialiased, filterVariance = DILATION } = cloud;
   const floats = (length: number): Float32Array => new Float32Array(allocate(4 * length), 0, length);
   const state = {
     rows: new Float64Array(allocate(8 * ROW * count), 0, ROW * count),
@@ -62,6 +63,7 @@ export function pairState(
     views: views.length,
     pixels: views.reduce((sum, { width, height }) => sum + width * height, 0) / views.length,
     antialiased,
+    filterVariance,
   };
   state.sh.set(cloud.sh);
   for (let i = 0; i < count; i++) {
@@ -87,11 +89,12 @@ export class PairCosts {
   readonly #sh: Float32Array;
   readonly #numbers: number;
   readonly #antialiased: boolean;
+  readonly #variance: number;
 
   constructor(state: PairState) {
     this.#state = state;
     ({ rows: this.#rows, views: this.#views, seen: this.#seen, visible: this.#visible } = state);
-    ({ sh: this.#sh, numbers: this.#numbers, antialiased: this.#antialiased } = state);
+    ({ sh: this.#sh, numbers: this.#numbers, antialiased: this.#antialiased, filterVariance: this.#variance } = state);
   }
 
   /** Puts where the splats are into `found`, [N, 3]. */
@@ -131,7 +134,7 @@ export class PairCosts {
       const areaA = Math.sqrt(uuA * vvA - uvA * uvA);
       const areaB = Math.sqrt(uuB * vvB - uvB * uvB);
       const area = Math.sqrt(uu * vv - uv * uv);
-      const amplitude = visible * (this.#antialiased ? compensation(uu, uv, vv) : 1);
+      const amplitude = visible * (this.#antialiased ? compensation(uu, uv, vv, this.#variance) : 1);
       const both = areaA * areaB * overlap(uuA + uuB, uvA + uvB, vvA + vvB, du, dv);
       const withA = areaA * area * overlap(uuA + uu, uvA + uv, vvA + vv, q * du, q * dv);
       const withB = areaB * area * overlap(uuB + uu, uvB + uv, vvB + vv, p * du, p * dv);
@@ -181,7 +184,9 @@ export class PairCosts {
       seen[a + UU] = p * seen[a + UU] + q * seen[b + UU] + p * q * du * du;
       seen[a + UV] = p * seen[a + UV] + q * seen[b + UV] + p * q * du * dv;
       seen[a + VV] = p * seen[a + VV] + q * seen[b + VV] + p * q * dv * dv;
-      const compensated = this.#antialiased ? compensation(seen[a + UU], seen[a + UV], seen[a + VV]) : 1;
+      const compensated = this.#antialiased
+        ? compensation(seen[a + UU], seen[a + UV], seen[a + VV], this.#variance)
+        : 1;
       seen[a + AMPLITUDE] = isSeen ? opacity * compensated : 0;
     }
   }
@@ -218,7 +223,7 @@ function overlap(uu: number, uv: number, vv: number, du: number, dv: number): nu
 }
 
 /** Share of its opacity that a splat keeps when the dilation, which the covariance has in it, makes it larger. */
-function compensation(uu: number, uv: number, vv: number): number {
+function compensation(uu: number, uv: number, vv: number, variance: number): number {
   const determinant = uu * vv - uv * uv;
-  return Math.sqrt(Math.max(0, (uu - DILATION) * (vv - DILATION) - uv * uv) / determinant);
+  return Math.sqrt(Math.max(0, (uu - variance) * (vv - variance) - uv * uv) / determinant);
 }

@@ -2,7 +2,18 @@ import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 
 /** Writes the PLY of 3D Gaussian Splatting, binary, float32, without normals; places in float64 where the cloud lies so far from (0, 0, 0) that float32 does not hold them. */
 export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
-  const { count, shDegree, positions, origin, sh, opacities, scales, rotations, antialiased } = cloud;
+  const {
+    count,
+    shDegree,
+    positions,
+    origin,
+    sh,
+    opacities,
+    scales,
+    rotations,
+    antialiased,
+    filterVariance = 0.3,
+  } = cloud;
   const coefficients = shCoefficientCount(shDegree);
   const isFar = origin.some((x) => x !== 0);
   const names = [
@@ -13,7 +24,7 @@ export function writePly(cloud: GaussianCloud): Uint8Array<ArrayBuffer> {
   const lines = [
     'ply',
     'format binary_little_endian 1.0',
-    ...(antialiased ? ['comment SplatRenderMode: mip'] : []),
+    ...(antialiased ? ['comment SplatRenderMode: mip', `comment filter_variance ${filterVariance}`] : []),
     `element vertex ${count}`,
     ...names.map((name, k) => `property ${isFar && k < 3 ? 'double' : 'float'} ${name}`),
     'end_header',

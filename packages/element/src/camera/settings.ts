@@ -20,7 +20,7 @@ export interface CameraSettings {
 /** Bounds of a scene, in its own frame. */
 export interface SceneBounds extends Bounds {
   /** The direction that points up, of length 1, where the scene declares one. */
-  readonly up?: Vector3;
+  readonly up?: Vector3 | undefined;
 }
 
 /** Rotation from the frame of a scene to viewer space. */

@@ -75,7 +75,10 @@ export class LargePly {
     this.#precision = sh === 'auto' ? 'int8' : sh;
     this.#answers = new Array<undefined>(Math.ceil(count / SHARE_SPLATS));
     this.#previews = new PartPreviews(this.#answers.length, (preview) =>
-      listeners.onPreview?.({ packed: packGaussians(preview, { sh: 'int8' }), bounds: boundsOf(preview) }),
+      listeners.onPreview?.({
+        packed: packGaussians(preview, { sh: 'int8' }),
+        bounds: { ...boundsOf(preview), up: preview.hints?.up },
+      }),
     );
     listeners.askForHelp?.(this.#answers.length, (port) => this.#addHelper(port));
   }
@@ -100,14 +103,16 @@ export class LargePly {
       const shares = this.#answers.map((answer) => answer?.packed);
       const first = this.#answers.find((answer) => answer?.packed);
       if (!first || shares.includes(undefined)) return undefined;
-      const { shDegree = 0, antialiased = false, origin = [0, 0, 0] } = first;
+      const { shDegree = 0, antialiased = false, filterVariance, origin = [0, 0, 0], up } = first;
       const packed = shares as PackedShare[];
       const droppedCount = this.#count - packed.reduce((sum, { count }) => sum + count, 0);
       this.#listeners.onReading?.(true);
-      const joined = joinShares(packed, { sh: this.#sh }, { shDegree, antialiased, origin, droppedCount });
+      const facts = { shDegree, antialiased, filterVariance, origin, droppedCount };
+      const joined = joinShares(packed, { sh: this.#sh }, facts);
       if (typeof joined !== 'string') {
         const { positions, opacities } = joined;
-        return { packed: joined.packed, bounds: boundsOf({ count: opacities.length, positions, opacities, origin }) };
+        const bounds = boundsOf({ count: opacities.length, positions, opacities, origin });
+        return { packed: joined.packed, bounds: { ...bounds, up } };
       }
       // Its colours need another precision than was taken for granted.
       this.#precision = joined;

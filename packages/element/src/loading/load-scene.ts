@@ -59,7 +59,7 @@ export async function loadScene(
     });
     const pack = (cloud: GaussianCloud): LoadedScene => ({
       packed: packGaussians(cloud, { sh: request.sh }),
-      bounds: boundsOf(cloud),
+      bounds: { ...boundsOf(cloud), up: cloud.hints?.up },
     });
     const start = performance.now();
     let loading: Promise<PreviewSchedule> | undefined;

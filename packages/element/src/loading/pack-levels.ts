@@ -5,5 +5,5 @@ import type { LoadedScene, SceneRequest } from './protocol.js';
 
 export const packLevels = (cloud: GaussianCloud, sh: SceneRequest['sh']): LoadedScene => ({
   packed: packLevelRuns(cloud, { sh }),
-  bounds: boundsOf(cloud),
+  bounds: { ...boundsOf(cloud), up: cloud.hints?.up },
 });

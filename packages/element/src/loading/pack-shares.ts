@@ -21,6 +21,9 @@ export interface ShareAnswer {
   readonly preview?: GaussianCloud;
   readonly shDegree?: ShDegree;
   readonly antialiased?: boolean;
+  readonly filterVariance?: number | undefined;
+  /** What the file says points up. */
+  readonly up?: Vector3 | undefined;
   readonly origin?: Vector3;
 }
 
@@ -28,9 +31,9 @@ export interface ShareAnswer {
 export async function packRows({ share, bytes, shPrecision }: ShareRequest): Promise<ShareAnswer> {
   const cloud = await readPrefix(bytes, { name: 'share.ply' });
   if (cloud === undefined) return { share };
-  const { shDegree, antialiased, origin } = cloud;
+  const { shDegree, antialiased, filterVariance, origin, hints } = cloud;
   return {
-    ...{ share, shDegree, antialiased, origin },
+    ...{ share, shDegree, antialiased, filterVariance, origin, up: hints?.up },
     packed: packShare(cloud, shPrecision),
     preview: samplePreview(cloud),
   };

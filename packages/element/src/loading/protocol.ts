@@ -1,5 +1,6 @@
 /** What the page and the scene worker say to each other. */
-import type { Bounds, ErrorData } from '@gaussian-splat/core';
+import type { ErrorData } from '@gaussian-splat/core';
+import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
 import type { LevelPage, LevelScene, PackedGaussians, ShPrecision, StreamedScene } from '@gaussian-splat/renderer';
 
@@ -33,7 +34,7 @@ export interface SceneRequest extends FileRequest {
 /** A scene, fetched and packed, ready for upload. */
 export interface LoadedScene {
   readonly packed: PackedGaussians;
-  readonly bounds: Bounds;
+  readonly bounds: SceneBounds;
 }
 
 /** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */

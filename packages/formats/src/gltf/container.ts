@@ -1,3 +1,4 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
 import { asciiOf, grouped, startsWith, viewOf } from '../bytes.js';
 import { damaged } from '../damaged.js';
 import { parseJson, show, type JsonSource } from '../json.js';
@@ -21,7 +22,7 @@ const HEADER_BYTES = 12;
  * (`KHR_mesh_quantization`) are read.
  */
 const HARMLESS =
-  /^(KHR_gaussian_splatting|KHR_mesh_quantization|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))/;
+  /^(KHR_mesh_quantization|KHR_draco_mesh_compression|[A-Z0-9]+_(animation|audio|lights?|materials?|mesh_features|structural_metadata|textures?|xmp)(_|$))|^KHR_gaussian_splatting(_compression_spz(_2)?)?$/;
 
 /** Takes a GLB, or a glTF in JSON, apart. Throws `decode/unsupported` where it requires what is not known here, as glTF asks of readers. */
 export function openContainer(source: JsonSource): GltfFile {
@@ -31,6 +32,7 @@ export function openContainer(source: JsonSource): GltfFile {
     : { json: parseJson(source, MAX_TEXT_BYTES), binary: undefined };
   const { asset, extensionsRequired } = file.json;
   const version = typeof asset === 'object' && asset !== null ? (asset as Json).version : undefined;
+  if ('geometricError' in file.json && 'root' in file.json) throw tileset(name);
   if (typeof version !== 'string' || !version.startsWith('2.')) {
     throw damaged(`${name}, asset.version`, 'glTF 2.x', show(version), 'decode/unsupported');
   }
@@ -42,6 +44,15 @@ export function openContainer(source: JsonSource): GltfFile {
     throw damaged(`${name}, extensionsRequired`, expected, show(unknown), 'decode/unsupported');
   }
   return file;
+}
+
+function tileset(name: string): GaussianSplatError {
+  return new GaussianSplatError('decode/unsupported', {
+    where: name,
+    expected: 'a glTF',
+    found: 'a tileset of 3D Tiles',
+    remedy: 'give one of the .glb files that it names, or convert the tiles to SPZ or PLY',
+  });
 }
 
 function openGlb({ bytes, name, budget }: JsonSource): GltfFile {

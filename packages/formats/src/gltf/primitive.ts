@@ -1,6 +1,6 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { allocateCloud, SH_C0, type DraftCloud } from '../cloud.js';
+import { allocateCloud, expInPlace, SH_C0, type DraftCloud } from '../cloud.js';
 import { damaged } from '../damaged.js';
 import { isObject, show } from '../json.js';
 import { readSpz } from '../readers/spz.js';
@@ -117,12 +117,32 @@ async function readAttributes(
   const cloud = allocateCloud(count, degreeOf(own), document);
   cloud.positions.set(positions);
   cloud.scales.set(await read('SCALE', own('SCALE'), 3));
+  if (await areLogarithms(document, own('SCALE'), cloud.scales)) expInPlace(cloud.scales);
   const opacity = own('OPACITY');
   if (opacity !== undefined || attributes.COLOR_0 === undefined) cloud.opacities.set(await read('OPACITY', opacity, 1));
   else setAlphas(cloud, await read('COLOR_0', attributes.COLOR_0, 4));
   toWFirst(await read('ROTATION', own('ROTATION'), 4), cloud.rotations);
   await readColours(cloud, own, attributes, read);
   return cloud;
+}
+
+/**
+ * splat-transform wrote scales as logarithms before June 2026: versions up to 2.3 always, later ones where an accessor has scales below 0, which the extension forbids.
+ * Throws `decode/corrupt` for scales of other tools that are all below 0.
+ */
+async function areLogarithms(document: GltfDocument, index: unknown, scales: Float32Array): Promise<boolean> {
+  const { asset } = document.json;
+  const generator = isObject(asset) && typeof asset.generator === 'string' ? asset.generator : '';
+  const [, major, minor] = /splat-transform v?(\d+)\.(\d+)/.exec(generator) ?? [];
+  if (major === undefined) {
+    if (scales.length > 0 && scales.every((scale) => scale < 0))
+      throw damaged(`${document.name}, SCALE`, 'scales of 0 or more', 'scales below 0 alone, as logarithms are');
+    return false;
+  }
+  if (Number(major) < 2 || (Number(major) === 2 && Number(minor) <= 3)) return true;
+  // All of them tell it, those too that were not asked for.
+  const { values } = await document.readAccessor(index);
+  return values.some((scale) => scale < 0);
 }
 
 function degreeOf(own: (name: string) => unknown): ShDegree {

@@ -13,7 +13,6 @@ export interface GaussianLayout {
   readonly colourIsSh: boolean;
   /** False for 2D Gaussians (2DGS): discs without a third axis. */
   readonly hasThirdScale: boolean;
-  readonly antialiased: boolean;
   /** Mip-Splatting: sizes and opacities are those before its filter, whose width each splat has. */
   readonly hasFilter: boolean;
 }
@@ -48,7 +47,6 @@ export function findGaussians(source: SceneSource, header: PlyHeader): GaussianL
     colour,
     colourIsSh,
     hasThirdScale,
-    antialiased: isAntialiased(header.comments) || hasFilter,
     hasFilter,
   };
 }
@@ -82,11 +80,6 @@ export function shDegreeOf(source: SceneSource, element: PlyElement): ShDegree |
     found: `${rest.length}${isComplete ? '' : ', with gaps in their numbers'}`,
     remedy: 'export the file again with a whole degree of spherical harmonics',
   });
-}
-
-/** Tags of trainers: brush writes `SplatRenderMode: mip`, Postshot `antialiased 1`. */
-function isAntialiased(comments: readonly string[]): boolean {
-  return comments.some((text) => /^(splatrendermode\s*:\s*mip|antialiased\s*[:=]?\s*1)\s*$/i.test(text.trim()));
 }
 
 function notSplats(source: SceneSource, expected: string, found: string): GaussianSplatError {

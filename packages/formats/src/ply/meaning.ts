@@ -1,6 +1,7 @@
 /** What the header of a PLY says beside its numbers. Loaded only for files that have comments, or properties that change what the others mean. */
 import { GaussianSplatError, normalize, type Vector3 } from '@gaussian-splat/core';
 import type { DraftCloud } from '../cloud.js';
+import type { PlyHeader } from './header.js';
 
 /** Variance in px² with which Mip-Splatting and Brush's mip mode train. */
 export const MIP_VARIANCE = 0.1;
@@ -25,7 +26,8 @@ export function readComments(cloud: DraftCloud, comments: readonly string[]): vo
   else if (mode === 'mip' && !comments.some((text) => /gsplat/i.test(text))) cloud.filterVariance = MIP_VARIANCE;
   const generator = valueOf(comments, /^((?:generated|exported|created) .*)$/i);
   const up = upOf(comments);
-  cloud.hints = { ...cloud.hints, ...(up && { up }), ...(generator !== undefined && { generator }) };
+  if (up) cloud.hints = { ...cloud.hints, up };
+  if (generator !== undefined) cloud.hints = { ...cloud.hints, generator };
 }
 
 /** nerfstudio writes `Vertical Axis: z` for +z; Brush writes the direction, or an axis, which it reads as the one that points down. */
@@ -45,7 +47,26 @@ function upOf(comments: readonly string[]): Vector3 | undefined {
     : undefined;
 }
 
-/** Kinds of splats whose properties have the names of plain ones and another meaning: told by a property that no other kind has. */
+/**
+ * What Mip-Splatting draws: Gaussians that its 3D smoothing filter has widened, as pale as they are wider (Yu et al. 2024, section 4.1; `create_fused_ply` of its code does
+ * the same). Its training keeps them apart from the filter.
+ */
+export function fuseFilter(cloud: DraftCloud, filter: Float32Array): void {
+  const { count, scales, opacities } = cloud;
+  cloud.antialiased = true;
+  cloud.filterVariance ??= MIP_VARIANCE;
+  for (let i = 0; i < count; i++) {
+    let share = 1;
+    for (let k = 3 * i; k < 3 * i + 3; k++) {
+      const wide = Math.hypot(scales[k], filter[i]);
+      share *= wide > 0 ? scales[k] / wide : 1;
+      scales[k] = wide;
+    }
+    opacities[i] *= share;
+  }
+}
+
+/** Kinds of splats that are no plain ones though their names may be the same: told by a name that no other kind has. */
 const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; readonly remedy: string }[] = [
   {
     mark: /^(trbf_center|motion_\d+|omega_\d+)$/,
@@ -53,43 +74,28 @@ const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; 
     remedy: 'export each moment as a PLY of its own and show them as a sequence',
   },
   {
-    mark: /^(binding(_\d+)?|face_id|flame_\w+)$/,
-    found: 'GaussianAvatars, whose splats lie in the frames of the triangles of a head',
-    remedy: 'export the posed splats, in the frame of the scene, as a PLY of their own',
-  },
-  {
-    mark: /^offset_?[0-9xyz]?$/,
-    found: "LAM's offsets to a head model, whose f_dc_* are plain colours",
-    remedy: 'export the posed splats, in the frame of the scene, as a PLY of their own',
-  },
-  {
     mark: /^(f_anchor_feat_\d+|f_offset_\d+)$/,
     found: 'anchors of Scaffold-GS, from which a network makes splats for each view',
     remedy: 'export its network as a generator, or bake the splats of one view into a PLY',
   },
+  {
+    mark: /^codebook_centers$/,
+    found: 'splats as reduced-3dgs compresses them',
+    remedy: 'save the scene without quantisation, or unpack it with the tools of reduced-3dgs, and give that PLY',
+  },
 ];
 
-/** Throws `decode/unsupported` where properties tell that the others mean something else than in a PLY of plain splats. */
-export function refuseOtherMeanings(where: string, properties: readonly string[]): void {
+/** Throws `decode/unsupported` where names tell that the numbers mean something else than in a PLY of plain splats. */
+export function refuseOtherMeanings(where: string, { elements }: PlyHeader): void {
+  const names = elements.flatMap(({ name, properties }) => [name, ...properties.map((property) => property.name)]);
   for (const { mark, found, remedy } of OTHER_MEANINGS) {
-    const told = properties.filter((name) => mark.test(name));
+    const told = names.filter((name) => mark.test(name));
     if (told.length === 0) continue;
     throw new GaussianSplatError('decode/unsupported', {
       where: `${where}, PLY header`,
       expected: 'plain Gaussian splats',
-      found: `${found} (properties ${told.slice(0, 3).join(', ')})`,
+      found: `${found} (${told.slice(0, 3).join(', ')})`,
       remedy,
     });
   }
-}
-
-/** The error for a PLY with the splats of a compression of which no reader is here; undefined for other headers. */
-export function compressedKind(where: string, elements: readonly string[]): GaussianSplatError | undefined {
-  if (!elements.some((name) => name === 'codebook_centers' || /^vertex_[0-3]$/.test(name))) return undefined;
-  return new GaussianSplatError('decode/unsupported', {
-    where: `${where}, PLY header`,
-    expected: 'an element "vertex" of plain splats',
-    found: 'splats as reduced-3dgs compresses them (elements vertex_0 to vertex_3 and codebook_centers)',
-    remedy: 'save it without quantisation, or decompress it with the tools of reduced-3dgs, and give that PLY',
-  });
 }

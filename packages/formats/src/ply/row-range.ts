@@ -18,7 +18,7 @@ export function plyRanges(source: SceneSource): SplatRanges | undefined {
 }
 
 /** Reads some rows of a PLY: of a file that has its header, and then these rows alone. */
-export function readPlyRange(source: SceneSource & { readonly range: SplatRange }): GaussianCloud {
+export function readPlyRange(source: SceneSource & { readonly range: SplatRange }): Promise<GaussianCloud> {
   const { bytes, range } = source;
   const { start, rowBytes = 0 } = openElement(source, parsePlyHeader(source), 'vertex');
   const rows = bytes.subarray(start + rowBytes * range.first, start + rowBytes * range.end);

@@ -3,6 +3,7 @@ import { grouped } from '../bytes.js';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, type DraftCloud } from '../cloud.js';
 import { shDegreeOf } from '../ply/gaussian-layout.js';
 import { harmonicTargets } from '../ply/harmonics.js';
+import { loadMeaning } from '../ply/load-meaning.js';
 import { parsePlyHeader, type PlyElement, type PlyHeader } from '../ply/header.js';
 import { openElement, readColumns } from '../ply/rows.js';
 import type { SceneSource } from '../scene-format.js';
@@ -24,7 +25,7 @@ const CHUNK_FLOATS = 18;
  * and never turned into logits, so that 255 is opacity 1 and not infinite. Files with 12 chunk properties (before
  * 2024) store colours 0..1 without bounds.
  */
-export function readCompressedPly(source: SceneSource): GaussianCloud {
+export async function readCompressedPly(source: SceneSource): Promise<GaussianCloud> {
   const header = parsePlyHeader(source);
   const { sh } = checkElements(source, header);
   // Coefficients come after all splats; of a file that is still arriving they are left out.
@@ -40,6 +41,7 @@ export function readCompressedPly(source: SceneSource): GaussianCloud {
   source.signal?.throwIfAborted();
   const cloud = allocateCloud(count, keptDegree(degree), source);
   unpackSplats(words, chunkBounds, cloud);
+  (await loadMeaning(header))?.readComments(cloud, header.comments);
   if (sh && !source.isPrefix) readHarmonics(source, header, degree, cloud);
   return cloud;
 }

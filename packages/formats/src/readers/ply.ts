@@ -2,6 +2,7 @@ import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { allocateCloud, expInPlace, keptDegree, SH_C0, sigmoidInPlace, type DraftCloud } from '../cloud.js';
 import { findGaussians, withPlainNames, type GaussianLayout } from '../ply/gaussian-layout.js';
 import { harmonicTargets } from '../ply/harmonics.js';
+import { loadMeaning } from '../ply/load-meaning.js';
 import { exceedsFloat32, parsePlyHeader, type PlyProperty } from '../ply/header.js';
 import { relativePositions } from '../ply/positions.js';
 import { openElement, readColumns, type ColumnTarget, type ElementData } from '../ply/rows.js';
@@ -12,12 +13,14 @@ import type { SceneSource } from '../scene-format.js';
  * are logits, scales logarithms, rotations (w, x, y, z), and `f_rest_*` holds all red coefficients of spherical
  * harmonics, then all green, then all blue.
  */
-export function readPly(source: SceneSource): GaussianCloud {
+export async function readPly(source: SceneSource): Promise<GaussianCloud> {
   const header = withPlainNames(parsePlyHeader(source));
+  const meaning = await loadMeaning(header);
+  meaning?.refuseOtherMeanings(source.name, header);
   const layout = findGaussians(source, header);
   const data = openElement(source, header, 'vertex');
   const cloud = allocateCloud(data.element.count, keptDegree(layout.degree), source);
-  cloud.antialiased = layout.antialiased;
+  meaning?.readComments(cloud, header.comments);
   source.signal?.throwIfAborted();
   const filter = new Float32Array(layout.hasFilter ? cloud.count : 0);
   readAttributes(data, layout, cloud, filter);
@@ -25,7 +28,7 @@ export function readPly(source: SceneSource): GaussianCloud {
   expInPlace(cloud.scales);
   if (!layout.hasThirdScale) flatten(cloud);
   sigmoidInPlace(cloud.opacities);
-  if (layout.hasFilter) fuseFilter(cloud, filter);
+  if (layout.hasFilter) meaning?.fuseFilter(cloud, filter);
   if (!layout.colourIsSh) convertPlainColours(cloud, layout.colour);
   return cloud;
 }
@@ -57,22 +60,6 @@ function readAttributes(data: ElementData, layout: GaussianLayout, cloud: DraftC
 /** Targets of properties that stand side by side in every row of an array. */
 function interleaved(names: readonly string[], array: ColumnTarget['array'], stride: number): ColumnTarget[] {
   return names.map((property, offset) => ({ property, array, stride, offset }));
-}
-
-/**
- * What Mip-Splatting draws: Gaussians that its 3D smoothing filter has widened, as pale as they are wider (Yu et al. 2024, section 4.1; `create_fused_ply` of its code does
- * the same). Its training keeps them apart from the filter.
- */
-function fuseFilter({ count, scales, opacities }: DraftCloud, filter: Float32Array): void {
-  for (let i = 0; i < count; i++) {
-    let share = 1;
-    for (let k = 3 * i; k < 3 * i + 3; k++) {
-      const wide = Math.hypot(scales[k], filter[i]);
-      share *= wide > 0 ? scales[k] / wide : 1;
-      scales[k] = wide;
-    }
-    opacities[i] *= share;
-  }
 }
 
 /** A 2D Gaussian has no extent along its third axis. */

@@ -11,6 +11,8 @@ export interface SogMeta {
   readonly version: 1 | 2;
   readonly count: number;
   readonly antialiased: boolean;
+  /** Variance of the filter where the file tells it; splat-transform 3 says `model: antialiased` of what PLY calls `SplatRenderMode: mip`. */
+  readonly filterVariance: number | undefined;
   readonly means: {
     readonly mins: readonly number[];
     readonly maxs: readonly number[];
@@ -62,6 +64,7 @@ export function parseSogMeta(source: JsonSource): SogMeta {
     return isFine ? (value as string[]) : fail(`${key}.files`, `${count} file names`, value);
   };
   const shape = part('means').shape;
+  if (version === 1 && !part('means').files && part('means').dtype !== undefined) throw gsplatPngs(name);
   const count = version === 2 ? json.count : Array.isArray(shape) ? shape[0] : undefined;
   if (!Number.isSafeInteger(count) || (count as number) < 0) fail('count', 'the number of splats', count);
   if (count === 0) throw noSplats(name);
@@ -77,7 +80,8 @@ export function parseSogMeta(source: JsonSource): SogMeta {
   return {
     version,
     count: count as number,
-    antialiased: json.antialias === true,
+    antialiased: json.antialias === true || json.model === 'antialiased',
+    filterVariance: json.model === 'antialiased' ? 0.1 : undefined,
     means: { mins: numbers('means', 'mins', 3), maxs: numbers('means', 'maxs', 3), files: files('means', 2) },
     scales: { values: isFirst ? between('scales', 3) : repeated(codebook('scales'), 3), files: files('scales', 1) },
     quats: { files: files('quats', 1) },
@@ -126,6 +130,16 @@ function ramp(min: number, max: number): Float32Array {
 
 function repeated(table: Float32Array, channels: number): Float32Array[] {
   return Array.from({ length: channels }, () => table);
+}
+
+/** The folder of gsplat's PNG compression, of which SOG came: its description names no files. */
+function gsplatPngs(name: string): GaussianSplatError {
+  return new GaussianSplatError('decode/unsupported', {
+    where: name,
+    expected: 'the meta.json of a SOG scene',
+    found: "that of gsplat's PNG compression, which names no files",
+    remedy: 'save the splats as PLY with the exporter of gsplat, and give that file or convert it to SOG',
+  });
 }
 
 function noSplats(name: string): GaussianSplatError {

@@ -86,6 +86,7 @@ function unpackGeometry(
   const selection: Selection = { count: Math.ceil(meta.count / step), step };
   const cloud = allocateCloud(selection.count, degree, source);
   cloud.antialiased = meta.antialiased;
+  cloud.filterVariance = meta.filterVariance;
   unpackMeans(planes.low, planes.high, meta.means, selection, cloud.positions);
   unpackScales(planes.scales, meta.scales, selection, cloud.scales);
   unpackQuats(planes.quats, selection, cloud.rotations);

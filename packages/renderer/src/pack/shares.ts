@@ -35,6 +35,7 @@ export interface PackedShare {
 export interface ShareFacts {
   readonly shDegree: ShDegree;
   readonly antialiased: boolean;
+  readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
   readonly droppedCount: number;
 }
@@ -92,6 +93,7 @@ export function joinShares(
       shDegree: facts.shDegree,
       shPrecision,
       antialiased: facts.antialiased,
+      filterVariance: facts.filterVariance,
       origin: cloud.origin,
     },
     droppedCount: facts.droppedCount + count - kept.length,
