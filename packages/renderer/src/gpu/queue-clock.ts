@@ -29,8 +29,8 @@ export class QueueClock {
   #measuredAt = -Infinity;
   /** When what was submitted was last known to be done. */
   #last: Told = { now: -Infinity, since: -Infinity };
-
-  #previousMs = 0;
+  /** Work that was told of at about one moment: since when, how much of it, and what all of it took, ms. */
+  #together = { now: -Infinity, count: 0, milliseconds: 0 };
 
   /** The one of a device. */
   static of(device: GPUDevice): QueueClock {
@@ -77,11 +77,15 @@ export class QueueClock {
     this.#latency = Math.min(this.#latency, now - submitted);
     const atMost = this.spent(before.since, submitted, now);
     const atLeast = Math.min(atMost, this.spent(before.now, submitted, since));
-    const previousMs = this.#previousMs;
-    this.#previousMs = atMost;
-    // Then the one before it has seemed to take the time of both.
-    const isTogether = before.now > submitted && now - before.now < TOGETHER_MS;
-    return { doneAt: now, atLeast, atMost: isTogether ? previousMs + atMost : atMost };
+    // Of work that is told of together the first seems to take the time of all.
+    const isTogether = before.now > submitted && now - this.#together.now < TOGETHER_MS;
+    const together = isTogether ? this.#together : (this.#together = { now, count: 0, milliseconds: 0 });
+    together.count++;
+    together.milliseconds += atMost;
+    await new Promise((resolve) => setTimeout(resolve));
+    if (together.count === 1) return { doneAt: now, atLeast, atMost };
+    const share = together.milliseconds / together.count;
+    return { doneAt: now, atLeast: Math.min(atLeast, share), atMost: share };
   }
 
   /**
