@@ -94,6 +94,10 @@ for (const isOne of [false, true]) {
       [60, 0, 0],
     ]);
     const list = listPages(folder.manifest);
+    const copiesOf = ({ pagesInSlots }: { pagesInSlots: readonly (number | undefined)[] }): number[] =>
+      [0, 60].map(
+        (x) => pagesInSlots.filter((page) => page !== undefined && page > 1 && list.translate(page)[0] === x).length,
+      );
     const picture = await target();
     const first = await renderer();
     const drawing = [first, isOne ? first : await renderer()];
@@ -106,8 +110,8 @@ for (const isOne of [false, true]) {
         drawing[1].render({ gaussians: scene, camera: still, target: picture, detail: 0.3 });
       };
       if (isMoving) {
-        // As many as pages take to be asked for, fetched and placed.
-        for (let frame = 0; frame < 240; frame++) {
+        // As many as pages take to be asked for, fetched and placed: more where other tests share the processor.
+        for (let frame = 0; frame < 240 || (frame < 2400 && copiesOf(scene).some((pages) => pages <= 20)); frame++) {
           draw();
           await (await anyDevice()).queue.onSubmittedWorkDone();
           await pause(4);
@@ -117,10 +121,7 @@ for (const isOne of [false, true]) {
         assert.ok(took < 0.9 * MOST_TURNS, `${took} turns`);
         assert.equal(scene.progress.error, 0);
       }
-      const copies = [0, 60].map(
-        (x) =>
-          scene.pagesInSlots.filter((page) => page !== undefined && page > 1 && list.translate(page)[0] === x).length,
-      );
+      const copies = copiesOf(scene);
       console.log(`${isMoving ? 'one moves' : 'at rest'}: ${copies.join(' and ')} pages`);
       assert.ok(copies[0] > 20 && copies[1] > 20, `pages of the copies: ${copies.join()}`);
       scene.destroy();
