@@ -51,7 +51,7 @@ test('what hangs overhead is not visible', { timeout: 180_000, skip: onlyInFull 
 
 test('the frontier page compares with the oracle', { timeout: 180_000 }, async () => {
   const query = { ...SMALL, rounds: '1', n: '20000', w: '192', h: '128', distance: '0.5', views: '2' };
-  const report = await runPage('bench/frontier.html', { ...query, only: '^(default|scale 0.5)$' });
+  const report = await runPage('bench/frontier.html', { ...query, only: '^(default|balanced at 0.5)$' });
   assert.deepEqual(report.errors, []);
   assert.equal(report.reference.kind, 'oracle');
   const [full, half] = report.results;

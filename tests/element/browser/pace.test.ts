@@ -72,21 +72,25 @@ describe('the pace of pictures', () => {
     assert(pace.reason === 'slow' || pace.reason === 'trial', `the reason is ${pace.reason}`);
     assert(why.length === 1 && why[0].includes(pace.moving), `says: ${why.join(' ')}`);
     // A frame's time has the browser's own work on the same processor in it.
-    assert(paced < whole, `${paced} ms instead of ${whole}`);
+    assert(paced < 0.9 * whole, `${paced} ms instead of ${whole}`);
 
     // Frames of the other one still wait on the same queue.
-    await gpuIdle();
-    await turnFor(auto, 500);
-    const rested = await comeToRest(auto);
-    await until(() => auto.stats?.pace.drawn === 'whole', 'the true image');
-    await gpuIdle();
-    const waited = performance.now() - rested;
+    // The best of three: other tests share the processor.
+    let waited = Infinity;
+    for (let i = 0; i < 3 && waited > 300 + 2 * whole; i++) {
+      await gpuIdle();
+      await turnFor(auto, 500);
+      const rested = await comeToRest(auto);
+      await until(() => auto.stats?.pace.drawn === 'whole', 'the true image');
+      await gpuIdle();
+      waited = Math.min(waited, performance.now() - rested);
+    }
     console.log(`the true image ${waited.toFixed(0)} ms after rest`);
     await frames(2);
     const [shown, expected] = [await screenOf(auto), await screenOf(fixed)];
     assertEqual(shown.differences(expected), 0, 'colour values that differ from the plain default picture');
-    // Finished, not only begun; a frame that is on its way when the camera stops is waited for, and one in which other tests share the processor.
-    assert(waited <= 300 + 3 * whole, `${waited} ms after rest, a frame takes ${whole}`);
+    // Finished, not only begun; a frame that is on its way when the camera stops is waited for.
+    assert(waited <= 300 + 2 * whole, `${waited} ms after rest, a frame takes ${whole}`);
   });
 
   it('makes no pipeline in motion, after another quality neither', async () => {
