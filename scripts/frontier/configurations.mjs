@@ -1,6 +1,6 @@
 /**
  * What the chart of speed against accuracy compares, a line for each configuration: its name, what it aims at (`tier`), and
- * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail, `sides: true` makes visible sets)
+ * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail)
  * or in resolution scale. A line whose options the renderer does not have yet is left out of the chart and listed as such.
  */
 export const configurations = [
@@ -32,8 +32,6 @@ export const configurations = [
   { name: 'detail 0.5 px', tier: 'lever', options: { detail: 0.5 }, pack: { detail: true } },
   { name: 'detail 1 px', tier: 'lever', options: { detail: 1 }, pack: { detail: true } },
   { name: 'detail 2 px', tier: 'lever', options: { detail: 2 }, pack: { detail: true } },
-  { name: 'visible sets', tier: 'lever', options: { visibleSets: true }, pack: { sides: true } },
-  { name: 'balanced, visible sets', tier: 'lever', options: { quality: 'balanced' }, pack: { sides: true } },
   ...[0.71, 0.5, 0.35, 0.25].map((resolutionScale) => ({
     ...{ name: `balanced at ${resolutionScale}`, tier: 'lever' },
     options: { quality: 'balanced', resolutionScale },

@@ -41,10 +41,6 @@ export interface Levers {
   readonly alphaMin: number;
   /** Least opacity times area, in px², of a splat that is drawn. */
   readonly minContribution: number;
-  /**
-   * Scenes with visible sets (`SidedGaussians`): leaves out splats that show from none of the sides near the camera's. False, the default, draws all.
-   */
-  readonly visibleSets: boolean;
   /** Spherical harmonics above this degree are ignored. */
   readonly shDegree: 0 | 1 | 2 | 3;
   /**
@@ -76,7 +72,6 @@ const EXACT: Levers = {
   transmittanceMin: TRAINED_TRANSMITTANCE,
   alphaMin: 1 / 255,
   minContribution: 0,
-  visibleSets: false,
   shDegree: 3,
   detail: 0,
   detailFade: 0.5,
@@ -103,13 +98,11 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
     ...EXACT,
     depthKeyBits: 16,
     transmittanceMin: 1 / 256,
-    visibleSets: true,
   },
   fast: {
     ...EXACT,
     depthKeyBits: 16,
     transmittanceMin: 1 / 128,
-    visibleSets: true,
   },
 };
 
@@ -125,7 +118,6 @@ const FRAME_LEVERS = [
   'transmittanceMin',
   'alphaMin',
   'minContribution',
-  'visibleSets',
   'shDegree',
   'detail',
   'resolutionScale',
@@ -149,7 +141,6 @@ const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
   threads: ['auto', 'parallel', 'serial'],
   accumulation: ['auto', 'rgba16float', 'rgba32float'],
   depthKeyBits: [16, 24, 32],
-  visibleSets: [false, true],
   shDegree: [0, 1, 2, 3],
 };
 

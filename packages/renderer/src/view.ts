@@ -28,7 +28,6 @@ export type CameraValues = Omit<
   | 'splat_budget'
   | 'alpha_min'
   | 'min_contribution'
-  | 'sides'
 >;
 
 /**

@@ -8,5 +8,4 @@ export const WITHOUT_LEVERS = {
   splat_budget: 0,
   alpha_min: constants.ALPHA_MIN,
   min_contribution: 0,
-  sides: [0, 0, 0, 0],
 } as const;
