@@ -21,7 +21,7 @@ import { countWork } from '../support/work-counters.js';
 
 const MIXES: readonly Partial<FrameLevers>[] = [
   { depthKeyBits: 16, resolutionScale: 0.6, shDegree: 0 },
-  { resolutionScale: 0.35, depthKeyBits: 16, alphaMin: 4 / 255, transmittanceMin: 0.05 },
+  { resolutionScale: 0.35, depthKeyBits: 16, transmittanceMin: 0.05 },
 ];
 
 const size = { width: 144, height: 70 };

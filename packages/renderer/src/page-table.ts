@@ -95,7 +95,7 @@ export class PageTable {
   look(
     camera: Camera,
     pixelArea: number,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget, alphaMin, minContribution }: Levers,
+    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
     isOrdered: boolean,
   ): void {
     const shared = {
@@ -105,8 +105,6 @@ export class PageTable {
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
-      alpha_min: alphaMin,
-      min_contribution: minContribution,
     };
     let page = 0;
     for (const scene of this.#scenes) {
