@@ -210,6 +210,7 @@ export class Stage
     return {
       element: this.element,
       runtimeLocation: this.services.runtimeLocation,
+      startWorker: this.services.sceneLoader.spawn,
       state: () => this.#live.state,
       ownsControls: () => !this.#live.post.isWanted,
       camera: (bounds) => {

@@ -21,6 +21,7 @@ export {
 export { sameInputs, type GpuTensor, type InputNumbers, type Inputs, type InputValue } from './input-value.js';
 export { PostProcessor, type FinishedPicture, type PictureInput, type PostProcessorOptions } from './post-processor.js';
 export { GeneratorSession } from './runtime/generator-session.js';
+export { answerCpuRun, type CpuRunMessage, type StartWorker } from './proof/run-on-cpu.js';
 export { compareParts, isDifferent, type ComparedPart, type Comparison } from './proof/compare.js';
 export type { Verdict } from './proof/record.js';
 export type { RunOutputs, SessionKind } from './runtime/live-session.js';

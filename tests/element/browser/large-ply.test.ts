@@ -100,6 +100,15 @@ describe('a large PLY', () => {
     assertEqual(element.error?.reason, 'decode/truncated');
   });
 
+  it('of more splats than the page allows is refused by name', async () => {
+    const { sceneLimits } = GaussianSplatElement;
+    GaussianSplatElement.sceneLimits = { maxSplats: SPLATS - 1 };
+    const element = show({ src: FILE });
+    await element.ready;
+    GaussianSplatElement.sceneLimits = sceneLimits;
+    assertEqual(element.error?.reason, 'out-of-memory/budget');
+  });
+
   it('is seen in part early, and never keeps the page from its work for long', async () => {
     await showLoaded();
     let longest = 0;
@@ -107,6 +116,11 @@ describe('a large PLY', () => {
       for (const { duration } of list.getEntries()) longest = Math.max(longest, duration);
     });
     observer.observe({ entryTypes: ['longtask'] });
+    let workers = 0;
+    GaussianSplatElement.sceneLoader = new Loader(() => {
+      workers++;
+      return new Worker(SCRIPT, { type: 'module' });
+    });
     const element = show({ src: `${FILE}&ms=4000` });
     const start = performance.now();
     await nextEvent(element, 'preview');
@@ -118,6 +132,7 @@ describe('a large PLY', () => {
     );
     observer.disconnect();
     assertEqual(element.statistics?.splats, expected.count, 'splats');
+    assert(workers > 1, `shared by ${workers} workers, with the limits that every page has`);
     assert(first < 4_000, `a preview after ${first.toFixed(0)} ms`);
   });
 });

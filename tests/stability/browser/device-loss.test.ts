@@ -60,7 +60,12 @@ describe('S22: the loss of the device', () => {
       element.style.width = '120px';
       const canvas = element.shadowRoot?.querySelector('canvas');
       await until(() => canvas?.width === 120, 'the size');
-      assertEqual((await screenOf(element)).differences(before), 0, `differing colour values after loss ${i}`);
+      // The camera has just jumped: what a busy machine draws first may be a picture of the jump.
+      const end = performance.now() + limit;
+      let differences;
+      do differences = (await screenOf(element)).differences(before);
+      while (differences !== 0 && performance.now() < end);
+      assertEqual(differences, 0, `differing colour values after loss ${i}`);
     }
     assertEqual(events.length, 2 * losses, `events: ${events.join()}`);
     times.sort((a, b) => a - b);

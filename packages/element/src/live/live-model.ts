@@ -57,6 +57,8 @@ export interface LiveRequest {
   readonly element: HTMLElement;
   /** Folder of the runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
+  /** Starts a worker that runs a model on the CPU when asked. */
+  readonly startWorker: () => Worker;
   readonly state: () => LiveState;
   /** False where controls may be another model's, which then reports what neither knows. */
   readonly ownsControls: () => boolean;

@@ -31,6 +31,7 @@ export class LiveWiring implements PostHost {
     return {
       credentials: credentialsOf(attributes.crossorigin),
       runtimeLocation: services.runtimeLocation,
+      startWorker: services.sceneLoader.spawn,
       state: () => this.state,
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),

@@ -47,7 +47,7 @@ export async function openLiveModel(
     },
     onError: (error) => (isOpen ? listeners.onError(error) : (firstFailure = error)),
     // Anything but "off" is what it is without the attribute.
-    compare: request.element.getAttribute('compare')?.trim() !== 'off',
+    compare: request.element.getAttribute('compare')?.trim() === 'off' ? false : request.startWorker,
     onFallback: (reason) => {
       listeners.onFallback(reason);
       listeners.onInput();

@@ -6,7 +6,7 @@ import type { LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
 import { StateReader } from './read-state.js';
 
-export interface PostRequest extends Pick<LiveRequest, 'credentials' | 'runtimeLocation' | 'state'> {
+export interface PostRequest extends Pick<LiveRequest, 'credentials' | 'runtimeLocation' | 'startWorker' | 'state'> {
   /** One post-processor, or several one after the other. */
   readonly urls: readonly string[];
   readonly signal: AbortSignal;
@@ -73,6 +73,7 @@ export class PostView implements FrameFilter {
       device,
       {
         signal,
+        compare: request.startWorker,
         onFallback,
         onPicture: (picture) => {
           if (view) view.#accept(picture);

@@ -50,13 +50,14 @@ export class LargePly {
     beginning: Uint8Array,
     total: number,
     name: string,
-    { sh }: SceneRequest,
+    { sh, limits: { maxSplats = Infinity } = {} }: SceneRequest,
     signal: AbortSignal,
     listeners: LoadListeners,
   ): Promise<LargePly | undefined> {
-    // What is wrong with a header, those say who read it whole.
+    // What is wrong with a header, or more than the page allows, those say who read it whole. The download keeps the limit of bytes.
     const { rows, count = 0 } = (await splatRanges(beginning, name).catch(() => undefined)) ?? {};
-    const isWhole = rows !== undefined && count > 0 && rows.start + count * rows.byteLength <= total;
+    const isWhole =
+      rows !== undefined && count > 0 && count <= maxSplats && rows.start + count * rows.byteLength <= total;
     return isWhole ? new LargePly(rows, count, sh, signal, listeners) : undefined;
   }
 

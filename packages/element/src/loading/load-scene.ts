@@ -132,10 +132,9 @@ class SharedReading {
     this.#of = [name, request, signal, listeners];
   }
 
-  /** True of large PLYs, but for those whose rows must be read in order, and where the page has set limits, which one reader keeps. */
+  /** True of large PLYs, but for those whose rows must be read in order, and where the page has set a limit of time, which one reader keeps. */
   mayBeShared(bytes: Uint8Array, total = 0): boolean {
-    const { maxSplats, maxBytes, maxSeconds } = this.#of[1].limits ?? {};
-    if ((maxSplats ?? maxBytes ?? maxSeconds) !== undefined) return false;
+    if (this.#of[1].limits?.maxSeconds !== undefined) return false;
     return total >= LARGE_BYTES && bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79 && !this.#isRefused;
   }
 

@@ -1,5 +1,6 @@
 /** What the page and the scene worker say to each other. */
 import type { ErrorData } from '@gaussian-splat/core';
+import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
 import type { LevelPage, LevelScene, PackedGaussians, ShPrecision, StreamedScene } from '@gaussian-splat/renderer';
@@ -85,7 +86,9 @@ export type PageMessage =
   /** A way to another worker that packs splats. */
   | { readonly type: 'helper'; readonly id: number; readonly port: MessagePort }
   /** Pack what comes through the port. */
-  | { readonly type: 'pack'; readonly port: MessagePort };
+  | { readonly type: 'pack'; readonly port: MessagePort }
+  /** Run a generator once on the CPU, in a worker that is started for it. */
+  | CpuRunMessage;
 
 export type WorkerMessage =
   /** The script runs. */

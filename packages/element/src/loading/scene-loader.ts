@@ -17,6 +17,8 @@ export type Here = typeof workerModule;
 
 /** Loads scenes in workers: one for the whole page, started on the first load and ended when idle, and more only where that one does not answer. */
 export class SceneLoader {
+  /** Starts a worker that is the caller's own. */
+  readonly spawn: () => Worker;
   readonly #pool: WorkerPool;
 
   /**
@@ -24,8 +26,9 @@ export class SceneLoader {
    * @param locationOf address of the worker's script; null for the one beside the code
    */
   constructor(spawn?: () => Worker, locationOf: () => string | null = () => null) {
+    this.spawn = spawn ?? (() => spawnSceneWorker(locationOf()));
     this.#pool = new WorkerPool(
-      spawn ?? (() => spawnSceneWorker(locationOf())),
+      this.spawn,
       () => this.#code(),
       (reason) =>
         console.warn(

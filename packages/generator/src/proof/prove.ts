@@ -2,7 +2,7 @@ import { loadRuntime } from '../runtime/load-runtime.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
 import { compareParts, isDifferent, type ComparedPart, type Comparison } from './compare.js';
 import { readRecord, recordKey, writeRecord, type Verdict } from './record.js';
-import { runInWorker, type CpuRun } from './run-on-cpu.js';
+import { runInWorker, type CpuRun, type StartWorker } from './run-on-cpu.js';
 
 /** A run on the GPU, with pieces of what it wrote. */
 export interface Evidence {
@@ -56,9 +56,10 @@ export function prove(
   device: GPUDevice,
   evidence: Evidence,
   signal: AbortSignal,
+  startWorker?: StartWorker,
 ): Promise<Verdict> {
   const entry = knownOf(model, device);
-  entry.verdict ??= compare(model, evidence, signal).then(
+  entry.verdict ??= compare(model, evidence, signal, startWorker).then(
     async (verdict) => {
       writeRecord(await entry.key, verdict);
       return verdict;
@@ -72,7 +73,12 @@ export function prove(
   return entry.verdict;
 }
 
-async function compare(model: GeneratorModel, evidence: Evidence, signal: AbortSignal): Promise<Verdict> {
+async function compare(
+  model: GeneratorModel,
+  evidence: Evidence,
+  signal: AbortSignal,
+  startWorker?: StartWorker,
+): Promise<Verdict> {
   const { header, contract, instances } = model;
   const unknown = (why: string): Verdict => ({ result: 'unknown', reason: `not compared with the CPU: ${why}` });
   if ([...header.operators.keys()].some((name) => IS_RANDOM.test(name))) return unknown('it draws random numbers');
@@ -91,6 +97,7 @@ async function compare(model: GeneratorModel, evidence: Evidence, signal: AbortS
       parts: parts.map(({ tensor, offset, size }) => ({ tensor, offset, size })),
     },
     signal,
+    startWorker,
   );
   for (const [name, dims] of Object.entries(outputs.dims)) {
     // A row more or less is a threshold, not another result; but then nothing lies where it lay.

@@ -1,4 +1,5 @@
-import type { RuntimeSource } from '../runtime/load-runtime.js';
+import type * as OnnxRuntime from 'onnxruntime-web/webgpu';
+import type { Ort, RuntimeSource } from '../runtime/load-runtime.js';
 
 /** A run of a model, with everything that a worker needs. */
 export interface CpuRun {
@@ -21,50 +22,83 @@ export interface CpuOutputs {
 /** Longest that a run may take, start of the runtime included, ms. */
 const LIMIT_MS = 60_000;
 
+/** What a worker of {@link StartWorker} is sent. */
+export interface CpuRunMessage {
+  readonly type: 'run-on-cpu';
+  readonly script: string;
+  readonly wasm: ArrayBuffer;
+  readonly run: CpuRun;
+}
+
+type Answer = { readonly type: 'ran-on-cpu'; readonly outputs?: CpuOutputs; readonly failure?: string };
+
 /**
- * The worker's whole script. A string, since it is a worker of any page's own origin that imports the runtime from wherever that is; bundlers
- * need not know of it.
+ * Starts a worker that calls {@link answerCpuRun} for messages of type `run-on-cpu`. For pages whose Content-Security-Policy has no `blob:` in
+ * `worker-src`, or whose Trusted Types let only named policies make the address of a script.
  */
-const SCRIPT = `onmessage = async ({ data: { script, wasm, run } }) => {
+export type StartWorker = () => Worker;
+
+/**
+ * The worker's side: runs the model, and posts what it wrote. It uses nothing but its arguments, for its text is the script of workers that
+ * this package starts itself.
+ */
+export async function answerCpuRun({ script, wasm, run }: CpuRunMessage): Promise<void> {
+  const post = postMessage as (answer: Answer, transfer?: Transferable[]) => void;
   try {
-    const ort = await import(script);
+    const ort = (await import(/* @vite-ignore */ /* webpackIgnore: true */ script)) as Ort;
     ort.env.logLevel = 'fatal';
     ort.env.wasm.numThreads = 1;
     ort.env.wasm.wasmBinary = wasm;
     const { externalData, freeDimensionOverrides } = run;
-    const options = {
+    const session = await ort.InferenceSession.create(run.model, {
       executionProviders: ['wasm'],
       // As the file says it: fusions have computed something else.
       graphOptimizationLevel: 'basic',
       logSeverityLevel: 4,
       externalData,
       freeDimensionOverrides,
-    };
-    const session = await ort.InferenceSession.create(run.model, options);
-    const feeds = {};
-    for (const [name, { dtype, data, dims }] of Object.entries(run.feeds)) feeds[name] = new ort.Tensor(dtype, data, dims);
+    });
+    const feeds: Record<string, OnnxRuntime.Tensor> = {};
+    for (const [name, { dtype, data, dims }] of Object.entries(run.feeds))
+      feeds[name] = new ort.Tensor(dtype as 'float32', data as Float32Array, dims);
     const results = await session.run(feeds, [...new Set(run.parts.map(({ tensor }) => tensor))]);
-    const dims = {};
+    const dims: Record<string, readonly number[]> = {};
     for (const [name, tensor] of Object.entries(results)) dims[name] = [...tensor.dims];
     const parts = run.parts.map(({ tensor, offset, size }) => {
-      const { buffer, byteOffset, byteLength } = results[tensor].data;
+      const { buffer, byteOffset, byteLength } = results[tensor].data as Float32Array;
       return new Uint8Array(buffer, byteOffset, byteLength).slice(offset, offset + size);
     });
-    postMessage({ dims, parts });
+    post({ type: 'ran-on-cpu', outputs: { dims, parts } });
   } catch (error) {
-    postMessage({ failure: String(error && error.message || error) });
+    post({ type: 'ran-on-cpu', failure: error instanceof Error ? error.message : String(error) });
   }
-};`;
+}
+
+/** A worker of any page's own origin; bundlers need not know of it. */
+function startOwnWorker(): Worker {
+  const text = `onmessage = ({ data }) => (${String(answerCpuRun)})(data);`;
+  const url = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
+  try {
+    return new Worker(url);
+  } finally {
+    // Its script has been asked for by then, or after a moment.
+    setTimeout(() => URL.revokeObjectURL(url), 10_000);
+  }
+}
 
 /**
  * Runs a model once on the CPU, in a worker of its own with a copy of the runtime of its own, which both end with it: the page's thread, and
  * frames, do not notice.
  * @throws if no worker may be started here, it takes too long, or the model does not run.
  */
-export function runInWorker({ script, wasm }: RuntimeSource, run: CpuRun, signal: AbortSignal): Promise<CpuOutputs> {
-  const url = URL.createObjectURL(new Blob([SCRIPT], { type: 'text/javascript' }));
+export function runInWorker(
+  { script, wasm }: RuntimeSource,
+  run: CpuRun,
+  signal: AbortSignal,
+  startWorker: StartWorker = startOwnWorker,
+): Promise<CpuOutputs> {
   return new Promise<CpuOutputs>((resolve, reject) => {
-    const worker = new Worker(url);
+    const worker = startWorker();
     const end = (finish: () => void): void => {
       clearTimeout(timer);
       worker.terminate();
@@ -75,9 +109,15 @@ export function runInWorker({ script, wasm }: RuntimeSource, run: CpuRun, signal
       LIMIT_MS,
     );
     signal.addEventListener('abort', () => end(() => reject(signal.reason as Error)), { once: true });
-    worker.onerror = (event) => end(() => reject(new Error(event.message || 'this page lets no worker be started')));
-    worker.onmessage = ({ data }: MessageEvent<CpuOutputs | { failure: string }>) =>
-      end(() => ('failure' in data ? reject(new Error(data.failure)) : resolve(data)));
-    worker.postMessage({ script, wasm, run });
-  }).finally(() => URL.revokeObjectURL(url));
+    worker.addEventListener('error', (event) =>
+      end(() => reject(new Error(event.message || 'this page lets no worker be started'))),
+    );
+    worker.addEventListener('message', ({ data }: MessageEvent<Answer | { readonly type: 'ready' }>) => {
+      if (data.type !== 'ran-on-cpu') return;
+      const { outputs, failure } = data;
+      end(() => (outputs ? resolve(outputs) : reject(new Error(failure))));
+    });
+    const message: CpuRunMessage = { type: 'run-on-cpu', script, wasm, run };
+    worker.postMessage(message);
+  });
 }

@@ -7,6 +7,7 @@ import type { LiveSession, RunOutputs, SessionKind } from './live-session.js';
 import { RuntimeGone } from './load-runtime.js';
 import type { GeneratorModel } from './open-model.js';
 import { earlierVerdict, prove, type Evidence } from '../proof/prove.js';
+import type { StartWorker } from '../proof/run-on-cpu.js';
 import type { Verdict } from '../proof/record.js';
 import { runFault, startSession } from './start-session.js';
 
@@ -26,7 +27,7 @@ export class GeneratorSession {
   readonly model: GeneratorModel;
   readonly device: GPUDevice;
   readonly #onFallback: (reason: string) => void;
-  readonly #isCompared: boolean;
+  readonly #compare: boolean | StartWorker;
   readonly #end = new AbortController();
   readonly #oneInstance: OnnxHeader;
   #live: Promise<LiveSession> | undefined;
@@ -44,19 +45,19 @@ export class GeneratorSession {
 
   /**
    * @param onFallback told once if the model has to run on the CPU
-   * @param isCompared whether what the first run writes on the GPU is compared with what the CPU writes
+   * @param compare whether what the first run writes on the GPU is compared with what the CPU writes; a function starts the worker for it
    * @throws GaussianSplatError `out-of-memory/buffer-limit` if an output is larger than the device's buffers.
    */
   constructor(
     model: GeneratorModel,
     device: GPUDevice,
     onFallback: (reason: string) => void = () => undefined,
-    isCompared = true,
+    compare: boolean | StartWorker = true,
   ) {
     this.model = model;
     this.device = device;
     this.#onFallback = onFallback;
-    this.#isCompared = isCompared;
+    this.#compare = compare;
     this.#oneInstance = oneInstance(model.header, model.contract);
     requireRoom(model, device);
     void device.lost.then(() => {
@@ -99,7 +100,7 @@ export class GeneratorSession {
       outputs: outputs.map((output) => ({ ...output, most: output.most && output.most * count })),
       instances: count,
     };
-    return new GeneratorSession(model, this.device, this.#onFallback, this.#isCompared);
+    return new GeneratorSession(model, this.device, this.#onFallback, this.#compare);
   }
 
   /**
@@ -184,7 +185,7 @@ export class GeneratorSession {
     const { model, device } = this;
     const requireLife = (): void => this.#requireLife();
     const onFallback = this.#kind === 'wasm' ? () => undefined : this.#onFallback;
-    if (this.#isCompared) this.#verdict ??= await earlierVerdict(model, device);
+    if (this.#compare) this.#verdict ??= await earlierVerdict(model, device);
     if (this.#verdict?.result === 'different') this.#refusal ??= this.#verdict.reason;
     const { session, evidence } = await startSession({
       model,
@@ -194,7 +195,7 @@ export class GeneratorSession {
       onBreakage: () => (this.#hasBroken = true),
       onFallback,
       refusal: this.#refusal,
-      keepsEvidence: this.#isCompared && this.#verdict === undefined,
+      keepsEvidence: this.#compare !== false && this.#verdict === undefined,
     });
     this.#kind = session.kind;
     if (evidence) void this.#prove(evidence);
@@ -203,7 +204,8 @@ export class GeneratorSession {
 
   /** Once what the GPU writes turns out to be wrong, the model runs on the CPU: the next run starts there. */
   async #prove(evidence: Evidence): Promise<void> {
-    const verdict = await prove(this.model, this.device, evidence, this.#end.signal);
+    const startWorker = typeof this.#compare === 'function' ? this.#compare : undefined;
+    const verdict = await prove(this.model, this.device, evidence, this.#end.signal, startWorker);
     if (this.#end.signal.aborted) return;
     this.#verdict = verdict;
     if (verdict.result !== 'different' || this.#kind === 'wasm') return;

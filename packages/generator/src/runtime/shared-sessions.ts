@@ -1,3 +1,4 @@
+import type { StartWorker } from '../proof/run-on-cpu.js';
 import { GeneratorSession } from './generator-session.js';
 import type { FetchOptions } from './fetch-bytes.js';
 import { openModel, type ModelSource } from './open-model.js';
@@ -26,9 +27,10 @@ export interface AcquireOptions extends Pick<FetchOptions, 'signal' | 'onProgres
   readonly onFallback?: (reason: string) => void;
   /**
    * Whether what the first run writes on the GPU is compared with what the CPU writes: in a worker, when the page is idle, once for each model and
-   * adapter. Where they differ the model runs on the CPU from then on. Default true; of those who share a model the first one's word counts.
+   * adapter. Where they differ the model runs on the CPU from then on. Default true; of those who share a model the first one's word counts. A
+   * function starts the worker: see {@link StartWorker}.
    */
-  readonly compare?: boolean;
+  readonly compare?: boolean | StartWorker;
 }
 
 /**
