@@ -39,7 +39,6 @@ RARE[ECONOMISE] = [
   'economise_moments',
   'economise_score',
   'economise_take',
-  'note_sides',
   'picture_error',
   'picture_error_sum',
   'refine_backward',

@@ -13,7 +13,6 @@ const IN_CHROMIUM = {
 const IN_NODE = {
   fuzz: ['--import', 'tsx', 'tests/stability/fuzz/run-fuzz.ts'],
   'detail-chart': ['scripts/charts/detail.mjs'],
-  'sides-chart': ['scripts/charts/sides.mjs'],
 };
 
 const [name, ...args] = process.argv.slice(2);

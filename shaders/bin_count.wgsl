@@ -14,7 +14,7 @@
 @group(0) @binding(5) var<storage, read_write> group_pairs: array<u32>;
 
 fn bin_rect(s: ProjectedSplat) -> u32 {
-  let c = coverage_of(s, view.alpha_min);
+  let c = coverage_of(s);
   let size = vec2f(f32(BIN_WIDTH), f32(BIN_HEIGHT));
   // Pixel centres are what counts, half a pixel inside the edges.
   let low = clamp(c.center - c.extent - 0.5, vec2f(0.0), view.viewport - 1.0);

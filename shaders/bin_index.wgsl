@@ -53,7 +53,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var mask = 0u;
   if (i < pair_plan.visible) {
     let bin = bins[i];
-    mask = touched_tiles(coverage_of(splats[pairs[i]], view.alpha_min), vec2u(bin % view.bins.x, bin / view.bins.x));
+    mask = touched_tiles(coverage_of(splats[pairs[i]]), vec2u(bin % view.bins.x, bin / view.bins.x));
     if (i == 0u || bins[i - 1u] != bin) { ranges[bin].x = i; }
     if (i == pair_plan.visible - 1u || bins[i + 1u] != bin) { ranges[bin].y = i + 1u; }
   }

@@ -24,7 +24,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let share = chunk_shares[group];
   if (share <= 0.0) { return; }
   let i = chunk * CULL_GROUP + lane;
-  if (i < view.splat_count && !is_turned_away(view, i)) {
+  if (i < view.splat_count) {
     let found = gaussian_at(i);
     if (!is_usable(found)) {
       atomicAdd(&gathered[UNUSABLE], 1u);

@@ -23,7 +23,6 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var nearest = 0xffffffffu;
   var farthest = 0u;
   for (var k = 0u; k < 32u && first + k < view.splat_count; k++) {
-    if (is_turned_away(view, first + k)) { continue; }
     let found = gaussian_at(first + k);
     if (!is_usable(found)) {
       atomicAdd(&gathered[UNUSABLE], 1u);

@@ -16,8 +16,6 @@ struct ProbePoint {
   pixel: vec2f,
   // World units along the camera's axis.
   depth: f32,
-  // Least alpha that the image was painted with.
-  alpha_min: f32,
 }
 
 struct ProbeAnswer {
@@ -38,7 +36,7 @@ var<workgroup> runs_in_front: array<f32, PROBE_LANES>;
 // Share of the light that a splat lets through at a pixel.
 fn passes(s: ProjectedSplat, point: ProbePoint) -> f32 {
   let alpha = alpha_at(point.pixel - s.shape.xy, s.shape.z, s.shape.w, bitcast<f32>(s.paint.x), bitcast<f32>(s.paint.w));
-  return select(1.0, 1.0 - alpha, alpha >= point.alpha_min);
+  return select(1.0, 1.0 - alpha, alpha >= ALPHA_MIN);
 }
 
 @compute @workgroup_size(PROBE_LANES)

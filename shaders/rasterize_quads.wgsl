@@ -16,8 +16,6 @@ struct RasterView {
   // Which part of the splats to draw, counted from the farthest, of how many.
   slice: u32,
   slices: u32,
-  // Least alpha that paints: ALPHA_MIN, or more as a lever.
-  alpha_min: f32,
 }
 
 struct Quad {
@@ -29,7 +27,7 @@ struct Quad {
 }
 
 // Pixels by which quads are larger than they need be: rasterizers snap vertices, some of them to 1/16 of a pixel, and the quad of a
-// splat whose opacity is just above alpha_min may be smaller than that.
+// splat whose opacity is just above ALPHA_MIN may be smaller than that.
 const SNAP_MARGIN = 0.0625;
 // Quads that reach farther than this, in pixels, are drawn as their box clipped to the image instead.
 const MAX_REACH = 8192.0;
@@ -38,7 +36,7 @@ fn quad_corner(s: ProjectedSplat, opacity: f32, corner: vec2f) -> vec2f {
   let sigma_x = 1.0 / s.shape.z;
   let slope = s.shape.w;
   let sigma_v = 1.0 / bitcast<f32>(s.paint.x);
-  let radius = cutoff_radius(opacity, raster.alpha_min);
+  let radius = cutoff_radius(opacity);
   let half_width = radius * sigma_x + SNAP_MARGIN;
   let half_height = radius * sqrt(slope * slope * sigma_x * sigma_x + sigma_v * sigma_v) + SNAP_MARGIN;
   if (max(half_width, half_height) > MAX_REACH) {
@@ -69,7 +67,7 @@ fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) ins
 fn fragment(quad: Quad) -> @location(0) vec4f {
   let offset = quad.position.xy - quad.shape.xy;
   let alpha = alpha_at(offset, quad.shape.z, quad.shape.w, quad.inverse_sigma_v, quad.color.a);
-  if (alpha < raster.alpha_min) { discard; }
+  if (alpha < ALPHA_MIN) { discard; }
   // Blended as colour = alpha · color + (1 - alpha) · colour and transmittance = (1 - alpha) · transmittance.
   return vec4f(quad.color.rgb * alpha, alpha);
 }

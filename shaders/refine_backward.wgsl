@@ -66,7 +66,7 @@ fn unblend(pixel: ptr<function, Pixel>, k: u32) {
   let u = offset.x * shape.z;
   let v = (offset.y - shape.w * offset.x) * bitcast<f32>(paints[k].x);
   let own = bitcast<f32>(paints[k].w) * exp(-0.5 * (u * u + v * v));
-  if (own < view.alpha_min) { return; }
+  if (own < ALPHA_MIN) { return; }
   let alpha = min(ALPHA_MAX, own);
   let before = (*pixel).transmittance;
   let weight = before * alpha;

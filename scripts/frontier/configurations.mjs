@@ -1,6 +1,6 @@
 /**
  * What the chart of speed against accuracy compares, a line for each configuration: its name, what it aims at (`tier`), and
- * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail, `sides: true` makes visible sets)
+ * how it differs from the default in options of the Renderer, of packGaussians (`pack`; `detail: true` packs levels of detail)
  * or in resolution scale. A line whose options the renderer does not have yet is left out of the chart and listed as such.
  */
 export const configurations = [
@@ -17,23 +17,12 @@ export const configurations = [
   { name: 'SH degree 0', tier: 'lever', options: { shDegree: 0 } },
   { name: '16-bit keys', tier: 'lever', options: { depthKeyBits: 16 } },
   { name: '32-bit keys', tier: 'lever', options: { depthKeyBits: 32 } },
-  { name: 'sort every degree', tier: 'lever', options: { sortAngle: 0.0175 } },
-  { name: 'sort every 2 degrees', tier: 'lever', options: { sortAngle: 0.035 } },
-  { name: 'sort every 4 degrees', tier: 'lever', options: { sortAngle: 0.07 } },
   { name: 'stop at 1/500', tier: 'lever', options: { transmittanceMin: 1 / 500 } },
   { name: 'stop at 1/64', tier: 'lever', options: { transmittanceMin: 1 / 64 } },
-  { name: 'alpha from 2/255', tier: 'lever', options: { alphaMin: 2 / 255 } },
-  { name: 'alpha from 4/255', tier: 'lever', options: { alphaMin: 4 / 255 } },
-  { name: 'alpha from 8/255', tier: 'lever', options: { alphaMin: 8 / 255 } },
-  { name: 'contribution from 0.5', tier: 'lever', options: { minContribution: 0.5 } },
-  { name: 'contribution from 1', tier: 'lever', options: { minContribution: 1 } },
-  { name: 'contribution from 3', tier: 'lever', options: { minContribution: 3 } },
   { name: 'detail 0.25 px', tier: 'lever', options: { detail: 0.25 }, pack: { detail: true } },
   { name: 'detail 0.5 px', tier: 'lever', options: { detail: 0.5 }, pack: { detail: true } },
   { name: 'detail 1 px', tier: 'lever', options: { detail: 1 }, pack: { detail: true } },
   { name: 'detail 2 px', tier: 'lever', options: { detail: 2 }, pack: { detail: true } },
-  { name: 'visible sets', tier: 'lever', options: { visibleSets: true }, pack: { sides: true } },
-  { name: 'balanced, visible sets', tier: 'lever', options: { quality: 'balanced' }, pack: { sides: true } },
   ...[0.71, 0.5, 0.35, 0.25].map((resolutionScale) => ({
     ...{ name: `balanced at ${resolutionScale}`, tier: 'lever' },
     options: { quality: 'balanced', resolutionScale },

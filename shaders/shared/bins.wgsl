@@ -30,8 +30,6 @@ struct BinView {
   splat_groups: u32,
   // First tile, across and down, of the part of the image that is painted: a frame with much to do is painted part by part.
   first_tile: vec2u,
-  // Least alpha that paints: ALPHA_MIN, or more as a lever.
-  alpha_min: f32,
   // A pixel is finished before a splat that would take its transmittance to this or below.
   transmittance_min: f32,
 }

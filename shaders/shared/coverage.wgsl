@@ -1,4 +1,4 @@
-// Which rectangles of pixels the visible part of a splat, the ellipse with alpha >= alpha_min, touches: exactly.
+// Which rectangles of pixels the visible part of a splat, the ellipse with alpha >= ALPHA_MIN, touches: exactly.
 #import shared/splat
 #import shared/falloff
 
@@ -22,11 +22,11 @@ struct Coverage {
   inverse_height: f32,
 }
 
-fn coverage_of(s: ProjectedSplat, alpha_min: f32) -> Coverage {
+fn coverage_of(s: ProjectedSplat) -> Coverage {
   let sigma_x = 1.0 / s.shape.z;
   let slope = s.shape.w;
   let sigma_v = 1.0 / bitcast<f32>(s.paint.x);
-  let radius = cutoff_radius(bitcast<f32>(s.paint.w), alpha_min);
+  let radius = cutoff_radius(bitcast<f32>(s.paint.w));
   let sheared = slope * sigma_x;
   // Divisions are what this costs: one here, for all bands.
   let variance_y = min(sheared * sheared + sigma_v * sigma_v, VARIANCE_MAX);

@@ -5,9 +5,9 @@ const ALPHA_MIN = 1.0 / 255.0;
 // No splat is more opaque than this: gsplat's limit. INRIA's is 0.99, which the reference images refuse.
 const ALPHA_MAX = 0.999;
 
-// Distance from the centre, in standard deviations, at which alpha falls to a least one. 0 for opacities up to that.
-fn cutoff_radius(opacity: f32, alpha_min: f32) -> f32 {
-  return sqrt(2.0 * log(max(opacity / alpha_min, 1.0)));
+// Distance from the centre, in standard deviations, at which alpha falls to ALPHA_MIN. 0 for opacities up to that.
+fn cutoff_radius(opacity: f32) -> f32 {
+  return sqrt(2.0 * log(max(opacity / ALPHA_MIN, 1.0)));
 }
 
 // Alpha of a splat at an offset from its centre, in pixels: opacity · exp(-(u² + v²) / 2), at most ALPHA_MAX.

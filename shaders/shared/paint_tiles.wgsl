@@ -82,7 +82,7 @@ fn pixel_in_tile(lane: u32) -> vec2u {
 
 // Notes splat k of the batch for the blocks of the tile that it touches.
 fn hit_blocks(k: u32, s: ProjectedSplat, tile_corner: vec2f) {
-  let c = coverage_of(s, view.alpha_min);
+  let c = coverage_of(s);
   let word = k / 32u;
   let bit = 1u << (k % 32u);
   let size = vec2f(f32(BLOCK_WIDTH), f32(BLOCK_HEIGHT));
@@ -224,7 +224,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let range = ranges[bin.y * view.bins.x + bin.x];
 
   var pixel = Pixel(vec3f(0.0), 1.0, select(view.transmittance_min, FINISHED, is_outside));
-  let least_power = log2(view.alpha_min);
+  let least_power = log2(ALPHA_MIN);
   if (lane == 0u) { brushes[NO_SPLAT].power = NO_POWER; }
   // First word of the window and the one behind it, and how many of the pairs found in it have been painted.
   var first_word = range.x / 32u;

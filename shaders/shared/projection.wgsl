@@ -55,9 +55,9 @@ fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
   );
 }
 
-// Half width and half height, in pixels, of the box of all points with alpha >= alpha_min.
+// Half width and half height, in pixels, of the box of all points with alpha >= ALPHA_MIN.
 fn half_extent(view: View, e: Ellipse) -> vec2f {
-  let radius = cutoff_radius(e.opacity, view.alpha_min);
+  let radius = cutoff_radius(e.opacity);
   let sheared = e.slope * e.sigma_x;
   return radius * vec2f(e.sigma_x, sqrt(sheared * sheared + e.sigma_v * e.sigma_v));
 }
@@ -67,5 +67,5 @@ fn covers_a_pixel(view: View, e: Ellipse) -> bool {
   let extent = half_extent(view, e);
   let first = max(ceil(e.center - extent - 0.5), vec2f(0.0));
   let last = min(floor(e.center + extent - 0.5), view.viewport - 1.0);
-  return e.opacity >= view.alpha_min && all(first <= last);
+  return e.opacity >= ALPHA_MIN && all(first <= last);
 }

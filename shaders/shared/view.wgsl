@@ -40,12 +40,6 @@ struct View {
   detail_fade: f32,
   // Splats that the frame may look at.
   splat_budget: u32,
-  // Least alpha that paints: ALPHA_MIN, or more as a lever.
-  alpha_min: f32,
-  // Splats with less than this opacity times their area in px² are left out. A lever: 0 leaves out none.
-  min_contribution: f32,
-  // Directions near the camera's, of those that splats were looked at from, a bit each (shared/sides); none draws all splats.
-  sides: vec4u,
 }
 
 // From page-local coordinates to the camera's axes. What lies near the eye is subtracted from it first, which is exact: far from the page's origin both are

@@ -35,13 +35,13 @@ function movedBy(side: number): readonly Miscompilation[] {
     // What the listing of bins finds, against what painting finds of the same splats.
     {
       shader: /gs\.bin_count/,
-      from: 'coverage_of(s, view.alpha_min)',
-      to: `coverage_of(s, ${factor} * view.alpha_min)`,
+      from: 'opacity / ALPHA_MIN',
+      to: `opacity / (${factor} * ALPHA_MIN)`,
     },
     {
       shader: /gs\.rasterize_tiles/,
-      from: 'coverage_of(s, view.alpha_min)',
-      to: `coverage_of(s, view.alpha_min / ${factor})`,
+      from: 'opacity / ALPHA_MIN',
+      to: `${factor} * opacity / ALPHA_MIN`,
     },
   ];
 }

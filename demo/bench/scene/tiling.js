@@ -1,6 +1,4 @@
 /** Copies of a scene, as one cloud or straight to the GPU. */
-import { boundsOf } from '@gaussian-splat/core';
-import { lookAround } from '@gaussian-splat/economise';
 import { GaussianBuffers, packGaussians, packWithDetail } from '@gaussian-splat/renderer';
 
 /** Splats in one upload: their harmonics stay well under the largest array that browsers allocate. */
@@ -42,16 +40,11 @@ export function tileCloud(cloud, copies) {
 
 /**
  * Uploads the copies, a few million splats at a time, without ever holding them all in memory.
- * @param pack options of packGaussians, and `detail`, `sides`: levels of detail, visible sets
+ * @param pack options of packGaussians, and `detail`: levels of detail
+ * It is handed on as it is: whoever asks for unread options watches that very object.
  * @returns {Promise<GaussianBuffers[]>} to be drawn together.
  */
 export async function uploadTiled(device, cloud, copies, pack = {}) {
-  const whole = await uploadWhole(device, cloud, copies, pack);
-  return pack.sides ? withSides(device, boundsAround(cloud, copies), whole) : whole;
-}
-
-/** `pack` is handed on as it is: whoever asks for unread options watches that very object. */
-async function uploadWhole(device, cloud, copies, pack) {
   // Levels of detail are built over all copies together.
   if (pack.detail) return [await GaussianBuffers.upload(device, packWithDetail(tileCloud(cloud, copies), pack))];
   const packed = packGaussians(cloud, pack);
@@ -65,23 +58,6 @@ async function uploadWhole(device, cloud, copies, pack) {
     first = end;
   }
   return uploads;
-}
-
-/** The same with visible sets; where copies fill several uploads, each shows what it hides of itself alone. */
-async function withSides(device, around, uploads) {
-  const sided = [];
-  for (const upload of uploads) sided.push(await lookAround(device, upload, around));
-  return sided;
-}
-
-/** A ball around all copies. */
-function boundsAround(cloud, copies) {
-  const { center, radius } = boundsOf(cloud);
-  const middle = [0, 1, 2].map((axis) => copies.reduce((sum, { offset }) => sum + offset[axis], 0) / copies.length);
-  const reach = Math.max(
-    ...copies.map(({ offset }) => Math.hypot(...offset.map((value, axis) => value - middle[axis]))),
-  );
-  return { center: center.map((value, axis) => value + middle[axis]), radius: radius + reach };
 }
 
 /** Splats whose bounds the packed scene keeps together. */

@@ -1,7 +1,6 @@
 export { economise, type Economised, type EconomiseOptions } from './economise.js';
 export type { CutFigures, Evaluator, JudgedViews } from './evaluator.js';
 export { GpuEvaluator, type GpuEvaluatorOptions } from './gpu/gpu-evaluator.js';
-export { lookAround, visibleSetsDecibels, type LookAroundOptions, type ViewSize } from './look-around.js';
 export { MergingEvaluator, type MergingOptions } from './merge/merging-evaluator.js';
 export { decibels, meanSquare, type Image } from './measure.js';
 export type { TaskPool } from './parts/task-pool.js';

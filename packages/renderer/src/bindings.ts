@@ -169,9 +169,8 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
     const gaussians = page.geometry;
     const reading = stages.reading(page.reading);
     const wishes = table.wishesOf(i);
-    // Something must be bound where there are no levels of detail and no visible sets; it is not looked at.
+    // Something must be bound where there are no levels of detail; it is not looked at.
     const details = page.details ?? page.chunks;
-    const seenFrom = page.seenFrom ?? page.chunks;
     const chunk = { view, visible_bits: visibleBits };
     return {
       reading,
@@ -194,7 +193,6 @@ function bindPages(stages: Stages, table: PageTable, scratch: Scratch): PageBind
         group_counts: groupOffsets,
         gathered,
         chunk_shares: chunkShares,
-        seen_from: seenFrom,
       }),
       compact: stages.compact.bind({ ...chunk, group_offsets: groupOffsets, survivors }),
       project: reading.project.bind({

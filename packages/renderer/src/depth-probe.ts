@@ -39,20 +39,16 @@ const WORDS_PER_ANSWER = layouts.ProbeAnswer.size / 4;
 
 /**
  * Looks into the frame that was drawn last, whatever rasterizer drew it. Reads back: for clicks and labels, not for every frame.
- * @param alphaMin least alpha that it was painted with
  */
 export async function probe(
   device: GPUDevice,
   source: ProbeSource,
   points: readonly ProbePoint[],
-  alphaMin: number,
 ): Promise<ProbeAnswer[]> {
   if (points.length === 0) return [];
   const memory = new GpuMemory(device);
   try {
-    const words = new Float32Array(
-      points.flatMap(({ x, y, depth }) => [x, y, depth ?? Infinity, alphaMin]).map(finite),
-    );
+    const words = new Float32Array(points.flatMap(({ x, y, depth }) => [x, y, depth ?? Infinity, 0]).map(finite));
     const bytes = points.length * layouts.ProbeAnswer.size;
     const asked = memory.buffer('gs.probe_depth.points', words.byteLength, storage, new Uint32Array(words.buffer));
     const answers = memory.buffer('gs.probe_depth.answers', bytes, storage | copySource);

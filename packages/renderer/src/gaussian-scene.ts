@@ -3,7 +3,6 @@ import type { GeometryReading } from './geometry-reading.js';
 import type { Resource } from './gpu/kernel.js';
 import type { Levers } from './levers.js';
 import type { ShPrecision } from './pack/sh.js';
-import type { Surroundings } from './sides.js';
 
 /** As many Gaussians as fit the largest buffer that a shader can bind on the device. */
 export interface GaussianPage {
@@ -18,8 +17,6 @@ export interface GaussianPage {
   readonly chunks: GPUBuffer;
   /** array<ChunkDetail>, if there are levels of detail. */
   readonly details?: GPUBuffer;
-  /** array<u32>: the sides that each splat shows from (shaders/shared/sides.wgsl), where the scene has visible sets. */
-  readonly seenFrom?: GPUBuffer;
 }
 
 /** What {@link Wishes} are noted from: a view, and of a page of the pool what lies there. */
@@ -56,8 +53,6 @@ export interface GaussianScene {
   /** World position, in float64, that the positions on the GPU are relative to. */
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
-  /** Of a scene with visible sets: what it was looked at from. */
-  readonly around?: Surroundings | undefined;
   /** Of a scene that is streamed: where views say which pages they wish for. */
   readonly wishes?: Wishes;
   /** Called before each frame: a streamed scene uploads what has come. */

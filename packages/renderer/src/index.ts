@@ -38,8 +38,6 @@ export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
 export { PictureTensor, type PictureFit, type PictureShape } from './pictures/picture-tensor.js';
 export { Renderer } from './renderer.js';
 export type { FrameRequest, RendererOptions } from './frame-request.js';
-export { SidedGaussians, type HeldScene } from './sided-gaussians.js';
-export { SIDES, sidesNear, type Surroundings } from './sides.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';
 export type { Threads } from './stages/plan.js';

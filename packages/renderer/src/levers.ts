@@ -37,14 +37,6 @@ export interface Levers {
    * Where tiles end a pixel. Up to 1e-4, which scenes are trained with: before the splat that would leave it this transmittance or less. Above: behind that splat.
    */
   readonly transmittanceMin: number;
-  /** A splat paints a pixel only with at least this alpha. */
-  readonly alphaMin: number;
-  /** Least opacity times area, in px², of a splat that is drawn. */
-  readonly minContribution: number;
-  /**
-   * Scenes with visible sets (`SidedGaussians`): leaves out splats that show from none of the sides near the camera's. False, the default, draws all.
-   */
-  readonly visibleSets: boolean;
   /** Spherical harmonics above this degree are ignored. */
   readonly shDegree: 0 | 1 | 2 | 3;
   /**
@@ -74,9 +66,6 @@ const EXACT: Levers = {
   submissions: 1,
   sortAngle: 1e-7,
   transmittanceMin: TRAINED_TRANSMITTANCE,
-  alphaMin: 1 / 255,
-  minContribution: 0,
-  visibleSets: false,
   shDegree: 3,
   detail: 0,
   detailFade: 0.5,
@@ -103,13 +92,11 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
     ...EXACT,
     depthKeyBits: 16,
     transmittanceMin: 1 / 256,
-    visibleSets: true,
   },
   fast: {
     ...EXACT,
     depthKeyBits: 16,
     transmittanceMin: 1 / 128,
-    visibleSets: true,
   },
 };
 
@@ -123,9 +110,6 @@ const FRAME_LEVERS = [
   'depthKeyBits',
   'sortAngle',
   'transmittanceMin',
-  'alphaMin',
-  'minContribution',
-  'visibleSets',
   'shDegree',
   'detail',
   'resolutionScale',
@@ -135,8 +119,6 @@ const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, mos
   submissions: [1, 256],
   sortAngle: [0, Math.PI],
   transmittanceMin: [0, 1],
-  alphaMin: [1 / 255, 1],
-  minContribution: [0, Infinity],
   detail: [0, 64],
   detailFade: [0, 2],
   splatBudget: [0, 2 ** 31],
@@ -149,7 +131,6 @@ const CHOICES: Readonly<Partial<Record<keyof Levers, readonly unknown[]>>> = {
   threads: ['auto', 'parallel', 'serial'],
   accumulation: ['auto', 'rgba16float', 'rgba32float'],
   depthKeyBits: [16, 24, 32],
-  visibleSets: [false, true],
   shDegree: [0, 1, 2, 3],
 };
 

@@ -6,15 +6,11 @@ import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import type { Levers } from './levers.js';
 import { SH_PRECISION } from './pack/sh.js';
-import { sidesNear } from './sides.js';
 import { cullGroups } from './stages/cull.js';
 import { cameraValues } from './view.js';
 
 /** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;
-
-/** Draws splats whatever they show from. */
-const ALL_SIDES = new Uint32Array(constants.SIDE_WORDS);
 
 /** The pages that are drawn together, with a `View` uniform for each. */
 export class PageTable {
@@ -99,7 +95,7 @@ export class PageTable {
   look(
     camera: Camera,
     pixelArea: number,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget, alphaMin, minContribution, visibleSets }: Levers,
+    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
     isOrdered: boolean,
   ): void {
     const shared = {
@@ -109,8 +105,6 @@ export class PageTable {
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
-      alpha_min: alphaMin,
-      min_contribution: minContribution,
     };
     let page = 0;
     for (const scene of this.#scenes) {
@@ -121,11 +115,9 @@ export class PageTable {
         sh_encoding: SH_PRECISION[scene.shPrecision],
         antialiased: scene.antialiased ? 1 : 0,
       };
-      const near = visibleSets && scene.around ? sidesNear(camera, scene.around) : ALL_SIDES;
-      for (const { count, details, seenFrom } of scene.pages) {
-        const sides = seenFrom ? near : ALL_SIDES;
+      for (const { count, details } of scene.pages) {
         const place = { has_detail: details ? 1 : 0, splat_count: count, page, first_group: this.firstGroups[page] };
-        const all = { ...values, ...shared, ...own, ...place, sides };
+        const all = { ...values, ...shared, ...own, ...place };
         writeStruct(layouts.View, all, this.#uniformBytes, VIEW_STRIDE * page);
         page++;
       }

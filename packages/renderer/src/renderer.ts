@@ -72,9 +72,7 @@ export class Renderer {
   readonly #resources: FrameResources;
   #accumulation: Accumulation | undefined;
   /** Where the slots of the last frame are listed, in which buffers, and its pixels for each of the target; undefined before there is one. */
-  #last:
-    | { readonly order: OrderKind; readonly scratch: Scratch; readonly scale: number; readonly alphaMin: number }
-    | undefined;
+  #last: { readonly order: OrderKind; readonly scratch: Scratch; readonly scale: number } | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
@@ -175,7 +173,7 @@ export class Renderer {
     if (isWatched) monitor.record(last, scratch.plan, pairPlan);
     this.#submit(last, submissions);
     timer?.submitted?.();
-    this.#last = { order, scratch, scale: drawn.width / camera.width, alphaMin: levers.alphaMin };
+    this.#last = { order, scratch, scale: drawn.width / camera.width };
     const counts = isWatched ? monitor.read() : undefined;
     if (counts && submissions.watch) {
       void this.#pacer.learn(
@@ -231,11 +229,11 @@ export class Renderer {
   async probeDepth(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
     const { probe } = await loadModule('the code that looks into a picture', () => import('./depth-probe.js'));
     if (this.#last === undefined || this.#last.scratch !== this.#resources.current?.scratch) return [];
-    const { scale, scratch, alphaMin } = this.#last;
+    const { scale, scratch } = this.#last;
     const { plan, splats, order, keys } = scratch;
     const nearToFar = { sorted: order[0], identity: keys[0] }[this.#last.order];
     const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
-    return probe(this.#device, { plan, splats, order: nearToFar }, drawn, alphaMin);
+    return probe(this.#device, { plan, splats, order: nearToFar }, drawn);
   }
 
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */

@@ -26,9 +26,6 @@ export type CameraValues = Omit<
   | 'detail'
   | 'detail_fade'
   | 'splat_budget'
-  | 'alpha_min'
-  | 'min_contribution'
-  | 'sides'
 >;
 
 /**

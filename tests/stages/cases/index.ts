@@ -7,7 +7,6 @@ import { probeCases } from './probe.js';
 import { projectionCases } from './projection.js';
 import { roundedApartCases } from './rounded-apart.js';
 import { scanCases } from './scan.js';
-import { sidesCases } from './sides.js';
 import { sortCases } from './sort.js';
 
 export const stageCases: readonly StageCase[] = [
@@ -18,7 +17,6 @@ export const stageCases: readonly StageCase[] = [
   ...detailCases,
   ...orderCases,
   ...probeCases,
-  ...sidesCases,
   ...sortCases,
   ...ingestCases,
 ];

@@ -89,7 +89,7 @@ async function checkProbe(bench: Bench, count: number, maxOpacity: number): Prom
   plan[layouts.Plan.fields.visible.offset / 4] = count;
   const stage = new ProbeDepthStage(bench.device);
   const answers = bench.buffer(points.length * layouts.ProbeAnswer.size);
-  const asked = Float32Array.from(points.flatMap(({ x, y, depth }) => [x, y, depth, ALPHA_MIN]));
+  const asked = Float32Array.from(points.flatMap(({ x, y, depth }) => [x, y, depth, 0]));
   const bindings = stage.bind({
     plan: bench.buffer(plan),
     splats: bench.buffer(count > 0 ? pack(splats) : 32),

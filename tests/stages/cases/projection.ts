@@ -30,22 +30,11 @@ import { WITHOUT_LEVERS } from './view.js';
 
 const { CULL_GROUP, WORDS_PER_GROUP } = constants;
 
-/** What `cull` leaves out although it is in view. */
-export interface LeftOut {
-  /** Visible sets: the sides of the view, and those of each splat. */
-  readonly sides?: readonly number[];
-  readonly seenFrom?: Uint32Array;
-  readonly threads?: Threads;
-}
-
-const NOTHING: LeftOut = {};
-
 /** Everything that `cull` and `project` read, on the GPU. */
 function uploadScene(
   bench: Bench,
   packed: PackedGaussians,
   camera: Camera,
-  { sides = WITHOUT_LEVERS.sides }: LeftOut = NOTHING,
 ): { view: GPUBuffer; gaussians: GPUBuffer; sh: GPUBuffer; chunks: GPUBuffer } {
   const bytes = new ArrayBuffer(layouts.View.size);
   const page = { splat_count: packed.count, page: 0, first_group: 0 };
@@ -54,7 +43,6 @@ function uploadScene(
     key_bits: 32,
     is_ordered: 0,
     ...WITHOUT_LEVERS,
-    sides,
   };
   const sh = { sh_degree: packed.shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[packed.shPrecision] };
   writeStruct(layouts.View, { ...cameraValues(camera, packed.origin), ...page, ...sh, ...flags }, bytes);
@@ -71,9 +59,9 @@ export async function cullOnGpu(
   bench: Bench,
   packed: PackedGaussians,
   camera: Camera,
-  leftOut = NOTHING,
+  threads?: Threads,
 ): Promise<{ visible: boolean[]; unusable: number; chunksSeen: number }> {
-  const { view, gaussians, chunks } = uploadScene(bench, packed, camera, leftOut);
+  const { view, gaussians, chunks } = uploadScene(bench, packed, camera);
   const groups = cullGroups(packed.count);
   // What `cull` does not write must come from `cull_chunks`: garbage would show.
   const bits = bench.buffer(new Uint32Array(WORDS_PER_GROUP * groups).fill(0xffffffff));
@@ -81,7 +69,7 @@ export async function cullOnGpu(
   const gathered = bench.buffer(4 * constants.GATHERED_WORDS);
   const shared = { view, visible_bits: bits, group_counts: counts };
   const shares = bench.buffer(4 * (groups + 1));
-  const [chunkStage, stage] = [new CullChunksStage(bench.device), new CullStage(bench.device, leftOut.threads)];
+  const [chunkStage, stage] = [new CullChunksStage(bench.device), new CullStage(bench.device, threads)];
   const chunkBindings = chunkStage.bind({
     ...shared,
     chunks,
@@ -91,7 +79,6 @@ export async function cullOnGpu(
   const bindings = stage.bind({
     ...{ ...shared, gaussians, gathered },
     chunk_shares: shares,
-    seen_from: leftOut.seenFrom ? bench.buffer(leftOut.seenFrom) : gaussians,
   });
   bench.compute((pass) => {
     chunkStage.record(pass, chunkBindings, packed.count);
@@ -347,10 +334,12 @@ export const projectionCases: readonly StageCase[] = [
       const packed = packGaussians(cloud);
       const spoilt = withSpoiltCopies(packed);
       const alone = await cullOnGpu(bench, packed, cameras[0]);
-      const mixed = await cullOnGpu(bench, spoilt.packed, cameras[0]);
-      alone.visible.forEach((flag, i) => check(mixed.visible[i] === flag, `good splat ${i} changed`));
-      spoilt.faults.forEach((fault, k) => check(!mixed.visible[packed.count + k], `${fault} was drawn`));
-      check(mixed.unusable === spoilt.faults.length, `${mixed.unusable} refused of ${spoilt.faults.join(', ')}`);
+      for (const threads of ['parallel', 'serial'] as const) {
+        const mixed = await cullOnGpu(bench, spoilt.packed, cameras[0], threads);
+        alone.visible.forEach((flag, i) => check(mixed.visible[i] === flag, `good splat ${i} changed, ${threads}`));
+        spoilt.faults.forEach((fault, k) => check(!mixed.visible[packed.count + k], `${fault} was drawn, ${threads}`));
+        check(mixed.unusable === spoilt.faults.length, `${mixed.unusable} refused of ${spoilt.faults.join(', ')}`);
+      }
     },
   },
 ];

@@ -19,8 +19,8 @@ const SCALES = [0.71, 0.5, 0.35, 0.25];
  */
 const [BALANCED_DETAIL, SMALLER_DETAIL] = [0.5, 1];
 
-const { depthKeyBits, transmittanceMin, visibleSets } = QUALITIES.balanced;
-const balanced: Partial<FrameLevers> = { depthKeyBits, transmittanceMin, visibleSets, detail: BALANCED_DETAIL };
+const { depthKeyBits, transmittanceMin } = QUALITIES.balanced;
+const balanced: Partial<FrameLevers> = { depthKeyBits, transmittanceMin, detail: BALANCED_DETAIL };
 
 /**
  * All levels, from the whole image down: the settings of the quality `balanced`, which lose least for what they win, then fewer pixels. Single objects, since

@@ -21,8 +21,6 @@ export class DetailedGaussians implements GaussianScene {
   /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
   readonly origin: Vector3;
-  /** Its visible sets are of its own splats; coarser ones are drawn from all sides. */
-  readonly around: GaussianScene['around'];
   readonly pages: readonly GaussianPage[];
   readonly #leaves: GaussianScene;
   readonly #coarser: GaussianBuffers;
@@ -38,7 +36,6 @@ export class DetailedGaussians implements GaussianScene {
       antialiased: this.antialiased,
       filterVariance: this.filterVariance,
       origin: this.origin,
-      around: this.around,
     } = leaves);
     this.count = leaves.count + coarser.count;
     try {

@@ -71,11 +71,11 @@ export class QuadsRasterizer implements Rasterizer {
   /** Quads are drawn from what the stages before have left. */
   prepareFrame(): void {}
 
-  record(encoder: GPUCommandEncoder, { surface, order, levers, timer }: Painting, slice: Slice): void {
+  record(encoder: GPUCommandEncoder, { surface, order, timer }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
     writeStruct(
       layouts.RasterView,
-      { viewport: [width, height], slice: slice.index, slices: slice.count, alpha_min: levers.alphaMin },
+      { viewport: [width, height], slice: slice.index, slices: slice.count },
       this.#uniformBytes,
     );
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);

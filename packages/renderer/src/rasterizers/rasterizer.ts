@@ -72,7 +72,7 @@ export interface NotedFrame {
 }
 
 /** Levers that rasterizers know. */
-export type PaintingLevers = Pick<Levers, 'alphaMin' | 'transmittanceMin'>;
+export type PaintingLevers = Pick<Levers, 'transmittanceMin'>;
 
 /** One frame to draw. */
 export interface Painting {

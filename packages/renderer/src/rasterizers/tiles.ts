@@ -288,14 +288,13 @@ export class TilesRasterizer implements Rasterizer {
     { width, height }: Surface,
     { columns, rows }: Grid,
     first_tile: readonly [number, number],
-    { alphaMin, transmittanceMin }: PaintingLevers,
+    { transmittanceMin }: PaintingLevers,
     background: Painting['background'] = TRANSPARENT,
   ): void {
     const { capacity, pairCapacity } = this.#inputs!;
     const room = { pair_capacity: pairCapacity, splat_groups: groupsOf(capacity) };
     const image = { viewport: [width, height], bins: [columns, rows], background, first_tile };
-    const ends = { alpha_min: alphaMin, transmittance_min: transmittanceMin };
-    writeStruct(layouts.BinView, { ...room, ...image, ...ends }, this.#viewBytes);
+    writeStruct(layouts.BinView, { ...room, ...image, transmittance_min: transmittanceMin }, this.#viewBytes);
     this.#device.queue.writeBuffer(this.#view, 0, this.#viewBytes);
   }
 }
