@@ -1,4 +1,4 @@
-import type { Camera, Vector3 } from '@gaussian-splat/core';
+import type { Camera } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
@@ -64,16 +64,6 @@ export class PageTable {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
 
-  /** Grows when the content of a scene changes; 0 if none ever does. */
-  get version(): number {
-    return this.#scenes.reduce((sum, { version }) => sum + version, 0);
-  }
-
-  /** World positions of the scenes' origins. */
-  get origins(): readonly Vector3[] {
-    return this.#scenes.map(({ origin }) => origin);
-  }
-
   get byteLength(): number {
     return this.#memory.byteLength;
   }
@@ -92,16 +82,10 @@ export class PageTable {
    * Points every page at a camera, for the commands that are submitted next.
    * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
    */
-  look(
-    camera: Camera,
-    pixelArea: number,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
-    isOrdered: boolean,
-  ): void {
+  look(camera: Camera, pixelArea: number, { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers): void {
     const shared = {
       sh_cap: shDegree,
       key_bits: depthKeyBits,
-      is_ordered: isOrdered ? 1 : 0,
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
