@@ -73,8 +73,8 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.#host.strings;
   }
 
-  get playback(): MotionHost['playback'] {
-    return this.#host.playback;
+  get player(): MotionHost['player'] {
+    return this.#host.player;
   }
 
   get autoRotates(): boolean {

@@ -142,7 +142,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** True while the scene is on show. */
   get loaded(): boolean {
-    return this.stage.scene.state === 'ready';
+    return this.stage.whole.state === 'ready';
   }
 
   /**
@@ -150,7 +150,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.scene.settled);
+    return this.updateComplete.then(() => this.stage.whole.settled);
   }
 
   /**
@@ -158,12 +158,12 @@ export class GaussianSplatElement extends ViewingMethods {
    * quarters, warming up is the rest.
    */
   get progress(): number {
-    return this.loaded ? 1 : (this.stage.progress ?? 0);
+    return this.loaded ? 1 : (this.stage.whole.progress ?? 0);
   }
 
   /** Why no scene is shown, or null. */
   get error(): ElementError | null {
-    return this.stage.scene.error;
+    return this.stage.whole.error;
   }
 
   /** Size of the scene on show, or null. */
@@ -249,11 +249,12 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
     // Through the style object, which a strict Content-Security-Policy allows, and not the attribute, which it refuses.
-    if (bar) bar.style.transform = `scaleX(${this.stage.progress ?? 0})`;
+    if (bar) bar.style.transform = `scaleX(${this.stage.whole.progress ?? 0})`;
   }
 
   protected override render(): TemplateResult {
-    const { scene, reveal, behaviours, hotspots, progress } = this.stage;
+    const { whole, reveal, behaviours, hotspots } = this.stage;
+    const { state, error, progress } = whole;
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
@@ -263,14 +264,14 @@ export class GaussianSplatElement extends ViewingMethods {
       posterLoading: this.#attributes.loading,
       showPoster: reveal.isCovered,
       onReveal: reveal.mayReveal ? null : this.#onReveal,
-      isLoading: scene.state === 'loading',
+      isLoading: state === 'loading',
       progress,
-      error: scene.error,
+      error,
       prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
       motion: motion.switch,
       onMotion: this.#onMotion,
       strings: this.#strings,
-      spoken: scene.error ? this.#spokenError(scene.error) : announcer.text,
+      spoken: error ? this.#spokenError(error) : announcer.text,
       hotspots: hotspots.names,
     });
   }
@@ -383,7 +384,7 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   #showStates(): void {
-    const { state, error } = this.stage.scene;
+    const { state, error } = this.stage.whole;
     const active: Record<(typeof STATES)[number], boolean> = {
       loading: state === 'loading',
       preview: this.stage.scene.isPreview,

@@ -1,5 +1,4 @@
 import type { Camera } from '@gaussian-splat/core';
-import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import type { ReactiveControllerHost } from 'lit';
 import { Behaviours, type BehaviourHost } from './behaviours.js';
 import type { CameraAction } from './camera/gestures.js';
@@ -7,7 +6,6 @@ import { CameraController } from './controllers/camera-controller.js';
 import { DetailController, type DetailHost } from './controllers/detail-controller.js';
 import { HotspotController, type HotspotHost } from './controllers/hotspot-controller.js';
 import { InputController, type InputHost } from './controllers/input-controller.js';
-import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
 import { PrintController } from './controllers/print-controller.js';
 import { RevealController, type RevealHost } from './controllers/reveal-controller.js';
@@ -20,11 +18,12 @@ import { ElementCore } from './element-core.js';
 import type { ElementError } from './errors.js';
 import type { CameraChangeSource } from './events.js';
 import { isGone } from './gpu/device-failures.js';
-import type { GpuScene } from './gpu/gpu-scene.js';
+import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
 import { SceneQueries, type QueryHost } from './scene-queries.js';
 import type { Source, StageHost } from './stage-host.js';
-import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
+import type { ReadCounts, SceneStats } from './stats.js';
+import { Whole } from './whole.js';
 
 /**
  * All that goes on behind the element's attributes and markup: scene, camera, size, sight and input, and who of them
@@ -53,14 +52,16 @@ export class Stage
   readonly behaviours: Behaviours;
   readonly hotspots: HotspotController;
   readonly queries: SceneQueries;
-  /** Share of the loading that is done, 0..1; null while it is not known. */
-  progress: number | null = null;
+  /** What of all that the element shows is beyond the controllers of its own scene. */
+  whole: Whole = new Whole(this);
+  /** Share of the loading of its own scene that is done, 0..1; null while it is not known. */
+  ownProgress: number | null = null;
   readonly size: SizeController;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   drawnFrom: Camera | undefined;
   readonly #visibility: VisibilityController;
-  readonly #view: ViewController;
-  readonly #live: LiveWiring;
+  readonly view: ViewController;
+  readonly live: LiveWiring;
   readonly #source: SourceController;
   #counts: ReadCounts | undefined;
   /** Bytes that have arrived, and how many there are. */
@@ -76,8 +77,8 @@ export class Stage
       () => this.#onSize(),
     );
     this.playback = new PlaybackController(this);
-    this.#view = new ViewController(this);
-    this.#live = new LiveWiring(this);
+    this.view = new ViewController(this);
+    this.live = new LiveWiring(this);
     this.scene = new SceneController(element, this);
     this.#source = new SourceController(this);
     this.detail = new DetailController(this);
@@ -87,7 +88,7 @@ export class Stage
     new PrintController(element, () => this.drawNow());
     this.queries = new SceneQueries(this);
     new InputController(element, this);
-    const onPageVisibility = (): void => this.playback.suspend();
+    const onPageVisibility = (): void => this.whole.suspend();
     element.addController({
       hostConnected: () => {
         document.addEventListener('visibilitychange', onPageVisibility);
@@ -101,41 +102,38 @@ export class Stage
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
   drawNow(): HTMLCanvasElement | null {
-    return this.scene.isPreview ? null : this.#view.drawNow();
+    return this.whole.isPreview ? null : this.view.drawNow();
   }
 
   /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */
   async updateFraming(): Promise<void> {
     const { scene } = this.scene;
-    if (scene === null) return;
-    const bounds = (await scene.live?.readBounds?.()) ?? scene.bounds;
-    if (this.scene.scene === scene) this.camera.frame(bounds);
+    const bounds = await this.whole.readBounds();
+    if (bounds && this.scene.scene === scene) this.camera.frame(bounds);
   }
 
   /** What is known of the scene on show; null where there is none. */
   get stats(): SceneStats | null {
-    const { scene } = this.scene;
-    if (scene === null) return null;
-    const { quality } = this.attributes;
-    return statsOf(scene, {
-      quality,
-      pace: this.#view.pace.report,
+    return this.whole.stats({
+      quality: this.attributes.quality,
+      pace: this.view.pace.report,
       counts: this.#counts,
-      isPreview: this.scene.isPreview,
+      isPreview: this.whole.isPreview,
+      frameBytes: this.view.viewport?.byteLength ?? 0,
     });
   }
 
   /** Asks the GPU for the counts of the picture on show. */
   async updateStats(): Promise<SceneStats | null> {
-    const { scene } = this.scene;
+    const { viewport } = this.view;
     const camera = this.drawnFrom;
-    if (scene === null || camera === undefined) return this.stats;
+    if (viewport === null || camera === undefined) return this.stats;
     try {
-      const counts = await scene.readCounts(camera);
-      if (this.scene.scene === scene) this.#counts = counts;
+      const counts = await viewport.readCounts(camera);
+      if (this.view.viewport === viewport) this.#counts = counts;
     } catch (error) {
       // What was asked for is gone; what there is now is known without it.
-      if (!(await isGone(scene))) throw error;
+      if (!(await isGone(viewport))) throw error;
     }
     return this.stats;
   }
@@ -143,7 +141,7 @@ export class Stage
   /** The scene to show. Called after every update; only changes act. */
   setSource(source: Source): void {
     this.#source.set(source);
-    this.#live.post.want(this.#source.postprocess);
+    this.live.post.want(this.#source.postprocess);
     if (!this.isLeavingFor(source)) this.playback.keepScene();
   }
 
@@ -174,12 +172,12 @@ export class Stage
 
   /** Asks for a frame: a changed attribute may concern the picture, for example its pixel ratio. */
   requestFrame(): void {
-    this.#view.requestFrame();
+    this.view.requestFrame();
   }
 
   /** The document that the element comes from has no window any more. */
   leaveWindowless(): void {
-    this.#view.renewCanvas();
+    this.view.renewCanvas();
   }
 
   // What the controllers ask.
@@ -199,7 +197,20 @@ export class Stage
   }
 
   get hasPicture(): boolean {
-    return this.scene.state === 'ready' || this.scene.isPreview;
+    return this.whole.hasPicture;
+  }
+
+  /** The attribute `autoplay` of the element's own scene. */
+  get autoplaysOwn(): boolean {
+    return super.autoplays;
+  }
+
+  override get autoplays(): boolean {
+    return this.whole.autoplays;
+  }
+
+  get player(): BehaviourHost['player'] {
+    return this.whole.player;
   }
 
   get wantsPreviews(): boolean {
@@ -211,18 +222,14 @@ export class Stage
       element: this.element,
       runtimeLocation: this.services.runtimeLocation,
       startWorker: this.services.sceneLoader.spawn,
-      state: () => this.#live.state,
-      ownsControls: () => !this.#live.post.isWanted,
+      state: () => this.live.state,
+      ownsControls: () => !this.live.post.isWanted,
       camera: (bounds) => {
         if (bounds) this.camera.frame(bounds);
         return this.camera.view(...FIRST_SIZE);
       },
-      listeners: this.#live.listeners,
+      listeners: this.live.listeners,
     };
-  }
-
-  async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
-    return (await this.scene.scene?.probe(points)) ?? [];
   }
 
   // What they tell.
@@ -231,9 +238,8 @@ export class Stage
     this.behaviours.advance(now);
   }
 
-  advanceScene(scene: GpuScene, camera: Camera, now: number): void {
-    // The last picture of a scene whose place another will take stays as it is.
-    if (!this.scene.isOutgoing) this.#live.advance(scene, camera, now);
+  advanceScene(camera: Camera, now: number): void {
+    this.whole.advance(camera, now);
   }
 
   afterFrame(camera: Camera): void {
@@ -249,16 +255,16 @@ export class Stage
   /** Other splats are drawn of the scene on show. */
   splatsChanged(): void {
     this.#counts = undefined;
-    this.#view.requestFrame();
+    this.view.requestFrame();
     this.element.requestUpdate();
   }
 
   notePace(isWhole: boolean): void {
-    this.detail.notePace(isWhole);
+    this.whole.notePace(isWhole);
   }
 
   drawingFailed(error: unknown): void {
-    this.scene.fail(error);
+    this.whole.fail(error);
   }
 
   playbackEvent(type: PlaybackEvent): void {
@@ -267,23 +273,24 @@ export class Stage
     if (type === 'play' || type === 'pause') this.element.requestUpdate();
   }
 
-  show(scene: GpuScene, entrance: Entrance): Promise<void> {
+  show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
     this.#counts = undefined;
-    if (entrance === 'new') this.camera.frame(scene.bounds);
-    if (entrance === 'whole') this.camera.refine(scene.bounds);
-    this.playback.setDuration(scene.live?.duration ?? NaN);
-    this.#live.post.attach(scene);
-    return this.#view.show(scene);
+    return this.whole.show(scene, entrance);
   }
 
   hide(clear: boolean): void {
-    this.#live.post.attach(null);
+    this.whole.hide(clear);
+  }
+
+  /** Nothing is shown any more; the last picture stays unless it is to be cleared. */
+  stopDrawing(clear: boolean): void {
+    this.live.post.attach(null);
     this.playback.suspend();
-    if (!clear) return this.#view.pause();
+    if (!clear) return this.view.pause();
     this.playback.empty();
     this.drawnFrom = undefined;
     this.hotspots.forget();
-    this.#view.clear();
+    this.view.clear();
   }
 
   loadStarted(): void {
@@ -292,13 +299,13 @@ export class Stage
 
   progressed(loaded: number, total: number | undefined, share = total ? loaded / total : undefined): void {
     this.#bytes = [loaded, total];
-    this.progress = share === undefined ? null : Math.min(1, share);
+    this.ownProgress = share === undefined ? null : Math.min(1, share);
     this.element.requestUpdate();
     const lengthComputable = total !== undefined;
     this.dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));
   }
 
-  previewShown({ gaussians }: GpuScene): void {
+  previewShown({ gaussians }: LoadedGaussians): void {
     this.element.requestUpdate();
     this.dispatch(new CustomEvent('preview', { detail: { splats: gaussians.count } }));
     this.progressed(...this.#bytes);
@@ -311,25 +318,24 @@ export class Stage
 
   emptied(): void {
     this.#source.needNow(false);
-    this.progress = null;
+    this.ownProgress = null;
     this.playback.empty();
     this.playback.stopWaits();
     this.dispatch(new Event('emptied'));
   }
 
   failed(error: ElementError): void {
-    this.progress = null;
+    this.ownProgress = null;
     this.dispatch(new CustomEvent('error', { detail: error }));
   }
 
   contextChanged(type: 'contextlost' | 'contextrestored'): void {
-    this.dispatch(new Event(type));
+    if (this.whole.tellsContext(type)) this.dispatch(new Event(type));
   }
 
   posterDismissed(): void {
     this.dispatch(new Event('poster-dismissed'));
-    const mayPlay = this.playback.canPlay && this.playback.paused && !prefersReducedMotion();
-    if (this.autoplays && mayPlay && !this.behaviours.motion.isHeld) this.playback.play();
+    this.whole.autoplay();
   }
 
   act(action: CameraAction): void {
@@ -353,21 +359,22 @@ export class Stage
 
   #onUpdate(): void {
     this.reveal.settle();
-    this.detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
+    this.whole.update();
   }
 
   #onVisibility(): void {
     this.#source.request();
-    if (!this.#visibility.isVisible) this.playback.suspend();
+    this.whole.request();
+    if (!this.#visibility.isVisible) this.whole.suspend();
     this.dispatch(new CustomEvent('model-visibility', { detail: { visible: this.#visibility.isVisible } }));
     this.element.requestUpdate();
-    this.#view.requestFrame();
+    this.view.requestFrame();
   }
 
   #onSize(): void {
     // Without a size, in a closed tab for one, there is no shape to follow.
     if (!this.size.isEmpty) this.camera.setAspect(this.size.aspect);
-    this.#view.requestFrame();
+    this.view.requestFrame();
   }
 }
 

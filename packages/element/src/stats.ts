@@ -1,6 +1,6 @@
 import type { QualityChoice } from './attributes.js';
 import type { PaceReport } from './controllers/pace-controller.js';
-import type { GpuScene } from './gpu/gpu-scene.js';
+import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 
 /** What is modelled, drawn, and seen of a scene, what it takes, and why. */
 export interface SceneStats {
@@ -45,10 +45,15 @@ export interface StatsContext {
   readonly pace: PaceReport;
   readonly counts: ReadCounts | undefined;
   readonly isPreview: boolean;
+  /** Bytes of GPU memory that frames are drawn with. */
+  readonly frameBytes: number;
 }
 
 /** Puts together what is known without asking the GPU. */
-export function statsOf(scene: GpuScene, { quality, pace, counts, isPreview }: StatsContext): SceneStats {
+export function statsOf(
+  scene: LoadedGaussians,
+  { quality, pace, counts, isPreview, frameBytes }: StatsContext,
+): SceneStats {
   const { gaussians } = scene;
   const dropped = gaussians.droppedCount ?? 0;
   const merged = scene.levels === undefined ? 0 : scene.levels.count - gaussians.count;
@@ -61,7 +66,7 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, isPreview }: S
     detail,
     drawn: counts?.drawn ?? null,
     contributed: counts?.contributed ?? null,
-    bytes: { scene: gaussians.byteLength + (scene.levels?.byteLength ?? 0), frames: scene.frameBytes },
+    bytes: { scene: gaussians.byteLength + (scene.levels?.byteLength ?? 0), frames: frameBytes },
     quality,
     pace,
     why: [

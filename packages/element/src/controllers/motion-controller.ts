@@ -9,7 +9,7 @@ export interface MotionHost {
   readonly autoplays: boolean;
   /** There is a picture to be seen that could move. */
   readonly isOnShow: boolean;
-  readonly playback: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'>;
+  readonly player: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'>;
   /** Lets the camera turn at once. */
   startTurning(): void;
 }
@@ -37,7 +37,7 @@ export class MotionController implements ReactiveController {
   /** What the visitor's switch does now; `none` where nothing moves by itself, and in a player, which has a button of its own. */
   get switch(): 'none' | 'pause' | 'play' {
     if (!this.#of.isOnShow || this.#host.slot === 'media' || !(this.#canTurn || this.#canPlay)) return 'none';
-    const isPlaying = this.#canPlay && !this.#of.playback.paused;
+    const isPlaying = this.#canPlay && !this.#of.player.paused;
     return isPlaying || (this.#canTurn && !this.#isHeld) ? 'pause' : 'play';
   }
 
@@ -46,7 +46,7 @@ export class MotionController implements ReactiveController {
     const action = this.switch;
     if (action === 'none') return false;
     this.#isHeld = action === 'pause';
-    if (this.#canPlay) this.#of.playback[action]();
+    if (this.#canPlay) this.#of.player[action]();
     if (action === 'play') this.#of.startTurning();
     this.#host.requestUpdate();
     return true;
@@ -63,6 +63,6 @@ export class MotionController implements ReactiveController {
 
   /** Also for people who want less motion, for whom nothing plays by itself: they may want this. */
   get #canPlay(): boolean {
-    return this.#of.autoplays && this.#of.playback.canPlay;
+    return this.#of.autoplays && this.#of.player.canPlay;
   }
 }

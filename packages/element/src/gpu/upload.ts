@@ -1,6 +1,6 @@
 import { GaussianBuffers } from '@gaussian-splat/renderer';
 import type { LoadedScene } from '../loading/protocol.js';
-import { GpuScene } from './gpu-scene.js';
+import { LoadedGaussians } from './loaded-gaussians.js';
 import type { DeviceLease } from './shared-device.js';
 
 export interface SceneUploadOptions {
@@ -16,9 +16,9 @@ export async function upload(
   lease: DeviceLease,
   { packed, bounds }: LoadedScene,
   { signal, memoryBudget, submissions }: SceneUploadOptions,
-): Promise<GpuScene> {
+): Promise<LoadedGaussians> {
   const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
-  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds, submissions);
+  if (!signal.aborted) return new LoadedGaussians(lease, gaussians, bounds, submissions);
   gaussians.destroy();
   throw signal.reason;
 }
