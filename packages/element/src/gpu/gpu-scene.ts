@@ -1,10 +1,12 @@
 import { GaussianSplatError, loadModule, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
   QueueClock,
-  Renderer,
-  type FrameRequest,
+  Viewpoint,
+  World,
   type GaussianScene,
   type FrameLevers,
+  type FrameSettings,
+  type Placement,
   type ProbeAnswer,
   type ProbePoint,
   type Quality,
@@ -17,7 +19,7 @@ import type { ReadCounts } from '../stats.js';
 import type { DeviceLease } from './shared-device.js';
 
 /** How much detail is drawn of a scene that has levels of it. */
-export type DetailLevers = Pick<FrameRequest, 'detail' | 'splatBudget'>;
+export type DetailLevers = Pick<FrameSettings, 'detail' | 'splatBudget'>;
 
 /** A scene's Gaussians with levels of detail besides; those alone are freed with it. */
 export interface OwnedLevels extends GaussianScene {
@@ -46,7 +48,7 @@ export interface Rendering {
 }
 
 /**
- * A scene on the GPU: its splats, the renderer that draws them (whose buffers fit this scene and this picture size,
+ * A scene on the GPU: its splats, the viewpoint that draws them (whose buffers fit this scene and this picture size,
  * and so cannot be shared), and the lease that keeps the device.
  */
 export class GpuScene {
@@ -58,7 +60,9 @@ export class GpuScene {
   onIncomplete: () => void = () => undefined;
   /** Called with `out-of-memory/allocation` where a later frame than the first needs more memory than there is. */
   onError: (error: GaussianSplatError) => void = () => undefined;
-  #renderer: Renderer;
+  readonly #world = new World();
+  #placement: Placement | undefined;
+  readonly #viewpoint: Viewpoint;
   #rendering: Rendering = { quality: 'default', shDegree: 3 };
   #filter: FrameFilter | undefined;
   readonly #submissions: number;
@@ -84,14 +88,21 @@ export class GpuScene {
     this.#gaussians = gaussians;
     this.bounds = bounds;
     this.#submissions = submissions;
-    this.#renderer = this.#makeRenderer();
+    this.#viewpoint = new Viewpoint(lease.device, this.#world, {
+      settings: this.#settings(),
+      onIncomplete: () => {
+        this.#drawnSize = '';
+        this.#filter?.invalidate();
+        this.onIncomplete();
+      },
+    });
     this.#clock = QueueClock.of(lease.device);
     if (live) this.#clock.isShared = true;
   }
 
   /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
   get frameBytes(): number {
-    return this.#renderer.byteLength + (this.#filter?.byteLength ?? 0);
+    return this.#viewpoint.byteLength + (this.#filter?.byteLength ?? 0);
   }
 
   /** Its splats. */
@@ -166,8 +177,8 @@ export class GpuScene {
     const { quality, shDegree } = this.#rendering;
     if (rendering.quality === quality && rendering.shDegree === shDegree) return;
     this.#rendering = rendering;
-    this.#renderer.destroy();
-    this.#renderer = this.#makeRenderer();
+    this.#isPrepared = false;
+    this.#viewpoint.settings = this.#settings();
     this.#drawnSize = '';
   }
 
@@ -184,14 +195,20 @@ export class GpuScene {
     this.#drawnSize = '';
   }
 
-  #makeRenderer(): Renderer {
-    this.#isPrepared = false;
-    const onIncomplete = (): void => {
-      this.#drawnSize = '';
-      this.#filter?.invalidate();
-      this.onIncomplete();
-    };
-    return new Renderer(this.device, { ...this.#rendering, submissions: this.#submissions, onIncomplete });
+  /** Settings of a frame; with levers of motion where there are some. */
+  #settings(levers?: Partial<FrameLevers>): FrameSettings {
+    const { splatBudget = 0 } = this.#detail;
+    // Whichever leaves out more: what the page asks for, or the pace.
+    const detail = Math.max(this.#detail.detail ?? 0, levers?.detail ?? 0);
+    return { ...this.#rendering, submissions: this.#submissions, ...levers, detail, splatBudget };
+  }
+
+  /** Shows what is to be drawn in the world. */
+  #place(): void {
+    const scene = this.#levels ?? this.#gaussians;
+    if (this.#placement?.scene === scene) return;
+    if (this.#placement) this.#world.remove(this.#placement);
+    this.#placement = this.#world.add({ scene });
   }
 
   /** True if there is what frames with other levers need. */
@@ -203,7 +220,10 @@ export class GpuScene {
   prepare(levers: readonly Partial<FrameLevers>[], format: GPUTextureFormat): void {
     if (this.isLost || this.#destroyed) return;
     this.#isPrepared = true;
-    this.#renderer.prepare(levers, format);
+    this.#viewpoint.prepare(
+      levers.map((each) => this.#settings(each)),
+      format,
+    );
   }
 
   /**
@@ -226,13 +246,11 @@ export class GpuScene {
   }
 
   #draw(frame: Frame): void {
-    const { splatBudget } = this.#detail;
-    // Whichever leaves out more: what the page asks for, or the pace.
-    const detail = Math.max(this.#detail.detail ?? 0, frame.levers?.detail ?? 0);
-    const gaussians = this.#levels ?? this.gaussians;
-    const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, detail, splatBudget, gaussians });
-    const { quality, shDegree } = this.#rendering;
-    const content = `${gaussians.version} ${quality} ${shDegree} ${detail} ${JSON.stringify(frame.levers ?? null)}`;
+    this.#place();
+    const settings = this.#settings(frame.levers);
+    const draw = ({ camera, target, background }: Frame): void =>
+      this.#viewpoint.draw(camera, { target, over: background }, settings);
+    const content = `${this.#placement?.scene.version} ${JSON.stringify(settings)}`;
     if (this.#filter) this.#filter.render(frame, content, draw);
     else draw(frame);
   }
@@ -265,18 +283,18 @@ export class GpuScene {
     return refusal();
   }
 
-  /** Looks into the last frame: see {@link Renderer.probeDepth}. */
+  /** Looks into the last frame: see {@link Viewpoint.probe}. */
   probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
-    return this.#renderer.probeDepth(points);
+    return this.#viewpoint.probe(points);
   }
 
   /** Counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
   async readCounts(camera: Camera): Promise<ReadCounts> {
-    const { visible, overflow } = await this.#renderer.readStatistics();
+    const { visible, overflow } = await this.#viewpoint.statistics();
     const { countContributing } = await loadModule('the code that counts splats', () => import('./contributions.js'));
     if (this.#destroyed) throw new Error('the scene is gone');
     const { quality } = this.#rendering;
-    const view = { ...this.#detail, gaussians: this.#levels ?? this.gaussians, camera, quality };
+    const view = { world: this.#world, camera, settings: { ...this.#detail, quality } };
     return { drawn: visible, left: overflow, contributed: await countContributing(this.device, view) };
   }
 
@@ -286,7 +304,7 @@ export class GpuScene {
     this.#destroyed = true;
     this.setFilter(undefined);
     this.live?.close();
-    this.#renderer.destroy();
+    this.#viewpoint.destroy();
     this.#levels?.destroy();
     this.#gaussians.destroy();
     this.#lease.release();
