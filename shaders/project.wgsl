@@ -126,7 +126,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let i = survivors[slot] - view.first_group * CULL_GROUP;
   if (i >= view.splat_count) { return; }
   var g = unpack_gaussian(gaussian_at(i));
-  g.opacity = shared_opacity(g.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
+  g.opacity = shared_opacity(g.opacity * view.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
   let e = project_ellipse(view, g);
   let color = splat_sh_color(i, normalize(g.position - view.eye));
   splats[slot] = pack_splat(e, color);

@@ -105,7 +105,7 @@ test('several scenes keep their common order while the camera moves', async () =
   let worst = 0;
   for (let i = 0; i < found.length; i++) worst = Math.max(worst, Math.abs(found[i] - expected[i]));
   assert.ok(worst < 0.01, `worst difference ${worst}`);
-  assert.ok((await moving.readStatistics()).visible > 1000);
+  assert.ok((await moving.statistics()).visible > 1000);
 });
 
 for (const rasterizer of ['quads', 'tiles'] as const) {

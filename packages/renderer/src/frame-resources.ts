@@ -2,13 +2,13 @@ import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityMemory, type Capacity } from './capacity-memory.js';
 import { CapacityMonitor, initialCapacity, LEAST_CAPACITY } from './capacity.js';
 import { DepthOrder } from './depth-order.js';
-import type { GaussianScene } from './gaussian-scene.js';
 import { OrderPolicy } from './order-policy.js';
 import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
 import type { Threads } from './stages/plan.js';
+import type { World } from './world.js';
 
 /** Room for pairs that the pacer learns from what one costs. */
 const TELLING_ROOM = 1 << 18;
@@ -71,16 +71,16 @@ export class FrameResources {
    * What a frame is drawn with: allocates where the scenes or the wished room are other ones than before.
    * @param splatBudget most splats that the frame draws; 0 for no limit
    */
-  fit(scenes: readonly GaussianScene[], splatBudget: number): Resources {
+  fit(world: World, splatBudget: number): Resources {
     this.#roomFor(splatBudget);
     const current = this.#current;
-    if (current?.table.holds(scenes)) {
+    if (current?.table.isCurrent) {
       // The monitor has asked for other room.
       const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
       return hasOtherRoom ? this.#rebind(current.table) : current;
     }
     this.release();
-    const table = new PageTable(this.#device, [...scenes]);
+    const table = new PageTable(this.#device, world);
     this.#capacity = this.#firstFor(table);
     this.#memory = new CapacityMemory();
     return this.#rebind(table);

@@ -1,4 +1,4 @@
-export { capture } from './capture.js';
+export { capture, type CaptureRequest } from './capture.js';
 export { createRenderer } from './choice/choose.js';
 export { chooseVariants, startVariants, type ChoiceOptions, type StartOptions } from './choice/choose.js';
 export type { ChoiceStore } from './choice/kept-choice.js';
@@ -36,7 +36,10 @@ export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, NotedFrame, RasterizerName } from './rasterizers/rasterizer.js';
 export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
 export { PictureTensor, type PictureFit, type PictureShape } from './pictures/picture-tensor.js';
+export { settings, type FrameSettings, type Picture, type Rgba, type TargetView } from './picture.js';
 export { Renderer } from './renderer.js';
+export { Viewpoint, type ViewpointOptions } from './viewpoint.js';
+export { Placement, World, type Box, type Placed } from './world.js';
 export type { FrameRequest, RendererOptions } from './frame-request.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';

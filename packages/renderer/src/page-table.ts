@@ -1,5 +1,5 @@
-import type { Camera, Vector3 } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
+import { multiply, type Camera, type Vector3 } from '@gaussian-splat/core';
+import type { GaussianPage, Wishes } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
@@ -7,12 +7,19 @@ import { writeStruct } from './gpu/struct.js';
 import type { Levers } from './levers.js';
 import { SH_PRECISION } from './pack/sh.js';
 import { cullGroups } from './stages/cull.js';
-import { cameraValues } from './view.js';
+import { cameraValues, MAX_FLOAT32 } from './view.js';
+import { inWorld, type Placement, type World } from './world.js';
 
 /** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;
 
-/** The pages that are drawn together, with a `View` uniform for each. */
+/** Stands for a crop that leaves nothing out. */
+const EVERYWHERE = {
+  min: [-MAX_FLOAT32, -MAX_FLOAT32, -MAX_FLOAT32],
+  max: [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32],
+} as const;
+
+/** The pages of the visible scenes of a world, with a `View` uniform for each. */
 export class PageTable {
   readonly pages: readonly GaussianPage[];
   /** First group (chunk) of each page, and behind the last the number of all groups. */
@@ -21,13 +28,20 @@ export class PageTable {
   readonly #memory: GpuMemory;
   readonly #uniforms: GPUBuffer;
   readonly #uniformBytes: ArrayBuffer;
-  readonly #scenes: readonly GaussianScene[];
+  readonly #world: World;
+  readonly #layout: number;
+  readonly #placements: readonly Placement[];
+  /** By page. */
+  readonly #placementOf: readonly Placement[];
 
-  constructor(device: GPUDevice, scenes: readonly GaussianScene[]) {
+  constructor(device: GPUDevice, world: World) {
     this.#device = device;
-    this.#scenes = scenes;
+    this.#world = world;
+    this.#layout = world.layout;
+    this.#placements = world.placements.filter(({ visible }) => visible);
     this.#memory = new GpuMemory(device);
-    this.pages = scenes.flatMap((scene) => scene.pages);
+    this.pages = this.#placements.flatMap(({ scene }) => scene.pages);
+    this.#placementOf = this.#placements.flatMap((placement) => placement.scene.pages.map(() => placement));
     this.firstGroups = firstGroups(this.pages);
     this.#uniformBytes = new ArrayBuffer(VIEW_STRIDE * Math.max(1, this.pages.length));
     const { uniform, copyDestination } = BUFFER_USAGE;
@@ -41,17 +55,17 @@ export class PageTable {
 
   /** Where views of the scene that a page is part of say what they wish for, if it is streamed. */
   wishesOf(page: number): Wishes | undefined {
-    return this.#scenes.find(({ pages }) => pages.includes(this.pages[page]))?.wishes;
+    return this.#placementOf[page].scene.wishes;
   }
 
   /** True if a scene is streamed. */
   get isStreamed(): boolean {
-    return this.#scenes.some(({ wishes }) => wishes !== undefined);
+    return this.#placements.some(({ scene }) => scene.wishes !== undefined);
   }
 
   /** Lets streamed scenes take in what has come. */
   update(): void {
-    for (const scene of this.#scenes) scene.update?.();
+    for (const { scene } of this.#placements) scene.update?.();
   }
 
   /** True if a page has levels of detail. */
@@ -64,14 +78,14 @@ export class PageTable {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
 
-  /** Grows when the content of a scene changes; 0 if none ever does. */
+  /** Grows when the content of a scene changes or a scene moves; 0 if none ever did. */
   get version(): number {
-    return this.#scenes.reduce((sum, { version }) => sum + version, 0);
+    return this.#placements.reduce((sum, { scene }) => sum + scene.version, this.#world.changes);
   }
 
   /** World positions of the scenes' origins. */
   get origins(): readonly Vector3[] {
-    return this.#scenes.map(({ origin }) => origin);
+    return this.#placements.map(({ scene, sceneToWorld }) => inWorld(sceneToWorld, scene.origin));
   }
 
   get byteLength(): number {
@@ -83,9 +97,9 @@ export class PageTable {
     return { buffer: this.#uniforms, offset: VIEW_STRIDE * page, size: layouts.View.size };
   }
 
-  /** True if the table was made for exactly these scenes. */
-  holds(scenes: readonly GaussianScene[]): boolean {
-    return scenes.length === this.#scenes.length && scenes.every((scene, i) => scene === this.#scenes[i]);
+  /** True while the scenes are those that the table was made for. */
+  get isCurrent(): boolean {
+    return this.#layout === this.#world.layout;
   }
 
   /**
@@ -107,10 +121,14 @@ export class PageTable {
       splat_budget: splatBudget,
     };
     let page = 0;
-    for (const scene of this.#scenes) {
+    for (const { scene, sceneToWorld, opacity, crop = EVERYWHERE } of this.#placements) {
+      const seen = sceneToWorld ? { ...camera, worldToCamera: multiply(camera.worldToCamera, sceneToWorld) } : camera;
       // The same filter whatever the frame is drawn at: in larger pixels it has less variance.
-      const values = cameraValues(camera, scene.origin, (scene.filterVariance ?? constants.DILATION) * pixelArea);
+      const values = cameraValues(seen, scene.origin, (scene.filterVariance ?? constants.DILATION) * pixelArea);
       const own = {
+        opacity,
+        crop_low: relative(crop.min, scene.origin),
+        crop_high: relative(crop.max, scene.origin),
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],
         antialiased: scene.antialiased ? 1 : 0,
@@ -129,6 +147,10 @@ export class PageTable {
     this.#memory.destroy();
   }
 }
+
+/** A corner of a crop in float32, from a scene's origin: infinities become numbers. */
+const relative = (corner: Vector3, origin: Vector3): number[] =>
+  corner.map((value, axis) => Math.min(MAX_FLOAT32, Math.max(-MAX_FLOAT32, value - origin[axis])));
 
 function firstGroups(pages: readonly GaussianPage[]): Uint32Array {
   const first = new Uint32Array(pages.length + 1);

@@ -6,7 +6,7 @@ import type { StructValues } from './gpu/struct.js';
 const CLAMP_MARGIN = 0.3;
 
 /** WGSL lets compilers assume that there is no infinity: a far plane at infinity is as far as float32 goes. */
-const MAX_FLOAT32 = 3.4028234663852886e38;
+export const MAX_FLOAT32 = 3.4028234663852886e38;
 
 type ViewValues = StructValues<typeof layouts.View>;
 
@@ -26,6 +26,9 @@ export type CameraValues = Omit<
   | 'detail'
   | 'detail_fade'
   | 'splat_budget'
+  | 'opacity'
+  | 'crop_low'
+  | 'crop_high'
 >;
 
 /**
