@@ -8,9 +8,9 @@ const scene = { gaussians: { count: 60, byteLength: 0 }, detail: {} } as unknown
 
 test('splats for which the device has no room are told of, after they were counted', () => {
   const pace = { moving: 'whole' } as unknown as StatsContext['pace'];
-  const context = { quality: 'default', pace, isPreview: false, frameBytes: 0 } as const;
+  const context = { quality: 'default', pace, isPreview: false, frameBytes: 0, pixels: 0 } as const;
   const whyOf = (left: number): string =>
-    statsOf(scene, { ...context, counts: { drawn: 60, left, contributed: 9 } }).why.join();
+    statsOf([scene], { ...context, counts: { drawn: 60, left, contributed: 9 } }).why.join();
   assert.equal(whyOf(0), '');
   assert.match(whyOf(1200), /^1200 splats are not drawn: the GPU allows no buffer/);
 });

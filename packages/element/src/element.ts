@@ -150,7 +150,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.whole.settled);
+    return this.updateComplete.then(() => this.stage.composing).then(() => this.stage.whole.settled);
   }
 
   /**
@@ -168,12 +168,13 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** Size of the scene on show, or null. */
   get statistics(): SceneStatistics | null {
-    const gaussians = this.stage.scene.scene?.gaussians;
-    if (!gaussians) return null;
+    const all = this.stage.whole.shown.map(({ gaussians }) => gaussians);
+    if (all.length === 0) return null;
+    const sum = (of: (each: (typeof all)[number]) => number): number => all.reduce((total, each) => total + of(each), 0);
     return {
-      splats: gaussians.frameCount ?? gaussians.count,
-      dropped: gaussians.droppedCount ?? 0,
-      bytes: gaussians.byteLength,
+      splats: sum(({ frameCount, count }) => frameCount ?? count),
+      dropped: sum(({ droppedCount = 0 }) => droppedCount),
+      bytes: sum(({ byteLength }) => byteLength),
     };
   }
 
@@ -254,7 +255,9 @@ export class GaussianSplatElement extends ViewingMethods {
 
   protected override render(): TemplateResult {
     const { whole, reveal, behaviours, hotspots } = this.stage;
-    const { state, error, progress } = whole;
+    const { state, progress, hasPicture } = whole;
+    // One of several scenes that fails leaves the others visible.
+    const error = hasPicture ? null : whole.error;
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,

@@ -1,4 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
+import { loadModule, type Camera } from '@gaussian-splat/core';
 import type { ReactiveControllerHost } from 'lit';
 import { Behaviours, type BehaviourHost } from './behaviours.js';
 import type { CameraAction } from './camera/gestures.js';
@@ -54,6 +54,8 @@ export class Stage
   readonly queries: SceneQueries;
   /** What of all that the element shows is beyond the controllers of its own scene. */
   whole: Whole = new Whole(this);
+  /** Fulfils when what shows the element's children is there; undefined where it has none. */
+  composing: Promise<void> | undefined;
   /** Share of the loading of its own scene that is done, 0..1; null while it is not known. */
   ownProgress: number | null = null;
   readonly size: SizeController;
@@ -120,6 +122,7 @@ export class Stage
       counts: this.#counts,
       isPreview: this.whole.isPreview,
       frameBytes: this.view.viewport?.byteLength ?? 0,
+      pixels: this.whole.detail.detail,
     });
   }
 
@@ -180,6 +183,18 @@ export class Stage
     this.view.renewCanvas();
   }
 
+  /** Children have come or gone: the first that is a scene or a mesh brings the code that shows it. */
+  childrenChanged(): void {
+    if (this.composing || !this.element.querySelector(':scope>splat-scene,:scope>splat-mesh')) return;
+    this.composing = loadModule('the code that shows several scenes', () => import('./composition/compose.js')).then(
+      ({ compose }) => compose(this),
+      (error: Error) => {
+        this.composing = undefined;
+        this.warn(error.message);
+      },
+    );
+  }
+
   // What the controllers ask.
 
   get isVisible(): boolean {
@@ -226,10 +241,15 @@ export class Stage
       ownsControls: () => !this.live.post.isWanted,
       camera: (bounds) => {
         if (bounds) this.camera.frame(bounds);
-        return this.camera.view(...FIRST_SIZE);
+        return this.firstView;
       },
       listeners: this.live.listeners,
     };
+  }
+
+  /** The camera before the picture has a size. */
+  get firstView(): Camera {
+    return this.camera.view(...FIRST_SIZE);
   }
 
   // What they tell.
@@ -252,7 +272,7 @@ export class Stage
     this.dispatch(new CustomEvent('camera-change', { detail: { source } }));
   }
 
-  /** Other splats are drawn of the scene on show. */
+  /** Other splats are drawn than before. */
   splatsChanged(): void {
     this.#counts = undefined;
     this.view.requestFrame();

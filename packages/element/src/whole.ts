@@ -42,12 +42,13 @@ export class Member {
 /** All that an element shows: here the scene of its own `src`. `Composition`, loaded where there are children, shows theirs besides. */
 export class Whole implements Contents {
   readonly stage: Stage;
-  readonly world = new World();
+  readonly world: World;
   /** The element's own scene. */
-  protected own: Member | undefined;
+  own: Member | undefined;
 
-  constructor(stage: Stage) {
+  constructor(stage: Stage, world = new World()) {
     this.stage = stage;
+    this.world = world;
   }
 
   get state(): SceneState {
@@ -160,8 +161,7 @@ export class Whole implements Contents {
   }
 
   stats(context: StatsContext): SceneStats | null {
-    const { scene } = this.stage.scene;
-    return scene && statsOf(scene, context);
+    return this.own ? statsOf(this.shown, context) : null;
   }
 
   /** The device was lost, or all of it is back: whether the page is to hear of it. */

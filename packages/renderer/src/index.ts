@@ -39,7 +39,7 @@ export { PictureTensor, type PictureFit, type PictureShape } from './pictures/pi
 export { settings, type FrameSettings, type Picture, type Rgba, type TargetView } from './picture.js';
 export { Renderer } from './renderer.js';
 export { Viewpoint, type ViewpointOptions } from './viewpoint.js';
-export { Placement, World, type Box, type Placed } from './world.js';
+export { Placement, unionOfBounds, World, type Box, type Placed } from './world.js';
 export type { FrameRequest, RendererOptions } from './frame-request.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';

@@ -13,6 +13,7 @@ export interface HotspotHost {
   readonly hotspotLayer: HTMLElement | null;
   /** Whose `probe` looks into the last frame, and rejects if it is gone. */
   readonly whole: Pick<Whole, 'probe'>;
+  childrenChanged(): void;
   warn(sentence: string): void;
 }
 
@@ -119,6 +120,7 @@ export class HotspotController implements ReactiveController {
   }
 
   #collect(): void {
+    this.#of.childrenChanged();
     const before = this.#hotspots;
     const children = [...this.#host.children].filter(
       (child): child is HTMLElement => 'dataset' in child && child.slot.startsWith(PREFIX),

@@ -102,6 +102,11 @@ export class SceneController implements ReactiveController {
     return this.#error;
   }
 
+  /** Absolute address of what was asked for last; empty for nothing. */
+  get url(): string {
+    return this.#request?.url ?? '';
+  }
+
   /** The scene on show. */
   get scene(): LoadedGaussians | null {
     return this.#scene;

@@ -1,0 +1,21 @@
+/** Loaded when an element has its first child that is a scene or a mesh: what shows them beside its own scene. */
+import type { Stage } from '../stage.js';
+import { adopt, compositions } from './adopt.js';
+import { SplatChild } from './child.js';
+import { Composition } from './composition.js';
+import { SplatSceneElement } from './splat-scene.js';
+
+/** Registers the children's tags. */
+export function define(): void {
+  if (!globalThis.customElements || customElements.get('splat-scene')) return;
+  customElements.define('splat-scene', SplatSceneElement);
+}
+
+/** Lets an element show its children. */
+export function compose(stage: Stage): void {
+  const composition = new Composition(stage, stage.whole);
+  stage.whole = composition;
+  compositions.set(stage.element, composition);
+  define();
+  for (const child of stage.element.children) if (child instanceof SplatChild) adopt(child);
+}

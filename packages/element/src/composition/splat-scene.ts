@@ -1,0 +1,108 @@
+import type { Matrix4, Vector3 } from '@gaussian-splat/core';
+import type { Box } from '@gaussian-splat/renderer';
+import type { PropertyDeclarations, PropertyValues } from 'lit';
+import type { Attributes } from '../attributes.js';
+import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../live/values.js';
+import type { LiveState } from '../live/live-model.js';
+import { SCENE_ATTRIBUTES, type PropertiesOf } from './attributes.js';
+import { childDeclarations, SplatChild } from './child.js';
+import { SceneSlot } from './scene-slot.js';
+
+/** Where a scene is, and how it is drawn. */
+export interface ScenePlace {
+  readonly placed: Matrix4;
+  readonly up: Vector3 | undefined;
+  readonly opacity: number;
+  readonly crop: Box | undefined;
+  readonly hidden: boolean;
+}
+
+/**
+ * A scene among others, as a child of `<gaussian-splat>`: all of them are sorted together and hide one another.
+ *
+ * ```html
+ * <gaussian-splat src="room.sog">
+ *   <splat-scene src="plant.spz" position="1.2m 0 0" rotation="0 90deg 0" scale="0.5"></splat-scene>
+ * </gaussian-splat>
+ * ```
+ *
+ * @tagname splat-scene
+ * @fires {CustomEvent<LoadDetail>} load - It is shown.
+ * @fires {ProgressEvent} progress - Bytes have arrived.
+ * @fires {CustomEvent<ElementError>} error - It cannot be shown; `detail` is the same object as the property `error`. The others stay.
+ * @fires {CustomEvent<ElementError>} generator-error - A run of its generator failed; the last good frame stays.
+ * @fires {Event} play - As of HTMLMediaElement: its own clock runs.
+ * @fires {Event} pause - Its own clock stands still.
+ * @fires {Event} ended - Its own clock has come to its end.
+ */
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
+export class SplatSceneElement extends SplatChild {
+  static override properties: PropertyDeclarations = {
+    ...childDeclarations(SCENE_ATTRIBUTES),
+    controls: { attribute: false },
+  };
+
+  /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
+  declare controls: ControlValues | null;
+  /** @internal */
+  readonly content = new SceneSlot(this);
+  protected readonly table = SCENE_ATTRIBUTES;
+  #place: ScenePlace | undefined;
+  #liveValues: Omit<LiveState, 'timeSeconds'> | undefined;
+  #observer: MutationObserver | undefined;
+
+  /** @internal */
+  get place(): ScenePlace {
+    return (this.#place ??= this.#readPlace());
+  }
+
+  /** @internal */
+  get liveValues(): Omit<LiveState, 'timeSeconds'> {
+    return (this.#liveValues ??= this.#readLiveValues());
+  }
+
+  /** @internal */
+  get credentials(): Attributes['crossorigin'] {
+    return this.read('crossorigin', this.crossorigin);
+  }
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    // Names of controls are the model's: no list of observed attributes can hold them.
+    this.#observer ??= new MutationObserver((records) => {
+      if (!records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) return;
+      this.#liveValues = undefined;
+      this.content.requestFrame();
+    });
+    this.#observer.observe(this, { attributes: true });
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.#observer?.disconnect();
+  }
+
+  protected override willUpdate(_changed: PropertyValues): void {
+    this.#place = this.#liveValues = undefined;
+  }
+
+  #readPlace(): ScenePlace {
+    const corners = this.read<readonly number[] | undefined>('crop', this.crop);
+    return {
+      placed: this.placed,
+      up: this.read('up', this.up),
+      opacity: this.read('opacity', this.opacity),
+      crop: corners && { min: corners.slice(0, 3) as never, max: corners.slice(3) as never },
+      hidden: this.hidden !== false,
+    };
+  }
+
+  #readLiveValues(): Omit<LiveState, 'timeSeconds'> {
+    const pose = readNumbers(this.pose);
+    if (pose === undefined && this.pose) this.warn('<splat-scene>: pose expects numbers; the rest pose counts.');
+    return { pose, ...readControls(this.attributes, this.controls, (sentence) => this.warn(sentence)) };
+  }
+}
+
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
+export interface SplatSceneElement extends PropertiesOf<Omit<typeof SCENE_ATTRIBUTES, 'autoplay' | 'loop'>> {}
