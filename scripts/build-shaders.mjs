@@ -25,6 +25,7 @@ const RARE = {
     'move_quantized_slots',
   ],
   'probe-shaders': ['probe_depth'],
+  'depth-shaders': ['rasterize_quads_depth', 'rasterize_tiles_depth'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
 const QUANTIZED = {

@@ -128,7 +128,8 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   var g = unpack_gaussian(gaussian_at(i));
   g.opacity = shared_opacity(g.opacity * view.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
   let e = project_ellipse(view, g);
-  let color = splat_sh_color(i, normalize(g.position - view.eye));
+  let toward = select(g.position - view.eye, view.axis, view.is_orthographic != 0u);
+  let color = splat_sh_color(i, normalize(toward));
   splats[slot] = pack_splat(e, color);
   keys[slot] = select(depth_key(e.depth), slot, view.is_ordered != 0u);
 }

@@ -43,6 +43,8 @@ export class FrameResources {
   #capacity: Capacity | undefined;
   #memory = new CapacityMemory();
   #hasOtherPairs = false;
+  /** A frame has asked for depths: frames to come may do so, too. */
+  #keepsDepths = false;
   #hasQuickPairs = false;
   /** The largest budget of splats that a frame has been given. */
   #mostSplats: number | undefined;
@@ -70,13 +72,17 @@ export class FrameResources {
   /**
    * What a frame is drawn with: allocates where the scenes or the wished room are other ones than before.
    * @param splatBudget most splats that the frame draws; 0 for no limit
+   * @param hasDepth whether the frame needs the depths of its splats
    */
-  fit(world: World, splatBudget: number): Resources {
+  fit(world: World, splatBudget: number, hasDepth: boolean): Resources {
     this.#roomFor(splatBudget);
     const current = this.#current;
+    const isFirstWithDepth = hasDepth && !this.#keepsDepths;
+    this.#keepsDepths ||= hasDepth;
     if (current?.table.isCurrent) {
       // The monitor has asked for other room.
-      const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
+      const hasOtherRoom =
+        current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs || isFirstWithDepth;
       return hasOtherRoom ? this.#rebind(current.table) : current;
     }
     this.release();
@@ -145,6 +151,7 @@ export class FrameResources {
     const spareBytes = this.#options.rasterizer.spareBytes({ capacity: visible, pairCapacity: pairs });
     kept?.fitSpare(spareBytes);
     const scratch = kept ?? new Scratch(this.#device, { visible, groups: table.groups, pages }, spareBytes);
+    if (this.#keepsDepths) scratch.keepDepths();
     this.#bindRasterizer(scratch, capacity);
     this.#hasOtherPairs = false;
     const bindings = new FrameBindings(this.#device, stages, { table, scratch });
@@ -153,13 +160,14 @@ export class FrameResources {
     return this.#current;
   }
 
-  #bindRasterizer({ plan, splats, order, keys, spare }: Scratch, { visible, pairs }: Capacity): void {
+  #bindRasterizer({ plan, splats, order, orders, depths, spare }: Scratch, { visible, pairs }: Capacity): void {
     this.#options.rasterizer.bind({
       plan,
       splats,
       spare,
       survivors: order[0],
-      orders: { sorted: order[0], identity: keys[0] },
+      orders,
+      depths,
       capacity: visible,
       pairCapacity: pairs,
     });

@@ -14,12 +14,14 @@ export interface Frame {
   readonly camera: Camera;
   readonly levers: WishLevers & Pick<Levers, 'depthKeyBits'>;
   /** An order of all splats that serves the camera; without it the visible splats are sorted. */
-  readonly depthOrder?: DepthOrder;
+  readonly depthOrder?: DepthOrder | undefined;
   /** Whether a page has levels of detail. */
   readonly hasDetail: boolean;
   /** Whether to keep the splats that are looked at within `Levers.splatBudget`. */
   readonly isBudgeted: boolean;
-  readonly timer?: FrameTimer;
+  /** Whether the rasterizer needs the depths of the splats: keys must be depths. */
+  readonly keepsDepths: boolean;
+  readonly timer?: FrameTimer | undefined;
 }
 
 /**
@@ -48,6 +50,9 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wish
   noteWishes(pass, frame, wishes);
   pass.end();
   for (const wish of wishes) wish.copy(encoder);
+  const { depths, keys } = scratch;
+  if (frame.keepsDepths && depths && !frame.depthOrder)
+    encoder.copyBufferToBuffer(keys[0], 0, depths.sorted, 0, keys[0].size);
   if (!frame.depthOrder) sort(encoder, frame);
   return wishes;
 }

@@ -41,6 +41,7 @@ export { Renderer } from './renderer.js';
 export { Viewpoint, type ViewpointOptions } from './viewpoint.js';
 export { Placement, unionOfBounds, World, type Box, type Placed } from './world.js';
 export type { FrameRequest, RendererOptions } from './frame-request.js';
+export { SceneDepth, type HostDepth, type SceneDepthOptions } from './scene-depth.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';
 export type { Threads } from './stages/plan.js';

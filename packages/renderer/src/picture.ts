@@ -1,7 +1,7 @@
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { Levers, Quality } from './levers.js';
 import { leversOf } from './levers.js';
-import type { FrameNotes } from './rasterizers/rasterizer.js';
+import type { FrameNotes, PaintingDepth } from './rasterizers/rasterizer.js';
 
 /** Red, green, blue and alpha, colour premultiplied. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
@@ -22,6 +22,8 @@ export interface Picture {
   readonly target: GPUTexture | TargetView;
   /** What is behind the splats: a colour, or what the target holds already. Default: transparent. */
   readonly over?: Rgba | 'target' | undefined;
+  /** Depth of what else is in the picture, and where to write that of the splats: a {@link SceneDepth}. */
+  readonly depth?: PaintingDepth | undefined;
   /** What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it. */
   readonly notes?: FrameNotes | undefined;
   /** Notes when each pass ran. */

@@ -1,6 +1,7 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
+import type { OrderKind } from './rasterizers/rasterizer.js';
 import { scanBytes } from './stages/plan.js';
 
 /** How much the buffers between the stages must hold. */
@@ -36,6 +37,7 @@ export class Scratch {
   readonly #keys: GPUBuffer;
   /** Slots in the order of their keys. Before the sort it lists the survivors. */
   readonly #order: GPUBuffer;
+  #deep: { readonly depths: GPUBuffer; readonly identity: GPUBuffer } | undefined;
   #spare: readonly [GPUBuffer, GPUBuffer];
   /** [block][digit] */
   readonly digitCounts: GPUBuffer;
@@ -81,6 +83,27 @@ export class Scratch {
   /** Slots in the order of their keys, which end in the first. Before the sort that lists the survivors. The second is the other of {@link spare}. */
   get order(): readonly [GPUBuffer, GPUBuffer] {
     return [this.#order, this.#spare[1]];
+  }
+
+  /** Slots from near to far, of a frame whose survivors are in that order, or of one that was sorted. */
+  get orders(): Readonly<Record<OrderKind, GPUBuffer>> {
+    return { sorted: this.#order, identity: this.#deep?.identity ?? this.#keys };
+  }
+
+  /** Camera depths by slot, of frames with depth: see {@link keepDepths}. A sort moves the keys, so that those of a frame that is sorted are copied before. */
+  get depths(): Readonly<Record<OrderKind, GPUBuffer>> | undefined {
+    return this.#deep && { sorted: this.#deep.depths, identity: this.#keys };
+  }
+
+  /** Makes room for depths. Keys are depths then, also where survivors are in order, and slots are listed elsewhere. */
+  keepDepths(): void {
+    if (this.#deep) return;
+    const { storage, copyDestination } = BUFFER_USAGE;
+    const listed = Uint32Array.from({ length: this.capacity }, (_, slot) => slot);
+    this.#deep = {
+      depths: this.#memory.buffer('gs.depths', 4 * this.capacity, storage | copyDestination),
+      identity: this.#memory.buffer('gs.identity', 4 * this.capacity, storage, listed),
+    };
   }
 
   /** Free once splats are in order: the rasterizer's then. */

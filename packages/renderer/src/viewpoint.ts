@@ -12,7 +12,7 @@ import { leversOf, type Levers } from './levers.js';
 import type { FrameSettings, Picture } from './picture.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
-import { requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
+import { requireDepth, requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -162,16 +162,20 @@ export class Viewpoint {
    * need a larger buffer than the device allows.
    */
   draw(camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
-    const { over, notes, timer } = picture;
+    const { over, notes, timer, depth } = picture;
     requirePicture(picture, settings);
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
     const target = this.#targetOf(picture, camera);
-    const levers = this.#leversOf(settings);
+    const asked = this.#leversOf(settings);
+    // Sorted exactly, so that a pixel may end at the first splat that is hidden.
+    const levers = depth ? { ...asked, depthKeyBits: 32 as const } : asked;
     const { resources: all, rasterizer, stages } = this.#useEngine(levers);
     if (notes) requireNotes(rasterizer);
     const drawn = scaled(camera, levers.resolutionScale);
-    const resources = all.fit(this.world, levers.splatBudget);
+    if (depth) requireDepth(rasterizer, depth, drawn, notes);
+    depth?.prepare(camera, drawn);
+    const resources = all.fit(this.world, levers.splatBudget, depth !== undefined);
     const { table, scratch, bindings, depthOrder, orderPolicy, monitor } = resources;
     table.update();
     timer?.startFrame();
@@ -179,7 +183,7 @@ export class Viewpoint {
     const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined };
     const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, levers, isOrdered);
+    table.look(drawn, pixelArea, levers, isOrdered && depth === undefined);
     const wishes = recordProjection(encoder, {
       stages,
       bindings,
@@ -189,6 +193,7 @@ export class Viewpoint {
       depthOrder: isOrdered ? depthOrder : undefined,
       hasDetail: table.hasDetail,
       isBudgeted: levers.splatBudget > 0 && table.hasDetail,
+      keepsDepths: depth !== undefined,
       timer,
     });
     const { pairPlan } = rasterizer;
@@ -199,7 +204,7 @@ export class Viewpoint {
     });
     const submissions = this.#submissionsFor(isWatched);
     const order = isOrdered ? 'identity' : 'sorted';
-    const how = { order, levers, notes, timer } as const;
+    const how = { order, levers, notes, timer, depth } as const;
     const last = this.#paint(encoder, target, drawn, how, over, submissions);
     timer?.endFrame?.(last);
     if (isWatched) monitor.record(last, scratch.plan, pairPlan);
@@ -262,8 +267,8 @@ export class Viewpoint {
     const { probe } = await loadModule('the code that looks into a picture', () => import('./depth-probe.js'));
     if (this.#last === undefined || this.#last.scratch !== this.#engine.resources.current?.scratch) return [];
     const { scale, scratch } = this.#last;
-    const { plan, splats, order, keys } = scratch;
-    const nearToFar = { sorted: order[0], identity: keys[0] }[this.#last.order];
+    const { plan, splats, orders } = scratch;
+    const nearToFar = orders[this.#last.order];
     const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
     return probe(this.#device, { plan, splats, order: nearToFar }, drawn);
   }
@@ -278,7 +283,7 @@ export class Viewpoint {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'order' | 'levers' | 'notes' | 'timer'>,
+    how: Pick<Painting, 'order' | 'levers' | 'notes' | 'timer' | 'depth'>,
     over: Picture['over'],
     submissions: Submissions,
   ): GPUCommandEncoder {

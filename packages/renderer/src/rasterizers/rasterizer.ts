@@ -1,5 +1,8 @@
 import type { FrameTimer } from '../gpu/pass-timer.js';
+import type { Camera } from '@gaussian-splat/core';
+import type { ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
 import type { Levers } from '../levers.js';
+import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
@@ -18,6 +21,8 @@ export interface RasterizerInputs {
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
   readonly orders: Readonly<Record<OrderKind, GPUBuffer>>;
+  /** Camera depths by slot, of frames with depth; undefined before there was one. */
+  readonly depths: Readonly<Record<OrderKind, GPUBuffer>> | undefined;
   /** Numbers of the visible splats by slot, for frames whose order is `identity`. */
   readonly survivors: GPUBuffer;
   /** Of at least {@link Rasterizer.spareBytes} each: nobody else's once splats are in order, until the next frame. */
@@ -71,12 +76,36 @@ export interface NotedFrame {
   readonly survivors: GPUBuffer;
 }
 
+/** What a frame has to do with depth besides its own. `SceneDepth` is one; pictures bring it, so that pages without it load none of its code. */
+export interface PaintingDepth {
+  /** True if splats end at the depth of what else is in the picture. */
+  readonly tests: boolean;
+  /** True if the splats' own depth is told. */
+  readonly tells: boolean;
+  readonly outSize: readonly [number, number] | undefined;
+  /** Called before a frame is recorded. */
+  prepare(camera: Camera, drawn: { readonly width: number; readonly height: number }): void;
+  tilesKernel(variant: RasterizeVariant): RasterizeKernel;
+  bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup;
+  readonly quadsProgram: QuadsWithDepth;
+}
+
+/** Quads that read depths: what a pipeline is made of, and what is bound to it. */
+export interface QuadsWithDepth extends Pick<ShaderProgram<ShaderDescription>, 'module' | 'pipelineLayout'> {
+  readonly name: string;
+  bind(
+    resources: Readonly<Record<'raster' | 'plan' | 'splats' | 'order', GPUBuffer>>,
+    depth: PaintingDepth,
+    depths: GPUBuffer,
+  ): GPUBindGroup;
+}
+
 /** Levers that rasterizers know. */
 export type PaintingLevers = Pick<Levers, 'transmittanceMin'>;
 
 /** One frame to draw. */
 export interface Painting {
-  readonly notes?: FrameNotes;
+  readonly notes?: FrameNotes | undefined;
   readonly surface: Surface;
   readonly order: OrderKind;
   readonly levers: PaintingLevers;
@@ -85,7 +114,8 @@ export interface Painting {
    * transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
    */
   readonly background?: readonly [number, number, number, number];
-  readonly timer?: FrameTimer;
+  readonly timer?: FrameTimer | undefined;
+  readonly depth?: PaintingDepth | undefined;
 }
 
 /** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */

@@ -147,7 +147,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, levers, background, notes, timer } = painting;
+    const { surface, levers, background, notes, timer, depth, order } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
     const { format, width, height } = surface;
@@ -159,15 +159,16 @@ export class TilesRasterizer implements Rasterizer {
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    const kernel = rasterizeKernel(this.#device, {
-      format,
-      isFinal: background !== undefined,
-      isNoting: notes !== undefined,
+    const variant = {
+      ...{ format, isFinal: background !== undefined, isNoting: notes !== undefined },
       refusesLast: refusesLast(levers),
-    });
-    const image = notes
-      ? this.#bindNoting(kernel, bound, surface.view, notes)
-      : this.#imageBindings(kernel, bound, surface.view);
+    };
+    const kernel = depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant);
+    const image = depth
+      ? depth.bindTiles(kernel, this.#painted(bound, surface.view), this.#inputs.depths![order])
+      : notes
+        ? this.#bindNoting(kernel, bound, surface.view, notes)
+        : this.#imageBindings(kernel, bound, surface.view);
     kernel.dispatchGrid(paint, image, columns, rows);
     paint.end();
   }
