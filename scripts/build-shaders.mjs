@@ -26,6 +26,7 @@ const RARE = {
   ],
   'probe-shaders': ['probe_depth'],
   'depth-shaders': ['rasterize_quads_depth', 'rasterize_tiles_depth'],
+  'linear-shaders': ['compose_linear'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
 const QUANTIZED = {

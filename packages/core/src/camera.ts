@@ -110,7 +110,8 @@ export function cameraFromProjection(
   { width, height, clipDepth = '0..1' }: ProjectionOptions,
 ): Camera {
   const p = projection;
-  const isMatrix = (m: ArrayLike<number>): boolean => m?.length === 16 && Array.prototype.every.call(m, Number.isFinite);
+  const isMatrix = (m: ArrayLike<number>): boolean =>
+    m?.length === 16 && Array.prototype.every.call(m, Number.isFinite);
   if (!isMatrix(view)) fail('view', '16 finite numbers, column-major', describe(view));
   if (!isMatrix(p)) fail('projection', '16 finite numbers, column-major', describe(p));
   const orthographic = p[11] === 0 && p[15] === 1;
@@ -127,7 +128,10 @@ export function cameraFromProjection(
   const [nearest, far] = [Math.min(...distances), Math.max(...distances)];
   const back = orthographic && nearest <= 0 ? LEAST_NEAR * (far - nearest) - nearest : 0;
   const flip = [1, -1, -1, 1];
-  const worldToCamera = Float64Array.from({ length: 16 }, (_, k) => flip[Math.floor(k / 4)] * view[4 * (k % 4) + Math.floor(k / 4)]);
+  const worldToCamera = Float64Array.from(
+    { length: 16 },
+    (_, k) => flip[Math.floor(k / 4)] * view[4 * (k % 4) + Math.floor(k / 4)],
+  );
   worldToCamera[11] += back;
   const camera: Camera = {
     ...{ width, height, worldToCamera },

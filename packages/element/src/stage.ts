@@ -183,9 +183,9 @@ export class Stage
     this.view.renewCanvas();
   }
 
-  /** Children have come or gone: the first that is a scene or a mesh brings the code that shows it. */
-  childrenChanged(): void {
-    if (this.composing || !this.element.querySelector(':scope>splat-scene,:scope>splat-mesh')) return;
+  /** Children have come or gone, or the scene has more than splats: the first time that there is more to show, its code is loaded. */
+  childrenChanged(hasMore = this.element.querySelector(':scope>splat-scene,:scope>splat-mesh') !== null): void {
+    if (this.composing || !hasMore) return;
     this.composing = loadModule('the code that shows several scenes', () => import('./composition/compose.js')).then(
       ({ compose }) => compose(this),
       (error: Error) => {

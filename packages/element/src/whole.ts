@@ -131,6 +131,7 @@ export class Whole implements Contents {
     playback.setDuration(scene.live?.duration ?? NaN);
     scene.onChange = () => view.requestFrame();
     this.own = new Member(this.world, scene);
+    if (scene.hasMeshes) this.stage.childrenChanged(true);
     const drawn = view.show(scene);
     live.post.attach(view.viewport, () => scene.live?.settable ?? []);
     return drawn;

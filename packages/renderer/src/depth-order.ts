@@ -64,6 +64,11 @@ export class DepthOrder {
     return this.#order;
   }
 
+  /** True if there is what {@link settle} frees. */
+  get isWorking(): boolean {
+    return this.#working !== undefined;
+  }
+
   get byteLength(): number {
     return this.#memory.byteLength + (this.#working?.memory.byteLength ?? 0);
   }

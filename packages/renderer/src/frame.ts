@@ -27,7 +27,7 @@ export interface Frame {
 /**
  * Records what turns Gaussians into projected splats from near to far: cull and project, then sort; or, with an order that
  * serves, thin that order and project. Counts travel in `plan`; nothing comes back to the CPU.
- * @returns what must be read after the submit: pages that streamed scenes lack
+ * @returns what must be copied at the end of the frame and read after the submit: pages that streamed scenes lack
  */
 export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wishes[] {
   const { scratch, bindings, timer } = frame;
@@ -49,7 +49,6 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wish
   }
   noteWishes(pass, frame, wishes);
   pass.end();
-  for (const wish of wishes) wish.copy(encoder);
   const { depths, keys } = scratch;
   if (frame.keepsDepths && depths && !frame.depthOrder)
     encoder.copyBufferToBuffer(keys[0], 0, depths.sorted, 0, keys[0].size);

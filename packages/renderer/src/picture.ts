@@ -1,7 +1,8 @@
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { Levers, Quality } from './levers.js';
 import { leversOf } from './levers.js';
-import type { FrameNotes, PaintingDepth } from './rasterizers/rasterizer.js';
+import type { Resource } from './gpu/kernel.js';
+import type { FrameNotes, PaintingDepth, Surface } from './rasterizers/rasterizer.js';
 
 /** Red, green, blue and alpha, colour premultiplied. */
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
@@ -13,6 +14,24 @@ export interface TargetView {
   readonly format: GPUTextureFormat;
 }
 
+/** A target that has been looked at. */
+export interface Target extends Surface {
+  /** Where more is known of it than a view. */
+  readonly texture?: GPUTexture | undefined;
+  /** Whether a compute shader may write it. */
+  readonly isStorable: boolean;
+}
+
+/** Lays accumulated splats over what is behind them, in place of the viewpoint's own way: see {@link LinearColours}. */
+export interface Composer {
+  compose(
+    encoder: GPUCommandEncoder,
+    resources: Readonly<Record<'compose' | 'accumulated', Resource>>,
+    target: Target,
+    keeps: boolean,
+  ): void;
+}
+
 /** What a frame is drawn into. */
 export interface Picture {
   /**
@@ -22,6 +41,8 @@ export interface Picture {
   readonly target: GPUTexture | TargetView;
   /** What is behind the splats: a colour, or what the target holds already. Default: transparent. */
   readonly over?: Rgba | 'target' | undefined;
+  /** How colours are written: a {@link LinearColours} for targets of linear light. Default: encoded as sRGB, as scenes are trained. */
+  readonly colours?: Composer | undefined;
   /** Depth of what else is in the picture, and where to write that of the splats: a {@link SceneDepth}. */
   readonly depth?: PaintingDepth | undefined;
   /** What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it. */

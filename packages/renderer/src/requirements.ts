@@ -85,11 +85,13 @@ export function requireBlendable(device: GPUDevice, format: AccumulationFormat):
 }
 
 /** Of a picture what types alone would say. @throws GaussianSplatError `argument/value` */
-export function requirePicture({ target, over }: Partial<Picture>, settings: FrameSettings): void {
+export function requirePicture({ target, over, colours }: Partial<Picture>, settings: FrameSettings): void {
   if (!isObject(target)) throw missing('target', 'a texture, or { view, format } of one', target);
   if (!('createView' in target) && (typeof target.format !== 'string' || !isObject(target.view)))
     throw missing('target', 'a texture, or a view of one with its format: { view, format }', JSON.stringify(target));
   if (!isObject(settings)) throw missing('settings', 'settings(…), or undefined', settings);
+  if (over === 'target' && !colours && formatOf(target).endsWith('-srgb'))
+    throw missing('colours', 'new LinearColours(device), to blend with what a target of linear light holds', colours);
   if (over === undefined || over === 'target') return;
   if (over?.length !== 4 || !Array.prototype.every.call(over, Number.isFinite))
     throw missing('over', "'target', or four finite numbers: premultiplied red, green, blue and alpha", over);
@@ -101,6 +103,8 @@ export function requireScenes(gaussians: unknown, levers: unknown): void {
   if (!scenes.every(isObject)) throw missing('gaussians', 'a scene, or a list of scenes', gaussians);
   if (levers !== undefined && !isObject(levers)) throw missing('settings', 'an object of levers, or undefined', levers);
 }
+
+const formatOf = (target: GPUTexture | { readonly format: GPUTextureFormat }): string => target.format;
 
 const isObject = (value: unknown): value is object => typeof value === 'object' && value !== null;
 

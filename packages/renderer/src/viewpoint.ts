@@ -3,16 +3,19 @@ import { AccumulationTexture } from './accumulation.js';
 import { makeStages, type Stages } from './bindings.js';
 import type { ProbeAnswer, ProbePoint } from './depth-probe.js';
 import { recordProjection } from './frame.js';
-import { FrameResources } from './frame-resources.js';
+import { angleBetween, axisOf } from './depth-order.js';
+import { FrameResources, type Resources } from './frame-resources.js';
+import type { Wishes } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { leversOf, type Levers } from './levers.js';
-import type { FrameSettings, Picture } from './picture.js';
+import type { FrameSettings, Picture, Target } from './picture.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
-import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
 import { requireDepth, requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
+import type { OrderOccasion } from './order-policy.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -33,11 +36,6 @@ interface Submissions {
   readonly watch?: SubmissionWatch;
 }
 
-/** A target, and whether a compute shader may write it. */
-interface Target extends Surface {
-  readonly isStorable: boolean;
-}
-
 const TRANSPARENT = [0, 0, 0, 0] as const;
 /** Of a target: a view of more than that is none to draw into. */
 const ONE_PICTURE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
@@ -50,6 +48,25 @@ export interface ViewpointOptions {
    * Called when a frame that was drawn lacked splats for want of room in the viewpoint's buffers. The next frame has the room: draw it.
    */
   readonly onIncomplete?: () => void;
+}
+
+/** One of several views: see {@link Viewpoint.drawAll}. */
+export interface View {
+  readonly camera: Camera;
+  readonly picture: Picture;
+}
+
+/** A frame that has been encoded. */
+interface Encoded {
+  /** The encoder to go on with. */
+  readonly last: GPUCommandEncoder;
+  /** Its counts are to be read. */
+  readonly isWatched: boolean;
+  readonly submissions: Submissions;
+  /** Pages that streamed scenes ask for are to be read. */
+  readonly wishes: readonly Wishes[];
+  readonly resources: Resources;
+  readonly occasion: Omit<OrderOccasion, 'timer'>;
 }
 
 /** What depends on the rasterizer, the format that it accumulates in, and how stages share their work. */
@@ -89,7 +106,11 @@ export class Viewpoint {
   readonly #views = new WeakMap<GPUTexture, GPUTextureView>();
   #settings: FrameSettings;
   #engine: Engine;
-  #accumulation: Accumulation | undefined;
+  /** By size, the one used last at the end. */
+  readonly #accumulations = new Map<string, Accumulation>();
+  #mostSizes = 1;
+  /** Views to come look along the axis of the one at hand. */
+  #sharesOrder = false;
   /** Where the slots of the last frame are listed, in which buffers, and its pixels for each of the target; undefined before there is one. */
   #last: { readonly order: OrderKind; readonly scratch: Scratch; readonly scale: number } | undefined;
 
@@ -134,8 +155,9 @@ export class Viewpoint {
 
   /** Bytes of GPU memory held between frames, scenes not counted. */
   get byteLength(): number {
-    const parts = [this.#memory, this.#engine.resources, this.#engine.rasterizer, this.#accumulation?.texture];
-    return parts.reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    const textures = [...this.#accumulations.values()].map(({ texture }) => texture);
+    const parts = [this.#memory, this.#engine.resources, this.#engine.rasterizer, ...textures];
+    return parts.reduce((sum, { byteLength }) => sum + byteLength, 0);
   }
 
   /** What the last frame that took notes was painted from; undefined before there is one. */
@@ -162,7 +184,64 @@ export class Viewpoint {
    * need a larger buffer than the device allows.
    */
   draw(camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
-    const { over, notes, timer, depth } = picture;
+    const { timer } = picture;
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
+    const encoded = this.#encode(encoder, camera, picture, settings, true);
+    const { last, isWatched, submissions, wishes, resources, occasion } = encoded;
+    timer?.endFrame?.(last);
+    for (const wish of wishes) wish.copy(last);
+    if (isWatched) this.#watch(last, resources);
+    this.#submit(last, submissions);
+    timer?.submitted?.();
+    const counts = isWatched ? resources.monitor.read() : undefined;
+    if (counts && submissions.watch) {
+      void this.#pacer.learn(
+        submissions.watch,
+        counts.then((painted) => painted?.pairs),
+      );
+    }
+    for (const wish of wishes) wish.read();
+    resources.orderPolicy.settle(occasion);
+  }
+
+  /**
+   * Records one frame into a host's encoder, between its passes, and submits nothing. The host submits within the same task: what the viewpoint learns of a frame
+   * (how much room it needs, which pages it asks for) it reads in the next one. Record a viewpoint once for each submission: its uniforms are those of
+   * the last frame that was recorded. `submissions` of the settings, and `timer` of the picture, are the host's.
+   * @throws GaussianSplatError as {@link draw} does.
+   */
+  record(encoder: GPUCommandEncoder, camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
+    const hosted = { ...picture, timer: undefined };
+    const encoded = this.#encode(encoder, camera, hosted, settings, false);
+    const { isWatched, wishes, resources } = encoded;
+    if (isWatched || wishes.length > 0 || resources.depthOrder.isWorking) setTimeout(() => this.#readLater(encoded));
+  }
+
+  /**
+   * Draws several views of the world, such as both eyes or thumbnails. Those that look along the same axis share one sort; sizes that come again keep their
+   * buffers.
+   * @throws GaussianSplatError as {@link draw} does.
+   */
+  drawAll(views: readonly View[], settings: FrameSettings = this.#settings): void {
+    const sizes = new Set(views.map(({ camera: { width, height } }) => `${width} ${height}`));
+    this.#mostSizes = Math.max(1, sizes.size);
+    const axes = views.map(({ camera }) => axisOf(camera));
+    this.#sharesOrder = axes.some((axis, k) => k > 0 && angleBetween(axis, axes[k - 1]) < 1e-7);
+    try {
+      for (const { camera, picture } of views) this.draw(camera, picture, settings);
+    } finally {
+      this.#sharesOrder = false;
+    }
+  }
+
+  #encode(
+    encoder: GPUCommandEncoder,
+    camera: Camera,
+    picture: Picture,
+    settings: FrameSettings,
+    mayDivide: boolean,
+  ): Encoded {
+    const { notes, timer, depth } = picture;
     requirePicture(picture, settings);
     validateCamera(camera);
     requireTextureSize(this.#device, camera);
@@ -179,8 +258,7 @@ export class Viewpoint {
     const { table, scratch, bindings, depthOrder, orderPolicy, monitor } = resources;
     table.update();
     timer?.startFrame();
-    const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined };
+    const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined || this.#sharesOrder };
     const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
     table.look(drawn, pixelArea, levers, isOrdered && depth === undefined);
@@ -196,30 +274,32 @@ export class Viewpoint {
       keepsDepths: depth !== undefined,
       timer,
     });
-    const { pairPlan } = rasterizer;
-    const isWatched = monitor.isDue(pairPlan !== undefined, {
+    const isWatched = monitor.isDue(rasterizer.pairPlan !== undefined, {
       pixels: drawn.width * drawn.height,
       wholePixels: camera.width * camera.height,
       isWhole: isWhole(levers, this.levers),
     });
-    const submissions = this.#submissionsFor(isWatched);
+    const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
     const order = isOrdered ? 'identity' : 'sorted';
-    const how = { order, levers, notes, timer, depth } as const;
-    const last = this.#paint(encoder, target, drawn, how, over, submissions);
-    timer?.endFrame?.(last);
-    if (isWatched) monitor.record(last, scratch.plan, pairPlan);
-    this.#submit(last, submissions);
-    timer?.submitted?.();
+    const last = this.#paint(encoder, target, drawn, { order, levers, notes, timer, depth }, picture, submissions);
     this.#last = { order, scratch, scale: drawn.width / camera.width };
-    const counts = isWatched ? monitor.read() : undefined;
-    if (counts && submissions.watch) {
-      void this.#pacer.learn(
-        submissions.watch,
-        counts.then((painted) => painted?.pairs),
-      );
-    }
+    return { last, isWatched, submissions, wishes, resources, occasion };
+  }
+
+  #watch(encoder: GPUCommandEncoder, { monitor, scratch }: Resources): void {
+    monitor.record(encoder, scratch.plan, this.#engine.rasterizer.pairPlan);
+  }
+
+  /** Reads what a frame left that a host has submitted. */
+  #readLater({ resources, isWatched, wishes, occasion }: Encoded): void {
+    if (this.#engine.resources.current !== resources) return;
+    resources.orderPolicy.settle(occasion);
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.read' });
+    for (const wish of wishes) wish.copy(encoder);
+    if (isWatched) this.#watch(encoder, resources);
+    this.#device.queue.submit([encoder.finish()]);
+    if (isWatched) void resources.monitor.read();
     for (const wish of wishes) wish.read();
-    orderPolicy.settle(occasion);
   }
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
@@ -284,13 +364,13 @@ export class Viewpoint {
     target: Target,
     camera: Camera,
     how: Pick<Painting, 'order' | 'levers' | 'notes' | 'timer' | 'depth'>,
-    over: Picture['over'],
+    { over, colours }: Picture,
     submissions: Submissions,
   ): GPUCommandEncoder {
     const keeps = over === 'target';
     const background = keeps ? TRANSPARENT : (over ?? TRANSPARENT);
     const isFullSize = camera.width === target.width && camera.height === target.height;
-    const isStored = target.isStorable && !keeps && this.#engine.rasterizer.finishes(target.format);
+    const isStored = target.isStorable && !keeps && !colours && this.#engine.rasterizer.finishes(target.format);
     if (isFullSize && isStored) {
       return this.#recordParts(encoder, { ...how, surface: target, background }, submissions);
     }
@@ -302,7 +382,8 @@ export class Viewpoint {
     const { view, format } = texture;
     const surface = { view, format, width: camera.width, height: camera.height };
     const last = this.#recordParts(encoder, { ...how, surface }, submissions);
-    if (isStored) this.#compose.store(last, compose, target, how.timer);
+    if (colours) colours.compose(last, compose.resources, target, keeps);
+    else if (isStored) this.#compose.store(last, compose, target, how.timer);
     else this.#compose.draw(last, compose, target, how.timer, keeps);
     return last;
   }
@@ -373,8 +454,8 @@ export class Viewpoint {
   #destroyEngine(): void {
     this.#engine.resources.release();
     this.#engine.rasterizer.destroy();
-    this.#accumulation?.texture.destroy();
-    this.#accumulation = undefined;
+    for (const { texture } of this.#accumulations.values()) texture.destroy();
+    this.#accumulations.clear();
     this.#last = undefined;
   }
 
@@ -388,7 +469,7 @@ export class Viewpoint {
     let view = this.#views.get(target);
     if (view === undefined) this.#views.set(target, (view = target.createView(ONE_PICTURE)));
     const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;
-    return { view, format: target.format, isStorable, width, height };
+    return { view, texture: target, format: target.format, isStorable, width, height };
   }
 
   /** As large as frames of this target are without levers of their own: one with fewer pixels paints a part of it. */
@@ -396,13 +477,23 @@ export class Viewpoint {
     const share = this.levers.resolutionScale;
     const width = Math.max(drawn.width, Math.round(target.width * share));
     const height = Math.max(drawn.height, Math.round(target.height * share));
-    const current = this.#accumulation;
-    if (current?.texture.width === width && current.texture.height === height) return current;
-    current?.texture.destroy();
+    const key = `${width} ${height}`;
+    const known = this.#accumulations.get(key);
+    if (known) {
+      this.#accumulations.delete(key);
+      this.#accumulations.set(key, known);
+      return known;
+    }
+    for (const old of this.#accumulations.keys()) {
+      if (this.#accumulations.size < this.#mostSizes) break;
+      this.#accumulations.get(old)!.texture.destroy();
+      this.#accumulations.delete(old);
+    }
     const texture = new AccumulationTexture(this.#device, this.#engine.levers.accumulation, width, height);
     const compose = this.#compose.bind({ compose: this.#composeUniform, accumulated: texture.view });
-    this.#accumulation = { texture, compose };
-    return this.#accumulation;
+    const made = { texture, compose };
+    this.#accumulations.set(key, made);
+    return made;
   }
 }
 

@@ -162,7 +162,7 @@ export class World {
       const { bounds, visible } = placement;
       return bounds && visible ? [placedBounds(bounds, placement)] : [];
     });
-    return all.length > 0 ? all.reduce(unionOfBounds) : undefined;
+    return all.length > 0 ? all.reduce(union) : undefined;
   }
 }
 
@@ -203,7 +203,7 @@ function cut(bounds: Bounds, crop: Box): Bounds {
 }
 
 /** Bounds of two scenes together. */
-export function unionOfBounds(a: Bounds, b: Bounds): Bounds {
+function union(a: Bounds, b: Bounds): Bounds {
   const pick = (choose: (x: number, y: number) => number, p: Vector3, q: Vector3): Vector3 => [
     choose(p[0], q[0]),
     choose(p[1], q[1]),

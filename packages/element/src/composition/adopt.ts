@@ -7,5 +7,5 @@ export const compositions = new WeakMap<Element, Composition>();
 /** Gives a child to its element. One that has not looked at its children yet asks for them itself. */
 export function adopt(child: SplatChild): void {
   const { parentElement } = child;
-  child.content.attach((parentElement && compositions.get(parentElement)) ?? null);
+  child.holder.attach((parentElement && compositions.get(parentElement)) ?? null);
 }

@@ -1,9 +1,13 @@
 import type { Matrix4, Vector3 } from '@gaussian-splat/core';
 import { ReactiveElement, type PropertyDeclarations, type PropertyValues } from 'lit';
-import { declarations, type Attribute } from '../attributes.js';
+import type { Box } from '@gaussian-splat/renderer';
+import { declarations, type Attribute, type Attributes } from '../attributes.js';
 import { readAttribute } from '../camera/grammar.js';
 import { notPlayed } from '../controllers/playback-controller.js';
 import type { ElementError } from '../errors.js';
+import type { GaussianSplatEventMap } from '../events.js';
+import type { LiveState } from '../live/live-model.js';
+import type { Source } from '../stage-host.js';
 import { adopt } from './adopt.js';
 import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
 import type { Part } from './part.js';
@@ -15,25 +19,47 @@ type Written = string | number | ArrayLike<number | string> | null | undefined;
 const written = (value: Written, unit = ''): string | number | null | undefined =>
   typeof value === 'object' && value !== null ? Array.from(value, (each) => `${each}${unit}`).join(' ') : value;
 
-/** Events of a child of `<gaussian-splat>`. None of them bubbles. */
-export interface ChildEventMap {
-  /** It is shown. */
-  load: CustomEvent<{ readonly url: string }>;
-  /** Bytes have arrived. */
-  progress: ProgressEvent;
-  /** It cannot be shown; the same object as its property `error`. What else there is stays. */
-  error: CustomEvent<ElementError>;
+/** Where a child is, and how it is drawn. */
+export interface ChildPlace {
+  /** From its own frame, once that is turned so that y is up, to viewer space. */
+  readonly placed: Matrix4;
+  readonly up: Vector3 | undefined;
+  readonly opacity: number;
+  readonly crop: Box | undefined;
+  readonly hidden: boolean;
 }
+
+/** As glTF has it. */
+const UP: Vector3 = [0, 1, 0];
+const NO_VALUES: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
+
+/** Events of a child of `<gaussian-splat>`, with the meanings that they have there. None of them bubbles. */
+export type ChildEventMap = Omit<
+  GaussianSplatEventMap,
+  'camera-change' | 'poster-dismissed' | 'model-visibility' | 'contextlost' | 'contextrestored' | 'loadeddata' | 'canplay'
+>;
+
+/** The properties that a page may set, for the typings of frameworks. */
+export type SettableOf<Table> = Partial<
+  PropertiesOf<Table> & Pick<SplatChild, 'matrix' | 'currentTime' | 'playbackRate'> & { hidden: boolean }
+>;
 
 /** What all children have: a source, a place, and what is known of it. */
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export abstract class SplatChild extends ReactiveElement {
   /** What stands for it among all that its `<gaussian-splat>` shows. @internal */
-  abstract readonly content: Part;
+  abstract readonly holder: Part;
   /** @internal */
   protected abstract readonly table: Readonly<Record<string, Attribute<unknown, unknown>>>;
   readonly #warned = new Set<string>();
   #isDriven = false;
+  #place: ChildPlace | undefined;
+
+  constructor() {
+    super();
+    // Boolean properties start as booleans: frameworks look at them to decide what a bare attribute means.
+    Object.assign(this, { autoplay: false, loop: false, hidden: false });
+  }
 
   /**
    * All of its place at once, above `position`, `rotation` and `scale`: 16 numbers of an affine matrix, row after row, or a `DOMMatrix`; from its own frame, y up, to viewer space. null for none.
@@ -42,59 +68,59 @@ export abstract class SplatChild extends ReactiveElement {
 
   /** True while it is shown. */
   get loaded(): boolean {
-    return this.content.state === 'ready';
+    return this.holder.state === 'ready';
   }
 
   /** Fulfils, and never rejects, when there is nothing left to wait for: it is shown ({@link loaded}), it cannot be ({@link error}), or it has no source. */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.content.settled);
+    return this.updateComplete.then(() => this.holder.settled);
   }
 
   /** Why it is not shown, or null. */
   get error(): ElementError | null {
-    return this.content.error;
+    return this.holder.error;
   }
 
   /** Share of the loading that is done, 0..1. */
   get progress(): number {
-    return this.loaded ? 1 : (this.content.progress ?? 0);
+    return this.loaded ? 1 : (this.holder.progress ?? 0);
   }
 
   /** Fetches it again, as if `src` had just been set. */
   load(): void {
-    this.content.reload();
+    this.holder.reload();
   }
 
   /** Seconds into what moves; setting it seeks, and gives it a clock of its own. What has none follows that of its `<gaussian-splat>`. */
   get currentTime(): number {
-    return this.content.playback.currentTime;
+    return this.holder.playback.currentTime;
   }
 
   set currentTime(seconds: number) {
     if (seconds === null || seconds === undefined) return;
     this.#drive();
-    this.content.playback.currentTime = seconds;
+    this.holder.playback.currentTime = seconds;
   }
 
   /** Seconds; NaN while nothing moves, Infinity for what has no end. */
   get duration(): number {
-    return this.content.duration;
+    return this.holder.duration;
   }
 
   /** Whether its time stands still. */
   get paused(): boolean {
-    return this.content.playback.paused;
+    return this.holder.playback.paused;
   }
 
   /** Speed of its own clock; 1 is that of the clock. */
   get playbackRate(): number {
-    return this.content.playback.playbackRate;
+    return this.holder.playback.playbackRate;
   }
 
   set playbackRate(rate: number) {
     if (rate === null || rate === undefined) return;
     this.#drive();
-    this.content.playback.playbackRate = rate;
+    this.holder.playback.playbackRate = rate;
   }
 
   /**
@@ -103,7 +129,7 @@ export abstract class SplatChild extends ReactiveElement {
    */
   async play(): Promise<void> {
     this.#drive();
-    const { playback } = this.content;
+    const { playback } = this.holder;
     const { pauses } = playback;
     await this.updateComplete;
     if (playback.pauses !== pauses) throw notPlayed();
@@ -115,12 +141,13 @@ export abstract class SplatChild extends ReactiveElement {
   /** Lets its time stand still. */
   pause(): void {
     this.#drive();
-    this.content.playback.pause();
+    this.holder.playback.pause();
   }
 
   /** From now on it has a clock of its own. */
   #drive(): void {
     this.#isDriven = true;
+    this.holder.hasBegun = true;
   }
 
   /** It has a clock of its own: it plays by itself, starts again by itself, or a script has moved its time. @internal */
@@ -128,8 +155,35 @@ export abstract class SplatChild extends ReactiveElement {
     return this.autoplay || this.loop || this.#isDriven;
   }
 
-  /** Its place in viewer space. @internal */
-  get placed(): Matrix4 {
+  /** @internal */
+  abstract get source(): Source;
+
+  /** @internal */
+  get liveValues(): Omit<LiveState, 'timeSeconds'> {
+    return NO_VALUES;
+  }
+
+  /** @internal */
+  get credentials(): Attributes['crossorigin'] {
+    return this.read('crossorigin', this.crossorigin);
+  }
+
+  /** @internal */
+  get place(): ChildPlace {
+    return (this.#place ??= this.readPlace());
+  }
+
+  /** @internal */
+  protected readPlace(): ChildPlace {
+    return { placed: this.#readPlaced(), up: UP, opacity: 1, crop: undefined, hidden: Boolean(this.hidden) };
+  }
+
+  protected override willUpdate(_changed: PropertyValues): void {
+    this.#place = undefined;
+  }
+
+  /** Its place in viewer space. */
+  #readPlaced(): Matrix4 {
     if (this.matrix !== null && this.matrix !== undefined) {
       const matrix = readMatrix(this.matrix);
       if (matrix) return matrix;
@@ -164,7 +218,7 @@ export abstract class SplatChild extends ReactiveElement {
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
-    this.content.attach(null);
+    this.holder.attach(null);
   }
 
   /** It shows nothing of its own. */
@@ -173,7 +227,7 @@ export abstract class SplatChild extends ReactiveElement {
   }
 
   protected override updated(_changed: PropertyValues): void {
-    this.content.update();
+    this.holder.update();
   }
 }
 

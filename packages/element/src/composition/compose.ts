@@ -3,12 +3,14 @@ import type { Stage } from '../stage.js';
 import { adopt, compositions } from './adopt.js';
 import { SplatChild } from './child.js';
 import { Composition } from './composition.js';
+import { SplatMeshElement } from './splat-mesh.js';
 import { SplatSceneElement } from './splat-scene.js';
 
 /** Registers the children's tags. */
 export function define(): void {
   if (!globalThis.customElements || customElements.get('splat-scene')) return;
   customElements.define('splat-scene', SplatSceneElement);
+  customElements.define('splat-mesh', SplatMeshElement);
 }
 
 /** Lets an element show its children. */

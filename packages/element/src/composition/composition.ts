@@ -1,5 +1,5 @@
-import type { Camera } from '@gaussian-splat/core';
-import { unionOfBounds, type Picture, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
+import { loadModule, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
+import { type Picture, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
 import type { ViewerFrame } from '../camera/orbit.js';
 import { frameOf, type SceneBounds } from '../camera/settings.js';
 import type { MotionHost } from '../controllers/motion-controller.js';
@@ -9,20 +9,21 @@ import type { Entrance, SceneState } from '../controllers/scene-controller.js';
 import type { ElementError } from '../errors.js';
 import type { DetailLevers, LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { Place } from '../gpu/viewport.js';
+import type * as meshes from './meshes/open-mesh.js';
 import type { Frame } from '../live/frame-filter.js';
 import type { Stage } from '../stage.js';
 import { statsOf, type PartStats, type SceneStats, type StatsContext } from '../stats.js';
 import { Member, Whole } from '../whole.js';
-import { costOf, type Part } from './part.js';
+import { credentialsOf } from '../attributes.js';
+import type { SceneSlot } from './scene-slot.js';
+import { costOf, type MeshDrawing, type Part, type PlacedModel } from './part.js';
 
-/** What draws the meshes of an element. */
-export interface MeshLayer {
-  /** Changes whenever the frame would. */
-  readonly version: number;
-  draw(frame: Frame, frameOfWorld: ViewerFrame): Partial<Picture>;
-  /** Puts depths of meshes into what was found of splats. */
-  probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]>;
-}
+/** From a glTF's axes, y up, to those of the cloud that its splats are read as. */
+const GLTF_TO_CLOUD: Matrix4 = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+const IDENTITY: Matrix4 = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+
+const loadMeshes = (): Promise<typeof meshes> =>
+  loadModule('the code that shows meshes', () => import('./meshes/open-mesh.js'));
 
 /** States from the one that says most of several parts on. */
 const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];
@@ -30,7 +31,7 @@ const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];
 /** Shows the scenes and meshes of an element's children beside its own scene. */
 export class Composition extends Whole {
   /** What draws meshes, where there are some. */
-  meshes: MeshLayer | undefined;
+  #meshes: MeshDrawing | undefined;
   readonly #parts = new Set<Part>();
   /** Parts come one after the other, so that one that fails is known. */
   #arrivals: Promise<void> | undefined;
@@ -44,6 +45,7 @@ export class Composition extends Whole {
     super(stage, before.world);
     this.own = before.own;
     this.#isFramed = before.own !== undefined;
+    if (before.own?.scene.hasMeshes) void this.#addMeshes(stage, before.own.scene);
   }
 
   // The parts.
@@ -65,13 +67,15 @@ export class Composition extends Whole {
    * Shows what a part has loaded, once those before it are drawn. Fulfils when it is, or need not be any more; rejects with GaussianSplatError `out-of-memory/*`.
    * @param enter puts it into the world, or whatever draws it
    */
-  arrive(part: Part | Stage, place: Place & { readonly isDestroyed: boolean }, entrance: Entrance, enter: () => void): Promise<void> {
+  #arrive(part: Part | Stage, scene: LoadedGaussians, entrance: Entrance, enter: () => void): Promise<void> {
     const show = async (): Promise<void> => {
-      if (place.isDestroyed || place.isLost) return;
+      if (scene.model) await this.#prepareMeshes(scene);
+      if (scene.isDestroyed || scene.isLost) return;
       enter();
+      if (scene.hasMeshes) void this.#addMeshes(part, scene);
       this.#latest = part;
       this.#frame(entrance, part === this.stage);
-      await this.#draw(place);
+      await this.#draw(scene);
     };
     const shown = this.#arrivals ? this.#arrivals.then(show) : show();
     const over = shown
@@ -85,7 +89,7 @@ export class Composition extends Whole {
 
   /** Shows the splats that a part has loaded. */
   join(part: Part, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void> {
-    return this.arrive(part, scene, entrance, () => {
+    return this.#arrive(part, scene, entrance, () => {
       enter(this.#memberOf(scene));
     });
   }
@@ -102,6 +106,49 @@ export class Composition extends Whole {
       this.#isToldLoaded = false;
       this.#isFramed = false;
       this.stage.stopDrawing(clear);
+    }
+    if (this.shown.some(({ model }) => model)) return;
+    this.#meshes?.destroy();
+    this.#meshes = undefined;
+  }
+
+  /** Meshes that are drawn, and where. */
+  get #models(): readonly PlacedModel[] {
+    return [...(this.own ? [this.own] : []), ...this.#members].flatMap(({ scene, placement }) => {
+      const { model, hasMeshes } = scene;
+      if (!model || !placement.visible) return [];
+      const { sceneToWorld = IDENTITY } = placement;
+      return [{ model, toWorld: hasMeshes ? multiply(sceneToWorld, GLTF_TO_CLOUD) : sceneToWorld }];
+    });
+  }
+
+  /** Makes what draws meshes on a device. */
+  async #prepareMeshes({ device }: LoadedGaussians): Promise<void> {
+    const { MeshLayer } = await loadMeshes();
+    if (this.#meshes?.device === device) return;
+    this.#meshes?.destroy();
+    this.#meshes = undefined;
+    this.#meshes = await MeshLayer.create(device);
+  }
+
+  /** The triangles of a file that has splats, too: they come after these, and what is wrong with them leaves the splats visible. */
+  async #addMeshes(part: Part | Stage, scene: LoadedGaussians): Promise<void> {
+    const { stage } = this;
+    const { attributes, services } = part === stage ? stage : (part as SceneSlot);
+    const url = part === stage ? stage.scene.url : (part as Part).url;
+    try {
+      const { openModel } = await loadMeshes();
+      const { signal } = new AbortController();
+      const request = { url, credentials: credentialsOf(attributes.crossorigin), limits: services.sceneLimits };
+      const frameUrl = (beside: string): string => services.urlModifier?.(beside) ?? beside;
+      const model = await openModel(request, { loader: services.sceneLoader, signal, frameUrl });
+      await this.#prepareMeshes(scene);
+      if (scene.isDestroyed) return model.dispose();
+      scene.model = model;
+      this.#frame('whole', false);
+      this.#changed();
+    } catch (error) {
+      if (!scene.isDestroyed) stage.warn(`<gaussian-splat>: the triangles are not shown: ${(error as Error).message}`);
     }
   }
 
@@ -217,19 +264,18 @@ export class Composition extends Whole {
 
   override prepare(): string {
     for (const part of this.#parts) part.place();
-    return `${super.prepare()} ${this.meshes?.version}`;
+    return `${super.prepare()} ${this.#models.map(({ model }) => model.version).join()}`;
   }
 
   drawBeneath(frame: Frame): Partial<Picture> {
-    return this.meshes?.draw(frame, this.frame) ?? {};
+    const models = this.#models;
+    return this.#meshes && models.length > 0 ? this.#meshes.draw(frame, models, this.frame) : {};
   }
 
   override get bounds(): SceneBounds | null {
     for (const part of this.#parts) part.place();
-    const splats = this.world.bounds();
-    const meshes = [...this.#parts].flatMap(({ bounds }) => bounds ?? []);
-    const all = [...(splats ? [splats] : []), ...meshes];
-    return all.length > 0 ? { ...all.reduce(unionOfBounds), up: this.own?.scene.bounds.up } : null;
+    const bounds = this.world.bounds();
+    return bounds ? { ...bounds, up: this.own?.scene.bounds.up } : null;
   }
 
   override async readBounds(): Promise<SceneBounds | null> {
@@ -264,7 +310,7 @@ export class Composition extends Whole {
   }
 
   override show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
-    return this.arrive(this.stage, scene, entrance, () => {
+    return this.#arrive(this.stage, scene, entrance, () => {
       this.own?.remove();
       this.own = this.#memberOf(scene);
       this.#changed();
@@ -302,7 +348,7 @@ export class Composition extends Whole {
 
   override async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
     const answers = await super.probe(points);
-    return this.meshes ? this.meshes.probe(points, answers) : answers;
+    return this.#meshes && this.#models.length > 0 ? this.#meshes.probe(points, answers) : answers;
   }
 
   override stats(context: StatsContext): SceneStats | null {

@@ -1,20 +1,41 @@
-import type { Bounds, Camera } from '@gaussian-splat/core';
+import type { Camera, Matrix4 } from '@gaussian-splat/core';
+import type { Picture, ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import type { ViewerFrame } from '../camera/orbit.js';
 import type { SceneState } from '../controllers/scene-controller.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import type { ElementError } from '../errors.js';
-import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { LoadedGaussians, MeshModel } from '../gpu/loaded-gaussians.js';
+import type { Frame } from '../live/frame-filter.js';
 import type { PartStats } from '../stats.js';
 import type { Member } from '../whole.js';
 import type { Composition } from './composition.js';
+
+/** A mesh where it is drawn. */
+export interface PlacedModel {
+  readonly model: MeshModel;
+  readonly toWorld: Matrix4;
+}
+
+/** What draws the meshes of an element, on one device. */
+export interface MeshDrawing {
+  readonly device: GPUDevice;
+  /** Draws them into a frame. @returns where splats are drawn over them */
+  draw(frame: Frame, models: readonly PlacedModel[], world: ViewerFrame): Partial<Picture>;
+  /** Puts depths of meshes into what was found of splats. */
+  probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]>;
+  destroy(): void;
+}
 
 /** What a scene takes. */
 export const costOf = (
   scene: LoadedGaussians | null,
 ): Pick<PartStats, 'splats' | 'triangles' | 'dropped' | 'bytes'> => ({
   splats: scene ? (scene.gaussians.frameCount ?? scene.gaussians.count) : 0,
-  triangles: 0,
+  triangles: scene?.model?.triangles ?? 0,
   dropped: scene?.gaussians.droppedCount ?? 0,
-  bytes: scene ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) : 0,
+  bytes: scene
+    ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) + (scene.model?.byteLength ?? 0)
+    : 0,
 });
 
 /** One of the things that an element shows besides its own scene, in the hands of {@link Composition}. */
@@ -31,6 +52,8 @@ export interface Part {
   readonly isShown: boolean;
   /** What is shown is a part of what is still loading. */
   readonly isPreview: boolean;
+  /** It has played or was told not to: it begins by itself no more. */
+  hasBegun: boolean;
   /** Plays by itself, on its own clock. */
   readonly autoplays: boolean;
   /** The clock that it follows. */
@@ -43,8 +66,6 @@ export interface Part {
   /** Absolute address of what was asked for last. */
   readonly url: string;
   readonly stats: PartStats;
-  /** Where meshes are, in the world; null for what the world knows itself. */
-  readonly bounds: Bounds | null;
   /** It belongs to this element from now on, or to none. */
   attach(composition: Composition | null): void;
   /** Its attributes, or those of the element, may ask for something else, or it may be loaded now. */

@@ -17,7 +17,7 @@ import type { Member } from '../whole.js';
 import type { Composition } from './composition.js';
 import { costOf, type Part } from './part.js';
 import { cameraInScene, isSolid, sceneToWorld } from './placing.js';
-import type { SplatSceneElement } from './splat-scene.js';
+import type { SplatChild } from './child.js';
 
 /** What a slot needs once it belongs to nothing any more. */
 const NO_SERVICES = { releaseDelay: 0 } as Services;
@@ -27,7 +27,8 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   readonly scene: SceneController;
   readonly ownClock: PlaybackController;
   progress: number | null = null;
-  readonly #element: SplatSceneElement;
+  hasBegun = false;
+  readonly #element: SplatChild;
   readonly #source: SourceController;
   readonly #live: LiveWiring;
   readonly #detail: DetailController;
@@ -36,7 +37,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   #stage: Stage | undefined;
   member: Member | undefined;
 
-  constructor(element: SplatSceneElement) {
+  constructor(element: SplatChild) {
     this.#element = element;
     this.ownClock = new PlaybackController(this);
     this.#live = new LiveWiring(this);
@@ -91,8 +92,6 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
     return this.scene.url;
   }
 
-  readonly bounds = null;
-
   get stats(): PartStats {
     const { state, error, scene } = this.scene;
     return { element: this.#element, state, error, ...costOf(scene) };
@@ -117,8 +116,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
 
   update(): void {
     if (this.#composition === null) return;
-    const { src, contract, chain } = this.#element;
-    this.#source.set({ src, contract, chain, postprocess: null });
+    this.#source.set(this.#element.source);
     this.#detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
     this.autoplay();
     this.requestFrame();
@@ -133,7 +131,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
 
   autoplay(): void {
     const { ownClock: clock } = this;
-    if (this.autoplays && clock.canPlay && clock.paused && this.#composition?.mayAutoplay) clock.play();
+    if (this.autoplays && !this.hasBegun && clock.canPlay && this.#composition?.mayAutoplay) clock.play();
   }
 
   place(): void {
@@ -233,7 +231,9 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
 
   playbackEvent(type: PlaybackEvent): void {
     this.dispatch(new Event(type));
-    if (type === 'play' || type === 'pause') this.#stage?.element.requestUpdate();
+    if (type !== 'play' && type !== 'pause') return;
+    this.hasBegun ||= type === 'play';
+    this.#stage?.element.requestUpdate();
   }
 
   async show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
@@ -283,6 +283,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
 
   emptied(): void {
     this.progress = null;
+    this.hasBegun = false;
     this.ownClock.empty();
     this.ownClock.stopWaits();
     this.dispatch(new Event('emptied'));

@@ -1,21 +1,10 @@
-import type { Matrix4, Vector3 } from '@gaussian-splat/core';
-import type { Box } from '@gaussian-splat/renderer';
 import type { PropertyDeclarations, PropertyValues } from 'lit';
-import type { Attributes } from '../attributes.js';
+import type { Source } from '../stage-host.js';
 import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../live/values.js';
 import type { LiveState } from '../live/live-model.js';
 import { SCENE_ATTRIBUTES, type PropertiesOf } from './attributes.js';
-import { childDeclarations, SplatChild } from './child.js';
+import { childDeclarations, SplatChild, type ChildPlace } from './child.js';
 import { SceneSlot } from './scene-slot.js';
-
-/** Where a scene is, and how it is drawn. */
-export interface ScenePlace {
-  readonly placed: Matrix4;
-  readonly up: Vector3 | undefined;
-  readonly opacity: number;
-  readonly crop: Box | undefined;
-  readonly hidden: boolean;
-}
 
 /**
  * A scene among others, as a child of `<gaussian-splat>`: all of them are sorted together and hide one another.
@@ -45,25 +34,19 @@ export class SplatSceneElement extends SplatChild {
   /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
   declare controls: ControlValues | null;
   /** @internal */
-  readonly content = new SceneSlot(this);
+  readonly holder: SceneSlot = new SceneSlot(this);
   protected readonly table = SCENE_ATTRIBUTES;
-  #place: ScenePlace | undefined;
   #liveValues: Omit<LiveState, 'timeSeconds'> | undefined;
   #observer: MutationObserver | undefined;
 
   /** @internal */
-  get place(): ScenePlace {
-    return (this.#place ??= this.#readPlace());
-  }
-
-  /** @internal */
-  get liveValues(): Omit<LiveState, 'timeSeconds'> {
+  override get liveValues(): Omit<LiveState, 'timeSeconds'> {
     return (this.#liveValues ??= this.#readLiveValues());
   }
 
   /** @internal */
-  get credentials(): Attributes['crossorigin'] {
-    return this.read('crossorigin', this.crossorigin);
+  get source(): Source {
+    return { src: this.src, contract: this.contract, chain: this.chain, postprocess: null };
   }
 
   override connectedCallback(): void {
@@ -72,7 +55,7 @@ export class SplatSceneElement extends SplatChild {
     this.#observer ??= new MutationObserver((records) => {
       if (!records.some(({ attributeName }) => attributeName?.startsWith(CONTROL_PREFIX))) return;
       this.#liveValues = undefined;
-      this.content.requestFrame();
+      this.holder.requestFrame();
     });
     this.#observer.observe(this, { attributes: true });
   }
@@ -82,18 +65,18 @@ export class SplatSceneElement extends SplatChild {
     this.#observer?.disconnect();
   }
 
-  protected override willUpdate(_changed: PropertyValues): void {
-    this.#place = this.#liveValues = undefined;
+  protected override willUpdate(changed: PropertyValues): void {
+    super.willUpdate(changed);
+    this.#liveValues = undefined;
   }
 
-  #readPlace(): ScenePlace {
+  protected override readPlace(): ChildPlace {
     const corners = this.read<readonly number[] | undefined>('crop', this.crop);
     return {
-      placed: this.placed,
+      ...super.readPlace(),
       up: this.read('up', this.up),
       opacity: this.read('opacity', this.opacity),
       crop: corners && { min: corners.slice(0, 3) as never, max: corners.slice(3) as never },
-      hidden: this.hidden !== false,
     };
   }
 
@@ -101,6 +84,12 @@ export class SplatSceneElement extends SplatChild {
     const pose = readNumbers(this.pose);
     if (pose === undefined && this.pose) this.warn('<splat-scene>: pose expects numbers; the rest pose counts.');
     return { pose, ...readControls(this.attributes, this.controls, (sentence) => this.warn(sentence)) };
+  }
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'splat-scene': SplatSceneElement;
   }
 }
 

@@ -29,6 +29,8 @@ export interface SceneHost {
   readonly memoryBudget: number | undefined;
   /** What a generator needs to know beyond the request. */
   readonly liveRequest: ReturnType<OpenOptions['live']>;
+  /** Opens what is no scene of splats. */
+  readonly open?: typeof openGaussians;
   /** Shows a scene; fulfils once its first frame is drawn. */
   show(scene: LoadedGaussians, entrance: Entrance): Promise<void>;
   /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
@@ -291,7 +293,8 @@ export class SceneController implements ReactiveController {
       if (!isSmall) this.#drop(false);
     };
     this.#spare(true);
-    const scene = await openGaussians(request, {
+    const open = this.#of.open ?? openGaussians;
+    const scene = await open(request, {
       device: services.sharedDevice,
       loader: services.sceneLoader,
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,

@@ -25,6 +25,15 @@ export interface OwnedGaussians extends GaussianScene {
   destroy(): void;
 }
 
+/** Triangles that a source has besides its splats, or in place of them. */
+export interface MeshModel {
+  readonly triangles: number;
+  readonly byteLength: number;
+  /** Grows when it has moved by itself. */
+  readonly version: number;
+  dispose(): void;
+}
+
 /** What one source has on the GPU: its splats, levels of detail of them, what writes them, and the lease that keeps the device. */
 export class LoadedGaussians {
   readonly bounds: SceneBounds;
@@ -32,6 +41,10 @@ export class LoadedGaussians {
   readonly live: Timeline | undefined;
   /** Submissions that the painting of a frame is divided into. */
   readonly submissions: number;
+  /** Its triangles, once they are read. */
+  model: MeshModel | undefined;
+  /** Its file has triangles, too. */
+  readonly hasMeshes: boolean;
   /** Called when the next frame would show more than the last one. */
   onChange: () => void = () => undefined;
   readonly #lease: DeviceLease;
@@ -45,7 +58,7 @@ export class LoadedGaussians {
     gaussians: OwnedGaussians,
     bounds: SceneBounds,
     submissions: number,
-    { live, detail = {} }: { live?: Timeline; detail?: DetailLevers } = {},
+    { live, detail = {}, hasMeshes = false }: { live?: Timeline | undefined; detail?: DetailLevers; hasMeshes?: boolean | undefined } = {},
   ) {
     this.#lease = lease;
     this.#gaussians = gaussians;
@@ -53,6 +66,7 @@ export class LoadedGaussians {
     this.submissions = submissions;
     this.live = live;
     this.#detail = detail;
+    this.hasMeshes = hasMeshes;
     if (live) QueueClock.of(lease.device).isShared = true;
   }
 
@@ -120,6 +134,7 @@ export class LoadedGaussians {
     if (this.#isDestroyed) return;
     this.#isDestroyed = true;
     this.live?.close();
+    this.model?.dispose();
     this.#levels?.destroy();
     this.#gaussians.destroy();
     this.#lease.release();
