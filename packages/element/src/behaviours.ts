@@ -81,10 +81,6 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.#host.autoRotates;
   }
 
-  get autoplays(): boolean {
-    return this.#host.autoplays;
-  }
-
   get isOnShow(): boolean {
     return this.#host.isOnShow;
   }

@@ -142,7 +142,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** True while the scene is on show. */
   get loaded(): boolean {
-    return this.stage.whole.state === 'ready';
+    return this.stage.state === 'ready';
   }
 
   /**
@@ -150,7 +150,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.composing).then(() => this.stage.whole.settled);
+    return this.updateComplete.then(() => this.stage.composing).then(() => this.stage.settled);
   }
 
   /**
@@ -158,24 +158,27 @@ export class GaussianSplatElement extends ViewingMethods {
    * quarters, warming up is the rest.
    */
   get progress(): number {
-    return this.loaded ? 1 : (this.stage.whole.progress ?? 0);
+    return this.loaded ? 1 : (this.stage.progress ?? 0);
   }
 
   /** Why no scene is shown, or null. */
   get error(): ElementError | null {
-    return this.stage.whole.error;
+    return this.stage.error;
   }
 
   /** Size of the scene on show, or null. */
   get statistics(): SceneStatistics | null {
-    const all = this.stage.whole.shown.map(({ gaussians }) => gaussians);
+    const all = this.stage.shown.map(({ gaussians }) => gaussians);
     if (all.length === 0) return null;
-    const sum = (of: (each: (typeof all)[number]) => number): number => all.reduce((total, each) => total + of(each), 0);
-    return {
-      splats: sum(({ frameCount, count }) => frameCount ?? count),
-      dropped: sum(({ droppedCount = 0 }) => droppedCount),
-      bytes: sum(({ byteLength }) => byteLength),
-    };
+    const nothing: SceneStatistics = { splats: 0, dropped: 0, bytes: 0 };
+    return all.reduce(
+      ({ splats, dropped, bytes }, { frameCount, count, droppedCount = 0, byteLength }) => ({
+        splats: splats + (frameCount ?? count),
+        dropped: dropped + droppedCount,
+        bytes: bytes + byteLength,
+      }),
+      nothing,
+    );
   }
 
   /**
@@ -250,14 +253,13 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#showStates();
     const bar = this.renderRoot.querySelector<HTMLElement>('[part="progress-bar"]');
     // Through the style object, which a strict Content-Security-Policy allows, and not the attribute, which it refuses.
-    if (bar) bar.style.transform = `scaleX(${this.stage.whole.progress ?? 0})`;
+    if (bar) bar.style.transform = `scaleX(${this.stage.progress ?? 0})`;
   }
 
   protected override render(): TemplateResult {
-    const { whole, reveal, behaviours, hotspots } = this.stage;
-    const { state, progress, hasPicture } = whole;
+    const { state, progress, hasPicture, reveal, behaviours, hotspots } = this.stage;
     // One of several scenes that fails leaves the others visible.
-    const error = hasPicture ? null : whole.error;
+    const error = hasPicture ? null : this.stage.error;
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
@@ -387,7 +389,7 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   #showStates(): void {
-    const { state, error } = this.stage.whole;
+    const { state, error } = this.stage;
     const active: Record<(typeof STATES)[number], boolean> = {
       loading: state === 'loading',
       preview: this.stage.scene.isPreview,

@@ -1,11 +1,12 @@
 import type { Camera } from '@gaussian-splat/core';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import { toViewer } from './camera/orbit.js';
 import { unproject } from './camera/projection.js';
+import type { SceneBounds } from './camera/settings.js';
 import { ScenePoint } from './camera/values.js';
 import type { CameraController } from './controllers/camera-controller.js';
 import type { ViewController } from './controllers/view-controller.js';
 import { isGone } from './gpu/device-failures.js';
-import type { Whole } from './whole.js';
 
 /** A box in viewer space, its sides along the axes. */
 export interface SceneBox {
@@ -15,7 +16,10 @@ export interface SceneBox {
 
 export interface QueryHost {
   readonly camera: CameraController;
-  readonly whole: Pick<Whole, 'bounds' | 'probe'>;
+  /** Where all that is shown is; null while nothing is. */
+  readonly bounds: SceneBounds | null;
+  /** Looks into the last frame. Rejects if it is gone. */
+  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
   readonly view: Pick<ViewController, 'viewport'>;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   readonly drawnFrom: Camera | undefined;
@@ -32,8 +36,7 @@ export class SceneQueries {
 
   /** Box around nearly all of the scene; null while none is on show. */
   get box(): SceneBox | null {
-    const { camera, whole } = this.#host;
-    const { bounds } = whole;
+    const { camera, bounds } = this.#host;
     if (bounds === null) return null;
     const [a, b] = [toViewer(camera.viewerFrame, bounds.min), toViewer(camera.viewerFrame, bounds.max)];
     const corner = (pick: (p: number, q: number) => number): ScenePoint =>
@@ -47,7 +50,7 @@ export class SceneQueries {
    * @returns null beside the scene, where it is more transparent than not, or if the frame is gone meanwhile.
    */
   async positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
-    const { camera, whole, view, drawnFrom: drawn, element } = this.#host;
+    const { camera, view, drawnFrom: drawn, element } = this.#host;
     const { viewport } = view;
     const { left, top, width, height } = element.getBoundingClientRect();
     if (drawn === undefined || viewport === null || element.clientWidth === 0) return null;
@@ -58,7 +61,7 @@ export class SceneQueries {
     const y = ((ownY - element.clientTop) * drawn.height) / element.clientHeight;
     if (!(x >= 0 && y >= 0 && x < drawn.width && y < drawn.height)) return null;
     try {
-      const [answer] = await whole.probe([{ x, y }]);
+      const [answer] = await this.#host.probe([{ x, y }]);
       if (!answer || answer.depth === null) return null;
       const point = unproject(drawn, { x, y, depth: answer.depth });
       return new ScenePoint(...toViewer(camera.viewerFrame, point));

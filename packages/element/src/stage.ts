@@ -1,15 +1,18 @@
 import { loadModule, type Camera } from '@gaussian-splat/core';
+import { World, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
 import type { ReactiveControllerHost } from 'lit';
 import { Behaviours, type BehaviourHost } from './behaviours.js';
 import type { CameraAction } from './camera/gestures.js';
+import type { SceneBounds } from './camera/settings.js';
 import { CameraController } from './controllers/camera-controller.js';
 import { DetailController, type DetailHost } from './controllers/detail-controller.js';
 import { HotspotController, type HotspotHost } from './controllers/hotspot-controller.js';
 import { InputController, type InputHost } from './controllers/input-controller.js';
+import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
 import { PrintController } from './controllers/print-controller.js';
 import { RevealController, type RevealHost } from './controllers/reveal-controller.js';
-import { SceneController, type Entrance, type SceneHost } from './controllers/scene-controller.js';
+import { SceneController, type Entrance, type SceneHost, type SceneState } from './controllers/scene-controller.js';
 import { SizeController } from './controllers/size-controller.js';
 import { SourceController, type SourceHost } from './controllers/source-controller.js';
 import { ViewController, type ViewHost } from './controllers/view-controller.js';
@@ -18,12 +21,12 @@ import { ElementCore } from './element-core.js';
 import type { ElementError } from './errors.js';
 import type { CameraChangeSource } from './events.js';
 import { isGone } from './gpu/device-failures.js';
-import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
+import type { DetailLevers, LoadedGaussians } from './gpu/loaded-gaussians.js';
+import { Member } from './member.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
 import { SceneQueries, type QueryHost } from './scene-queries.js';
 import type { Source, StageHost } from './stage-host.js';
-import type { ReadCounts, SceneStats } from './stats.js';
-import { Whole } from './whole.js';
+import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 
 /**
  * All that goes on behind the element's attributes and markup: scene, camera, size, sight and input, and who of them
@@ -52,8 +55,10 @@ export class Stage
   readonly behaviours: Behaviours;
   readonly hotspots: HotspotController;
   readonly queries: SceneQueries;
-  /** What of all that the element shows is beyond the controllers of its own scene. */
-  whole: Whole = new Whole(this);
+  /** All that is drawn. */
+  readonly world = new World();
+  /** What is drawn of the element's own scene. */
+  own: Member | undefined;
   /** Fulfils when what shows the element's children is there; undefined where it has none. */
   composing: Promise<void> | undefined;
   /** Share of the loading of its own scene that is done, 0..1; null while it is not known. */
@@ -90,39 +95,41 @@ export class Stage
     new PrintController(element, () => this.drawNow());
     this.queries = new SceneQueries(this);
     new InputController(element, this);
-    const onPageVisibility = (): void => this.whole.suspend();
+    const onPageVisibility = (): void => this.suspend();
     element.addController({
       hostConnected: () => {
         document.addEventListener('visibilitychange', onPageVisibility);
         // Put back after a while, an eager element loads again though nothing has come into sight.
         this.#source.request();
       },
-      hostUpdated: () => this.#onUpdate(),
+      hostUpdated: () => this.updated(),
       hostDisconnected: () => document.removeEventListener('visibilitychange', onPageVisibility),
     });
   }
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
   drawNow(): HTMLCanvasElement | null {
-    return this.whole.isPreview ? null : this.view.drawNow();
+    return this.scene.isPreview ? null : this.view.drawNow();
   }
 
   /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */
   async updateFraming(): Promise<void> {
     const { scene } = this.scene;
-    const bounds = await this.whole.readBounds();
+    const bounds = await this.readBounds();
     if (bounds && this.scene.scene === scene) this.camera.frame(bounds);
   }
 
   /** What is known of the scene on show; null where there is none. */
   get stats(): SceneStats | null {
-    return this.whole.stats({
+    const { shown } = this;
+    if (shown.length === 0) return null;
+    return statsOf(shown, {
       quality: this.attributes.quality,
       pace: this.view.pace.report,
       counts: this.#counts,
-      isPreview: this.whole.isPreview,
+      isPreview: this.scene.isPreview,
       frameBytes: this.view.viewport?.byteLength ?? 0,
-      pixels: this.whole.detail.detail,
+      pixels: this.levels.detail,
     });
   }
 
@@ -183,10 +190,14 @@ export class Stage
     this.view.renewCanvas();
   }
 
-  /** Children have come or gone, or the scene has more than splats: the first time that there is more to show, its code is loaded. */
-  childrenChanged(hasMore = this.element.querySelector(':scope>splat-scene,:scope>splat-mesh') !== null): void {
-    if (this.composing || !hasMore) return;
-    this.composing = loadModule('the code that shows several scenes', () => import('./composition/compose.js')).then(
+  /** Children have come or gone. */
+  childrenChanged(): void {
+    if (this.element.querySelector(':scope>splat-scene,:scope>splat-mesh')) this.compose();
+  }
+
+  /** Lets more be shown than the splats of one scene. */
+  compose(): void {
+    this.composing ??= loadModule('the code that shows several scenes', () => import('./composition/compose.js')).then(
       ({ compose }) => compose(this),
       (error: Error) => {
         this.composing = undefined;
@@ -196,6 +207,56 @@ export class Stage
   }
 
   // What the controllers ask.
+
+  get state(): SceneState {
+    return this.scene.state;
+  }
+
+  /** Why nothing is shown. */
+  get error(): ElementError | null {
+    return this.scene.error;
+  }
+
+  /** Fulfils, and never rejects, once nothing is left to wait for. */
+  get settled(): Promise<void> {
+    return this.scene.settled;
+  }
+
+  /** Share of the loading that is done, 0..1; null while it is not known. */
+  get progress(): number | null {
+    return this.ownProgress;
+  }
+
+  /** The sources that are drawn. */
+  get shown(): readonly LoadedGaussians[] {
+    return this.own ? [this.own.scene] : [];
+  }
+
+  /** How much detail is drawn, at rest too. */
+  get levels(): DetailLevers {
+    return this.own?.scene.detail ?? {};
+  }
+
+  /** Where all of it is, in the frame of the element's own scene; null while nothing is shown. */
+  get bounds(): SceneBounds | null {
+    return this.own?.scene.bounds ?? null;
+  }
+
+  /** The same, measured anew where a generator may have moved it. */
+  async readBounds(): Promise<SceneBounds | null> {
+    return (await this.own?.scene.live?.readBounds?.()) ?? this.bounds;
+  }
+
+  prepareFrame(): string {
+    void this.own?.placement;
+    const { layout, changes, placements } = this.world;
+    return `${layout} ${changes} ${placements.map(({ scene }) => scene.version).join()}`;
+  }
+
+  /** Looks into the last frame. Rejects if it is gone. */
+  async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
+    return (await this.view.viewport?.viewpoint.probe(points)) ?? [];
+  }
 
   get isVisible(): boolean {
     return this.#visibility.isVisible;
@@ -212,20 +273,11 @@ export class Stage
   }
 
   get hasPicture(): boolean {
-    return this.whole.hasPicture;
-  }
-
-  /** The attribute `autoplay` of the element's own scene. */
-  get autoplaysOwn(): boolean {
-    return super.autoplays;
-  }
-
-  override get autoplays(): boolean {
-    return this.whole.autoplays;
+    return this.scene.state === 'ready' || this.scene.isPreview;
   }
 
   get player(): BehaviourHost['player'] {
-    return this.whole.player;
+    return this.autoplays ? this.playback : undefined;
   }
 
   get wantsPreviews(): boolean {
@@ -259,7 +311,9 @@ export class Stage
   }
 
   advanceScene(camera: Camera, now: number): void {
-    this.whole.advance(camera, now);
+    const { scene, live } = this;
+    // The last picture of a scene whose place another will take stays as it is.
+    if (scene.scene && !scene.isOutgoing) live.advance(scene.scene, camera, now);
   }
 
   afterFrame(camera: Camera): void {
@@ -280,11 +334,11 @@ export class Stage
   }
 
   notePace(isWhole: boolean): void {
-    this.whole.notePace(isWhole);
+    this.detail.notePace(isWhole);
   }
 
   drawingFailed(error: unknown): void {
-    this.whole.fail(error);
+    this.scene.fail(error);
   }
 
   playbackEvent(type: PlaybackEvent): void {
@@ -295,11 +349,27 @@ export class Stage
 
   show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
     this.#counts = undefined;
-    return this.whole.show(scene, entrance);
+    const { camera, view } = this;
+    if (entrance === 'new') camera.frame(scene.bounds);
+    if (entrance === 'whole') camera.refine(scene.bounds);
+    this.playback.setDuration(scene.live?.duration ?? NaN);
+    if (scene.hasMeshes) this.compose();
+    this.own = this.enter(scene);
+    const drawn = view.show(scene);
+    this.live.post.attach(view.viewport, () => scene.live?.settable ?? []);
+    return drawn;
+  }
+
+  /** Puts what is loaded into the world. */
+  enter(scene: LoadedGaussians): Member {
+    scene.onChange = () => this.requestFrame();
+    return new Member(this.world, scene);
   }
 
   hide(clear: boolean): void {
-    this.whole.hide(clear);
+    this.own?.remove();
+    this.own = undefined;
+    this.stopDrawing(clear);
   }
 
   /** Nothing is shown any more; the last picture stays unless it is to be cleared. */
@@ -350,12 +420,24 @@ export class Stage
   }
 
   contextChanged(type: 'contextlost' | 'contextrestored'): void {
-    if (this.whole.tellsContext(type)) this.dispatch(new Event(type));
+    this.dispatch(new Event(type));
+  }
+
+  /** A pause of the picture is not time that passes. */
+  suspend(): void {
+    this.playback.suspend();
+  }
+
+  /** Starts what plays by itself, where it may. */
+  autoplay(): void {
+    const { playback } = this;
+    const mayPlay = playback.canPlay && playback.paused && !prefersReducedMotion();
+    if (this.autoplays && mayPlay && !this.behaviours.motion.isHeld) playback.play();
   }
 
   posterDismissed(): void {
     this.dispatch(new Event('poster-dismissed'));
-    this.whole.autoplay();
+    this.autoplay();
   }
 
   act(action: CameraAction): void {
@@ -377,15 +459,15 @@ export class Stage
     return true;
   }
 
-  #onUpdate(): void {
+  /** Called after each update of the element. */
+  updated(): void {
     this.reveal.settle();
-    this.whole.update();
+    this.detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
   }
 
   #onVisibility(): void {
     this.#source.request();
-    this.whole.request();
-    if (!this.#visibility.isVisible) this.whole.suspend();
+    if (!this.#visibility.isVisible) this.suspend();
     this.dispatch(new CustomEvent('model-visibility', { detail: { visible: this.#visibility.isVisible } }));
     this.element.requestUpdate();
     this.view.requestFrame();

@@ -2,6 +2,7 @@
 import type { Stage } from '../stage.js';
 import { adopt, compositions } from './adopt.js';
 import { SplatChild } from './child.js';
+import { ComposedStage } from './composed-stage.js';
 import { Composition } from './composition.js';
 import { SplatMeshElement } from './splat-mesh.js';
 import { SplatSceneElement } from './splat-scene.js';
@@ -15,9 +16,8 @@ export function define(): void {
 
 /** Lets an element show its children. */
 export function compose(stage: Stage): void {
-  const composition = new Composition(stage, stage.whole);
-  stage.whole = composition;
-  compositions.set(stage.element, composition);
+  compositions.set(stage.element, new Composition(stage));
+  Object.setPrototypeOf(stage, ComposedStage.prototype);
   define();
   for (const child of stage.element.children) if (child instanceof SplatChild) adopt(child);
 }

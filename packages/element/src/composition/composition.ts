@@ -12,8 +12,8 @@ import type { Place } from '../gpu/viewport.js';
 import type * as meshes from './meshes/open-mesh.js';
 import type { Frame } from '../live/frame-filter.js';
 import type { Stage } from '../stage.js';
-import { statsOf, type PartStats, type SceneStats, type StatsContext } from '../stats.js';
-import { Member, Whole } from '../whole.js';
+import type { PartStats, SceneStats } from '../stats.js';
+import type { Member } from '../member.js';
 import { credentialsOf } from '../attributes.js';
 import type { SceneSlot } from './scene-slot.js';
 import { costOf, type MeshDrawing, type Part, type PlacedModel } from './part.js';
@@ -29,7 +29,8 @@ const loadMeshes = (): Promise<typeof meshes> =>
 const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];
 
 /** Shows the scenes and meshes of an element's children beside its own scene. */
-export class Composition extends Whole {
+export class Composition {
+  readonly stage: Stage;
   /** What draws meshes, where there are some. */
   #meshes: MeshDrawing | undefined;
   readonly #parts = new Set<Part>();
@@ -40,12 +41,11 @@ export class Composition extends Whole {
   #isToldLoaded = false;
   readonly #lost = new Set<object>();
 
-  /** Takes over from what has shown the element's own scene alone. */
-  constructor(stage: Stage, before: Whole) {
-    super(stage, before.world);
-    this.own = before.own;
-    this.#isFramed = before.own !== undefined;
-    if (before.own?.scene.hasMeshes) void this.#addMeshes(stage, before.own.scene);
+  constructor(stage: Stage) {
+    this.stage = stage;
+    const { own } = stage;
+    this.#isFramed = own !== undefined;
+    if (own?.scene.hasMeshes) void this.#addMeshes(stage, own.scene);
   }
 
   // The parts.
@@ -90,13 +90,8 @@ export class Composition extends Whole {
   /** Shows the splats that a part has loaded. */
   join(part: Part, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void> {
     return this.#arrive(part, scene, entrance, () => {
-      enter(this.#memberOf(scene));
+      enter(this.stage.enter(scene));
     });
-  }
-
-  #memberOf(scene: LoadedGaussians): Member {
-    scene.onChange = () => this.stage.requestFrame();
-    return new Member(this.world, scene);
   }
 
   /** Something is shown no more: draws what is left, or nothing. */
@@ -107,14 +102,14 @@ export class Composition extends Whole {
       this.#isFramed = false;
       this.stage.stopDrawing(clear);
     }
-    if (this.shown.some(({ model }) => model)) return;
+    if (this.members.some(({ scene }) => scene.model)) return;
     this.#meshes?.destroy();
     this.#meshes = undefined;
   }
 
   /** Meshes that are drawn, and where. */
   get #models(): readonly PlacedModel[] {
-    return [...(this.own ? [this.own] : []), ...this.#members].flatMap(({ scene, placement }) => {
+    return this.members.flatMap(({ scene, placement }) => {
       const { model, hasMeshes } = scene;
       if (!model || !placement.visible) return [];
       const { sceneToWorld = IDENTITY } = placement;
@@ -157,7 +152,7 @@ export class Composition extends Whole {
     const before = view.viewport;
     const drawn = view.show(place);
     if (view.viewport !== before)
-      live.post.attach(view.viewport, () => this.shown.flatMap((scene) => scene.live?.settable ?? []));
+      live.post.attach(view.viewport, () => this.members.flatMap(({ scene }) => scene.live?.settable ?? []));
     await drawn;
   }
 
@@ -183,12 +178,14 @@ export class Composition extends Whole {
     else if (this.error) this.stage.failed(this.error);
   }
 
-  get #members(): readonly Member[] {
-    return [...this.#parts].flatMap(({ member }) => member ?? []);
+  /** All that is in the world. */
+  get members(): readonly Member[] {
+    const { own } = this.stage;
+    return [...(own ? [own] : []), ...[...this.#parts].flatMap(({ member }) => member ?? [])];
   }
 
   get #isEmpty(): boolean {
-    return this.own === undefined && ![...this.#parts].some(({ isEntered }) => isEntered);
+    return this.stage.own === undefined && ![...this.#parts].some(({ isEntered }) => isEntered);
   }
 
   #changed(): void {
@@ -200,7 +197,7 @@ export class Composition extends Whole {
   #setDuration(): void {
     const { scene, playback } = this.stage;
     if (scene.state === 'waiting' || scene.state === 'loading') return;
-    const own = this.own?.scene.live?.duration ?? NaN;
+    const own = this.stage.own?.scene.live?.duration ?? NaN;
     const followed = [...this.#parts].flatMap(({ hasOwnClock, duration }) => (hasOwnClock ? [] : [duration]));
     const durations = [own, ...followed].filter((seconds) => !Number.isNaN(seconds));
     playback.setDuration(Number.isNaN(own) && durations.length > 0 ? Math.max(...durations) : own);
@@ -213,58 +210,54 @@ export class Composition extends Whole {
 
   /** Rotation from the world, the frame of the element's own scene, to viewer space. */
   get frame(): ViewerFrame {
-    return frameOf(this.stage.attributes, { up: this.own?.scene.bounds.up });
+    return frameOf(this.stage.attributes, { up: this.stage.own?.scene.bounds.up });
   }
 
   // What the stage asks.
 
-  override get state(): SceneState {
-    const own = super.state;
+  get state(): SceneState {
+    const own = this.stage.scene.state;
     if (own !== 'empty' && own !== 'failed') return own;
     const states = [...this.#parts].map(({ state }) => state);
     return STATES.find((state) => states.includes(state)) ?? own;
   }
 
-  override get error(): ElementError | null {
-    const own = super.error;
-    if (own || super.state !== 'empty' || this.state !== 'failed') return own;
-    return [...this.#parts].find(({ error }) => error)?.error ?? null;
+  get error(): ElementError | null {
+    const { error, state } = this.stage.scene;
+    if (error || state !== 'empty' || this.state !== 'failed') return error;
+    return [...this.#parts].find((part) => part.error)?.error ?? null;
   }
 
-  override get settled(): Promise<void> {
-    return Promise.all([super.settled, ...[...this.#parts].map((part) => part.settled)]).then(() => undefined);
+  get settled(): Promise<unknown> {
+    return Promise.all([...this.#parts].map(({ settled }) => settled));
   }
 
-  override get progress(): number | null {
-    const all = [...this.#parts].filter(({ state }) => state !== 'empty' && state !== 'failed');
-    const shares = all.map((part) => (part.state === 'ready' ? 1 : part.progress));
-    const own = super.state === 'ready' ? 1 : super.progress;
-    if (super.state !== 'empty' && super.state !== 'failed') shares.push(own);
+  /** @param own that of the element's own scene */
+  progressWith(own: number | null): number | null {
+    const { scene } = this.stage;
+    const all = [{ state: scene.state, progress: own }, ...this.#parts].filter(
+      ({ state }) => state !== 'empty' && state !== 'failed',
+    );
+    const shares = all.map(({ state, progress }) => (state === 'ready' ? 1 : progress));
     const known = shares.filter((share) => share !== null);
     return known.length > 0 ? known.reduce((sum, share) => sum + share, 0) / shares.length : null;
   }
 
-  override get hasPicture(): boolean {
-    return super.hasPicture || [...this.#parts].some(({ isShown }) => isShown);
+  get hasPicture(): boolean {
+    return [...this.#parts].some(({ isShown }) => isShown);
   }
 
-  override get isPreview(): boolean {
-    return super.isPreview || [...this.#parts].some(({ isPreview }) => isPreview);
-  }
-
-  override get shown(): readonly LoadedGaussians[] {
-    return [...super.shown, ...this.#members.map(({ scene }) => scene)];
-  }
-
-  override get detail(): DetailLevers {
-    const all = this.shown.map(({ detail }) => detail);
-    const most = (of: (levers: DetailLevers) => number | undefined): number => Math.max(0, ...all.map((each) => of(each) ?? 0));
+  get levels(): DetailLevers {
+    const all = this.members.map(({ scene }) => scene.detail);
+    const most = (of: (levers: DetailLevers) => number | undefined): number =>
+      Math.max(0, ...all.map((each) => of(each) ?? 0));
     return { detail: most(({ detail }) => detail), splatBudget: most(({ splatBudget }) => splatBudget) };
   }
 
-  override prepare(): string {
+  /** Puts all parts where they are. @returns what changes whenever meshes do */
+  prepareFrame(): string {
     for (const part of this.#parts) part.place();
-    return `${super.prepare()} ${this.#models.map(({ model }) => model.version).join()}`;
+    return this.#models.map(({ model }) => model.version).join();
   }
 
   drawBeneath(frame: Frame): Partial<Picture> {
@@ -272,15 +265,15 @@ export class Composition extends Whole {
     return this.#meshes && models.length > 0 ? this.#meshes.draw(frame, models, this.frame) : {};
   }
 
-  override get bounds(): SceneBounds | null {
+  get bounds(): SceneBounds | null {
     for (const part of this.#parts) part.place();
-    const bounds = this.world.bounds();
-    return bounds ? { ...bounds, up: this.own?.scene.bounds.up } : null;
+    const bounds = this.stage.world.bounds();
+    return bounds ? { ...bounds, up: this.stage.own?.scene.bounds.up } : null;
   }
 
-  override async readBounds(): Promise<SceneBounds | null> {
+  async readBounds(): Promise<SceneBounds | null> {
     await Promise.all(
-      [...(this.own ? [this.own] : []), ...this.#members].map(async (member) => {
+      this.members.map(async (member) => {
         const bounds = await member.scene.live?.readBounds?.();
         if (bounds) member.placement.bounds = bounds;
       }),
@@ -288,13 +281,11 @@ export class Composition extends Whole {
     return this.bounds;
   }
 
-  override get autoplays(): boolean {
-    return super.autoplays || [...this.#parts].some(({ autoplays }) => autoplays);
-  }
-
-  override get player(): MotionHost['player'] {
-    const clocks: PlaybackController[] = [...this.#parts].flatMap(({ autoplays, ownClock }) => (autoplays ? [ownClock] : []));
-    if (super.autoplays) clocks.push(this.stage.playback);
+  /** @param own the clock of the element, where it plays by itself */
+  playerWith(own: PlaybackController | undefined): MotionHost['player'] {
+    const clocks = [...this.#parts].flatMap(({ autoplays, ownClock }) => (autoplays ? [ownClock] : []));
+    if (own) clocks.push(own);
+    if (clocks.length === 0) return undefined;
     const playable = clocks.filter(({ canPlay }) => canPlay);
     return {
       canPlay: playable.length > 0,
@@ -304,84 +295,80 @@ export class Composition extends Whole {
     };
   }
 
-  override autoplay(): void {
-    super.autoplay();
+  autoplay(): void {
     for (const part of this.#parts) part.autoplay();
   }
 
-  override show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
-    return this.#arrive(this.stage, scene, entrance, () => {
-      this.own?.remove();
-      this.own = this.#memberOf(scene);
+  show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
+    const { stage } = this;
+    return this.#arrive(stage, scene, entrance, () => {
+      stage.own?.remove();
+      stage.own = stage.enter(scene);
       this.#changed();
     });
   }
 
-  override hide(clear: boolean): void {
-    this.own?.remove();
-    this.own = undefined;
+  hide(clear: boolean): void {
+    this.stage.own?.remove();
+    this.stage.own = undefined;
     this.left(clear);
   }
 
-  override advance(camera: Camera, now: number): void {
-    const { playback } = this.stage;
-    super.advance(camera, now);
-    // Its own scene may stand still while others follow its clock.
-    playback.tick(now);
+  advance(camera: Camera, now: number): void {
+    // Its own scene may stand still while others follow the element's clock.
+    this.stage.playback.tick(now);
     for (const part of this.#parts) part.advance(camera, now);
   }
 
-  override suspend(): void {
-    super.suspend();
+  suspend(): void {
     for (const { ownClock } of this.#parts) ownClock.suspend();
   }
 
   /** What came last was too much; whatever else it was, what is left is tried again. */
-  override fail(error: unknown): void {
-    const last = [...this.#parts].filter((part) => part.isEntered).pop();
-    const latest = this.#latest === this.stage ? undefined : (this.#latest as Part | undefined);
-    const blamed = latest?.isEntered ? latest : this.own ? undefined : last;
+  fail(error: unknown): void {
+    const entered = [...this.#parts].filter((part) => part.isEntered);
+    const latest = entered.find((part) => part === this.#latest);
+    const { own, scene } = this.stage;
+    const blamed = latest ?? (own ? undefined : entered.at(-1));
     this.#latest = undefined;
     if (blamed) blamed.fail(error);
-    else if (this.own) super.fail(error);
+    else if (own) scene.fail(error);
   }
 
-  override async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
-    const answers = await super.probe(points);
+  /** Ends what was found of splats where a mesh is nearer. */
+  async probe(points: readonly ProbePoint[], answers: readonly ProbeAnswer[]): Promise<readonly ProbeAnswer[]> {
     return this.#meshes && this.#models.length > 0 ? this.#meshes.probe(points, answers) : answers;
   }
 
-  override stats(context: StatsContext): SceneStats | null {
-    if (!this.hasPicture) return null;
+  /** @param stats of all splats together */
+  statsWith(stats: SceneStats): SceneStats {
     const { scene, element } = this.stage;
     const { state, error } = scene;
     const own: PartStats[] = state === 'empty' ? [] : [{ element, state, error, ...costOf(scene.scene) }];
-    const parts = [...this.#parts].map(({ stats }) => stats);
-    const stats = statsOf(this.shown, context);
-    const meshes = parts.reduce((sum, { triangles, bytes }) => sum + (triangles > 0 ? bytes : 0), 0);
-    return { ...stats, bytes: { ...stats.bytes, scene: stats.bytes.scene + meshes }, scenes: [...own, ...parts] };
+    const parts = [...own, ...[...this.#parts].map((part) => part.stats)];
+    const meshes = this.members.reduce((sum, { scene: { model } }) => sum + (model?.byteLength ?? 0), 0);
+    const isPreview = stats.isPreview || [...this.#parts].some((part) => part.isPreview);
+    return { ...stats, isPreview, bytes: { ...stats.bytes, scene: stats.bytes.scene + meshes }, scenes: parts };
   }
 
-  override tellsContext(type: 'contextlost' | 'contextrestored', who: object = this.stage): boolean {
+  /** Whether the page is to hear that a device was lost, or that all is back. */
+  tellsContext(type: 'contextlost' | 'contextrestored', who: object = this.stage): boolean {
     const before = this.#lost.size;
     if (type === 'contextlost') this.#lost.add(who);
     else this.#lost.delete(who);
     return type === 'contextlost' ? before === 0 : before > 0 && this.#lost.size === 0;
   }
 
-  override request(): void {
-    for (const part of this.#parts) part.request();
-  }
-
-  override update(): void {
-    super.update();
+  /** Called after each update of the element, and when it comes into sight. */
+  update(): void {
     this.#setDuration();
-    this.request();
-    for (const part of this.#parts) part.autoplay();
+    for (const part of this.#parts) {
+      part.request();
+      part.autoplay();
+    }
   }
 
-  override notePace(isWhole: boolean): void {
-    super.notePace(isWhole);
+  notePace(isWhole: boolean): void {
     for (const part of this.#parts) part.notePace(isWhole);
   }
 }

@@ -7,7 +7,7 @@ import type { ElementError } from '../errors.js';
 import type { LoadedGaussians, MeshModel } from '../gpu/loaded-gaussians.js';
 import type { Frame } from '../live/frame-filter.js';
 import type { PartStats } from '../stats.js';
-import type { Member } from '../whole.js';
+import type { Member } from '../member.js';
 import type { Composition } from './composition.js';
 
 /** A mesh where it is drawn. */

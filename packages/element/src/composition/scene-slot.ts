@@ -13,7 +13,7 @@ import type { ProgressListener } from '../loading/protocol.js';
 import type { Services } from '../stage-host.js';
 import type { Stage } from '../stage.js';
 import type { PartStats } from '../stats.js';
-import type { Member } from '../whole.js';
+import type { Member } from '../member.js';
 import type { Composition } from './composition.js';
 import { costOf, type Part } from './part.js';
 import { cameraInScene, isSolid, sceneToWorld } from './placing.js';

@@ -1,18 +1,18 @@
 import type { Camera } from '@gaussian-splat/core';
+import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { parsePoint } from '../camera/grammar.js';
 import { toScene } from '../camera/orbit.js';
 import { project } from '../camera/projection.js';
 import { ScenePoint } from '../camera/values.js';
-import type { Whole } from '../whole.js';
 import type { CameraController } from './camera-controller.js';
 
 export interface HotspotHost {
   readonly camera: Pick<CameraController, 'viewerFrame' | 'bounds'>;
   /** Holds a box for each of {@link HotspotController.names}, in their order, once it is rendered. */
   readonly hotspotLayer: HTMLElement | null;
-  /** Whose `probe` looks into the last frame, and rejects if it is gone. */
-  readonly whole: Pick<Whole, 'probe'>;
+  /** Looks into the last frame. Rejects if it is gone. */
+  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
   childrenChanged(): void;
   warn(sentence: string): void;
 }
@@ -226,7 +226,7 @@ export class HotspotController implements ReactiveController {
       y: (y * camera.height) / clientHeight,
       depth: depth - margin,
     }));
-    const answers = await this.#of.whole.probe(points);
+    const answers = await this.#of.probe(points);
     answers.forEach(({ transmittance }, i) => (asked[i].isOccluded = transmittance < HIDDEN_BELOW));
     this.#place();
   }

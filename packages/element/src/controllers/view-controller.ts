@@ -11,12 +11,11 @@ import { PaceController } from './pace-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
-export interface ViewHost {
+export interface ViewHost extends Contents {
   readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'maxPixelRatio' | 'frameBudget'>;
   readonly camera: CameraController;
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
-  readonly whole: Contents;
   readonly canvas: HTMLCanvasElement | null;
   /** False where nobody would see a frame. */
   readonly isVisible: boolean;
@@ -159,7 +158,7 @@ export class ViewController implements FrameClient {
     const pixels = this.#pixelsOf(viewport);
     if (pixels === null) return null;
     this.#applyRendering(viewport);
-    viewport.render(this.#frameRequest(viewport, pixels), this.#host.whole.prepare());
+    viewport.render(this.#frameRequest(viewport, pixels), this.#host.prepareFrame());
     return canvas;
   }
 
@@ -179,7 +178,7 @@ export class ViewController implements FrameClient {
     const first = this.#first;
     this.#first = undefined;
     this.#applyRendering(viewport);
-    const content = this.#host.whole.prepare();
+    const content = this.#host.prepareFrame();
     const hasChanged = first === undefined && (cameraMoved || content !== this.#drawnContent);
     this.#drawnContent = content;
     const pixels = request.camera.width * request.camera.height;

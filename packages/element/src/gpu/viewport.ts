@@ -26,12 +26,13 @@ export type Place = Pick<LoadedGaussians, 'device' | 'isLost' | 'submissions'>;
 /** What frames show, as of now. */
 export interface Contents {
   readonly world: World;
-  readonly detail: DetailLevers;
+  /** How much detail is drawn, at rest too. */
+  readonly levels: DetailLevers;
   /**
    * Called before each frame: puts into the world what is to be drawn.
    * @returns what changes whenever the frame would
    */
-  prepare(): string;
+  prepareFrame(): string;
   /** Draws what is no splats, before these are drawn over it. @returns where the splats are drawn, as far as that differs */
   drawBeneath?(frame: Frame): Partial<Picture>;
 }
@@ -48,7 +49,7 @@ export interface ViewportEvents {
 export class Viewport {
   readonly viewpoint: Viewpoint;
   readonly #place: Place;
-  readonly #of: { readonly whole: Contents };
+  readonly #contents: Contents;
   readonly #events: ViewportEvents;
   readonly #clock: QueueClock;
   #rendering: Rendering = { quality: 'default', shDegree: 3 };
@@ -59,11 +60,11 @@ export class Viewport {
   #drawnSize = '';
   #layout = 0;
 
-  constructor(place: Place, of: { readonly whole: Contents }, events: ViewportEvents) {
+  constructor(place: Place, contents: Contents, events: ViewportEvents) {
     this.#place = place;
-    this.#of = of;
+    this.#contents = contents;
     this.#events = events;
-    this.viewpoint = new Viewpoint(place.device, of.whole.world, {
+    this.viewpoint = new Viewpoint(place.device, contents.world, {
       settings: this.#settings(),
       onIncomplete: () => {
         this.#drawnSize = '';
@@ -116,7 +117,7 @@ export class Viewport {
 
   /** Settings of a frame; with levers of motion where there are some. */
   #settings(levers?: Partial<FrameLevers>): FrameSettings {
-    const { detail = 0, splatBudget = 0 } = this.#of.whole.detail;
+    const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { submissions } = this.#place;
     // Whichever leaves out more: what the page asks for, or the pace.
     const most = Math.max(detail, levers?.detail ?? 0);
@@ -140,12 +141,12 @@ export class Viewport {
 
   /**
    * Encodes and submits one frame.
-   * @param content what `Contents.prepare` has just returned
+   * @param content what `Contents.prepareFrame` has just returned
    * @param onTime gets how long the frame kept the GPU, some frames later
    */
   render(frame: Frame, content: string, onTime?: (time: WorkTime) => void): void {
     const size = sizeOf(frame);
-    const { layout } = this.#of.whole.world;
+    const { layout } = this.#contents.world;
     if (layout === this.#layout && size === this.#drawnSize) return this.#renderOnce(frame, content, onTime);
     this.#drawnSize = size;
     void this.#withRefusal(() => this.#renderOnce(frame, content, onTime)).then((error) => {
@@ -160,11 +161,11 @@ export class Viewport {
   }
 
   #draw(frame: Frame, content: string): void {
-    this.#layout = this.#of.whole.world.layout;
+    this.#layout = this.#contents.world.layout;
     const settings = this.#settings(frame.levers);
     const draw = (drawn: Frame): void => {
       const { camera, target, background: over } = drawn;
-      this.viewpoint.draw(camera, { target, over, ...this.#of.whole.drawBeneath?.(drawn) }, settings);
+      this.viewpoint.draw(camera, { target, over, ...this.#contents.drawBeneath?.(drawn) }, settings);
     };
     if (this.#filter) this.#filter.render(frame, content + JSON.stringify(settings), draw);
     else draw(frame);
@@ -203,8 +204,8 @@ export class Viewport {
     const { visible, overflow } = await this.viewpoint.statistics();
     const { countContributing } = await loadModule('the code that counts splats', () => import('./contributions.js'));
     if (this.#isDestroyed) throw new Error('the picture is gone');
-    const { world, detail } = this.#of.whole;
-    const view = { world, camera, settings: { ...detail, quality: this.#rendering.quality } };
+    const { world, levels } = this.#contents;
+    const view = { world, camera, settings: { ...levels, quality: this.#rendering.quality } };
     return { drawn: visible, left: overflow, contributed: await countContributing(this.device, view) };
   }
 
