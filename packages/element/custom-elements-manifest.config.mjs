@@ -68,7 +68,18 @@ const ENTRIES = [
   'src/composition/splat-mesh.ts',
 ];
 /** The life cycle of Lit and of the platform is inherited as well, and nobody's concern. */
-const LIFE_CYCLE = ['stage', 'connectedMoveCallback', 'holder', 'place', 'source', 'liveValues', 'credentials', 'hasOwnClock', 'warn', 'table'];
+const LIFE_CYCLE = [
+  'stage',
+  'connectedMoveCallback',
+  'holder',
+  'place',
+  'source',
+  'liveValues',
+  'credentials',
+  'hasOwnClock',
+  'warn',
+  'table',
+];
 const isPublic = ({ name, privacy }) =>
   !name.startsWith('#') && privacy !== 'private' && privacy !== 'protected' && !LIFE_CYCLE.includes(name);
 

@@ -5,7 +5,11 @@ import { fileURLToPath } from 'node:url';
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 /** Of each tag: the table of its attributes, and the document that has their rows. */
 const TABLES = {
-  'gaussian-splat': { table: 'ATTRIBUTES', document: path('../README.md'), rows: /(<!-- attributes: [^>]*-->\n)[^]*?(\n<!-- end -->)/ },
+  'gaussian-splat': {
+    table: 'ATTRIBUTES',
+    document: path('../README.md'),
+    rows: /(<!-- attributes: [^>]*-->\n)[^]*?(\n<!-- end -->)/,
+  },
   'splat-scene': {
     table: 'SCENE_ATTRIBUTES',
     document: path('../../../docs/guide/scenes-and-meshes.md'),
@@ -35,7 +39,8 @@ export function tableOfAttributes() {
   return {
     name: 'table-of-attributes',
     analyzePhase({ ts, node }) {
-      if (!ts.isVariableDeclaration(node) || !node.initializer || !ts.isObjectLiteralExpression(node.initializer)) return;
+      if (!ts.isVariableDeclaration(node) || !node.initializer || !ts.isObjectLiteralExpression(node.initializer))
+        return;
       if (!/^([A-Z_]*ATTRIBUTES|PLACED)$/.test(node.name.getText())) return;
       const entries = node.initializer.properties.flatMap((entry) => {
         // What several tables have in common stands in one before them.

@@ -71,7 +71,8 @@ const number = <V>(grammar: AttributeGrammar<V>): Attribute<number | string | nu
 /** The first is the default. */
 const keyword = <V extends string>(words: readonly V[]): Attribute<V | null, V> => read(keywordGrammar(words));
 /** `''` is what the bare attribute gives. */
-export const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> => read(keywordGrammar(words));
+export const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> =>
+  read(keywordGrammar(words));
 
 const map = <A, B>(grammar: AttributeGrammar<A>, to: (value: A) => B): AttributeGrammar<B> => ({
   ...grammar,
@@ -305,7 +306,9 @@ export const credentialsOf = (crossorigin: Attributes['crossorigin']): RequestCr
   crossorigin === 'use-credentials' ? 'include' : 'same-origin';
 
 /** What Lit is told of a table. */
-export const declarations = (table: Readonly<Record<string, Attribute<unknown, unknown>>> = ATTRIBUTES): PropertyDeclarations =>
+export const declarations = (
+  table: Readonly<Record<string, Attribute<unknown, unknown>>> = ATTRIBUTES,
+): PropertyDeclarations =>
   Object.fromEntries(Object.entries(table).map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
 
 /** The properties that are on or off. */

@@ -14,7 +14,8 @@ export { SplatMeshElement } from './composition/splat-mesh.js';
 export { SplatSceneElement } from './composition/splat-scene.js';
 
 /** The properties of `<splat-scene>` that a page may set. */
-export type SettableSceneProperties = SettableOf<typeof SCENE_ATTRIBUTES> & Partial<Pick<SplatSceneElement, 'controls'>>;
+export type SettableSceneProperties = SettableOf<typeof SCENE_ATTRIBUTES> &
+  Partial<Pick<SplatSceneElement, 'controls'>>;
 /** The properties of `<splat-mesh>` that a page may set. */
 export type SettableMeshProperties = SettableOf<typeof MESH_ATTRIBUTES>;
 

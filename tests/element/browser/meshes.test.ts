@@ -36,7 +36,12 @@ const placeOf = async (element: Element, isPicked: (colour: Rgb) => boolean): Pr
   return middle && [(middle.x - 60) / METRE, (50 - middle.y) / METRE];
 };
 
-function assertNear(actual: readonly number[] | null, expected: readonly number[], what: string, tolerance = 0.15): void {
+function assertNear(
+  actual: readonly number[] | null,
+  expected: readonly number[],
+  what: string,
+  tolerance = 0.15,
+): void {
   const isNear = actual?.every((value, k) => Math.abs(value - expected[k]) <= tolerance);
   assert(isNear, `${what}: expected ${expected.join()}, found ${actual?.map((v) => v.toFixed(2)).join() ?? 'nothing'}`);
 }
@@ -76,7 +81,11 @@ describe('meshes', () => {
     await element.ready;
     assert(element.loaded, 'loaded');
     assertNear(await placeOf(element, isRed), [0, 1], 'the box');
-    assertEqual(element.stats?.scenes.map(({ triangles }) => triangles), [12], 'triangles');
+    assertEqual(
+      element.stats?.scenes.map(({ triangles }) => triangles),
+      [12],
+      'triangles',
+    );
     element.src = GREEN;
     await nextEvent(element, 'load');
     assert(await placeOf(element, isGreen), 'the scene');
@@ -111,6 +120,7 @@ describe('meshes', () => {
     child.setAttribute('rotation', '0 180deg 0');
     element.append(child);
     await element.ready;
+    assert(child.error === null, `${child.error?.message}`);
     await until(() => (element.stats?.scenes[0].triangles ?? 0) > 0, 'the triangles');
     await frames();
     assertNear(await placeOf(element, isRed), [0, 0], 'triangles');

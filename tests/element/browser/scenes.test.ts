@@ -37,7 +37,9 @@ async function placeLoaded(html: string): Promise<GaussianSplatElement> {
   return element;
 }
 
-const childrenOf = (element: Element): SplatSceneElement[] => [...element.querySelectorAll<SplatSceneElement>('splat-scene')];
+const childrenOf = (element: Element): SplatSceneElement[] => [
+  ...element.querySelectorAll<SplatSceneElement>('splat-scene'),
+];
 
 /** Where a colour's middle is, in metres from the middle of the picture. */
 async function placeOf(
@@ -48,7 +50,12 @@ async function placeOf(
   return middle && [(middle.x - 60) / METRE, (50 - middle.y) / METRE];
 }
 
-function assertNear(actual: readonly number[] | null, expected: readonly number[], what: string, tolerance = 0.15): void {
+function assertNear(
+  actual: readonly number[] | null,
+  expected: readonly number[],
+  what: string,
+  tolerance = 0.15,
+): void {
   const isNear = actual?.every((value, k) => Math.abs(value - expected[k]) <= tolerance);
   assert(isNear, `${what}: expected ${expected.join()}, found ${actual?.map((v) => v.toFixed(2)).join() ?? 'nothing'}`);
 }
@@ -58,7 +65,11 @@ describe('several scenes in one element', () => {
     const element = await placeLoaded(`<gaussian-splat src="${COMPASS}" ${VIEW}>
       <splat-scene src="${GREEN}" position="2m 100cm 0" scale="0.5"></splat-scene></gaussian-splat>`);
     assertNear(await placeOf(element, isRed), [1, 0], 'the own scene');
-    assertEqual(childrenOf(element).map(({ loaded, error }) => [loaded, error]), [[true, null]], 'the child');
+    assertEqual(
+      childrenOf(element).map(({ loaded, error }) => [loaded, error]),
+      [[true, null]],
+      'the child',
+    );
     const alone = await placeLoaded(`<gaussian-splat ${VIEW}>
       <splat-scene src="${COMPASS}" position="0 1 0" rotation="0 0 90deg" scale="2 2 2"></splat-scene></gaussian-splat>`);
     // Turned against the clock: what was on the right is above.
@@ -83,7 +94,10 @@ describe('several scenes in one element', () => {
       await childrenOf(element)[0].updateComplete;
       await frames();
       const white = (await screenOf(element)).at(60, 50);
-      assert(white.every((channel) => channel > 200), `and before it: ${white.join()}`);
+      assert(
+        white.every((channel) => channel > 200),
+        `and before it: ${white.join()}`,
+      );
       element.remove();
     }
   });
@@ -132,7 +146,10 @@ describe('several scenes in one element', () => {
     await at(-2, 1, 'put back');
     const other = await placeLoaded(`<gaussian-splat src="${GREEN}" ${VIEW}></gaussian-splat>`);
     other.append(child);
-    await until(() => (other as unknown as { stage: { composing?: unknown } }).stage.composing !== undefined, 'its code');
+    await until(
+      () => (other as unknown as { stage: { composing?: unknown } }).stage.composing !== undefined,
+      'its code',
+    );
     await delay(100);
     assertNear(await placeOf(other, isRed), [-2, 1], 'in another element');
     assertEqual(loads, 0, 'further loads');
@@ -163,7 +180,11 @@ describe('several scenes in one element', () => {
       const [x, y] = [60 + METRE * ((i % 6) - 2.5), 50 - METRE * (Math.floor(i / 6) - 1.5)];
       assertEqual(isGreen(screen.at(x, y)), loaded, `scene ${i}`);
     }
-    assertEqual(element.stats?.scenes.map(({ state }) => state).filter((state) => state === 'failed').length, 2, 'stats');
+    assertEqual(
+      element.stats?.scenes.map(({ state }) => state).filter((state) => state === 'failed').length,
+      2,
+      'stats',
+    );
     assertEqual(element.stats?.modelled, 22, 'splats of all');
     const before = submits;
     await delay(300);
@@ -180,7 +201,10 @@ describe('several scenes in one element', () => {
     await nextEvent(child, 'load');
     element.jumpCameraToGoal();
     await frames();
-    assert(element.getCameraOrbit().radius > 2 * radius, `the camera goes back: ${element.getCameraOrbit().toString()}`);
+    assert(
+      element.getCameraOrbit().radius > 2 * radius,
+      `the camera goes back: ${element.getCameraOrbit().toString()}`,
+    );
     assert(element.getBoundingBox()!.max.x > 20, 'the box has both');
     const red = (await screenOf(element)).middleOf(isRed)!;
     const { left, top } = element.getBoundingClientRect();
@@ -190,7 +214,8 @@ describe('several scenes in one element', () => {
     const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d')!;
     context.drawImage(picture, 0, 0);
     const { data } = context.getImageData(0, 0, picture.width, picture.height);
-    const count = (isPicked: (i: number) => boolean): number => data.filter((_, i) => i % 4 === 0 && isPicked(i)).length;
+    const count = (isPicked: (i: number) => boolean): number =>
+      data.filter((_, i) => i % 4 === 0 && isPicked(i)).length;
     assert(count((i) => data[i] > 150 && data[i + 1] < 100 && data[i + 3] > 100) > 0, 'red in the picture');
     assert(count((i) => data[i + 1] > 150 && data[i] < 100 && data[i + 3] > 100) > 0, 'green in the picture');
   });

@@ -78,4 +78,3 @@ export const MESH_ATTRIBUTES = {
 export type PropertiesOf<Table> = {
   -readonly [K in keyof Table]: Table[K] extends Attribute<infer P, unknown> ? P : never;
 };
-

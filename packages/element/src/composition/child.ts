@@ -1,5 +1,5 @@
 import type { Matrix4, Vector3 } from '@gaussian-splat/core';
-import { ReactiveElement, type PropertyDeclarations, type PropertyValues } from 'lit';
+import { ReactiveElement, type PropertyDeclarations } from 'lit';
 import type { Box } from '@gaussian-splat/renderer';
 import { declarations, type Attribute, type Attributes } from '../attributes.js';
 import { readAttribute } from '../camera/grammar.js';
@@ -36,7 +36,13 @@ const NO_VALUES: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {
 /** Events of a child of `<gaussian-splat>`, with the meanings that they have there. None of them bubbles. */
 export type ChildEventMap = Omit<
   GaussianSplatEventMap,
-  'camera-change' | 'poster-dismissed' | 'model-visibility' | 'contextlost' | 'contextrestored' | 'loadeddata' | 'canplay'
+  | 'camera-change'
+  | 'poster-dismissed'
+  | 'model-visibility'
+  | 'contextlost'
+  | 'contextrestored'
+  | 'loadeddata'
+  | 'canplay'
 >;
 
 /** The properties that a page may set, for the typings of frameworks. */
@@ -178,7 +184,7 @@ export abstract class SplatChild extends ReactiveElement {
     return { placed: this.#readPlaced(), up: UP, opacity: 1, crop: undefined, hidden: Boolean(this.hidden) };
   }
 
-  protected override willUpdate(_changed: PropertyValues): void {
+  protected override willUpdate(): void {
     this.#place = undefined;
   }
 
@@ -187,7 +193,9 @@ export abstract class SplatChild extends ReactiveElement {
     if (this.matrix !== null && this.matrix !== undefined) {
       const matrix = readMatrix(this.matrix);
       if (matrix) return matrix;
-      this.warn(`<${this.localName}> matrix: expected 16 numbers, the last row 0 0 0 1, or a DOMMatrix; the place is used.`);
+      this.warn(
+        `<${this.localName}> matrix: expected 16 numbers, the last row 0 0 0 1, or a DOMMatrix; the place is used.`,
+      );
     }
     return matrixOf({
       position: this.read<Vector3>('position', written(this.position)),
@@ -226,7 +234,7 @@ export abstract class SplatChild extends ReactiveElement {
     return this;
   }
 
-  protected override updated(_changed: PropertyValues): void {
+  protected override updated(): void {
     this.holder.update();
   }
 }

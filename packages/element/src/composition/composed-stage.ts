@@ -18,7 +18,6 @@ const allOf = ({ element }: Stage): Composition => compositions.get(element)!;
  * children carry nothing of this.
  */
 export class ComposedStage extends Stage {
-
   override get state(): SceneState {
     return allOf(this).state;
   }

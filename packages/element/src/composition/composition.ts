@@ -9,7 +9,7 @@ import type { Entrance, SceneState } from '../controllers/scene-controller.js';
 import type { ElementError } from '../errors.js';
 import type { DetailLevers, LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { Place } from '../gpu/viewport.js';
-import type * as meshes from './meshes/open-mesh.js';
+import type * as meshes from '../meshes/open-mesh.js';
 import type { Frame } from '../live/frame-filter.js';
 import type { Stage } from '../stage.js';
 import type { PartStats, SceneStats } from '../stats.js';
@@ -23,7 +23,7 @@ const GLTF_TO_CLOUD: Matrix4 = [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1
 const IDENTITY: Matrix4 = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 const loadMeshes = (): Promise<typeof meshes> =>
-  loadModule('the code that shows meshes', () => import('./meshes/open-mesh.js'));
+  loadModule('the code that shows meshes', () => import('../meshes/open-mesh.js'));
 
 /** States from the one that says most of several parts on. */
 const STATES: readonly SceneState[] = ['ready', 'loading', 'waiting', 'failed'];

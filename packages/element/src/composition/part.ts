@@ -33,9 +33,7 @@ export const costOf = (
   splats: scene ? (scene.gaussians.frameCount ?? scene.gaussians.count) : 0,
   triangles: scene?.model?.triangles ?? 0,
   dropped: scene?.gaussians.droppedCount ?? 0,
-  bytes: scene
-    ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) + (scene.model?.byteLength ?? 0)
-    : 0,
+  bytes: scene ? scene.gaussians.byteLength + (scene.levels?.byteLength ?? 0) + (scene.model?.byteLength ?? 0) : 0,
 });
 
 /** One of the things that an element shows besides its own scene, in the hands of {@link Composition}. */

@@ -54,9 +54,7 @@ export function isSolid(m: Matrix4): boolean {
 }
 
 function determinant(m: Matrix4): number {
-  return (
-    m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8])
-  );
+  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
 /** A camera of the world as a scene sees it that stands there, in the scene's own units. */

@@ -270,9 +270,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   progressed(...[loaded, total, share = total ? loaded / total : undefined]: Parameters<ProgressListener>): void {
     this.progress = share === undefined ? null : Math.min(1, share);
     this.#stage?.element.requestUpdate();
-    this.dispatch(
-      new ProgressEvent('progress', { lengthComputable: total !== undefined, loaded, total: total ?? 0 }),
-    );
+    this.dispatch(new ProgressEvent('progress', { lengthComputable: total !== undefined, loaded, total: total ?? 0 }));
   }
 
   loaded(url: string): void {
@@ -314,4 +312,3 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
     return sceneToWorld(this.#composition.frame, placed, frameOf({ up }, {}));
   }
 }
-

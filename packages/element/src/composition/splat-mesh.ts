@@ -9,7 +9,7 @@ import { SceneSlot } from './scene-slot.js';
 /** The mesh of a `<splat-mesh>`: a source without splats. */
 class MeshSlot extends SceneSlot {
   readonly open: typeof openGaussians = async (request, options) => {
-    const { openMesh } = await loadModule('the code that shows meshes', () => import('./meshes/open-mesh.js'));
+    const { openMesh } = await loadModule('the code that shows meshes', () => import('../meshes/open-mesh.js'));
     return openMesh(request, options);
   };
 }
@@ -32,10 +32,10 @@ class MeshSlot extends SceneSlot {
  * @fires {Event} pause - Its own clock stands still.
  * @fires {Event} ended - Its own clock has come to its end.
  */
-// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class SplatMeshElement extends SplatChild {
   static override properties: PropertyDeclarations = childDeclarations(MESH_ATTRIBUTES);
 
+  declare src: PropertiesOf<typeof MESH_ATTRIBUTES>['src'];
   /** @internal */
   readonly holder: SceneSlot = new MeshSlot(this);
   protected readonly table = MESH_ATTRIBUTES;
@@ -51,6 +51,3 @@ declare global {
     'splat-mesh': SplatMeshElement;
   }
 }
-
-// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
-export interface SplatMeshElement extends PropertiesOf<Pick<typeof MESH_ATTRIBUTES, 'src'>> {}

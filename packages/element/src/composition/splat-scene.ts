@@ -1,10 +1,12 @@
-import type { PropertyDeclarations, PropertyValues } from 'lit';
+import type { PropertyDeclarations } from 'lit';
 import type { Source } from '../stage-host.js';
 import { CONTROL_PREFIX, readControls, readNumbers, type ControlValues } from '../live/values.js';
 import type { LiveState } from '../live/live-model.js';
 import { SCENE_ATTRIBUTES, type PropertiesOf } from './attributes.js';
 import { childDeclarations, SplatChild, type ChildPlace } from './child.js';
 import { SceneSlot } from './scene-slot.js';
+
+type Properties = PropertiesOf<typeof SCENE_ATTRIBUTES>;
 
 /**
  * A scene among others, as a child of `<gaussian-splat>`: all of them are sorted together and hide one another.
@@ -24,12 +26,19 @@ import { SceneSlot } from './scene-slot.js';
  * @fires {Event} pause - Its own clock stands still.
  * @fires {Event} ended - Its own clock has come to its end.
  */
-// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export class SplatSceneElement extends SplatChild {
   static override properties: PropertyDeclarations = {
     ...childDeclarations(SCENE_ATTRIBUTES),
     controls: { attribute: false },
   };
+
+  declare src: Properties['src'];
+  declare up: Properties['up'];
+  declare opacity: Properties['opacity'];
+  declare crop: Properties['crop'];
+  declare contract: Properties['contract'];
+  declare chain: Properties['chain'];
+  declare pose: Properties['pose'];
 
   /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
   declare controls: ControlValues | null;
@@ -65,8 +74,8 @@ export class SplatSceneElement extends SplatChild {
     this.#observer?.disconnect();
   }
 
-  protected override willUpdate(changed: PropertyValues): void {
-    super.willUpdate(changed);
+  protected override willUpdate(): void {
+    super.willUpdate();
     this.#liveValues = undefined;
   }
 
@@ -92,6 +101,3 @@ declare global {
     'splat-scene': SplatSceneElement;
   }
 }
-
-// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
-export interface SplatSceneElement extends PropertiesOf<Omit<typeof SCENE_ATTRIBUTES, 'autoplay' | 'loop'>> {}

@@ -25,8 +25,8 @@ export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
 const LOSS_MS = 200;
 
 /** Whether what failed did so because frames are no longer drawn, or the device was lost. */
-export async function isGone(viewport: Pick<Viewport, 'device' | 'isDestroyed' | 'isLost'>): Promise<boolean> {
-  if (!viewport.isDestroyed) await Promise.race([viewport.device.lost, delay(LOSS_MS)]);
+export async function isGone(viewport: Pick<Viewport, 'isDestroyed' | 'isLost'>): Promise<boolean> {
+  if (!viewport.isDestroyed && !viewport.isLost) await delay(LOSS_MS);
   return viewport.isDestroyed || viewport.isLost;
 }
 

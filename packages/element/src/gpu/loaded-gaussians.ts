@@ -58,7 +58,11 @@ export class LoadedGaussians {
     gaussians: OwnedGaussians,
     bounds: SceneBounds,
     submissions: number,
-    { live, detail = {}, hasMeshes = false }: { live?: Timeline | undefined; detail?: DetailLevers; hasMeshes?: boolean | undefined } = {},
+    {
+      live,
+      detail = {},
+      hasMeshes = false,
+    }: { live?: Timeline | undefined; detail?: DetailLevers; hasMeshes?: boolean | undefined } = {},
   ) {
     this.#lease = lease;
     this.#gaussians = gaussians;

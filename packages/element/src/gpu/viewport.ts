@@ -1,4 +1,4 @@
-import { GaussianSplatError, loadModule, type Camera, type ShDegree } from '@gaussian-splat/core';
+import { loadModule, type Camera, type GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
 import {
   QueueClock,
   Viewpoint,
@@ -12,6 +12,7 @@ import {
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { ReadCounts } from '../stats.js';
 import type { DetailLevers, LoadedGaussians } from './loaded-gaussians.js';
+import { why } from './request-device.js';
 
 /** How frames are drawn. */
 export interface Rendering {
@@ -149,8 +150,9 @@ export class Viewport {
     const { layout } = this.#contents.world;
     if (layout === this.#layout && size === this.#drawnSize) return this.#renderOnce(frame, content, onTime);
     this.#drawnSize = size;
-    void this.#withRefusal(() => this.#renderOnce(frame, content, onTime)).then((error) => {
-      if (error !== null && !this.#isDestroyed) this.#events.onError(outOfMemory(`frame of ${size} pixels`, error));
+    void this.#withRefusal(() => this.#renderOnce(frame, content, onTime)).then(async (error) => {
+      const reason = error && (await why(({ outOfMemory }) => outOfMemory(`frame of ${size} pixels`, error)));
+      if (reason && !this.#isDestroyed) this.#events.onError(reason);
     });
   }
 
@@ -178,7 +180,7 @@ export class Viewport {
   async renderFirst(frame: Frame, content: string): Promise<void> {
     this.#drawnSize = sizeOf(frame);
     const error = await this.#withRefusal(() => this.#draw(frame, content));
-    if (error !== null) throw outOfMemory('first frame', error);
+    if (error) throw await why(({ outOfMemory }) => outOfMemory('first frame', error));
     await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
     // The GPU has nothing to do now. Nobody waits for it.
     this.#clock.calibrate().catch(() => undefined);
@@ -219,13 +221,3 @@ export class Viewport {
 }
 
 const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
-
-function outOfMemory(where: string, cause: GPUError): GaussianSplatError {
-  return new GaussianSplatError('out-of-memory/allocation', {
-    where,
-    expected: 'enough free GPU memory',
-    found: cause.message || 'an allocation that failed',
-    remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
-    cause,
-  });
-}

@@ -6,7 +6,12 @@ function box([hx, hy, hz]: readonly number[]): { positions: number[]; normals: n
   for (const axis of [0, 1, 2]) {
     for (const side of [-1, 1]) {
       const first = positions.length / 3;
-      for (const [u, v] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+      for (const [u, v] of [
+        [-1, -1],
+        [1, -1],
+        [1, 1],
+        [-1, 1],
+      ]) {
         const corner = [0, 0, 0];
         corner[axis] = side;
         corner[(axis + 1) % 3] = u * side;
@@ -59,7 +64,7 @@ export function boxGlb({ half = [0.5, 0.5, 0.5], colour = [1, 0, 0], moves, spla
     const attributes = {
       POSITION: floats(splat, 'VEC3', { min: splat, max: splat }),
       'KHR_gaussian_splatting:ROTATION': floats([0, 0, 0, 1], 'VEC4'),
-      'KHR_gaussian_splatting:SCALE': floats([-1.5, -1.5, -1.5], 'VEC3'),
+      'KHR_gaussian_splatting:SCALE': floats([0.2, 0.2, 0.2], 'VEC3'),
       'KHR_gaussian_splatting:OPACITY': floats([0.99], 'SCALAR'),
       'KHR_gaussian_splatting:SH_DEGREE_0_COEF_0': floats([-1.7, 1.7, -1.7], 'VEC3'),
     };

@@ -92,7 +92,12 @@ export class MeshResolve {
     const pass = encoder.beginRenderPass({
       label: 'gs.mesh_resolve',
       colorAttachments: [{ view: target.createView(), loadOp: 'clear', storeOp: 'store' }],
-      depthStencilAttachment: { view: own.createView(), depthLoadOp: 'clear', depthClearValue: 0, depthStoreOp: 'store' },
+      depthStencilAttachment: {
+        view: own.createView(),
+        depthLoadOp: 'clear',
+        depthClearValue: 0,
+        depthStoreOp: 'store',
+      },
     });
     pass.setPipeline(this.#pipelineFor(target.format));
     pass.setBindGroup(0, this.#bound.group);

@@ -13,10 +13,10 @@ import {
   WebGPURenderer,
   type Group,
 } from 'three/webgpu';
-import type { ViewerFrame } from '../../camera/orbit.js';
-import type { Frame } from '../../live/frame-filter.js';
-import { matrixOfFrame, transposed } from '../placing.js';
-import type { MeshDrawing, PlacedModel } from '../part.js';
+import type { ViewerFrame } from '../camera/orbit.js';
+import type { Frame } from '../live/frame-filter.js';
+import { matrixOfFrame, transposed } from '../composition/placing.js';
+import type { MeshDrawing, PlacedModel } from '../composition/part.js';
 import type { Model } from './model.js';
 import { MeshResolve } from './mesh-resolve.js';
 

@@ -72,11 +72,16 @@ export class Model {
    * @throws GaussianSplatError `decode/*`
    */
   static async read(bytes: ArrayBuffer, { url, credentials, partUrl }: ModelRequest): Promise<Model> {
-    const loader = new GLTFLoader(new LoadingManager().setURLModifier((part) => (/^(blob|data):/.test(part) ? part : partUrl(part))));
+    const loader = new GLTFLoader(
+      new LoadingManager().setURLModifier((part) => (/^(blob|data):/.test(part) ? part : partUrl(part))),
+    );
     loader.setWithCredentials(credentials === 'include');
     loader.register((parser) => ({ name: 'without-splats', beforeRoot: () => prepare(loader, parser) }));
     try {
-      const { scene, animations } = await loader.parseAsync(bytes, new URL('.', url.replace(/^blob:.*/, document.baseURI)).href);
+      const { scene, animations } = await loader.parseAsync(
+        bytes,
+        new URL('.', url.replace(/^blob:.*/, document.baseURI)).href,
+      );
       return new Model(scene, animations);
     } catch (error) {
       if (error instanceof GaussianSplatError) throw error;
@@ -121,7 +126,9 @@ export class Model {
 const isMesh = (object: Object3D): object is Mesh => 'isMesh' in object;
 
 const texturesOf = (material: Material): Texture[] =>
-  Object.values(material).filter((value): value is Texture => value !== null && typeof value === 'object' && 'isTexture' in value);
+  Object.values(material).filter(
+    (value): value is Texture => value !== null && typeof value === 'object' && 'isTexture' in value,
+  );
 
 /** Leaves out the primitives that hold splats, and fetches what compressed ones need. */
 async function prepare(loader: GLTFLoader, { json }: GLTFParser): Promise<void> {

@@ -1,10 +1,10 @@
 /** Loaded when an element has meshes: three.js is behind this module. */
 import type { GaussianScene } from '@gaussian-splat/renderer';
-import { LoadedGaussians } from '../../gpu/loaded-gaussians.js';
-import type { OpenOptions } from '../../gpu/open-scene.js';
-import { assertWebGpu } from '../../gpu/request-device.js';
-import type { Timeline } from '../../live/live-model.js';
-import type { SceneRequest } from '../../loading/protocol.js';
+import { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import type { OpenOptions } from '../gpu/open-scene.js';
+import { assertWebGpu } from '../gpu/request-device.js';
+import type { Timeline } from '../live/live-model.js';
+import type { SceneRequest } from '../loading/protocol.js';
 import { Model } from './model.js';
 
 export { MeshLayer } from './mesh-layer.js';
