@@ -101,6 +101,8 @@ async function buildDemo() {
   rmSync(to, { recursive: true, force: true });
   const { writeSequence } = await import('../demo/site/sequence-scene.mjs');
   await writeSequence(join(to, 'scenes/knot'));
+  const { writePavilion } = await import('../demo/site/pavilion.mjs');
+  writePavilion(join(to, 'scenes/pavilion.glb'));
   // Its packages were not there when this script started on a fresh clone.
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));

@@ -19,7 +19,7 @@ const MATERIALS = {
 };
 
 /** A profile of [radius, height] turned around the y axis; each stretch of it has normals of its own where `isFlat`. */
-function lathe(profile, { at: [x, z] = [0, 0], isFlat = true } = {}) {
+function lathe(profile, { at: [x, z] = [0, 0], isFlat = true, segments = SEGMENTS } = {}) {
   const mesh = { positions: [], normals: [], indices: [] };
   const slope = ([r0, y0], [r1, y1]) => {
     const length = Math.hypot(r1 - r0, y1 - y0);
@@ -34,8 +34,8 @@ function lathe(profile, { at: [x, z] = [0, 0], isFlat = true } = {}) {
     const first = isFlat || k === 0 ? normal : between(stretches[k - 1].normal, normal);
     const last = isFlat || k === stretches.length - 1 ? normal : between(normal, stretches[k + 1].normal);
     const from = mesh.positions.length / 3;
-    for (let i = 0; i <= SEGMENTS; i++) {
-      const angle = (2 * Math.PI * i) / SEGMENTS;
+    for (let i = 0; i <= segments; i++) {
+      const angle = (2 * Math.PI * i) / segments;
       const [sin, cos] = [Math.sin(angle), Math.cos(angle)];
       ends.forEach(([radius, height], end) => {
         const [out, up] = end === 0 ? first : last;
@@ -43,7 +43,7 @@ function lathe(profile, { at: [x, z] = [0, 0], isFlat = true } = {}) {
         mesh.normals.push(out * sin, up, out * cos);
       });
     }
-    for (let i = 0; i < SEGMENTS; i++) {
+    for (let i = 0; i < segments; i++) {
       const [a, b, c, d] = [0, 2, 3, 1].map((corner) => from + 2 * i + corner);
       mesh.indices.push(a, b, c, a, c, d);
     }
@@ -98,7 +98,8 @@ function parts() {
       const share = i / 8;
       return [0.125 - 0.025 * share + 0.012 * Math.sin(Math.PI * share), 0.14 + share * (COLUMN_HEIGHT - 0.3)];
     });
-    return joined([lathe(base, { at }), lathe(shaft, { at, isFlat: false }), lathe(capital, { at })]);
+    const turn = { at, segments: 20 };
+    return joined([lathe(base, turn), lathe(shaft, { ...turn, isFlat: false }), lathe(capital, turn)]);
   });
   const [inner, outer] = [COLUMN_CIRCLE - 0.16, COLUMN_CIRCLE + 0.16];
   const ring = lathe([

@@ -30,7 +30,7 @@ const TYPES = { flag: 'boolean', number: 'number | string | null' };
 function typeOf(ts, { expression, typeArguments, arguments: [words] }) {
   const kind = expression.getText();
   if (/keyword$/i.test(kind)) return `${words.elements.map((word) => word.getText()).join(' | ')} | null`;
-  return TYPES[kind] ?? typeArguments?.[0].getText() ?? 'string | null';
+  return TYPES[kind] ?? typeArguments?.at(-1).getText() ?? 'string | null';
 }
 
 /** A plugin of the manifest's analyzer: adds each entry of a table to its element, as an attribute and as its property. */
@@ -62,7 +62,14 @@ export function tableOfAttributes() {
           ...entries.map((entry) => ({ kind: 'field', privacy: 'public', ...entry, attribute: kebab(entry.name) })),
           ...element.members.filter(({ name }) => !names.has(name)),
         ];
-        element.attributes = entries.map((entry) => ({ ...entry, name: kebab(entry.name), fieldName: entry.name }));
+        // An attribute is text, whatever else its property takes.
+        const written = ({ text }) => ({ text: text.replace(' | readonly number[]', '') });
+        element.attributes = entries.map((entry) => ({
+          ...entry,
+          name: kebab(entry.name),
+          type: written(entry.type),
+          fieldName: entry.name,
+        }));
       }
     },
   };

@@ -1,0 +1,31 @@
+/** The same in Vue. */
+import '@gaussian-splat/element/scenes.js';
+import { createApp, h, nextTick, shallowRef } from 'vue';
+import type { Child, Rendering } from './scenes.js';
+
+export { GaussianSplatElement } from '@gaussian-splat/element';
+
+export function mount(place: HTMLElement, attributes: object, told: (name: string, what: string) => void): Rendering {
+  const children = shallowRef<readonly Child[]>([]);
+  const app = createApp(() =>
+    h(
+      'gaussian-splat',
+      attributes,
+      children.value.map(({ name, kind, ...properties }) =>
+        h(kind === 'mesh' ? 'splat-mesh' : 'splat-scene', {
+          ...{ key: name, id: name, ...properties },
+          onLoad: () => told(name, 'load'),
+          onError: ({ detail }: CustomEvent<{ reason: string }>) => told(name, detail.reason),
+        }),
+      ),
+    ),
+  );
+  app.mount(place);
+  return {
+    render: (next) => {
+      children.value = next;
+      return nextTick();
+    },
+    unmount: () => app.unmount(),
+  };
+}
