@@ -226,7 +226,8 @@ export abstract class SplatChild extends ReactiveElement {
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
-    this.holder.attach(null);
+    // With its element around it, it stays what it is, and goes when that does.
+    if (this.parentElement !== this.holder.owner) this.holder.attach(null);
   }
 
   /** It shows nothing of its own. */

@@ -36,6 +36,7 @@ export class Composition {
   readonly #parts = new Set<Part>();
   /** Parts come one after the other, so that one that fails is known. */
   #arrivals: Promise<void> | undefined;
+  #preparing = Promise.resolve();
   #latest: Part | Stage | undefined;
   #isFramed = false;
   #isToldLoaded = false;
@@ -58,8 +59,8 @@ export class Composition {
   remove(part: Part): void {
     this.#parts.delete(part);
     part.leave();
-    this.tellsContext('contextrestored', part);
-    this.left(false);
+    if (this.tellsContext('contextrestored', part)) this.stage.dispatch(new Event('contextrestored'));
+    this.left(true);
     this.#changed();
   }
 
@@ -98,8 +99,7 @@ export class Composition {
   left(clear: boolean): void {
     this.stage.splatsChanged();
     if (this.#isEmpty) {
-      this.#isToldLoaded = false;
-      this.#isFramed = false;
+      if (clear) this.#isToldLoaded = this.#isFramed = false;
       this.stage.stopDrawing(clear);
     }
     if (this.members.some(({ scene }) => scene.model)) return;
@@ -117,13 +117,18 @@ export class Composition {
     });
   }
 
-  /** Makes what draws meshes on a device. */
-  async #prepareMeshes({ device }: LoadedGaussians): Promise<void> {
-    const { MeshLayer } = await loadMeshes();
-    if (this.#meshes?.device === device) return;
-    this.#meshes?.destroy();
-    this.#meshes = undefined;
-    this.#meshes = await MeshLayer.create(device);
+  /** Makes what draws meshes on a device: once, whoever asks. */
+  #prepareMeshes({ device }: LoadedGaussians): Promise<void> {
+    const prepare = async (): Promise<void> => {
+      const { MeshLayer } = await loadMeshes();
+      if (this.#meshes?.device === device) return;
+      this.#meshes?.destroy();
+      this.#meshes = undefined;
+      this.#meshes = await MeshLayer.create(device);
+    };
+    const prepared = this.#preparing.then(prepare);
+    this.#preparing = prepared.catch(() => undefined);
+    return prepared;
   }
 
   /** The triangles of a file that has splats, too: they come after these, and what is wrong with them leaves the splats visible. */

@@ -64,6 +64,8 @@ export interface Part {
   /** Absolute address of what was asked for last. */
   readonly url: string;
   readonly stats: PartStats;
+  /** The element that it belongs to; null for none. */
+  readonly owner: Element | null;
   /** It belongs to this element from now on, or to none. */
   attach(composition: Composition | null): void;
   /** Its attributes, or those of the element, may ask for something else, or it may be loaded now. */

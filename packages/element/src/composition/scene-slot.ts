@@ -97,8 +97,12 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
     return { element: this.#element, state, error, ...costOf(scene) };
   }
 
+  get owner(): Element | null {
+    return this.#composition?.stage.element ?? null;
+  }
+
   attach(composition: Composition | null): void {
-    if (composition === this.#composition) return;
+    if (composition === this.#composition) return this.update();
     this.#composition?.remove(this);
     this.#composition = composition;
     if (composition === null) return;
@@ -285,13 +289,13 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
     this.ownClock.empty();
     this.ownClock.stopWaits();
     this.dispatch(new Event('emptied'));
-    this.#composition?.tellsContext('contextrestored', this);
+    this.contextChanged('contextrestored');
   }
 
   failed(error: ElementError): void {
     this.progress = null;
     this.dispatch(new CustomEvent('error', { detail: error }));
-    this.#composition?.tellsContext('contextrestored', this);
+    this.contextChanged('contextrestored');
     this.#composition?.partSettled();
   }
 
