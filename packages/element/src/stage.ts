@@ -139,7 +139,8 @@ export class Stage
     const camera = this.drawnFrom;
     if (viewport === null || camera === undefined) return this.stats;
     try {
-      const counts = await viewport.readCounts(camera);
+      const { readCounts } = await loadModule('the code that counts splats', () => import('./gpu/contributions.js'));
+      const counts = await readCounts(viewport, camera);
       if (this.view.viewport === viewport) this.#counts = counts;
     } catch (error) {
       // What was asked for is gone; what there is now is known without it.
@@ -356,7 +357,7 @@ export class Stage
     if (scene.hasMeshes) this.compose();
     this.own = this.enter(scene);
     const drawn = view.show(scene);
-    this.live.post.attach(view.viewport, () => scene.live?.settable ?? []);
+    this.live.post.attach(view.viewport);
     return drawn;
   }
 

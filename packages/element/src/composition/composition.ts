@@ -156,8 +156,7 @@ export class Composition {
     const { view, live } = this.stage;
     const before = view.viewport;
     const drawn = view.show(place);
-    if (view.viewport !== before)
-      live.post.attach(view.viewport, () => this.members.flatMap(({ scene }) => scene.live?.settable ?? []));
+    if (view.viewport !== before) live.post.attach(view.viewport);
     await drawn;
   }
 

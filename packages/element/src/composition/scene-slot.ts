@@ -197,6 +197,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   }
 
   readonly startTime = 0;
+  readonly shown = [];
 
   get liveValues(): LiveHost['liveValues'] {
     return this.#element.liveValues;

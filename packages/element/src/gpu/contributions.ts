@@ -1,6 +1,8 @@
 /** Loaded only when a page asks what its splats contribute. */
 import type { Camera } from '@gaussian-splat/core';
-import { Viewpoint, type FrameSettings, type World } from '@gaussian-splat/renderer';
+import { Viewpoint } from '@gaussian-splat/renderer';
+import type { ReadCounts } from '../stats.js';
+import type { Viewport } from './viewport.js';
 
 /** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits: half a step. */
 const LEAST_WEIGHT = 0.5 / 255;
@@ -9,18 +11,18 @@ const CHUNK = 256;
 /** Frames until buffers have room for all. */
 const MOST_TRIES = 4;
 
-/** A picture at rest. */
-export interface View {
-  readonly world: World;
-  readonly camera: Camera;
-  readonly settings: FrameSettings;
+/** Counts of the last frame of a viewport, and of a view. Reads back from the GPU: for panels, not for frames. */
+export async function readCounts(viewport: Viewport, camera: Camera): Promise<ReadCounts> {
+  const { visible, overflow } = await viewport.viewpoint.statistics();
+  if (viewport.isDestroyed) throw new Error('the picture is gone');
+  return { drawn: visible, left: overflow, contributed: await countContributing(viewport, camera) };
 }
 
 /**
  * Counts the splats that some pixel of a view shows. Draws the view with the compute rasterizer, whatever the page uses, and reads all weights back: for
  * panels, not for frames.
  */
-export async function countContributing(device: GPUDevice, { world, camera, settings }: View): Promise<number> {
+async function countContributing({ device, view: { world, settings } }: Viewport, camera: Camera): Promise<number> {
   const { STORAGE, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
   const size =
     4 *

@@ -1,4 +1,4 @@
-import { loadModule, type Camera, type GaussianSplatError, type ShDegree } from '@gaussian-splat/core';
+import type { GaussianSplatError, ShDegree } from '@gaussian-splat/core';
 import {
   QueueClock,
   Viewpoint,
@@ -10,7 +10,6 @@ import {
   type World,
 } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
-import type { ReadCounts } from '../stats.js';
 import type { DetailLevers, LoadedGaussians } from './loaded-gaussians.js';
 import { why } from './request-device.js';
 
@@ -201,14 +200,9 @@ export class Viewport {
     return refusal();
   }
 
-  /** Counts of the last frame, and of a view. Reads back from the GPU: for panels, not for frames. */
-  async readCounts(camera: Camera): Promise<ReadCounts> {
-    const { visible, overflow } = await this.viewpoint.statistics();
-    const { countContributing } = await loadModule('the code that counts splats', () => import('./contributions.js'));
-    if (this.#isDestroyed) throw new Error('the picture is gone');
-    const { world, levels } = this.#contents;
-    const view = { world, camera, settings: { ...levels, quality: this.#rendering.quality } };
-    return { drawn: visible, left: overflow, contributed: await countContributing(this.device, view) };
+  /** What it draws at rest. */
+  get view(): { readonly world: World; readonly settings: FrameSettings } {
+    return { world: this.#contents.world, settings: this.#settings() };
   }
 
   /** Frees the GPU memory. What it draws is its owner's. */

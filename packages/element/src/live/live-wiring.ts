@@ -11,6 +11,8 @@ import { PostController, type PostHost } from './post-controller.js';
 /** Whom the models of an element meet. */
 export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'liveValues'> {
   readonly playback: PlaybackController;
+  /** The sources that are drawn. */
+  readonly shown: readonly LoadedGaussians[];
   requestFrame(): void;
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
@@ -33,6 +35,7 @@ export class LiveWiring implements PostHost {
       runtimeLocation: services.runtimeLocation,
       startWorker: services.sceneLoader.spawn,
       state: () => this.state,
+      others: () => this.#host.shown.flatMap(({ live }) => live?.settable ?? []),
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
     };

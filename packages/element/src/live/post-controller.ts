@@ -5,7 +5,7 @@ import type { PostRequest } from './post-view.js';
 
 export interface PostHost {
   /** What a post-processor needs to know beyond its address. */
-  readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
+  readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
   requestFrame(): void;
 }
 
@@ -14,7 +14,6 @@ export class PostController {
   readonly #host: PostHost;
   #urls: readonly string[] = [];
   #viewport: Viewport | null = null;
-  #others: () => readonly string[] = () => [];
   readonly #opening = new LatestTask();
 
   constructor(host: PostHost) {
@@ -33,13 +32,9 @@ export class PostController {
     this.#open();
   }
 
-  /**
-   * Frames are drawn, or none any more. A viewport that is destroyed closes its processor itself.
-   * @param others inputs of what is shown that `control-NAME` sets, too
-   */
-  attach(viewport: Viewport | null, others: () => readonly string[] = () => []): void {
+  /** Frames are drawn, or none any more. A viewport that is destroyed closes its processor itself. */
+  attach(viewport: Viewport | null): void {
     this.#viewport = viewport;
-    this.#others = others;
     this.#open();
   }
 
@@ -62,7 +57,6 @@ export class PostController {
         ...options,
         urls: this.#urls,
         signal,
-        others: this.#others,
         onError: (error) => (signal.aborted ? undefined : options.onError(error)),
         onChange: () => this.#host.requestFrame(),
       },
