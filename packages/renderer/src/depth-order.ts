@@ -30,8 +30,6 @@ interface Working {
  * A splat's number counts pages as whole chunks; what fills up a page's last chunk stands at the end of the order.
  */
 export class DepthOrder {
-  /** Splats in the order. */
-  readonly length: number;
   readonly #device: GPUDevice;
   readonly #table: PageTable;
   readonly #sort: SortStage;
@@ -50,7 +48,11 @@ export class DepthOrder {
     this.#table = table;
     this.#sort = new SortStage(device, threads);
     this.#memory = new GpuMemory(device);
-    this.length = CULL_GROUP * table.groups;
+  }
+
+  /** Splats in the order. */
+  get length(): number {
+    return CULL_GROUP * this.#table.groups;
   }
 
   /** False if the device has no buffers large enough. */
@@ -99,6 +101,15 @@ export class DepthOrder {
   settle(): void {
     this.#working?.memory.destroy();
     this.#working = undefined;
+  }
+
+  /** Other pages have been laid out: the order is made anew when it is next of use. */
+  forget(): void {
+    this.settle();
+    this.#axis = undefined;
+    // Neither too small nor far too large.
+    const needed = 4 * this.length;
+    if (this.#order && (this.#order.size < needed || this.#order.size > 2 * needed)) this.release();
   }
 
   /** Gives the order up. */

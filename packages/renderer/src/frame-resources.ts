@@ -12,6 +12,8 @@ import type { World } from './world.js';
 
 /** Room for pairs that the pacer learns from what one costs. */
 const TELLING_ROOM = 1 << 18;
+/** Share of the room that scenes which are left must need: else it is given back. */
+const LEAST_USED = 0.5;
 /** Submissions that painting a frame may always be divided into: each takes the page's thread some tenths of a millisecond. */
 const FEW_SUBMISSIONS = 4;
 
@@ -43,6 +45,8 @@ export class FrameResources {
   #capacity: Capacity | undefined;
   #memory = new CapacityMemory();
   #hasOtherPairs = false;
+  /** What the rasterizer was last bound to, of what may be replaced. */
+  #bound: { readonly plan: GPUBuffer; readonly depths: GPUBuffer | undefined } | undefined;
   /** A frame has asked for depths: frames to come may do so, too. */
   #keepsDepths = false;
   #hasQuickPairs = false;
@@ -85,9 +89,31 @@ export class FrameResources {
         current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs || isFirstWithDepth;
       return hasOtherRoom ? this.#rebind(current.table) : current;
     }
-    this.release();
+    if (current) return this.#layAnew(current);
     const table = new PageTable(this.#device, world);
     this.#capacity = this.#firstFor(table);
+    this.#memory = new CapacityMemory();
+    return this.#rebind(table);
+  }
+
+  /** Scenes have come or gone: what still has room stays, what has not is made larger by what came. */
+  #layAnew({ table, depthOrder }: Resources): Resources {
+    const before = table.splats;
+    table.lay();
+    depthOrder.forget();
+    const [now, most, first] = [this.#capacity!, this.#mostFor(table), this.#firstFor(table)];
+    const added = table.splats - before;
+    const visible =
+      added > 0
+        ? Math.min(most.visible, now.visible + initialCapacity(added, most, this.#isBudgeted(table)).visible)
+        : Math.min(now.visible, first.visible);
+    const pairs = added > 0 ? Math.max(now.pairs, first.pairs) : Math.min(now.pairs, first.pairs);
+    const isEnough = (own: number, wanted: number): boolean => wanted <= own && wanted >= own * LEAST_USED;
+    this.#capacity = {
+      visible: isEnough(now.visible, visible) ? now.visible : visible,
+      pairs: isEnough(now.pairs, pairs) ? now.pairs : pairs,
+    };
+    this.#hasOtherPairs = this.#capacity.pairs !== now.pairs;
     this.#memory = new CapacityMemory();
     return this.#rebind(table);
   }
@@ -101,6 +127,7 @@ export class FrameResources {
     depthOrder?.release();
     monitor?.destroy();
     this.#current = undefined;
+    this.#bound = undefined;
   }
 
   /** A larger budget of splats than before makes other room. */
@@ -150,9 +177,12 @@ export class FrameResources {
     const { visible, pairs } = capacity;
     const spareBytes = this.#options.rasterizer.spareBytes({ capacity: visible, pairCapacity: pairs });
     kept?.fitSpare(spareBytes);
+    kept?.fitPages(table.groups, pages);
     const scratch = kept ?? new Scratch(this.#device, { visible, groups: table.groups, pages }, spareBytes);
     if (this.#keepsDepths) scratch.keepDepths();
-    this.#bindRasterizer(scratch, capacity);
+    const isSame = kept !== undefined && kept.plan === this.#bound?.plan && kept.depths?.sorted === this.#bound.depths;
+    if (!isSame || this.#hasOtherPairs) this.#bindRasterizer(scratch, capacity);
+    this.#bound = { plan: scratch.plan, depths: scratch.depths?.sorted };
     this.#hasOtherPairs = false;
     const bindings = new FrameBindings(this.#device, stages, { table, scratch });
     const monitor = this.#watch(table, capacity);

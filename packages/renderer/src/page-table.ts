@@ -21,31 +21,48 @@ const EVERYWHERE = {
 
 /** The pages of the visible scenes of a world, with a `View` uniform for each. */
 export class PageTable {
-  readonly pages: readonly GaussianPage[];
-  /** First group (chunk) of each page, and behind the last the number of all groups. */
-  readonly firstGroups: Uint32Array;
+  #pages: readonly GaussianPage[] = [];
+  #firstGroups: Uint32Array = new Uint32Array(1);
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
-  readonly #uniforms: GPUBuffer;
-  readonly #uniformBytes: ArrayBuffer;
+  #uniforms!: GPUBuffer;
+  #uniformBytes = new ArrayBuffer(0);
   readonly #world: World;
-  readonly #layout: number;
-  readonly #placements: readonly Placement[];
+  #layout = -1;
+  #placements: readonly Placement[] = [];
   /** By page. */
-  readonly #placementOf: readonly Placement[];
+  #placementOf: readonly Placement[] = [];
 
   constructor(device: GPUDevice, world: World) {
     this.#device = device;
     this.#world = world;
-    this.#layout = world.layout;
-    this.#placements = world.placements.filter(({ visible }) => visible);
     this.#memory = new GpuMemory(device);
-    this.pages = this.#placements.flatMap(({ scene }) => scene.pages);
+    this.lay();
+  }
+
+  /** Lays out the pages of the scenes that are visible by now. Whatever was bound to a page must be bound again; memory is kept where it suffices. */
+  lay(): void {
+    const { layout, placements } = this.#world;
+    this.#layout = layout;
+    this.#placements = placements.filter(({ visible }) => visible);
+    this.#pages = this.#placements.flatMap(({ scene }) => scene.pages);
     this.#placementOf = this.#placements.flatMap((placement) => placement.scene.pages.map(() => placement));
-    this.firstGroups = firstGroups(this.pages);
-    this.#uniformBytes = new ArrayBuffer(VIEW_STRIDE * Math.max(1, this.pages.length));
+    this.#firstGroups = firstGroups(this.#pages);
+    const bytes = VIEW_STRIDE * Math.max(1, this.#pages.length);
+    if (bytes <= this.#uniformBytes.byteLength) return;
+    this.#memory.destroy();
+    this.#uniformBytes = new ArrayBuffer(bytes);
     const { uniform, copyDestination } = BUFFER_USAGE;
-    this.#uniforms = this.#memory.buffer('gs.views', this.#uniformBytes.byteLength, uniform | copyDestination);
+    this.#uniforms = this.#memory.buffer('gs.views', bytes, uniform | copyDestination);
+  }
+
+  get pages(): readonly GaussianPage[] {
+    return this.#pages;
+  }
+
+  /** First group (chunk) of each page, and behind the last the number of all groups. */
+  get firstGroups(): Uint32Array {
+    return this.#firstGroups;
   }
 
   /** Groups of all pages. */
@@ -97,7 +114,7 @@ export class PageTable {
     return { buffer: this.#uniforms, offset: VIEW_STRIDE * page, size: layouts.View.size };
   }
 
-  /** True while the scenes are those that the table was made for. */
+  /** True while the visible scenes are those that were laid out. */
   get isCurrent(): boolean {
     return this.#layout === this.#world.layout;
   }
@@ -140,7 +157,8 @@ export class PageTable {
         page++;
       }
     }
-    this.#device.queue.writeBuffer(this.#uniforms, 0, this.#uniformBytes);
+    const bytes = VIEW_STRIDE * Math.max(1, this.#pages.length);
+    this.#device.queue.writeBuffer(this.#uniforms, 0, this.#uniformBytes, 0, bytes);
   }
 
   destroy(): void {
