@@ -59,7 +59,7 @@ async function buildBesideBundle() {
 function projects() {
   const names =
     extent !== 'element'
-      ? ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react']
+      ? ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react', 'three']
       : ['element'];
   return names.map((name) => `packages/${name}`);
 }
