@@ -8,7 +8,7 @@ import type { Levers } from './levers.js';
 import { SH_PRECISION } from './pack/sh.js';
 import { cullGroups } from './stages/cull.js';
 import { cameraValues, MAX_FLOAT32 } from './view.js';
-import { inWorld, type Placement, type World } from './world.js';
+import type { Placement, World } from './world.js';
 
 /** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;
@@ -95,16 +95,6 @@ export class PageTable {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
 
-  /** Grows when the content of a scene changes or a scene moves; 0 if none ever did. */
-  get version(): number {
-    return this.#placements.reduce((sum, { scene }) => sum + scene.version, this.#world.changes);
-  }
-
-  /** World positions of the scenes' origins. */
-  get origins(): readonly Vector3[] {
-    return this.#placements.map(({ scene, sceneToWorld }) => inWorld(sceneToWorld, scene.origin));
-  }
-
   get byteLength(): number {
     return this.#memory.byteLength;
   }
@@ -123,16 +113,10 @@ export class PageTable {
    * Points every page at a camera, for the commands that are submitted next.
    * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
    */
-  look(
-    camera: Camera,
-    pixelArea: number,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
-    isOrdered: boolean,
-  ): void {
+  look(camera: Camera, pixelArea: number, { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers): void {
     const shared = {
       sh_cap: shDegree,
       key_bits: depthKeyBits,
-      is_ordered: isOrdered ? 1 : 0,
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,

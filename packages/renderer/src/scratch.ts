@@ -1,7 +1,6 @@
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
-import type { OrderKind } from './rasterizers/rasterizer.js';
 import { scanBytes } from './stages/plan.js';
 
 /** How much the buffers between the stages must hold. */
@@ -37,12 +36,13 @@ export class Scratch {
   readonly #keys: GPUBuffer;
   /** Slots in the order of their keys. Before the sort it lists the survivors. */
   readonly #order: GPUBuffer;
-  #deep: { readonly depths: GPUBuffer; readonly identity: GPUBuffer } | undefined;
   #spare: readonly [GPUBuffer, GPUBuffer];
   /** [block][digit] */
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
   readonly #memory: GpuMemory;
+  #survivors: GPUBuffer | undefined;
+  #depths: GPUBuffer | undefined;
 
   /** @param spareBytes least size of {@link spare} */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
@@ -86,27 +86,6 @@ export class Scratch {
     return [this.#order, this.#spare[1]];
   }
 
-  /** Slots from near to far, of a frame whose survivors are in that order, or of one that was sorted. */
-  get orders(): Readonly<Record<OrderKind, GPUBuffer>> {
-    return { sorted: this.#order, identity: this.#deep?.identity ?? this.#keys };
-  }
-
-  /** Camera depths by slot, of frames with depth: see {@link keepDepths}. A sort moves the keys, so that those of a frame that is sorted are copied before. */
-  get depths(): Readonly<Record<OrderKind, GPUBuffer>> | undefined {
-    return this.#deep && { sorted: this.#deep.depths, identity: this.#keys };
-  }
-
-  /** Makes room for depths. Keys are depths then, also where survivors are in order, and slots are listed elsewhere. */
-  keepDepths(): void {
-    if (this.#deep) return;
-    const { storage, copyDestination } = BUFFER_USAGE;
-    const listed = Uint32Array.from({ length: this.capacity }, (_, slot) => slot);
-    this.#deep = {
-      depths: this.#memory.buffer('gs.depths', 4 * this.capacity, storage | copyDestination),
-      identity: this.#memory.buffer('gs.identity', 4 * this.capacity, storage, listed),
-    };
-  }
-
   /** Free once splats are in order: the rasterizer's then. */
   get spare(): readonly [GPUBuffer, GPUBuffer] {
     return this.#spare;
@@ -132,6 +111,31 @@ export class Scratch {
     if (this.#spare[0].size === this.#spareSize(bytes)) return;
     for (const buffer of this.#spare) this.#memory.free(buffer);
     this.#spare = this.#makeSpare(bytes);
+  }
+
+  /** Numbers of the visible splats by slot, once {@link keepSurvivors} has been recorded: the sort overwrites what lists them. */
+  get survivors(): GPUBuffer {
+    return (this.#survivors ??= this.#makeKept('survivors'));
+  }
+
+  /** To be recorded between `compact` and the sort. */
+  keepSurvivors(encoder: GPUCommandEncoder): void {
+    encoder.copyBufferToBuffer(this.#order, 0, this.survivors, 0, 4 * this.capacity);
+  }
+
+  /** Camera depths by slot, float32, once {@link keepDepths} has been recorded. */
+  get depths(): GPUBuffer {
+    return (this.#depths ??= this.#makeKept('depths'));
+  }
+
+  /** To be recorded between `project` and the sort, which moves the keys, of a frame whose keys are depths. */
+  keepDepths(encoder: GPUCommandEncoder): void {
+    encoder.copyBufferToBuffer(this.#keys, 0, this.depths, 0, 4 * this.capacity);
+  }
+
+  #makeKept(name: string): GPUBuffer {
+    const { storage, copyDestination } = BUFFER_USAGE;
+    return this.#memory.buffer(`gs.${name}`, 4 * this.capacity, storage | copyDestination);
   }
 
   get byteLength(): number {
