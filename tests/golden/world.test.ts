@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { lookAt, multiply, type Camera, type GaussianCloud, type Matrix4 } from '@gaussian-splat/core';
 import {
+  boundsOfWorld,
   capture,
   GaussianBuffers,
   packGaussians,
@@ -10,6 +11,7 @@ import {
   settings,
   Viewpoint,
   World,
+  type GaussianScene,
   type HostDepth,
   type RasterizerName,
 } from '@gaussian-splat/renderer';
@@ -433,4 +435,30 @@ test('one scene twice, two viewpoints of one world', async () => {
   }
   for (const viewpoint of viewpoints) viewpoint.destroy();
   free();
+});
+
+test('the bounds of a world hold what is visible of it', () => {
+  const scene = { pages: [] } as unknown as GaussianScene;
+  const bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 } as const;
+  const world = new World();
+  assert.equal(boundsOfWorld(world), undefined);
+  const one = world.add({ scene, bounds, sceneToWorld: all(move(5, 0, 0), stretch(2)) });
+  assert.deepEqual(boundsOfWorld(world), { min: [3, -2, -2], max: [7, 2, 2], center: [5, 0, 0], radius: 2 });
+  const other = world.add({ scene, bounds, crop: { min: [0, -1, -1], max: [1, 1, 1] } });
+  const { min, max, center, radius } = boundsOfWorld(world)!;
+  assert.deepEqual(
+    [min, max],
+    [
+      [0, -2, -2],
+      [7, 2, 2],
+    ],
+  );
+  for (const { at, reach } of [
+    { at: 5, reach: 2 },
+    { at: 0, reach: 1 },
+  ])
+    assert.ok(Math.abs(center[0] - at) + reach <= radius + 1e-9, 'both balls are held');
+  one.visible = false;
+  other.crop = undefined;
+  assert.deepEqual(boundsOfWorld(world), bounds);
 });
