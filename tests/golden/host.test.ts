@@ -64,7 +64,6 @@ for (const how of BOTH) {
     for (const format of ['rgba8unorm', 'rgba16float'] as const) {
       const texture = target(device, format);
       const counter = countWork(device);
-      // Frames that are sorted, that make an order of all splats, and that use it.
       for (let frame = 0; frame < 3; frame++) {
         const encoder = device.createCommandEncoder();
         clear(encoder, texture, CLEAR);
@@ -115,7 +114,7 @@ for (const how of BOTH) {
   });
 }
 
-test('several views of one axis share a sort, and keep their buffers', async () => {
+test('several views at once are as each alone, and keep their buffers', async () => {
   const device = await serialDevice();
   const { world, scene } = await skullWorld(device);
   const viewpoint = new Viewpoint(device, world, { settings: BOTH[0] });

@@ -3,6 +3,7 @@ import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { lookAt, multiply, type Camera, type GaussianCloud, type Matrix4 } from '@gaussian-splat/core';
 import {
+  boundsOfWorld,
   capture,
   GaussianBuffers,
   packGaussians,
@@ -10,11 +11,14 @@ import {
   settings,
   Viewpoint,
   World,
+  type GaussianScene,
   type HostDepth,
   type RasterizerName,
 } from '@gaussian-splat/renderer';
 import { renderOracleWorld, type PlacedCloud } from '../oracle/oracle.js';
 import { closeness } from '../support/compare.js';
+import { psnr } from '../support/metrics.js';
+import { countWork } from '../support/work-counters.js';
 import { randomSource } from '../support/gpu.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
 import { readTexture } from '../support/read-frame.js';
@@ -339,4 +343,122 @@ test('a picture of one scene that moves is that of a camera that moves the other
   }
   viewpoint.destroy();
   free();
+});
+
+test('memory follows what comes: ten scenes, one of them added, moved, hidden, removed', async () => {
+  const device = await serialDevice();
+  const scenes = await Promise.all(
+    Array.from({ length: 10 }, (_, k) =>
+      GaussianBuffers.upload(device, packGaussians(blobs(400 + 10 * k, 20 + k, false))),
+    ),
+  );
+  const camera = view();
+  const target = device.createTexture({ size: [camera.width, camera.height], format: 'rgba8unorm', usage: 0x10 });
+  const counter = countWork(device);
+  for (const rasterizer of RASTERIZERS) {
+    const how = settings('default', { rasterizer });
+    const bytesOf = (some: readonly GaussianBuffers[]): number => {
+      const world = new World();
+      for (const scene of some) world.add({ scene });
+      const viewpoint = new Viewpoint(device, world, { settings: how });
+      viewpoint.draw(camera, { target });
+      const { byteLength } = viewpoint;
+      viewpoint.destroy();
+      return byteLength;
+    };
+    const world = new World();
+    const placements = scenes.slice(0, 9).map((scene) => world.add({ scene }));
+    const viewpoint = new Viewpoint(device, world, { settings: how });
+    const draw = () => {
+      counter.take();
+      viewpoint.draw(camera, { target });
+      return counter.take();
+    };
+    draw();
+    const before = viewpoint.byteLength;
+    const last = world.add({ scene: scenes[9] });
+    draw();
+    const grown = viewpoint.byteLength - before;
+    assert.ok(grown <= bytesOf([scenes[9]]), `${rasterizer}: ${grown} bytes for one scene`);
+    assert.ok(viewpoint.byteLength <= bytesOf(scenes) + 4096, 'no more than for ten at once');
+    draw();
+    for (let k = 0; k < 12; k++) {
+      placements[3].sceneToWorld = move(0.01 * k, 0, 0);
+      const { buffersCreated, bytesAllocated, submits } = draw();
+      assert.deepEqual([buffersCreated, bytesAllocated, submits], [0, 0, 1], 'moving allocates nothing');
+    }
+    const expected = await capture(device, viewpoint, { camera });
+    last.visible = false;
+    await capture(device, viewpoint, { camera });
+    world.remove(placements[0]);
+    placements[0] = world.add({ scene: scenes[0] });
+    last.visible = true;
+    const again = await capture(device, viewpoint, { camera });
+    assert.ok(psnr(again, expected) > 90, 'what came back looks as before');
+    for (const placement of placements) world.remove(placement);
+    draw();
+    assert.ok(viewpoint.byteLength <= bytesOf([scenes[9]]) + 16384, 'room is given back');
+    const alone = new World();
+    alone.add({ scene: scenes[9] });
+    const fresh = new Viewpoint(device, alone, { settings: how });
+    assert.deepEqual(await capture(device, viewpoint, { camera }), await capture(device, fresh, { camera }));
+    fresh.destroy();
+    viewpoint.destroy();
+  }
+  for (const scene of scenes) scene.destroy();
+  target.destroy();
+});
+
+test('one scene twice, two viewpoints of one world', async () => {
+  const device = await serialDevice();
+  const { world, free } = await worldOf(device, [{}]);
+  const [{ scene }] = world.placements;
+  const sceneToWorld = all(move(0.7, 0, 0.5), turn(0.9));
+  world.add({ scene, sceneToWorld });
+  const [one, other] = [view(), cameraAt([-2, -1, -3], [0, 0, 0], { width: 96, height: 64 })];
+  const twice: PlacedCloud[] = [
+    { cloud: clouds[0], mode: 'classic' },
+    { cloud: clouds[0], mode: 'classic', sceneToWorld },
+  ];
+  const viewpoints = [
+    new Viewpoint(device, world),
+    new Viewpoint(device, world, { settings: settings('default', { rasterizer: 'tiles' }) }),
+  ];
+  for (const camera of [one, other, one]) {
+    for (const viewpoint of viewpoints) {
+      const { psnr: found } = closeness(
+        await capture(device, viewpoint, { camera }),
+        renderOracleWorld(twice, camera, { rules: 'gsplat' }),
+      );
+      assert.ok(found >= 59, `${found} dB`);
+    }
+  }
+  for (const viewpoint of viewpoints) viewpoint.destroy();
+  free();
+});
+
+test('the bounds of a world hold what is visible of it', () => {
+  const scene = { pages: [] } as unknown as GaussianScene;
+  const bounds = { min: [-1, -1, -1], max: [1, 1, 1], center: [0, 0, 0], radius: 1 } as const;
+  const world = new World();
+  assert.equal(boundsOfWorld(world), undefined);
+  const one = world.add({ scene, bounds, sceneToWorld: all(move(5, 0, 0), stretch(2)) });
+  assert.deepEqual(boundsOfWorld(world), { min: [3, -2, -2], max: [7, 2, 2], center: [5, 0, 0], radius: 2 });
+  const other = world.add({ scene, bounds, crop: { min: [0, -1, -1], max: [1, 1, 1] } });
+  const { min, max, center, radius } = boundsOfWorld(world)!;
+  assert.deepEqual(
+    [min, max],
+    [
+      [0, -2, -2],
+      [7, 2, 2],
+    ],
+  );
+  for (const { at, reach } of [
+    { at: 5, reach: 2 },
+    { at: 0, reach: 1 },
+  ])
+    assert.ok(Math.abs(center[0] - at) + reach <= radius + 1e-9, 'both balls are held');
+  one.visible = false;
+  other.crop = undefined;
+  assert.deepEqual(boundsOfWorld(world), bounds);
 });

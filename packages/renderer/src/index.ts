@@ -48,6 +48,7 @@ export {
 } from './picture.js';
 export { Renderer } from './renderer.js';
 export { Viewpoint, type View, type ViewpointOptions } from './viewpoint.js';
+export { boundsOfWorld } from './world-bounds.js';
 export { Placement, World, type Box, type Placed } from './world.js';
 export type { FrameRequest, RendererOptions } from './frame-request.js';
 export { SceneDepth, type HostDepth, type SceneDepthOptions } from './scene-depth.js';

@@ -8,7 +8,7 @@ import type { Levers } from './levers.js';
 import { SH_PRECISION } from './pack/sh.js';
 import { cullGroups } from './stages/cull.js';
 import { cameraValues, MAX_FLOAT32 } from './view.js';
-import { inWorld, type Placement, type World } from './world.js';
+import type { Placement, World } from './world.js';
 
 /** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;
@@ -21,31 +21,48 @@ const EVERYWHERE = {
 
 /** The pages of the visible scenes of a world, with a `View` uniform for each. */
 export class PageTable {
-  readonly pages: readonly GaussianPage[];
-  /** First group (chunk) of each page, and behind the last the number of all groups. */
-  readonly firstGroups: Uint32Array;
+  #pages: readonly GaussianPage[] = [];
+  #firstGroups: Uint32Array = new Uint32Array(1);
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
-  readonly #uniforms: GPUBuffer;
-  readonly #uniformBytes: ArrayBuffer;
+  #uniforms!: GPUBuffer;
+  #uniformBytes = new ArrayBuffer(0);
   readonly #world: World;
-  readonly #layout: number;
-  readonly #placements: readonly Placement[];
+  #layout = -1;
+  #placements: readonly Placement[] = [];
   /** By page. */
-  readonly #placementOf: readonly Placement[];
+  #placementOf: readonly Placement[] = [];
 
   constructor(device: GPUDevice, world: World) {
     this.#device = device;
     this.#world = world;
-    this.#layout = world.layout;
-    this.#placements = world.placements.filter(({ visible }) => visible);
     this.#memory = new GpuMemory(device);
-    this.pages = this.#placements.flatMap(({ scene }) => scene.pages);
+    this.lay();
+  }
+
+  /** Lays out the pages of the scenes that are visible by now. Whatever was bound to a page must be bound again; memory is kept where it suffices. */
+  lay(): void {
+    const { layout, placements } = this.#world;
+    this.#layout = layout;
+    this.#placements = placements.filter(({ visible }) => visible);
+    this.#pages = this.#placements.flatMap(({ scene }) => scene.pages);
     this.#placementOf = this.#placements.flatMap((placement) => placement.scene.pages.map(() => placement));
-    this.firstGroups = firstGroups(this.pages);
-    this.#uniformBytes = new ArrayBuffer(VIEW_STRIDE * Math.max(1, this.pages.length));
+    this.#firstGroups = firstGroups(this.#pages);
+    const bytes = VIEW_STRIDE * Math.max(1, this.#pages.length);
+    if (bytes <= this.#uniformBytes.byteLength) return;
+    this.#memory.destroy();
+    this.#uniformBytes = new ArrayBuffer(bytes);
     const { uniform, copyDestination } = BUFFER_USAGE;
-    this.#uniforms = this.#memory.buffer('gs.views', this.#uniformBytes.byteLength, uniform | copyDestination);
+    this.#uniforms = this.#memory.buffer('gs.views', bytes, uniform | copyDestination);
+  }
+
+  get pages(): readonly GaussianPage[] {
+    return this.#pages;
+  }
+
+  /** First group (chunk) of each page, and behind the last the number of all groups. */
+  get firstGroups(): Uint32Array {
+    return this.#firstGroups;
   }
 
   /** Groups of all pages. */
@@ -78,16 +95,6 @@ export class PageTable {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
 
-  /** Grows when the content of a scene changes or a scene moves; 0 if none ever did. */
-  get version(): number {
-    return this.#placements.reduce((sum, { scene }) => sum + scene.version, this.#world.changes);
-  }
-
-  /** World positions of the scenes' origins. */
-  get origins(): readonly Vector3[] {
-    return this.#placements.map(({ scene, sceneToWorld }) => inWorld(sceneToWorld, scene.origin));
-  }
-
   get byteLength(): number {
     return this.#memory.byteLength;
   }
@@ -97,7 +104,7 @@ export class PageTable {
     return { buffer: this.#uniforms, offset: VIEW_STRIDE * page, size: layouts.View.size };
   }
 
-  /** True while the scenes are those that the table was made for. */
+  /** True while the visible scenes are those that were laid out. */
   get isCurrent(): boolean {
     return this.#layout === this.#world.layout;
   }
@@ -106,16 +113,10 @@ export class PageTable {
    * Points every page at a camera, for the commands that are submitted next.
    * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
    */
-  look(
-    camera: Camera,
-    pixelArea: number,
-    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
-    isOrdered: boolean,
-  ): void {
+  look(camera: Camera, pixelArea: number, { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers): void {
     const shared = {
       sh_cap: shDegree,
       key_bits: depthKeyBits,
-      is_ordered: isOrdered ? 1 : 0,
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
@@ -140,7 +141,8 @@ export class PageTable {
         page++;
       }
     }
-    this.#device.queue.writeBuffer(this.#uniforms, 0, this.#uniformBytes);
+    const bytes = VIEW_STRIDE * Math.max(1, this.#pages.length);
+    this.#device.queue.writeBuffer(this.#uniforms, 0, this.#uniformBytes, 0, bytes);
   }
 
   destroy(): void {

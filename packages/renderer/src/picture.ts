@@ -45,7 +45,7 @@ export interface Picture {
   readonly colours?: Composer | undefined;
   /** Depth of what else is in the picture, and where to write that of the splats: a {@link SceneDepth}. */
   readonly depth?: PaintingDepth | undefined;
-  /** What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it. */
+  /** What to note besides the image: `tiles` only, and not for every frame. */
   readonly notes?: FrameNotes | undefined;
   /** Notes when each pass ran. */
   readonly timer?: FrameTimer | undefined;

@@ -30,11 +30,13 @@ export class Renderer extends Viewpoint {
   }
 
   #show(scenes: readonly GaussianScene[]): void {
-    const { placements } = this.world;
-    if (scenes.length === placements.length && scenes.every((scene, i) => scene === placements[i].scene)) return;
-    const left = new Set<Placement>(placements);
+    const left = new Set<Placement>(this.world.placements);
+    const come = scenes.filter((scene) => {
+      const known = [...left].find((placement) => placement.scene === scene);
+      return known === undefined || !left.delete(known);
+    });
     for (const placement of left) this.world.remove(placement);
-    for (const scene of scenes) this.world.add({ scene });
+    for (const scene of come) this.world.add({ scene });
   }
 }
 

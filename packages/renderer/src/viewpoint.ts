@@ -3,7 +3,6 @@ import { AccumulationTexture } from './accumulation.js';
 import { makeStages, type Stages } from './bindings.js';
 import type { ProbeAnswer, ProbePoint } from './depth-probe.js';
 import { recordProjection } from './frame.js';
-import { angleBetween, axisOf } from './depth-order.js';
 import { FrameResources, type Resources } from './frame-resources.js';
 import type { Wishes } from './gaussian-scene.js';
 import { layouts } from './generated/shaders.js';
@@ -13,9 +12,8 @@ import { writeStruct } from './gpu/struct.js';
 import { leversOf, type Levers } from './levers.js';
 import type { FrameSettings, Picture, Target } from './picture.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
-import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
+import type { NotedFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
 import { requireDepth, requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
-import type { OrderOccasion } from './order-policy.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -66,7 +64,6 @@ interface Encoded {
   /** Pages that streamed scenes ask for are to be read. */
   readonly wishes: readonly Wishes[];
   readonly resources: Resources;
-  readonly occasion: Omit<OrderOccasion, 'timer'>;
 }
 
 /** What depends on the rasterizer, the format that it accumulates in, and how stages share their work. */
@@ -88,7 +85,7 @@ interface Engine {
  * ```
  *
  * Memory is allocated when scenes come, and when the image size or the share of visible splats changes, never while only the camera or a scene moves; no frame
- * waits for a read-back. Splats are sorted while the camera turns; a camera that moves without turning sorts nothing.
+ * waits for a read-back. Each frame sorts the splats that it shows.
  */
 export class Viewpoint {
   readonly world: World;
@@ -109,10 +106,8 @@ export class Viewpoint {
   /** By size, the one used last at the end. */
   readonly #accumulations = new Map<string, Accumulation>();
   #mostSizes = 1;
-  /** Views to come look along the axis of the one at hand. */
-  #sharesOrder = false;
-  /** Where the slots of the last frame are listed, in which buffers, and its pixels for each of the target; undefined before there is one. */
-  #last: { readonly order: OrderKind; readonly scratch: Scratch; readonly scale: number } | undefined;
+  /** The buffers of the last frame, and its pixels for each of the target; undefined before there is one. */
+  #last: { readonly scratch: Scratch; readonly scale: number } | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if settings need a feature that the device lacks. */
   constructor(device: GPUDevice, world: World, { settings = {}, onIncomplete }: ViewpointOptions = {}) {
@@ -187,7 +182,7 @@ export class Viewpoint {
     const { timer } = picture;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
     const encoded = this.#encode(encoder, camera, picture, settings, true);
-    const { last, isWatched, submissions, wishes, resources, occasion } = encoded;
+    const { last, isWatched, submissions, wishes, resources } = encoded;
     timer?.endFrame?.(last);
     for (const wish of wishes) wish.copy(last);
     if (isWatched) this.#watch(last, resources);
@@ -201,7 +196,6 @@ export class Viewpoint {
       );
     }
     for (const wish of wishes) wish.read();
-    resources.orderPolicy.settle(occasion);
   }
 
   /**
@@ -213,25 +207,17 @@ export class Viewpoint {
   record(encoder: GPUCommandEncoder, camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
     const hosted = { ...picture, timer: undefined };
     const encoded = this.#encode(encoder, camera, hosted, settings, false);
-    const { isWatched, wishes, resources } = encoded;
-    if (isWatched || wishes.length > 0 || resources.depthOrder.isWorking) setTimeout(() => this.#readLater(encoded));
+    if (encoded.isWatched || encoded.wishes.length > 0) setTimeout(() => this.#readLater(encoded));
   }
 
   /**
-   * Draws several views of the world, such as both eyes or thumbnails. Those that look along the same axis share one sort; sizes that come again keep their
-   * buffers.
+   * Draws several views of the world, such as both eyes or thumbnails: sizes that come again keep their buffers.
    * @throws GaussianSplatError as {@link draw} does.
    */
   drawAll(views: readonly View[], settings: FrameSettings = this.#settings): void {
     const sizes = new Set(views.map(({ camera: { width, height } }) => `${width} ${height}`));
     this.#mostSizes = Math.max(1, sizes.size);
-    const axes = views.map(({ camera }) => axisOf(camera));
-    this.#sharesOrder = axes.some((axis, k) => k > 0 && angleBetween(axis, axes[k - 1]) < 1e-7);
-    try {
-      for (const { camera, picture } of views) this.draw(camera, picture, settings);
-    } finally {
-      this.#sharesOrder = false;
-    }
+    for (const { camera, picture } of views) this.draw(camera, picture, settings);
   }
 
   #encode(
@@ -254,21 +240,19 @@ export class Viewpoint {
     const drawn = scaled(camera, levers.resolutionScale);
     if (depth) requireDepth(rasterizer, depth, drawn, notes);
     depth?.prepare(camera, drawn);
-    const resources = all.fit(this.world, levers.splatBudget, depth !== undefined);
-    const { table, scratch, bindings, depthOrder, orderPolicy, monitor } = resources;
+    const resources = all.fit(this.world, levers.splatBudget);
+    const { table, scratch, bindings, monitor } = resources;
     table.update();
     timer?.startFrame();
-    const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined || this.#sharesOrder };
-    const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, levers, isOrdered && depth === undefined);
+    table.look(drawn, pixelArea, levers);
     const wishes = recordProjection(encoder, {
       stages,
       bindings,
       scratch,
       camera: drawn,
       levers,
-      depthOrder: isOrdered ? depthOrder : undefined,
+      keepsSurvivors: notes !== undefined,
       hasDetail: table.hasDetail,
       isBudgeted: levers.splatBudget > 0 && table.hasDetail,
       keepsDepths: depth !== undefined,
@@ -280,10 +264,10 @@ export class Viewpoint {
       isWhole: isWhole(levers, this.levers),
     });
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
-    const order = isOrdered ? 'identity' : 'sorted';
-    const last = this.#paint(encoder, target, drawn, { order, levers, notes, timer, depth }, picture, submissions);
-    this.#last = { order, scratch, scale: drawn.width / camera.width };
-    return { last, isWatched, submissions, wishes, resources, occasion };
+    const how = { levers, notes, survivors: notes && scratch.survivors, timer, depth, depths: depth && scratch.depths };
+    const last = this.#paint(encoder, target, drawn, how, picture, submissions);
+    this.#last = { scratch, scale: drawn.width / camera.width };
+    return { last, isWatched, submissions, wishes, resources };
   }
 
   #watch(encoder: GPUCommandEncoder, { monitor, scratch }: Resources): void {
@@ -291,9 +275,8 @@ export class Viewpoint {
   }
 
   /** Reads what a frame left that a host has submitted. */
-  #readLater({ resources, isWatched, wishes, occasion }: Encoded): void {
+  #readLater({ resources, isWatched, wishes }: Encoded): void {
     if (this.#engine.resources.current !== resources) return;
-    resources.orderPolicy.settle(occasion);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.read' });
     for (const wish of wishes) wish.copy(encoder);
     if (isWatched) this.#watch(encoder, resources);
@@ -347,10 +330,9 @@ export class Viewpoint {
     const { probe } = await loadModule('the code that looks into a picture', () => import('./depth-probe.js'));
     if (this.#last === undefined || this.#last.scratch !== this.#engine.resources.current?.scratch) return [];
     const { scale, scratch } = this.#last;
-    const { plan, splats, orders } = scratch;
-    const nearToFar = orders[this.#last.order];
+    const { plan, splats, order } = scratch;
     const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
-    return probe(this.#device, { plan, splats, order: nearToFar }, drawn);
+    return probe(this.#device, { plan, splats, order: order[0] }, drawn);
   }
 
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
@@ -363,7 +345,7 @@ export class Viewpoint {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'order' | 'levers' | 'notes' | 'timer' | 'depth'>,
+    how: Pick<Painting, 'levers' | 'notes' | 'survivors' | 'timer' | 'depth' | 'depths'>,
     { over, colours }: Picture,
     submissions: Submissions,
   ): GPUCommandEncoder {
@@ -444,7 +426,7 @@ export class Viewpoint {
     const stages = makeStages(this.#device, levers);
     const rasterizer = makeRasterizer(this.#device, levers);
     const resources = new FrameResources(this.#device, {
-      ...{ stages, rasterizer, threads: levers.threads },
+      ...{ stages, rasterizer },
       pairsAtOnce: () => this.#pacer.pairsAtOnce,
       onIncomplete: this.#onIncomplete,
     });

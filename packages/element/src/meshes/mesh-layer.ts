@@ -144,7 +144,7 @@ export class MeshLayer implements MeshDrawing {
   #makeEnvironment(): RenderTarget {
     const generator = new PMREMGenerator(this.#renderer);
     const room = new RoomEnvironment();
-    const environment = generator.fromScene(room, 0.04);
+    const environment = generator.fromScene(room, 0.04, 0.1, 100, { size: 128 });
     room.dispose();
     generator.dispose();
     return environment;

@@ -85,7 +85,13 @@ declare module 'three/webgpu' {
   }
   export class PMREMGenerator {
     constructor(renderer: WebGPURenderer);
-    fromScene(scene: Scene, sigma?: number): RenderTarget;
+    fromScene(
+      scene: Scene,
+      sigma?: number,
+      near?: number,
+      far?: number,
+      options?: { readonly size?: number },
+    ): RenderTarget;
     dispose(): void;
   }
   export class WebGPURenderer {

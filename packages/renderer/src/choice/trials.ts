@@ -3,7 +3,6 @@ import { GaussianBuffers } from '../gaussian-buffers.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
-import { OrderKeysStage } from '../stages/order-keys.js';
 import type { Variants } from '../variants.js';
 import type { FrameClock } from './frame-clock.js';
 import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud, viewpointOf } from './known-answer.js';
@@ -33,7 +32,6 @@ function prepare(device: GPUDevice, variants: Variants, format: GPUTextureFormat
   const renderer = new Viewpoint(device, new World(), { settings: variants });
   renderer.prepare([{}], format);
   renderer.destroy();
-  new OrderKeysStage(device);
 }
 
 /** Whether an answer is right, and WebGPU had nothing to say against the way to it. */
@@ -66,7 +64,7 @@ export async function timeFrames(
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);
   const draw = (): void => renderer.draw(camera, { target: texture });
-  // The first frame also makes pipelines and orders everything.
+  // The first frame also makes pipelines.
   await clock.time(1, draw);
   const time = await clock.time(FRAMES, draw);
   texture.destroy();

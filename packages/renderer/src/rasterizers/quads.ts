@@ -3,7 +3,6 @@ import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/ker
 import { writeStruct } from '../gpu/struct.js';
 import type {
   AccumulationFormat,
-  OrderKind,
   Painting,
   QuadsWithDepth,
   Rasterizer,
@@ -27,7 +26,7 @@ export class QuadsRasterizer implements Rasterizer {
   readonly #indices: GPUBuffer;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.RasterView.size);
-  #bindings: Readonly<Record<OrderKind, GPUBindGroup>> | undefined;
+  #bindings: GPUBindGroup | undefined;
   #inputs: RasterizerInputs | undefined;
 
   constructor(device: GPUDevice, format: AccumulationFormat) {
@@ -63,13 +62,8 @@ export class QuadsRasterizer implements Rasterizer {
 
   bind(inputs: RasterizerInputs): void {
     this.#inputs = inputs;
-    const { plan, splats, orders } = inputs;
-    const bindTo = (order: GPUBuffer): GPUBindGroup =>
-      this.#program.bind({ raster: this.#uniform, plan, splats, order });
-    this.#bindings = {
-      sorted: bindTo(orders.sorted),
-      identity: bindTo(orders.identity),
-    };
+    const { plan, splats, order } = inputs;
+    this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });
   }
 
   /** One pipeline serves all levers. */
@@ -80,7 +74,7 @@ export class QuadsRasterizer implements Rasterizer {
   /** Quads are drawn from what the stages before have left. */
   prepareFrame(): void {}
 
-  record(encoder: GPUCommandEncoder, { surface, order, timer, depth }: Painting, slice: Slice): void {
+  record(encoder: GPUCommandEncoder, { surface, timer, depth, depths }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
     writeStruct(
       layouts.RasterView,
@@ -102,13 +96,13 @@ export class QuadsRasterizer implements Rasterizer {
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
     if (this.#bindings !== undefined && this.#inputs !== undefined) {
-      const { plan, splats, orders, depths, capacity } = this.#inputs;
+      const { plan, splats, order, capacity } = this.#inputs;
       const deep = depth?.quadsProgram;
-      const resources = { raster: this.#uniform, plan, splats, order: orders[order] };
+      const resources = { raster: this.#uniform, plan, splats, order };
       // The image may be a part of the texture.
       pass.setViewport(0, 0, width, height, 0, 1);
       pass.setPipeline(this.#pipeline(deep));
-      pass.setBindGroup(0, deep ? deep.bind(resources, depth!, depths![order]) : this.#bindings[order]);
+      pass.setBindGroup(0, deep && depths ? deep.bind(resources, depth!, depths) : this.#bindings);
       pass.setIndexBuffer(this.#indices, 'uint16');
       // As many as there is room for: the vertices of those that are not there lie outside.
       pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(capacity / QUAD_BATCH));

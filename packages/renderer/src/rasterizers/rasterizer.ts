@@ -10,9 +10,6 @@ export type RasterizerName = 'quads' | 'tiles';
 /** Formats of the accumulation texture. Quads blend into `rgba32float` only with the feature `float32-blendable`. */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
 
-/** Buffers that list slots from near to far: the one that a sort leaves, and the one for slots that are in that order themselves. */
-export type OrderKind = 'sorted' | 'identity';
-
 /** What every rasterizer reads. */
 export interface RasterizerInputs {
   /** `Plan`: how many splats there are to draw. */
@@ -20,11 +17,7 @@ export interface RasterizerInputs {
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
-  readonly orders: Readonly<Record<OrderKind, GPUBuffer>>;
-  /** Camera depths by slot, of frames with depth; undefined before there was one. */
-  readonly depths: Readonly<Record<OrderKind, GPUBuffer>> | undefined;
-  /** Numbers of the visible splats by slot, for frames whose order is `identity`. */
-  readonly survivors: GPUBuffer;
+  readonly order: GPUBuffer;
   /** Of at least {@link Rasterizer.spareBytes} each: nobody else's once splats are in order, until the next frame. */
   readonly spare: readonly [GPUBuffer, GPUBuffer];
   /** Most splats that can be visible. */
@@ -106,8 +99,9 @@ export type PaintingLevers = Pick<Levers, 'transmittanceMin'>;
 /** One frame to draw. */
 export interface Painting {
   readonly notes?: FrameNotes | undefined;
+  /** Numbers of the visible splats by slot; with {@link notes}. */
+  readonly survivors?: GPUBuffer | undefined;
   readonly surface: Surface;
-  readonly order: OrderKind;
   readonly levers: PaintingLevers;
   /**
    * Premultiplied colour to lay the splats over; the surface is then the final image. Without it the surface receives colour, and
@@ -116,6 +110,8 @@ export interface Painting {
   readonly background?: readonly [number, number, number, number];
   readonly timer?: FrameTimer | undefined;
   readonly depth?: PaintingDepth | undefined;
+  /** Camera depths of the splats by slot; with {@link depth}. */
+  readonly depths?: GPUBuffer | undefined;
 }
 
 /** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */
