@@ -1,5 +1,5 @@
 import { loadModule, multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
-import { type Picture, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
+import { boundsOfWorld, type Picture, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
 import type { ViewerFrame } from '../camera/orbit.js';
 import { frameOf, type SceneBounds } from '../camera/settings.js';
 import type { MotionHost } from '../controllers/motion-controller.js';
@@ -271,7 +271,7 @@ export class Composition {
 
   get bounds(): SceneBounds | null {
     for (const part of this.#parts) part.place();
-    const bounds = this.stage.world.bounds();
+    const bounds = boundsOfWorld(this.stage.world);
     return bounds ? { ...bounds, up: this.stage.own?.scene.bounds.up } : null;
   }
 
