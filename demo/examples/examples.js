@@ -106,6 +106,8 @@ function conductWalker(card, joints) {
 /** Seconds for one round about the plinth, and how far from its middle. */
 const ROUND_SECONDS = 14;
 const ROUND_METRES = 1.35;
+/** Its middle is above its feet. */
+const HIP_METRES = 0.83;
 
 /** The avatar walks around among a scene and a mesh. */
 async function conductRound(card) {
@@ -116,7 +118,7 @@ async function conductRound(card) {
   let [frame, seconds, last] = [0, 0, 0];
   const put = () => {
     const angle = (2 * Math.PI * seconds) / ROUND_SECONDS;
-    walker.position = [ROUND_METRES * Math.sin(angle), 0, ROUND_METRES * Math.cos(angle)];
+    walker.position = [ROUND_METRES * Math.sin(angle), HIP_METRES, ROUND_METRES * Math.cos(angle)];
     walker.rotation = [0, angle + Math.PI / 2, 0];
     walker.pose = walkingPose(joints, seconds * PACES_PER_SECOND);
   };

@@ -13,8 +13,8 @@ const COLUMN_HEIGHT = 2.3;
 
 /** Linear base colours. */
 const MATERIALS = {
-  floor: { baseColorFactor: [0.23, 0.2, 0.17, 1], roughnessFactor: 0.85, metallicFactor: 0 },
-  stone: { baseColorFactor: [0.66, 0.6, 0.52, 1], roughnessFactor: 0.75, metallicFactor: 0 },
+  floor: { baseColorFactor: [0.17, 0.14, 0.11, 1], roughnessFactor: 0.85, metallicFactor: 0 },
+  stone: { baseColorFactor: [0.4, 0.33, 0.26, 1], roughnessFactor: 0.75, metallicFactor: 0 },
   brass: { baseColorFactor: [0.72, 0.46, 0.17, 1], roughnessFactor: 0.32, metallicFactor: 1 },
 };
 

@@ -165,7 +165,7 @@ describe('meshes', () => {
       assert(good.loaded && element.error === null, 'the others');
       const picture = await screenOf(element);
       for (let i = 0; i < 2; i++) {
-        const restored = nextEvent(element, 'contextrestored');
+        const restored = nextEvent(element, 'contextrestored', 60_000);
         devices.at(-1)!.destroy();
         await restored;
         await frames();

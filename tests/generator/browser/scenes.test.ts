@@ -72,7 +72,7 @@ describe('generators among other scenes', () => {
       element.currentTime = 0;
       await nextEvent(element, 'seeked');
       for (let i = 0; i < LOSSES; i++) {
-        const restored = nextEvent(element, 'contextrestored');
+        const restored = nextEvent(element, 'contextrestored', 60_000);
         devices.at(-1)!.destroy();
         await restored;
       }

@@ -16,7 +16,7 @@ export function mount(place: HTMLElement, attributes: object, told: (name: strin
         id={name}
         {...properties}
         onLoad={() => told(name, 'load')}
-        onError={({ detail }) => told(name, detail.reason)}
+        onError={({ detail }) => told(name, detail.code === 'network' ? detail.reason : detail.message)}
       />
     );
   };

@@ -15,7 +15,8 @@ export function mount(place: HTMLElement, attributes: object, told: (name: strin
         h(kind === 'mesh' ? 'splat-mesh' : 'splat-scene', {
           ...{ key: name, id: name, ...properties },
           onLoad: () => told(name, 'load'),
-          onError: ({ detail }: CustomEvent<{ reason: string }>) => told(name, detail.reason),
+          onError: ({ detail }: CustomEvent<{ code: string; reason: string; message: string }>) =>
+            told(name, detail.code === 'network' ? detail.reason : detail.message),
         }),
       ),
     ),
