@@ -2,7 +2,7 @@
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
 import type { FrameSettings, Picture } from './picture.js';
 import { TEXTURE_USAGE } from './gpu/kernel.js';
-import type { AccumulationFormat, PaintingDepth, Rasterizer } from './rasterizers/rasterizer.js';
+import type { AccumulationFormat, Rasterizer } from './rasterizers/rasterizer.js';
 
 export function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
   const limit = device.limits.maxTextureDimension2D;
@@ -49,29 +49,6 @@ export function requireNotes({ name, takesNotes }: Rasterizer): void {
     found: name,
     remedy: "draw with settings('default', { rasterizer: 'tiles' })",
   });
-}
-
-/** @param drawn pixels that are drawn */
-export function requireDepth(
-  { name }: Rasterizer,
-  { tells, outSize }: PaintingDepth,
-  drawn: { readonly width: number; readonly height: number },
-  notes: unknown,
-): void {
-  if (notes) throw missing('depth', 'no depth in a picture with notes', 'both');
-  if (tells && name !== 'tiles')
-    throw new GaussianSplatError('unsupported/limits', {
-      where: 'SceneDepth.out',
-      expected: 'settings with the rasterizer tiles',
-      found: name,
-      remedy: "draw with settings('default', { rasterizer: 'tiles' })",
-    });
-  if (outSize && (outSize[0] !== drawn.width || outSize[1] !== drawn.height))
-    throw missing(
-      'depth',
-      `SceneDepth.out of ${drawn.width} x ${drawn.height} pixels, as many as are drawn`,
-      outSize.join(' x '),
-    );
 }
 
 export function requireBlendable(device: GPUDevice, format: AccumulationFormat): void {

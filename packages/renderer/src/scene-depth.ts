@@ -10,7 +10,7 @@ import {
   type ComputeKernel,
 } from './gpu/kernel.js';
 import { writeStruct } from './gpu/struct.js';
-import type { PaintingDepth, QuadsWithDepth } from './rasterizers/rasterizer.js';
+import type { FrameNotes, PaintingDepth, QuadsWithDepth, RasterizerName } from './rasterizers/rasterizer.js';
 import { rasterizeKernel, type RasterizeKernel, type RasterizeVariant } from './rasterizers/tile-kernels.js';
 
 /** Depth that a host has drawn, for splats to be hidden by. */
@@ -53,10 +53,7 @@ const FORMATS = /^(depth(32float|24plus|16unorm)(-stencil8)?|r32float)$/;
  * Frames with depth sort their splats by all 32 bits of it, and keep 8 bytes more for each visible splat. Pages without it load nothing of this.
  */
 export class SceneDepth implements PaintingDepth {
-  readonly tests: boolean;
-  readonly tells: boolean;
-  /** Pixels of what is told; undefined where nothing is. */
-  readonly outSize: readonly [number, number] | undefined;
+  readonly #outTexture: GPUTexture | undefined;
   readonly #device: GPUDevice;
   readonly #host: HostDepth | undefined;
   readonly #stored: GPUTextureView;
@@ -73,24 +70,30 @@ export class SceneDepth implements PaintingDepth {
     if (out) requireOut(out);
     this.#device = device;
     this.#host = host;
-    this.tests = host !== undefined;
-    this.tells = out !== undefined;
-    this.outSize = out && [out.width, out.height];
+    this.#outTexture = out;
     this.#stored = host ? viewOf(host.texture) : nothing(device);
     this.#out = (out ?? nowhere(device)).createView();
     const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
     this.#uniform = device.createBuffer({ label: 'gs.scene_depth', size: layouts.SceneDepth.size, usage });
   }
 
-  prepare(camera: Camera, { width, height }: { readonly width: number; readonly height: number }): void {
+  /** @throws GaussianSplatError `unsupported/limits` for median depth of quads; `argument/value` for one of another size, or beside auxiliary outputs. */
+  prepare(
+    camera: Camera,
+    { width, height }: { readonly width: number; readonly height: number },
+    rasterizer: RasterizerName,
+    notes: FrameNotes | undefined,
+  ): void {
     const host = this.#host;
+    if (notes) throw wrong('Picture.depth', 'no depth in a picture with notes', 'both');
+    if (this.#outTexture) requireRoom(this.#outTexture, width, height, rasterizer);
     const scale = host ? [host.texture.width / width, host.texture.height / height] : [1, 1];
     writeStruct(layouts.SceneDepth, { ...readingOf(host, camera), scale }, this.#bytes);
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#bytes);
   }
 
   tilesKernel(variant: RasterizeVariant): RasterizeKernel {
-    const overrides = { tests_depth: +this.tests, tells_depth: +this.tells };
+    const overrides = { tests_depth: +(this.#host !== undefined), tells_depth: +(this.#outTexture !== undefined) };
     return rasterizeKernel(this.#device, variant, rasterizeTilesDepth, overrides) as unknown as RasterizeKernel;
   }
 
@@ -185,6 +188,20 @@ function requireOut({ format, usage }: GPUTexture): void {
   if (format !== 'r32float') throw wrong('SceneDepth.out', 'a texture of the format r32float', format);
   if ((usage & TEXTURE_USAGE.storageBinding) === 0)
     throw wrong('SceneDepth.out', 'a texture with the usage STORAGE_BINDING', `usage ${usage}`);
+}
+
+/** @param width pixels that are drawn, across */
+function requireRoom(out: GPUTexture, width: number, height: number, rasterizer: RasterizerName): void {
+  if (rasterizer !== 'tiles')
+    throw new GaussianSplatError('unsupported/limits', {
+      where: 'SceneDepth.out',
+      expected: 'settings with the rasterizer tiles',
+      found: rasterizer,
+      remedy: "draw with settings('default', { rasterizer: 'tiles' })",
+    });
+  if (out.width === width && out.height === height) return;
+  const expected = `a texture of ${width} x ${height} pixels, as many as are drawn`;
+  throw wrong('SceneDepth.out', expected, `${out.width} x ${out.height}`);
 }
 
 function wrong(where: string, expected: string, found: unknown): GaussianSplatError {

@@ -13,7 +13,7 @@ import { leversOf, type Levers } from './levers.js';
 import type { FrameSettings, Picture, Target } from './picture.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
 import type { NotedFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
-import { requireDepth, requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
+import { requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
 import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
@@ -238,8 +238,7 @@ export class Viewpoint {
     const { resources: all, rasterizer, stages } = this.#useEngine(levers);
     if (notes) requireNotes(rasterizer);
     const drawn = scaled(camera, levers.resolutionScale);
-    if (depth) requireDepth(rasterizer, depth, drawn, notes);
-    depth?.prepare(camera, drawn);
+    depth?.prepare(camera, drawn, rasterizer.name, notes);
     const resources = all.fit(this.world, levers.splatBudget);
     const { table, scratch, bindings, monitor } = resources;
     table.update();

@@ -49,7 +49,7 @@ export class SplatRenderer {
   /** @throws GaussianSplatError `argument/value` for a renderer that is not initialised, or does not draw with WebGPU. */
   constructor(renderer: WebGPURenderer, options: SplatRendererOptions = {}) {
     const { device, isWebGPUBackend = false } = renderer.backend;
-    if (!isWebGPUBackend || device === undefined)
+    if (!isWebGPUBackend || !device)
       throw wrong(
         'renderer',
         'a WebGPURenderer that draws with WebGPU and is initialised',

@@ -108,7 +108,7 @@ export class WebGPURenderer {
   dispose(): void;
   readonly backend: {
     readonly isWebGPUBackend?: boolean;
-    readonly device?: GPUDevice;
+    readonly device?: GPUDevice | null;
     get(texture: Texture): { texture?: GPUTexture };
   };
   getDrawingBufferSize(size: Vector2): Vector2;

@@ -71,13 +71,13 @@ export interface NotedFrame {
 
 /** What a frame has to do with depth besides its own. `SceneDepth` is one; pictures bring it, so that pages without it load none of its code. */
 export interface PaintingDepth {
-  /** True if splats end at the depth of what else is in the picture. */
-  readonly tests: boolean;
-  /** True if the splats' own depth is told. */
-  readonly tells: boolean;
-  readonly outSize: readonly [number, number] | undefined;
-  /** Called before a frame is recorded. */
-  prepare(camera: Camera, drawn: { readonly width: number; readonly height: number }): void;
+  /** Called before a frame is recorded, with the pixels that are drawn. @throws GaussianSplatError for a frame that it does not fit */
+  prepare(
+    camera: Camera,
+    drawn: { readonly width: number; readonly height: number },
+    rasterizer: RasterizerName,
+    notes: FrameNotes | undefined,
+  ): void;
   tilesKernel(variant: RasterizeVariant): RasterizeKernel;
   bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup;
   readonly quadsProgram: QuadsWithDepth;
