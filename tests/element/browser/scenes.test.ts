@@ -264,6 +264,10 @@ describe('several scenes in one element', () => {
     element.currentTime = 0.15;
     await seeked;
     assertNear(await placeOf(element, isGreen), [-2, 0], 'the frame of that time', 0.6);
+    const third = await placeLoaded(`<gaussian-splat autoplay loop ${VIEW}><splat-scene src="${GREEN}"></splat-scene>
+      <splat-scene src="${movie}"></splat-scene></gaussian-splat>`);
+    await until(() => !third.paused && third.currentTime > 0.1, 'the clock of an element that plays by itself');
+    third.remove();
     const button = element.shadowRoot?.querySelector<HTMLButtonElement>('[part=pause-button]');
     assert(button, 'visitors can start and stop what plays by itself');
     button.click();

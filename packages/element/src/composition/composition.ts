@@ -199,12 +199,15 @@ export class Composition {
 
   /** The element's clock goes as far as its own scene, or else as what follows it. */
   #setDuration(): void {
-    const { scene, playback } = this.stage;
-    if (scene.state === 'waiting' || scene.state === 'loading') return;
-    const own = this.stage.own?.scene.live?.duration ?? NaN;
-    const followed = [...this.#parts].flatMap(({ hasOwnClock, duration }) => (hasOwnClock ? [] : [duration]));
-    const durations = [own, ...followed].filter((seconds) => !Number.isNaN(seconds));
-    playback.setDuration(Number.isNaN(own) && durations.length > 0 ? Math.max(...durations) : own);
+    const { scene, playback, own } = this.stage;
+    if (own === undefined && (scene.state === 'waiting' || scene.state === 'loading')) return;
+    const couldPlay = playback.canPlay;
+    const duration = own?.scene.live?.duration ?? NaN;
+    const followed = [...this.#parts].flatMap((part) => (part.hasOwnClock ? [] : [part.duration]));
+    const moving = followed.filter((seconds) => !Number.isNaN(seconds));
+    playback.setDuration(Number.isNaN(duration) && moving.length > 0 ? Math.max(...moving) : duration);
+    // What follows the clock may come when the poster has gone.
+    if (!couldPlay && playback.canPlay && this.stage.isOnShow) this.stage.autoplay();
   }
 
   /** What plays by itself may begin. */
