@@ -201,6 +201,8 @@ export class Composition {
   #setDuration(): void {
     const { scene, playback, own } = this.stage;
     if (own === undefined && (scene.state === 'waiting' || scene.state === 'loading')) return;
+    // What has gone with a device comes back, and its time goes on.
+    if (this.#lost.size > 0) return;
     const couldPlay = playback.canPlay;
     const duration = own?.scene.live?.duration ?? NaN;
     const followed = [...this.#parts].flatMap((part) => (part.hasOwnClock ? [] : [part.duration]));
