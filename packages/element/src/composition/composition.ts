@@ -66,13 +66,12 @@ export class Composition {
 
   /**
    * Shows what a part has loaded, once those before it are drawn. Fulfils when it is, or need not be any more; rejects with GaussianSplatError `out-of-memory/*`.
-   * @param enter puts it into the world, or whatever draws it
+   * @param enter puts it into the world; false where it is not wanted any more
    */
-  #arrive(part: Part | Stage, scene: LoadedGaussians, entrance: Entrance, enter: () => void): Promise<void> {
+  #arrive(part: Part | Stage, scene: LoadedGaussians, entrance: Entrance, enter: () => boolean): Promise<void> {
     const show = async (): Promise<void> => {
       if (scene.model) await this.#prepareMeshes(scene);
-      if (scene.isDestroyed || scene.isLost) return;
-      enter();
+      if (scene.isDestroyed || scene.isLost || !enter()) return;
       if (scene.hasMeshes) void this.#addMeshes(part, scene);
       this.#latest = part;
       this.#frame(entrance, part === this.stage);
@@ -91,7 +90,9 @@ export class Composition {
   /** Shows the splats that a part has loaded. */
   join(part: Part, scene: LoadedGaussians, entrance: Entrance, enter: (member: Member) => void): Promise<void> {
     return this.#arrive(part, scene, entrance, () => {
-      enter(this.stage.enter(scene));
+      const isWanted = this.#parts.has(part) && part.source === scene;
+      if (isWanted) enter(this.stage.enter(scene));
+      return isWanted;
     });
   }
 
@@ -314,6 +315,7 @@ export class Composition {
       stage.own?.remove();
       stage.own = stage.enter(scene);
       this.#changed();
+      return true;
     });
   }
 

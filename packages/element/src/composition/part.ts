@@ -42,6 +42,8 @@ export interface Part {
   readonly error: ElementError | null;
   readonly settled: Promise<void>;
   readonly progress: number | null;
+  /** What it has on the GPU. */
+  readonly source: LoadedGaussians | null;
   /** Its splats in the world; undefined for none. */
   readonly member: Member | undefined;
   /** Something of it is drawn, or about to be. */

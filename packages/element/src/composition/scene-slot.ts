@@ -60,6 +60,10 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
     return this.scene.settled;
   }
 
+  get source(): LoadedGaussians | null {
+    return this.scene.scene;
+  }
+
   get isEntered(): boolean {
     return this.member !== undefined;
   }
