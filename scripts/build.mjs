@@ -85,6 +85,9 @@ function writeLicencesOfBundle() {
   const others = [
     ['Lit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js', 'node_modules/lit/LICENSE'],
     ['fflate, in readers/', 'node_modules/fflate/LICENSE'],
+    ['three.js, in the script that is fetched for meshes', 'node_modules/three/LICENSE'],
+    // Its decoder comes with three.js, without a text beside it.
+    ['meshoptimizer, in the same', 'packages/element/third-party/meshoptimizer/LICENSE'],
     // Its npm package has neither.
     ['ONNX Runtime, in onnxruntime/', `${RUNTIME_LICENCES}/LICENSE`],
     ['What ONNX Runtime is made of', `${RUNTIME_LICENCES}/ThirdPartyNotices.txt`],
