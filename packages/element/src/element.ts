@@ -150,7 +150,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.composing).then(() => this.stage.settled);
+    return this.updateComplete.then(() => this.stage.childrenKnown).then(() => this.stage.settled);
   }
 
   /**
@@ -277,7 +277,7 @@ export class GaussianSplatElement extends ViewingMethods {
       onMotion: this.#onMotion,
       strings: this.#strings,
       spoken: error ? this.#spokenError(error) : announcer.text,
-      hotspots: hotspots.names,
+      hotspots: hotspots?.names ?? [],
     });
   }
 

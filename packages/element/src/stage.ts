@@ -6,7 +6,7 @@ import type { CameraAction } from './camera/gestures.js';
 import type { SceneBounds } from './camera/settings.js';
 import { CameraController } from './controllers/camera-controller.js';
 import { DetailController, type DetailHost } from './controllers/detail-controller.js';
-import { HotspotController, type HotspotHost } from './controllers/hotspot-controller.js';
+import type { HotspotController, HotspotHost } from './controllers/hotspot-controller.js';
 import { InputController, type InputHost } from './controllers/input-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
@@ -53,7 +53,8 @@ export class Stage
   readonly playback: PlaybackController;
   readonly reveal: RevealController;
   readonly behaviours: Behaviours;
-  readonly hotspots: HotspotController;
+  /** Labels of the page, where there are some. */
+  hotspots: HotspotController | undefined;
   readonly queries: SceneQueries;
   /** All that is drawn. */
   readonly world = new World();
@@ -71,6 +72,8 @@ export class Stage
   readonly live: LiveWiring;
   readonly #source: SourceController;
   #counts: ReadCounts | undefined;
+  #children: MutationObserver | undefined;
+  #labelling: Promise<void> | undefined;
   /** Bytes that have arrived, and how many there are. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
@@ -91,7 +94,6 @@ export class Stage
     this.detail = new DetailController(this);
     this.reveal = new RevealController(element, this);
     this.behaviours = new Behaviours(element, this);
-    this.hotspots = new HotspotController(element, this);
     new PrintController(element, () => this.drawNow());
     this.queries = new SceneQueries(this);
     new InputController(element, this);
@@ -99,11 +101,17 @@ export class Stage
     element.addController({
       hostConnected: () => {
         document.addEventListener('visibilitychange', onPageVisibility);
+        this.#children ??= new MutationObserver(() => this.#lookAtChildren());
+        this.#children.observe(element, { childList: true, subtree: true, attributeFilter: ['slot'] });
+        this.#lookAtChildren();
         // Put back after a while, an eager element loads again though nothing has come into sight.
         this.#source.request();
       },
       hostUpdated: () => this.updated(),
-      hostDisconnected: () => document.removeEventListener('visibilitychange', onPageVisibility),
+      hostDisconnected: () => {
+        document.removeEventListener('visibilitychange', onPageVisibility);
+        this.#children?.disconnect();
+      },
     });
   }
 
@@ -191,9 +199,11 @@ export class Stage
     this.view.renewCanvas();
   }
 
-  /** Children have come or gone. */
-  childrenChanged(): void {
-    if (this.element.querySelector(':scope>splat-scene,:scope>splat-mesh')) this.compose();
+  /** Children bring what they need: few pages have any. */
+  #lookAtChildren(): void {
+    const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
+    if (has('splat-scene,splat-mesh')) this.compose();
+    if (has('[slot^=hotspot-]')) this.#label();
   }
 
   /** Lets more be shown than the splats of one scene. */
@@ -202,6 +212,24 @@ export class Stage
       ({ compose }) => compose(this),
       (error: Error) => {
         this.composing = undefined;
+        this.warn(error.message);
+      },
+    );
+  }
+
+  /** Fulfils when the code of the element's children is there. */
+  get childrenKnown(): Promise<unknown> {
+    return Promise.all([this.composing, this.#labelling]);
+  }
+
+  #label(): void {
+    this.#labelling ??= loadModule('the code of labels', () => import('./controllers/hotspot-controller.js')).then(
+      ({ HotspotController }) => {
+        this.hotspots = new HotspotController(this.element, this);
+        if (this.drawnFrom) this.hotspots.frameDrawn(this.drawnFrom);
+      },
+      (error: Error) => {
+        this.#labelling = undefined;
         this.warn(error.message);
       },
     );
@@ -319,7 +347,7 @@ export class Stage
 
   afterFrame(camera: Camera): void {
     this.drawnFrom = camera;
-    this.hotspots.frameDrawn(camera);
+    this.hotspots?.frameDrawn(camera);
   }
 
   cameraChanged(source: CameraChangeSource): void {
@@ -380,7 +408,7 @@ export class Stage
     if (!clear) return this.view.pause();
     this.playback.empty();
     this.drawnFrom = undefined;
-    this.hotspots.forget();
+    this.hotspots?.forget();
     this.view.clear();
   }
 

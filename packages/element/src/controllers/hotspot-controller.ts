@@ -13,7 +13,6 @@ export interface HotspotHost {
   readonly hotspotLayer: HTMLElement | null;
   /** Looks into the last frame. Rejects if it is gone. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
-  childrenChanged(): void;
   warn(sentence: string): void;
 }
 
@@ -120,7 +119,6 @@ export class HotspotController implements ReactiveController {
   }
 
   #collect(): void {
-    this.#of.childrenChanged();
     const before = this.#hotspots;
     const children = [...this.#host.children].filter(
       (child): child is HTMLElement => 'dataset' in child && child.slot.startsWith(PREFIX),
