@@ -10,9 +10,9 @@ import { root } from './run.mjs';
 const LABORATORY = [
   /^tests\/economise\/(?!command|live-mask)/,
   /^tests\/bench\/(scene|pages)/,
-  /^tests\/frameworks\/browser\/(react-strict|vue)/,
+  /^tests\/frameworks\/browser\/(react-strict|vue|scenes-vue)/,
   /^tests\/site\/(compare|cost-card|playground)/,
-  /^tests\/generator\/browser\/examples\/(plant|walker)/,
+  /^tests\/generator\/browser\/(scenes|examples\/(plant|walker))/,
 ];
 /** Tests in Chromium that look at what happens in time: no other page runs beside them. */
 const TIMING = [

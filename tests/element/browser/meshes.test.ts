@@ -2,6 +2,7 @@
 import '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement } from '@gaussian-splat/element';
 import type { SplatMeshElement } from '@gaussian-splat/element/scenes.js';
+import { isLab } from '../../support/extent-in-pages.js';
 import { boxGlb, type BoxOptions } from './support/glb.js';
 import { holdings } from './support/ledger.js';
 import { assert, assertEqual, COMPASS, delay, devices, FIXTURES, frames, nextEvent, until } from './support/harness.js';
@@ -164,7 +165,7 @@ describe('meshes', () => {
       assertEqual([broken.error?.reason, missing.error?.reason], ['decode/corrupt', 'network/status'], 'errors');
       assert(good.loaded && element.error === null, 'the others');
       const picture = await screenOf(element);
-      for (let i = 0; i < 2; i++) {
+      for (let i = 0; i < (isLab ? 3 : 1); i++) {
         const restored = nextEvent(element, 'contextrestored', 60_000);
         devices.at(-1)!.destroy();
         await restored;
