@@ -133,11 +133,12 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
 }
 
 /**
- * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, of which levels may be wanted or not.
+ * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, which may be wanted whole.
  */
-export function isStreamed({ url, levels }: SceneRequest): boolean {
+export function isStreamed({ url, isWhole }: SceneRequest): boolean {
   return (
-    URL.canParse(url) && (levels ? /(^|\/)(detail|lod-meta)\.json$/ : /(^|\/)detail\.json$/).test(new URL(url).pathname)
+    URL.canParse(url) &&
+    (isWhole ? /(^|\/)detail\.json$/ : /(^|\/)(detail|lod-meta)\.json$/).test(new URL(url).pathname)
   );
 }
 

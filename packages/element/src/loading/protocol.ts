@@ -26,6 +26,8 @@ export interface SceneRequest extends FileRequest {
   readonly sh: ShPrecision | 'auto';
   /** Whether levels of detail are wanted that the file has, besides the finest. */
   readonly levels?: boolean;
+  /** Whether a streamed SOG scene is loaded whole, in its finest level. */
+  readonly isWhole?: boolean;
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
   readonly contract?: unknown;
   /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */
