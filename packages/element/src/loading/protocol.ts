@@ -3,7 +3,14 @@ import type { ErrorData } from '@gaussian-splat/core';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
-import type { LevelPage, LevelScene, PackedGaussians, ShPrecision, StreamedScene } from '@gaussian-splat/renderer';
+import type {
+  CodedFile,
+  LevelPage,
+  LevelScene,
+  PackedGaussians,
+  ShPrecision,
+  StreamedScene,
+} from '@gaussian-splat/renderer';
 
 /** A file to fetch. */
 export interface FileRequest {
@@ -12,6 +19,8 @@ export interface FileRequest {
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
   readonly limits?: SceneLimits | undefined;
+  /** What a file of pages that is coded is decoded by. */
+  readonly coded?: CodedFile | undefined;
 }
 
 /** What loads of a page may cost, and whom they may ask: see `GaussianSplatElement.sceneLimits`. */
