@@ -136,10 +136,8 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
  * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, which may be wanted whole.
  */
 export function isStreamed({ url, isWhole }: SceneRequest): boolean {
-  return (
-    URL.canParse(url) &&
-    (isWhole ? /(^|\/)detail\.json$/ : /(^|\/)(detail|lod-meta)\.json$/).test(new URL(url).pathname)
-  );
+  const name = URL.canParse(url) && /(^|\/)(detail|lod-meta)\.json$/.exec(new URL(url).pathname)?.[2];
+  return name === 'detail' || (!!name && !isWhole);
 }
 
 async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {

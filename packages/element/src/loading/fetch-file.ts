@@ -12,6 +12,6 @@ export async function fetchFile(
   const { maxBytes, maxSeconds } = limits ?? {};
   const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, maxBytes, maxSeconds });
   if (coded === undefined) return bytes.slice().buffer;
-  const { decodePage } = await loadModule('the code that decodes pages', () => import('./decode-pages.js'));
+  const { decodePage } = await loadModule('the code that streams scenes', () => import('./open-manifest.js'));
   return decodePage(url, bytes as Uint8Array<ArrayBuffer>, coded);
 }

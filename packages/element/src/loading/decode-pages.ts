@@ -1,2 +1,0 @@
-/** Loaded by the worker when the first coded page has come. */
-export { decodePage } from '@gaussian-splat/renderer';
