@@ -22,6 +22,7 @@ const USAGE = `usage: npm run lab:bytes -- [options]
   --out FOLDER     where bytes.json and bytes.svg go (default docs/frontier)
   --scenes A,B     of skull, playbot3, st-peter (default all); others keep their figures
   --views N        held-out views (default 8)
+  --kept           of what takes long to make only what is in --work
 `;
 
 /** Bytes a second of 20 Mbit/s. */
@@ -57,13 +58,14 @@ const { values } = parseArgs({
     out: text(join(root, 'docs/frontier')),
     scenes: text(Object.keys(SCENES).join(',')),
     views: text('8'),
+    kept: { type: 'boolean' },
     help: { type: 'boolean' },
   },
 });
 
 /** Runs a command that makes a file, unless that is there; false where it fails. */
 function make(path, command, args) {
-  if (existsSync(path)) return true;
+  if (existsSync(path) || values.kept) return existsSync(path);
   console.log(`  ${basename(path)} ...`);
   const { status, stderr } = spawnSync(command, args, { encoding: 'utf8', cwd: root });
   if (status === 0) return true;
