@@ -11,6 +11,7 @@ import { encodingsFor, GpuEvaluator, viewsAround } from '@gaussian-splat/economi
 import { readScene } from '@gaussian-splat/formats';
 import { cloudOfChunks, decodePage, deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
+import { encodeWebp } from '../../packages/cli/src/lib/webp.mjs';
 import { root } from '../lib/run.mjs';
 import { drawChart } from './chart.mjs';
 import { writeSplat } from './splat.mjs';
@@ -121,7 +122,7 @@ async function measure(scene, { source, files }, device) {
   const made = (file) => join(values.work, `${scene}.${file}`);
   const cloud = await read(path(source));
   const around = (count, seed) => viewsAround(boundsOf(cloud), count, { seed });
-  const views = { scored: around(1, 10), searched: around(1, 1), heldOut: around(Number(values.views), 5) };
+  const views = { scored: around(1, 10), searched: around(2, 1), heldOut: around(Number(values.views), 5) };
   const evaluator = await GpuEvaluator.create(device, cloud, views);
   const rows = [];
   const note = async (name, isOwn, bytes, first, decodeMs, found) => {
@@ -164,7 +165,15 @@ async function measure(scene, { source, files }, device) {
     writeFileSync(at, await encoding.write(whole));
     await file(`SPZ 3, ours, ${/\d+ bits/.exec(encoding.title)?.[0]}`, true, at);
   }
+  const measured = async (bytes) => {
+    const errors = await evaluator.compare(await readScene(bytes, { name: 'tuned.sog' }), 'searched');
+    return errors.reduce((sum, error) => sum + error, 0) / errors.length;
+  };
   for (const dB of DECIBELS) {
+    const [{ tune }] = encodingsFor('a.sog', cloud, { encodeWebp });
+    const at = made(`tuned-${dB}.sog`);
+    writeFileSync(at, await (await tune(whole, measured, 10 ** (-dB / 10))).write(whole));
+    await file(`SOG, ours, no splat dropped, ${dB} dB`, true, at);
     const folder = made(`pages-${dB}`);
     if (make(folder, process.execPath, own('detail', path(source), '--out', folder, '--min-db', String(dB)))) {
       const [ms, found] = await timed(() => readFolder(folder));
@@ -173,7 +182,7 @@ async function measure(scene, { source, files }, device) {
     const smaller = made(`own-${dB}.sog`);
     const options = ['--min-db', String(dB), '--scored', '24', '--out', smaller];
     if (make(smaller, process.execPath, own('economise', path(source), ...options)))
-      await file(`our SOG, ${dB} dB`, true, smaller);
+      await file(`SOG, ours, pruned, ${dB} dB`, true, smaller);
   }
   evaluator.destroy();
   return { name: scene, source, splats: cloud.count, shDegree: cloud.shDegree, rows };
