@@ -1,4 +1,3 @@
-import { loadModule } from '@gaussian-splat/core';
 import { fetchScene } from '@gaussian-splat/formats';
 import type { FileRequest } from './protocol.js';
 
@@ -12,6 +11,6 @@ export async function fetchFile(
   const { maxBytes, maxSeconds } = limits ?? {};
   const bytes = await fetchScene(url, { mode: 'cors', credentials, signal, maxBytes, maxSeconds });
   if (coded === undefined) return bytes.slice().buffer;
-  const { decodePage } = await loadModule('the code that streams scenes', () => import('./open-manifest.js'));
-  return decodePage(url, bytes as Uint8Array<ArrayBuffer>, coded);
+  // What read the manifest is there already.
+  return (await import('./open-manifest.js')).decodePage(url, bytes as Uint8Array<ArrayBuffer>, coded);
 }
