@@ -13,6 +13,7 @@ const IN_CHROMIUM = {
 const IN_NODE = {
   fuzz: ['--import', 'tsx', 'tests/stability/fuzz/run-fuzz.ts'],
   'detail-chart': ['scripts/charts/detail.mjs'],
+  bytes: ['scripts/bytes/run-bytes.mjs'],
 };
 
 const [name, ...args] = process.argv.slice(2);

@@ -245,7 +245,8 @@ export const ATTRIBUTES = {
    */
   maxShDegree: number(map(keywordGrammar(['3', '2', '1', '0']), (degree) => Number(degree) as ShDegree)),
   /**
-   * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every picture to be off by so many.
+   * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every picture to be off by so many. Scenes that
+   * come in levels (`detail.json`, `lod-meta.json`) are streamed: `auto` is `1px` for them, and with `off` a `lod-meta.json` is loaded whole.
    * @default `auto`
    */
   detail: read(detailGrammar),

@@ -25,9 +25,20 @@ export {
   type DetailTree,
   type DetailTreeOptions,
 } from './detail/build-pages.js';
+export { decodePage } from './detail/decode-page.js';
+export {
+  codingOf,
+  PageEncoder,
+  USUAL_STEPS,
+  type Deflate,
+  type PageSteps,
+  type WrittenCoding,
+} from './detail/encode-page.js';
+export { cloudOfChunks, type PageChunks } from './detail/page-cloud.js';
+export type { CodedFile, PageCoding } from './detail/page-coding.js';
 export { treeOfCopies } from './detail/tile-tree.js';
 export { StreamedGaussians, type PoolOptions, type StreamOptions } from './detail/streamed-gaussians.js';
-export type { PageSource, StreamedScene } from './detail/page-source.js';
+export type { FetchPage, PageSource, StreamedScene } from './detail/page-source.js';
 export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './detail/level-pages.js';
 export { levelSource, packLevelPage } from './detail/level-source.js';
 export { checkManifest, type DetailManifest } from './detail/manifest.js';

@@ -1,7 +1,8 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { MemoryLedger } from '@gaussian-splat/renderer';
+import { MemoryLedger, USUAL_STEPS } from '@gaussian-splat/renderer';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
+import { storedBlocks } from '../../support/stored-blocks.js';
 import { assert, assertEqual, claimFault, devices, nextEvent, show, until } from './support/harness.js';
 
 const folder = detailFolder(pebbles(40_000));
@@ -110,6 +111,38 @@ describe('a streamed scene', () => {
     child.remove();
     element.remove();
     stop();
+  });
+
+  it('comes from coded pages, which its worker decodes', async () => {
+    const [loader, asked] = [GaussianSplatElement.sceneLoader, [] as boolean[]];
+    const coded = detailFolder(pebbles(6_000), undefined, {
+      geometry: 'quantized',
+      coded: { steps: USUAL_STEPS, deflate: storedBlocks },
+    });
+    const address = '/net/kept/coded/';
+    const put = (path: string, body: BodyInit): Promise<unknown> => fetch(address + path, { method: 'PUT', body });
+    await Promise.all([...coded.files].map(([path, bytes]) => put(path, bytes)));
+    await put('detail.json', JSON.stringify(coded.manifest));
+    loader.fetchFile = (request, signal) => {
+      asked.push(request.coded !== undefined);
+      return Object.getPrototypeOf(loader).fetchFile.call(loader, request, signal) as Promise<ArrayBuffer>;
+    };
+    const view = { 'camera-orbit': '30deg 60deg 12m', 'camera-target': '0m 0m 0m' };
+    try {
+      const element = show({ src: `${address}detail.json`, detail: '0.02px', ...view });
+      await element.ready;
+      assert(element.loaded, `loaded: ${element.error?.message}`);
+      await until(() => asked.length === coded.files.size, 'all files');
+      assert(asked.every(Boolean), 'files that the worker decodes');
+      await close(element);
+      await put(coded.manifest.trees[0].pages[0].file, 'no page');
+      const broken = show({ src: `${address}detail.json` });
+      await broken.ready;
+      assertEqual(broken.error?.reason, 'decode/corrupt');
+      broken.remove();
+    } finally {
+      Reflect.deleteProperty(loader, 'fetchFile');
+    }
   });
 
   it('stays on show where a page is missing, and fails with a name where the first is', async () => {

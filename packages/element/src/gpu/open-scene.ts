@@ -133,12 +133,11 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
 }
 
 /**
- * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, of which levels may be wanted or not.
+ * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, which may be wanted whole.
  */
-export function isStreamed({ url, levels }: SceneRequest): boolean {
-  return (
-    URL.canParse(url) && (levels ? /(^|\/)(detail|lod-meta)\.json$/ : /(^|\/)detail\.json$/).test(new URL(url).pathname)
-  );
+export function isStreamed({ url, isWhole }: SceneRequest): boolean {
+  const name = URL.canParse(url) && /(^|\/)(detail|lod-meta)\.json$/.exec(new URL(url).pathname)?.[2];
+  return name === 'detail' || (!!name && !isWhole);
 }
 
 async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {

@@ -75,8 +75,9 @@ const openPages: Open = async (request, device, { loader, signal, onProgress }, 
   );
   return StreamedGaussians.open(device, manifest, {
     ...pool,
-    fetchPage: async (page, aborted) =>
-      loader.fetchFile({ ...partRequest(page, request, limits.origins), limits }, aborted),
+    isDecoded: true,
+    fetchPage: async (page, aborted, coded) =>
+      loader.fetchFile({ ...partRequest(page, request, limits.origins), limits, coded }, aborted),
   });
 };
 

@@ -5,6 +5,8 @@ import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
 import { fileName, named, throttled } from './load-scene.js';
 import type { FileRequest, ProgressListener } from './protocol.js';
 
+export { decodePage } from '@gaussian-splat/renderer';
+
 /** As of the index of streamed SOG. A page takes some 50 bytes. */
 const MAX_BYTES = 1 << 26;
 

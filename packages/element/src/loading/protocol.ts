@@ -3,7 +3,14 @@ import type { ErrorData } from '@gaussian-splat/core';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
-import type { LevelPage, LevelScene, PackedGaussians, ShPrecision, StreamedScene } from '@gaussian-splat/renderer';
+import type {
+  CodedFile,
+  LevelPage,
+  LevelScene,
+  PackedGaussians,
+  ShPrecision,
+  StreamedScene,
+} from '@gaussian-splat/renderer';
 
 /** A file to fetch. */
 export interface FileRequest {
@@ -12,6 +19,8 @@ export interface FileRequest {
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
   readonly limits?: SceneLimits | undefined;
+  /** What a file of pages that is coded is decoded by. */
+  readonly coded?: CodedFile | undefined;
 }
 
 /** What loads of a page may cost, and whom they may ask: see `GaussianSplatElement.sceneLimits`. */
@@ -26,6 +35,8 @@ export interface SceneRequest extends FileRequest {
   readonly sh: ShPrecision | 'auto';
   /** Whether levels of detail are wanted that the file has, besides the finest. */
   readonly levels?: boolean;
+  /** Whether a streamed SOG scene is loaded whole, in its finest level. */
+  readonly isWhole?: boolean;
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
   readonly contract?: unknown;
   /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */

@@ -4,6 +4,7 @@ import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { shWords, type ShPrecision } from '../pack/sh.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
+import { CLASSES, CLASS_STEP, LEAST_OPACITY_STEP, type PageCoding } from './page-coding.js';
 import { QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
 
 /** Chunks that stand for the same one, at most: those of a page, which fill a slot of the pool. */
@@ -44,14 +45,16 @@ export interface TreeInstance {
  */
 export interface DetailManifest {
   readonly format: 'gaussian-splat-detail';
-  /** 2 if {@link geometry} is given. */
-  readonly version: 1 | 2;
+  /** 2 if {@link geometry} is given, 3 if {@link coding} is, too. */
+  readonly version: 1 | 2 | 3;
   /** Splats of the finest level. */
   readonly splats: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   /** How centres, shapes and opacities are stored: {@link packQuantizedChunk}. Default: as `PackedGaussian`, in twice the bytes. */
   readonly geometry?: 'quantized';
+  /** How files are coded: `decodePage` makes the words of them. Default: they are the words. */
+  readonly coding?: PageCoding;
   readonly antialiased: boolean;
   /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
@@ -105,12 +108,13 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
   const { format, version, splats, shDegree, shPrecision, geometry, antialiased, origin, bounds } = manifest;
   const { trees, instances } = manifest;
   if (format !== 'gaussian-splat-detail') fail('format', 'gaussian-splat-detail', format, 'decode/unsupported');
-  if (version !== 1 && version !== 2) fail('version', '1 or 2', version, 'decode/unsupported');
+  if (version !== 1 && version !== 2 && version !== 3) fail('version', '1, 2 or 3', version, 'decode/unsupported');
   if (!isCount(splats)) fail('splats', 'a number of splats', splats);
   if (![0, 1, 2, 3].includes(shDegree as number)) fail('shDegree', '0, 1, 2 or 3', shDegree);
   if (shPrecision !== 'int8' && shPrecision !== 'float16') fail('shPrecision', 'int8 or float16', shPrecision);
   const kind = version === 1 ? undefined : 'quantized';
   if (geometry !== kind) fail('geometry', kind ?? 'nothing in version 1', geometry, 'decode/unsupported');
+  checkCoding(manifest, fail);
   if (typeof antialiased !== 'boolean') fail('antialiased', 'true or false', antialiased);
   const { filterVariance } = manifest;
   if (filterVariance !== undefined && !(filterVariance >= 0 && filterVariance <= 1)) {
@@ -136,6 +140,27 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
   });
   checkPages(manifest as DetailManifest, fail);
   return manifest as DetailManifest;
+}
+
+/** Least and most of what a coding says; colours may be of any size. */
+const CODING_RANGES: Readonly<Record<keyof PageCoding, readonly [least: number, most: number]>> = {
+  size: [1 / 48, 1],
+  directions: [3, 255],
+  opacity: [LEAST_OPACITY_STEP, 512],
+  color: [0, 1e6],
+  chroma: [0, 1e6],
+  scale: [0, 255 - CLASS_STEP * (CLASSES - 1)],
+};
+
+function checkCoding({ version, coding, shPrecision }: Partial<DetailManifest>, fail: Fail): void {
+  if (version !== 3) return void (coding === undefined || fail('coding', 'nothing before version 3', coding));
+  if (shPrecision !== 'int8') fail('shPrecision', 'int8 where files are coded', shPrecision);
+  for (const [key, [least, most]] of Object.entries(CODING_RANGES)) {
+    const value = coding?.[key as keyof PageCoding];
+    const isFine = typeof value === 'number' && value >= least && value <= most;
+    const isWhole = ['directions', 'opacity', 'scale'].includes(key);
+    if (!isFine || (isWhole && !Number.isInteger(value))) fail(`coding.${key}`, `${least} to ${most}`, value);
+  }
 }
 
 /** What files and instances must agree in, each of which is fine by itself. */
