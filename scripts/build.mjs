@@ -11,7 +11,14 @@ import { ensureDependencies, noteBuilt } from './lib/prepare.mjs';
 import { must, mustSoon, root } from './lib/run.mjs';
 
 /** Scripts of pages, each beside its page. */
-const SCRIPTS = ['home.js', 'check/check.js', 'compare/compare.js', 'examples/examples.js', 'playground/playground.js'];
+const SCRIPTS = [
+  'home.js',
+  'check/check.js',
+  'compare/compare.js',
+  'examples/examples.js',
+  'examples/features/features.js',
+  'playground/playground.js',
+];
 
 /** Texts of ONNX Runtime and of what is in it, as its releases bring them. */
 const RUNTIME_LICENCES = 'packages/element/third-party/onnxruntime';
