@@ -15,6 +15,7 @@ const SCRIPTS = [
   'home.js',
   'check/check.js',
   'compare/compare.js',
+  'docs/search.js',
   'examples/examples.js',
   'examples/features/features.js',
   'playground/playground.js',
