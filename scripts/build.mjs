@@ -15,7 +15,9 @@ const SCRIPTS = [
   'home.js',
   'check/check.js',
   'compare/compare.js',
+  'docs/search.js',
   'examples/examples.js',
+  'examples/features/features.js',
   'playground/playground.js',
   'three/three.js',
 ];
