@@ -35,6 +35,7 @@ const STYLED = [
   'playground',
   'reference',
   'stability',
+  'three',
   'without-webgpu',
 ];
 /** HTML that is no page of the site: what is built, and what the benchmark frames. */

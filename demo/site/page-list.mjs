@@ -8,7 +8,9 @@ const DIST = 'demo/dist';
 
 /** `pages.json`: every page. @param results {{ url: string, outputPath: string }[]} what Eleventy has written. */
 export function writePageList(results) {
-  const urls = results.filter(({ outputPath }) => outputPath?.endsWith('.html')).map(({ url }) => url);
+  const urls = results
+    .filter(({ outputPath, url }) => outputPath?.endsWith('.html') && url !== '/404.html')
+    .map(({ url }) => url);
   writeFileSync(join(DIST, 'pages.json'), `${JSON.stringify(urls.sort(), null, 2)}\n`);
   writeTwins();
   writeFileSync(join(DIST, 'llms.txt'), overview());

@@ -95,7 +95,10 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
       undefined,
       PATIENCE,
     );
-    assert.match((await tab.locator('#status').textContent())!, /^\d+ × \d+ pixels, \d+ frames of each in turns, on .+\.$/);
+    assert.match(
+      (await tab.locator('#status').textContent())!,
+      /^\d+ × \d+ pixels, \d+ frames of each in turns, on .+\.$/,
+    );
     const rows = await tab.locator('#figures tbody tr').allTextContents();
     const cells = await tab.locator('#figures tbody tr:first-child td').allTextContents();
     const [decibels, worst] = [Number(cells[2]), Number(cells[3])];

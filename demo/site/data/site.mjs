@@ -23,6 +23,7 @@ export default {
   footer: [
     { title: 'Get started', url: '/docs/guide/start/' },
     { title: 'Generators', url: '/examples/' },
+    { title: 'In three.js', url: '/three/' },
     { title: 'Without WebGPU', url: '/without-webgpu/' },
     { title: 'Check a generator', url: '/check/' },
     { title: 'React', url: '/react/' },
