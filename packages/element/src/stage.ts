@@ -273,6 +273,7 @@ export class Stage
     if (entrance === 'whole') this.camera.refine(scene.bounds);
     this.playback.setDuration(scene.live?.duration ?? NaN);
     this.#live.post.attach(scene);
+    this.#live.tellInputs(scene.inputs);
     return this.#view.show(scene);
   }
 

@@ -12,6 +12,7 @@ import {
 } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
+import type { GeneratorInput } from '../live/inputs.js';
 import type { Timeline } from '../live/live-model.js';
 import type { ReadCounts } from '../stats.js';
 import type { DeviceLease } from './shared-device.js';
@@ -50,7 +51,7 @@ export interface Rendering {
  * and so cannot be shared), and the lease that keeps the device.
  */
 export class GpuScene {
-  readonly bounds: SceneBounds;
+  readonly #bounds: SceneBounds;
   #gaussians: OwnedGaussians;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
@@ -82,7 +83,7 @@ export class GpuScene {
     this.#detail = detail;
     this.live = live;
     this.#gaussians = gaussians;
-    this.bounds = bounds;
+    this.#bounds = bounds;
     this.#submissions = submissions;
     this.#renderer = this.#makeRenderer();
     this.#clock = QueueClock.of(lease.device);
@@ -169,6 +170,16 @@ export class GpuScene {
     this.#renderer.destroy();
     this.#renderer = this.#makeRenderer();
     this.#drawnSize = '';
+  }
+
+  /** Of a generator, those of its last runs. */
+  get bounds(): SceneBounds {
+    return this.live?.bounds ?? this.#bounds;
+  }
+
+  /** What the page may set of its models. */
+  get inputs(): readonly GeneratorInput[] {
+    return [...(this.live?.inputs ?? []), ...(this.#filter?.inputs ?? [])];
   }
 
   /** What stands between the renderer and the canvas; undefined for frames as they are drawn. */

@@ -1,10 +1,13 @@
 import type { FrameRequest } from '@gaussian-splat/renderer';
+import type { GeneratorInput } from './inputs.js';
 
 /** A frame without the Gaussians. */
 export type Frame = Omit<FrameRequest, 'gaussians'> & { readonly target: GPUTexture };
 
 /** Something between the renderer and the canvas. Knows no runtime: what does is loaded when first needed. */
 export interface FrameFilter {
+  /** What the page may set. */
+  readonly inputs: readonly GeneratorInput[];
   /** Bytes of GPU memory that its own pictures take. */
   readonly byteLength: number;
   /**

@@ -12,6 +12,7 @@ import { PostController, type PostHost } from './post-controller.js';
 export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'liveValues'> {
   readonly playback: PlaybackController;
   requestFrame(): void;
+  readonly element: HTMLElement;
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
 
@@ -20,6 +21,8 @@ export class LiveWiring implements PostHost {
   readonly post: PostController;
   readonly #host: LiveHost;
   #lastFault = '';
+  /** How many inputs there were last. */
+  #inputs = 0;
 
   constructor(host: LiveHost) {
     this.#host = host;
@@ -27,8 +30,9 @@ export class LiveWiring implements PostHost {
   }
 
   get postRequest(): PostHost['postRequest'] {
-    const { attributes, services } = this.#host;
+    const { attributes, services, element } = this.#host;
     return {
+      element,
       credentials: credentialsOf(attributes.crossorigin),
       runtimeLocation: services.runtimeLocation,
       startWorker: services.sceneLoader.spawn,
@@ -40,6 +44,12 @@ export class LiveWiring implements PostHost {
 
   requestFrame(): void {
     this.#host.requestFrame();
+  }
+
+  /** What the page may set is another thing than before, once what is told of is on show. */
+  tellInputs(inputs: { readonly length: number } = [0]): void {
+    if (inputs.length + this.#inputs > 0) queueMicrotask(() => this.#host.dispatch(new Event('inputs-change')));
+    this.#inputs = inputs.length;
   }
 
   /** What the page says about the models at this time. */

@@ -7,6 +7,8 @@ export interface PostHost {
   /** What a post-processor needs to know beyond its address. */
   readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
   requestFrame(): void;
+  /** There is another filter, or none. */
+  tellInputs(): void;
 }
 
 /** Puts the post-processor of the attribute between the scene on show and the canvas. Until it is there, frames are shown as they are drawn. */
@@ -42,7 +44,10 @@ export class PostController {
     this.#opening.renew();
     const scene = this.#scene;
     if (scene === null) return;
-    if (scene.filter) this.#host.requestFrame();
+    if (scene.filter) {
+      this.#host.requestFrame();
+      this.#host.tellInputs();
+    }
     scene.setFilter(undefined);
     if (this.#urls.length === 0) return;
     const options = this.#host.postRequest;
@@ -65,6 +70,7 @@ export class PostController {
     );
     if (signal.aborted || scene.isDestroyed) return view.close();
     scene.setFilter(view);
+    this.#host.tellInputs();
     this.#host.requestFrame();
   }
 }
