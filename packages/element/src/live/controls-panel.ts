@@ -215,7 +215,8 @@ function slider(
 ): HTMLElement {
   const field = make('input', { type: 'range', part: 'control-input' });
   Object.assign(field, { min: String(min), max: String(max), step: String(step) });
-  const shown = make('output', { part: 'control-value' });
+  // Not an output: a label is that of the first such element in it. A range says its value itself.
+  const shown = make('span', { part: 'control-value', ariaHidden: 'true' });
   const control = labelled(title, field, shown);
   field.addEventListener('input', () => {
     shown.textContent = short(field.valueAsNumber);
@@ -227,7 +228,7 @@ function slider(
 
 function showValue(control: HTMLElement, value: number): void {
   control.querySelector('input')!.value = String(value);
-  control.querySelector('output')!.textContent = short(value);
+  control.querySelector('[part=control-value]')!.textContent = short(value);
 }
 
 function labelled(title: string, ...fields: HTMLElement[]): HTMLElement {
