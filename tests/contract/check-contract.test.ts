@@ -166,6 +166,25 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
     PACKED,
     ['operator operator com.nobody:Foo'],
   ],
+  ...[17, 18].map((opset): [string, OnnxHeader, Contract, string[]] => [
+    `a reduction of opset 18 in a file of opset ${opset}`,
+    {
+      ...ready,
+      opsets: new Map([['ai.onnx', opset]]),
+      nodes: [
+        {
+          name: '',
+          operator: 'ReduceL2',
+          inputs: ['x'],
+          outputs: ['y'],
+          isInner: false,
+          numbers: { noop_with_empty_axes: 0 },
+        },
+      ],
+    },
+    PACKED,
+    opset === 17 ? ['operator operator ReduceL2 (y)'] : [],
+  ]),
   [
     'operators of the file and of the runtime',
     {

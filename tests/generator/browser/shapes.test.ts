@@ -76,7 +76,7 @@ describe('what models take, told to the page', () => {
   });
 
   it('a panel of controls: sliders by their names, joints, a reset, and gone with its attribute', async () => {
-    const element = await showLoaded({ src: `${FIXTURES}state.onnx`, 'controls-panel': true });
+    const element = await showLoaded({ src: `${FIXTURES}state.onnx`, 'controls-panel': '' });
     const part = (name: string): HTMLElement | null => element.shadowRoot!.querySelector(`[part=${name}]`);
     await until(() => part('controls-panel') !== null, 'the panel');
     const labels = (): string[] =>
@@ -104,6 +104,6 @@ describe('what models take, told to the page', () => {
       `a quarter turn around x: ${pose.slice(0, 9).join(' ')}`,
     );
     element.removeAttribute('controls-panel');
-    await until(() => part('controls-panel')!.hidden, 'no panel');
+    await until(() => part('controls-panel')!.hidden === true, 'no panel');
   });
 });
