@@ -6,12 +6,12 @@ interface ModelElement extends HTMLElement {
   readonly controlsPanel?: boolean;
 }
 
-/** What the attribute `compare` asks for. Anything but "off" is what it is without the attribute. */
+/** What the attribute `compare` asks for; elements within another have no property of it. Anything but "off" is what it is without the attribute. */
 export const compareOf = ({
   element,
   startWorker,
 }: Pick<LiveRequest, 'element' | 'startWorker'>): false | LiveRequest['startWorker'] =>
-  (element as ModelElement).compare?.trim() === 'off' ? false : startWorker;
+  ((element as ModelElement).compare ?? element.getAttribute('compare'))?.trim() === 'off' ? false : startWorker;
 
 const offered = new WeakSet<HTMLElement>();
 

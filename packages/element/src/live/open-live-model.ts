@@ -87,7 +87,7 @@ export async function openLiveModel(
     watch = new RunWatch(gaussians, model.header.name, onError, (now, isFirst) => {
       // The contract speaks of all times.
       if (declared === undefined || isFirst) bounds = { ...now, up: upOf(model.contract) };
-      if (isFirst) void (request.element as Framed).updateFraming();
+      if (isFirst) void (request.element as Framed).updateFraming?.();
     });
     watch.frameMade();
     return {
@@ -165,9 +165,9 @@ async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<un
 const takesTime = ({ contract: { inputs, fps } }: GeneratorModel): boolean =>
   Object.values(inputs).some(({ role }) => role === 'time' || (role === 'frame' && fps !== undefined));
 
-/** The element, as far as it frames its scene. */
+/** The element, as far as it frames its scene: one within another does not. */
 interface Framed extends HTMLElement {
-  updateFraming(): Promise<void>;
+  updateFraming?(): Promise<void>;
 }
 
 const asError = (error: unknown): Error => (error instanceof Error ? error : new Error(String(error)));
