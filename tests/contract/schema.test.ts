@@ -73,6 +73,8 @@ const EVERYTHING: readonly Contract[] = [
     name: 'x',
     inputs: {
       a: { role: 'view', order: 'column-major', axes: 'LUF' },
+      b1: { role: 'camera_to_world', order: 'row-major', axes: 'RUB' },
+      b2: { role: 'intrinsics', unit: 'normalized' },
       b: { role: 'projection', order: 'row-major', axes: 'RUB' },
       c: { role: 'view_projection', order: 'row-major' },
       d: { role: 'camera_position' },
@@ -91,6 +93,7 @@ const EVERYTHING: readonly Contract[] = [
       j: { role: 'shape', names: ['wide'], default: [0] },
       k: { role: 'control', range: [0, 1], default: [0, 1], step: 0.1, label: 'K' },
       l: { role: 'gaussians', attribute: 'packed', color: 'sh', shOrder: 'channel-major', opacityActivation: 'logit' },
+      n: { role: 'state', output: 'next', default: 0.5 },
       m: { role: 'image' },
     },
     outputs: { layout: 'visionary', gaussians: 'g', sh: 'c', count: 'n' },

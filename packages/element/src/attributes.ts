@@ -257,8 +257,15 @@ export const ATTRIBUTES = {
   contract: text<string | object | null>(),
   /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */
   chain: text(),
+  /**
+   * `off`: the first run of a generator on the GPU is not compared with the same run on the CPU.
+   * @default each model once on each adapter, when the page is idle
+   */
+  compare: text(),
   /** URL of a post-processor that makes the picture shown from the one drawn, or several with spaces between them. */
   postprocess: text(),
+  /** Controls for visitors, made from what the generator or post-processor takes: sliders, a pose by its joints, pictures, the time. Style them by their parts. */
+  controlsPanel: flag(),
   /** Seconds: where the scene's time is put whenever this changes. See `currentTime` for where it is. */
   time: text<number | string | null>(),
   /**

@@ -4,6 +4,7 @@ import { readAttributes, type Attributes } from './attributes.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
+import type { GeneratorInput } from './live/inputs.js';
 import type { LiveState } from './live/live-model.js';
 import type { SceneLimits } from './loading/protocol.js';
 import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
@@ -49,6 +50,11 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart pause-button - The visitor's button for what `auto-rotate` and `autoplay` move.
  * @csspart progress-track - The progress bar's ground.
  * @csspart progress-bar - The progress bar.
+ * @csspart controls-panel - The panel of the attribute `controls-panel`.
+ * @csspart control - A control in it, with its label.
+ * @csspart control-label - The label.
+ * @csspart control-input - The slider, field or button.
+ * @csspart control-value - The number beside a slider.
  * @csspart fallback - The default text where there is no WebGPU.
  * @csspart error - The default text after an error.
  * @cssproperty [--poster-fit=cover] - `object-fit` of the poster.
@@ -79,6 +85,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {Event} poster-dismissed - The poster has given way to the scene.
  * @fires {CustomEvent<VisibilityDetail>} model-visibility - The element has come into sight, or left it.
  * @fires {CustomEvent<ElementError>} generator-error - A run of the generator failed; the last good frame stays.
+ * @fires {Event} inputs-change - The inputs that the page may set are others; `inputs` has them.
  * @fires {CustomEvent<FallbackDetail>} generator-fallback - The generator runs on the CPU; `detail.reason` says why.
  * @fires {Event} play - As of HTMLMediaElement, like those that follow.
  * @fires {Event} playing - The time runs.
@@ -164,6 +171,11 @@ export class GaussianSplatElement extends ViewingMethods {
   /** Why no scene is shown, or null. */
   get error(): ElementError | null {
     return this.stage.error;
+  }
+
+  /** What the page may set of the models on show, from their contracts: for controls of one's own. Empty without a model; `inputs-change` tells of others. */
+  get inputs(): readonly GeneratorInput[] {
+    return this.stage.inputs;
   }
 
   /** Size of the scene on show, or null. */

@@ -54,6 +54,8 @@ export interface GaussianSplatEventMap {
   'model-visibility': CustomEvent<VisibilityDetail>;
   /** A run of the generator failed; the last good frame stays, and the next change tries again. */
   'generator-error': CustomEvent<ElementError>;
+  /** The inputs that the page may set are others: see the property `inputs`. */
+  'inputs-change': Event;
   /** The generator runs on the CPU, because of the reason given. */
   'generator-fallback': CustomEvent<FallbackDetail>;
   /** Loading and time, as of HTMLMediaElement. */

@@ -31,7 +31,8 @@ export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/val
 export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';
 export { SceneTimeRanges } from './time-ranges.js';
-export type { ControlValues, Numbers, Picture } from './live/values.js';
+export type { GeneratorInput } from './live/inputs.js';
+export type { ControlValues, Numbers, Picture, Pictures } from './live/values.js';
 export type { SceneLimits } from './loading/protocol.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 

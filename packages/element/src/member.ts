@@ -1,4 +1,5 @@
 import type { Placed, Placement, World } from '@gaussian-splat/renderer';
+import type { SceneBounds } from './camera/settings.js';
 import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 
 /** A loaded source in the world. */
@@ -6,11 +7,13 @@ export class Member {
   readonly scene: LoadedGaussians;
   readonly #world: World;
   #placement: Placement;
+  #bounds: SceneBounds;
 
   constructor(world: World, scene: LoadedGaussians) {
     this.#world = world;
     this.scene = scene;
-    this.#placement = this.#add({ bounds: scene.bounds });
+    this.#bounds = scene.bounds;
+    this.#placement = this.#add({ bounds: this.#bounds });
   }
 
   /** How it stands in the world. Other splats of the source may be drawn now than in the last frame: levels of detail, or a sequence's next buffers. */
@@ -21,6 +24,8 @@ export class Member {
       const { sceneToWorld, opacity, crop, visible, bounds } = before;
       this.#placement = this.#add({ sceneToWorld, opacity, crop, visible, bounds });
     }
+    const { bounds } = this.scene;
+    if (bounds !== this.#bounds) this.#placement.bounds = this.#bounds = bounds;
     return this.#placement;
   }
 

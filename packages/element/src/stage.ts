@@ -22,6 +22,7 @@ import type { ElementError } from './errors.js';
 import type { CameraChangeSource } from './events.js';
 import { isGone } from './gpu/device-failures.js';
 import type { DetailLevers, LoadedGaussians } from './gpu/loaded-gaussians.js';
+import type { GeneratorInput } from './live/inputs.js';
 import { Member } from './member.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
 import { SceneQueries, type QueryHost } from './scene-queries.js';
@@ -266,6 +267,11 @@ export class Stage
     return this.own?.scene.detail ?? {};
   }
 
+  /** What the page may set of the models on show. */
+  get inputs(): readonly GeneratorInput[] {
+    return [...(this.own?.scene.live?.inputs ?? []), ...(this.view.viewport?.filter?.inputs ?? [])];
+  }
+
   /** Where all of it is, in the frame of the element's own scene; null while nothing is shown. */
   get bounds(): SceneBounds | null {
     return this.own?.scene.bounds ?? null;
@@ -386,6 +392,7 @@ export class Stage
     this.own = this.enter(scene);
     const drawn = view.show(scene);
     this.live.post.attach(view.viewport);
+    this.live.tellInputs(this.inputs);
     return drawn;
   }
 

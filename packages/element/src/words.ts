@@ -1,6 +1,7 @@
 /** The words that the element says to people, and those that a page may put in their place. */
 import type { ViewName } from './camera/spoken.js';
 import type { ElementErrorCode } from './errors.js';
+import type { PANEL_WORDS } from './live/controls-panel.js';
 
 /** What the element says apart from the camera's places, in English; `…` stands for the scene's text alternative. The keys are those of `a11y`, too. */
 export const WORDS = {
@@ -22,7 +23,7 @@ export const WORDS = {
 
 /** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
 export type SpokenStrings = Readonly<
-  Partial<Record<ViewName | keyof typeof WORDS | `error-${ElementErrorCode}`, string>>
+  Partial<Record<ViewName | keyof typeof WORDS | keyof typeof PANEL_WORDS | `error-${ElementErrorCode}`, string>>
 >;
 
 /** A word of the page, or the English one. */

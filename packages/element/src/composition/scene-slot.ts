@@ -28,7 +28,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   readonly ownClock: PlaybackController;
   progress: number | null = null;
   hasBegun = false;
-  readonly #element: SplatChild;
+  readonly element: SplatChild;
   readonly #source: SourceController;
   readonly #live: LiveWiring;
   readonly #detail: DetailController;
@@ -38,7 +38,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   member: Member | undefined;
 
   constructor(element: SplatChild) {
-    this.#element = element;
+    this.element = element;
     this.ownClock = new PlaybackController(this);
     this.#live = new LiveWiring(this);
     this.scene = new SceneController(element, this);
@@ -77,11 +77,11 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   }
 
   get autoplays(): boolean {
-    return this.#element.autoplay;
+    return this.element.autoplay;
   }
 
   get hasOwnClock(): boolean {
-    return this.#element.hasOwnClock;
+    return this.element.hasOwnClock;
   }
 
   get playback(): PlaybackController {
@@ -98,7 +98,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
 
   get stats(): PartStats {
     const { state, error, scene } = this.scene;
-    return { element: this.#element, state, error, ...costOf(scene) };
+    return { element: this.element, state, error, ...costOf(scene) };
   }
 
   get owner(): Element | null {
@@ -124,7 +124,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
 
   update(): void {
     if (this.#composition === null) return;
-    this.#source.set(this.#element.source);
+    this.#source.set(this.element.source);
     this.#detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
     this.autoplay();
     this.requestFrame();
@@ -145,7 +145,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   place(): void {
     if (this.member === undefined || this.#composition === null) return;
     const { bounds } = this.member.scene;
-    const { placed, up, opacity, crop, hidden } = this.#element.place;
+    const { placed, up, opacity, crop, hidden } = this.element.place;
     const { placement } = this.member;
     const isSeen = !hidden && isSolid(placed);
     if (isSeen) placement.sceneToWorld = sceneToWorld(this.#composition.frame, placed, frameOf({ up }, bounds));
@@ -172,7 +172,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
 
   get attributes(): Attributes {
     const { attributes } = this.#stage!;
-    const crossorigin = this.#element.crossorigin === null ? attributes.crossorigin : this.#element.credentials;
+    const crossorigin = this.element.crossorigin === null ? attributes.crossorigin : this.element.credentials;
     return { ...attributes, crossorigin };
   }
 
@@ -197,20 +197,20 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   }
 
   get loops(): boolean {
-    return this.hasOwnClock ? this.#element.loop : this.#stage!.loops;
+    return this.hasOwnClock ? this.element.loop : this.#stage!.loops;
   }
 
   readonly startTime = 0;
   readonly shown = [];
 
   get liveValues(): LiveHost['liveValues'] {
-    return this.#element.liveValues;
+    return this.element.liveValues;
   }
 
   get liveRequest(): SceneHost['liveRequest'] {
     const stage = this.#stage!;
     return {
-      element: this.#element,
+      element: this.element,
       runtimeLocation: this.services.runtimeLocation,
       startWorker: this.services.sceneLoader.spawn,
       state: () => this.#live.state,
@@ -231,11 +231,11 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   }
 
   warn(sentence: string): void {
-    this.#element.warn(sentence);
+    this.element.warn(sentence);
   }
 
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void {
-    this.#element.dispatchEvent(event);
+    this.element.dispatchEvent(event);
   }
 
   playbackEvent(type: PlaybackEvent): void {
@@ -317,7 +317,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
   /** Where it will stand, before anything is known of it. */
   #toWorld(): Matrix4 | undefined {
     if (this.#composition === null) return undefined;
-    const { placed, up } = this.#element.place;
+    const { placed, up } = this.element.place;
     return sceneToWorld(this.#composition.frame, placed, frameOf({ up }, {}));
   }
 }

@@ -36,7 +36,7 @@ export interface MeshModel {
 
 /** What one source has on the GPU: its splats, levels of detail of them, what writes them, and the lease that keeps the device. */
 export class LoadedGaussians {
-  readonly bounds: SceneBounds;
+  readonly #bounds: SceneBounds;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
   /** Submissions that the painting of a frame is divided into. */
@@ -66,12 +66,17 @@ export class LoadedGaussians {
   ) {
     this.#lease = lease;
     this.#gaussians = gaussians;
-    this.bounds = bounds;
+    this.#bounds = bounds;
     this.submissions = submissions;
     this.live = live;
     this.#detail = detail;
     this.hasMeshes = hasMeshes;
     if (live) QueueClock.of(lease.device).isShared = true;
+  }
+
+  /** Of a generator, those of its last runs. */
+  get bounds(): SceneBounds {
+    return this.live?.bounds ?? this.#bounds;
   }
 
   get gaussians(): OwnedGaussians {

@@ -1,5 +1,6 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameLevers, Rgba } from '@gaussian-splat/renderer';
+import type { GeneratorInput } from './inputs.js';
 
 /** A frame to draw. */
 export interface Frame {
@@ -13,6 +14,8 @@ export interface Frame {
 
 /** Something between the renderer and the canvas. Knows no runtime: what does is loaded when first needed. */
 export interface FrameFilter {
+  /** What the page may set. */
+  readonly inputs: readonly GeneratorInput[];
   /** Bytes of GPU memory that its own pictures take. */
   readonly byteLength: number;
   /**

@@ -1,6 +1,7 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
+import type { GeneratorInput } from './inputs.js';
 import type { ReadControls } from './values.js';
 
 /** What a page says about a model, apart from the camera. Small and capital letters of names are the same. */
@@ -28,8 +29,12 @@ export interface LiveListeners {
 export interface Timeline {
   /** Bounds of the Gaussians as they are now; absent where those of the first frame count. */
   readBounds?(): Promise<SceneBounds>;
+  /** Where the Gaussians are: as the contract declares, or as of the last runs. */
+  readonly bounds?: SceneBounds;
   /** Seconds; Infinity where the contract declares none. */
   readonly duration: number;
+  /** What the page may set; absent where there is nothing. */
+  readonly inputs?: readonly GeneratorInput[];
   /** Inputs that `control-NAME` sets; absent where there are none. */
   readonly settable?: readonly string[];
   /** Asks for the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */

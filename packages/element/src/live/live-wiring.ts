@@ -14,6 +14,7 @@ export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'l
   /** The sources that are drawn. */
   readonly shown: readonly LoadedGaussians[];
   requestFrame(): void;
+  readonly element: HTMLElement;
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
 
@@ -22,6 +23,8 @@ export class LiveWiring implements PostHost {
   readonly post: PostController;
   readonly #host: LiveHost;
   #lastFault = '';
+  /** How many inputs there were last. */
+  #inputs = 0;
 
   constructor(host: LiveHost) {
     this.#host = host;
@@ -29,8 +32,9 @@ export class LiveWiring implements PostHost {
   }
 
   get postRequest(): PostHost['postRequest'] {
-    const { attributes, services } = this.#host;
+    const { attributes, services, element } = this.#host;
     return {
+      element,
       credentials: credentialsOf(attributes.crossorigin),
       runtimeLocation: services.runtimeLocation,
       startWorker: services.sceneLoader.spawn,
@@ -43,6 +47,12 @@ export class LiveWiring implements PostHost {
 
   requestFrame(): void {
     this.#host.requestFrame();
+  }
+
+  /** What the page may set is another thing than before, once what is told of is on show. */
+  tellInputs(inputs: { readonly length: number } = [0]): void {
+    if (inputs.length + this.#inputs > 0) queueMicrotask(() => this.#host.dispatch(new Event('inputs-change')));
+    this.#inputs = inputs.length;
   }
 
   /** What the page says about the models at this time. */

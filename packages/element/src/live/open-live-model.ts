@@ -3,8 +3,10 @@ import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } 
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener } from '../loading/protocol.js';
 import { fetchBeside } from './fetch-beside.js';
+import { inputsOf } from './inputs.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
+import { compareOf, offerPanel } from './of-element.js';
 import { StateReader } from './read-state.js';
 import { RunWatch } from './run-watch.js';
 import type { Contract, Vector3 } from '@gaussian-splat/core';
@@ -46,8 +48,7 @@ export async function openLiveModel(
       watch?.frameMade();
     },
     onError: (error) => (isOpen ? listeners.onError(error) : (firstFailure = error)),
-    // Anything but "off" is what it is without the attribute.
-    compare: request.element.getAttribute('compare')?.trim() === 'off' ? false : request.startWorker,
+    compare: compareOf(request),
     onFallback: (reason) => {
       listeners.onFallback(reason);
       listeners.onInput();
@@ -79,14 +80,21 @@ export async function openLiveModel(
     await generator.idle;
     signal.throwIfAborted();
     if (firstFailure !== undefined) throw asError(firstFailure);
-    const bounds = declared ?? (await live.readBounds!());
+    let bounds = declared ?? (await live.readBounds!());
     signal.throwIfAborted();
     isOpen = true;
-    watch = new RunWatch(gaussians, model.header.name, onError);
+    offerPanel(request.element);
+    watch = new RunWatch(gaussians, model.header.name, onError, (now, isFirst) => {
+      // The contract speaks of all times.
+      if (declared === undefined || isFirst) bounds = { ...now, up: upOf(model.contract) };
+      if (isFirst) void (request.element as Framed).updateFraming?.();
+    });
     watch.frameMade();
     return {
       ...live,
-      bounds,
+      get bounds() {
+        return bounds;
+      },
       close: () => {
         watch?.close();
         live.close();
@@ -111,6 +119,7 @@ function liveModel(
   const reader = new StateReader(models, listeners.onError);
   return {
     gaussians,
+    inputs: inputsOf(models),
     settable: reader.settable,
     readBounds: async () => ({ ...(await gaussians.readBounds()), up }),
     duration: models.some(takesTime)
@@ -155,5 +164,10 @@ async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<un
 /** False for what the clock changes nothing of: it has nothing to play. Without `fps` no time tells a frame. */
 const takesTime = ({ contract: { inputs, fps } }: GeneratorModel): boolean =>
   Object.values(inputs).some(({ role }) => role === 'time' || (role === 'frame' && fps !== undefined));
+
+/** The element, as far as it frames its scene: one within another does not. */
+interface Framed extends HTMLElement {
+  updateFraming?(): Promise<void>;
+}
 
 const asError = (error: unknown): Error => (error instanceof Error ? error : new Error(String(error)));

@@ -7,6 +7,8 @@ export interface PostHost {
   /** What a post-processor needs to know beyond its address. */
   readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
   requestFrame(): void;
+  /** There is another filter, or none. */
+  tellInputs(): void;
 }
 
 /** Puts the post-processor of the attribute between the frames and the canvas. Until it is there, frames are shown as they are drawn. */
@@ -42,7 +44,10 @@ export class PostController {
     this.#opening.renew();
     const viewport = this.#viewport;
     if (viewport === null) return;
-    if (viewport.filter) this.#host.requestFrame();
+    if (viewport.filter) {
+      this.#host.requestFrame();
+      this.#host.tellInputs();
+    }
     viewport.setFilter(undefined);
     if (this.#urls.length === 0) return;
     const options = this.#host.postRequest;
@@ -64,6 +69,7 @@ export class PostController {
     );
     if (signal.aborted || viewport.isDestroyed) return view.close();
     viewport.setFilter(view);
+    this.#host.tellInputs();
     this.#host.requestFrame();
   }
 }

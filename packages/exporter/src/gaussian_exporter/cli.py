@@ -20,7 +20,7 @@ from .checkpoints.moving import read_deformable, read_gaussian4d, read_spacetime
 from .checkpoints.networks import read_feed_forward, read_image_filter
 from .checkpoints.scaffold_folder import read_scaffold
 from .conformance import check_outputs
-from .contract import Coordinates, DType, Facts, Json, Layout, Up, of_metadata
+from .contract import METADATA_KEY, Coordinates, DType, Facts, Json, Layout, Up, of_metadata
 from .cost import cost_of, report
 from .errors import ExportError
 from .families.avatar import PoseFormat, export_avatar
@@ -131,6 +131,9 @@ def check(given: argparse.Namespace) -> None:
     """Holds a file against its contract, and reports what would leave the GPU."""
     path = given.file
     model = onnx.load(existing(path, "an .onnx file"))
+    beside = path.with_suffix(".contract.json")
+    if METADATA_KEY not in {prop.key for prop in model.metadata_props} and beside.exists():
+        model.metadata_props.add(key=METADATA_KEY, value=beside.read_text())
     contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
     print(f"{path}: contract version {contract['version']}, {contract.get('name', 'without a name')}")
     if find_spec("onnxruntime") is None:
