@@ -1,4 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
+import type { Camera, SplatFilter } from '@gaussian-splat/core';
 import type { GaussianScene } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { FrameLevers, Levers, Quality } from './levers.js';
@@ -26,6 +26,8 @@ export interface FrameRequest {
   readonly targetFormat?: GPUTextureFormat;
   /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
   readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
+  /** Low-pass filter of all scenes of the frame. Default: the one that each was trained with, as far as its file tells. */
+  readonly filter?: SplatFilter | undefined;
   /** The levers of these names, for this frame alone. */
   readonly detail?: number;
   readonly splatBudget?: number;

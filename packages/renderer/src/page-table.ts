@@ -1,4 +1,4 @@
-import type { Camera, Vector3 } from '@gaussian-splat/core';
+import { SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
@@ -91,12 +91,14 @@ export class PageTable {
   /**
    * Points every page at a camera, for the commands that are submitted next.
    * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
+   * @param filter in place of those of the scenes
    */
   look(
     camera: Camera,
     pixelArea: number,
     { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
     isOrdered: boolean,
+    filter?: SplatFilter,
   ): void {
     const shared = {
       sh_cap: shDegree,
@@ -109,11 +111,12 @@ export class PageTable {
     let page = 0;
     for (const scene of this.#scenes) {
       // The same filter whatever the frame is drawn at: in larger pixels it has less variance.
-      const values = cameraValues(camera, scene.origin, (scene.filterVariance ?? constants.DILATION) * pixelArea);
+      const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : scene;
+      const values = cameraValues(camera, scene.origin, filterVariance * pixelArea);
       const own = {
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],
-        antialiased: scene.antialiased ? 1 : 0,
+        antialiased: antialiased ? 1 : 0,
       };
       for (const { count, details } of scene.pages) {
         const place = { has_detail: details ? 1 : 0, splat_count: count, page, first_group: this.firstGroups[page] };

@@ -147,7 +147,7 @@ export class Renderer {
     const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     const own = { ...levers, ...detail };
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, own, isOrdered);
+    table.look(drawn, pixelArea, own, isOrdered, request.filter);
     const wishes = recordProjection(encoder, {
       stages: this.#stages,
       bindings,

@@ -10,7 +10,7 @@ const MOST_TRIES = 4;
 
 /** A picture at rest. */
 export interface View
-  extends Pick<FrameRequest, 'camera' | 'detail' | 'splatBudget'>, Pick<RendererOptions, 'quality'> {
+  extends Pick<FrameRequest, 'camera' | 'detail' | 'splatBudget' | 'filter'>, Pick<RendererOptions, 'quality'> {
   readonly gaussians: GaussianScene;
 }
 

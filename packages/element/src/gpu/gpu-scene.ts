@@ -1,4 +1,4 @@
-import { GaussianSplatError, loadModule, type Camera, type ShDegree } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, type Camera, type ShDegree, type SplatFilter } from '@gaussian-splat/core';
 import {
   QueueClock,
   Renderer,
@@ -43,6 +43,8 @@ export interface Rendering {
   readonly quality: Quality;
   /** Spherical harmonics above this degree are not evaluated. */
   readonly shDegree: ShDegree;
+  /** In place of the scene's own. */
+  readonly filter?: SplatFilter | undefined;
 }
 
 /**
@@ -164,8 +166,9 @@ export class GpuScene {
   /** Draws the frames to come like this. */
   setRendering(rendering: Rendering): void {
     const { quality, shDegree } = this.#rendering;
-    if (rendering.quality === quality && rendering.shDegree === shDegree) return;
+    // A filter takes effect with the next frame, whatever draws it.
     this.#rendering = rendering;
+    if (rendering.quality === quality && rendering.shDegree === shDegree) return;
     this.#renderer.destroy();
     this.#renderer = this.#makeRenderer();
     this.#drawnSize = '';
@@ -186,12 +189,13 @@ export class GpuScene {
 
   #makeRenderer(): Renderer {
     this.#isPrepared = false;
+    const { quality, shDegree } = this.#rendering;
     const onIncomplete = (): void => {
       this.#drawnSize = '';
       this.#filter?.invalidate();
       this.onIncomplete();
     };
-    return new Renderer(this.device, { ...this.#rendering, submissions: this.#submissions, onIncomplete });
+    return new Renderer(this.device, { quality, shDegree, submissions: this.#submissions, onIncomplete });
   }
 
   /** True if there is what frames with other levers need. */
@@ -230,9 +234,10 @@ export class GpuScene {
     // Whichever leaves out more: what the page asks for, or the pace.
     const detail = Math.max(this.#detail.detail ?? 0, frame.levers?.detail ?? 0);
     const gaussians = this.#levels ?? this.gaussians;
-    const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, detail, splatBudget, gaussians });
-    const { quality, shDegree } = this.#rendering;
-    const content = `${gaussians.version} ${quality} ${shDegree} ${detail} ${JSON.stringify(frame.levers ?? null)}`;
+    const { quality, shDegree, filter } = this.#rendering;
+    const draw = (drawn: Frame): void =>
+      this.#renderer.render({ ...drawn, detail, splatBudget, filter, gaussians });
+    const content = `${gaussians.version} ${quality} ${shDegree} ${filter} ${detail} ${JSON.stringify(frame.levers ?? null)}`;
     if (this.#filter) this.#filter.render(frame, content, draw);
     else draw(frame);
   }
@@ -275,8 +280,8 @@ export class GpuScene {
     const { visible, overflow } = await this.#renderer.readStatistics();
     const { countContributing } = await loadModule('the code that counts splats', () => import('./contributions.js'));
     if (this.#destroyed) throw new Error('the scene is gone');
-    const { quality } = this.#rendering;
-    const view = { ...this.#detail, gaussians: this.#levels ?? this.gaussians, camera, quality };
+    const { quality, filter } = this.#rendering;
+    const view = { ...this.#detail, gaussians: this.#levels ?? this.gaussians, camera, quality, filter };
     return { drawn: visible, left: overflow, contributed: await countContributing(this.device, view) };
   }
 

@@ -1,4 +1,5 @@
 /** Loaded only when a generator is shown: what knows `@gaussian-splat/generator` is behind this module and post-view.ts. */
+import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener } from '../loading/protocol.js';
@@ -62,7 +63,7 @@ export async function openLiveModel(
     const { models, model } = generator;
     for (const { notes, url } of models) for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
     gaussians = await DynamicGaussians.create(device, model.layout, {
-      antialiased: model.contract.antialiased,
+      ...(model.contract.filter ? SPLAT_FILTERS[model.contract.filter] : { antialiased: model.contract.antialiased }),
       memoryBudget: request.memoryBudget,
     });
     generator.sink = gaussians;
