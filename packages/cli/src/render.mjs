@@ -141,6 +141,7 @@ async function render(options) {
   checkFiles(options);
   const camera = readCamera(options.camera, options.view);
   const cloud = await readSceneFile(options.scene);
+  for (const warning of cloud.warnings ?? []) console.error(`${options.scene}: ${warning}`);
   const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
 
   const adapter = await requestNodeAdapter();

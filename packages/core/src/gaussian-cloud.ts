@@ -63,6 +63,10 @@ export interface GaussianCloud {
   readonly levelRuns?: readonly LevelRun[];
   /** Number of splats of the source that were left out because a value was not usable; see {@link keepUsable}. */
   readonly droppedCount: number;
+  /** How many of them {@link keepUsable} left out for which fault, in words such as "no rotation". */
+  readonly faults?: Readonly<Record<string, number>> | undefined;
+  /** Sentences for people about what of the file is not drawn, or may mean something else than what is drawn. */
+  readonly warnings?: readonly string[] | undefined;
 }
 
 /**
@@ -142,8 +146,13 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   let kept = 0;
   const runs = cloud.levelRuns?.map(({ node, level }) => ({ first: 0, count: 0, node, level }));
   let run = 0;
+  const faults: Record<string, number> = { ...cloud.faults };
   for (let i = 0; i < count; i++) {
-    if (!isUsable(cloud, i)) continue;
+    if (!isUsable(cloud, i)) {
+      const fault = faultOf(cloud, i);
+      faults[fault] = (faults[fault] ?? 0) + 1;
+      continue;
+    }
     if (runs) {
       while (i >= cloud.levelRuns![run].first + cloud.levelRuns![run].count) runs[++run].first = kept;
       runs[run].count++;
@@ -168,8 +177,18 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
     opacities: opacities.subarray(0, kept),
     sh: sh.subarray(0, shLength * kept),
     ...(runs && { levelRuns: runs }),
+    ...(kept < count && { faults }),
     droppedCount: cloud.droppedCount + count - kept,
   };
+}
+
+/** Why a splat cannot be drawn. */
+function faultOf({ scales, rotations }: GaussianCloud, i: number): string {
+  const axes = scales.subarray(3 * i, 3 * i + 3);
+  if (axes.some((scale) => scale < 0)) return 'a scale below 0';
+  if (squaredNorm(rotations, 4 * i) === 0) return 'no rotation';
+  if (Math.max(...axes) < MIN_LONGEST_SCALE) return 'no extent';
+  return 'values that are not finite or too large';
 }
 
 function normaliseQuaternion(rotations: Float32Array, at: number): void {

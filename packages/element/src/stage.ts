@@ -271,6 +271,7 @@ export class Stage
     this.#counts = undefined;
     if (entrance === 'new') this.camera.frame(scene.bounds);
     if (entrance === 'whole') this.camera.refine(scene.bounds);
+    for (const warning of scene.warnings) this.warn(`<gaussian-splat>: ${warning}`);
     this.playback.setDuration(scene.live?.duration ?? NaN);
     this.#live.post.attach(scene);
     return this.#view.show(scene);

@@ -27,6 +27,8 @@ export interface SceneStats {
   readonly quality: QualityChoice;
   /** What pictures at rest and in motion are drawn with. */
   readonly pace: PaceReport;
+  /** What of the file is not drawn, or may mean something else than what is drawn, for people; the console has it, too. */
+  readonly warnings: readonly string[];
   /** All that is done to the scene for the sake of time or memory, for people; empty where nothing is. */
   readonly why: readonly string[];
 }
@@ -64,6 +66,7 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, isPreview }: S
     bytes: { scene: gaussians.byteLength + (scene.levels?.byteLength ?? 0), frames: scene.frameBytes },
     quality,
     pace,
+    warnings: scene.warnings,
     why: [
       ...whyPreview(isPreview),
       ...whyDropped(dropped),

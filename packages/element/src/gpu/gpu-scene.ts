@@ -56,6 +56,8 @@ export class GpuScene {
   #gaussians: OwnedGaussians;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
+  /** What of its file is not drawn, for people. */
+  readonly warnings: readonly string[];
   /** Called when the frame just drawn lacked something that the next one will have. */
   onIncomplete: () => void = () => undefined;
   /** Called with `out-of-memory/allocation` where a later frame than the first needs more memory than there is. */
@@ -78,11 +80,16 @@ export class GpuScene {
     gaussians: OwnedGaussians,
     bounds: SceneBounds,
     submissions: number,
-    { live, detail = {} }: { live?: Timeline; detail?: DetailLevers } = {},
+    {
+      live,
+      detail = {},
+      warnings = [],
+    }: { live?: Timeline; detail?: DetailLevers; warnings?: readonly string[] | undefined } = {},
   ) {
     this.#lease = lease;
     this.#detail = detail;
     this.live = live;
+    this.warnings = warnings;
     this.#gaussians = gaussians;
     this.bounds = bounds;
     this.#submissions = submissions;
@@ -235,8 +242,7 @@ export class GpuScene {
     const detail = Math.max(this.#detail.detail ?? 0, frame.levers?.detail ?? 0);
     const gaussians = this.#levels ?? this.gaussians;
     const { quality, shDegree, filter } = this.#rendering;
-    const draw = (drawn: Frame): void =>
-      this.#renderer.render({ ...drawn, detail, splatBudget, filter, gaussians });
+    const draw = (drawn: Frame): void => this.#renderer.render({ ...drawn, detail, splatBudget, filter, gaussians });
     const content = `${gaussians.version} ${quality} ${shDegree} ${filter} ${detail} ${JSON.stringify(frame.levers ?? null)}`;
     if (this.#filter) this.#filter.render(frame, content, draw);
     else draw(frame);

@@ -14,11 +14,11 @@ export interface SceneUploadOptions {
 /** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
 export async function upload(
   lease: DeviceLease,
-  { packed, bounds }: LoadedScene,
+  { packed, bounds, warnings }: LoadedScene,
   { signal, memoryBudget, submissions }: SceneUploadOptions,
 ): Promise<GpuScene> {
   const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
-  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds, submissions);
+  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds, submissions, { warnings });
   gaussians.destroy();
   throw signal.reason;
 }

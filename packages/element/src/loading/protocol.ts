@@ -36,6 +36,8 @@ export interface SceneRequest extends FileRequest {
 export interface LoadedScene {
   readonly packed: PackedGaussians;
   readonly bounds: SceneBounds;
+  /** What of the file is not drawn: see `GaussianCloud.warnings`. */
+  readonly warnings?: readonly string[] | undefined;
 }
 
 /** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */
