@@ -63,8 +63,8 @@ export interface GaussianCloud {
   readonly levelRuns?: readonly LevelRun[];
   /** Number of splats of the source that were left out because a value was not usable; see {@link keepUsable}. */
   readonly droppedCount: number;
-  /** How many of them {@link keepUsable} left out for which fault, in words such as "no rotation". */
-  readonly faults?: Readonly<Record<string, number>> | undefined;
+  /** How many of them {@link keepUsable} left out for a scale below 0, for no rotation, for no extent, and for values that are not finite or too large. */
+  readonly faults?: readonly number[] | undefined;
   /** Sentences for people about what of the file is not drawn, or may mean something else than what is drawn. */
   readonly warnings?: readonly string[] | undefined;
 }
@@ -146,11 +146,10 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   let kept = 0;
   const runs = cloud.levelRuns?.map(({ node, level }) => ({ first: 0, count: 0, node, level }));
   let run = 0;
-  const faults: Record<string, number> = { ...cloud.faults };
+  const faults = [...(cloud.faults ?? [0, 0, 0, 0])];
   for (let i = 0; i < count; i++) {
     if (!isUsable(cloud, i)) {
-      const fault = faultOf(cloud, i);
-      faults[fault] = (faults[fault] ?? 0) + 1;
+      faults[faultOf(cloud, i)]++;
       continue;
     }
     if (runs) {
@@ -182,13 +181,12 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   };
 }
 
-/** Why a splat cannot be drawn. */
-function faultOf({ scales, rotations }: GaussianCloud, i: number): string {
+/** Why a splat cannot be drawn: which of {@link GaussianCloud.faults}. */
+function faultOf({ scales, rotations }: GaussianCloud, i: number): number {
   const axes = scales.subarray(3 * i, 3 * i + 3);
-  if (axes.some((scale) => scale < 0)) return 'a scale below 0';
-  if (squaredNorm(rotations, 4 * i) === 0) return 'no rotation';
-  if (Math.max(...axes) < MIN_LONGEST_SCALE) return 'no extent';
-  return 'values that are not finite or too large';
+  if (Math.min(...axes) < 0) return 0;
+  if (squaredNorm(rotations, 4 * i) === 0) return 1;
+  return Math.max(...axes) < MIN_LONGEST_SCALE ? 2 : 3;
 }
 
 function normaliseQuaternion(rotations: Float32Array, at: number): void {

@@ -30,16 +30,6 @@ export function allocateCloud(
   };
 }
 
-/** What is said where degree 4 is cut to 3. */
-export const DEGREE_4 =
-  'Spherical harmonics of degree 4 are drawn up to degree 3; the finest changes of colour with direction are left out.';
-
-/** Adds a sentence about what is not drawn, once. */
-export function warn(cloud: DraftCloud, sentence: string): void {
-  const { warnings = [] } = cloud;
-  if (!warnings.includes(sentence)) cloud.warnings = [...warnings, sentence];
-}
-
 /** Replaces logits by opacities, 1/(1 + exp(-x)), in place. */
 export function sigmoidInPlace(values: Float32Array): void {
   for (let i = 0; i < values.length; i++) values[i] = 1 / (1 + Math.exp(-values[i]));

@@ -1,4 +1,4 @@
-export type { LoadLimits } from './budget.js';
+export { LoadBudget, type LoadLimits } from './budget.js';
 export { detectFormat } from './detect.js';
 export { fetchScene, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './formats.js';

@@ -1,5 +1,6 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { allocateCloud, warn, type DraftCloud } from './cloud.js';
+import { allocateCloud, type DraftCloud } from './cloud.js';
+import { warn } from './warn.js';
 import type { SceneSource } from './scene-format.js';
 
 /** Splats `first` to `first + count` of a cloud. */

@@ -93,10 +93,8 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   const { count, droppedCount } = cloud;
   if (count === 0) throw noSplats(name, droppedCount);
   if (droppedCount <= MOST_DROPPED * (count + droppedCount)) return cloud;
-  return (await loadModule('the code that tells what is left out', () => import('./left-out.js'))).withLeftOut(
-    cloud,
-    name,
-  );
+  const { withLeftOut } = await loadModule('the code of warnings', () => import('./left-out.js'));
+  return withLeftOut(cloud, name);
 }
 
 function emptyFile(name: string): GaussianSplatError {

@@ -1,6 +1,6 @@
 /** Loaded by the worker for large PLYs: their rows are packed by several workers while the rest is on its way. */
 import { boundsOf } from '@gaussian-splat/core';
-import { MOST_DROPPED, splatRanges, type SplatRanges } from '@gaussian-splat/formats';
+import { MOST_DROPPED, splatRanges, type LoadLimits, type SplatRanges } from '@gaussian-splat/formats';
 import { joinShares, packGaussians, SHARE_SPLATS, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer';
 import type { LoadListeners } from './load-scene.js';
 import { packRows, type ShareAnswer, type ShareRequest } from './pack-shares.js';
@@ -28,6 +28,7 @@ export class LargePly {
   readonly #rows: Rows;
   readonly #count: number;
   readonly #sh: SceneRequest['sh'];
+  readonly #limits: () => LoadLimits;
   readonly #signal: AbortSignal;
   readonly #listeners: LoadListeners;
   readonly #answers: (ShareAnswer | undefined)[];
@@ -51,15 +52,17 @@ export class LargePly {
     beginning: Uint8Array,
     total: number,
     name: string,
-    { sh, limits: { maxSplats = Infinity } = {} }: SceneRequest,
+    { sh }: SceneRequest,
+    limits: () => LoadLimits,
     signal: AbortSignal,
     listeners: LoadListeners,
   ): Promise<LargePly | undefined> {
+    const { maxSplats = Infinity } = limits();
     // What is wrong with a header, or more than the page allows, those say who read it whole. The download keeps the limit of bytes.
     const { rows, count = 0 } = (await splatRanges(beginning, name).catch(() => undefined)) ?? {};
     const isWhole =
       rows !== undefined && count > 0 && count <= maxSplats && rows.start + count * rows.byteLength <= total;
-    return isWhole ? new LargePly(name, rows, count, sh, signal, listeners) : undefined;
+    return isWhole ? new LargePly(name, rows, count, sh, limits, signal, listeners) : undefined;
   }
 
   private constructor(
@@ -67,6 +70,7 @@ export class LargePly {
     rows: Rows,
     count: number,
     sh: SceneRequest['sh'],
+    limits: () => LoadLimits,
     signal: AbortSignal,
     listeners: LoadListeners,
   ) {
@@ -74,6 +78,7 @@ export class LargePly {
     this.#rows = rows;
     this.#count = count;
     this.#sh = sh;
+    this.#limits = limits;
     this.#signal = signal;
     this.#listeners = listeners;
     this.#precision = sh === 'auto' ? 'int8' : sh;
@@ -104,6 +109,8 @@ export class LargePly {
     if (this.#arrived < this.#answers.length) return undefined;
     for (;;) {
       await this.#packAll();
+      // Who reads it whole says that there is no time left.
+      if (this.#isLate) return undefined;
       const shares = this.#answers.map((answer) => answer?.packed);
       const first = this.#answers.find((answer) => answer?.packed);
       if (!first || shares.includes(undefined)) return undefined;
@@ -124,6 +131,11 @@ export class LargePly {
       this.#precision = joined;
       this.#forget();
     }
+  }
+
+  get #isLate(): boolean {
+    const { maxSeconds = Infinity } = this.#limits();
+    return maxSeconds <= 0;
   }
 
   /** Shares of which all bytes are there. */
@@ -206,6 +218,7 @@ export class LargePly {
   async #packAll(): Promise<void> {
     for (;;) {
       this.#signal.throwIfAborted();
+      if (this.#isLate) return;
       this.#feed();
       const share = this.#take();
       if (share !== undefined) {

@@ -3,12 +3,11 @@ import type { PlyHeader } from './header.js';
 import type * as meaning from './meaning.js';
 
 /** Properties that plain splats have, up to degree 3, packed ones too; normals mean nothing. */
-export const PLAIN =
-  /^([xyz]|n[xyz]|f_dc_[0-2]|f_rest_([0-9]|[123]\d|4[0-4])|opacity|(scale|rot)_[0-3]|red|green|blue|(packed|min|max)_.*)$/;
+export const PLAIN = /^(n?[xyz]|f_dc_\d|f_rest_([1-3]?\d|4[0-4])|opacity|(scale|rot)_\d|red|green|blue|packed_.*)$/;
 /** Elements that say what the vertices are, or that are drawn beside them. */
 const ODD = /^(face|tristrips|codebook_centers)$/;
 /** LAM writes offsets from a mesh in place of positions, and only the name of the file tells it. */
-export const OFFSETS = /(^|[/_])offset\.ply$/i;
+export const OFFSETS = /offset\.ply$/i;
 
 /** What knows the meaning of a header that says more than which numbers follow; undefined for all others. */
 export async function loadMeaning(

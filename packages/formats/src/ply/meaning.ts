@@ -1,7 +1,8 @@
 /** What the header of a PLY says beside its numbers. Loaded only for files that have comments, or properties that change what the others mean. */
 import { GaussianSplatError, normalize, type Vector3 } from '@gaussian-splat/core';
 import { grouped } from '../bytes.js';
-import { DEGREE_4, warn, type DraftCloud } from '../cloud.js';
+import type { DraftCloud } from '../cloud.js';
+import { DEGREE_4, warn } from '../warn.js';
 import type { PlyHeader } from './header.js';
 import { OFFSETS, PLAIN } from './load-meaning.js';
 

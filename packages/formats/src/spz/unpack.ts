@@ -1,6 +1,7 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
-import { allocateCloud, DEGREE_4, expInPlace, keptDegree, warn } from '../cloud.js';
+import { allocateCloud, expInPlace, keptDegree } from '../cloud.js';
+import { DEGREE_4, warn } from '../warn.js';
 import { float16 } from '../float16.js';
 import { harmonicSigns, quaternionSigns, type AxisSigns } from './axes.js';
 import { bytesPerSplat, type SpzHeader } from './header.js';
