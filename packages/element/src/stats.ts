@@ -1,3 +1,4 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import type { QualityChoice } from './attributes.js';
 import type { PaceReport } from './controllers/pace-controller.js';
 import type { GpuScene } from './gpu/gpu-scene.js';
@@ -27,6 +28,8 @@ export interface SceneStats {
   readonly quality: QualityChoice;
   /** What pictures at rest and in motion are drawn with. */
   readonly pace: PaceReport;
+  /** The direction of the scene's frame that its file says points up, of length 1; null where it says nothing. */
+  readonly up: Vector3 | null;
   /** What of the file is not drawn, or may mean something else than what is drawn, for people; the console has it, too. */
   readonly warnings: readonly string[];
   /** All that is done to the scene for the sake of time or memory, for people; empty where nothing is. */
@@ -66,6 +69,7 @@ export function statsOf(scene: GpuScene, { quality, pace, counts, isPreview }: S
     bytes: { scene: gaussians.byteLength + (scene.levels?.byteLength ?? 0), frames: scene.frameBytes },
     quality,
     pace,
+    up: scene.bounds.up ?? null,
     warnings: scene.warnings,
     why: [
       ...whyPreview(isPreview),
