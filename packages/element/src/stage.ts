@@ -210,7 +210,7 @@ export class Stage
     return {
       element: this.element,
       runtimeLocation: this.services.runtimeLocation,
-      startWorker: this.services.sceneLoader.spawn,
+      loader: this.services.sceneLoader,
       state: () => this.#live.state,
       ownsControls: () => !this.#live.post.isWanted,
       camera: (bounds) => {

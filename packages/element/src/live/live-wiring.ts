@@ -31,7 +31,8 @@ export class LiveWiring implements PostHost {
     return {
       credentials: credentialsOf(attributes.crossorigin),
       runtimeLocation: services.runtimeLocation,
-      startWorker: services.sceneLoader.spawn,
+      loader: services.sceneLoader,
+      limits: services.sceneLimits,
       state: () => this.state,
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),

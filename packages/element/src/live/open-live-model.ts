@@ -6,6 +6,7 @@ import type { ProgressListener } from '../loading/protocol.js';
 import { fetchBeside } from './fetch-beside.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
+import { readsHeaders } from './read-header.js';
 import { StateReader } from './read-state.js';
 import { RunWatch } from './run-watch.js';
 import type { Contract, Vector3 } from '@gaussian-splat/core';
@@ -48,7 +49,7 @@ export async function openLiveModel(
     },
     onError: (error) => (isOpen ? listeners.onError(error) : (firstFailure = error)),
     // Anything but "off" is what it is without the attribute.
-    compare: request.element.getAttribute('compare')?.trim() === 'off' ? false : request.startWorker,
+    compare: request.element.getAttribute('compare')?.trim() === 'off' ? false : request.loader.spawn,
     onFallback: (reason) => {
       listeners.onFallback(reason);
       listeners.onInput();
@@ -135,7 +136,8 @@ function liveModel(
 async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<ModelSource[]> {
   const { url, chain = [], credentials } = request;
   const contract = await contractOf(request, signal);
-  return [{ url, credentials, contract }, ...chain.map((next) => ({ url: next, credentials }))];
+  const openHeader = readsHeaders(request.loader, request.limits);
+  return [{ url, credentials, contract, openHeader }, ...chain.map((next) => ({ url: next, credentials, openHeader }))];
 }
 
 async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<unknown> {

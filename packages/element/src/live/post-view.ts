@@ -4,9 +4,13 @@ import { FilteredFrame } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from './frame-filter.js';
 import type { LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
+import { readsHeaders } from './read-header.js';
 import { StateReader } from './read-state.js';
 
-export interface PostRequest extends Pick<LiveRequest, 'credentials' | 'runtimeLocation' | 'startWorker' | 'state'> {
+export interface PostRequest extends Pick<
+  LiveRequest,
+  'credentials' | 'runtimeLocation' | 'loader' | 'limits' | 'state'
+> {
   /** One post-processor, or several one after the other. */
   readonly urls: readonly string[];
   readonly signal: AbortSignal;
@@ -69,11 +73,11 @@ export class PostView implements FrameFilter {
     if (runtimeLocation !== null) setRuntimeLocation(new URL(runtimeLocation, document.baseURI));
     let view: PostView | undefined;
     const post = await PostProcessor.open(
-      urls.map((url) => ({ url, credentials })),
+      urls.map((url) => ({ url, credentials, openHeader: readsHeaders(request.loader, request.limits) })),
       device,
       {
         signal,
-        compare: request.startWorker,
+        compare: request.loader.spawn,
         onFallback,
         onPicture: (picture) => {
           if (view) view.#accept(picture);

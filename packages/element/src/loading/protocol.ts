@@ -1,5 +1,5 @@
 /** What the page and the scene worker say to each other. */
-import type { ErrorData } from '@gaussian-splat/core';
+import type { ErrorData, ModelPlace } from '@gaussian-splat/core';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
@@ -18,6 +18,12 @@ export interface FileRequest {
 export interface SceneLimits extends LoadLimits {
   /** Origins of other servers that manifests may name files on, such as `https://cdn.example`; they get no cookies. Default: none but the manifest's own. */
   readonly origins?: readonly string[];
+}
+
+/** A model whose header is to be read. */
+export interface ModelRequest {
+  readonly place: ModelPlace;
+  readonly limits?: SceneLimits | undefined;
 }
 
 /** A scene to fetch. */
@@ -78,7 +84,8 @@ export type WorkerRequest =
   | { readonly type: 'file'; readonly request: FileRequest }
   | { readonly type: 'manifest'; readonly request: FileRequest }
   | { readonly type: 'boxes'; readonly request: SceneRequest }
-  | { readonly type: 'box'; readonly request: BoxRequest };
+  | { readonly type: 'box'; readonly request: BoxRequest }
+  | { readonly type: 'model'; readonly request: ModelRequest };
 
 export type PageMessage =
   | (WorkerRequest & { readonly id: number })
