@@ -80,7 +80,7 @@ def add_common(family: Command) -> None:
     facts.add_argument(
         "--filter",
         choices=get_args(Filter),
-        help="what it was trained with: 0.3 px², 0.3 with compensation, 0.1 with compensation; default: by --antialiased",
+        help="trained with 0.3 px², 0.3 with compensation, or 0.1 with compensation; default: by --antialiased",
     )
     facts.add_argument("--up", choices=get_args(Up), default="-y", help="the axis that points up; default -y")
     facts.add_argument("--left-handed", action="store_true")

@@ -88,7 +88,8 @@ def export_module(
     expected = [_in_torch(wrapped, values, torch) for values in tries]
     _require_finite(expected[0], layout)
     given = {"version": 1, "name": name or path.stem}
-    contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **_facts(inputs, n_max, fps, antialiased, filter)}
+    facts = _facts(inputs, n_max, fps, antialiased, filter)
+    contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **facts}
     contract |= {"coordinates": (coordinates or Coordinates()).json(), "license": license, "attribution": attribution}
     refusals = []
     for exporter in _OPSETS:
