@@ -4,7 +4,7 @@ import { test } from 'node:test';
 import type { GpuScene } from '../../packages/element/src/gpu/gpu-scene.js';
 import { statsOf, type StatsContext } from '../../packages/element/src/stats.js';
 
-const scene = { gaussians: { count: 60, byteLength: 0 }, detail: {}, frameBytes: 0 } as unknown as GpuScene;
+const scene = { gaussians: { count: 60, byteLength: 0 }, detail: {}, bounds: {}, frameBytes: 0 } as unknown as GpuScene;
 
 test('splats for which the device has no room are told of, after they were counted', () => {
   const pace = { moving: 'whole' } as unknown as StatsContext['pace'];
