@@ -48,7 +48,7 @@ if (!existsSync(join(folder, 'honest.ply'))) {
 }
 const limitMs = 1000 * Number(values.seconds);
 const served = mkdtempSync(join(tmpdir(), 'attack-'));
-const files = readdirSync(folder).filter((file) => !/README|NOT-RUN/.test(file) && file.includes(values.only));
+const files = readdirSync(folder).filter((file) => !/README|NOT-RUN/.test(file) && new RegExp(values.only).test(file));
 const faults = [];
 
 /** Where a file lies for the page: streamed scenes are known by the name of their manifest. */

@@ -28,8 +28,6 @@ struct View {
   filter_variance: f32,
   // Bits of a depth key: 32 for those of the float32 depth itself, fewer for a share of the visible range.
   key_bits: u32,
-  // 1 if the survivors are listed in depth order already, so that they need no keys.
-  is_ordered: u32,
   // Most that the camera's matrix stretches a vector: 1 unless it is more than a rotation and a translation.
   stretch: f32,
   // 1 if the page has levels of detail.

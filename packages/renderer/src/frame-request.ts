@@ -32,7 +32,7 @@ export interface FrameRequest {
   readonly detail?: number;
   readonly splatBudget?: number;
   /**
-   * What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it.
+   * What to note besides the image: `tiles` only, and not for every frame.
    */
   readonly notes?: FrameNotes;
   /**

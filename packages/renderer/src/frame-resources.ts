@@ -1,14 +1,11 @@
 import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityMemory, type Capacity } from './capacity-memory.js';
 import { CapacityMonitor, initialCapacity, LEAST_CAPACITY } from './capacity.js';
-import { DepthOrder } from './depth-order.js';
 import type { GaussianScene } from './gaussian-scene.js';
-import { OrderPolicy } from './order-policy.js';
 import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
-import type { Threads } from './stages/plan.js';
 
 /** Room for pairs that the pacer learns from what one costs. */
 const TELLING_ROOM = 1 << 18;
@@ -20,14 +17,11 @@ export interface Resources {
   readonly table: PageTable;
   readonly scratch: Scratch;
   readonly bindings: FrameBindings;
-  readonly depthOrder: DepthOrder;
-  readonly orderPolicy: OrderPolicy;
   readonly monitor: CapacityMonitor;
 }
 
 export interface ResourceOptions {
   readonly stages: Stages;
-  readonly threads: Threads;
   readonly rasterizer: Rasterizer;
   /** Pairs of splat and bin that are painted in one submission. */
   readonly pairsAtOnce: () => number;
@@ -63,8 +57,8 @@ export class FrameResources {
   }
 
   get byteLength(): number {
-    const { table, scratch, bindings, depthOrder } = this.#current ?? {};
-    return [table, scratch, bindings, depthOrder].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    const { table, scratch, bindings } = this.#current ?? {};
+    return [table, scratch, bindings].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
   /**
@@ -88,11 +82,10 @@ export class FrameResources {
 
   /** Frees everything. */
   release(): void {
-    const { table, scratch, bindings, depthOrder, monitor } = this.#current ?? {};
+    const { table, scratch, bindings, monitor } = this.#current ?? {};
     table?.destroy();
     scratch?.destroy();
     bindings?.destroy();
-    depthOrder?.release();
     monitor?.destroy();
     this.#current = undefined;
   }
@@ -131,10 +124,8 @@ export class FrameResources {
 
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
   #rebind(table: PageTable): Resources {
-    const { stages, threads } = this.#options;
+    const { stages } = this.#options;
     const capacity = this.#capacity!;
-    const depthOrder = this.#current?.depthOrder ?? new DepthOrder(this.#device, table, threads);
-    const orderPolicy = this.#current?.orderPolicy ?? new OrderPolicy(table, depthOrder);
     const kept = this.#current?.scratch.capacity === capacity.visible ? this.#current.scratch : undefined;
     if (kept === undefined) this.#current?.scratch.destroy();
     this.#current?.bindings.destroy();
@@ -149,17 +140,16 @@ export class FrameResources {
     this.#hasOtherPairs = false;
     const bindings = new FrameBindings(this.#device, stages, { table, scratch });
     const monitor = this.#watch(table, capacity);
-    this.#current = { table, scratch, bindings, depthOrder, orderPolicy, monitor };
+    this.#current = { table, scratch, bindings, monitor };
     return this.#current;
   }
 
-  #bindRasterizer({ plan, splats, order, keys, spare }: Scratch, { visible, pairs }: Capacity): void {
+  #bindRasterizer({ plan, splats, order, spare }: Scratch, { visible, pairs }: Capacity): void {
     this.#options.rasterizer.bind({
       plan,
       splats,
       spare,
-      survivors: order[0],
-      orders: { sorted: order[0], identity: keys[0] },
+      order: order[0],
       capacity: visible,
       pairCapacity: pairs,
     });

@@ -19,7 +19,7 @@ export interface Levers {
    */
   readonly accumulation: 'auto' | AccumulationFormat;
   /**
-   * Bits of the keys that splats are sorted by while the camera turns. 32 are those of the float32 depth and sort exactly; fewer
+   * Bits of the keys that splats are sorted by. 32 are those of the float32 depth and sort exactly; fewer
    * are spread over the logarithm of the visible depths.
    */
   readonly depthKeyBits: 16 | 24 | 32;
@@ -28,11 +28,6 @@ export interface Levers {
    * them too long. Frames of tiles that may have much to do are divided further without being asked. 1 to 256.
    */
   readonly submissions: number;
-  /**
-   * Radians that the camera may turn before splats are sorted again. Scenes of at most 2²⁰ splats keep an order of them all meanwhile, where the camera turns by at most
-   * half of that a frame; larger ones, and a camera that turns faster, have the visible splats sorted for each frame.
-   */
-  readonly sortAngle: number;
   /**
    * Where tiles end a pixel. Up to 1e-4, which scenes are trained with: before the splat that would leave it this transmittance or less. Above: behind that splat.
    */
@@ -64,7 +59,6 @@ const EXACT: Levers = {
   accumulation: 'auto',
   depthKeyBits: 24,
   submissions: 1,
-  sortAngle: 1e-7,
   transmittanceMin: TRAINED_TRANSMITTANCE,
   shDegree: 3,
   detail: 0,
@@ -85,7 +79,6 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
     ...EXACT,
     rasterizer: 'tiles',
     accumulation: 'rgba32float',
-    sortAngle: 0,
   },
   default: EXACT,
   balanced: {
@@ -106,18 +99,10 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
  */
 export type FrameLevers = Pick<Levers, (typeof FRAME_LEVERS)[number]>;
 
-const FRAME_LEVERS = [
-  'depthKeyBits',
-  'sortAngle',
-  'transmittanceMin',
-  'shDegree',
-  'detail',
-  'resolutionScale',
-] as const;
+const FRAME_LEVERS = ['depthKeyBits', 'transmittanceMin', 'shDegree', 'detail', 'resolutionScale'] as const;
 
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
   submissions: [1, 256],
-  sortAngle: [0, Math.PI],
   transmittanceMin: [0, 1],
   detail: [0, 64],
   detailFade: [0, 2],

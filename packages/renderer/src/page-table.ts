@@ -1,4 +1,4 @@
-import { SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
+import { SPLAT_FILTERS, type Camera, type SplatFilter } from '@gaussian-splat/core';
 import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
@@ -64,16 +64,6 @@ export class PageTable {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
 
-  /** Grows when the content of a scene changes; 0 if none ever does. */
-  get version(): number {
-    return this.#scenes.reduce((sum, { version }) => sum + version, 0);
-  }
-
-  /** World positions of the scenes' origins. */
-  get origins(): readonly Vector3[] {
-    return this.#scenes.map(({ origin }) => origin);
-  }
-
   get byteLength(): number {
     return this.#memory.byteLength;
   }
@@ -97,13 +87,11 @@ export class PageTable {
     camera: Camera,
     pixelArea: number,
     { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
-    isOrdered: boolean,
     filter?: SplatFilter,
   ): void {
     const shared = {
       sh_cap: shDegree,
       key_bits: depthKeyBits,
-      is_ordered: isOrdered ? 1 : 0,
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,

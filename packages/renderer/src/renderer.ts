@@ -12,7 +12,7 @@ import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
 import { leversOf, leversOfFrame, requireInRange, type FrameLevers, type Levers } from './levers.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
-import type { NotedFrame, OrderKind, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
+import type { NotedFrame, Painting, Rasterizer, RasterizerName, Surface } from './rasterizers/rasterizer.js';
 import { missingFormat, requireNotes, requireRequest, requireTarget, requireTextureSize } from './requirements.js';
 import type { Scratch } from './scratch.js';
 import { ComposeStage, type ComposeBindings } from './stages/compose.js';
@@ -52,7 +52,7 @@ const ONE_PICTURE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 
  * ```
  *
  * Memory is allocated when the scenes, the image size or the share of visible splats change, never while only the camera moves; no frame waits
- * for a read-back. Splats are sorted while the camera turns; a camera that moves without turning sorts nothing.
+ * for a read-back. Each frame sorts the splats that it shows.
  */
 export class Renderer {
   /** The levers in force; nothing is left `auto`. */
@@ -71,8 +71,8 @@ export class Renderer {
   readonly #views = new WeakMap<GPUTexture, GPUTextureView>();
   readonly #resources: FrameResources;
   #accumulation: Accumulation | undefined;
-  /** Where the slots of the last frame are listed, in which buffers, and its pixels for each of the target; undefined before there is one. */
-  #last: { readonly order: OrderKind; readonly scratch: Scratch; readonly scale: number } | undefined;
+  /** The buffers of the last frame, and its pixels for each of the target; undefined before there is one. */
+  #last: { readonly scratch: Scratch; readonly scale: number } | undefined;
 
   /** @throws GaussianSplatError `unsupported/limits` if an option needs a feature that the device lacks. */
   constructor(device: GPUDevice, options: RendererOptions = {}) {
@@ -85,7 +85,6 @@ export class Renderer {
     this.#pacer = new SubmissionPacer(device);
     this.#resources = new FrameResources(device, {
       stages: this.#stages,
-      threads: this.levers.threads,
       rasterizer: this.#rasterizer,
       pairsAtOnce: () => this.#pacer.pairsAtOnce,
       onIncomplete: this.#onIncomplete,
@@ -139,22 +138,20 @@ export class Renderer {
     const detail = detailOf(request, levers);
     const drawn = scaled(camera, levers.resolutionScale);
     const resources = this.#resources.fit(scenes, detail.splatBudget);
-    const { table, scratch, bindings, depthOrder, orderPolicy, monitor } = resources;
+    const { table, scratch, bindings, monitor } = resources;
     table.update();
     timer?.startFrame();
     const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
-    const occasion = { sortAngle: levers.sortAngle, isAskedFor: notes !== undefined };
-    const isOrdered = orderPolicy.prepare(encoder, drawn, { ...occasion, timer });
     const own = { ...levers, ...detail };
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, own, isOrdered, request.filter);
+    table.look(drawn, pixelArea, own, request.filter);
     const wishes = recordProjection(encoder, {
       stages: this.#stages,
       bindings,
       scratch,
       camera: drawn,
       levers: own,
-      depthOrder: isOrdered ? depthOrder : undefined,
+      keepsSurvivors: notes !== undefined,
       hasDetail: table.hasDetail,
       isBudgeted: detail.splatBudget > 0 && table.hasDetail,
       timer,
@@ -166,14 +163,13 @@ export class Renderer {
       isWhole: request.levers === undefined,
     });
     const submissions = this.#submissionsFor(isWatched);
-    const order = isOrdered ? 'identity' : 'sorted';
-    const how = { order, levers, notes, timer } as const;
+    const how = { levers, notes, survivors: notes && scratch.survivors, timer };
     const last = this.#paint(encoder, target, drawn, how, background, submissions);
     timer?.endFrame?.(last);
     if (isWatched) monitor.record(last, scratch.plan, pairPlan);
     this.#submit(last, submissions);
     timer?.submitted?.();
-    this.#last = { order, scratch, scale: drawn.width / camera.width };
+    this.#last = { scratch, scale: drawn.width / camera.width };
     const counts = isWatched ? monitor.read() : undefined;
     if (counts && submissions.watch) {
       void this.#pacer.learn(
@@ -182,7 +178,6 @@ export class Renderer {
       );
     }
     for (const wish of wishes) wish.read();
-    orderPolicy.settle(occasion);
   }
 
   /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
@@ -230,10 +225,9 @@ export class Renderer {
     const { probe } = await loadModule('the code that looks into a picture', () => import('./depth-probe.js'));
     if (this.#last === undefined || this.#last.scratch !== this.#resources.current?.scratch) return [];
     const { scale, scratch } = this.#last;
-    const { plan, splats, order, keys } = scratch;
-    const nearToFar = { sorted: order[0], identity: keys[0] }[this.#last.order];
+    const { plan, splats, order } = scratch;
     const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
-    return probe(this.#device, { plan, splats, order: nearToFar }, drawn);
+    return probe(this.#device, { plan, splats, order: order[0] }, drawn);
   }
 
   /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
@@ -249,7 +243,7 @@ export class Renderer {
     encoder: GPUCommandEncoder,
     target: Target,
     camera: Camera,
-    how: Pick<Painting, 'order' | 'levers' | 'notes' | 'timer'>,
+    how: Pick<Painting, 'levers' | 'notes' | 'survivors' | 'timer'>,
     background: readonly [number, number, number, number],
     submissions: Submissions,
   ): GPUCommandEncoder {

@@ -41,6 +41,7 @@ export class Scratch {
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
   readonly #memory: GpuMemory;
+  #survivors: GPUBuffer | undefined;
 
   /** @param spareBytes least size of {@link spare} */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
@@ -93,6 +94,17 @@ export class Scratch {
     if (this.#spare[0].size === this.#spareSize(bytes)) return;
     for (const buffer of this.#spare) this.#memory.free(buffer);
     this.#spare = this.#makeSpare(bytes);
+  }
+
+  /** Numbers of the visible splats by slot, once {@link keepSurvivors} has been recorded: the sort overwrites what lists them. */
+  get survivors(): GPUBuffer {
+    const { storage, copyDestination } = BUFFER_USAGE;
+    return (this.#survivors ??= this.#memory.buffer('gs.survivors', 4 * this.capacity, storage | copyDestination));
+  }
+
+  /** To be recorded between `compact` and the sort. */
+  keepSurvivors(encoder: GPUCommandEncoder): void {
+    encoder.copyBufferToBuffer(this.#order, 0, this.survivors, 0, 4 * this.capacity);
   }
 
   get byteLength(): number {

@@ -21,7 +21,6 @@ export type CameraValues = Omit<
   | 'sh_encoding'
   | 'antialiased'
   | 'key_bits'
-  | 'is_ordered'
   | 'has_detail'
   | 'detail'
   | 'detail_fade'

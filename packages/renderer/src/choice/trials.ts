@@ -2,7 +2,6 @@
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { Renderer } from '../renderer.js';
-import { OrderKeysStage } from '../stages/order-keys.js';
 import type { Variants } from '../variants.js';
 import type { FrameClock } from './frame-clock.js';
 import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud } from './known-answer.js';
@@ -32,7 +31,6 @@ function prepare(device: GPUDevice, variants: Variants, format: GPUTextureFormat
   const renderer = new Renderer(device, variants);
   renderer.prepare([{}], format);
   renderer.destroy();
-  new OrderKeysStage(device);
 }
 
 /** Whether an answer is right, and WebGPU had nothing to say against the way to it. */
@@ -65,7 +63,7 @@ export async function timeFrames(
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);
   const draw = (): void => renderer.render({ gaussians, camera, target: texture });
-  // The first frame also makes pipelines and orders everything.
+  // The first frame also makes pipelines.
   await clock.time(1, draw);
   const time = await clock.time(FRAMES, draw);
   texture.destroy();

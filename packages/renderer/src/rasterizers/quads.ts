@@ -1,7 +1,7 @@
 import { constants, layouts, rasterizeQuads } from '../generated/shaders.js';
 import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
-import type { AccumulationFormat, OrderKind, Painting, Rasterizer, RasterizerInputs, Slice } from './rasterizer.js';
+import type { AccumulationFormat, Painting, Rasterizer, RasterizerInputs, Slice } from './rasterizer.js';
 
 const { QUAD_BATCH } = constants;
 /** Two triangles. */
@@ -19,7 +19,7 @@ export class QuadsRasterizer implements Rasterizer {
   readonly #indices: GPUBuffer;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.RasterView.size);
-  #bindings: Readonly<Record<OrderKind, GPUBindGroup>> | undefined;
+  #bindings: GPUBindGroup | undefined;
   #capacity = 0;
 
   constructor(device: GPUDevice, format: AccumulationFormat) {
@@ -53,14 +53,9 @@ export class QuadsRasterizer implements Rasterizer {
     return 0;
   }
 
-  bind({ plan, splats, orders, capacity }: RasterizerInputs): void {
+  bind({ plan, splats, order, capacity }: RasterizerInputs): void {
     this.#capacity = capacity;
-    const bindTo = (order: GPUBuffer): GPUBindGroup =>
-      this.#program.bind({ raster: this.#uniform, plan, splats, order });
-    this.#bindings = {
-      sorted: bindTo(orders.sorted),
-      identity: bindTo(orders.identity),
-    };
+    this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });
   }
 
   /** One pipeline serves all levers. */
@@ -71,7 +66,7 @@ export class QuadsRasterizer implements Rasterizer {
   /** Quads are drawn from what the stages before have left. */
   prepareFrame(): void {}
 
-  record(encoder: GPUCommandEncoder, { surface, order, timer }: Painting, slice: Slice): void {
+  record(encoder: GPUCommandEncoder, { surface, timer }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
     writeStruct(
       layouts.RasterView,
@@ -96,7 +91,7 @@ export class QuadsRasterizer implements Rasterizer {
       // The image may be a part of the texture.
       pass.setViewport(0, 0, width, height, 0, 1);
       pass.setPipeline(this.#pipeline());
-      pass.setBindGroup(0, this.#bindings[order]);
+      pass.setBindGroup(0, this.#bindings);
       pass.setIndexBuffer(this.#indices, 'uint16');
       // As many as there is room for: the vertices of those that are not there lie outside.
       pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(this.#capacity / QUAD_BATCH));

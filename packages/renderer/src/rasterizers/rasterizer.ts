@@ -7,9 +7,6 @@ export type RasterizerName = 'quads' | 'tiles';
 /** Formats of the accumulation texture. Quads blend into `rgba32float` only with the feature `float32-blendable`. */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
 
-/** Buffers that list slots from near to far: the one that a sort leaves, and the one for slots that are in that order themselves. */
-export type OrderKind = 'sorted' | 'identity';
-
 /** What every rasterizer reads. */
 export interface RasterizerInputs {
   /** `Plan`: how many splats there are to draw. */
@@ -17,9 +14,7 @@ export interface RasterizerInputs {
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
-  readonly orders: Readonly<Record<OrderKind, GPUBuffer>>;
-  /** Numbers of the visible splats by slot, for frames whose order is `identity`. */
-  readonly survivors: GPUBuffer;
+  readonly order: GPUBuffer;
   /** Of at least {@link Rasterizer.spareBytes} each: nobody else's once splats are in order, until the next frame. */
   readonly spare: readonly [GPUBuffer, GPUBuffer];
   /** Most splats that can be visible. */
@@ -77,8 +72,9 @@ export type PaintingLevers = Pick<Levers, 'transmittanceMin'>;
 /** One frame to draw. */
 export interface Painting {
   readonly notes?: FrameNotes;
+  /** Numbers of the visible splats by slot; with {@link notes}. */
+  readonly survivors?: GPUBuffer;
   readonly surface: Surface;
-  readonly order: OrderKind;
   readonly levers: PaintingLevers;
   /**
    * Premultiplied colour to lay the splats over; the surface is then the final image. Without it the surface receives colour, and
