@@ -158,22 +158,6 @@ describe('a worker that dies', () => {
     assert(time < 3_000, `${time.toFixed(0)} ms`);
   });
 
-  it('without a word, while it reads and cannot answer: noticed at once', async () => {
-    const spawned: Worker[] = [];
-    GaussianSplatElement.sceneLoader = new Loader(() => {
-      const worker = hogWorker(spawned.length === 0 ? HOG_URL : SCRIPT);
-      spawned.push(worker);
-      return worker;
-    });
-    const element = show({ src: ENDLESS });
-    await delay(1_200);
-    assertEqual(element.loaded, false, 'it reads for ever');
-    Worker.prototype.terminate.call(spawned[0]);
-    const time = await timeOf(() => element.ready);
-    assertEqual([element.loaded, element.error], [true, null], 'in another worker');
-    assert(time < 3_000, `${time.toFixed(0)} ms`);
-  });
-
   it('with an error, while several load: all begin again', async () => {
     const elements = [1, 2, 3].map((i) => show({ src: `/net/slow/compass.ply?ms=2000&${i}` }));
     await delay(600);

@@ -92,8 +92,6 @@ export type PageMessage =
   | { readonly type: 'cancel'; readonly id: number }
   /** Is answered by `pong`. */
   | { readonly type: 'ping' }
-  /** A port that closes when the worker is no more: nothing is said through it. */
-  | { readonly type: 'alive'; readonly port: MessagePort }
   /** A way to another worker that packs splats. */
   | { readonly type: 'helper'; readonly id: number; readonly port: MessagePort }
   /** Pack what comes through the port. */

@@ -50,8 +50,6 @@ export const openModel = async (request: ModelRequest, signal: AbortSignal): Pro
 
 /** The part of a worker's global scope that is used here; TypeScript's page types do not know it. */
 interface WorkerScope {
-  /** Kept for as long as the worker lives. */
-  alive?: MessagePort;
   postMessage(message: WorkerMessage, transfer?: Transferable[]): void;
   addEventListener(type: 'message', listener: (event: MessageEvent<PageMessage>) => void): void;
 }
@@ -138,8 +136,7 @@ function serve(scope: WorkerScope): void {
   }
 
   scope.addEventListener('message', ({ data }) => {
-    if (data.type === 'alive') scope.alive = data.port;
-    else if (data.type === 'ping') scope.postMessage({ type: 'pong' });
+    if (data.type === 'ping') scope.postMessage({ type: 'pong' });
     else if (data.type === 'cancel') running.get(data.id)?.abort.abort();
     else if (data.type === 'helper') running.get(data.id)?.onHelper?.(data.port);
     else if (data.type === 'pack') void import('./pack-shares.js').then(({ packShares }) => packShares(data.port));

@@ -12,7 +12,7 @@ const TICK_MS = 100;
 const BUSY = 2;
 /** And after which what else waits in it begins again elsewhere, and a worker whose load was called off is ended. */
 const SILENT = 5;
-/** And after which it counts as dead, whatever it was said to read, where the browser does not tell. */
+/** And after which it counts as dead, whatever it was said to read: browsers do not tell. */
 const DEAD = 600;
 /** A script that takes longer is loaded without the worker, ms. */
 const START_MS = 2_000;
@@ -136,7 +136,7 @@ export class WorkerPool {
       this.#refuse(error instanceof Error ? error.message : String(error));
       return undefined;
     }
-    const slot: WorkerSlot = new WorkerSlot(worker, () => this.#die(slot));
+    const slot = new WorkerSlot(worker);
     this.#slots.add(slot);
     worker.addEventListener('message', ({ data }: MessageEvent<WorkerMessage>) => this.#receive(slot, data));
     worker.addEventListener('error', (event) => {
@@ -257,14 +257,6 @@ export class WorkerPool {
     for (const job of jobs)
       this.#move(slot, job, job === guilty ? MOST_MOVES + 1 : 1, message || 'a worker that stopped');
     this.#placeQueued();
-  }
-
-  /** The browser says so. */
-  #die(slot: WorkerSlot): void {
-    // One whose script has not come is late, or says why.
-    if (!slot.isReady || !this.#slots.has(slot)) return;
-    slot.missed = DEAD;
-    this.#relieve(slot);
   }
 
   #end(slot: WorkerSlot): void {

@@ -32,17 +32,8 @@ export class WorkerSlot {
   startTimer: ReturnType<typeof setTimeout> | undefined;
   #idleTimer: ReturnType<typeof setTimeout> | undefined;
 
-  /** Kept, so that it can tell. */
-  readonly #alive: MessagePort;
-
-  /** @param onDeath called where the browser tells that the worker is no more, whoever has ended it */
-  constructor(worker: Worker, onDeath: () => void) {
+  constructor(worker: Worker) {
     this.worker = worker;
-    const { port1, port2 } = new MessageChannel();
-    this.#alive = port1;
-    port1.addEventListener('close', onDeath);
-    port1.start();
-    this.post({ type: 'alive', port: port2 }, [port2]);
   }
 
   /** Whether it is worth asking for a sign of life. */
@@ -97,7 +88,6 @@ export class WorkerSlot {
   end(): void {
     clearTimeout(this.#idleTimer);
     clearTimeout(this.startTimer);
-    this.#alive.close();
     this.worker.terminate();
     for (const stop of this.helpers.values()) stop();
   }
