@@ -53,8 +53,11 @@ test('triangles beside splats, in PLY and glTF', async () => {
   assert.deepEqual(await warningsOf(glb({}), 'a.glb'), []);
   const [mesh] = json.meshes as { primitives: object[] }[];
   const meshes = [{ primitives: [...mesh.primitives, { attributes: { POSITION: 0 } }] }];
-  assert.match((await warningsOf(glb({ meshes }), 'a.glb'))[0], /^1 primitives of the scene are no splats/);
   const extensionsUsed = ['KHR_gaussian_splatting', 'KHR_lights_punctual', 'EXT_splat_motion'];
+  // The file's meshes are told of in a hint: who draws them, as the element does, leaves out nothing.
+  const both = await readScene(glb({ meshes, extensionsUsed }), { name: 'a.glb' });
+  assert.deepEqual([both.hints?.meshes, both.warnings ?? []], [true, []]);
+  assert.match((await warningsOf(glb({ animations: [{}] }), 'a.glb'))[0], /^1 animations are left out for splats/);
   assert.match((await warningsOf(glb({ extensionsUsed }), 'a.glb'))[0], /not known are left out: EXT_splat_motion\./);
 });
 

@@ -1,4 +1,4 @@
-/** In which frame real SPZ files are: what decision 21 counts. */
+/** In which frame real SPZ files are: what decision 22 counts. */
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';

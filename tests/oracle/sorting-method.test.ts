@@ -1,5 +1,5 @@
 /**
- * How far the two orders that KHR_gaussian_splatting knows are apart: by z, as trainers and we have it, and by the distance to the camera. Decision 22 rests on these figures.
+ * How far the two orders that KHR_gaussian_splatting knows are apart: by z, as trainers and we have it, and by the distance to the camera. Decision 23 rests on these figures.
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';

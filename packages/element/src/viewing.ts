@@ -1,4 +1,5 @@
 import type { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
+import { wasLost } from './gpu/device-failures.js';
 import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
 import type { SceneBox } from './scene-queries.js';
@@ -89,7 +90,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /** Where the hotspot of a slot is now, for example `hotspot-door`; null if there is none with a position. */
   queryHotspot(name: string): HotspotPlace | null {
-    return this.stage.hotspots.query(name);
+    return this.stage.hotspots?.query(name) ?? null;
   }
 
   /**
@@ -98,10 +99,10 @@ export abstract class ViewingMethods extends MediaProperties {
    */
   async toBlob({ mimeType = 'image/png', qualityArgument }: PictureOptions = {}): Promise<Blob> {
     const canvas = this.#drawnCanvas();
-    const { scene } = this.stage.scene;
+    const { viewport } = this.stage.view;
     const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, mimeType, qualityArgument));
     // A device that was lost before it had drawn leaves an empty picture, and says so later.
-    if (scene && (await scene.wasLost())) throw new DOMException(LOST, 'InvalidStateError');
+    if (viewport && (await wasLost(viewport))) throw new DOMException(LOST, 'InvalidStateError');
     if (blob === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
     return blob;
   }

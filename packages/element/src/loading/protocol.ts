@@ -44,6 +44,8 @@ export interface LoadedScene {
   readonly bounds: SceneBounds;
   /** What of the file is not drawn: see `GaussianCloud.warnings`. */
   readonly warnings?: readonly string[] | undefined;
+  /** The file has triangles, too. */
+  readonly hasMeshes?: boolean | undefined;
 }
 
 /** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */

@@ -24,7 +24,7 @@ const SAMPLES = 4096;
 /**
  * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives of the default scene that hold splats, each moved by its nodes
  * (spherical harmonics turn along), uncompressed or as SPZ. Degrees may differ. Meshes and points without the extension,
- * cameras, lights and animations are left out.
+ * cameras, lights and animations are left out; `hints.meshes` says that there are some of the first.
  */
 export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   const { name, signal, range } = source;
@@ -50,23 +50,22 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
           clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
           source,
         );
-  noteLeftOut(whole, document.json, others);
+  if (others > 0) whole.hints = { ...whole.hints, meshes: true };
+  noteLeftOut(whole, document.json, others > 0);
   return whole;
 }
 
 /** Extensions that are named, at most. */
 const MOST_NAMED = 6;
 
-/** Says what of the file is not drawn. */
-function noteLeftOut(cloud: DraftCloud, json: Json, others: number): void {
-  if (others > 0)
-    warn(cloud, `${grouped(others)} primitives of the scene are no splats (meshes, lines, points); they are left out.`);
-  const unknown = unknownExtensions(json);
+/** Says what of the file is not drawn. What else a file with meshes means is for those to say who draw them. */
+function noteLeftOut(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
+  const unknown = hasMeshes ? [] : unknownExtensions(json);
   const named = unknown.slice(0, MOST_NAMED).map((extension) => extension.slice(0, 80));
   if (unknown.length > 0) warn(cloud, `Extensions of glTF that are not known are left out: ${named.join(', ')}.`);
   const { animations } = json;
   if (Array.isArray(animations) && animations.length > 0)
-    warn(cloud, `${grouped(animations.length)} animations are left out: glTF scenes are drawn as they stand.`);
+    warn(cloud, `${grouped(animations.length)} animations are left out for splats: they are drawn as they stand.`);
 }
 
 /** True if a node moves so far, as georeferenced ones do, that float32 would round what it moves by more than a few hundredths of a millimetre. */
@@ -174,6 +173,6 @@ function noSplats({ meshes }: Json, name: string, others: number): GaussianSplat
     remedy:
       hidden > 0
         ? 'name the scene that shows them in "scene", or put their node into the one that is named'
-        : 'show meshes with <model-viewer>, or export the scene with KHR_gaussian_splatting',
+        : 'show meshes with <splat-mesh src> in a <gaussian-splat>, or export the scene with KHR_gaussian_splatting',
   });
 }
