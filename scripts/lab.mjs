@@ -9,6 +9,7 @@ const IN_CHROMIUM = {
   bench: ['scripts/bench/run-bench.mjs'],
   frontier: ['scripts/frontier/run-frontier.mjs'],
   soak: ['scripts/soak/run-soak.mjs'],
+  attack: ['scripts/attack/run-attack.mjs'],
 };
 const IN_NODE = {
   fuzz: ['--import', 'tsx', 'tests/stability/fuzz/run-fuzz.ts'],

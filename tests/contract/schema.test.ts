@@ -105,6 +105,7 @@ const EVERYTHING: readonly Contract[] = [
     fps: 30,
     coordinates: { up: '+y', handedness: 'left', metresPerUnit: 2 },
     antialiased: true,
+    filter: 'mip',
     license: 'MIT',
     attribution: 'somebody',
   },

@@ -4,7 +4,12 @@ import { test } from 'node:test';
 import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaussians.js';
 import { statsOf, type StatsContext } from '../../packages/element/src/stats.js';
 
-const scene = { gaussians: { count: 60, byteLength: 0 }, detail: {} } as unknown as LoadedGaussians;
+const scene = {
+  gaussians: { count: 60, byteLength: 0 },
+  detail: {},
+  bounds: {},
+  warnings: [],
+} as unknown as LoadedGaussians;
 
 test('splats for which the device has no room are told of, after they were counted', () => {
   const pace = { moving: 'whole' } as unknown as StatsContext['pace'];

@@ -205,6 +205,7 @@ function writeFolder(out, writePages) {
 async function main({ scene, out, degree, geometry, minDecibels, columns, rows, spacing }) {
   const openPart = (path) => readWhole(join(dirname(scene), path));
   const cloud = upTo(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
+  for (const warning of cloud.warnings ?? []) console.error(`${scene}: ${warning}`);
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
   const built = performance.now();

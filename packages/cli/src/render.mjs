@@ -2,7 +2,7 @@
 import { basename, dirname, join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { PNG } from 'pngjs';
-import { cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
+import { cameraFromCalibration, GaussianSplatError, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
@@ -24,12 +24,6 @@ const USAGE = `usage: gaussian-splat render SCENE --camera CAMERA.json --out IMA
                        auto (default): rgba32float where the device can blend it, since no frame rate is at stake
   --background R,G,B   0..1; default: transparent
 `;
-
-const FILTERS = {
-  classic: { antialiased: false, filterVariance: undefined },
-  antialiased: { antialiased: true, filterVariance: undefined },
-  mip: { antialiased: true, filterVariance: 0.1 },
-};
 
 class UsageError extends Error {}
 
@@ -147,7 +141,8 @@ async function render(options) {
   checkFiles(options);
   const camera = readCamera(options.camera, options.view);
   const cloud = await readSceneFile(options.scene);
-  const { antialiased, filterVariance } = options.filter === undefined ? cloud : FILTERS[options.filter];
+  for (const warning of cloud.warnings ?? []) console.error(`${options.scene}: ${warning}`);
+  const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
 
   const adapter = await requestNodeAdapter();
   const device = await adapter.requestDevice(deviceDescriptor(adapter));

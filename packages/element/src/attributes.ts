@@ -2,7 +2,7 @@
  * The attributes of `<gaussian-splat>`, each in one place: its property's type, what Lit is told of it, its grammar, its default and what people read of it. The manifest
  * for editors and the table in README.md are made from this file (`scripts/attributes.mjs`). Kinds are called without options where their type says all.
  */
-import type { ShDegree } from '@gaussian-splat/core';
+import type { ShDegree, SplatFilter } from '@gaussian-splat/core';
 import type { Quality } from '@gaussian-splat/renderer';
 import type { PropertyDeclaration, PropertyDeclarations } from 'lit';
 import {
@@ -37,6 +37,9 @@ export type DetailChoice = 'auto' | 'off' | number;
 
 /** What pictures are drawn with: `auto` is the true image at rest and, in motion, as much of it as there is time for. */
 export type QualityChoice = 'auto' | Quality;
+
+/** The low-pass filter that a scene was trained with: `auto` is what its file says, or else `classic`. */
+export type FilterChoice = 'auto' | SplatFilter;
 
 /** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
 export type Reveal = 'auto' | 'manual';
@@ -244,6 +247,12 @@ export const ATTRIBUTES = {
    * @default `3`
    */
   maxShDegree: number(map(keywordGrammar(['3', '2', '1', '0']), (degree) => Number(degree) as ShDegree)),
+  /**
+   * The filter that the scene was trained with, for files that cannot say it: `classic` (0.3 px²), `antialiased` (0.3 px² with compensation: gsplat's and INRIA's options of that name), `mip`
+   * (0.1 px² with compensation: Mip-Splatting, Brush's mip mode). Distant splats are too thin or too thick with another one.
+   * @default `auto`: what the file says, else `classic`
+   */
+  filter: keyword<FilterChoice>(['auto', 'classic', 'antialiased', 'mip']),
   /**
    * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every picture to be off by so many. Scenes that
    * come in levels (`detail.json`, `lod-meta.json`) are streamed: `auto` is `1px` for them, and with `off` a `lod-meta.json` is loaded whole.

@@ -323,7 +323,7 @@ export class Stage
     return {
       element: this.element,
       runtimeLocation: this.services.runtimeLocation,
-      startWorker: this.services.sceneLoader.spawn,
+      loader: this.services.sceneLoader,
       state: () => this.live.state,
       ownsControls: () => !this.live.post.isWanted,
       camera: (bounds) => {
@@ -399,6 +399,7 @@ export class Stage
   /** Puts what is loaded into the world. */
   enter(scene: LoadedGaussians): Member {
     scene.onChange = () => this.requestFrame();
+    for (const warning of scene.warnings) this.warn(`<gaussian-splat>: ${warning}`);
     return new Member(this.world, scene);
   }
 

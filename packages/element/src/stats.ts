@@ -1,3 +1,4 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import type { QualityChoice } from './attributes.js';
 import type { PaceReport } from './controllers/pace-controller.js';
 import type { SceneState } from './controllers/scene-controller.js';
@@ -29,6 +30,10 @@ export interface SceneStats {
   readonly quality: QualityChoice;
   /** What pictures at rest and in motion are drawn with. */
   readonly pace: PaceReport;
+  /** The direction of the scene's frame that its file says points up, of length 1; null where it says nothing. Of several scenes that of the first. */
+  readonly up: Vector3 | null;
+  /** What of the files is not drawn, or may mean something else than what is drawn, for people; the console has it, too. */
+  readonly warnings: readonly string[];
   /** The element's own scene, then its children, each by itself; empty for an element without children. */
   readonly scenes: readonly PartStats[];
   /** All that is done to the scene for the sake of time or memory, for people; empty where nothing is. */
@@ -95,6 +100,8 @@ export function statsOf(
     },
     quality,
     pace,
+    up: scenes[0]?.bounds.up ?? null,
+    warnings: scenes.flatMap(({ warnings }) => warnings),
     scenes: [],
     why: [
       ...whyPreview(isPreview),

@@ -9,7 +9,7 @@ export interface RendererOptions extends FrameSettings {
 }
 
 /** One image to draw. */
-export interface FrameRequest extends Pick<Picture, 'notes' | 'timer'> {
+export interface FrameRequest extends Pick<Picture, 'filter' | 'notes' | 'timer'> {
   /** One scene, or several that are sorted and blended together. Of equal depths the scene that came first is in front. */
   readonly gaussians: GaussianScene | readonly GaussianScene[];
   /** Its width and height must be those of the target. */

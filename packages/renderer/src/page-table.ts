@@ -1,4 +1,4 @@
-import { multiply, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { multiply, SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
 import type { GaussianPage, Wishes } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
@@ -112,8 +112,14 @@ export class PageTable {
   /**
    * Points every page at a camera, for the commands that are submitted next.
    * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
+   * @param filter in place of those of the scenes
    */
-  look(camera: Camera, pixelArea: number, { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers): void {
+  look(
+    camera: Camera,
+    pixelArea: number,
+    { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
+    filter?: SplatFilter,
+  ): void {
     const shared = {
       sh_cap: shDegree,
       key_bits: depthKeyBits,
@@ -125,14 +131,15 @@ export class PageTable {
     for (const { scene, sceneToWorld, opacity, crop = EVERYWHERE } of this.#placements) {
       const seen = sceneToWorld ? { ...camera, worldToCamera: multiply(camera.worldToCamera, sceneToWorld) } : camera;
       // The same filter whatever the frame is drawn at: in larger pixels it has less variance.
-      const values = cameraValues(seen, scene.origin, (scene.filterVariance ?? constants.DILATION) * pixelArea);
+      const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : scene;
+      const values = cameraValues(seen, scene.origin, filterVariance * pixelArea);
       const own = {
         opacity,
         crop_low: relative(crop.min, scene.origin),
         crop_high: relative(crop.max, scene.origin),
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],
-        antialiased: scene.antialiased ? 1 : 0,
+        antialiased: antialiased ? 1 : 0,
       };
       for (const { count, details } of scene.pages) {
         const place = { has_detail: details ? 1 : 0, splat_count: count, page, first_group: this.firstGroups[page] };

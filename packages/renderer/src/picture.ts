@@ -1,3 +1,4 @@
+import type { SplatFilter } from '@gaussian-splat/core';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { Levers, Quality } from './levers.js';
 import { leversOf } from './levers.js';
@@ -45,6 +46,8 @@ export interface Picture {
   readonly colours?: Composer | undefined;
   /** Depth of what else is in the picture, and where to write that of the splats: a {@link SceneDepth}. */
   readonly depth?: PaintingDepth | undefined;
+  /** Low-pass filter of all scenes of the frame. Default: the one that each was trained with, as far as its file tells. */
+  readonly filter?: SplatFilter | undefined;
   /** What to note besides the image: `tiles` only, and not for every frame. */
   readonly notes?: FrameNotes | undefined;
   /** Notes when each pass ran. */

@@ -244,7 +244,7 @@ export class Viewpoint {
     table.update();
     timer?.startFrame();
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
-    table.look(drawn, pixelArea, levers);
+    table.look(drawn, pixelArea, levers, picture.filter);
     const wishes = recordProjection(encoder, {
       stages,
       bindings,

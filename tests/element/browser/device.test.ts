@@ -210,9 +210,14 @@ describe('the loss of the device', () => {
     });
     try {
       const element = await showLoaded();
+      // The page's own words take no room.
+      element.innerHTML = '<span slot="error"></span>';
+      const before = await screenOf(element);
       devices[devices.length - 1].destroy();
       await nextEvent(element, 'error');
       assertEqual([element.error?.code, element.error?.reason], ['device-lost', 'device-lost/unrecoverable'], 'codes');
+      assert(before.middleOf(isRed), 'a picture before');
+      assertEqual((await screenOf(element)).differences(before), 0, 'colour values of the last picture that differ');
       const { message } = element.error!;
       const said =
         /lost \(reason "destroyed": Device was destroyed\), and no other in its place \(.*: the GPU process does not answer\)\. /;

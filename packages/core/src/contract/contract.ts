@@ -1,3 +1,4 @@
+import type { SplatFilter } from '../filter.js';
 import type { ShDegree } from '../gaussian-cloud.js';
 import type { Vector3 } from '../vector.js';
 
@@ -32,6 +33,8 @@ export interface Contract {
   readonly coordinates?: Coordinates;
   /** True if trained with opacity compensation for the screen-space dilation (Mip-Splatting style). Default false. */
   readonly antialiased?: boolean;
+  /** The screen-space low-pass filter that it was trained with; counts in place of `antialiased`. */
+  readonly filter?: SplatFilter;
   /** SPDX identifier, or a few words. */
   readonly license?: string;
   /** Who is to be named. */

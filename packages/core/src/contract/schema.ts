@@ -2,6 +2,7 @@
  * The JSON Schema of contracts, and the one place that says what a contract's JSON may hold: `parseContract` follows it, and
  * contract.schema.json is its copy for other languages (`node scripts/write-contract-schema.mjs`).
  */
+import { SPLAT_FILTERS, type SplatFilter } from '../filter.js';
 
 /** The part of JSON Schema (draft 2020-12) that the contract uses. */
 export interface Schema {
@@ -316,6 +317,10 @@ export const CONTRACT_SCHEMA: Schema = {
       description: 'The frame that Gaussians are written in',
     },
     antialiased: { type: 'boolean', description: 'Trained with opacity compensation for the dilation; default false' },
+    filter: choice(
+      'Filter it was trained with, in place of antialiased: 0.3 px², 0.3 with compensation, 0.1 with compensation',
+      ...(Object.keys(SPLAT_FILTERS) as SplatFilter[]),
+    ),
     license: text('SPDX identifier, or a few words'),
     attribution: text('Who is to be named'),
   },

@@ -212,7 +212,7 @@ export class SceneSlot implements Part, SceneHost, SourceHost, PlaybackHost, Liv
     return {
       element: this.element,
       runtimeLocation: this.services.runtimeLocation,
-      startWorker: this.services.sceneLoader.spawn,
+      loader: this.services.sceneLoader,
       state: () => this.#live.state,
       ownsControls: () => !stage.live.post.isWanted,
       camera: () => this.#seenFrom(stage.firstView),

@@ -157,11 +157,14 @@ export class SceneController implements ReactiveController {
     if (this.#state === 'waiting' && mayStart) void this.#load(request);
   }
 
-  /** Gives up: the scene cannot be drawn. */
-  fail(error: unknown): void {
+  /**
+   * Gives up: the scene cannot be drawn.
+   * @param clear false keeps the last picture
+   */
+  fail(error: unknown, clear = true): void {
     this.#running.renew();
     const wasShown = this.#state === 'ready' || (this.#scene !== null && !this.isOutgoing);
-    this.#drop(true);
+    this.#drop(clear);
     this.#error = toElementError(error);
     this.#setState('failed');
     if (wasShown) this.#of.emptied();
@@ -235,7 +238,7 @@ export class SceneController implements ReactiveController {
         () => import('../gpu/come-back.js'),
       );
       if (given.aborted) return;
-      this.fail(unrecoverable(error, loss));
+      this.fail(unrecoverable(error, loss), this.isOutgoing);
       if (mayReturn) void this.#comeBack(request, deviceBack);
     } catch (missing) {
       if (!given.aborted) this.fail(missing);

@@ -12,7 +12,7 @@ import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
 export interface ViewHost extends Contents {
-  readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'maxPixelRatio' | 'frameBudget'>;
+  readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'filter' | 'maxPixelRatio' | 'frameBudget'>;
   readonly camera: CameraController;
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
@@ -211,8 +211,9 @@ export class ViewController implements FrameClient {
   }
 
   #applyRendering(viewport: Viewport): void {
-    const { quality, maxShDegree: shDegree } = this.#host.attributes;
-    viewport.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree });
+    const { quality, maxShDegree: shDegree, filter } = this.#host.attributes;
+    const trained = filter === 'auto' ? undefined : filter;
+    viewport.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, filter: trained });
   }
 
   #finishUnseen(): void {

@@ -22,7 +22,8 @@ export async function readCounts(viewport: Viewport, camera: Camera): Promise<Re
  * Counts the splats that some pixel of a view shows. Draws the view with the compute rasterizer, whatever the page uses, and reads all weights back: for
  * panels, not for frames.
  */
-async function countContributing({ device, view: { world, settings } }: Viewport, camera: Camera): Promise<number> {
+async function countContributing({ device, view }: Viewport, camera: Camera): Promise<number> {
+  const { world, settings, filter } = view;
   const { STORAGE, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
   const size =
     4 *
@@ -43,7 +44,7 @@ async function countContributing({ device, view: { world, settings } }: Viewport
   });
   try {
     for (let tries = 0; tries < MOST_TRIES; tries++) {
-      viewpoint.draw(camera, { target, notes: { contributions } });
+      viewpoint.draw(camera, { target, filter, notes: { contributions } });
       if (await viewpoint.isComplete()) break;
     }
     const encoder = device.createCommandEncoder({ label: 'gs.contributions' });

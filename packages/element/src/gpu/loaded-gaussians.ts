@@ -45,6 +45,8 @@ export class LoadedGaussians {
   model: MeshModel | undefined;
   /** Its file has triangles, too. */
   readonly hasMeshes: boolean;
+  /** What of its file is not drawn, for people. */
+  readonly warnings: readonly string[];
   /** Called when the next frame would show more than the last one. */
   onChange: () => void = () => undefined;
   readonly #lease: DeviceLease;
@@ -62,7 +64,13 @@ export class LoadedGaussians {
       live,
       detail = {},
       hasMeshes = false,
-    }: { live?: Timeline | undefined; detail?: DetailLevers; hasMeshes?: boolean | undefined } = {},
+      warnings = [],
+    }: {
+      live?: Timeline | undefined;
+      detail?: DetailLevers;
+      hasMeshes?: boolean | undefined;
+      warnings?: readonly string[] | undefined;
+    } = {},
   ) {
     this.#lease = lease;
     this.#gaussians = gaussians;
@@ -71,6 +79,7 @@ export class LoadedGaussians {
     this.live = live;
     this.#detail = detail;
     this.hasMeshes = hasMeshes;
+    this.warnings = warnings;
     if (live) QueueClock.of(lease.device).isShared = true;
   }
 

@@ -1,4 +1,4 @@
-import type { GaussianSplatError, ShDegree } from '@gaussian-splat/core';
+import type { GaussianSplatError, ShDegree, SplatFilter } from '@gaussian-splat/core';
 import {
   QueueClock,
   Viewpoint,
@@ -18,6 +18,8 @@ export interface Rendering {
   readonly quality: Quality;
   /** Spherical harmonics above this degree are not evaluated. */
   readonly shDegree: ShDegree;
+  /** In place of those of the scenes. */
+  readonly filter?: SplatFilter | undefined;
 }
 
 /** Where frames are drawn: what keeps the device. */
@@ -95,8 +97,9 @@ export class Viewport {
   /** Draws the frames to come like this. */
   setRendering(rendering: Rendering): void {
     const { quality, shDegree } = this.#rendering;
-    if (rendering.quality === quality && rendering.shDegree === shDegree) return;
+    // A filter takes effect with the next frame, whatever draws it.
     this.#rendering = rendering;
+    if (rendering.quality === quality && rendering.shDegree === shDegree) return;
     this.#isPrepared = false;
     this.viewpoint.settings = this.#settings();
     this.#drawnSize = '';
@@ -119,9 +122,10 @@ export class Viewport {
   #settings(levers?: Partial<FrameLevers>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { submissions } = this.#place;
+    const { quality, shDegree } = this.#rendering;
     // Whichever leaves out more: what the page asks for, or the pace.
     const most = Math.max(detail, levers?.detail ?? 0);
-    return { ...this.#rendering, submissions, ...levers, detail: most, splatBudget };
+    return { quality, shDegree, submissions, ...levers, detail: most, splatBudget };
   }
 
   /** True if there is what frames with other levers need. */
@@ -164,11 +168,12 @@ export class Viewport {
   #draw(frame: Frame, content: string): void {
     this.#layout = this.#contents.world.layout;
     const settings = this.#settings(frame.levers);
+    const { filter } = this.#rendering;
     const draw = (drawn: Frame): void => {
       const { camera, target, background: over } = drawn;
-      this.viewpoint.draw(camera, { target, over, ...this.#contents.drawBeneath?.(drawn) }, settings);
+      this.viewpoint.draw(camera, { target, over, filter, ...this.#contents.drawBeneath?.(drawn) }, settings);
     };
-    if (this.#filter) this.#filter.render(frame, content + JSON.stringify(settings), draw);
+    if (this.#filter) this.#filter.render(frame, `${content} ${filter} ${JSON.stringify(settings)}`, draw);
     else draw(frame);
   }
 
@@ -201,8 +206,8 @@ export class Viewport {
   }
 
   /** What it draws at rest. */
-  get view(): { readonly world: World; readonly settings: FrameSettings } {
-    return { world: this.#contents.world, settings: this.#settings() };
+  get view(): { readonly world: World; readonly settings: FrameSettings; readonly filter: SplatFilter | undefined } {
+    return { world: this.#contents.world, settings: this.#settings(), filter: this.#rendering.filter };
   }
 
   /** Frees the GPU memory. What it draws is its owner's. */

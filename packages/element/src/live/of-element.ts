@@ -9,9 +9,9 @@ interface ModelElement extends HTMLElement {
 /** What the attribute `compare` asks for; elements within another have no property of it. Anything but "off" is what it is without the attribute. */
 export const compareOf = ({
   element,
-  startWorker,
-}: Pick<LiveRequest, 'element' | 'startWorker'>): false | LiveRequest['startWorker'] =>
-  ((element as ModelElement).compare ?? element.getAttribute('compare'))?.trim() === 'off' ? false : startWorker;
+  loader,
+}: Pick<LiveRequest, 'element' | 'loader'>): false | LiveRequest['loader']['spawn'] =>
+  ((element as ModelElement).compare ?? element.getAttribute('compare'))?.trim() === 'off' ? false : loader.spawn;
 
 const offered = new WeakSet<HTMLElement>();
 

@@ -1,4 +1,5 @@
 /** Loaded only when a generator is shown: what knows `@gaussian-splat/generator` is behind this module and post-view.ts. */
+import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener } from '../loading/protocol.js';
@@ -7,6 +8,7 @@ import { inputsOf } from './inputs.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
 import { compareOf, offerPanel } from './of-element.js';
+import { readsHeaders } from './read-header.js';
 import { StateReader } from './read-state.js';
 import { RunWatch } from './run-watch.js';
 import type { Contract, Vector3 } from '@gaussian-splat/core';
@@ -63,7 +65,7 @@ export async function openLiveModel(
     const { models, model } = generator;
     for (const { notes, url } of models) for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
     gaussians = await DynamicGaussians.create(device, model.layout, {
-      antialiased: model.contract.antialiased,
+      ...(model.contract.filter ? SPLAT_FILTERS[model.contract.filter] : { antialiased: model.contract.antialiased }),
       memoryBudget: request.memoryBudget,
     });
     generator.sink = gaussians;
@@ -143,7 +145,8 @@ function liveModel(
 async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<ModelSource[]> {
   const { url, chain = [], credentials } = request;
   const contract = await contractOf(request, signal);
-  return [{ url, credentials, contract }, ...chain.map((next) => ({ url: next, credentials }))];
+  const openHeader = readsHeaders(request.loader, request.limits);
+  return [{ url, credentials, contract, openHeader }, ...chain.map((next) => ({ url: next, credentials, openHeader }))];
 }
 
 async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<unknown> {

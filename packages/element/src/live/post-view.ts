@@ -6,11 +6,12 @@ import { inputsOf, type GeneratorInput } from './inputs.js';
 import type { LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
 import { compareOf, offerPanel } from './of-element.js';
+import { readsHeaders } from './read-header.js';
 import { StateReader } from './read-state.js';
 
 export interface PostRequest extends Pick<
   LiveRequest,
-  'credentials' | 'element' | 'runtimeLocation' | 'startWorker' | 'state'
+  'credentials' | 'element' | 'runtimeLocation' | 'loader' | 'limits' | 'state'
 > {
   /** One post-processor, or several one after the other. */
   readonly urls: readonly string[];
@@ -74,7 +75,7 @@ export class PostView implements FrameFilter {
     if (runtimeLocation !== null) setRuntimeLocation(new URL(runtimeLocation, document.baseURI));
     let view: PostView | undefined;
     const post = await PostProcessor.open(
-      urls.map((url) => ({ url, credentials })),
+      urls.map((url) => ({ url, credentials, openHeader: readsHeaders(request.loader, request.limits) })),
       device,
       {
         signal,

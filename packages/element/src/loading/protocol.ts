@@ -1,5 +1,5 @@
 /** What the page and the scene worker say to each other. */
-import type { ErrorData } from '@gaussian-splat/core';
+import type { ErrorData, ModelPlace } from '@gaussian-splat/core';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
@@ -29,6 +29,12 @@ export interface SceneLimits extends LoadLimits {
   readonly origins?: readonly string[];
 }
 
+/** A model whose header is to be read. */
+export interface ModelRequest {
+  readonly place: ModelPlace;
+  readonly limits?: SceneLimits | undefined;
+}
+
 /** A scene to fetch. */
 export interface SceneRequest extends FileRequest {
   /** Precision of the spherical harmonics on the GPU. */
@@ -47,6 +53,8 @@ export interface SceneRequest extends FileRequest {
 export interface LoadedScene {
   readonly packed: PackedGaussians;
   readonly bounds: SceneBounds;
+  /** What of the file is not drawn: see `GaussianCloud.warnings`. */
+  readonly warnings?: readonly string[] | undefined;
   /** The file has triangles, too. */
   readonly hasMeshes?: boolean | undefined;
 }
@@ -89,7 +97,8 @@ export type WorkerRequest =
   | { readonly type: 'file'; readonly request: FileRequest }
   | { readonly type: 'manifest'; readonly request: FileRequest }
   | { readonly type: 'boxes'; readonly request: SceneRequest }
-  | { readonly type: 'box'; readonly request: BoxRequest };
+  | { readonly type: 'box'; readonly request: BoxRequest }
+  | { readonly type: 'model'; readonly request: ModelRequest };
 
 export type PageMessage =
   | (WorkerRequest & { readonly id: number })

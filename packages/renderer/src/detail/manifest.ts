@@ -1,4 +1,4 @@
-import { GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, type Bounds, type ErrorCode, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS } from '../pack/pack.js';
@@ -93,12 +93,13 @@ function shown(value: unknown): string {
 
 /**
  * Checks what was read from a `detail.json`.
- * @throws GaussianSplatError `decode/unsupported` for another format or version, `decode/header` for anything else that is wrong.
+ * @param mostPages pages that the load may take memory for
+ * @throws GaussianSplatError `out-of-memory/budget` for more, `decode/unsupported` for another format or version, `decode/header` for anything else that is wrong.
  */
-export function checkManifest(value: unknown, where: string): DetailManifest {
+export function checkManifest(value: unknown, where: string, mostPages = MOST_PAGES): DetailManifest {
   const manifest = (typeof value === 'object' && value !== null ? value : {}) as Partial<DetailManifest>;
-  const fail = (path: string, expected: string, found: unknown, code = 'decode/header'): never => {
-    throw new GaussianSplatError(code as 'decode/header', {
+  const fail = (path: string, expected: string, found: unknown, code: ErrorCode = 'decode/header'): never => {
+    throw new GaussianSplatError(code, {
       where: `${where}, ${path}`,
       expected,
       found: shown(found),
@@ -138,7 +139,7 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
       (i === 0 || isPlace(instance.parent, trees![instances![0].tree].pages));
     if (!isFine) fail(`instances[${i}]`, 'a tree, where it stands, and the chunk above it', instance);
   });
-  checkPages(manifest as DetailManifest, fail);
+  checkPages(manifest as DetailManifest, fail, Math.min(MOST_PAGES, mostPages));
   return manifest as DetailManifest;
 }
 
@@ -164,7 +165,7 @@ function checkCoding({ version, coding, shPrecision }: Partial<DetailManifest>, 
 }
 
 /** What files and instances must agree in, each of which is fine by itself. */
-function checkPages({ trees, instances }: DetailManifest, fail: Fail): void {
+function checkPages({ trees, instances }: DetailManifest, fail: Fail, mostPages: number): void {
   const lengths = new Map<string, number>();
   const taken = trees.map((tree, t) => {
     const places = new Places(tree);
@@ -183,6 +184,8 @@ function checkPages({ trees, instances }: DetailManifest, fail: Fail): void {
   const counts = trees.map(({ pages }) => pages.reduce((sum, file) => sum + pagesIn(file), 0));
   const count = instances.reduce((sum, { tree }) => sum + counts[tree], 0);
   if (count > MOST_PAGES) fail('instances', `at most ${MOST_PAGES} pages`, count);
+  if (count > mostPages)
+    fail('instances', `at most ${mostPages} pages in a file of this size`, count, 'out-of-memory/budget');
 }
 
 /** Pages that lie in a file. */
@@ -206,7 +209,7 @@ class Places {
   }
 }
 
-type Fail = (path: string, expected: string, found: unknown) => never;
+type Fail = (path: string, expected: string, found: unknown, code?: ErrorCode) => never;
 
 function checkTree(tree: Tree, fail: Fail): void {
   if (!Array.isArray(tree?.pages) || tree.pages.length === 0) fail('pages', 'one file or more', tree);

@@ -16,7 +16,7 @@ import numpy as np
 import onnx
 
 from ..arrays import AnyArray
-from ..contract import Coordinates, Json, metadata
+from ..contract import Coordinates, Filter, Json, metadata
 from ..errors import ExportError
 from ..placement import RULES, Finding, gpu_findings
 from .finish import finish_graph
@@ -67,6 +67,7 @@ def export_module(
     n_max: int | None = None,
     coordinates: Coordinates | None = None,
     antialiased: bool = False,
+    filter: Filter | None = None,
     fps: float | None = None,
     batched: bool = False,
     quiet: bool = False,
@@ -96,7 +97,8 @@ def export_module(
         raise _does_not_take(module, inputs, batched, error) from error
     _require_finite(expected[0], layout)
     given = {"version": 1, "name": name or path.stem}
-    contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **_facts(inputs, n_max, fps, antialiased)}
+    facts = _facts(inputs, n_max, fps, antialiased, filter)
+    contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **facts}
     contract |= {"coordinates": (coordinates or Coordinates()).json(), "license": license, "attribution": attribution}
     refusals = []
     for exporter in _OPSETS:
@@ -247,12 +249,15 @@ def _bindings(model: onnx.ModelProto, inputs: Mapping[str, Role], layout: Layout
     }
 
 
-def _facts(inputs: Mapping[str, Role], n_max: int | None, fps: float | None, antialiased: bool) -> Json:
+def _facts(
+    inputs: Mapping[str, Role], n_max: int | None, fps: float | None, antialiased: bool, filter: Filter | None
+) -> Json:
     durations = [role.binding["_duration"] for role in inputs.values() if role.binding.get("_duration")]
     facts: Json = {"duration": durations[0]} if durations else {}
     if fps is not None:
         facts["fps"] = fps
-    return {**facts, "antialiased": antialiased}
+    compensates = antialiased or filter in ("antialiased", "mip")
+    return {**facts, "antialiased": compensates, **({} if filter is None else {"filter": filter})}
 
 
 def _bounds(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, torch: Any) -> Json:
