@@ -38,6 +38,9 @@ export type DetailChoice = 'auto' | 'off' | number;
 /** What pictures are drawn with: `auto` is the true image at rest and, in motion, as much of it as there is time for. */
 export type QualityChoice = 'auto' | Quality;
 
+/** When the wheel zooms, and when it is the page's. */
+export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
+
 /** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
 export type Reveal = 'auto' | 'manual';
 
@@ -127,7 +130,7 @@ export const ATTRIBUTES = {
   cameraControls: flag(),
   /**
    * Theta, phi, radius: `deg` or `rad`; `m`, `cm`, `mm`, or `%` of the radius that frames the scene (all of a subject that stands alone, of others the 90 % of splats around the middle); `auto`, also
-   * for what is left out at the end. As in `<model-viewer>`, but for `calc()` and `env()`. Where the camera goes: see `getCameraOrbit()`.
+   * for what is left out at the end. As in `<model-viewer>`, but for `calc()` and `env()`. Setting it moves the camera, also when the value is the same as before. Where the camera goes: see `getCameraOrbit()`.
    * @default `0deg 75deg auto`
    */
   cameraOrbit: read(orbitGrammar('0deg 75deg auto')),
@@ -136,6 +139,16 @@ export const ATTRIBUTES = {
    * @default `auto`
    */
   cameraTarget: read(targetGrammar),
+  /**
+   * Least `camera-target`. Without this and `max-camera-target`, visitors pan within the radius that frames the scene.
+   * @default `auto`: no limit
+   */
+  minCameraTarget: read(targetGrammar),
+  /**
+   * Greatest `camera-target`.
+   * @default `auto`: no limit
+   */
+  maxCameraTarget: read(targetGrammar),
   /**
    * Vertical angle, such as `45deg`.
    * @default `auto` (45deg)
@@ -171,11 +184,16 @@ export const ATTRIBUTES = {
    * @default `pan-y`
    */
   touchAction: keyword<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']),
+  /**
+   * When the wheel zooms: `auto` with Ctrl, while the scene has the focus, or where there is nothing to scroll; `always`; `ctrl` with Ctrl only; `none`. At the zoom limit the page scrolls. Two fingers zoom in any case.
+   * @default `auto`
+   */
+  zoom: keyword<WheelZoom>(['auto', 'always', 'ctrl', 'none']),
   /** Leaves the wheel and all that two fingers do to the page; keys do not zoom either. */
   disableZoom: flag(),
   /** Keeps the camera's target where it is. */
   disablePan: flag(),
-  /** Keeps the camera's target where it is on a double click or a double tap, which otherwise pick the point to turn around. */
+  /** Ignores a double click and a double tap, which otherwise pick the point to turn around or, beside the scene, bring the camera back. */
   disableTap: flag(),
   /**
    * `orbit` turns around the target; `fly` looks around, and flies by W, A, S, D, Q and E, with Shift faster.
@@ -211,7 +229,7 @@ export const ATTRIBUTES = {
   interactionPromptThreshold: number(milliseconds(3_000)),
   /**
    * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`,
-   * `show` (`…` stands for `alt`), `loading`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
+   * `show` (`…` stands for `alt`), `loading`, `reset`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
    * @default English
    */
   a11y: text<SpokenStrings | string | null>(),
@@ -323,6 +341,8 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
     camera: {
       orbit: values.cameraOrbit,
       target: values.cameraTarget,
+      minTarget: values.minCameraTarget,
+      maxTarget: values.maxCameraTarget,
       fieldOfView: values.fieldOfView,
       minOrbit: values.minCameraOrbit,
       maxOrbit: values.maxCameraOrbit,

@@ -51,10 +51,6 @@ export class ElementCore implements StageHost {
     return this.#host.autoRotates;
   }
 
-  get retargets(): boolean {
-    return this.#host.retargets;
-  }
-
   get startTime(): number {
     return this.#host.startTime;
   }

@@ -62,6 +62,7 @@ export class Stage
   readonly #view: ViewController;
   readonly #live: LiveWiring;
   readonly #source: SourceController;
+  readonly #input: InputController;
   #counts: ReadCounts | undefined;
   /** Bytes that have arrived, and how many there are. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
@@ -86,7 +87,7 @@ export class Stage
     this.hotspots = new HotspotController(element, this);
     new PrintController(element, () => this.drawNow());
     this.queries = new SceneQueries(this);
-    new InputController(element, this);
+    this.#input = new InputController(element, this);
     const onPageVisibility = (): void => this.playback.suspend();
     element.addController({
       hostConnected: () => {
@@ -186,6 +187,11 @@ export class Stage
 
   get isVisible(): boolean {
     return this.#visibility.isVisible;
+  }
+
+  /** Fingers have moved the camera, and have no Home key. */
+  get offersReset(): boolean {
+    return this.input.enabled && this.isOnShow && this.#input.isTouch && this.camera.isTouched;
   }
 
   /** Somebody would see the scene. */
@@ -332,13 +338,15 @@ export class Stage
     if (this.autoplays && mayPlay && !this.behaviours.motion.isHeld) this.playback.play();
   }
 
-  act(action: CameraAction): void {
-    this.behaviours.act(action);
+  act(action: CameraAction): boolean {
+    return this.behaviours.act(action);
   }
 
+  /** Beside the scene is where somebody has lost it. */
   pick(clientX: number, clientY: number): void {
     void this.queries.positionFromPoint(clientX, clientY).then((point) => {
-      if (point !== null && this.retargets) this.behaviours.aimAt([point.x, point.y, point.z]);
+      if (point === null) this.act({ type: 'reset' });
+      else if (this.input.pan) this.behaviours.aimAt([point.x, point.y, point.z]);
     });
   }
 

@@ -15,6 +15,7 @@ export const WORDS = {
   'interaction-prompt': 'Drag to look around',
   show: 'Show …',
   loading: 'Loading the 3D scene',
+  reset: 'Bring the view back',
   pause: 'Stop the motion',
   play: 'Start the motion',
   details: 'Details',

@@ -10,6 +10,8 @@ export interface CameraSettings {
   readonly minOrbit: OrbitSetting;
   readonly maxOrbit: OrbitSetting;
   readonly target: TargetSetting;
+  readonly minTarget: TargetSetting;
+  readonly maxTarget: TargetSetting;
   readonly fieldOfView: AngleSetting;
   readonly minFieldOfView: AngleSetting;
   readonly maxFieldOfView: AngleSetting;
@@ -71,22 +73,23 @@ export function limitsOf(settings: CameraSettings, bounds: SceneBounds, aspect: 
   const { minOrbit, maxOrbit } = settings;
   const pose = poseOf(settings, bounds, aspect);
   const framing = framingDistance(bounds.radius, pose.fieldOfView, aspect);
-  const free = { x: Infinity, y: Infinity, z: Infinity };
+  const place = (setting: TargetSetting, auto: number): Pick<Pose, 'x' | 'y' | 'z'> => {
+    const [x, y, z] = setting.map((value) => (value === 'auto' ? auto : value));
+    return { x, y, z };
+  };
   return {
     min: {
       theta: angle(minOrbit.theta, -Infinity),
       phi: Math.max(0, angle(minOrbit.phi, Math.min(AUTO.minPhi, pose.phi))),
       radius: distance(minOrbit.radius, Math.min(AUTO.minFramings * framing, pose.radius), framing),
-      x: -free.x,
-      y: -free.y,
-      z: -free.z,
+      ...place(settings.minTarget, -Infinity),
       fieldOfView: angle(settings.minFieldOfView, Math.min(AUTO.minFieldOfView, pose.fieldOfView)),
     },
     max: {
       theta: angle(maxOrbit.theta, Infinity),
       phi: Math.min(Math.PI, angle(maxOrbit.phi, Math.max(AUTO.maxPhi, pose.phi))),
       radius: distance(maxOrbit.radius, Math.max(AUTO.maxFramings * framing, pose.radius), framing),
-      ...free,
+      ...place(settings.maxTarget, Infinity),
       fieldOfView: angle(settings.maxFieldOfView, Math.max(AUTO.maxFieldOfView, pose.fieldOfView)),
     },
   };

@@ -1,5 +1,5 @@
-import type { Camera, Vector3 } from '@gaussian-splat/core';
-import { cameraOfPose, nearPlane, type ViewerFrame } from '../camera/orbit.js';
+import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { cameraOfPose, nearPlane, toViewer, type ViewerFrame } from '../camera/orbit.js';
 import { OrbitCamera, type Pivot } from '../camera/orbit-camera.js';
 import { frameOf, limitsOf, poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
@@ -72,6 +72,11 @@ export class CameraController {
     this.#camera.pivot = pivot;
   }
 
+  /** A person has moved the camera since it stood where the page put it. */
+  get isTouched(): boolean {
+    return this.#isTouched;
+  }
+
   get isMoving(): boolean {
     return this.#camera.moving;
   }
@@ -81,13 +86,17 @@ export class CameraController {
     return cameraOfPose(this.#camera.now, this.viewerFrame, width, height, nearPlane(this.#bounds));
   }
 
-  /** New attributes. What did not change keeps the place that a person may have given it. */
-  applySettings(settings: CameraSettings): void {
+  /**
+   * New attributes. What was not set keeps the place that a person may have given it.
+   * @param set what the page has set, be it to the value that it had
+   */
+  applySettings(settings: CameraSettings, set: ReadonlySet<keyof CameraSettings> = new Set()): void {
     const old = this.#settings;
     this.#settings = settings;
     this.#camera.limits = limitsOf(settings, this.#bounds, this.#aspect);
     const { theta, phi, radius, x, y, z, fieldOfView } = poseOf(settings, this.#bounds, this.#aspect);
-    const changed = (key: keyof CameraSettings): boolean => JSON.stringify(old[key]) !== JSON.stringify(settings[key]);
+    const changed = (key: keyof CameraSettings): boolean =>
+      set.has(key) || JSON.stringify(old[key]) !== JSON.stringify(settings[key]);
     this.#source = 'none';
     if (changed('up')) return this.#reframe('none');
     if (changed('fieldOfView')) this.#camera.setGoal({ fieldOfView });
@@ -136,7 +145,7 @@ export class CameraController {
   /** Where the attributes put the camera, whatever a person did since. */
   reset(source: CameraChangeSource): void {
     this.#source = source;
-    this.#userDistance = false;
+    this.#userDistance = this.#isTouched = false;
     this.#camera.setGoal(poseOf(this.#settings, this.#bounds, this.#aspect));
     this.#camera.unwind();
     this.#onChange();
@@ -166,16 +175,21 @@ export class CameraController {
     this.#moveByUser();
   }
 
-  /** A person changes the distance by a factor. */
-  zoomBy(factor: number): void {
-    this.#userDistance = true;
+  /** A person changes the distance by a factor. @returns false at the limit */
+  zoomBy(factor: number): boolean {
+    const { radius } = this.#camera.goal;
     this.#camera.zoomBy(factor);
+    if (this.#camera.goal.radius === radius) return false;
+    this.#userDistance = true;
     this.#moveByUser();
+    return true;
   }
 
   /** A person moves the camera sideways, in shares of the picture's height. */
   panBy(right: number, up: number): void {
+    const { x, y, z } = this.#camera.goal;
     this.#camera.panBy(right, up);
+    this.#keepNear([x, y, z]);
     this.#moveByUser();
   }
 
@@ -211,6 +225,19 @@ export class CameraController {
     const changed = moved || this.#jumped;
     this.#jumped = false;
     return changed ? this.#source : null;
+  }
+
+  /** Keeps the target in the ball that is framed, so that no pan loses the scene. One that was farther out stays where it was. Limits that the page has set count alone. */
+  #keepNear(before: Vector3): void {
+    const { minTarget, maxTarget } = this.#settings;
+    if (this.#camera.pivot === 'eye' || [...minTarget, ...maxTarget].some((limit) => limit !== 'auto')) return;
+    const middle = toViewer(this.viewerFrame, this.#bounds.center);
+    const { x, y, z } = this.#camera.goal;
+    const [from, to] = [before, [x, y, z] as const].map((place) => subtract(place, middle));
+    const share = Math.max(this.#bounds.radius, Math.hypot(...from)) / Math.hypot(...to);
+    if (share >= 1) return;
+    const [nearX, nearY, nearZ] = middle.map((value, axis) => value + share * to[axis]);
+    this.#camera.setGoal({ x: nearX, y: nearY, z: nearZ });
   }
 
   #moveByUser(): void {

@@ -26,7 +26,7 @@ export interface HotspotPlace {
   readonly canvasPosition: { readonly x: number; readonly y: number } | null;
   /** False where its normal points away from the camera. */
   readonly facingCamera: boolean;
-  /** False where it faces away, is hidden by scenery, or is behind the camera. */
+  /** False where it faces away, is hidden by scenery, or is behind the camera or outside of the frame. */
   readonly visible: boolean;
 }
 
@@ -183,8 +183,11 @@ export class HotspotController implements ReactiveController {
   }
 
   #show(hotspot: Hotspot, box: HTMLElement): void {
-    const isVisible = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
-    box.classList.toggle('hidden', !isVisible);
+    const { x, y } = hotspot;
+    const isOpen = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
+    // Of a label whose point has left the frame a part may still be there to read.
+    box.classList.toggle('hidden', !isOpen);
+    const isVisible = isOpen && x >= 0 && y >= 0 && x <= this.#host.clientWidth && y <= this.#host.clientHeight;
     hotspot.isVisible = isVisible;
     for (const element of hotspot.elements) {
       if (this.#told.get(element) === isVisible) continue;
