@@ -155,6 +155,10 @@ export const ATTRIBUTES = {
    */
   fieldOfView: read(fieldOfViewGrammar),
   /**
+   * Views that visitors can choose from: JSON or, as a property, a list `[{ name, orbit, target, fieldOfView }]`; or the URL of such a file, of a trainer's `cameras.json`, or of the settings of SuperSplat. Children with `data-orbit` are views, too.
+   */
+  views: text<object | string | null>(),
+  /**
    * Least `camera-orbit`.
    * @default `auto`: phi 22.5deg, radius 2 %
    */
@@ -228,8 +232,8 @@ export const ATTRIBUTES = {
    */
   interactionPromptThreshold: number(milliseconds(3_000)),
   /**
-   * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`,
-   * `show` (`…` stands for `alt`), `loading`, `reset`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
+   * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`, `keys-views`,
+   * `views`, `next-view`, `previous-view`, `show` (`…` stands for `alt`), `loading`, `reset`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
    * @default English
    */
   a11y: text<SpokenStrings | string | null>(),

@@ -143,8 +143,18 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   async #loadFly(): Promise<void> {
     this.#isFlyLoaded = true;
     const { FlyController } = await import('./controllers/fly-controller.js');
-    this.#movers.push(new FlyController(this.#element, this));
+    this.add(new FlyController(this.#element, this));
     this.#element.requestUpdate();
+  }
+
+  /** Something else that moves the camera by itself. */
+  add(mover: Mover): void {
+    this.#movers.push(mover);
+  }
+
+  /** What turns by itself waits once more. */
+  rest(): void {
+    this.#autoRotate.rest();
   }
 
   /** Moves what moves by itself on to a frame. */
@@ -184,10 +194,10 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
 
   #touched(): void {
     this.prompt.dismiss();
-    this.#autoRotate.rest();
+    this.rest();
   }
 
-  readonly #onBlur = (): void => this.#autoRotate.rest();
+  readonly #onBlur = (): void => this.rest();
 }
 
 /** True while a person has come to the picture by keyboard, and nothing may move under their hands. */

@@ -35,6 +35,10 @@ export class ElementCore implements StageHost {
     return this.#host.strings;
   }
 
+  get views(): StageHost['views'] {
+    return this.#host.views;
+  }
+
   get liveValues(): StageHost['liveValues'] {
     return this.#host.liveValues;
   }

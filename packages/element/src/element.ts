@@ -48,6 +48,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @slot interaction-prompt - Shown to people who have not touched the scene yet.
  * @slot fallback - Shown where the browser has no WebGPU.
  * @slot error - Shown if the scene cannot be.
+ * @slot view - Buttons of the page for its views, each with `data-orbit`.
  * @slot hotspot-* - A label of the page at the point of the scene that its `data-position` names.
  * @csspart canvas - The picture.
  * @csspart poster - The image of the `poster` attribute.
@@ -55,6 +56,10 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @csspart poster-cue - The sign in the middle of that button.
  * @csspart prompt - The default interaction prompt.
  * @csspart reset-button - Brings the camera back: shown to visitors who have moved it with their fingers.
+ * @csspart views - The bar of the views.
+ * @csspart view-name - The name of the present view in it.
+ * @csspart previous-view - Its button for the view before.
+ * @csspart next-view - Its button for the next view.
  * @csspart pause-button - The visitor's button for what `auto-rotate` and `autoplay` move.
  * @csspart progress-track - The progress bar's ground.
  * @csspart progress-bar - The progress bar.
@@ -70,6 +75,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty --interaction-prompt-color - Its colour.
  * @cssproperty [--pause-button-display=block] - `none` takes the pause button away: for pages that bring a control of their own.
  * @cssproperty [--reset-button-display=block] - `none` takes the reset button away.
+ * @cssproperty [--views-display=flex] - `none` takes the bar of the views away.
  * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
  * @cssproperty [--max-hotspot-opacity=1] - Opacity of the others.
  * @cssproperty --message-background - Ground of the default texts.
@@ -86,6 +92,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is on show while the rest loads.
  * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
+ * @fires {CustomEvent<ViewChangeDetail>} view-change - The camera sets out for a view of the list.
  * @fires {Event} poster-dismissed - The poster has given way to the scene.
  * @fires {CustomEvent<VisibilityDetail>} model-visibility - The element has come into sight, or left it.
  * @fires {CustomEvent<ElementError>} generator-error - A run of the generator failed; the last good frame stays.
@@ -316,6 +323,9 @@ export class GaussianSplatElement extends ViewingMethods {
       },
       get autoRotates() {
         return element.autoRotate;
+      },
+      get views() {
+        return element.views;
       },
       get strings() {
         return element.#strings;

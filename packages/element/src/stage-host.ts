@@ -40,6 +40,7 @@ export interface StageHost {
   /** The attribute `time`, in seconds; 0 without. */
   readonly startTime: number;
   readonly autoRotates: boolean;
+  readonly views: object | string | null;
   readonly strings: SpokenStrings;
   readonly liveValues: Omit<LiveState, 'timeSeconds'>;
   readonly canvas: HTMLCanvasElement | null;

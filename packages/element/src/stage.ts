@@ -1,4 +1,4 @@
-import type { Camera } from '@gaussian-splat/core';
+import { loadModule, type Camera } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
 import type { ReactiveControllerHost } from 'lit';
 import { Behaviours, type BehaviourHost } from './behaviours.js';
@@ -24,6 +24,7 @@ import type { GpuScene } from './gpu/gpu-scene.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
 import { SceneQueries, type QueryHost } from './scene-queries.js';
 import type { Source, StageHost } from './stage-host.js';
+import type { Tour, TourHost } from './views/tour.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 
 /**
@@ -43,6 +44,7 @@ export class Stage
     InputHost,
     BehaviourHost,
     QueryHost,
+    TourHost,
     LiveHost
 {
   readonly camera: CameraController;
@@ -63,6 +65,7 @@ export class Stage
   readonly #live: LiveWiring;
   readonly #source: SourceController;
   readonly #input: InputController;
+  #tour: Promise<Tour> | undefined;
   #counts: ReadCounts | undefined;
   /** Bytes that have arrived, and how many there are. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
@@ -98,6 +101,13 @@ export class Stage
       hostUpdated: () => this.#onUpdate(),
       hostDisconnected: () => document.removeEventListener('visibilitychange', onPageVisibility),
     });
+  }
+
+  /** What flies from view to view: fetched by pages that have views, or ask for a flight. */
+  tour(): Promise<Tour> {
+    return (this.#tour ??= loadModule('the code for views', () => import('./views/tour.js')).then(
+      ({ Tour }) => new Tour(this.element, this),
+    ));
   }
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
@@ -360,6 +370,8 @@ export class Stage
   }
 
   #onUpdate(): void {
+    if (this.#tour === undefined && (this.views || this.element.querySelector(':scope > [data-orbit]')))
+      void this.tour();
     this.reveal.settle();
     this.detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
   }

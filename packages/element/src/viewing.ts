@@ -2,6 +2,8 @@ import type { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camer
 import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
 import type { SceneBox } from './scene-queries.js';
+import type { CameraView } from './views/camera-view.js';
+import type { FlightOptions, PathOptions } from './views/tour.js';
 
 /** Why there is no picture of a device that is lost. */
 const LOST = 'The GPU device was lost before the picture was drawn: take it again after the event contextrestored';
@@ -59,6 +61,38 @@ export abstract class ViewingMethods extends MediaProperties {
   resetCamera(): void {
     this.applyAttributes();
     this.stage.camera.reset('none');
+  }
+
+  /**
+   * Flies to a view: one of the page's list by its name or its place in it (from 0), or any other. Waits for the scene. People who want less motion are there at once.
+   * @returns fulfils at the end: true on arrival, false where a visitor, an attribute or another flight has taken the camera. Rejects with
+   * `argument/camera` for a view that is malformed or has no such name.
+   */
+  async flyTo(view: CameraView | string | number, options?: FlightOptions): Promise<boolean> {
+    return (await this.stage.tour()).flyTo(view, options);
+  }
+
+  /** Flies to the next view of the list, after the last to the first. As {@link flyTo}. */
+  async nextView(options?: FlightOptions): Promise<boolean> {
+    return (await this.stage.tour()).step(1, options);
+  }
+
+  /** Flies to the view before. As {@link flyTo}. */
+  async previousView(options?: FlightOptions): Promise<boolean> {
+    return (await this.stage.tour()).step(-1, options);
+  }
+
+  /** Flies along all views of the list on one smooth path, or along the keyframes that its file has. As {@link flyTo}. */
+  async flyAlong(options?: PathOptions): Promise<boolean> {
+    return (await this.stage.tour()).flyAlong(options);
+  }
+
+  /**
+   * Puts the camera on that path, at once: for scenes that follow the page's scrolling.
+   * @param share 0..1, from the first view to the last
+   */
+  async showAlong(share: number): Promise<void> {
+    return (await this.stage.tour()).showAlong(share);
   }
 
   /** Lets the interaction prompt come again, as if nobody had touched the scene. */

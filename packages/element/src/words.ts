@@ -21,9 +21,12 @@ export const WORDS = {
   details: 'Details',
 } as const;
 
+/** Words of the bar of the views, which few pages have. */
+export type ViewWord = 'views' | 'next-view' | 'previous-view' | 'keys-views';
+
 /** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
 export type SpokenStrings = Readonly<
-  Partial<Record<ViewName | keyof typeof WORDS | `error-${ElementErrorCode}`, string>>
+  Partial<Record<ViewName | keyof typeof WORDS | `error-${ElementErrorCode}` | ViewWord, string>>
 >;
 
 /** A word of the page, or the English one. */

@@ -68,10 +68,13 @@ export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: nu
   };
 }
 
-/** The limits that the attributes ask for. An automatic limit gives way to a pose that was asked for outright. */
-export function limitsOf(settings: CameraSettings, bounds: SceneBounds, aspect: number): PoseLimits {
+/** The limits that the attributes ask for. An automatic limit gives way to a pose that was asked for outright: by the attributes, and by a flight. */
+export function limitsOf(settings: CameraSettings, bounds: SceneBounds, aspect: number, asked?: Pose): PoseLimits {
   const { minOrbit, maxOrbit } = settings;
   const pose = poseOf(settings, bounds, aspect);
+  const poses = [pose, asked ?? pose];
+  const least = (auto: number, key: keyof Pose): number => Math.min(auto, ...poses.map((each) => each[key]));
+  const most = (auto: number, key: keyof Pose): number => Math.max(auto, ...poses.map((each) => each[key]));
   const framing = framingDistance(bounds.radius, pose.fieldOfView, aspect);
   const place = (setting: TargetSetting, auto: number): Pick<Pose, 'x' | 'y' | 'z'> => {
     const [x, y, z] = setting.map((value) => (value === 'auto' ? auto : value));
@@ -80,17 +83,17 @@ export function limitsOf(settings: CameraSettings, bounds: SceneBounds, aspect: 
   return {
     min: {
       theta: angle(minOrbit.theta, -Infinity),
-      phi: Math.max(0, angle(minOrbit.phi, Math.min(AUTO.minPhi, pose.phi))),
-      radius: distance(minOrbit.radius, Math.min(AUTO.minFramings * framing, pose.radius), framing),
+      phi: Math.max(0, angle(minOrbit.phi, least(AUTO.minPhi, 'phi'))),
+      radius: distance(minOrbit.radius, least(AUTO.minFramings * framing, 'radius'), framing),
       ...place(settings.minTarget, -Infinity),
-      fieldOfView: angle(settings.minFieldOfView, Math.min(AUTO.minFieldOfView, pose.fieldOfView)),
+      fieldOfView: angle(settings.minFieldOfView, least(AUTO.minFieldOfView, 'fieldOfView')),
     },
     max: {
       theta: angle(maxOrbit.theta, Infinity),
-      phi: Math.min(Math.PI, angle(maxOrbit.phi, Math.max(AUTO.maxPhi, pose.phi))),
-      radius: distance(maxOrbit.radius, Math.max(AUTO.maxFramings * framing, pose.radius), framing),
+      phi: Math.min(Math.PI, angle(maxOrbit.phi, most(AUTO.maxPhi, 'phi'))),
+      radius: distance(maxOrbit.radius, most(AUTO.maxFramings * framing, 'radius'), framing),
       ...place(settings.maxTarget, Infinity),
-      fieldOfView: angle(settings.maxFieldOfView, Math.max(AUTO.maxFieldOfView, pose.fieldOfView)),
+      fieldOfView: angle(settings.maxFieldOfView, most(AUTO.maxFieldOfView, 'fieldOfView')),
     },
   };
 }

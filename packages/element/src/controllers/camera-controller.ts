@@ -1,9 +1,10 @@
 import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { cameraOfPose, nearPlane, toViewer, type ViewerFrame } from '../camera/orbit.js';
+import { cameraOfPose, nearPlane, toViewer, type Pose, type ViewerFrame } from '../camera/orbit.js';
 import { OrbitCamera, type Pivot } from '../camera/orbit-camera.js';
 import { frameOf, limitsOf, poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
 import type { CameraChangeSource } from '../events.js';
+import type { ViewContext } from '../views/camera-view.js';
 
 /** All of a subject that stands alone is shown, of other scenes their middle. */
 const framed = (bounds: SceneBounds): SceneBounds => ({ ...bounds, ...bounds.subject });
@@ -33,6 +34,8 @@ export class CameraController {
   /** The element itself has turned it. */
   #isTurned = false;
   #jumped = false;
+  /** Where a flight has put the camera: automatic limits give way to it. */
+  #asked: Pose | undefined;
   #lastStep: number | undefined;
 
   /** @param onChange the camera is no longer where it was drawn. */
@@ -40,7 +43,7 @@ export class CameraController {
     this.#settings = settings;
     this.#onChange = onChange;
     this.#camera = new OrbitCamera(poseOf(settings, UNKNOWN_BOUNDS, 1));
-    this.#camera.limits = limitsOf(settings, UNKNOWN_BOUNDS, 1);
+    this.#limit();
   }
 
   get orbit(): CameraOrbit {
@@ -77,6 +80,27 @@ export class CameraController {
     return this.#isTouched;
   }
 
+  /** Where it is going. */
+  get goal(): Pose {
+    return this.#camera.goal;
+  }
+
+  /** What views are read against. */
+  get context(): ViewContext {
+    const [settings, bounds, aspect, from] = [this.#settings, this.#bounds, this.#aspect, this.#camera.goal];
+    return { settings, bounds, frame: this.viewerFrame, aspect, from };
+  }
+
+  /** Puts the camera there at once, within the limits that the page has set: a step of a flight. */
+  moveTo(pose: Pose): void {
+    this.#source = 'none';
+    this.#userDistance = this.#isTouched = true;
+    this.#asked = pose;
+    this.#limit();
+    this.#camera.setGoal(pose);
+    this.jumpToGoal();
+  }
+
   get isMoving(): boolean {
     return this.#camera.moving;
   }
@@ -93,7 +117,7 @@ export class CameraController {
   applySettings(settings: CameraSettings, set: ReadonlySet<keyof CameraSettings> = new Set()): void {
     const old = this.#settings;
     this.#settings = settings;
-    this.#camera.limits = limitsOf(settings, this.#bounds, this.#aspect);
+    this.#limit();
     const { theta, phi, radius, x, y, z, fieldOfView } = poseOf(settings, this.#bounds, this.#aspect);
     const changed = (key: keyof CameraSettings): boolean =>
       set.has(key) || JSON.stringify(old[key]) !== JSON.stringify(settings[key]);
@@ -121,7 +145,7 @@ export class CameraController {
   /** More of the scene is known: the camera goes where it would have stood, unless a person has moved it. */
   refine(bounds: SceneBounds): void {
     this.#bounds = framed(bounds);
-    this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect);
+    this.#limit();
     if (!this.#isTouched) {
       this.#source = 'automatic';
       const { theta, ...pose } = poseOf(this.#settings, this.#bounds, this.#aspect);
@@ -134,7 +158,7 @@ export class CameraController {
   setAspect(aspect: number): void {
     if (aspect === this.#aspect) return;
     this.#aspect = aspect;
-    this.#camera.limits = limitsOf(this.#settings, this.#bounds, aspect);
+    this.#limit();
     if (this.#userDistance) return;
     this.#camera.setGoal({ radius: poseOf(this.#settings, this.#bounds, aspect).radius });
     if (!this.#camera.moving) return;
@@ -146,6 +170,8 @@ export class CameraController {
   reset(source: CameraChangeSource): void {
     this.#source = source;
     this.#userDistance = this.#isTouched = false;
+    this.#asked = undefined;
+    this.#limit();
     this.#camera.setGoal(poseOf(this.#settings, this.#bounds, this.#aspect));
     this.#camera.unwind();
     this.#onChange();
@@ -246,8 +272,11 @@ export class CameraController {
     this.#onChange();
   }
 
+  #limit(): void {
+    this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect, this.#asked);
+  }
+
   #reframe(source: CameraChangeSource): void {
-    this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect);
     this.reset(source);
     this.#jumped = true;
     this.jumpToGoal();

@@ -77,7 +77,7 @@ export class HotspotController implements ReactiveController {
 
   hostConnected(): void {
     this.#observer = new MutationObserver(() => this.#collect());
-    const attributeFilter = ['slot', 'data-position', 'data-normal'];
+    const attributeFilter = ['slot', 'data-position', 'data-normal', 'data-orbit'];
     this.#observer.observe(this.#host, { childList: true, subtree: true, attributeFilter });
     this.#collect();
   }
@@ -126,8 +126,8 @@ export class HotspotController implements ReactiveController {
     this.#hotspots = new Map(
       [...groupBySlot(children)].map(([name, elements]) => [name, this.#read(elements, before.get(name))]),
     );
-    if (before.size + this.#hotspots.size === 0) return;
     this.#host.requestUpdate();
+    if (before.size + this.#hotspots.size === 0) return;
     // Where they are now is known once their boxes are.
     void this.#host.updateComplete.then(() => this.#look());
   }
