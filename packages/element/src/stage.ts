@@ -111,8 +111,8 @@ export class Stage
   }
 
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
-  drawNow(): HTMLCanvasElement | null {
-    return this.scene.isPreview ? null : this.#view.drawNow();
+  drawNow(...picture: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
+    return this.scene.isPreview ? null : this.#view.drawNow(...picture);
   }
 
   /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */

@@ -1,3 +1,4 @@
+import { loadModule } from '@gaussian-splat/core';
 import type { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
 import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
@@ -5,15 +6,17 @@ import type { SceneBox } from './scene-queries.js';
 import type { CameraView } from './views/camera-view.js';
 import type { FlightOptions, PathOptions } from './views/tour.js';
 
-/** Why there is no picture of a device that is lost. */
-const LOST = 'The GPU device was lost before the picture was drawn: take it again after the event contextrestored';
-
 /** A picture to take. */
 export interface PictureOptions {
   /** Default `image/png`. */
   readonly mimeType?: string;
   /** 0..1, for formats that lose some. */
   readonly qualityArgument?: number;
+  /** Pixels. Default: as large as the element is drawn; one of the two alone keeps its shape. */
+  readonly width?: number;
+  readonly height?: number;
+  /** A CSS colour behind the scene. Default: transparent. */
+  readonly background?: string;
 }
 
 /** What scripts ask of the picture: its poster, its camera, what lies under a point of it, and the picture itself. */
@@ -127,32 +130,22 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /**
-   * The picture as it is now, drawn anew and read in the same task.
-   * @returns rejects with an `InvalidStateError` where no scene is on show, or the element has no size.
+   * The picture as it is on the screen now, with the CSS filters of the element, drawn anew. A colour that exceeds its alpha has no place in a transparent picture: give `background` where the scene has such.
+   * @returns rejects with an `InvalidStateError` where no scene is on show, or the element has no size; with a `RangeError` for a size that the GPU
+   * cannot draw, and a `TypeError` for a background that is no colour.
    */
-  async toBlob({ mimeType = 'image/png', qualityArgument }: PictureOptions = {}): Promise<Blob> {
-    const canvas = this.#drawnCanvas();
-    const { scene } = this.stage.scene;
-    const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, mimeType, qualityArgument));
-    // A device that was lost before it had drawn leaves an empty picture, and says so later.
-    if (scene && (await scene.wasLost())) throw new DOMException(LOST, 'InvalidStateError');
-    if (blob === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
-    return blob;
+  async toBlob(options: PictureOptions = {}): Promise<Blob> {
+    const { takePicture } = await loadModule('the code for pictures', () => import('./picture.js'));
+    this.applyAttributes();
+    return takePicture(this.stage, options);
   }
 
-  /** The same as a `data:` URL, at once. Throws an `InvalidStateError` where no scene is on show, or the element has no size. */
+  /** The same as a `data:` URL, at once and without CSS filters. Throws an `InvalidStateError` where no scene is on show, or the element has no size. */
   toDataURL(mimeType = 'image/png', qualityArgument?: number): string {
-    return this.#drawnCanvas().toDataURL(mimeType, qualityArgument);
-  }
-
-  #drawnCanvas(): HTMLCanvasElement {
     this.applyAttributes();
     const canvas = this.stage.drawNow();
     if (canvas === null)
-      throw new DOMException(
-        'There is nothing to take a picture of: expected a scene on show in an element that has a size',
-        'InvalidStateError',
-      );
-    return canvas;
+      throw new DOMException('Expected a scene on show in an element that has a size', 'InvalidStateError');
+    return canvas.toDataURL(mimeType, qualityArgument);
   }
 }

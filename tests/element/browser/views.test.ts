@@ -34,7 +34,7 @@ const code = (promise: Promise<unknown>): Promise<string> =>
     (error: { code: string }) => error.code,
   );
 
-afterEach(resetMouse);
+afterEach(() => resetMouse());
 
 describe('flyTo', () => {
   it('goes there in its time, and fulfils on arrival', async () => {

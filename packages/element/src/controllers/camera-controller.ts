@@ -1,5 +1,5 @@
 import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
-import { cameraOfPose, nearPlane, toViewer, type Pose, type ViewerFrame } from '../camera/orbit.js';
+import { cameraOfPose, framingDistance, nearPlane, toViewer, type Pose, type ViewerFrame } from '../camera/orbit.js';
 import { OrbitCamera, type Pivot } from '../camera/orbit-camera.js';
 import { frameOf, limitsOf, poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
@@ -47,8 +47,8 @@ export class CameraController {
   }
 
   get orbit(): CameraOrbit {
-    const { theta, phi, radius } = this.#camera.now;
-    return new CameraOrbit(theta, phi, radius);
+    const { theta, phi, radius, fieldOfView } = this.#camera.now;
+    return new CameraOrbit(theta, phi, radius, framingDistance(this.#bounds.radius, fieldOfView, this.#aspect));
   }
 
   get target(): CameraTarget {

@@ -136,16 +136,18 @@ export class ViewController implements FrameClient {
 
   /**
    * Draws a frame within the running task, for those who read the canvas before it ends: afterwards a WebGPU canvas is blank to readers.
+   * @param size of the picture; default that of the element
+   * @param background premultiplied, behind the splats
    * @returns the canvas, or null where there is nothing to draw.
    */
-  drawNow(): HTMLCanvasElement | null {
+  drawNow(size?: PixelSize, background?: Frame['background']): HTMLCanvasElement | null {
     const scene = this.#scene;
     const canvas = this.#host.canvas;
     if (scene === null || scene.isLost || this.#first !== undefined || canvas === null) return null;
-    const pixels = this.#pixelsOf(scene);
+    const pixels = this.#pixelsOf(scene) && (size ?? this.#pixelsOf(scene));
     if (pixels === null) return null;
     this.#applyRendering(scene);
-    scene.render(this.#frameRequest(scene, pixels));
+    scene.render({ ...this.#frameRequest(scene, pixels), background });
     return canvas;
   }
 
