@@ -198,9 +198,9 @@ test('a view that turns to the scene lacks nothing, though hardly anything was v
     await device.queue.onSubmittedWorkDone();
   };
   for (let frame = 0; frame < 24; frame++) await look([-300, -5, 50]);
-  const away = await renderer.readStatistics();
+  const away = await renderer.statistics();
   await look([50, 0, 50]);
-  const towards = await renderer.readStatistics();
+  const towards = await renderer.statistics();
   console.log(`${away.visible} splats visible, then ${towards.visible}; ${towards.overflow} left out`);
   assert.ok(scene.count > 1.5e5 && away.visible === 0 && towards.visible > 100);
   assert.equal(towards.overflow + towards.pairOverflow, 0);

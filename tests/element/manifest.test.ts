@@ -5,6 +5,7 @@ import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import ts from 'typescript';
 import { GaussianSplatElement } from '@gaussian-splat/element/element.js';
+import { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 
 const folder = fileURLToPath(new URL('../../packages/element/', import.meta.url));
 const source = (name: string): string => readFileSync(`${folder}src/${name}`, 'utf8');
@@ -64,6 +65,24 @@ check('defines gaussian-splat in modules that exist', () => {
 check('names the attributes that the element observes, each with a description', () => {
   assert.deepEqual(namesOf(element?.attributes), [...GaussianSplatElement.observedAttributes].sort());
   for (const { name, description } of element?.attributes ?? []) assert.ok(description, name);
+});
+
+check('names the attributes of the children, and only members that they have, each described', () => {
+  for (const [tag, kind] of [
+    ['splat-scene', SplatSceneElement],
+    ['splat-mesh', SplatMeshElement],
+  ] as const) {
+    const child = manifest?.modules.flatMap(({ declarations }) => declarations).find((d) => d.tagName === tag);
+    // `hidden` is the platform's, and in no table.
+    const observed = kind.observedAttributes.filter((name) => name !== 'hidden').sort();
+    assert.deepEqual(namesOf(child?.attributes), observed, tag);
+    const reactive = new Set([...kind.elementProperties.keys()].map(String));
+    for (const { name, description, type, return: returned } of child?.members ?? []) {
+      assert.ok(name in kind.prototype || reactive.has(name), `${tag} ${name}`);
+      assert.ok(description && (type ?? returned?.type)?.text, `${tag} ${name}: description and type`);
+    }
+    assert.ok(namesOf(child?.members).includes('currentTime'), tag);
+  }
 });
 
 check('names the events of the typed map, with their types, and every one that the sources dispatch', () => {

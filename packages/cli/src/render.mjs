@@ -157,7 +157,7 @@ async function render(options) {
   const renderer = new Renderer(device, { rasterizer: options.raster, accumulation });
   const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased, filterVariance }));
   const pixels = await capture(device, renderer, { gaussians, camera, background: options.background });
-  const statistics = await renderer.readStatistics();
+  const statistics = await renderer.statistics();
   if (validationErrors.length > 0) throw new Error(`WebGPU: ${validationErrors.join('\n')}`);
 
   if (options.out) writeWhole(resolve(from, options.out), encodePng(pixels, camera.width, camera.height));

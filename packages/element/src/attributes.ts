@@ -53,28 +53,29 @@ export type InteractionPromptStyle = 'wiggle' | 'basic';
 /** What the camera does under a person's hands: turn around its target, or fly. */
 export type Navigation = 'orbit' | 'fly';
 
-/** One attribute. Only types know `P`, of the property, and `V`, of what is read of it: never where the element takes the property as it is. */
-interface Attribute<P, V = never> {
+/** One attribute, as the tables of elements list them. Only types know `P`, of the property, and `V`, of what is read of it: never where the element takes the property as it is. */
+export interface Attribute<P, V = never> {
   readonly lit: PropertyDeclaration;
   readonly grammar?: AttributeGrammar<V>;
   readonly property?: P;
 }
 
 /** Taken as it is written. */
-const text = <P = string | null>(): Attribute<P> => ({ lit: {} });
+export const text = <P = string | null>(): Attribute<P> => ({ lit: {} });
 /** On wherever it is written, but for `"false"`: what frameworks write that take it for an attribute with a value. */
-const flag = (): Attribute<boolean> => ({
+export const flag = (): Attribute<boolean> => ({
   lit: {
     type: Boolean,
     converter: { fromAttribute: (value: string | null): boolean => value !== null && value !== 'false' },
   },
 });
-const read = <V, P = string | null>(grammar: AttributeGrammar<V>): Attribute<P, V> => ({ lit: {}, grammar });
+export const read = <V, P = string | null>(grammar: AttributeGrammar<V>): Attribute<P, V> => ({ lit: {}, grammar });
 const number = <V>(grammar: AttributeGrammar<V>): Attribute<number | string | null, V> => ({ lit: {}, grammar });
 /** The first is the default. */
 const keyword = <V extends string>(words: readonly V[]): Attribute<V | null, V> => read(keywordGrammar(words));
 /** `''` is what the bare attribute gives. */
-const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> => read(keywordGrammar(words));
+export const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> =>
+  read(keywordGrammar(words));
 
 const map = <A, B>(grammar: AttributeGrammar<A>, to: (value: A) => B): AttributeGrammar<B> => ({
   ...grammar,
@@ -326,9 +327,11 @@ const attributeOf = (property: string): string => property.replace(/[A-Z]/g, (le
 export const credentialsOf = (crossorigin: Attributes['crossorigin']): RequestCredentials =>
   crossorigin === 'use-credentials' ? 'include' : 'same-origin';
 
-/** What Lit is told of them. */
-export const declarations = (): PropertyDeclarations =>
-  Object.fromEntries(entries.map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
+/** What Lit is told of a table. */
+export const declarations = (
+  table: Readonly<Record<string, Attribute<unknown, unknown>>> = ATTRIBUTES,
+): PropertyDeclarations =>
+  Object.fromEntries(Object.entries(table).map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
 
 /** The properties that are on or off. */
 export const flags = entries.filter(([, { lit }]) => lit.type === Boolean).map(([name]) => name);

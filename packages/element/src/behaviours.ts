@@ -78,16 +78,12 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.#host.strings;
   }
 
-  get playback(): MotionHost['playback'] {
-    return this.#host.playback;
+  get player(): MotionHost['player'] {
+    return this.#host.player;
   }
 
   get autoRotates(): boolean {
     return this.#host.autoRotates;
-  }
-
-  get autoplays(): boolean {
-    return this.#host.autoplays;
   }
 
   get isOnShow(): boolean {

@@ -161,7 +161,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** True while the scene is on show. */
   get loaded(): boolean {
-    return this.stage.scene.state === 'ready';
+    return this.stage.state === 'ready';
   }
 
   /**
@@ -169,7 +169,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.scene.settled);
+    return this.updateComplete.then(() => this.stage.childrenKnown).then(() => this.stage.settled);
   }
 
   /**
@@ -182,18 +182,22 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** Why no scene is shown, or null. */
   get error(): ElementError | null {
-    return this.stage.scene.error;
+    return this.stage.error;
   }
 
   /** Size of the scene on show, or null. */
   get statistics(): SceneStatistics | null {
-    const gaussians = this.stage.scene.scene?.gaussians;
-    if (!gaussians) return null;
-    return {
-      splats: gaussians.frameCount ?? gaussians.count,
-      dropped: gaussians.droppedCount ?? 0,
-      bytes: gaussians.byteLength,
-    };
+    const all = this.stage.shown.map(({ gaussians }) => gaussians);
+    if (all.length === 0) return null;
+    const nothing: SceneStatistics = { splats: 0, dropped: 0, bytes: 0 };
+    return all.reduce(
+      ({ splats, dropped, bytes }, { frameCount, count, droppedCount = 0, byteLength }) => ({
+        splats: splats + (frameCount ?? count),
+        dropped: dropped + droppedCount,
+        bytes: bytes + byteLength,
+      }),
+      nothing,
+    );
   }
 
   /**
@@ -272,7 +276,9 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   protected override render(): TemplateResult {
-    const { scene, reveal, behaviours, hotspots, progress } = this.stage;
+    const { state, progress, hasPicture, reveal, behaviours, hotspots } = this.stage;
+    // One of several scenes that fails leaves the others visible.
+    const error = hasPicture ? null : this.stage.error;
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
@@ -282,17 +288,17 @@ export class GaussianSplatElement extends ViewingMethods {
       posterLoading: this.#attributes.loading,
       showPoster: reveal.isCovered,
       onReveal: reveal.mayReveal ? null : this.#onReveal,
-      isLoading: scene.state === 'loading',
+      isLoading: state === 'loading',
       progress,
-      error: scene.error,
+      error,
       hasPoster: this.#hasPoster,
       prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
       motion: motion.switch,
       onMotion: this.#onMotion,
       onReset: this.stage.offersReset ? this.#onReset : null,
       strings: this.#strings,
-      spoken: scene.error ? this.#spokenError(scene.error) : announcer.text,
-      hotspots: hotspots.names,
+      spoken: error ? this.#spokenError(error) : announcer.text,
+      hotspots: hotspots?.names ?? [],
     });
   }
 
@@ -429,7 +435,7 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   #showStates(): void {
-    const { state, error } = this.stage.scene;
+    const { state, error } = this.stage;
     const active: Record<(typeof STATES)[number], boolean> = {
       loading: state === 'loading',
       preview: this.stage.scene.isPreview,

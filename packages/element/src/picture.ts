@@ -1,12 +1,13 @@
 /** Pictures for scripts: of any size, over a colour, and with the filters that the page's CSS puts on the element. */
-import type { GpuScene } from './gpu/gpu-scene.js';
 import type { PixelSize } from './controllers/size-controller.js';
+import type { ViewController } from './controllers/view-controller.js';
+import { wasLost } from './gpu/device-failures.js';
 import type { PictureOptions } from './viewing.js';
 
 export interface PictureHost {
   readonly element: HTMLElement;
   readonly canvas: HTMLCanvasElement | null;
-  readonly scene: { readonly scene: GpuScene | null };
+  readonly view: Pick<ViewController, 'viewport'>;
   warn(sentence: string): void;
   /** Draws a frame into the element's canvas now; null where there is nothing to draw. */
   drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
@@ -20,8 +21,8 @@ const LOST = 'The GPU device was lost before the picture was drawn: take it agai
 
 export async function takePicture(host: PictureHost, options: PictureOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
-  const { scene } = host.scene;
-  const pixels = scene && sizeOf(options, host.canvas, scene.device.limits.maxTextureDimension2D);
+  const { viewport } = host.view;
+  const pixels = viewport && sizeOf(options, host.canvas, viewport.device.limits.maxTextureDimension2D);
   const drawn = host.drawNow(pixels ?? undefined, background === undefined ? undefined : rgbaOf(background));
   if (drawn === null) throw nothingToDraw();
   const blob = new Promise<Blob | null>((resolve) =>
@@ -31,7 +32,7 @@ export async function takePicture(host: PictureHost, options: PictureOptions): P
   if (pixels || background !== undefined) host.drawNow();
   const taken = await blob;
   // A device that was lost before it had drawn leaves an empty picture, and says so later.
-  if (scene && (await scene.wasLost())) throw new DOMException(LOST, 'InvalidStateError');
+  if (viewport && (await wasLost(viewport))) throw new DOMException(LOST, 'InvalidStateError');
   if (taken === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
   return taken;
 }

@@ -126,7 +126,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /** Where the hotspot of a slot is now, for example `hotspot-door`; null if there is none with a position. */
   queryHotspot(name: string): HotspotPlace | null {
-    return this.stage.hotspots.query(name);
+    return this.stage.hotspots?.query(name) ?? null;
   }
 
   /**

@@ -1,4 +1,4 @@
-export { capture } from './capture.js';
+export { capture, type CaptureRequest } from './capture.js';
 export { createRenderer } from './choice/choose.js';
 export { chooseVariants, startVariants, type ChoiceOptions, type StartOptions } from './choice/choose.js';
 export type { ChoiceStore } from './choice/kept-choice.js';
@@ -11,6 +11,7 @@ export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
+export { LinearColours } from './linear-colours.js';
 export { packWithDetail } from './detail/pack-with-detail.js';
 export { buildPackedLevels, type PackedLevels } from './detail/packed-levels.js';
 export { packLevelRuns } from './detail/pack-runs.js';
@@ -36,8 +37,21 @@ export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, NotedFrame, RasterizerName } from './rasterizers/rasterizer.js';
 export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
 export { PictureTensor, type PictureFit, type PictureShape } from './pictures/picture-tensor.js';
+export {
+  settings,
+  type Composer,
+  type FrameSettings,
+  type Picture,
+  type Rgba,
+  type Target,
+  type TargetView,
+} from './picture.js';
 export { Renderer } from './renderer.js';
+export { Viewpoint, type View, type ViewpointOptions } from './viewpoint.js';
+export { boundsOfWorld } from './world-bounds.js';
+export { Placement, World, type Box, type Placed } from './world.js';
 export type { FrameRequest, RendererOptions } from './frame-request.js';
+export { SceneDepth, type HostDepth, type SceneDepthOptions } from './scene-depth.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';
 export type { Threads } from './stages/plan.js';

@@ -93,6 +93,25 @@ describe('a streamed scene', () => {
     stop();
   });
 
+  it('as a child asks for what the view needs of it where it stands', async () => {
+    const { requests, stop } = await serve('/net/kept/child/');
+    const element = show({ 'camera-orbit': '200deg 80deg 30m', 'camera-target': '5 0 0', loading: 'eager' });
+    const child = document.createElement('splat-scene');
+    child.setAttribute('src', '/net/kept/child/detail.json');
+    child.setAttribute('position', '5 0 0');
+    element.append(child);
+    await element.ready;
+    assert(element.loaded, `loaded: ${element.stats?.scenes[0]?.error?.message}`);
+    const few = requests.length;
+    // Close to the scene itself; close to where it would stand without its place nothing more is asked for.
+    element.setAttribute('camera-orbit', '200deg 80deg 1m');
+    await until(() => requests.length > few + 3, 'pages for a closer view');
+    assertEqual(new Set(requests).size, requests.length, 'no page twice');
+    child.remove();
+    element.remove();
+    stop();
+  });
+
   it('stays on show where a page is missing, and fails with a name where the first is', async () => {
     const warned: string[] = [];
     const original = console.warn;

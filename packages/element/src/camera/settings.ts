@@ -26,7 +26,7 @@ export interface SceneBounds extends Bounds {
 }
 
 /** Rotation from the frame of a scene to viewer space. */
-export const frameOf = ({ up }: CameraSettings, bounds: SceneBounds): ViewerFrame =>
+export const frameOf = ({ up }: Pick<CameraSettings, 'up'>, bounds: Pick<SceneBounds, 'up'>): ViewerFrame =>
   viewerFrame(up ?? bounds.up ?? [0, -1, 0]);
 
 const DEGREE = Math.PI / 180;

@@ -3,7 +3,7 @@ import { partRequest } from '@gaussian-splat/core';
 import { levelSource, MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { Here, SceneLoader } from '../loading/scene-loader.js';
-import type { DetailLevers } from './gpu-scene.js';
+import type { DetailLevers } from './loaded-gaussians.js';
 import { isHandheld } from './memory-budget.js';
 
 export interface StreamedOptions {

@@ -3,7 +3,7 @@ import { credentialsOf } from '../attributes.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import { toElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { StageHost } from '../stage-host.js';
 import type { LiveListeners, LiveState } from './live-model.js';
 import { PostController, type PostHost } from './post-controller.js';
@@ -11,6 +11,8 @@ import { PostController, type PostHost } from './post-controller.js';
 /** Whom the models of an element meet. */
 export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'liveValues'> {
   readonly playback: PlaybackController;
+  /** The sources that are drawn. */
+  readonly shown: readonly LoadedGaussians[];
   requestFrame(): void;
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
@@ -33,6 +35,7 @@ export class LiveWiring implements PostHost {
       runtimeLocation: services.runtimeLocation,
       startWorker: services.sceneLoader.spawn,
       state: () => this.state,
+      others: () => this.#host.shown.flatMap(({ live }) => live?.settable ?? []),
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
     };
@@ -48,14 +51,15 @@ export class LiveWiring implements PostHost {
   }
 
   get listeners(): LiveListeners {
-    const { playback } = this.#host;
+    // Which clock a scene follows may change.
+    const onShown = (timeSeconds: number): void => this.#host.playback.frameShown(timeSeconds);
     return {
       onFrame: (timeSeconds) => {
         this.#lastFault = '';
         this.requestFrame();
-        playback.frameShown(timeSeconds);
+        onShown(timeSeconds);
       },
-      onShown: (timeSeconds) => playback.frameShown(timeSeconds),
+      onShown,
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
       onInput: () => this.requestFrame(),
@@ -63,7 +67,7 @@ export class LiveWiring implements PostHost {
   }
 
   /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
-  advance({ live }: GpuScene, camera: Camera, now: number): void {
+  advance({ live }: LoadedGaussians, camera: Camera, now: number): void {
     if (live === undefined) return;
     this.#host.playback.tick(now);
     try {

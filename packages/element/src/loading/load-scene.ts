@@ -60,6 +60,7 @@ export async function loadScene(
     const pack = (cloud: GaussianCloud): LoadedScene => ({
       packed: packGaussians(cloud, { sh: request.sh }),
       bounds: { ...boundsOf(cloud), up: cloud.hints?.up },
+      hasMeshes: cloud.hints?.meshes,
     });
     const start = performance.now();
     let loading: Promise<PreviewSchedule> | undefined;

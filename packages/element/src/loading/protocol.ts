@@ -36,6 +36,8 @@ export interface SceneRequest extends FileRequest {
 export interface LoadedScene {
   readonly packed: PackedGaussians;
   readonly bounds: SceneBounds;
+  /** The file has triangles, too. */
+  readonly hasMeshes?: boolean | undefined;
 }
 
 /** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */

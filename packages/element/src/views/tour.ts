@@ -3,7 +3,6 @@ import type { Behaviours } from '../behaviours.js';
 import type { Pose } from '../camera/orbit.js';
 import type { CameraController } from '../controllers/camera-controller.js';
 import { prefersReducedMotion, type Mover } from '../controllers/mover.js';
-import type { SceneController } from '../controllers/scene-controller.js';
 import type { GaussianSplatEventMap } from '../events.js';
 import { languageOf, type SpokenStrings, type ViewWord } from '../words.js';
 import { fail, poseOfView, type CameraView } from './camera-view.js';
@@ -32,7 +31,8 @@ export interface PathOptions {
 export interface TourHost {
   readonly camera: CameraController;
   readonly behaviours: Behaviours;
-  readonly scene: Pick<SceneController, 'scene' | 'settled'>;
+  /** Fulfils, and never rejects, once nothing is left to wait for. */
+  readonly settled: Promise<void>;
   readonly surface: HTMLElement | null;
   readonly strings: SpokenStrings;
   readonly views: object | string | null;
@@ -165,7 +165,7 @@ export class Tour implements ReactiveController, Mover {
   /** The list, once it and the scene are there: what is in percent or `auto` is known then. */
   async #ready(): Promise<ViewList> {
     await this.#element.updateComplete;
-    await this.#of.scene.settled;
+    await this.#of.settled;
     this.#readChildren();
     const { path } = await this.#list;
     return { views: this.#views, path };

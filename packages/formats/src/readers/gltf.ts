@@ -21,7 +21,7 @@ const SAMPLES = 4096;
 /**
  * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives of the default scene that hold splats, each moved by its nodes
  * (spherical harmonics turn along), uncompressed or as SPZ. Degrees may differ. Meshes and points without the extension,
- * cameras, lights and animations are left out.
+ * cameras, lights and animations are left out; `hints.meshes` says that there are some of the first.
  */
 export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   const { name, signal, range } = source;
@@ -40,11 +40,14 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
     splats += own?.count ?? cloud.count;
     clouds.push(moved(cloud, multiply(TO_CLOUD, toScene)));
   }
-  if (clouds.length === 1) return clouds[0];
-  return mergeClouds(
-    clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
-    source,
-  );
+  const cloud =
+    clouds.length === 1
+      ? clouds[0]
+      : mergeClouds(
+          clouds.map((part) => ({ cloud: part, first: 0, count: part.count })),
+          source,
+        );
+  return others > 0 ? { ...cloud, hints: { ...cloud.hints, meshes: true } } : cloud;
 }
 
 /** True if a node moves so far, as georeferenced ones do, that float32 would round what it moves by more than a few hundredths of a millimetre. */
@@ -152,6 +155,6 @@ function noSplats({ meshes }: Json, name: string, others: number): GaussianSplat
     remedy:
       hidden > 0
         ? 'name the scene that shows them in "scene", or put their node into the one that is named'
-        : 'show meshes with <model-viewer>, or export the scene with KHR_gaussian_splatting',
+        : 'show meshes with <splat-mesh src> in a <gaussian-splat>, or export the scene with KHR_gaussian_splatting',
   });
 }

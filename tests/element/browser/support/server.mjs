@@ -6,7 +6,7 @@ import { Readable } from 'node:stream';
 import { setTimeout as delay } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
-import { DEVELOPMENT_APP, developmentScript, plainApp } from './apps.mjs';
+import { DEVELOPMENT_APP, developmentScript, frameworkScript, plainApp } from './apps.mjs';
 
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
 const fixtures = fileURLToPath(new URL('../fixtures/', import.meta.url));
@@ -310,6 +310,12 @@ const ANSWERS = {
   async 'react-development'(context, name) {
     context.type = name === 'app.js' ? 'text/javascript' : 'text/html';
     context.body = name === 'app.js' ? await developmentScript() : DEVELOPMENT_APP;
+  },
+
+  /** Modules of frameworks with what they import. */
+  async 'framework-scenes'(context, name) {
+    context.type = 'text/javascript';
+    context.body = await frameworkScript(name);
   },
 
   /** The same app without any framework. */
