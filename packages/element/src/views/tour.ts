@@ -227,8 +227,10 @@ export class Tour implements ReactiveController, Mover {
       if (isCurrent()) this.#setViews(list.views);
       return list;
     } catch (error) {
-      if (isCurrent())
+      if (isCurrent()) {
+        this.#setViews([]);
         this.#of.warn(`<gaussian-splat> views: ${error instanceof Error ? error.message : String(error)}`);
+      }
       return NO_VIEWS;
     }
   }
