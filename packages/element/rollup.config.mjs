@@ -34,7 +34,9 @@ const plugins = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
   shortPrivates,
-  minifyTemplateLiterals({ include: [path('./dist/styles.js'), path('./dist/template.js')] }),
+  minifyTemplateLiterals({
+    include: [path('./dist/styles.js'), path('./dist/template.js'), path('./dist/views/tour.js')],
+  }),
   // Statements compress better than what they can be joined to with commas. No property is read here for what its getter does.
   terser({
     module: true,

@@ -40,6 +40,8 @@ export type QualityChoice = 'auto' | Quality;
 
 /** The low-pass filter that a scene was trained with: `auto` is what its file says, or else `classic`. */
 export type FilterChoice = 'auto' | SplatFilter;
+/** When the wheel zooms, and when it is the page's. */
+export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 
 /** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
 export type Reveal = 'auto' | 'manual';
@@ -131,7 +133,7 @@ export const ATTRIBUTES = {
   cameraControls: flag(),
   /**
    * Theta, phi, radius: `deg` or `rad`; `m`, `cm`, `mm`, or `%` of the radius that frames the scene (all of a subject that stands alone, of others the 90 % of splats around the middle); `auto`, also
-   * for what is left out at the end. As in `<model-viewer>`, but for `calc()` and `env()`. Where the camera goes: see `getCameraOrbit()`.
+   * for what is left out at the end. As in `<model-viewer>`, but for `calc()` and `env()`. Setting it moves the camera, also when the value is the same as before. Where the camera goes: see `getCameraOrbit()`.
    * @default `0deg 75deg auto`
    */
   cameraOrbit: read(orbitGrammar('0deg 75deg auto')),
@@ -141,10 +143,24 @@ export const ATTRIBUTES = {
    */
   cameraTarget: read(targetGrammar),
   /**
+   * Least `camera-target`. Without this and `max-camera-target`, visitors pan within the radius that frames the scene.
+   * @default `auto`: no limit
+   */
+  minCameraTarget: read(targetGrammar),
+  /**
+   * Greatest `camera-target`.
+   * @default `auto`: no limit
+   */
+  maxCameraTarget: read(targetGrammar),
+  /**
    * Vertical angle, such as `45deg`.
    * @default `auto` (45deg)
    */
   fieldOfView: read(fieldOfViewGrammar),
+  /**
+   * Views that visitors can choose from: JSON or, as a property, a list `[{ name, orbit, target, fieldOfView }]`; or the URL of such a file, of a trainer's `cameras.json`, or of the settings of SuperSplat. Children with `data-orbit` are views, too.
+   */
+  views: text<object | string | null>(),
   /**
    * Least `camera-orbit`.
    * @default `auto`: phi 22.5deg, radius 2 %
@@ -175,11 +191,16 @@ export const ATTRIBUTES = {
    * @default `pan-y`
    */
   touchAction: keyword<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']),
+  /**
+   * When the wheel zooms: `auto` with Ctrl, while the scene has the focus, or where there is nothing to scroll; `always`; `ctrl` with Ctrl only; `none`. At the zoom limit the page scrolls. Two fingers zoom in any case.
+   * @default `auto`
+   */
+  zoom: keyword<WheelZoom>(['auto', 'always', 'ctrl', 'none']),
   /** Leaves the wheel and all that two fingers do to the page; keys do not zoom either. */
   disableZoom: flag(),
   /** Keeps the camera's target where it is. */
   disablePan: flag(),
-  /** Keeps the camera's target where it is on a double click or a double tap, which otherwise pick the point to turn around. */
+  /** Ignores a double click and a double tap, which otherwise pick the point to turn around or, beside the scene, bring the camera back. */
   disableTap: flag(),
   /**
    * `orbit` turns around the target; `fly` looks around, and flies by W, A, S, D, Q and E, with Shift faster.
@@ -214,8 +235,8 @@ export const ATTRIBUTES = {
    */
   interactionPromptThreshold: number(milliseconds(3_000)),
   /**
-   * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`,
-   * `show` (`…` stands for `alt`), `loading`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
+   * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`, `keys-views`,
+   * `views`, `next-view`, `previous-view`, `show` (`…` stands for `alt`), `loading`, `reset`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
    * @default English
    */
   a11y: text<SpokenStrings | string | null>(),
@@ -343,6 +364,8 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
     camera: {
       orbit: values.cameraOrbit,
       target: values.cameraTarget,
+      minTarget: values.minCameraTarget,
+      maxTarget: values.maxCameraTarget,
       fieldOfView: values.fieldOfView,
       minOrbit: values.minCameraOrbit,
       maxOrbit: values.maxCameraOrbit,

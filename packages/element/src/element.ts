@@ -1,6 +1,7 @@
-import { isServer, type PropertyValues, type TemplateResult } from 'lit';
+import { isServer, type PropertyValues, type ReactiveElement, type TemplateResult } from 'lit';
 import { adoptStyles, styles } from './styles.js';
 import { readAttributes, type Attributes } from './attributes.js';
+import type { CameraSettings } from './camera/settings.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
@@ -25,6 +26,13 @@ export interface SceneStatistics {
   readonly bytes: number;
 }
 
+/** The properties that move the camera, and what each sets. */
+const CAMERA_SETTINGS: ReadonlyMap<unknown, keyof CameraSettings> = new Map([
+  ['cameraOrbit', 'orbit'],
+  ['cameraTarget', 'target'],
+  ['fieldOfView', 'fieldOfView'],
+]);
+
 /** Names of the custom states, for `gaussian-splat:state(ready)` in CSS. */
 const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'] as const;
 
@@ -41,12 +49,18 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @slot interaction-prompt - Shown to people who have not touched the scene yet.
  * @slot fallback - Shown where the browser has no WebGPU.
  * @slot error - Shown if the scene cannot be.
+ * @slot view - Buttons of the page for its views, each with `data-orbit`.
  * @slot hotspot-* - A label of the page at the point of the scene that its `data-position` names.
  * @csspart canvas - The picture.
  * @csspart poster - The image of the `poster` attribute.
  * @csspart poster-button - The button around it with `reveal="manual"`.
  * @csspart poster-cue - The sign in the middle of that button.
  * @csspart prompt - The default interaction prompt.
+ * @csspart reset-button - Brings the camera back: shown to visitors who have moved it with their fingers.
+ * @csspart views - The bar of the views.
+ * @csspart view-name - The name of the present view in it.
+ * @csspart previous-view - Its button for the view before.
+ * @csspart next-view - Its button for the next view.
  * @csspart pause-button - The visitor's button for what `auto-rotate` and `autoplay` move.
  * @csspart progress-track - The progress bar's ground.
  * @csspart progress-bar - The progress bar.
@@ -66,6 +80,8 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty --interaction-prompt-background - Ground of the default prompt.
  * @cssproperty --interaction-prompt-color - Its colour.
  * @cssproperty [--pause-button-display=block] - `none` takes the pause button away: for pages that bring a control of their own.
+ * @cssproperty [--reset-button-display=block] - `none` takes the reset button away.
+ * @cssproperty [--views-display=flex] - `none` takes the bar of the views away.
  * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
  * @cssproperty [--max-hotspot-opacity=1] - Opacity of the others.
  * @cssproperty --message-background - Ground of the default texts.
@@ -82,6 +98,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is on show while the rest loads.
  * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
+ * @fires {CustomEvent<ViewChangeDetail>} view-change - The camera sets out for a view of the list.
  * @fires {Event} poster-dismissed - The poster has given way to the scene.
  * @fires {CustomEvent<VisibilityDetail>} model-visibility - The element has come into sight, or left it.
  * @fires {CustomEvent<ElementError>} generator-error - A run of the generator failed; the last good frame stays.
@@ -135,6 +152,8 @@ export class GaussianSplatElement extends ViewingMethods {
   readonly #internals: ElementInternals | null;
   #liveValues: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
   #strings: SpokenStrings = {};
+  /** What the page has set of the camera since it was last applied. */
+  readonly #set = new Set<keyof CameraSettings>();
   #controlObserver: MutationObserver | undefined;
   readonly #warned = new Set<string>();
   /** @internal */
@@ -284,9 +303,11 @@ export class GaussianSplatElement extends ViewingMethods {
       isLoading: state === 'loading',
       progress,
       error,
+      hasPoster: this.#hasPoster,
       prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
       motion: motion.switch,
       onMotion: this.#onMotion,
+      onReset: this.stage.offersReset ? this.#onReset : null,
       strings: this.#strings,
       spoken: error ? this.#spokenError(error) : announcer.text,
       hotspots: hotspots?.names ?? [],
@@ -302,8 +323,9 @@ export class GaussianSplatElement extends ViewingMethods {
         return element.#attributes;
       },
       get input() {
-        const { cameraControls: enabled, disableZoom, disablePan } = element;
-        return { enabled, zoom: !disableZoom, pan: !disablePan, touchAction: element.#attributes.touchAction };
+        const { cameraControls: enabled, disableZoom, disablePan, disableTap } = element;
+        const { touchAction, zoom: wheel } = element.#attributes;
+        return { enabled, zoom: !disableZoom, pan: !disablePan, tap: !disableTap, touchAction, wheel };
       },
       get services() {
         return element.constructor as typeof GaussianSplatElement;
@@ -320,8 +342,8 @@ export class GaussianSplatElement extends ViewingMethods {
       get autoRotates() {
         return element.autoRotate;
       },
-      get retargets() {
-        return !element.disableTap && !element.disablePan;
+      get views() {
+        return element.views;
       },
       get strings() {
         return element.#strings;
@@ -342,10 +364,19 @@ export class GaussianSplatElement extends ViewingMethods {
     };
   }
 
-  /** The page's own words, where it has some. */
+  /** The page's own words, where it has some; none for a poster that stands in for the scene. */
   #spokenError(error: ElementError): string {
-    const slotted = this.querySelector(`:scope > [slot=${error.code === 'unsupported' ? 'fallback' : 'error'}]`);
-    return slotted?.textContent.trim() || visitorMessage(error, this.#strings);
+    const isUnsupported = error.code === 'unsupported';
+    const own = this.#slotted(isUnsupported ? 'fallback' : 'error')?.textContent.trim();
+    return own || (isUnsupported && this.#hasPoster ? '' : visitorMessage(error, this.#strings));
+  }
+
+  get #hasPoster(): boolean {
+    return !!this.poster || this.#slotted('poster') !== null;
+  }
+
+  #slotted(name: string): Element | null {
+    return this.querySelector?.(`:scope > [slot=${name}]`) ?? null;
   }
 
   /** A person clicked the poster: the keyboard goes on in the scene. */
@@ -354,14 +385,29 @@ export class GaussianSplatElement extends ViewingMethods {
     void this.updateComplete.then(() => this.focus());
   };
 
+  readonly #onReset = (): void => {
+    this.stage.act({ type: 'reset' });
+    // The button goes.
+    this.focus({ preventScroll: true });
+  };
+
   readonly #onMotion = (): void => void this.stage.behaviours.motion.toggle();
+
+  /** Lit passes over a value that is set again; where the camera goes, it counts: a bookmark works twice. */
+  override requestUpdate(...request: Parameters<ReactiveElement['requestUpdate']>): void {
+    const setting = CAMERA_SETTINGS.get(request[0]);
+    if (setting === undefined) return super.requestUpdate(...request);
+    this.#set.add(setting);
+    super.requestUpdate();
+  }
 
   /** Attributes count at once for those who call a method right after setting one. */
   protected override applyAttributes(): void {
     const before = this.#attributes;
     this.#attributes = this.#readAttributes();
-    if (JSON.stringify(before.camera) !== JSON.stringify(this.#attributes.camera)) {
-      this.stage.camera.applySettings(this.#attributes.camera);
+    if (this.#set.size > 0 || JSON.stringify(before.camera) !== JSON.stringify(this.#attributes.camera)) {
+      this.stage.camera.applySettings(this.#attributes.camera, this.#set);
+      this.#set.clear();
     }
   }
 

@@ -10,6 +10,13 @@ export interface CameraChangeDetail {
   readonly source: CameraChangeSource;
 }
 
+export interface ViewChangeDetail {
+  /** The view's name. */
+  readonly name: string;
+  /** Its place in the list, from 0. */
+  readonly index: number;
+}
+
 export interface LoadDetail {
   /** Absolute URL of the scene. */
   readonly url: string;
@@ -48,6 +55,8 @@ export interface GaussianSplatEventMap {
   error: CustomEvent<ElementError>;
   /** The camera has moved; at most once a frame. */
   'camera-change': CustomEvent<CameraChangeDetail>;
+  /** The camera sets out for a view of the list. */
+  'view-change': CustomEvent<ViewChangeDetail>;
   /** The poster has given way to the scene. */
   'poster-dismissed': Event;
   /** The element has come into sight, or left it. */

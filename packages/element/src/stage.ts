@@ -27,6 +27,7 @@ import { Member } from './member.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
 import { SceneQueries, type QueryHost } from './scene-queries.js';
 import type { Source, StageHost } from './stage-host.js';
+import type { Tour, TourHost } from './views/tour.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 
 /**
@@ -46,6 +47,7 @@ export class Stage
     InputHost,
     BehaviourHost,
     QueryHost,
+    TourHost,
     LiveHost
 {
   readonly camera: CameraController;
@@ -72,6 +74,8 @@ export class Stage
   readonly view: ViewController;
   readonly live: LiveWiring;
   readonly #source: SourceController;
+  readonly #input: InputController;
+  #tour: Promise<Tour> | undefined;
   #counts: ReadCounts | undefined;
   #children: MutationObserver | undefined;
   #labelling: Promise<void> | undefined;
@@ -97,13 +101,13 @@ export class Stage
     this.behaviours = new Behaviours(element, this);
     new PrintController(element, () => this.drawNow());
     this.queries = new SceneQueries(this);
-    new InputController(element, this);
+    this.#input = new InputController(element, this);
     const onPageVisibility = (): void => this.suspend();
     element.addController({
       hostConnected: () => {
         document.addEventListener('visibilitychange', onPageVisibility);
         this.#children ??= new MutationObserver(() => this.#lookAtChildren());
-        this.#children.observe(element, { childList: true, subtree: true, attributeFilter: ['slot'] });
+        this.#children.observe(element, { childList: true, subtree: true, attributeFilter: ['slot', 'data-orbit'] });
         this.#lookAtChildren();
         // Put back after a while, an eager element loads again though nothing has come into sight.
         this.#source.request();
@@ -116,9 +120,16 @@ export class Stage
     });
   }
 
+  /** What flies from view to view: fetched by pages that have views, or ask for a flight. */
+  tour(): Promise<Tour> {
+    return (this.#tour ??= loadModule('the code for views', () => import('./views/tour.js')).then(
+      ({ Tour }) => new Tour(this.element, this),
+    ));
+  }
+
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
-  drawNow(): HTMLCanvasElement | null {
-    return this.scene.isPreview ? null : this.view.drawNow();
+  drawNow(...picture: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
+    return this.scene.isPreview ? null : this.view.drawNow(...picture);
   }
 
   /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */
@@ -205,6 +216,7 @@ export class Stage
     const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
     if (has('splat-scene,splat-mesh')) this.compose();
     if (has('[slot^=hotspot-]')) this.#label();
+    if (this.#tour !== undefined || has('[data-orbit]')) this.#showViews();
   }
 
   /** Lets more be shown than the splats of one scene. */
@@ -221,6 +233,13 @@ export class Stage
   /** Fulfils when the code of the element's children is there. */
   get childrenKnown(): Promise<unknown> {
     return Promise.all([this.composing, this.#labelling]);
+  }
+
+  #showViews(): void {
+    this.tour().then(
+      () => this.element.requestUpdate(),
+      (error: Error) => this.warn(error.message),
+    );
   }
 
   #label(): void {
@@ -295,6 +314,11 @@ export class Stage
 
   get isVisible(): boolean {
     return this.#visibility.isVisible;
+  }
+
+  /** Fingers have moved the camera, and have no Home key. */
+  get offersReset(): boolean {
+    return this.input.enabled && this.isOnShow && this.#input.isTouch && this.camera.isTouched;
   }
 
   /** Somebody would see the scene. */
@@ -477,13 +501,15 @@ export class Stage
     this.autoplay();
   }
 
-  act(action: CameraAction): void {
-    this.behaviours.act(action);
+  act(action: CameraAction): boolean {
+    return this.behaviours.act(action);
   }
 
+  /** Beside the scene is where somebody has lost it. */
   pick(clientX: number, clientY: number): void {
     void this.queries.positionFromPoint(clientX, clientY).then((point) => {
-      if (point !== null && this.retargets) this.behaviours.aimAt([point.x, point.y, point.z]);
+      if (point === null) this.act({ type: 'reset' });
+      else if (this.input.pan) this.behaviours.aimAt([point.x, point.y, point.z]);
     });
   }
 
@@ -498,6 +524,7 @@ export class Stage
 
   /** Called after each update of the element. */
   updated(): void {
+    if (this.views && this.#tour === undefined) this.#showViews();
     this.reveal.settle();
     this.detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
   }

@@ -149,16 +149,18 @@ export class ViewController implements FrameClient {
 
   /**
    * Draws a frame within the running task, for those who read the canvas before it ends: afterwards a WebGPU canvas is blank to readers.
+   * @param size of the picture; default that of the element
+   * @param background premultiplied, behind the splats
    * @returns the canvas, or null where there is nothing to draw.
    */
-  drawNow(): HTMLCanvasElement | null {
+  drawNow(size?: PixelSize, background?: Frame['background']): HTMLCanvasElement | null {
     const viewport = this.#viewport;
     const canvas = this.#host.canvas;
     if (viewport === null || viewport.isLost || this.#first !== undefined || canvas === null) return null;
-    const pixels = this.#pixelsOf(viewport);
-    if (pixels === null) return null;
+    const own = this.#pixelsOf(viewport);
+    if (own === null) return null;
     this.#applyRendering(viewport);
-    viewport.render(this.#frameRequest(viewport, pixels), this.#host.prepareFrame());
+    viewport.render({ ...this.#frameRequest(viewport, size ?? own), background }, this.#host.prepareFrame());
     return canvas;
   }
 
