@@ -27,7 +27,9 @@ export type ViewWord = 'views' | 'next-view' | 'previous-view' | 'keys-views';
 
 /** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
 export type SpokenStrings = Readonly<
-  Partial<Record<ViewName | keyof typeof WORDS | keyof typeof PANEL_WORDS | `error-${ElementErrorCode}` | ViewWord, string>>
+  Partial<
+    Record<ViewName | keyof typeof WORDS | keyof typeof PANEL_WORDS | `error-${ElementErrorCode}` | ViewWord, string>
+  >
 >;
 
 /** A word of the page, or the English one. */
