@@ -10,7 +10,7 @@ const SECTIONS = [
     'Guide',
     [
       ...['start', 'prepare', 'camera', 'loading', 'labels', 'animation', 'styling', 'events'].map(guide),
-      ...['scenes', 'large-scenes', 'performance', 'accessibility', 'hosting', 'vue'].map(guide),
+      ...['scenes-and-meshes', 'large-scenes', 'performance', 'accessibility', 'frameworks', 'three', 'vue'].map(guide),
       /^packages\/(element|react)\/README/,
     ],
   ],

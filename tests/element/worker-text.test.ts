@@ -65,3 +65,43 @@ test('the texts make the code of the worker: a reader of each format runs', { sk
 test('the script of that worker is one that can be parsed', () => {
   assert.doesNotThrow(() => new Function('early', `return ${BOOTSTRAP}`));
 });
+
+test('a chunk that two loads ask for at once is there for both', async () => {
+  const texts: Record<string, string> = {
+    './scene-worker.js': '"./scene-worker.js":(exports,require,load)=>{exports.load=load}',
+    './reader.js': '"./reader.js":(exports)=>{exports.read=1}',
+  };
+  const sent = new Set<string>();
+  const port: { onmessage?: (event: object) => void; postMessage: (question: { id: number; chunk: string }) => void } =
+    {
+      // As the page answers: what has been sent is not sent again.
+      postMessage({ id, chunk }) {
+        const wanted = sent.has(chunk) ? [] : [texts[chunk]];
+        sent.add(chunk);
+        setTimeout(() => port.onmessage?.({ data: { id, texts: wanted } }));
+      },
+    };
+  class Text {
+    readonly text: string;
+    constructor(parts: readonly string[]) {
+      this.text = parts.join('');
+    }
+  }
+  const addresses = {
+    createObjectURL: ({ text }: Text) => `data:text/javascript,${encodeURIComponent(text)}`,
+    revokeObjectURL: () => undefined,
+  };
+  const listen = (name: string, heard: (event: object) => void): void => {
+    if (name === 'message') setTimeout(() => heard({ ports: [port] }));
+  };
+  const names = ['early', 'addEventListener', 'self', 'URL', 'Blob'];
+  const start = new Function(...names, `return ${BOOTSTRAP}`) as (...values: unknown[]) => Promise<{
+    load: (chunk: string) => Promise<{ read?: number }>;
+  }>;
+  const { load } = await start([], listen, globalThis, addresses, Text);
+  const read = await Promise.all([load('./reader.js'), load('./reader.js')]);
+  assert.deepEqual(
+    read.map((module) => module.read),
+    [1, 1],
+  );
+});

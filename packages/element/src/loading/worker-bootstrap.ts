@@ -10,7 +10,7 @@ export type CodeAnswer =
 
 /**
  * The script of a worker made of text, for `spawnText`: a promise of its main chunk. The first message brings the port for its code. Each text is `"name":(exports,require,load)=>{…}`. They are run one after the
- * other, for the second of two that were asked for at the same time may need what came with the first. It is written as text itself, since bundlers change functions.
+ * other, and an answer without texts waits, too: the second of two that were asked for at the same time may need what came with the first, or be the same. It is written as text itself, since bundlers change functions.
  */
 export const BOOTSTRAP = `new Promise((start)=>addEventListener('message',({ports})=>{
 early.length=0;
@@ -35,7 +35,7 @@ const load=async(chunk)=>{
 if(!code[chunk]){
 const answer=await new Promise((resolve)=>port.postMessage({id:asked.push(resolve)-1,chunk}));
 if(answer.failure)throw new Error(answer.failure);
-if(answer.texts.length)await(tail=tail.catch(()=>0).then(()=>run(answer.texts)));
+await(tail=tail.catch(()=>0).then(()=>answer.texts.length&&run(answer.texts)));
 }
 return require(chunk);
 };
