@@ -88,7 +88,8 @@ test('a chunk that two loads ask for at once is there for both', async () => {
     }
   }
   const addresses = {
-    createObjectURL: ({ text }: Text) => `data:text/javascript,${encodeURIComponent(text)}`,
+    createObjectURL: ({ text }: Text) =>
+      `data:text/javascript,await new Promise((done) => setTimeout(done, 30));${encodeURIComponent(text)}`,
     revokeObjectURL: () => undefined,
   };
   const listen = (name: string, heard: (event: object) => void): void => {
