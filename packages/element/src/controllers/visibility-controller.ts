@@ -26,8 +26,6 @@ export class VisibilityController implements ReactiveController {
 
   hostConnected(): void {
     const { IntersectionObserver } = windowOf(this.#element);
-    // Documents of unit tests (jsdom) have no layout.
-    if (!IntersectionObserver) return this.#set(true);
     this.#observer = new IntersectionObserver((entries) => this.#set(entries[entries.length - 1].isIntersecting), {
       threshold: THRESHOLD,
     });

@@ -1,12 +1,9 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
+import type * as OnnxRuntime from 'onnxruntime-web/webgpu';
 import { fetchBytes } from './fetch-bytes.js';
 import { noteRuntimeBytes, WASM_BYTES, wasmBuild } from './runtime-progress.js';
 
-// Who shows no generator need not have onnxruntime-web, nor its types: then this is any.
-// eslint-disable-next-line @typescript-eslint/ban-ts-comment
-/** @ts-ignore */
-// eslint-disable-next-line @typescript-eslint/consistent-type-imports
-export type Ort = typeof import('onnxruntime-web/webgpu');
+export type Ort = typeof OnnxRuntime;
 
 /** Longest that one call of the runtime may take, ms. */
 let callLimit = 120_000;
@@ -85,8 +82,8 @@ let loading: Promise<Runtime> | undefined;
 let copies = 0;
 
 /**
- * Where four files of onnxruntime-web 1.30.0 are: `ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs`, `ort-wasm-simd-threaded.jspi.wasm` and
- * `ort-wasm-simd-threaded.asyncify.wasm`. Default: the folder `onnxruntime/` beside this module, where the CDN build has them.
+ * Where the files of onnxruntime-web 1.30.0 are (`ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs` and the `.wasm` files that they
+ * name). Default: the folder `onnxruntime/` beside this module, where the CDN build has them.
  * @param folder absolute, or relative to the page.
  */
 export function setRuntimeLocation(folder: string | URL): void {
@@ -146,16 +143,9 @@ export function folderBeside(module: string | undefined): string {
     where: 'onnxruntime/',
     expected: 'the folder of the files of onnxruntime-web 1.30.0',
     found: 'no address of this code, which a bundler has rewritten',
-    remedy: REMEDY.replace('there', 'on your server').replace('; or name', ', and name'),
+    remedy: 'name their folder: GaussianSplatElement.runtimeLocation, or setRuntimeLocation',
   });
 }
-
-const FILES =
-  'ort.jspi.bundle.min.mjs, ort.webgpu.bundle.min.mjs, ort-wasm-simd-threaded.jspi.wasm, ort-wasm-simd-threaded.asyncify.wasm';
-
-const REMEDY =
-  `put these files of node_modules/onnxruntime-web/dist there (npm install onnxruntime-web@1.30.0): ${FILES}; ` +
-  'or name their folder with GaussianSplatElement.runtimeLocation (without the element: setRuntimeLocation)';
 
 /** A module is evaluated once for each address: another copy needs another address. */
 async function importScript(script: string): Promise<Ort> {
@@ -168,7 +158,7 @@ async function importScript(script: string): Promise<Ort> {
       expected: 'the script of onnxruntime-web 1.30.0',
       // The same whichever copy it was: what is told twice is told once.
       found: ((cause as Error)?.message ?? 'nothing').replace(address, script),
-      remedy: REMEDY,
+      remedy: 'put the files of onnxruntime-web there, or name their folder with setRuntimeLocation',
       cause,
     });
   }
@@ -177,17 +167,20 @@ async function importScript(script: string): Promise<Ort> {
 /** Fetched by us: a copy of the runtime that did not find its WebAssembly never works again. */
 async function fetchWasm(folder: string, build: keyof typeof WASM_BYTES): Promise<Uint8Array<ArrayBuffer>> {
   const expected = WASM_BYTES[build];
-  const url = `${folder}ort-wasm-simd-threaded.${build}.wasm`;
-  const bytes = await fetchBytes(url, {
+  const bytes = await fetchBytes(`${folder}ort-wasm-simd-threaded.${build}.wasm`, {
     expected,
     onProgress: (loaded, total = expected) => noteRuntimeBytes([loaded, total]),
-    mayBeMissing: true,
   });
-  if (bytes?.[0] === 0 && bytes[1] === 0x61 && bytes[2] === 0x73 && bytes[3] === 0x6d) return bytes;
+  requireWasm(bytes, folder);
+  return bytes;
+}
+
+function requireWasm(bytes: Uint8Array, folder: string): void {
+  if (bytes[0] === 0 && bytes[1] === 0x61 && bytes[2] === 0x73 && bytes[3] === 0x6d) return;
   throw new GaussianSplatError('network/status', {
-    where: url.slice(0, 200),
+    where: folder.slice(0, 200),
     expected: 'the WebAssembly file of onnxruntime-web 1.30.0',
-    found: bytes ? 'something else, perhaps a web page' : 'no such file',
-    remedy: REMEDY,
+    found: 'something else, perhaps a web page',
+    remedy: 'put the files of onnxruntime-web there, or name their folder with setRuntimeLocation',
   });
 }
