@@ -9,6 +9,7 @@ const EVENTS = {
   onError: 'error',
   onCameraChange: 'camera-change',
   onPosterDismissed: 'poster-dismissed',
+  onInputsChange: 'inputs-change',
   onViewChange: 'view-change',
   onModelVisibility: 'model-visibility',
   onGeneratorError: 'generator-error',
