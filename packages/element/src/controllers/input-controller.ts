@@ -102,7 +102,8 @@ export class InputController implements ReactiveController {
     const { enabled, zoom, wheel, touchAction } = this.#of.input;
     const targets = [this.#surface, layer];
     for (const { style } of targets) style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
-    if (!enabled) return this.#stop();
+    // An element that has left the page is updated once more; the listener of its document would keep it for good.
+    if (!enabled || !this.#surface.isConnected) return this.#stop();
     this.#listening ??= this.#listen(this.#surface, targets);
     // A wheel listener that may prevent scrolling costs the page; it exists only where the wheel zooms.
     if (zoom && wheel !== 'none') this.#wheel ??= this.#listenToWheel(targets);
