@@ -108,7 +108,8 @@ describe('a streamed scene', () => {
     element.setAttribute('camera-orbit', '200deg 80deg 1m');
     await until(() => requests.length > few + 3, 'pages for a closer view');
     assertEqual(new Set(requests).size, requests.length, 'no page twice');
-    child.remove();
+    child.removeAttribute('src');
+    await until(() => !(child as HTMLElement & { loaded: boolean }).loaded, 'the scene is let go');
     element.remove();
     stop();
   });
