@@ -25,7 +25,7 @@ import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [options]
 
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
-  --max-mb MB     instead of it: the most accurate file of at most so many megabytes
+  --max-mb MB     instead of it: the most accurate file of at most this size
   --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
