@@ -1,8 +1,7 @@
 /** The work behind `gaussian-splat detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
-import { parseArgs } from 'node:util';
-import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
+import { shCoefficientCount } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import {
   buildDetailTree,
@@ -16,6 +15,7 @@ import {
   treeOfCopies,
   USUAL_STEPS,
 } from '@gaussian-splat/renderer';
+import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
 import { findSteps } from './lib/coded-pages.mjs';
 import { deflate } from './lib/deflate.mjs';
 import { writeWhole } from './lib/output-file.mjs';
@@ -32,40 +32,23 @@ const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
   --spacing LEN   world units between copies; default: 2.5 times the radius of the scene
 `;
 
-class UsageError extends Error {}
-
-/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
-const from = process.env.INIT_CWD ?? process.cwd();
-
 function parseOptions(args) {
   const text = { type: 'string' };
-  let parsed;
-  try {
-    parsed = parseArgs({
-      args,
-      allowPositionals: true,
-      options: {
-        out: text,
-        degree: text,
-        tile: text,
-        spacing: text,
-        'min-db': { ...text, default: '50' },
-        quantized: { type: 'boolean' },
-        exact: { type: 'boolean' },
-        help: { type: 'boolean' },
-      },
-    });
-  } catch (error) {
-    throw new UsageError(error.message);
-  }
-  const { values, positionals } = parsed;
-  if (values.help) return undefined;
-  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
+  const parsed = parseSceneOptions(args, {
+    out: text,
+    degree: text,
+    tile: text,
+    spacing: text,
+    'min-db': { ...text, default: '50' },
+    quantized: { type: 'boolean' },
+    exact: { type: 'boolean' },
+  });
+  if (parsed === undefined) return undefined;
+  const { values } = parsed;
   if (values.out === undefined) throw new UsageError('--out is missing');
   const out = resolve(from, values.out);
-  const scene = resolve(from, positionals[0]);
-  if (existsSync(scene) && statSync(scene).isDirectory())
-    throw new UsageError(`${positionals[0]} is a folder, no scene`);
+  const scene = resolve(from, parsed.scene);
+  if (existsSync(scene) && statSync(scene).isDirectory()) throw new UsageError(`${parsed.scene} is a folder, no scene`);
   if (existsSync(out) && !statSync(out).isDirectory()) throw new UsageError(`--out: ${values.out} is no folder`);
   if (existsSync(out) && !isEmpty(out) && !isUnfinished(out)) throw new UsageError(`--out: ${values.out} is not empty`);
   const tile = /^([1-9]\d{0,3})x([1-9]\d{0,3})$/.exec(values.tile ?? '1x1');
@@ -233,15 +216,4 @@ async function main({ scene, out, degree, geometry, minDecibels, columns, rows, 
     );
 }
 
-try {
-  const options = parseOptions(process.argv.slice(2));
-  if (options === undefined) console.log(USAGE);
-  else await main(options);
-  // Dawn keeps Node alive.
-  process.exit(0);
-} catch (error) {
-  if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
-  else if (error instanceof GaussianSplatError || error.syscall !== undefined) console.error(error.message);
-  else console.error(error);
-  process.exit(error instanceof UsageError ? 2 : 1);
-}
+await runCommand(USAGE, parseOptions, main);

@@ -1,8 +1,7 @@
 /** The work behind `gaussian-splat economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
 import { statSync } from 'node:fs';
 import { resolve } from 'node:path';
-import { parseArgs } from 'node:util';
-import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
+import { boundsOf, cameraFromCalibration } from '@gaussian-splat/core';
 import {
   dealtViewsAround,
   dealViews,
@@ -14,6 +13,7 @@ import {
   viewsBetween,
 } from '@gaussian-splat/economise';
 import { inline } from '@gaussian-splat/economise/parts';
+import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
 import { encodeWebp } from './lib/webp.mjs';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
@@ -25,7 +25,7 @@ import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [options]
 
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
-  --max-mb MB     instead of it: the most accurate file of at most so many megabytes
+  --max-mb MB     instead of it: the most accurate file of at most this size
   --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
@@ -37,40 +37,21 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [opt
   --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
 `;
 
-class UsageError extends Error {}
-
-/** Whether the file system says it: ENOENT, EACCES, ENOSPC. Its sentence is enough for people. */
-const isOfFiles = ({ code }) => /^E[A-Z]+$/.test(code);
-
-/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
-const from = process.env.INIT_CWD ?? process.cwd();
-
 function parseOptions(args) {
   const text = { type: 'string' };
-  let parsed;
-  try {
-    parsed = parseArgs({
-      args,
-      allowPositionals: true,
-      options: {
-        'min-db': text,
-        'max-mb': text,
-        out: text,
-        views: text,
-        report: text,
-        scored: { ...text, default: '216' },
-        threads: { ...text, default: String(usualThreads()) },
-        merge: { type: 'boolean', default: false },
-        refine: { type: 'boolean', default: false },
-        help: { type: 'boolean' },
-      },
-    });
-  } catch (error) {
-    throw new UsageError(error.message);
-  }
-  const { values, positionals } = parsed;
-  if (values.help) return undefined;
-  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
+  const parsed = parseSceneOptions(args, {
+    'min-db': text,
+    'max-mb': text,
+    out: text,
+    views: text,
+    report: text,
+    scored: { ...text, default: '216' },
+    threads: { ...text, default: String(usualThreads()) },
+    merge: { type: 'boolean', default: false },
+    refine: { type: 'boolean', default: false },
+  });
+  if (parsed === undefined) return undefined;
+  const { values } = parsed;
   const maxBytes = values['max-mb'] === undefined ? undefined : 1e6 * Number(values['max-mb']);
   if (maxBytes !== undefined && !(maxBytes > 0)) throw new UsageError('--max-mb: expected megabytes, above 0');
   if ((maxBytes === undefined) === (values['min-db'] === undefined))
@@ -79,7 +60,7 @@ function parseOptions(args) {
   if (!(minDecibels >= 10 && minDecibels <= 100)) throw new UsageError('--min-db: expected a number from 10 to 100');
   if (values.out === undefined) throw new UsageError('--out is missing');
   const { merge, refine } = values;
-  const [scene, out, views, report] = [positionals[0], values.out, values.views, values.report].map(
+  const [scene, out, views, report] = [parsed.scene, values.out, values.views, values.report].map(
     (path) => path && resolve(from, path),
   );
   checkFiles({ scene, out, views, report });
@@ -242,15 +223,4 @@ seconds      ${times.join(', ')}`);
   if (report) writeWhole(report, JSON.stringify(figures, null, 2));
 }
 
-try {
-  const options = parseOptions(process.argv.slice(2));
-  if (options === undefined) console.log(USAGE);
-  else await main(options);
-  // Dawn keeps Node alive.
-  process.exit(0);
-} catch (error) {
-  if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
-  else if (error instanceof GaussianSplatError || isOfFiles(error)) console.error(error.message);
-  else console.error(error);
-  process.exit(error instanceof UsageError ? 2 : 1);
-}
+await runCommand(USAGE, parseOptions, main);

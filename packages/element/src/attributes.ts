@@ -207,7 +207,7 @@ export const ATTRIBUTES = {
    * @default `orbit`
    */
   navigation: keyword<Navigation>(['orbit', 'fly']),
-  /** Turns the camera around the scene while nobody touches it; not for people who want less motion, nor under the keyboard; visitors can stop it. */
+  /** Turns the camera around the scene until a visitor touches it. Off for visitors who want less motion, and while the scene has the keyboard; a button stops it. */
   autoRotate: flag(),
   /**
    * Rest before it turns, in milliseconds.
@@ -275,7 +275,7 @@ export const ATTRIBUTES = {
    */
   filter: keyword<FilterChoice>(['auto', 'classic', 'antialiased', 'mip']),
   /**
-   * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every picture to be off by so many. Scenes that
+   * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every frame an error of that size. Scenes that
    * come in levels (`detail.json`, `lod-meta.json`) are streamed: `auto` is `1px` for them, and with `off` a `lod-meta.json` is loaded whole.
    * @default `auto`
    */
@@ -303,7 +303,7 @@ export const ATTRIBUTES = {
    * @default the rest pose
    */
   pose: text<Numbers | null>(),
-  /** Plays a scene that moves as soon as it is on show; not for people who want less motion; visitors can stop it. */
+  /** Plays a scene that moves as soon as it is shown. Off for visitors who want less motion; a button stops it. */
   autoplay: flag(),
   /** Starts again at the end. */
   loop: flag(),

@@ -192,7 +192,7 @@ export class GaussianSplatElement extends ViewingMethods {
     return this.stage.error;
   }
 
-  /** What the page may set of the models on show, from their contracts: for controls of one's own. Empty without a model; `inputs-change` tells of others. */
+  /** What the page may set of the models that are shown, from their contracts: for controls of one's own. Empty without a model; `inputs-change` tells of others. */
   get inputs(): readonly GeneratorInput[] {
     return this.stage.inputs;
   }

@@ -39,7 +39,7 @@ export async function takePicture(host: PictureHost, options: PictureOptions): P
 
 export const nothingToDraw = (): DOMException =>
   new DOMException(
-    'There is nothing to take a picture of: expected a scene on show in an element that has a size',
+    'There is nothing to take a picture of: expected a loaded scene in an element that has a size',
     'InvalidStateError',
   );
 

@@ -131,7 +131,7 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /**
    * The picture as it is on the screen now, with the CSS filters of the element, drawn anew. A colour that exceeds its alpha has no place in a transparent picture: give `background` where the scene has such.
-   * @returns rejects with an `InvalidStateError` where no scene is on show, or the element has no size; with a `RangeError` for a size that the GPU
+   * @returns rejects with an `InvalidStateError` where no scene is shown, or the element has no size; with a `RangeError` for a size that the GPU
    * cannot draw, and a `TypeError` for a background that is no colour.
    */
   async toBlob(options: PictureOptions = {}): Promise<Blob> {
@@ -140,12 +140,12 @@ export abstract class ViewingMethods extends MediaProperties {
     return takePicture(this.stage, options);
   }
 
-  /** The same as a `data:` URL, at once and without CSS filters. Throws an `InvalidStateError` where no scene is on show, or the element has no size. */
+  /** The same as a `data:` URL, at once and without CSS filters. Throws an `InvalidStateError` where no scene is shown, or the element has no size. */
   toDataURL(mimeType = 'image/png', qualityArgument?: number): string {
     this.applyAttributes();
     const canvas = this.stage.drawNow();
     if (canvas === null)
-      throw new DOMException('Expected a scene on show in an element that has a size', 'InvalidStateError');
+      throw new DOMException('Expected a loaded scene in an element that has a size', 'InvalidStateError');
     return canvas.toDataURL(mimeType, qualityArgument);
   }
 }
