@@ -240,7 +240,7 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
   const knot = join(root, 'demo/dist/scenes/knot');
   const bodies = new Map(readdirSync(knot).map((name) => [name, readFileSync(join(knot, name))]));
   const headers = { 'access-control-allow-origin': '*' };
-  await tab.route(/\/(skull|scene|garden|mine%20%26%20yours)\.(ply|spz|glb)$/, (route) =>
+  await tab.route(/\/(skull|scene|garden|room|mine%20%26%20yours)\.(ply|spz|glb)$/, (route) =>
     route.fulfill({ headers, body: fixture('element/browser/fixtures/compass.ply') }),
   );
   await tab.route(/\/copied\/|^https:\/\/[a-z]+\.example\//, async (route) => {
@@ -268,7 +268,7 @@ function pageOf(all: readonly Snippet[], origin: string): string {
     return `<section>${body}</section>`;
   });
   return `<!doctype html><title>Copied</title><link rel="icon" href="data:,">
-    <style>section { display: inline-block } gaussian-splat { display: block; width: 120px; height: 90px }</style>
+    <style>section { display: inline-block; width: 120px } gaussian-splat { display: block; width: 120px; height: 90px }</style>
     <script type="module" src="${origin}/cdn/gaussian-splat.min.js"></script>
     <script>
       const scripts = () => [...document.querySelectorAll('section script[type=module]')];
@@ -304,6 +304,10 @@ function stateOf(tab: Page): Promise<State[]> {
     for (const scene of document.querySelectorAll<Splat>('section gaussian-splat')) {
       scene.scrollIntoView();
       await scene.ready;
+      if (!scene.loaded) {
+        states.push({ shown: false, error: scene.error?.message ?? 'no scene', covered: false, plays: false });
+        continue;
+      }
       const picture = await createImageBitmap(await scene.toBlob());
       const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d')!;
       context.drawImage(picture, 0, 0);
