@@ -248,6 +248,9 @@ async function serveScenes(tab: Page, origin: string): Promise<void> {
     if (name.endsWith('.min.js')) return route.fulfill({ headers: { ...headers, location: `${origin}/cdn/${name}` }, status: 302 }); // prettier-ignore
     return route.fallback();
   });
+  await tab.route(/\/skull\.(webp|jpg)$/, (route) =>
+    route.fulfill({ path: join(root, 'demo/scenes/skull-poster.webp') }),
+  );
   await tab.route('**/dancer.json', (route) => route.fulfill({ body: bodies.get('knot.json') }));
   await tab.route('**/frame-*.spz', (route) => route.fulfill({ body: bodies.get(new URL(route.request().url()).pathname.slice(1)) })); // prettier-ignore
   await tab.route('**/style.onnx', (route) => route.fulfill({ body: fixture('fixtures/generators/post-fixed.onnx') }));
