@@ -19,6 +19,8 @@ const RARE = {
   'streamed-shaders': ['move_slots', 'note_wishes'],
   'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],
   'probe-shaders': ['probe_depth'],
+  'depth-shaders': ['rasterize_quads_depth', 'rasterize_tiles_depth'],
+  'linear-shaders': ['compose_linear'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
 const QUANTIZED = {

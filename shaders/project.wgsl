@@ -124,9 +124,10 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let slot = page.first_slot + rank;
   let i = survivors[slot] - view.first_group * CULL_GROUP;
   var g = unpack_gaussian(gaussian_at(i));
-  g.opacity = shared_opacity(g.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
+  g.opacity = shared_opacity(g.opacity * view.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
   let e = project_ellipse(view, g);
-  let color = splat_sh_color(i, normalize(g.position - view.eye));
+  let toward = select(g.position - view.eye, view.axis, view.is_orthographic != 0u);
+  let color = splat_sh_color(i, normalize(toward));
   splats[slot] = pack_splat(e, color);
   keys[slot] = depth_key(e.depth);
 }

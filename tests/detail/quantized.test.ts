@@ -229,7 +229,7 @@ test('copies that are moved on the GPU, and coarser levels, are what exact pages
         const scene = await StreamedGaussians.open(device, manifest, { fetchPage, arrivalMs: 0 });
         await drawUntilCalm(scene, renderer, camera, detail);
         const image = await readFrame(device, renderer, { gaussians: scene, camera, detail });
-        const { visible } = await renderer.readStatistics();
+        const { visible } = await renderer.statistics();
         scene.destroy();
         return { image, visible };
       }),
@@ -270,7 +270,7 @@ test('chunks whose first rows make no sense are not drawn, and spoil nothing els
     await drawUntilCalm(scene, renderer, camera, 0);
     const image = await readFrame(device, renderer, { gaussians: scene, camera, detail: 0 });
     assert.ok(image.every(Number.isFinite), `word ${word}`);
-    const { unusable, visible } = await renderer.readStatistics();
+    const { unusable, visible } = await renderer.statistics();
     assert.ok(unusable > 500 && visible > 300, `word ${word}: ${unusable} refused, ${visible} visible`);
     scene.destroy();
   }

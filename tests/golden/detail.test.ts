@@ -110,9 +110,9 @@ test('from afar fewer splats are drawn, and the picture stays', async () => {
   for (const [farther, detail, decibels, share] of HELD) {
     const camera = viewFrom(farther * away);
     const truth = await readFrame(device, renderer, { gaussians: plain, camera });
-    const { visible: all } = await renderer.readStatistics();
+    const { visible: all } = await renderer.statistics();
     const found = await readFrame(device, renderer, { gaussians: detailed, camera, detail });
-    const { visible } = await renderer.readStatistics();
+    const { visible } = await renderer.statistics();
     const covered = truth.filter((_, i) => i % 4 === 3).map((alpha) => (alpha > 0 ? 1 : 0));
     const close = psnr(truth, found, { channels: 4, mask: covered });
     console.log(`${farther} times as far, detail ${detail}: ${close.toFixed(1)} dB with ${visible} of ${all} splats`);

@@ -98,7 +98,7 @@ function isField(tokens: readonly Token[], at: number, isInStruct: boolean): boo
 
 test('token by token they are the same but for names, each has one other, and two in a declaration stay two', () => {
   assert.equal(forms.short.length, forms.readable.length);
-  assert.ok(forms.readable.length > 40, `${forms.readable.length} stages`);
+  assert.ok(forms.readable.length > 35, `${forms.readable.length} stages`);
   const shortOf = new Map<string, string>();
   let [before, now] = [0, 0];
   forms.readable.forEach(({ name, code }, k) => {

@@ -65,7 +65,7 @@ test('several scenes are drawn in their common order while the camera moves', as
   let worst = 0;
   for (let i = 0; i < found.length; i++) worst = Math.max(worst, Math.abs(found[i] - expected[i]));
   assert.ok(worst < 0.01, `worst difference ${worst}`);
-  assert.ok((await moving.readStatistics()).visible > 1000);
+  assert.ok((await moving.statistics()).visible > 1000);
 });
 
 for (const rasterizer of ['quads', 'tiles'] as const) {

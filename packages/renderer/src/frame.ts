@@ -18,13 +18,15 @@ export interface Frame {
   readonly hasDetail: boolean;
   /** Whether to keep the splats that are looked at within `Levers.splatBudget`. */
   readonly isBudgeted: boolean;
-  readonly timer?: FrameTimer;
+  /** Whether the rasterizer needs the depths of the splats: keys must be depths. */
+  readonly keepsDepths: boolean;
+  readonly timer?: FrameTimer | undefined;
 }
 
 /**
  * Records what turns Gaussians into projected splats from near to far: cull, project, sort. Counts travel in `plan`; nothing comes back to
  * the CPU.
- * @returns what must be read after the submit: pages that streamed scenes lack
+ * @returns what must be copied at the end of the frame and read after the submit: pages that streamed scenes lack
  */
 export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wishes[] {
   const { scratch, bindings, timer } = frame;
@@ -43,8 +45,8 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wish
   }
   noteWishes(pass, frame, wishes);
   pass.end();
-  for (const wish of wishes) wish.copy(encoder);
   if (frame.keepsSurvivors) scratch.keepSurvivors(encoder);
+  if (frame.keepsDepths) scratch.keepDepths(encoder);
   sort(encoder, frame);
   return wishes;
 }

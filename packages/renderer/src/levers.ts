@@ -94,12 +94,9 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
 };
 
 /**
- * The levers that single frames may set otherwise than their renderer: see {@link FrameRequest.levers}. The others decide what a renderer
- * allocates.
+ * The levers that frames may set otherwise than those before and behind them at no cost. The others decide what a viewpoint allocates.
  */
-export type FrameLevers = Pick<Levers, (typeof FRAME_LEVERS)[number]>;
-
-const FRAME_LEVERS = ['depthKeyBits', 'transmittanceMin', 'shDegree', 'detail', 'resolutionScale'] as const;
+export type FrameLevers = Pick<Levers, 'depthKeyBits' | 'transmittanceMin' | 'shDegree' | 'detail' | 'resolutionScale'>;
 
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
   submissions: [1, 256],
@@ -133,18 +130,8 @@ export function leversOf(options: Partial<Levers> & { readonly quality?: Quality
   return levers;
 }
 
-/**
- * A renderer's levers with those that a frame sets otherwise.
- * @throws GaussianSplatError `argument/value` for a value out of its lever's range.
- */
-export function leversOfFrame<L extends Levers>(levers: L, changes: Partial<FrameLevers>): L {
-  const set = FRAME_LEVERS.filter((name) => changes[name] !== undefined);
-  for (const name of set) requireInRange(name, changes[name], 'FrameRequest.levers');
-  return { ...levers, ...Object.fromEntries(set.map((name) => [name, changes[name]])) };
-}
-
 /** @throws GaussianSplatError `argument/value` for a value that is not in its lever's range or none of its choices. */
-export function requireInRange(name: keyof Levers, found: unknown, where = 'RendererOptions'): void {
+export function requireInRange(name: keyof Levers, found: unknown, where = 'FrameSettings'): void {
   const choices = CHOICES[name];
   if (choices && !choices.includes(found)) throw invalid(name, choices.join(', '), found, where);
   const range = RANGES[name];
@@ -155,7 +142,7 @@ export function requireInRange(name: keyof Levers, found: unknown, where = 'Rend
   }
 }
 
-function invalid(name: string, expected: string, found: unknown, where = 'RendererOptions'): GaussianSplatError {
+function invalid(name: string, expected: string, found: unknown, where = 'FrameSettings'): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
     where: `${where}.${name}`,
     expected,

@@ -2,6 +2,8 @@
 export { CapacityMonitor, LEAST_CAPACITY } from './capacity.js';
 export { CapacityMemory, type Capacity, type LookedAt } from './capacity-memory.js';
 export { givesKnownAnswer, packSpheres, sphereCloud } from './choice/known-answer.js';
+export * from './generated/depth-shaders.js';
+export * from './generated/linear-shaders.js';
 export * from './generated/live-shaders.js';
 export * from './generated/probe-shaders.js';
 export * from './generated/quantized-shaders.js';

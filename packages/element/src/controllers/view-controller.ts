@@ -3,7 +3,7 @@ import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import { Viewport, type Contents, type Place } from '../gpu/viewport.js';
 import type { Frame } from '../live/frame-filter.js';
 import { LADDER } from '../pace/ladder.js';
 import type { CameraController } from './camera-controller.js';
@@ -11,8 +11,8 @@ import { PaceController } from './pace-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
-export interface ViewHost {
-  readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'maxPixelRatio' | 'frameBudget'>;
+export interface ViewHost extends Contents {
+  readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'filter' | 'maxPixelRatio' | 'frameBudget'>;
   readonly camera: CameraController;
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
@@ -24,7 +24,7 @@ export interface ViewHost {
   /** Called once a frame before the camera steps: what moves it by itself does so now. */
   beforeFrame(now: number): void;
   /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
-  advanceScene(scene: GpuScene, camera: Camera, now: number): void;
+  advanceScene(camera: Camera, now: number): void;
   /** Called once a frame, after it was submitted, with the camera that it is drawn from. */
   afterFrame(camera: Camera): void;
   cameraChanged(source: CameraChangeSource): void;
@@ -50,12 +50,12 @@ export class ViewController implements FrameClient {
   /** What frames in motion are drawn with. */
   readonly pace: PaceController;
   readonly #host: ViewHost;
-  #scene: GpuScene | null = null;
+  #viewport: Viewport | null = null;
   #context: GPUCanvasContext | null = null;
   #configured: GPUDevice | null = null;
   /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
   #first: Settle | undefined;
-  #drawnVersion = 0;
+  #drawnContent = '';
   #preparing: ReturnType<typeof setTimeout> | undefined;
 
   constructor(host: ViewHost) {
@@ -74,14 +74,24 @@ export class ViewController implements FrameClient {
     if (this.#isDrawable) this.#host.scheduler.request(this);
   }
 
+  /** What frames are drawn with; null while nothing is. */
+  get viewport(): Viewport | null {
+    return this.#viewport;
+  }
+
   /**
-   * Takes a scene over. Fulfils once its first frame is drawn, or at once where there is no pixel to draw; rejects with
-   * GaussianSplatError `out-of-memory/*`.
+   * Draws what is to be shown from now on, or what has been added to it. Fulfils once the first frame of it is drawn, or at once where there is no pixel to draw;
+   * rejects with GaussianSplatError `out-of-memory/*`.
    */
-  show(scene: GpuScene): Promise<void> {
-    this.#scene = scene;
-    scene.onIncomplete = () => this.requestFrame();
-    scene.onError = (error) => this.#scene === scene && this.#host.drawingFailed(error);
+  show(place: Place): Promise<void> {
+    if (place.device !== this.#viewport?.device) {
+      this.#viewport?.destroy();
+      const viewport = new Viewport(place, this.#host, {
+        onIncomplete: () => this.requestFrame(),
+        onError: (error) => this.#viewport === viewport && this.#host.drawingFailed(error),
+      });
+      this.#viewport = viewport;
+    }
     this.pace.reset();
     return new Promise((resolve, reject) => {
       this.#first = { resolve, reject };
@@ -91,7 +101,10 @@ export class ViewController implements FrameClient {
 
   /** Stops drawing. The last picture stays, so that the next scene can replace it without a gap. */
   pause(): void {
-    this.#scene = null;
+    this.#viewport?.destroy();
+    this.#viewport = null;
+    // Nobody need wait for it.
+    this.#first?.resolve();
     this.#first = undefined;
     this.pace.stop();
     this.#host.scheduler.cancel(this);
@@ -113,19 +126,19 @@ export class ViewController implements FrameClient {
   }
 
   drawFrame(now: number): void {
-    const scene = this.#scene;
+    const viewport = this.#viewport;
     // It may have left the viewport since it asked.
-    if (scene === null || !this.#isDrawable) return;
+    if (viewport === null || !this.#isDrawable) return;
     const { camera } = this.#host;
-    const pixels = this.#pixelsOf(scene);
+    const pixels = this.#pixelsOf(viewport);
     // Without a size nothing is drawn; the observer of the size asks again when there is one.
     if (pixels === null) return this.#finishUnseen();
     this.#host.beforeFrame(now);
     const source = camera.step(now, this.#host.decayMs);
     try {
-      const request = this.#frameRequest(scene, pixels);
-      this.#host.advanceScene(scene, request.camera, now);
-      this.#render(scene, request, now, source !== null);
+      const request = this.#frameRequest(viewport, pixels);
+      this.#host.advanceScene(request.camera, now);
+      this.#render(viewport, request, now, source !== null);
       this.#host.afterFrame(request.camera);
     } catch (error) {
       return this.#host.drawingFailed(error);
@@ -136,38 +149,40 @@ export class ViewController implements FrameClient {
 
   /**
    * Draws a frame within the running task, for those who read the canvas before it ends: afterwards a WebGPU canvas is blank to readers.
+   * @param size of the picture; default that of the element
+   * @param background premultiplied, behind the splats
    * @returns the canvas, or null where there is nothing to draw.
    */
-  drawNow(): HTMLCanvasElement | null {
-    const scene = this.#scene;
+  drawNow(size?: PixelSize, background?: Frame['background']): HTMLCanvasElement | null {
+    const viewport = this.#viewport;
     const canvas = this.#host.canvas;
-    if (scene === null || scene.isLost || this.#first !== undefined || canvas === null) return null;
-    const pixels = this.#pixelsOf(scene);
-    if (pixels === null) return null;
-    this.#applyRendering(scene);
-    scene.render(this.#frameRequest(scene, pixels));
+    if (viewport === null || viewport.isLost || this.#first !== undefined || canvas === null) return null;
+    const own = this.#pixelsOf(viewport);
+    if (own === null) return null;
+    this.#applyRendering(viewport);
+    viewport.render({ ...this.#frameRequest(viewport, size ?? own), background }, this.#host.prepareFrame());
     return canvas;
   }
 
   /** There is a scene, and somebody sees it or waits for its first frame. A document without a window, as of a frame that was taken away, shows none. */
   get #isDrawable(): boolean {
     const { canvas, isVisible } = this.#host;
-    if (this.#scene?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
+    if (this.#viewport?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
     return this.#first !== undefined || isVisible;
   }
 
   /** null where there is no size. */
-  #pixelsOf({ device }: GpuScene): PixelSize | null {
+  #pixelsOf({ device }: Viewport): PixelSize | null {
     return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, device.limits.maxTextureDimension2D);
   }
 
-  #render(scene: GpuScene, request: Frame, now: number, cameraMoved: boolean): void {
+  #render(viewport: Viewport, request: Frame, now: number, cameraMoved: boolean): void {
     const first = this.#first;
     this.#first = undefined;
-    this.#applyRendering(scene);
-    const { version } = scene.gaussians;
-    const hasChanged = first === undefined && (cameraMoved || version !== this.#drawnVersion);
-    this.#drawnVersion = version;
+    this.#applyRendering(viewport);
+    const content = this.#host.prepareFrame();
+    const hasChanged = first === undefined && (cameraMoved || content !== this.#drawnContent);
+    this.#drawnContent = content;
     const pixels = request.camera.width * request.camera.height;
     const goesOn = this.#host.camera.isMoving;
     const plan = this.pace.plan({ now, pixels, hasChanged, goesOn });
@@ -176,30 +191,31 @@ export class ViewController implements FrameClient {
     const onTime =
       this.#host.attributes.quality === 'auto' ? (time: WorkTime) => this.pace.sample(plan, time) : undefined;
     if (first !== undefined) {
-      scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
+      viewport.renderFirst(request, content).then(() => this.#afterFirst(viewport, request, first), first.reject);
       return;
     }
-    scene.render({ ...request, levers }, onTime);
-    this.#prepareSoon(scene, request);
+    viewport.render({ ...request, levers }, content, onTime);
+    this.#prepareSoon(viewport, request);
   }
 
-  #afterFirst(scene: GpuScene, request: Frame, { resolve }: Settle): void {
+  #afterFirst(viewport: Viewport, request: Frame, { resolve }: Settle): void {
     resolve();
-    this.#prepareSoon(scene, request);
+    this.#prepareSoon(viewport, request);
   }
 
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
-  #prepareSoon(scene: GpuScene, { target: { format } }: Frame): void {
-    if (scene.isPrepared || this.#host.attributes.quality !== 'auto') return;
+  #prepareSoon(viewport: Viewport, { target: { format } }: Frame): void {
+    if (viewport.isPrepared || this.#host.attributes.quality !== 'auto') return;
     this.#preparing ??= setTimeout(() => {
       this.#preparing = undefined;
-      if (this.#scene === scene) scene.prepare(MOVING_LEVERS, format);
+      if (this.#viewport === viewport) viewport.prepare(MOVING_LEVERS, format);
     }, PREPARE_AFTER_MS);
   }
 
-  #applyRendering(scene: GpuScene): void {
-    const { quality, maxShDegree: shDegree } = this.#host.attributes;
-    scene.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree });
+  #applyRendering(viewport: Viewport): void {
+    const { quality, maxShDegree: shDegree, filter } = this.#host.attributes;
+    const trained = filter === 'auto' ? undefined : filter;
+    viewport.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, filter: trained });
   }
 
   #finishUnseen(): void {
@@ -208,8 +224,8 @@ export class ViewController implements FrameClient {
     this.#first = undefined;
   }
 
-  #frameRequest(scene: GpuScene, { width, height }: PixelSize): Frame {
-    const context = this.#contextFor(scene.device);
+  #frameRequest(viewport: Viewport, { width, height }: PixelSize): Frame {
+    const context = this.#contextFor(viewport.device);
     const canvas = context.canvas;
     // Setting a canvas's size clears it, even to the same size; here a frame follows at once.
     if (canvas.width !== width) canvas.width = width;

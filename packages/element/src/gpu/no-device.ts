@@ -1,4 +1,4 @@
-/** Loaded only by pages that have no GPU device: what people read there. */
+/** Loaded only by pages that have no GPU device, or too little of its memory: what people read there. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 
 export function noWebGpu(): GaussianSplatError {
@@ -42,5 +42,15 @@ export const noDevice = (cause: unknown): GaussianSplatError =>
     expected: 'a WebGPU device',
     found: cause instanceof Error ? cause.message : String(cause),
     remedy: 'reload the page, or update the graphics driver',
+    cause,
+  });
+
+/** @param where what could not be drawn */
+export const outOfMemory = (where: string, cause: GPUError): GaussianSplatError =>
+  new GaussianSplatError('out-of-memory/allocation', {
+    where,
+    expected: 'enough free GPU memory',
+    found: cause.message || 'an allocation that failed',
+    remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
     cause,
   });

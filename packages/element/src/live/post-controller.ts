@@ -1,19 +1,21 @@
 import { loadModule } from '@gaussian-splat/core';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { Viewport } from '../gpu/viewport.js';
 import { LatestTask } from '../latest-task.js';
 import type { PostRequest } from './post-view.js';
 
 export interface PostHost {
   /** What a post-processor needs to know beyond its address. */
-  readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
+  readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
   requestFrame(): void;
+  /** There is another filter, or none. */
+  tellInputs(): void;
 }
 
-/** Puts the post-processor of the attribute between the scene on show and the canvas. Until it is there, frames are shown as they are drawn. */
+/** Puts the post-processor of the attribute between the frames and the canvas. Until it is there, frames are shown as they are drawn. */
 export class PostController {
   readonly #host: PostHost;
   #urls: readonly string[] = [];
-  #scene: GpuScene | null = null;
+  #viewport: Viewport | null = null;
   readonly #opening = new LatestTask();
 
   constructor(host: PostHost) {
@@ -32,24 +34,27 @@ export class PostController {
     this.#open();
   }
 
-  /** A scene is on show, or none any more. A scene that is destroyed closes its processor itself. */
-  attach(scene: GpuScene | null): void {
-    this.#scene = scene;
+  /** Frames are drawn, or none any more. A viewport that is destroyed closes its processor itself. */
+  attach(viewport: Viewport | null): void {
+    this.#viewport = viewport;
     this.#open();
   }
 
   #open(): void {
     this.#opening.renew();
-    const scene = this.#scene;
-    if (scene === null) return;
-    if (scene.filter) this.#host.requestFrame();
-    scene.setFilter(undefined);
+    const viewport = this.#viewport;
+    if (viewport === null) return;
+    if (viewport.filter) {
+      this.#host.requestFrame();
+      this.#host.tellInputs();
+    }
+    viewport.setFilter(undefined);
     if (this.#urls.length === 0) return;
     const options = this.#host.postRequest;
-    this.#opening.run((signal) => this.#load(scene, options, signal), options.onError);
+    this.#opening.run((signal) => this.#load(viewport, options, signal), options.onError);
   }
 
-  async #load(scene: GpuScene, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
+  async #load(viewport: Viewport, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
     const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
     if (signal.aborted) return;
     const view = await PostView.open(
@@ -57,14 +62,14 @@ export class PostController {
         ...options,
         urls: this.#urls,
         signal,
-        others: () => scene.live?.settable ?? [],
         onError: (error) => (signal.aborted ? undefined : options.onError(error)),
         onChange: () => this.#host.requestFrame(),
       },
-      scene.device,
+      viewport.device,
     );
-    if (signal.aborted || scene.isDestroyed) return view.close();
-    scene.setFilter(view);
+    if (signal.aborted || viewport.isDestroyed) return view.close();
+    viewport.setFilter(view);
+    this.#host.tellInputs();
     this.#host.requestFrame();
   }
 }

@@ -1,9 +1,16 @@
 /** What the page and the scene worker say to each other. */
-import type { ErrorData } from '@gaussian-splat/core';
+import type { ErrorData, ModelPlace } from '@gaussian-splat/core';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
-import type { LevelPage, LevelScene, PackedGaussians, ShPrecision, StreamedScene } from '@gaussian-splat/renderer';
+import type {
+  CodedFile,
+  LevelPage,
+  LevelScene,
+  PackedGaussians,
+  ShPrecision,
+  StreamedScene,
+} from '@gaussian-splat/renderer';
 
 /** A file to fetch. */
 export interface FileRequest {
@@ -12,6 +19,8 @@ export interface FileRequest {
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
   readonly limits?: SceneLimits | undefined;
+  /** What a file of pages that is coded is decoded by. */
+  readonly coded?: CodedFile | undefined;
 }
 
 /** What loads of a page may cost, and whom they may ask: see `GaussianSplatElement.sceneLimits`. */
@@ -20,12 +29,20 @@ export interface SceneLimits extends LoadLimits {
   readonly origins?: readonly string[];
 }
 
+/** A model whose header is to be read. */
+export interface ModelRequest {
+  readonly place: ModelPlace;
+  readonly limits?: SceneLimits | undefined;
+}
+
 /** A scene to fetch. */
 export interface SceneRequest extends FileRequest {
   /** Precision of the spherical harmonics on the GPU. */
   readonly sh: ShPrecision | 'auto';
   /** Whether levels of detail are wanted that the file has, besides the finest. */
   readonly levels?: boolean;
+  /** Whether a streamed SOG scene is loaded whole, in its finest level. */
+  readonly isWhole?: boolean;
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
   readonly contract?: unknown;
   /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */
@@ -36,6 +53,10 @@ export interface SceneRequest extends FileRequest {
 export interface LoadedScene {
   readonly packed: PackedGaussians;
   readonly bounds: SceneBounds;
+  /** What of the file is not drawn: see `GaussianCloud.warnings`. */
+  readonly warnings?: readonly string[] | undefined;
+  /** The file has triangles, too. */
+  readonly hasMeshes?: boolean | undefined;
 }
 
 /** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */
@@ -76,7 +97,8 @@ export type WorkerRequest =
   | { readonly type: 'file'; readonly request: FileRequest }
   | { readonly type: 'manifest'; readonly request: FileRequest }
   | { readonly type: 'boxes'; readonly request: SceneRequest }
-  | { readonly type: 'box'; readonly request: BoxRequest };
+  | { readonly type: 'box'; readonly request: BoxRequest }
+  | { readonly type: 'model'; readonly request: ModelRequest };
 
 export type PageMessage =
   | (WorkerRequest & { readonly id: number })

@@ -1,5 +1,8 @@
 import type { FrameTimer } from '../gpu/pass-timer.js';
+import type { Camera } from '@gaussian-splat/core';
+import type { ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
 import type { Levers } from '../levers.js';
+import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
@@ -66,14 +69,38 @@ export interface NotedFrame {
   readonly survivors: GPUBuffer;
 }
 
+/** What a frame has to do with depth besides its own. `SceneDepth` is one; pictures bring it, so that pages without it load none of its code. */
+export interface PaintingDepth {
+  /** Called before a frame is recorded, with the pixels that are drawn. @throws GaussianSplatError for a frame that it does not fit */
+  prepare(
+    camera: Camera,
+    drawn: { readonly width: number; readonly height: number },
+    rasterizer: RasterizerName,
+    notes: FrameNotes | undefined,
+  ): void;
+  tilesKernel(variant: RasterizeVariant): RasterizeKernel;
+  bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup;
+  readonly quadsProgram: QuadsWithDepth;
+}
+
+/** Quads that read depths: what a pipeline is made of, and what is bound to it. */
+export interface QuadsWithDepth extends Pick<ShaderProgram<ShaderDescription>, 'module' | 'pipelineLayout'> {
+  readonly name: string;
+  bind(
+    resources: Readonly<Record<'raster' | 'plan' | 'splats' | 'order', GPUBuffer>>,
+    depth: PaintingDepth,
+    depths: GPUBuffer,
+  ): GPUBindGroup;
+}
+
 /** Levers that rasterizers know. */
 export type PaintingLevers = Pick<Levers, 'transmittanceMin'>;
 
 /** One frame to draw. */
 export interface Painting {
-  readonly notes?: FrameNotes;
+  readonly notes?: FrameNotes | undefined;
   /** Numbers of the visible splats by slot; with {@link notes}. */
-  readonly survivors?: GPUBuffer;
+  readonly survivors?: GPUBuffer | undefined;
   readonly surface: Surface;
   readonly levers: PaintingLevers;
   /**
@@ -81,7 +108,10 @@ export interface Painting {
    * transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
    */
   readonly background?: readonly [number, number, number, number];
-  readonly timer?: FrameTimer;
+  readonly timer?: FrameTimer | undefined;
+  readonly depth?: PaintingDepth | undefined;
+  /** Camera depths of the splats by slot; with {@link depth}. */
+  readonly depths?: GPUBuffer | undefined;
 }
 
 /** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */

@@ -146,7 +146,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, levers, background, notes, survivors, timer } = painting;
+    const { surface, levers, background, notes, survivors, timer, depth, depths } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
     const { format, width, height } = surface;
@@ -158,16 +158,17 @@ export class TilesRasterizer implements Rasterizer {
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    const kernel = rasterizeKernel(this.#device, {
-      format,
-      isFinal: background !== undefined,
-      isNoting: notes !== undefined,
+    const variant = {
+      ...{ format, isFinal: background !== undefined, isNoting: notes !== undefined },
       refusesLast: refusesLast(levers),
-    });
+    };
+    const kernel = depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant);
     const image =
-      notes && survivors
-        ? this.#bindNoting(kernel, bound, surface.view, { ...notes, survivors })
-        : this.#imageBindings(kernel, bound, surface.view);
+      depth && depths
+        ? depth.bindTiles(kernel, this.#painted(bound, surface.view), depths)
+        : notes && survivors
+          ? this.#bindNoting(kernel, bound, surface.view, { ...notes, survivors })
+          : this.#imageBindings(kernel, bound, surface.view);
     kernel.dispatchGrid(paint, image, columns, rows);
     paint.end();
   }
