@@ -1,6 +1,8 @@
 /**
  * The CDN build: `cdn/gaussian-splat.min.js` (the element and the renderer in one file, for a script tag with an
  * integrity attribute), and beside it the scene worker with a chunk for every reader, which it finds from its own URL.
+ * And for bundlers, in the package: the worker as text, a module for each chunk, and as one file (src/loading/own-worker.ts); and the element as
+ * short as for CDNs, for those that build for production.
  */
 import { cpSync, mkdirSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -11,14 +13,21 @@ import terser from '@rollup/plugin-terser';
 import { minifyTemplateLiterals } from 'rollup-plugin-minify-template-literals';
 import { shortShaders } from './scripts/shader-plugin.mjs';
 import { transform } from 'esbuild';
+import { workerAsText } from './scripts/worker-text.mjs';
+
+/** Of the package's own modules these stay as they are: they find files by their own address, or are the worker's. */
+const KEPT = /\/element\/dist\/loading\/(own-worker|spawn-worker|scene-worker)\.js$/;
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 
 /** esbuild gives the private names of all classes the same few letters. Terser, which is better at all else, gives each its own. */
 const shortPrivates = {
   name: 'short-privates',
-  renderChunk: (code) =>
-    transform(code, { format: 'esm', target: 'es2022', minifyIdentifiers: true, sourcemap: 'external' }),
+  renderChunk: (code, chunk, { format, sourcemap }) =>
+    transform(code, {
+      ...(format === 'es' && { format: 'esm' }),
+      ...{ target: 'es2022', minifyIdentifiers: true, sourcemap: sourcemap ? 'external' : false },
+    }),
 };
 
 const plugins = [
@@ -50,6 +59,12 @@ const noMapOfThree = {
   },
 };
 
+/** Here the worker's script lies beside the element's. */
+const workerBeside = {
+  name: 'worker-beside',
+  load: (id) => (id === path('./dist/loading/own-worker.js') ? `export * from './own-worker-cdn.js'` : null),
+};
+
 /** Chunks carry a hash in their name, so those of earlier builds would pile up. */
 const emptyFirst = { name: 'empty-first', buildStart: () => rmSync(path('./cdn'), { recursive: true, force: true }) };
 
@@ -61,20 +76,26 @@ const RUNTIME_FILES = [
   'ort-wasm-simd-threaded.asyncify.wasm',
 ];
 
-const copyRuntime = {
-  name: 'copy-runtime',
+/** And the page for iframes. */
+const copyOthers = {
+  name: 'copy-others',
   writeBundle() {
+    cpSync(path('./embed'), path('./cdn'), { recursive: true });
     const from = dirname(createRequire(import.meta.url).resolve('onnxruntime-web/webgpu'));
     mkdirSync(path('./cdn/onnxruntime'), { recursive: true });
     for (const file of RUNTIME_FILES) cpSync(join(from, file), path(`./cdn/onnxruntime/${file}`));
   },
 };
 
+/** What is in a chunk; where its module says it least, the name of the package. */
+const NAMES = { index: 'generator', dist: 'generator', meta: 'sog-meta', lod: 'sog-levels', bundle: 'sog-bundle' };
+const nameOf = ({ name }) => NAMES[name] ?? name;
+
 const output = {
   dir: path('./cdn'),
   format: 'es',
   sourcemap: true,
-  chunkFileNames: 'readers/[name]-[hash].js',
+  chunkFileNames: (chunk) => `readers/${nameOf(chunk)}-[hash].js`,
 };
 
 export default [
@@ -84,11 +105,11 @@ export default [
     external: (id) => id.endsWith('scene-worker.js'),
     // What generators need is a chunk of its own, loaded when the first is shown; it finds the runtime beside itself.
     preserveEntrySignatures: 'allow-extension',
-    plugins: [emptyFirst, ...plugins, noMapOfThree, copyRuntime],
+    plugins: [emptyFirst, workerBeside, ...plugins, noMapOfThree, copyOthers],
     // What two chunks share and is smaller than a request for it goes where the page has it already.
     output: {
       ...output,
-      chunkFileNames: 'generator-[hash].js',
+      chunkFileNames: (chunk) => `${nameOf(chunk)}-[hash].js`,
       paths: () => './scene-worker.js',
       experimentalMinChunkSize: 500,
     },
@@ -98,6 +119,28 @@ export default [
     // The page imports `loadScene` from it, so its exports stay; readers import what they share with it from it.
     preserveEntrySignatures: 'allow-extension',
     plugins,
-    output,
+    output: [output, { dir: path('./dist/loading'), format: 'cjs', plugins: [workerAsText] }],
+  },
+  {
+    input: { index: path('./dist/index.js'), element: path('./dist/element.js'), scenes: path('./dist/scenes.js') },
+    // Lit and the errors' class may be the app's own, too.
+    external: (id) => /^(lit|@lit|three\b|@gaussian-splat\/core$)/.test(id) || KEPT.test(id),
+    plugins,
+    output: {
+      ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500 },
+      entryFileNames: 'production/[name].js',
+      chunkFileNames: (chunk) => `production/${nameOf(chunk)}.js`,
+    },
+  },
+  {
+    input: path('./dist/loading/scene-worker.js'),
+    plugins,
+    output: { file: path('./dist/loading/scene-worker.bundle.js'), format: 'es', inlineDynamicImports: true },
+  },
+  {
+    // All in one module, for pages that are one file.
+    input: path('./dist/index.js'),
+    plugins,
+    output: { file: path('./dist/single.js'), format: 'es', inlineDynamicImports: true },
   },
 ];

@@ -182,6 +182,6 @@ describe("a worker's script that never comes", () => {
     } finally {
       GaussianSplatElement.sceneLoader = original;
     }
-    claimFault(/refuses its worker \(its script does not come\)/);
+    claimFault(/no worker could be started \(its script does not come\)/);
   });
 });

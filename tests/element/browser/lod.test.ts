@@ -158,6 +158,6 @@ describe('a streamed SOG scene', () => {
     await asked(served, '0_0/meta.json');
     await close(element);
     GaussianSplatElement.sceneLoader = original;
-    claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
+    claimFault(/console\.warn: <gaussian-splat>: no worker could be started .* workerLocation/);
   });
 });
