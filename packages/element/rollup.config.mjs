@@ -15,8 +15,8 @@ import { shortShaders } from './scripts/shader-plugin.mjs';
 import { transform } from 'esbuild';
 import { workerAsText } from './scripts/worker-text.mjs';
 
-/** Of the package's own modules these stay as they are: they find files by their own address, or are the worker's. */
-const KEPT = /\/element\/dist\/loading\/(own-worker|spawn-worker|scene-worker)\.js$/;
+/** Of the package's own modules these stay as they are: they find files by their own address, are the worker's, or are made here. */
+const KEPT = /\/element\/dist\/(loading\/(own-worker|spawn-worker|scene-worker)|meshes\/three)\.js$/;
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 
@@ -28,6 +28,12 @@ const shortPrivates = {
       ...(format === 'es' && { format: 'esm' }),
       ...{ target: 'es2022', minifyIdentifiers: true, sourcemap: sourcemap ? 'external' : false },
     }),
+};
+
+/** Quick: whatever bundles it does better, if it does. */
+const shortText = {
+  name: 'short-text',
+  renderChunk: (code) => transform(code, { format: 'esm', target: 'es2022', minify: true, legalComments: 'inline' }),
 };
 
 const plugins = [
@@ -51,7 +57,7 @@ const noMapOfThree = {
   name: 'no-map-of-three',
   generateBundle(_options, bundle) {
     for (const chunk of Object.values(bundle)) {
-      if (!chunk.moduleIds?.some((id) => id.includes('/node_modules/three/build/'))) continue;
+      if (!chunk.moduleIds?.includes(path('./dist/meshes/three.js'))) continue;
       delete bundle[`${chunk.fileName}.map`];
       chunk.code = chunk.code.replace(/\n\/\/# sourceMappingURL=\S+\s*$/, '\n');
       chunk.map = null;
@@ -100,6 +106,12 @@ const output = {
 
 export default [
   {
+    // three.js, as much as meshes need: a package of 24 MB otherwise.
+    input: { three: path('./scripts/three.mjs') },
+    plugins: [nodeResolve({ exportConditions: ['production', 'browser'] }), shortText],
+    output: { dir: path('./dist/meshes'), format: 'es', entryFileNames: '[name].js', chunkFileNames: '[name].js' },
+  },
+  {
     input: { 'gaussian-splat.min': path('./dist/index.js') },
     // Where workers are refused, the element imports the worker's module; it is the same file, not a copy.
     external: (id) => id.endsWith('scene-worker.js'),
@@ -124,7 +136,7 @@ export default [
   {
     input: { index: path('./dist/index.js'), element: path('./dist/element.js'), scenes: path('./dist/scenes.js') },
     // Lit and the errors' class may be the app's own, too.
-    external: (id) => /^(lit|@lit|three\b|@gaussian-splat\/core$)/.test(id) || KEPT.test(id),
+    external: (id) => /^(lit|@lit|@gaussian-splat\/core$)/.test(id) || KEPT.test(id),
     plugins,
     output: {
       ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500 },
