@@ -135,11 +135,13 @@ export default [
   },
   {
     input: { index: path('./dist/index.js'), element: path('./dist/element.js'), scenes: path('./dist/scenes.js') },
+    // Imports for nothing but their effects, which these do not have, would make bundlers warn.
+    treeshake: { moduleSideEffects: (_, isExternal) => !isExternal },
     // Lit and the errors' class may be the app's own, too.
     external: (id) => /^(lit|@lit|@gaussian-splat\/core$)/.test(id) || KEPT.test(id),
     plugins,
     output: {
-      ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500 },
+      ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500, hoistTransitiveImports: false },
       entryFileNames: 'production/[name].js',
       chunkFileNames: (chunk) => `production/${nameOf(chunk)}.js`,
     },
@@ -150,9 +152,9 @@ export default [
     output: { file: path('./dist/loading/scene-worker.bundle.js'), format: 'es', inlineDynamicImports: true },
   },
   {
-    // All in one module, for pages that are one file.
+    // All in one module, for `gaussian-splat page --single`.
     input: path('./dist/index.js'),
     plugins,
-    output: { file: path('./dist/single.js'), format: 'es', inlineDynamicImports: true },
+    output: { file: path('../cli/dist/single.js'), format: 'es', inlineDynamicImports: true },
   },
 ];
