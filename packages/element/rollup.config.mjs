@@ -71,8 +71,12 @@ const workerBeside = {
   load: (id) => (id === path('./dist/loading/own-worker.js') ? `export * from './own-worker-cdn.js'` : null),
 };
 
-/** Chunks carry a hash in their name, so those of earlier builds would pile up. */
-const emptyFirst = { name: 'empty-first', buildStart: () => rmSync(path('./cdn'), { recursive: true, force: true }) };
+/** Chunks are called by what is in them, and most carry a hash: those of earlier builds would pile up. */
+const MADE = ['./cdn', './dist/production', './dist/loading/worker-code'];
+const emptyFirst = {
+  name: 'empty-first',
+  buildStart: () => MADE.forEach((folder) => rmSync(path(folder), { recursive: true, force: true })),
+};
 
 /** ONNX Runtime for generators, in both its builds: fetched by pages that show a generator, and by no other. */
 const RUNTIME_FILES = [
