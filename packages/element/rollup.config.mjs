@@ -36,6 +36,12 @@ const shortText = {
   renderChunk: (code) => transform(code, { format: 'esm', target: 'es2022', minify: true, legalComments: 'inline' }),
 };
 
+/** TypeScript takes them from the sources and leaves them there. */
+const typesOfThree = {
+  name: 'types-of-three',
+  writeBundle: () => cpSync(path('./src/meshes/three.d.ts'), path('./dist/meshes/three.d.ts')),
+};
+
 const plugins = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
@@ -112,7 +118,7 @@ export default [
   {
     // three.js, as much as meshes need: a package of 24 MB otherwise.
     input: { three: path('./scripts/three.mjs') },
-    plugins: [nodeResolve({ exportConditions: ['production', 'browser'] }), shortText],
+    plugins: [nodeResolve({ exportConditions: ['production', 'browser'] }), shortText, typesOfThree],
     output: { dir: path('./dist/meshes'), format: 'es', entryFileNames: '[name].js', chunkFileNames: '[name].js' },
   },
   {
