@@ -38,6 +38,9 @@ export type DetailChoice = 'auto' | 'off' | number;
 /** What pictures are drawn with: `auto` is the true image at rest and, in motion, as much of it as there is time for. */
 export type QualityChoice = 'auto' | Quality;
 
+/** What draws: `auto` is WebGPU where the browser has it, else WebGL 2. */
+export type RendererChoice = 'auto' | 'webgpu' | 'webgl';
+
 /** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
 export type Reveal = 'auto' | 'manual';
 
@@ -238,6 +241,11 @@ export const ATTRIBUTES = {
    * @default `auto`
    */
   quality: keyword<QualityChoice>(['auto', 'default', 'reference', 'balanced', 'fast']),
+  /**
+   * What draws: `auto` is WebGPU and, in browsers without it, WebGL 2, which shows scene files alone; `webgpu` and `webgl` are that one or an error.
+   * @default `auto`
+   */
+  renderer: keyword<RendererChoice>(['auto', 'webgpu', 'webgl']),
   /**
    * Highest degree of spherical harmonics that colours are made of: 0, the same from everywhere, to 3. Whatever the file has beyond it is kept, but not evaluated.
    * @default `3`

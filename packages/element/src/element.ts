@@ -22,6 +22,8 @@ export interface SceneStatistics {
   readonly dropped: number;
   /** Bytes of GPU memory that the splats take. */
   readonly bytes: number;
+  /** What draws: WebGPU, or WebGL 2 where there is none. */
+  readonly renderer: 'webgpu' | 'webgl';
 }
 
 /** Names of the custom states, for `gaussian-splat:state(ready)` in CSS. */
@@ -168,9 +170,11 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** Size of the scene on show, or null. */
   get statistics(): SceneStatistics | null {
-    const gaussians = this.stage.scene.scene?.gaussians;
-    if (!gaussians) return null;
+    const { scene } = this.stage.scene;
+    if (!scene) return null;
+    const { gaussians, renderer } = scene;
     return {
+      renderer,
       splats: gaussians.frameCount ?? gaussians.count,
       dropped: gaussians.droppedCount ?? 0,
       bytes: gaussians.byteLength,

@@ -35,7 +35,7 @@ export class Addresses {
   /** The scene that is asked for; null for none. */
   request(
     { src, contract, chain }: Source,
-    { crossorigin, quality, detail }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail'>,
+    { crossorigin, quality, detail, renderer }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail' | 'renderer'>,
     modifier: UrlModifier,
   ): SceneRequest | null {
     const [url] = this.#src.of(src ? [src] : [], modifier);
@@ -45,6 +45,7 @@ export class Addresses {
       credentials: credentialsOf(crossorigin),
       sh: quality === 'reference' ? 'float16' : 'auto',
       levels: typeof detail === 'number' && detail > 0,
+      renderer,
       contract,
       chain: this.#chain.of(listed(chain), modifier),
     };

@@ -20,7 +20,7 @@ import { ElementCore } from './element-core.js';
 import type { ElementError } from './errors.js';
 import type { CameraChangeSource } from './events.js';
 import { isGone } from './gpu/device-failures.js';
-import type { GpuScene } from './gpu/gpu-scene.js';
+import type { DrawnScene } from './gpu/open-scene.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
 import { SceneQueries, type QueryHost } from './scene-queries.js';
 import type { Source, StageHost } from './stage-host.js';
@@ -231,7 +231,7 @@ export class Stage
     this.behaviours.advance(now);
   }
 
-  advanceScene(scene: GpuScene, camera: Camera, now: number): void {
+  advanceScene(scene: DrawnScene, camera: Camera, now: number): void {
     // The last picture of a scene whose place another will take stays as it is.
     if (!this.scene.isOutgoing) this.#live.advance(scene, camera, now);
   }
@@ -267,7 +267,7 @@ export class Stage
     if (type === 'play' || type === 'pause') this.element.requestUpdate();
   }
 
-  show(scene: GpuScene, entrance: Entrance): Promise<void> {
+  show(scene: DrawnScene, entrance: Entrance): Promise<void> {
     this.#counts = undefined;
     if (entrance === 'new') this.camera.frame(scene.bounds);
     if (entrance === 'whole') this.camera.refine(scene.bounds);
@@ -298,7 +298,7 @@ export class Stage
     this.dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));
   }
 
-  previewShown({ gaussians }: GpuScene): void {
+  previewShown({ gaussians }: DrawnScene): void {
     this.element.requestUpdate();
     this.dispatch(new CustomEvent('preview', { detail: { splats: gaussians.count } }));
     this.progressed(...this.#bytes);

@@ -1,9 +1,11 @@
 import type { QualityChoice } from './attributes.js';
 import type { PaceReport } from './controllers/pace-controller.js';
-import type { GpuScene } from './gpu/gpu-scene.js';
+import type { DrawnScene } from './gpu/open-scene.js';
 
 /** What is modelled, drawn, and seen of a scene, what it takes, and why. */
 export interface SceneStats {
+  /** What draws. */
+  readonly renderer: 'webgpu' | 'webgl';
   /** Splats that the file has, or a generator writes at most. */
   readonly modelled: number;
   /** What is on show is a part of a scene that is still loading; all counts are those of the part. */
@@ -36,7 +38,8 @@ export interface ReadCounts {
   readonly drawn: number;
   /** Visible, but without room in what the device allows a buffer to hold. */
   readonly left: number;
-  readonly contributed: number;
+  /** null where it is not counted: with WebGL. */
+  readonly contributed: number | null;
 }
 
 /** What is known besides the scene. */
@@ -48,12 +51,13 @@ export interface StatsContext {
 }
 
 /** Puts together what is known without asking the GPU. */
-export function statsOf(scene: GpuScene, { quality, pace, counts, isPreview }: StatsContext): SceneStats {
+export function statsOf(scene: DrawnScene, { quality, pace, counts, isPreview }: StatsContext): SceneStats {
   const { gaussians } = scene;
   const dropped = gaussians.droppedCount ?? 0;
   const merged = scene.levels === undefined ? 0 : scene.levels.count - gaussians.count;
   const detail = { splats: merged, pixels: scene.detail.detail ?? 0 };
   return {
+    renderer: scene.renderer,
     isPreview,
     modelled: (gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
     dropped,

@@ -1,5 +1,6 @@
 import type { Attributes, DetailChoice } from '../attributes.js';
 import type { DetailLevers, GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
+import type { DrawnScene } from '../gpu/open-scene.js';
 import { LatestTask } from '../latest-task.js';
 import type { Services } from '../stage-host.js';
 
@@ -25,7 +26,7 @@ export interface DetailHost {
 /** Sees to levels of detail: built when the page asks for them, or when pictures in motion cannot be drawn whole; and drawn as far as the page allows. */
 export class DetailController {
   readonly #host: DetailHost;
-  #scene: GpuScene | null = null;
+  #scene: DrawnScene | null = null;
   /** What a streamed scene came with. */
   #own: DetailLevers = {};
   /** Splats whose levels are there, on their way, or not to be had. */
@@ -43,7 +44,7 @@ export class DetailController {
   }
 
   /** Looks at the scene that is on show whole, or null for none, and at the attribute. Safe to call as often as one likes. */
-  update(scene: GpuScene | null): void {
+  update(scene: DrawnScene | null): void {
     if (scene !== this.#scene) this.#begin(scene);
     if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
     this.#allow(scene, this.#host.attributes.detail);
@@ -64,7 +65,7 @@ export class DetailController {
     if (this.#scene) this.update(this.#scene);
   }
 
-  #begin(scene: GpuScene | null): void {
+  #begin(scene: DrawnScene | null): void {
     this.#stop();
     this.#slowMs = 0;
     this.#isPressed = false;
@@ -79,7 +80,7 @@ export class DetailController {
   }
 
   /** Lets pictures be off by so much from now on. */
-  #allow(scene: GpuScene, choice: DetailChoice): void {
+  #allow(scene: DrawnScene, choice: DetailChoice): void {
     if (choice === this.#choice) return;
     this.#choice = choice;
     const pixels = choice === 'auto' ? this.#own.detail : choice === 'off' ? 0 : choice;
@@ -87,7 +88,7 @@ export class DetailController {
     this.#host.splatsChanged();
   }
 
-  #dismiss(scene: GpuScene): void {
+  #dismiss(scene: DrawnScene): void {
     this.#stop();
     scene.setLevels(undefined);
   }

@@ -1,11 +1,9 @@
 import { loadModule } from '@gaussian-splat/core';
-import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
 import type * as comeBack from '../gpu/come-back.js';
 import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/device-failures.js';
-import type { GpuScene } from '../gpu/gpu-scene.js';
-import { isStreamed, openGpuScene, type OpenOptions } from '../gpu/open-scene.js';
+import { isStreamed, openScene, type DrawnScene, type OpenOptions } from '../gpu/open-scene.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { LatestTask } from '../latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
@@ -30,11 +28,11 @@ export interface SceneHost {
   /** What a generator needs to know beyond the request. */
   readonly liveRequest: ReturnType<OpenOptions['live']>;
   /** Shows a scene; fulfils once its first frame is drawn. */
-  show(scene: GpuScene, entrance: Entrance): Promise<void>;
+  show(scene: DrawnScene, entrance: Entrance): Promise<void>;
   /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
   hide(clear: boolean): void;
   /** A preview of the scene is on show. */
-  previewShown(preview: GpuScene): void;
+  previewShown(preview: DrawnScene): void;
   loadStarted(): void;
   progressed(...progress: Parameters<ProgressListener>): void;
   loaded(url: string): void;
@@ -75,7 +73,8 @@ export class SceneController implements ReactiveController {
   readonly #of: SceneHost;
   #state: SceneState = 'empty';
   #error: ElementError | null = null;
-  #scene: GpuScene | null = null;
+  #scene: DrawnScene | null = null;
+  #renderer: DrawnScene['renderer'] = 'webgpu';
   #isPreview = false;
   /** What the scene on show was asked for by. */
   #shownRequest: SceneRequest | null = null;
@@ -103,7 +102,7 @@ export class SceneController implements ReactiveController {
   }
 
   /** The scene on show. */
-  get scene(): GpuScene | null {
+  get scene(): DrawnScene | null {
     return this.#scene;
   }
 
@@ -278,7 +277,7 @@ export class SceneController implements ReactiveController {
 
   async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
     const { services, memoryBudget, wantsPreviews } = this.#of;
-    const onPreview = isNew && wantsPreviews ? (preview: GpuScene) => this.#showPreview(preview) : undefined;
+    const onPreview = isNew && wantsPreviews ? (preview: DrawnScene) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
       if (signal.aborted) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
@@ -286,14 +285,19 @@ export class SceneController implements ReactiveController {
       if (!isSmall) this.#drop(false);
     };
     this.#spare(true);
-    const scene = await openGpuScene(request, {
-      device: services.sharedDevice,
-      loader: services.sceneLoader,
-      frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
-      loops: () => this.#of.loops,
-      live: () => this.#of.liveRequest,
-      ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
-    }).finally(() => this.#spare(false));
+    // What comes back is drawn by what has drawn it.
+    const renderer = isNew ? request.renderer : this.#renderer;
+    const scene = await openScene(
+      { ...request, renderer },
+      {
+        device: services.sharedDevice,
+        loader: services.sceneLoader,
+        frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
+        loops: () => this.#of.loops,
+        live: () => this.#of.liveRequest,
+        ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
+      },
+    ).finally(() => this.#spare(false));
     if (signal.aborted) return scene.destroy();
     const entrance = !isNew ? 'again' : this.#isPreview ? 'whole' : 'new';
     this.#replace(scene, false);
@@ -309,7 +313,7 @@ export class SceneController implements ReactiveController {
     });
   }
 
-  #showPreview(preview: GpuScene): void {
+  #showPreview(preview: DrawnScene): void {
     const entrance = this.#isPreview ? 'whole' : 'new';
     this.#replace(preview, true);
     void this.#of.show(preview, entrance).then(
@@ -321,9 +325,10 @@ export class SceneController implements ReactiveController {
   }
 
   /** Another scene in place of the one on show, whose picture stays until the first of the new one. */
-  #replace(scene: GpuScene, isPreview: boolean): void {
+  #replace(scene: DrawnScene, isPreview: boolean): void {
     this.#drop(false);
     this.#scene = scene;
+    this.#renderer = scene.renderer;
     this.#shownRequest = this.#request;
     this.#isPreview = isPreview;
     this.#spare(isPreview);
@@ -341,7 +346,7 @@ export class SceneController implements ReactiveController {
   /** Whether the scene on show may be dropped where others lack its memory: the element is gone, or another scene is to take its place. */
   #spare(isSpare: boolean): void {
     if (this.#scene === null) return;
-    const { spare } = MemoryLedger.of(this.#scene.device);
+    const { spare } = this.#scene.ledger;
     if (isSpare || this.#releaseTimer) spare.add(this.#giveBack);
     else spare.delete(this.#giveBack);
   }
@@ -351,7 +356,7 @@ export class SceneController implements ReactiveController {
   #drop(clear: boolean): void {
     if (this.#scene !== null || clear) this.#of.hide(clear);
     if (this.#scene === null) return;
-    MemoryLedger.of(this.#scene.device).spare.delete(this.#giveBack);
+    this.#scene.ledger.spare.delete(this.#giveBack);
     this.#scene.destroy();
     this.#scene = null;
   }
@@ -370,5 +375,6 @@ export class SceneController implements ReactiveController {
 const isSame = (a: SceneRequest, b: SceneRequest | null): boolean =>
   a.url === b?.url &&
   a.credentials === b.credentials &&
+  a.renderer === b.renderer &&
   isSameContract(a.contract, b.contract) &&
   (a.chain ?? []).join(' ') === (b.chain ?? []).join(' ');

@@ -3,8 +3,8 @@ import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
-import type { GpuScene } from '../gpu/gpu-scene.js';
-import type { Frame } from '../live/frame-filter.js';
+import type { CanvasFrame, Surface } from '../gpu/gpu-scene.js';
+import type { DrawnScene } from '../gpu/open-scene.js';
 import { LADDER } from '../pace/ladder.js';
 import type { CameraController } from './camera-controller.js';
 import { PaceController } from './pace-controller.js';
@@ -24,7 +24,7 @@ export interface ViewHost {
   /** Called once a frame before the camera steps: what moves it by itself does so now. */
   beforeFrame(now: number): void;
   /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
-  advanceScene(scene: GpuScene, camera: Camera, now: number): void;
+  advanceScene(scene: DrawnScene, camera: Camera, now: number): void;
   /** Called once a frame, after it was submitted, with the camera that it is drawn from. */
   afterFrame(camera: Camera): void;
   cameraChanged(source: CameraChangeSource): void;
@@ -50,9 +50,10 @@ export class ViewController implements FrameClient {
   /** What frames in motion are drawn with. */
   readonly pace: PaceController;
   readonly #host: ViewHost;
-  #scene: GpuScene | null = null;
-  #context: GPUCanvasContext | null = null;
-  #configured: GPUDevice | null = null;
+  #scene: DrawnScene | null = null;
+  /** What is drawn into, and the scene that it was set up for. */
+  #surface: Surface | null = null;
+  #surfaceOf: DrawnScene | null = null;
   /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
   #first: Settle | undefined;
   #drawnVersion = 0;
@@ -78,7 +79,7 @@ export class ViewController implements FrameClient {
    * Takes a scene over. Fulfils once its first frame is drawn, or at once where there is no pixel to draw; rejects with
    * GaussianSplatError `out-of-memory/*`.
    */
-  show(scene: GpuScene): Promise<void> {
+  show(scene: DrawnScene): Promise<void> {
     this.#scene = scene;
     scene.onIncomplete = () => this.requestFrame();
     scene.onError = (error) => this.#scene === scene && this.#host.drawingFailed(error);
@@ -100,16 +101,16 @@ export class ViewController implements FrameClient {
   /** Stops drawing and clears the canvas. */
   clear(): void {
     this.pause();
-    this.#context?.unconfigure();
-    this.#configured = null;
+    this.#surface?.unconfigure();
+    this.#surfaceOf = null;
   }
 
-  /** Puts another canvas in the place of one whose document has lost its window: that one never shows a picture again. */
+  /** Puts another canvas in the place of one that never shows a picture again: its document has lost its window, or something else draws now. */
   renewCanvas(): void {
     const canvas = this.#host.canvas;
     canvas?.replaceWith(canvas.cloneNode());
-    this.#context = null;
-    this.#configured = null;
+    this.#surface = null;
+    this.#surfaceOf = null;
   }
 
   drawFrame(now: number): void {
@@ -145,8 +146,9 @@ export class ViewController implements FrameClient {
     const pixels = this.#pixelsOf(scene);
     if (pixels === null) return null;
     this.#applyRendering(scene);
-    scene.render(this.#frameRequest(scene, pixels));
-    return canvas;
+    const request = this.#frameRequest(scene, pixels);
+    scene.render({ ...request, isRead: true });
+    return request.surface.canvas as HTMLCanvasElement;
   }
 
   /** There is a scene, and somebody sees it or waits for its first frame. A document without a window, as of a frame that was taken away, shows none. */
@@ -157,11 +159,11 @@ export class ViewController implements FrameClient {
   }
 
   /** null where there is no size. */
-  #pixelsOf({ device }: GpuScene): PixelSize | null {
-    return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, device.limits.maxTextureDimension2D);
+  #pixelsOf({ maxSide }: DrawnScene): PixelSize | null {
+    return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, maxSide);
   }
 
-  #render(scene: GpuScene, request: Frame, now: number, cameraMoved: boolean): void {
+  #render(scene: DrawnScene, request: CanvasFrame, now: number, cameraMoved: boolean): void {
     const first = this.#first;
     this.#first = undefined;
     this.#applyRendering(scene);
@@ -176,28 +178,28 @@ export class ViewController implements FrameClient {
     const onTime =
       this.#host.attributes.quality === 'auto' ? (time: WorkTime) => this.pace.sample(plan, time) : undefined;
     if (first !== undefined) {
-      scene.renderFirst(request).then(() => this.#afterFirst(scene, request, first), first.reject);
+      scene.renderFirst(request).then(() => this.#afterFirst(scene, first), first.reject);
       return;
     }
     scene.render({ ...request, levers }, onTime);
-    this.#prepareSoon(scene, request);
+    this.#prepareSoon(scene);
   }
 
-  #afterFirst(scene: GpuScene, request: Frame, { resolve }: Settle): void {
+  #afterFirst(scene: DrawnScene, { resolve }: Settle): void {
     resolve();
-    this.#prepareSoon(scene, request);
+    this.#prepareSoon(scene);
   }
 
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
-  #prepareSoon(scene: GpuScene, { target: { format } }: Frame): void {
+  #prepareSoon(scene: DrawnScene): void {
     if (scene.isPrepared || this.#host.attributes.quality !== 'auto') return;
     this.#preparing ??= setTimeout(() => {
       this.#preparing = undefined;
-      if (this.#scene === scene) scene.prepare(MOVING_LEVERS, format);
+      if (this.#scene === scene) scene.prepare(MOVING_LEVERS);
     }, PREPARE_AFTER_MS);
   }
 
-  #applyRendering(scene: GpuScene): void {
+  #applyRendering(scene: DrawnScene): void {
     const { quality, maxShDegree: shDegree } = this.#host.attributes;
     scene.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree });
   }
@@ -208,37 +210,33 @@ export class ViewController implements FrameClient {
     this.#first = undefined;
   }
 
-  #frameRequest(scene: GpuScene, { width, height }: PixelSize): Frame {
-    const context = this.#contextFor(scene.device);
-    const canvas = context.canvas;
+  #frameRequest(scene: DrawnScene, { width, height }: PixelSize): CanvasFrame {
+    const surface = this.#surfaceFor(scene);
+    const { canvas } = surface;
     // Setting a canvas's size clears it, even to the same size; here a frame follows at once.
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
-    const texture = context.getCurrentTexture();
-    return {
-      camera: this.#host.camera.view(width, height),
-      target: texture,
-    };
+    return { camera: this.#host.camera.view(width, height), surface };
   }
 
-  /** The canvas's context, set up for the device. Premultiplied alpha lets the page show through. */
-  #contextFor(device: GPUDevice): GPUCanvasContext {
-    const context = (this.#context ??= this.#host.canvas?.getContext('webgpu') ?? null);
-    if (context === null) throw noContext();
-    if (this.#configured !== device) {
-      const format = navigator.gpu.getPreferredCanvasFormat();
-      context.configure({ device, format, usage: canvasUsage(device, format), alphaMode: 'premultiplied' });
-      this.#configured = device;
+  #surfaceFor(scene: DrawnScene): Surface {
+    if (this.#surfaceOf !== scene) {
+      this.#surface = this.#surfaceOn(scene);
+      if (this.#surface === null) {
+        // What has drawn on this canvas keeps it.
+        this.renewCanvas();
+        this.#surface = this.#surfaceOn(scene);
+      }
+      this.#surfaceOf = scene;
     }
-    return context;
+    if (this.#surface === null) throw noContext();
+    return this.#surface;
   }
-}
 
-/** Compute shaders may then write the canvas itself, where the device lets them. */
-function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsageFlags {
-  const { RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
-  const isStorable = format === 'rgba8unorm' || device.features.has('bgra8unorm-storage');
-  return isStorable ? RENDER_ATTACHMENT | STORAGE_BINDING : RENDER_ATTACHMENT;
+  #surfaceOn(scene: DrawnScene): Surface | null {
+    const { canvas } = this.#host;
+    return canvas && scene.surfaceOn(canvas);
+  }
 }
 
 function noContext(): GaussianSplatError {

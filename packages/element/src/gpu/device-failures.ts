@@ -1,6 +1,6 @@
 /** What a scene's life knows of devices that are lost. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { GpuScene } from './gpu-scene.js';
+import type { DrawnScene } from './open-scene.js';
 
 /** The device went away before the scene was seen. */
 export class DeviceLostError extends Error {
@@ -25,7 +25,7 @@ export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
 const LOSS_MS = 200;
 
 /** Whether what failed did so because its scene was given up, or lost its device. */
-export async function isGone(scene: GpuScene): Promise<boolean> {
+export async function isGone(scene: DrawnScene): Promise<boolean> {
   if (!scene.isDestroyed) await Promise.race([scene.lost, delay(LOSS_MS)]);
   return scene.isDestroyed || scene.isLost;
 }

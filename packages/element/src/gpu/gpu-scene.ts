@@ -1,5 +1,6 @@
 import { GaussianSplatError, loadModule, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
+  MemoryLedger,
   QueueClock,
   Renderer,
   type FrameRequest,
@@ -38,6 +39,20 @@ export interface OwnedGaussians extends GaussianScene {
   destroy(): void;
 }
 
+/** What a canvas shows: a context that scenes of one kind draw into. */
+export interface Surface {
+  readonly canvas: HTMLCanvasElement | OffscreenCanvas;
+  /** Clears the canvas, and frees what it holds. */
+  unconfigure(): void;
+}
+
+/** One frame to draw on a canvas. */
+export interface CanvasFrame extends Pick<FrameRequest, 'camera' | 'levers'> {
+  readonly surface: Surface;
+  /** The picture is read in the same task. */
+  readonly isRead?: boolean;
+}
+
 /** How frames are drawn. */
 export interface Rendering {
   readonly quality: Quality;
@@ -50,6 +65,7 @@ export interface Rendering {
  * and so cannot be shared), and the lease that keeps the device.
  */
 export class GpuScene {
+  readonly renderer = 'webgpu';
   readonly bounds: SceneBounds;
   #gaussians: OwnedGaussians;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
@@ -140,6 +156,27 @@ export class GpuScene {
     return this.#lease.device;
   }
 
+  /** Of all scenes that share its memory. */
+  get ledger(): MemoryLedger {
+    return MemoryLedger.of(this.device);
+  }
+
+  /** Longest side that an image may have, in pixels. */
+  get maxSide(): number {
+    return this.device.limits.maxTextureDimension2D;
+  }
+
+  /** The canvas's context, set up for the device; null for a canvas of another kind. Premultiplied alpha lets the page show through. */
+  surfaceOn(canvas: HTMLCanvasElement): Surface | null {
+    const context = canvas.getContext('webgpu');
+    const format = navigator.gpu.getPreferredCanvasFormat();
+    context?.configure({
+      ...{ device: this.device, format, usage: canvasUsage(this.device, format) },
+      alphaMode: 'premultiplied',
+    });
+    return context;
+  }
+
   get isLost(): boolean {
     return this.#lease.isLost;
   }
@@ -200,17 +237,18 @@ export class GpuScene {
   }
 
   /** Makes what frames with other levers need, so that none of them has to. */
-  prepare(levers: readonly Partial<FrameLevers>[], format: GPUTextureFormat): void {
+  prepare(levers: readonly Partial<FrameLevers>[]): void {
     if (this.isLost || this.#destroyed) return;
     this.#isPrepared = true;
-    this.#renderer.prepare(levers, format);
+    this.#renderer.prepare(levers, navigator.gpu.getPreferredCanvasFormat());
   }
 
   /**
    * Encodes and submits one frame.
    * @param onTime gets how long the frame kept the GPU, some frames later
    */
-  render(frame: Frame, onTime?: (time: WorkTime) => void): void {
+  render(request: CanvasFrame, onTime?: (time: WorkTime) => void): void {
+    const frame = frameOf(request);
     const size = sizeOf(frame);
     if (size === this.#drawnSize) return this.#renderOnce(frame, onTime);
     this.#drawnSize = size;
@@ -241,7 +279,8 @@ export class GpuScene {
    * Renders the first frame, for which the renderer allocates its buffers, and waits until the GPU has finished it.
    * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU tells of a failed allocation only through a scope.
    */
-  async renderFirst(frame: Frame): Promise<void> {
+  async renderFirst(request: CanvasFrame): Promise<void> {
+    const frame = frameOf(request);
     this.#drawnSize = sizeOf(frame);
     const error = await this.#withRefusal(() => this.#draw(frame));
     if (error !== null) throw outOfMemory('first frame', error);
@@ -291,6 +330,18 @@ export class GpuScene {
     this.#gaussians.destroy();
     this.#lease.release();
   }
+}
+
+const frameOf = ({ camera, levers, surface }: CanvasFrame): Frame => ({
+  ...{ camera, levers },
+  target: (surface as GPUCanvasContext).getCurrentTexture(),
+});
+
+/** Compute shaders may then write the canvas itself, where the device lets them. */
+function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsageFlags {
+  const { RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
+  const isStorable = format === 'rgba8unorm' || device.features.has('bgra8unorm-storage');
+  return isStorable ? RENDER_ATTACHMENT | STORAGE_BINDING : RENDER_ATTACHMENT;
 }
 
 const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;

@@ -3,6 +3,7 @@ import { startVariants } from '@gaussian-splat/renderer';
 import type { LiveModel, LiveRequest } from '../live/live-model.js';
 import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
+import type { GlScene } from '../webgl/gl-scene.js';
 import { chooseAtRest } from './choose-at-rest.js';
 import { GpuScene } from './gpu-scene.js';
 import { limitScenes, loadBytes } from './memory-budget.js';
@@ -21,7 +22,7 @@ export interface OpenOptions {
   readonly loops: () => boolean;
   readonly onProgress: ProgressListener;
   /** Called with what can be shown of a scene that is still loading; the scene is the callee's. Absent: previews are not wanted. */
-  readonly onPreview?: (preview: GpuScene) => void;
+  readonly onPreview?: (preview: DrawnScene) => void;
   /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. Gets its bytes. */
   readonly beforeUpload: (byteLength: number) => void;
   /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
@@ -32,13 +33,34 @@ export interface OpenOptions {
   readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }
 
-/** Opens what is asked for; what its device is served best with is looked for later. Rejects with GaussianSplatError or the signal's reason. */
-export async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+/** A scene, by what draws it. */
+export type DrawnScene = GpuScene | GlScene;
+
+/** Opens what is asked for, with WebGL where there is no WebGPU and the request lets it. Rejects with GaussianSplatError or the signal's reason. */
+export async function openScene(request: SceneRequest, options: OpenOptions): Promise<DrawnScene> {
+  let reason: unknown;
+  if (request.renderer !== 'webgl')
+    try {
+      return await openGpuScene(request, options);
+    } catch (error) {
+      reason = error;
+      if (request.renderer !== 'auto' || (error as Partial<GaussianSplatError>).family !== 'unsupported') throw error;
+    }
+  const { openGlScene } = await loadModule('the code that draws with WebGL', () => import('../webgl/open-gl-scene.js'));
+  return openGlScene(limited(request, options), options, reason);
+}
+
+const limited = (request: SceneRequest, { memoryBudget }: OpenOptions): SceneRequest => ({
+  ...request,
+  limits: { maxBytes: loadBytes(memoryBudget), ...request.limits },
+});
+
+/** What its device is served best with is looked for later. */
+async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
   // Known at once, and then not a byte is fetched.
   await assertWebGpu();
   const open = isGenerator(request) ? openLiveScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
-  const limits = { maxBytes: loadBytes(options.memoryBudget), ...request.limits };
-  const scene = await open({ ...request, limits }, options);
+  const scene = await open(limited(request, options), options);
   chooseAtRest(scene.device);
   return scene;
 }
@@ -75,7 +97,7 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
 }
 
 /** Generators are known by the name of the file, or by the contract that the page gives along. */
-function isGenerator({ url, contract }: SceneRequest): boolean {
+export function isGenerator({ url, contract }: SceneRequest): boolean {
   if (contract !== undefined && contract !== null && contract !== '') return true;
   const { pathname, protocol, hash } = URL.canParse(url) ? new URL(url) : { pathname: url, protocol: '', hash: '' };
   return /\.onnx$/i.test(protocol === 'blob:' ? hash : pathname);

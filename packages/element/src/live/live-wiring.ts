@@ -3,7 +3,7 @@ import { credentialsOf } from '../attributes.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import { toElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { DrawnScene } from '../gpu/open-scene.js';
 import type { StageHost } from '../stage-host.js';
 import type { LiveListeners, LiveState } from './live-model.js';
 import { PostController, type PostHost } from './post-controller.js';
@@ -63,7 +63,7 @@ export class LiveWiring implements PostHost {
   }
 
   /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
-  advance({ live }: GpuScene, camera: Camera, now: number): void {
+  advance({ live }: DrawnScene, camera: Camera, now: number): void {
     if (live === undefined) return;
     this.#host.playback.tick(now);
     try {

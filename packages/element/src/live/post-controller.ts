@@ -1,5 +1,5 @@
 import { loadModule } from '@gaussian-splat/core';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { DrawnScene } from '../gpu/open-scene.js';
 import { LatestTask } from '../latest-task.js';
 import type { PostRequest } from './post-view.js';
 
@@ -13,7 +13,7 @@ export interface PostHost {
 export class PostController {
   readonly #host: PostHost;
   #urls: readonly string[] = [];
-  #scene: GpuScene | null = null;
+  #scene: DrawnScene | null = null;
   readonly #opening = new LatestTask();
 
   constructor(host: PostHost) {
@@ -33,7 +33,7 @@ export class PostController {
   }
 
   /** A scene is on show, or none any more. A scene that is destroyed closes its processor itself. */
-  attach(scene: GpuScene | null): void {
+  attach(scene: DrawnScene | null): void {
     this.#scene = scene;
     this.#open();
   }
@@ -49,7 +49,7 @@ export class PostController {
     this.#opening.run((signal) => this.#load(scene, options, signal), options.onError);
   }
 
-  async #load(scene: GpuScene, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
+  async #load(scene: DrawnScene, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
     const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
     if (signal.aborted) return;
     const view = await PostView.open(

@@ -1,0 +1,242 @@
+import { MemoryLedger, type ProbeAnswer, type ProbePoint, type WorkTime } from '@gaussian-splat/renderer';
+import {
+  glBytes,
+  GlGaussians,
+  GlRenderer,
+  isSameView,
+  orderView,
+  drawn as whenDrawn,
+  type GlGaussianFacts,
+  type OrderView,
+} from '@gaussian-splat/renderer/webgl';
+import { GaussianSplatError } from '@gaussian-splat/core';
+import type { SceneBounds } from '../camera/settings.js';
+import type { CanvasFrame, DetailLevers, OwnedLevels, Rendering, Surface } from '../gpu/gpu-scene.js';
+import { defaultMemoryBudget } from '../gpu/memory-budget.js';
+import type { Timeline } from '../live/live-model.js';
+import type { LoadedScene } from '../loading/protocol.js';
+import type { ReadCounts } from '../stats.js';
+import { DepthSorter, type SortedSplats } from './depth-sorter.js';
+import { cannotShow } from './errors.js';
+import type { GlLease } from './gl-session.js';
+
+/** What all scenes drawn with WebGL hold together. */
+const ledger = new MemoryLedger();
+/** 32-bit words of a splat's geometry; the first three are its position. */
+const GEOMETRY_WORDS = 8;
+
+/** A canvas that shows copies of what the page's context draws. */
+interface CopySurface extends Surface {
+  readonly context: CanvasRenderingContext2D;
+}
+
+export interface GlSceneOptions {
+  readonly signal: AbortSignal;
+  readonly memoryBudget: number | undefined;
+  readonly spawn: () => Worker;
+}
+
+/** A scene that is drawn with WebGL: what the element asks of a `GpuScene`, as far as WebGL can do it. */
+export class GlScene {
+  readonly renderer = 'webgl';
+  readonly ledger = ledger;
+  readonly bounds: SceneBounds;
+  readonly gaussians: GlGaussianFacts & {
+    readonly version: 0;
+    readonly byteLength: number;
+    readonly frameCount?: undefined;
+    readonly leafCount?: undefined;
+  };
+  readonly live: Timeline | undefined = undefined;
+  readonly levels: OwnedLevels | undefined = undefined;
+  readonly filter = undefined;
+  readonly detail: DetailLevers = {};
+  /** None are built. */
+  readonly hasOwnLevels = true as const;
+  readonly isPrepared = true;
+  onIncomplete: () => void = () => undefined;
+  onError: (error: GaussianSplatError) => void = () => undefined;
+  readonly #lease: GlLease;
+  readonly #textures: GlGaussians;
+  readonly #frames: GlRenderer;
+  readonly #sorter: DepthSorter;
+  readonly #reservation: { release(): void };
+  /** The view that the order on the GPU is of. */
+  #sorted: OrderView | undefined;
+  /** The view that was asked for last. */
+  #asked: OrderView | undefined;
+  readonly #first: Promise<void>;
+  #rendering: Rendering = { quality: 'default', shDegree: 3 };
+  #destroyed = false;
+
+  private constructor(
+    lease: GlLease,
+    textures: GlGaussians,
+    { packed, bounds }: LoadedScene,
+    reservation: { release(): void },
+    spawn: () => Worker,
+  ) {
+    this.#lease = lease;
+    this.#textures = textures;
+    this.#reservation = reservation;
+    this.bounds = bounds;
+    this.gaussians = { ...textures.facts, version: 0, byteLength: glBytes(packed) };
+    this.#frames = new GlRenderer(lease.gl, textures);
+    let isSorted: () => void;
+    this.#first = new Promise((resolve) => (isSorted = resolve));
+    this.#sorter = new DepthSorter({
+      positions: positionsIn(packed.geometry),
+      spawn,
+      onOrder: (sorted) => {
+        this.#setOrder(sorted);
+        isSorted();
+        this.onIncomplete();
+      },
+    });
+  }
+
+  /** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
+  static async open(lease: GlLease, scene: LoadedScene, options: GlSceneOptions): Promise<GlScene> {
+    const { signal, memoryBudget, spawn } = options;
+    const { packed } = scene;
+    ledger.budgetBytes = Math.max(memoryBudget ?? 0, defaultMemoryBudget() ?? Infinity);
+    const reservation = ledger.reserve(`scene of ${packed.count} splats`, glBytes(packed), memoryBudget);
+    let textures: GlGaussians | undefined;
+    try {
+      textures = await GlGaussians.upload(lease.gl, packed);
+      signal.throwIfAborted();
+      return new GlScene(lease, textures, scene, reservation, spawn);
+    } catch (error) {
+      textures?.destroy();
+      reservation.release();
+      throw error;
+    }
+  }
+
+  /** Models that run on the GPU need WebGPU. */
+  get device(): never {
+    throw cannotShow('a post-processor');
+  }
+
+  get maxSide(): number {
+    return this.#lease.maxSide;
+  }
+
+  get frameBytes(): number {
+    return this.#frames.byteLength;
+  }
+
+  get isLost(): boolean {
+    return this.#lease.isLost;
+  }
+
+  get lost(): Promise<GPUDeviceLostInfo> {
+    return this.#lease.lost.then(
+      () => ({ reason: 'unknown', message: 'the WebGL context was lost' }) as GPUDeviceLostInfo,
+    );
+  }
+
+  get isDestroyed(): boolean {
+    return this.#destroyed;
+  }
+
+  async wasLost(): Promise<boolean> {
+    return this.isLost;
+  }
+
+  setLevels(): void {}
+
+  setDetail(): void {}
+
+  setFilter(): void {}
+
+  prepare(): void {}
+
+  setRendering(rendering: Rendering): void {
+    this.#rendering = rendering;
+  }
+
+  surfaceOn(canvas: HTMLCanvasElement): CopySurface | null {
+    const context = canvas.getContext('2d');
+    return context && { canvas, context, unconfigure: () => context.clearRect(0, 0, canvas.width, canvas.height) };
+  }
+
+  render(frame: CanvasFrame, onTime?: (time: WorkTime) => void): void {
+    if (this.isLost) return;
+    const view = orderView(frame.camera, this.gaussians.origin);
+    if (this.#sorted === undefined || !isSameView(view, this.#sorted)) {
+      // Who reads the picture at once cannot wait for the worker.
+      if (frame.isRead) this.#setOrder(this.#sorter.sortNow(view));
+      else this.#ask(view);
+    }
+    if (onTime === undefined) return this.#draw(frame);
+    this.#lease.clock.time(() => this.#draw(frame)).then(onTime, () => undefined);
+  }
+
+  /** Waits for the order of the first frame, and until the GPU has drawn it. */
+  async renderFirst(frame: CanvasFrame): Promise<void> {
+    this.#ask(orderView(frame.camera, this.gaussians.origin));
+    await Promise.race([this.#first, this.lost]);
+    if (this.isLost || this.#destroyed) return;
+    this.#draw(frame);
+    await whenDrawn(this.#lease.gl).catch(() => undefined);
+  }
+
+  async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
+    return this.isLost || this.#destroyed ? [] : this.#frames.probe(points);
+  }
+
+  async readCounts(): Promise<ReadCounts> {
+    return { drawn: this.#frames.countDrawn(), left: 0, contributed: null };
+  }
+
+  destroy(): void {
+    if (this.#destroyed) return;
+    this.#destroyed = true;
+    this.#sorter.destroy();
+    this.#frames.destroy();
+    this.#textures.destroy();
+    this.#reservation.release();
+    this.#lease.release();
+  }
+
+  #ask(view: OrderView): void {
+    if (this.#asked && isSameView(view, this.#asked)) return;
+    this.#asked = view;
+    this.#sorter.request(view);
+  }
+
+  #setOrder({ view, order, count }: SortedSplats): void {
+    if (this.isLost || this.#destroyed) return;
+    this.#sorted = view;
+    this.#frames.setOrder(order, count);
+  }
+
+  #draw({ camera, levers, surface }: CanvasFrame): void {
+    const { context } = surface as CopySurface;
+    const { width, height } = camera;
+    const { quality, shDegree } = this.#rendering;
+    this.#lease.fit(width, height);
+    this.#frames.render({
+      camera,
+      shDegree,
+      accumulation: quality === 'reference' ? 'rgba32float' : 'rgba16float',
+      resolutionScale: levers?.resolutionScale ?? 1,
+    });
+    const { canvas } = this.#lease.gl;
+    // WebGL counts rows from below, so that is where a smaller image lies.
+    context.globalCompositeOperation = 'copy';
+    context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
+  }
+}
+
+function positionsIn(geometry: Uint32Array): Float32Array {
+  const numbers = new Float32Array(geometry.buffer, geometry.byteOffset, geometry.length);
+  const positions = new Float32Array((3 * geometry.length) / GEOMETRY_WORDS);
+  for (let at = 0, from = 0; at < positions.length; at += 3, from += GEOMETRY_WORDS) {
+    positions[at] = numbers[from];
+    positions[at + 1] = numbers[from + 1];
+    positions[at + 2] = numbers[from + 2];
+  }
+  return positions;
+}

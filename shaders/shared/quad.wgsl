@@ -1,0 +1,57 @@
+// A splat as a quad just large enough for alpha >= 1/255. The fragment evaluates the Gaussian at the
+// pixel centre from flat inputs, so nothing is interpolated and the maths is that of any other rasterizer.
+#import shared/splat
+#import shared/falloff
+
+struct Quad {
+  @builtin(position) position: vec4f,
+  @location(0) @interpolate(flat, either) shape: vec4f,
+  // red, green, blue, opacity
+  @location(1) @interpolate(flat, either) color: vec4f,
+  @location(2) @interpolate(flat, either) inverse_sigma_v: f32,
+}
+
+// Pixels by which quads are larger than they need be: rasterizers snap vertices, some of them to 1/16 of a pixel, and the quad of a
+// splat whose opacity is just above ALPHA_MIN may be smaller than that.
+const SNAP_MARGIN = 0.0625;
+// Quads that reach farther than this, in pixels, are drawn as their box clipped to the image instead.
+const MAX_REACH = 8192.0;
+
+fn quad_corner(s: ProjectedSplat, opacity: f32, corner: vec2f, viewport: vec2f) -> vec2f {
+  let sigma_x = 1.0 / s.shape.z;
+  let slope = s.shape.w;
+  let sigma_v = 1.0 / bitcast<f32>(s.paint.x);
+  let radius = cutoff_radius(opacity);
+  let half_width = radius * sigma_x + SNAP_MARGIN;
+  let half_height = radius * sqrt(slope * slope * sigma_x * sigma_x + sigma_v * sigma_v) + SNAP_MARGIN;
+  if (max(half_width, half_height) > MAX_REACH) {
+    let box = s.shape.xy + corner * vec2f(half_width, half_height);
+    return clamp(box, vec2f(-1.0), viewport + 1.0);
+  }
+  // The square around the circle of that radius in (u, v): as tight as a rectangle along the ellipse's axes.
+  let dx = corner.x * half_width;
+  return s.shape.xy + vec2f(dx, slope * dx + corner.y * (radius * sigma_v + SNAP_MARGIN * (1.0 + abs(slope))));
+}
+
+// Outside of the image.
+fn no_quad() -> Quad {
+  return Quad(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), 0.0);
+}
+
+// One of its corners, by the lower two bits of a number.
+fn quad_of(s: ProjectedSplat, number: u32, viewport: vec2f) -> Quad {
+  let opacity = bitcast<f32>(s.paint.w);
+  let corner = vec2f(f32(number & 1u), f32((number >> 1u) & 1u)) * 2.0 - 1.0;
+  let pixel = quad_corner(s, opacity, corner, viewport);
+  let ndc = (pixel / viewport * 2.0 - 1.0) * vec2f(1.0, -1.0);
+  return Quad(vec4f(ndc, 0.0, 1.0), s.shape, vec4f(splat_color(s), opacity), bitcast<f32>(s.paint.x));
+}
+
+@fragment
+fn fragment(quad: Quad) -> @location(0) vec4f {
+  let offset = quad.position.xy - quad.shape.xy;
+  let alpha = alpha_at(offset, quad.shape.z, quad.shape.w, quad.inverse_sigma_v, quad.color.a);
+  if (alpha < ALPHA_MIN) { discard; }
+  // Blended as colour = alpha · color + (1 - alpha) · colour and transmittance = (1 - alpha) · transmittance.
+  return vec4f(quad.color.rgb * alpha, alpha);
+}
