@@ -20,6 +20,8 @@ struct RasterView {
 fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) instance: u32) -> Quad {
   let rank = instance * QUAD_BATCH + vertex_index / 4u;
   let share = (plan.visible + raster.slices - 1u) / raster.slices;
-  if (rank >= plan.visible || rank / share != raster.slice) { return no_quad(); }
-  return quad_of(splats[order[plan.visible - 1u - rank]], vertex_index, raster.viewport);
+  if (rank >= plan.visible || rank / share != raster.slice) {
+    return Quad(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), 0.0);
+  }
+  return quad_of(splats[order[plan.visible - 1u - rank]], vertex_index);
 }

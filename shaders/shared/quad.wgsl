@@ -1,5 +1,5 @@
 // A splat as a quad just large enough for alpha >= 1/255. The fragment evaluates the Gaussian at the
-// pixel centre from flat inputs, so nothing is interpolated and the maths is that of any other rasterizer.
+// pixel centre from flat inputs, so nothing is interpolated and the maths is that of any other rasterizer. `raster` is the stage's.
 #import shared/splat
 #import shared/falloff
 
@@ -17,7 +17,7 @@ const SNAP_MARGIN = 0.0625;
 // Quads that reach farther than this, in pixels, are drawn as their box clipped to the image instead.
 const MAX_REACH = 8192.0;
 
-fn quad_corner(s: ProjectedSplat, opacity: f32, corner: vec2f, viewport: vec2f) -> vec2f {
+fn quad_corner(s: ProjectedSplat, opacity: f32, corner: vec2f) -> vec2f {
   let sigma_x = 1.0 / s.shape.z;
   let slope = s.shape.w;
   let sigma_v = 1.0 / bitcast<f32>(s.paint.x);
@@ -26,24 +26,19 @@ fn quad_corner(s: ProjectedSplat, opacity: f32, corner: vec2f, viewport: vec2f) 
   let half_height = radius * sqrt(slope * slope * sigma_x * sigma_x + sigma_v * sigma_v) + SNAP_MARGIN;
   if (max(half_width, half_height) > MAX_REACH) {
     let box = s.shape.xy + corner * vec2f(half_width, half_height);
-    return clamp(box, vec2f(-1.0), viewport + 1.0);
+    return clamp(box, vec2f(-1.0), raster.viewport + 1.0);
   }
   // The square around the circle of that radius in (u, v): as tight as a rectangle along the ellipse's axes.
   let dx = corner.x * half_width;
   return s.shape.xy + vec2f(dx, slope * dx + corner.y * (radius * sigma_v + SNAP_MARGIN * (1.0 + abs(slope))));
 }
 
-// Outside of the image.
-fn no_quad() -> Quad {
-  return Quad(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), 0.0);
-}
-
 // One of its corners, by the lower two bits of a number.
-fn quad_of(s: ProjectedSplat, number: u32, viewport: vec2f) -> Quad {
+fn quad_of(s: ProjectedSplat, number: u32) -> Quad {
   let opacity = bitcast<f32>(s.paint.w);
   let corner = vec2f(f32(number & 1u), f32((number >> 1u) & 1u)) * 2.0 - 1.0;
-  let pixel = quad_corner(s, opacity, corner, viewport);
-  let ndc = (pixel / viewport * 2.0 - 1.0) * vec2f(1.0, -1.0);
+  let pixel = quad_corner(s, opacity, corner);
+  let ndc = (pixel / raster.viewport * 2.0 - 1.0) * vec2f(1.0, -1.0);
   return Quad(vec4f(ndc, 0.0, 1.0), s.shape, vec4f(splat_color(s), opacity), bitcast<f32>(s.paint.x));
 }
 

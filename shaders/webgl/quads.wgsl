@@ -16,8 +16,7 @@ struct QuadsView {
 @vertex
 fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) instance: u32) -> Quad {
   let rank = instance * QUAD_BATCH + vertex_index / 4u;
-  if (rank >= raster.count) { return no_quad(); }
-  let s = splat_at(raster.count - 1u - rank);
-  if (s.paint.w == 0u) { return no_quad(); }
-  return quad_of(s, vertex_index, raster.viewport);
+  let s = splat_at(raster.count - 1u - min(rank, raster.count - 1u));
+  if (rank >= raster.count || s.paint.w == 0u) { return Quad(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), 0.0); }
+  return quad_of(s, vertex_index);
 }

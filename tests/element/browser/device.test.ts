@@ -322,7 +322,7 @@ describe('the loss of the device', () => {
   });
 });
 
-describe('without WebGPU', () => {
+describe('without WebGPU, where the page asks for it', () => {
   const cases: Readonly<Record<string, readonly [gpu: unknown, reason: string, text: RegExp]>> = {
     'no API': [undefined, 'unsupported/no-webgpu', /current Chrome/],
     'no adapter': [{ requestAdapter: async () => null }, 'unsupported/no-adapter', /hardware acceleration/],
@@ -341,7 +341,11 @@ describe('without WebGPU', () => {
   for (const [name, [gpu, reason, text]] of Object.entries(cases)) {
     it(`${name}: the fallback says why, the poster stays, the page lives on`, async () => {
       await withGpu(gpu, async () => {
-        const element = show({ src: COMPASS, poster: 'data:image/gif;base64,R0lGODlhAQABAAAAACw=' });
+        const element = show({
+          src: COMPASS,
+          renderer: 'webgpu',
+          poster: 'data:image/gif;base64,R0lGODlhAQABAAAAACw=',
+        });
         await nextEvent(element, 'error');
         await element.ready;
         await element.updateComplete;
@@ -356,7 +360,7 @@ describe('without WebGPU', () => {
 
   it('an adapter that never comes is an error', async () => {
     await withGpu({ ...navigator.gpu, requestAdapter: () => new Promise(() => undefined) }, async () => {
-      const element = show({ src: COMPASS });
+      const element = show({ src: COMPASS, renderer: 'webgpu' });
       await nextEvent(element, 'error', 30_000);
       assertEqual(element.error?.reason, 'unsupported/no-adapter');
       assert(/no answer within 20 s/.test(element.error?.message ?? ''), element.error?.message ?? '');
@@ -366,7 +370,7 @@ describe('without WebGPU', () => {
   it('not a byte of the scene is fetched', async () => {
     await withGpu(undefined, async () => {
       const src = `${COMPASS}?unfetched`;
-      const element = show({ src });
+      const element = show({ src, renderer: 'webgpu' });
       await nextEvent(element, 'error');
       await delay(200);
       const fetched = performance.getEntriesByType('resource').filter(({ name }) => name.includes('unfetched'));
@@ -376,7 +380,7 @@ describe('without WebGPU', () => {
 
   it("the page's own fallback takes the place of the default", async () => {
     await withGpu(undefined, async () => {
-      const element = show({ src: COMPASS });
+      const element = show({ src: COMPASS, renderer: 'webgpu' });
       const own = document.createElement('p');
       own.slot = 'fallback';
       own.textContent = 'A picture instead';
@@ -392,7 +396,7 @@ describe('without WebGPU', () => {
     Object.defineProperty(window, 'isSecureContext', { configurable: true, get: () => false });
     try {
       await withGpu(undefined, async () => {
-        const element = show({ src: COMPASS });
+        const element = show({ src: COMPASS, renderer: 'webgpu' });
         await nextEvent(element, 'error');
         assertEqual(element.error?.reason, 'unsupported/insecure-context');
       });

@@ -74,7 +74,6 @@ export class SceneController implements ReactiveController {
   #state: SceneState = 'empty';
   #error: ElementError | null = null;
   #scene: DrawnScene | null = null;
-  #renderer: DrawnScene['renderer'] = 'webgpu';
   #isPreview = false;
   /** What the scene on show was asked for by. */
   #shownRequest: SceneRequest | null = null;
@@ -198,10 +197,11 @@ export class SceneController implements ReactiveController {
     const { shPrecision, shDegree } = scene.gaussians;
     if (request.sh === 'auto' || request.sh === shPrecision || shDegree === 0) return;
     const signal = this.#running.renew();
+    const again: SceneRequest = { ...request, renderer: scene.renderer };
     try {
-      await this.#open(request, signal, false, () => undefined);
+      await this.#open(again, signal, false, () => undefined);
     } catch {
-      if (!signal.aborted && this.#scene !== scene) await this.#attempt(request, signal, false, () => undefined);
+      if (!signal.aborted && this.#scene !== scene) await this.#attempt(again, signal, false, () => undefined);
     }
   }
 
@@ -285,19 +285,14 @@ export class SceneController implements ReactiveController {
       if (!isSmall) this.#drop(false);
     };
     this.#spare(true);
-    // What comes back is drawn by what has drawn it.
-    const renderer = isNew ? request.renderer : this.#renderer;
-    const scene = await openScene(
-      { ...request, renderer },
-      {
-        device: services.sharedDevice,
-        loader: services.sceneLoader,
-        frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
-        loops: () => this.#of.loops,
-        live: () => this.#of.liveRequest,
-        ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
-      },
-    ).finally(() => this.#spare(false));
+    const scene = await openScene(request, {
+      device: services.sharedDevice,
+      loader: services.sceneLoader,
+      frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
+      loops: () => this.#of.loops,
+      live: () => this.#of.liveRequest,
+      ...{ signal, onProgress, onPreview, beforeUpload, memoryBudget, submissions: this.#submissions },
+    }).finally(() => this.#spare(false));
     if (signal.aborted) return scene.destroy();
     const entrance = !isNew ? 'again' : this.#isPreview ? 'whole' : 'new';
     this.#replace(scene, false);
@@ -309,7 +304,8 @@ export class SceneController implements ReactiveController {
       if (this.#scene !== scene) return;
       // What will take its place has its own way back.
       if (this.isOutgoing) this.#drop(false);
-      else void this.#restore(this.#request ?? request, loss);
+      // What comes back is drawn by what has drawn it.
+      else void this.#restore({ ...(this.#request ?? request), renderer: scene.renderer }, loss);
     });
   }
 
@@ -328,7 +324,6 @@ export class SceneController implements ReactiveController {
   #replace(scene: DrawnScene, isPreview: boolean): void {
     this.#drop(false);
     this.#scene = scene;
-    this.#renderer = scene.renderer;
     this.#shownRequest = this.#request;
     this.#isPreview = isPreview;
     this.#spare(isPreview);

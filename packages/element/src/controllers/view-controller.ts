@@ -1,10 +1,11 @@
-import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
+import type { Camera } from '@gaussian-splat/core';
 import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
 import type { CanvasFrame, Surface } from '../gpu/gpu-scene.js';
 import type { DrawnScene } from '../gpu/open-scene.js';
+import { why } from '../gpu/request-device.js';
 import { LADDER } from '../pace/ladder.js';
 import type { CameraController } from './camera-controller.js';
 import { PaceController } from './pace-controller.js';
@@ -109,6 +110,7 @@ export class ViewController implements FrameClient {
   renewCanvas(): void {
     const canvas = this.#host.canvas;
     canvas?.replaceWith(canvas.cloneNode());
+    this.#host.size.hostUpdated();
     this.#surface = null;
     this.#surfaceOf = null;
   }
@@ -125,6 +127,7 @@ export class ViewController implements FrameClient {
     const source = camera.step(now, this.#host.decayMs);
     try {
       const request = this.#frameRequest(scene, pixels);
+      if (request === null) return void this.#failWithoutContext();
       this.#host.advanceScene(scene, request.camera, now);
       this.#render(scene, request, now, source !== null);
       this.#host.afterFrame(request.camera);
@@ -147,6 +150,7 @@ export class ViewController implements FrameClient {
     if (pixels === null) return null;
     this.#applyRendering(scene);
     const request = this.#frameRequest(scene, pixels);
+    if (request === null) return null;
     scene.render({ ...request, isRead: true });
     return request.surface.canvas as HTMLCanvasElement;
   }
@@ -204,14 +208,19 @@ export class ViewController implements FrameClient {
     scene.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree });
   }
 
+  async #failWithoutContext(): Promise<void> {
+    this.#host.drawingFailed(await why(({ noContext }) => noContext()));
+  }
+
   #finishUnseen(): void {
     if (!this.#host.size.isEmpty) return;
     this.#first?.resolve();
     this.#first = undefined;
   }
 
-  #frameRequest(scene: DrawnScene, { width, height }: PixelSize): CanvasFrame {
+  #frameRequest(scene: DrawnScene, { width, height }: PixelSize): CanvasFrame | null {
     const surface = this.#surfaceFor(scene);
+    if (surface === null) return null;
     const { canvas } = surface;
     // Setting a canvas's size clears it, even to the same size; here a frame follows at once.
     if (canvas.width !== width) canvas.width = width;
@@ -219,31 +228,15 @@ export class ViewController implements FrameClient {
     return { camera: this.#host.camera.view(width, height), surface };
   }
 
-  #surfaceFor(scene: DrawnScene): Surface {
-    if (this.#surfaceOf !== scene) {
-      this.#surface = this.#surfaceOn(scene);
-      if (this.#surface === null) {
-        // What has drawn on this canvas keeps it.
-        this.renewCanvas();
-        this.#surface = this.#surfaceOn(scene);
-      }
-      this.#surfaceOf = scene;
+  /** null where the browser shows nothing of the kind on a canvas. */
+  #surfaceFor(scene: DrawnScene): Surface | null {
+    const take = (): Surface | null => (this.#surface = scene.surfaceOn(this.#host.canvas!));
+    if (this.#surfaceOf !== scene && take() === null) {
+      // What has drawn on this canvas keeps it.
+      this.renewCanvas();
+      take();
     }
-    if (this.#surface === null) throw noContext();
+    this.#surfaceOf = scene;
     return this.#surface;
   }
-
-  #surfaceOn(scene: DrawnScene): Surface | null {
-    const { canvas } = this.#host;
-    return canvas && scene.surfaceOn(canvas);
-  }
-}
-
-function noContext(): GaussianSplatError {
-  return new GaussianSplatError('unsupported/no-webgpu', {
-    where: 'canvas',
-    expected: 'a WebGPU canvas context',
-    found: 'none',
-    remedy: 'use a browser that shows WebGPU on a canvas',
-  });
 }

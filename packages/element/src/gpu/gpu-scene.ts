@@ -169,11 +169,8 @@ export class GpuScene {
   /** The canvas's context, set up for the device; null for a canvas of another kind. Premultiplied alpha lets the page show through. */
   surfaceOn(canvas: HTMLCanvasElement): Surface | null {
     const context = canvas.getContext('webgpu');
-    const format = navigator.gpu.getPreferredCanvasFormat();
-    context?.configure({
-      ...{ device: this.device, format, usage: canvasUsage(this.device, format) },
-      alphaMode: 'premultiplied',
-    });
+    const [format, { device }] = [canvasFormat(), this];
+    context?.configure({ device, format, usage: canvasUsage(device, format), alphaMode: 'premultiplied' });
     return context;
   }
 
@@ -240,7 +237,7 @@ export class GpuScene {
   prepare(levers: readonly Partial<FrameLevers>[]): void {
     if (this.isLost || this.#destroyed) return;
     this.#isPrepared = true;
-    this.#renderer.prepare(levers, navigator.gpu.getPreferredCanvasFormat());
+    this.#renderer.prepare(levers, canvasFormat());
   }
 
   /**
@@ -331,6 +328,9 @@ export class GpuScene {
     this.#lease.release();
   }
 }
+
+/** What the canvas is made of. */
+export const canvasFormat = (): GPUTextureFormat => navigator.gpu.getPreferredCanvasFormat();
 
 const frameOf = ({ camera, levers, surface }: CanvasFrame): Frame => ({
   ...{ camera, levers },

@@ -35,6 +35,14 @@ export const noLimits = (error: unknown): GaussianSplatError =>
     cause: error,
   });
 
+export const noContext = (): GaussianSplatError =>
+  new GaussianSplatError('unsupported/no-webgpu', {
+    where: 'canvas',
+    expected: 'a canvas context to draw into',
+    found: 'none',
+    remedy: 'use a browser that shows WebGPU on a canvas',
+  });
+
 /** Of a page's own device, or of a browser that does not answer. */
 export const noDevice = (cause: unknown): GaussianSplatError =>
   new GaussianSplatError('unsupported/no-adapter', {

@@ -5,7 +5,7 @@ import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/
 import type { SceneLoader } from '../loading/scene-loader.js';
 import type { GlScene } from '../webgl/gl-scene.js';
 import { chooseAtRest } from './choose-at-rest.js';
-import { GpuScene } from './gpu-scene.js';
+import { canvasFormat, GpuScene } from './gpu-scene.js';
 import { limitScenes, loadBytes } from './memory-budget.js';
 import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu } from './request-device.js';
@@ -189,8 +189,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
   }
 }
 
-/** What the canvas is made of. */
-const pictures = (): { format: GPUTextureFormat } => ({ format: navigator.gpu.getPreferredCanvasFormat() });
+const pictures = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
 
 /** That no variant draws the right image ends the loading; that none could be timed does not. */
 function unlessWrong(error: unknown): void {

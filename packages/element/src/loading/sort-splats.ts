@@ -9,13 +9,17 @@ export interface SortRequest {
 
 export interface SortAnswer extends SortRequest {
   readonly count: number;
+  /** What sorting took, ms. */
+  readonly milliseconds: number;
 }
 
 /** Answers what comes through a port. @param positions [N, 3] */
 export function sortSplats(port: MessagePort, positions: Float32Array): void {
   const splats = new SplatOrder(positions);
   port.onmessage = ({ data: { view, order } }: MessageEvent<SortRequest>) => {
-    const answer: SortAnswer = { view, order, count: splats.sort(view, order) };
+    const begin = performance.now();
+    const count = splats.sort(view, order);
+    const answer: SortAnswer = { view, order, count, milliseconds: performance.now() - begin };
     port.postMessage(answer, [order.buffer]);
   };
 }

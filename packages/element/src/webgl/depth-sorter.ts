@@ -5,9 +5,57 @@ import type { SortAnswer, SortRequest } from '../loading/sort-splats.js';
 /** How long an order may be waited for, ms: a worker that has not begun by then may never do. */
 const LATE_MS = 2_000;
 
-/** An order, and the view that it is of. */
-export interface SortedSplats {
+/** The worker that sorts for all scenes of a page. */
+class SortWorker {
+  static #current: SortWorker | undefined;
+  /** Rejects where the page refuses it. */
+  readonly ready: Promise<Worker>;
+  readonly #spawn: () => Worker;
+  #worker: Worker | undefined;
+  #users = 0;
+
+  private constructor(spawn: () => Worker) {
+    this.#spawn = spawn;
+    this.ready = new Promise((resolve, reject) => {
+      const worker = (this.#worker = spawn());
+      worker.addEventListener('message', ({ data }: MessageEvent<WorkerMessage>) => {
+        if (data.type === 'ready') resolve(worker);
+      });
+      worker.addEventListener('error', (event) => {
+        event.preventDefault();
+        this.#end();
+        reject(new Error(event.message));
+      });
+    });
+    this.ready.catch(() => undefined);
+  }
+
+  static acquire(spawn: () => Worker): SortWorker {
+    const known = this.#current;
+    const worker = known && known.#spawn === spawn ? known : new SortWorker(spawn);
+    this.#current = worker;
+    worker.#users++;
+    return worker;
+  }
+
+  release(): void {
+    if (--this.#users === 0) this.#end();
+  }
+
+  #end(): void {
+    if (SortWorker.#current === this) SortWorker.#current = undefined;
+    this.#worker?.terminate();
+  }
+}
+
+/** A view, and when its order was asked for, by the page's clock. */
+interface Asked {
   readonly view: OrderView;
+  readonly askedAt: number;
+}
+
+/** An order, and the view that it is of. */
+export interface SortedSplats extends Asked {
   /** Numbers of splats from near to far, in whole rows of `DATA_WIDTH`. */
   readonly order: Uint32Array;
   readonly count: number;
@@ -27,25 +75,30 @@ export interface DepthSorterOptions {
  */
 export class DepthSorter {
   readonly #options: DepthSorterOptions;
-  readonly #worker: Worker | undefined;
+  readonly #worker: SortWorker;
   #port: MessagePort | undefined;
   #here: SplatOrder | undefined;
   /** Lent to the worker while it sorts. */
   #buffer: Uint32Array<ArrayBuffer>;
-  #isSorting = false;
-  #next: OrderView | undefined;
-  #late: ReturnType<typeof setTimeout> | undefined;
+  #sorting: Asked | undefined;
+  #next: Asked | undefined;
+  #isHere = false;
+  #isOver = false;
+  readonly #late: ReturnType<typeof setTimeout>;
+  /** What the last order took the worker. */
+  milliseconds = Infinity;
 
   constructor(options: DepthSorterOptions) {
     this.#options = options;
     this.#buffer = this.#makeBuffer();
-    this.#worker = this.#start();
+    this.#worker = SortWorker.acquire(options.spawn);
     this.#late = setTimeout(this.#giveUp, LATE_MS);
+    this.#worker.ready.then((worker) => this.#connect(worker), this.#giveUp);
   }
 
   /** Asks for the order of a view. */
   request(view: OrderView): void {
-    this.#next = view;
+    this.#next = { view, askedAt: performance.now() };
     this.#proceed();
   }
 
@@ -54,15 +107,16 @@ export class DepthSorter {
     this.#here ??= new SplatOrder(this.#options.positions);
     // Its own buffer may be away.
     const order = this.#buffer.length > 0 ? this.#buffer : this.#makeBuffer();
-    return { view, order, count: this.#here.sort(view, order) };
+    return { view, askedAt: performance.now(), order, count: this.#here.sort(view, order) };
   }
 
   destroy(): void {
+    if (this.#isOver) return;
+    this.#isOver = true;
     clearTimeout(this.#late);
     this.#next = undefined;
     this.#port?.close();
-    this.#port = undefined;
-    this.#worker?.terminate();
+    this.#worker.release();
   }
 
   #makeBuffer(): Uint32Array<ArrayBuffer> {
@@ -70,24 +124,8 @@ export class DepthSorter {
     return new Uint32Array(Math.max(1, Math.ceil(count / DATA_WIDTH)) * DATA_WIDTH);
   }
 
-  #start(): Worker | undefined {
-    try {
-      const worker = this.#options.spawn();
-      worker.addEventListener('message', ({ data }: MessageEvent<WorkerMessage>) => {
-        if (data.type === 'ready' && this.#late !== undefined) this.#connect(worker);
-      });
-      worker.addEventListener('error', (event) => {
-        event.preventDefault();
-        this.#giveUp();
-      });
-      return worker;
-    } catch {
-      queueMicrotask(this.#giveUp);
-      return undefined;
-    }
-  }
-
   #connect(worker: Worker): void {
+    if (this.#isOver || this.#isHere) return;
     const { port1, port2 } = new MessageChannel();
     const { positions } = this.#options;
     worker.postMessage({ type: 'sort', port: port2, positions } satisfies PageMessage, [port2]);
@@ -97,43 +135,44 @@ export class DepthSorter {
   }
 
   #proceed(): void {
-    const view = this.#next;
-    if (view === undefined || this.#isSorting) return;
-    if (this.#port === undefined) {
-      // Until the worker is there, or never will be.
-      if (this.#late === undefined) setTimeout(this.#sortHere);
-      return;
-    }
+    const next = this.#next;
+    if (next === undefined || this.#sorting !== undefined) return;
+    if (this.#isHere) return void setTimeout(this.#sortHere);
+    // It comes, or is given up.
+    if (this.#port === undefined) return;
     this.#next = undefined;
-    this.#isSorting = true;
-    const buffer = this.#buffer;
+    this.#sorting = next;
+    const order = this.#buffer;
     this.#buffer = new Uint32Array(0);
-    this.#port.postMessage({ view, order: buffer } satisfies SortRequest, [buffer.buffer]);
+    this.#port.postMessage({ view: next.view, order } satisfies SortRequest, [order.buffer]);
   }
 
-  #take({ view, order, count }: SortAnswer): void {
+  #take({ view, order, count, milliseconds }: SortAnswer): void {
+    if (this.#isHere || this.#isOver) return;
+    this.milliseconds = milliseconds;
     clearTimeout(this.#late);
-    this.#isSorting = false;
+    const { askedAt = 0 } = this.#sorting ?? {};
+    this.#sorting = undefined;
     this.#buffer = order;
-    this.#options.onOrder({ view, order, count });
+    this.#options.onOrder({ view, askedAt, order, count });
     this.#proceed();
   }
 
   readonly #sortHere = (): void => {
-    const view = this.#next;
+    const next = this.#next;
     this.#next = undefined;
-    if (view !== undefined) this.#options.onOrder(this.sortNow(view));
+    if (next !== undefined) this.#options.onOrder(this.sortNow(next.view));
   };
 
   /** No worker answers: the page's thread sorts from now on. */
   readonly #giveUp = (): void => {
+    if (this.#isOver || this.#isHere) return;
+    this.#isHere = true;
     clearTimeout(this.#late);
-    this.#late = undefined;
     this.#port?.close();
-    this.#port = undefined;
-    this.#worker?.terminate();
-    if (this.#isSorting) this.#buffer = this.#makeBuffer();
-    this.#isSorting = false;
+    this.#next ??= this.#sorting;
+    this.#sorting = undefined;
+    if (this.#buffer.length === 0) this.#buffer = this.#makeBuffer();
     this.#proceed();
   };
 }

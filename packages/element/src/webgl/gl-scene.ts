@@ -9,7 +9,7 @@ import {
   type GlGaussianFacts,
   type OrderView,
 } from '@gaussian-splat/renderer/webgl';
-import { GaussianSplatError } from '@gaussian-splat/core';
+import type { GaussianSplatError } from '@gaussian-splat/core';
 import type { SceneBounds } from '../camera/settings.js';
 import type { CanvasFrame, DetailLevers, OwnedLevels, Rendering, Surface } from '../gpu/gpu-scene.js';
 import { defaultMemoryBudget } from '../gpu/memory-budget.js';
@@ -22,6 +22,8 @@ import type { GlLease } from './gl-session.js';
 
 /** What all scenes drawn with WebGL hold together. */
 const ledger = new MemoryLedger();
+/** An order that is older when it is drawn, ms, is made anew on the page's thread, where that is known to take no longer than the second. */
+const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];
 /** 32-bit words of a splat's geometry; the first three are its position. */
 const GEOMETRY_WORDS = 8;
 
@@ -63,9 +65,15 @@ export class GlScene {
   readonly #reservation: { release(): void };
   /** The view that the order on the GPU is of. */
   #sorted: OrderView | undefined;
+  /** When it was asked for, by the page's clock. */
+  #sortedAt = 0;
   /** The view that was asked for last. */
   #asked: OrderView | undefined;
-  readonly #first: Promise<void>;
+  /** The first order is there. */
+  readonly #ordered: Promise<void>;
+  /** The first frame is drawn. */
+  readonly #shown: Promise<void>;
+  #tellShown: () => void = () => undefined;
   #rendering: Rendering = { quality: 'default', shDegree: 3 };
   #destroyed = false;
 
@@ -82,15 +90,17 @@ export class GlScene {
     this.bounds = bounds;
     this.gaussians = { ...textures.facts, version: 0, byteLength: glBytes(packed) };
     this.#frames = new GlRenderer(lease.gl, textures);
-    let isSorted: () => void;
-    this.#first = new Promise((resolve) => (isSorted = resolve));
+    let tellOrdered: () => void;
+    this.#ordered = new Promise((resolve) => (tellOrdered = resolve));
+    this.#shown = new Promise((resolve) => (this.#tellShown = resolve));
     this.#sorter = new DepthSorter({
       positions: positionsIn(packed.geometry),
       spawn,
       onOrder: (sorted) => {
+        const isFirst = this.#sorted === undefined;
         this.#setOrder(sorted);
-        isSorted();
-        this.onIncomplete();
+        tellOrdered();
+        if (!isFirst) this.onIncomplete();
       },
     });
   }
@@ -166,9 +176,13 @@ export class GlScene {
     const view = orderView(frame.camera, this.gaussians.origin);
     if (this.#sorted === undefined || !isSameView(view, this.#sorted)) {
       // Who reads the picture at once cannot wait for the worker.
-      if (frame.isRead) this.#setOrder(this.#sorter.sortNow(view));
-      else this.#ask(view);
+      if (frame.isRead || this.#isOld) {
+        this.#asked = view;
+        this.#setOrder(this.#sorter.sortNow(view));
+      } else this.#ask(view);
     }
+    // The first frame waits for an order.
+    if (this.#sorted === undefined) return;
     if (onTime === undefined) return this.#draw(frame);
     this.#lease.clock.time(() => this.#draw(frame)).then(onTime, () => undefined);
   }
@@ -176,13 +190,15 @@ export class GlScene {
   /** Waits for the order of the first frame, and until the GPU has drawn it. */
   async renderFirst(frame: CanvasFrame): Promise<void> {
     this.#ask(orderView(frame.camera, this.gaussians.origin));
-    await Promise.race([this.#first, this.lost]);
+    await Promise.race([this.#ordered, this.lost]);
     if (this.isLost || this.#destroyed) return;
     this.#draw(frame);
+    this.#tellShown();
     await whenDrawn(this.#lease.gl).catch(() => undefined);
   }
 
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
+    await Promise.race([this.#shown, this.lost]);
     return this.isLost || this.#destroyed ? [] : this.#frames.probe(points);
   }
 
@@ -193,11 +209,17 @@ export class GlScene {
   destroy(): void {
     if (this.#destroyed) return;
     this.#destroyed = true;
+    this.#tellShown();
     this.#sorter.destroy();
     this.#frames.destroy();
     this.#textures.destroy();
     this.#reservation.release();
     this.#lease.release();
+  }
+
+  get #isOld(): boolean {
+    const age = performance.now() - this.#sortedAt;
+    return this.#sorted !== undefined && age > OLDEST_MS && this.#sorter.milliseconds <= LONGEST_SORT_MS;
   }
 
   #ask(view: OrderView): void {
@@ -206,9 +228,11 @@ export class GlScene {
     this.#sorter.request(view);
   }
 
-  #setOrder({ view, order, count }: SortedSplats): void {
-    if (this.isLost || this.#destroyed) return;
+  #setOrder({ view, order, count, askedAt }: SortedSplats): void {
+    // What was sorted at once meanwhile is newer.
+    if (this.isLost || this.#destroyed || askedAt < this.#sortedAt) return;
     this.#sorted = view;
+    this.#sortedAt = askedAt;
     this.#frames.setOrder(order, count);
   }
 

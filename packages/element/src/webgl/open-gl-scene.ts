@@ -1,6 +1,6 @@
 /** Loaded only where a page has no WebGPU, or asks for WebGL by name. */
+import { glBytes } from '@gaussian-splat/renderer/webgl';
 import { isGenerator, isStreamed, type OpenOptions } from '../gpu/open-scene.js';
-import { byteLengthOf } from '../gpu/upload.js';
 import type { LoadedScene, SceneRequest } from '../loading/protocol.js';
 import { cannotShow, noWebGl } from './errors.js';
 import { GlScene } from './gl-scene.js';
@@ -27,7 +27,7 @@ export async function openGlScene(asked: SceneRequest, options: OpenOptions, rea
       .finally(() => previews.end());
     signal.throwIfAborted();
     if ('frames' in scene) throw cannotShow('a sequence of scenes', reason);
-    beforeUpload(byteLengthOf(scene));
+    beforeUpload(glBytes(scene.packed));
     return await GlScene.open(lease, scene, openOptions(options, signal));
   } catch (error) {
     lease.release();

@@ -38,11 +38,13 @@ export class GlClock {
   async time(draw: () => void): Promise<WorkTime> {
     const begin = performance.now();
     draw();
+    // Where the browser draws at once, nothing else could be done meanwhile.
+    const busy = performance.now() - begin;
     const before = this.#last;
     const told = await drawn(this.#gl);
     this.#last = told;
     const atMost = told.now - Math.max(begin, before.since);
-    const atLeast = Math.min(atMost, Math.max(0, told.since - Math.max(begin, before.now)));
+    const atLeast = Math.min(atMost, Math.max(busy, told.since - Math.max(begin, before.now)));
     return { doneAt: told.now, atLeast, atMost };
   }
 }

@@ -1,7 +1,6 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
 import { turn } from '../gpu/turn.js';
-import { GEOMETRY_WORDS, type PackedGaussians } from '../pack/pack.js';
-import { shWords } from '../pack/sh.js';
+import type { PackedGaussians } from '../pack/pack.js';
 import { makeTexture, requireMemory } from './gl.js';
 import { DATA_WIDTH } from './shaders.js';
 
@@ -29,8 +28,8 @@ export class GlGaussians {
 
   private constructor(gl: WebGL2RenderingContext, packed: PackedGaussians) {
     this.#gl = gl;
-    const { geometry: _, sh: __, chunks: ___, details: ____, leafCount: _____, ...facts } = packed;
-    this.facts = facts;
+    const { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin } = packed;
+    this.facts = { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin };
     requireRoom(gl, packed);
     this.geometry = makeTexture(gl, gl.RGBA32UI, [DATA_WIDTH, rowsOf(packed.geometry.length / 4)]);
     this.sh = makeTexture(gl, gl.RG32UI, [DATA_WIDTH, rowsOf(packed.sh.length / 2)]);
@@ -82,11 +81,11 @@ async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content:
   }
 }
 
-function requireRoom(gl: WebGL2RenderingContext, { count, shDegree, shPrecision }: PackedGaussians): void {
+function requireRoom(gl: WebGL2RenderingContext, { count, shDegree, geometry, sh }: PackedGaussians): void {
   const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
-  const texels = Math.max(GEOMETRY_WORDS / 4, shWords(shDegree, shPrecision) / 2);
-  const most = side < DATA_WIDTH ? 0 : Math.floor((side * DATA_WIDTH) / texels);
-  if (count <= most || gl.isContextLost()) return;
+  const texels = Math.max(geometry.length / 4, sh.length / 2);
+  const most = side < DATA_WIDTH ? 0 : Math.floor((side * DATA_WIDTH * count) / texels);
+  if (!(count > most) || gl.isContextLost()) return;
   throw new GaussianSplatError('out-of-memory/buffer-limit', {
     where: `scene of ${count} splats, drawn with WebGL 2`,
     expected: `at most ${most} splats with harmonics of degree ${shDegree}: textures of this browser have ${side} rows at most`,
