@@ -19,6 +19,10 @@
 @group(0) @binding(7) var<storage, read_write> keys: array<u32>;
 @group(0) @binding(8) var<storage, read> chunk_shares: array<f32>;
 
+fn sh_word(i: u32) -> vec2u {
+  return sh[i];
+}
+
 // Orders as the depth does. The bits of a positive float32, read as a number, grow like its logarithm: a share of the
 // visible range of that number is a logarithmic key that needs no logarithm.
 fn depth_key(depth: f32) -> u32 {

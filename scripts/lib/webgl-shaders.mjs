@@ -17,7 +17,7 @@ export const NAGA = '30.0.1';
 export const WEBGL_SHADERS = fileURLToPath(new URL('../../packages/renderer/src/webgl/shaders.ts', import.meta.url));
 
 /** What stands in the place of WebGPU's buffers. */
-const REPLACED = { 'shared/stored_gaussian': 'webgl/textured_gaussian', 'shared/stored_sh': 'webgl/textured_sh' };
+const REPLACED = { 'shared/stored_gaussian': 'webgl/textured_gaussian' };
 const STAGES = ['project', 'quads', 'compose', 'probe'];
 const ENTRIES = [['whole_target', 'vertex'], ['quads', 'vertex'], ...STAGES.map((stage) => [stage, 'fragment'])];
 /** Structs of uniforms that WebGPU's stages do not have. */

@@ -1,6 +1,5 @@
-// Colour of a splat from its spherical harmonics, as pack/sh.ts of the renderer packs them. `view` is the stage's.
+// Colour of a splat from its spherical harmonics, as pack/sh.ts of the renderer packs them. `view` is the stage's, and so is `sh_word`, which finds them.
 #import shared/sh
-#import shared/stored_sh
 
 // Colour that four coefficients in three words add, or one coefficient in the last word of degrees 0 and 2.
 fn quartet_color(first_word: u32, basis: vec4f) -> vec3f {

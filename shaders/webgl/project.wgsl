@@ -6,6 +6,12 @@
 
 @group(0) @binding(0) var<uniform> view: View;
 
+@group(0) @binding(2) var harmonics: texture_2d<u32>;
+
+fn sh_word(i: u32) -> vec2u {
+  return textureLoad(harmonics, texel_of(i), 0).xy;
+}
+
 struct Projected {
   // The bits of the floats.
   @location(0) shape: vec4u,

@@ -1,4 +1,5 @@
 import { loadModule } from '@gaussian-splat/core';
+import { MemoryLedger } from '@gaussian-splat/renderer';
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
 import type * as comeBack from '../gpu/come-back.js';
@@ -341,7 +342,7 @@ export class SceneController implements ReactiveController {
   /** Whether the scene on show may be dropped where others lack its memory: the element is gone, or another scene is to take its place. */
   #spare(isSpare: boolean): void {
     if (this.#scene === null) return;
-    const { spare } = this.#scene.ledger;
+    const { spare } = MemoryLedger.of(this.#scene.device);
     if (isSpare || this.#releaseTimer) spare.add(this.#giveBack);
     else spare.delete(this.#giveBack);
   }
@@ -351,7 +352,7 @@ export class SceneController implements ReactiveController {
   #drop(clear: boolean): void {
     if (this.#scene !== null || clear) this.#of.hide(clear);
     if (this.#scene === null) return;
-    this.#scene.ledger.spare.delete(this.#giveBack);
+    MemoryLedger.of(this.#scene.device).spare.delete(this.#giveBack);
     this.#scene.destroy();
     this.#scene = null;
   }

@@ -163,8 +163,8 @@ export class ViewController implements FrameClient {
   }
 
   /** null where there is no size. */
-  #pixelsOf({ maxSide }: DrawnScene): PixelSize | null {
-    return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, maxSide);
+  #pixelsOf({ device }: DrawnScene): PixelSize | null {
+    return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, device.limits.maxTextureDimension2D);
   }
 
   #render(scene: DrawnScene, request: CanvasFrame, now: number, cameraMoved: boolean): void {

@@ -1,6 +1,5 @@
-import { GaussianSplatError, loadModule, type Camera, type ShDegree } from '@gaussian-splat/core';
+import { loadModule, type GaussianSplatError, type Camera, type ShDegree } from '@gaussian-splat/core';
 import {
-  MemoryLedger,
   QueueClock,
   Renderer,
   type FrameRequest,
@@ -15,6 +14,7 @@ import type { SceneBounds } from '../camera/settings.js';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
 import type { Timeline } from '../live/live-model.js';
 import type { ReadCounts } from '../stats.js';
+import { why } from './request-device.js';
 import type { DeviceLease } from './shared-device.js';
 
 /** How much detail is drawn of a scene that has levels of it. */
@@ -156,16 +156,6 @@ export class GpuScene {
     return this.#lease.device;
   }
 
-  /** Of all scenes that share its memory. */
-  get ledger(): MemoryLedger {
-    return MemoryLedger.of(this.device);
-  }
-
-  /** Longest side that an image may have, in pixels. */
-  get maxSide(): number {
-    return this.device.limits.maxTextureDimension2D;
-  }
-
   /** The canvas's context, set up for the device; null for a canvas of another kind. Premultiplied alpha lets the page show through. */
   surfaceOn(canvas: HTMLCanvasElement): Surface | null {
     const context = canvas.getContext('webgpu');
@@ -249,8 +239,9 @@ export class GpuScene {
     const size = sizeOf(frame);
     if (size === this.#drawnSize) return this.#renderOnce(frame, onTime);
     this.#drawnSize = size;
-    void this.#withRefusal(() => this.#renderOnce(frame, onTime)).then((error) => {
-      if (error !== null && !this.#destroyed) this.onError(outOfMemory(`frame of ${size} pixels`, error));
+    void this.#withRefusal(() => this.#renderOnce(frame, onTime)).then(async (error) => {
+      if (error === null || this.#destroyed) return;
+      this.onError(await why(({ noMemory }) => noMemory(`frame of ${size} pixels`, error)));
     });
   }
 
@@ -280,7 +271,7 @@ export class GpuScene {
     const frame = frameOf(request);
     this.#drawnSize = sizeOf(frame);
     const error = await this.#withRefusal(() => this.#draw(frame));
-    if (error !== null) throw outOfMemory('first frame', error);
+    if (error !== null) throw await why(({ noMemory }) => noMemory('first frame', error));
     await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
     // The GPU has nothing to do now. Nobody waits for it.
     this.#clock.calibrate().catch(() => undefined);
@@ -345,13 +336,3 @@ function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsa
 }
 
 const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
-
-function outOfMemory(where: string, cause: GPUError): GaussianSplatError {
-  return new GaussianSplatError('out-of-memory/allocation', {
-    where,
-    expected: 'enough free GPU memory',
-    found: cause.message || 'an allocation that failed',
-    remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
-    cause,
-  });
-}

@@ -1,4 +1,4 @@
-/** Loaded only by pages that have no GPU device: what people read there. */
+/** Loaded only by pages that have no GPU device, or too little of it: what people read there. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 
 export function noWebGpu(): GaussianSplatError {
@@ -52,3 +52,14 @@ export const noDevice = (cause: unknown): GaussianSplatError =>
     remedy: 'reload the page, or update the graphics driver',
     cause,
   });
+
+/** Of a frame for which memory was lacking. */
+export function noMemory(where: string, cause: GPUError): GaussianSplatError {
+  return new GaussianSplatError('out-of-memory/allocation', {
+    where,
+    expected: 'enough free GPU memory',
+    found: cause.message || 'an allocation that failed',
+    remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
+    cause,
+  });
+}

@@ -2,7 +2,7 @@ import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import type * as reasons from './no-device.js';
 
-/** Why this page has no device, for people. */
+/** Why this page has no device, or a frame no memory, for people. */
 export const why = async (reason: (of: typeof reasons) => GaussianSplatError): Promise<GaussianSplatError> =>
   reason(await loadModule('what is to be said of a page without a GPU', () => import('./no-device.js')));
 

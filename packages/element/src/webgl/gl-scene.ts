@@ -17,11 +17,8 @@ import type { Timeline } from '../live/live-model.js';
 import type { LoadedScene } from '../loading/protocol.js';
 import type { ReadCounts } from '../stats.js';
 import { DepthSorter, type SortedSplats } from './depth-sorter.js';
-import { cannotShow } from './errors.js';
 import type { GlLease } from './gl-session.js';
 
-/** What all scenes drawn with WebGL hold together. */
-const ledger = new MemoryLedger();
 /** An order that is older when it is drawn, ms, is made anew on the page's thread, where that is known to take no longer than the second. */
 const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];
 /** 32-bit words of a splat's geometry; the first three are its position. */
@@ -41,7 +38,6 @@ export interface GlSceneOptions {
 /** A scene that is drawn with WebGL: what the element asks of a `GpuScene`, as far as WebGL can do it. */
 export class GlScene {
   readonly renderer = 'webgl';
-  readonly ledger = ledger;
   readonly bounds: SceneBounds;
   readonly gaussians: GlGaussianFacts & {
     readonly version: 0;
@@ -109,6 +105,7 @@ export class GlScene {
   static async open(lease: GlLease, scene: LoadedScene, options: GlSceneOptions): Promise<GlScene> {
     const { signal, memoryBudget, spawn } = options;
     const { packed } = scene;
+    const ledger = MemoryLedger.of(lease.device);
     ledger.budgetBytes = Math.max(memoryBudget ?? 0, defaultMemoryBudget() ?? Infinity);
     const reservation = ledger.reserve(`scene of ${packed.count} splats`, glBytes(packed), memoryBudget);
     let textures: GlGaussians | undefined;
@@ -123,13 +120,9 @@ export class GlScene {
     }
   }
 
-  /** Models that run on the GPU need WebGPU. */
-  get device(): never {
-    throw cannotShow('a post-processor');
-  }
-
-  get maxSide(): number {
-    return this.#lease.maxSide;
+  /** Its limits alone. */
+  get device(): GPUDevice {
+    return this.#lease.device;
   }
 
   get frameBytes(): number {

@@ -1,12 +1,13 @@
 /** One WebGL context for all elements of a page: browsers end the oldest of more than 8 or 16. Elements show copies of what it draws. */
 import { GlClock } from '@gaussian-splat/renderer/webgl';
+import { cannotShow } from './errors.js';
 
 /** A share in the page's context. */
 export interface GlLease {
   readonly gl: WebGL2RenderingContext;
   readonly clock: GlClock;
-  /** Longest side that an image may have, in pixels. */
-  readonly maxSide: number;
+  /** Stands where a WebGPU device is asked for. */
+  readonly device: GPUDevice;
   readonly isLost: boolean;
   /** Fulfils when the context is lost. */
   readonly lost: Promise<void>;
@@ -19,7 +20,7 @@ export interface GlLease {
 class GlSession {
   readonly gl: WebGL2RenderingContext;
   readonly clock: GlClock;
-  readonly maxSide: number;
+  readonly device: GPUDevice;
   isLost = false;
   /** Whom a loss is told. Not by one promise for all: it would hold on to everybody who ever waited for it. */
   readonly #listeners = new Set<() => void>();
@@ -29,7 +30,8 @@ class GlSession {
     this.gl = gl;
     this.clock = new GlClock(gl);
     const [width, height] = gl.getParameter(gl.MAX_VIEWPORT_DIMS) as Int32Array;
-    this.maxSide = Math.min(width, height, gl.getParameter(gl.MAX_TEXTURE_SIZE) as number);
+    const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
+    this.device = limitsAlone({ limits: { maxTextureDimension2D: Math.min(width, height, side) } });
     gl.canvas.addEventListener('webglcontextlost', () => {
       this.isLost = true;
       if (current === this) current = undefined;
@@ -54,7 +56,7 @@ class GlSession {
     return {
       gl: this.gl,
       clock: this.clock,
-      maxSide: this.maxSide,
+      device: this.device,
       lost,
       get isLost() {
         return isLost();
@@ -75,6 +77,15 @@ class GlSession {
     this.gl.getExtension('WEBGL_lose_context')?.loseContext();
   }
 }
+
+/** Has the limits of a device; whatever else is asked of it is an error by name. Models that run on the GPU need WebGPU. */
+const limitsAlone = (known: object): GPUDevice =>
+  new Proxy(known, {
+    get: (target, key) => {
+      if (key in target) return Reflect.get(target, key) as unknown;
+      throw cannotShow('a post-processor');
+    },
+  }) as GPUDevice;
 
 let current: GlSession | undefined;
 

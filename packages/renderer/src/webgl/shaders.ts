@@ -2,7 +2,7 @@
  * Written by `npm run shaders:webgl` from shaders/webgl and shaders/shared, and committed: see scripts/lib/webgl-shaders.mjs. Do not edit.
  */
 /** Of the WGSL that this was made of. */
-export const SOURCE_DIGEST = '7c38bc3fcb03552f3ea5688945fd1e73';
+export const SOURCE_DIGEST = '5c6dff1aab5f34d32bb0a1bfc2bdfadd';
 /** Texels in a row of the textures that hold arrays. */
 export const DATA_WIDTH = 4096;
 export const QuadsView = {
