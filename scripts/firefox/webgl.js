@@ -44,9 +44,11 @@ async function drawView(url, camera, mode, accumulation) {
   renderer.setOrder(order, count);
   const request = { camera: whole, accumulation, shDegree: 3, resolutionScale: 1 };
   renderer.render(request);
+  renderer.present();
   await drawn(gl);
   const start = performance.now();
   renderer.render(request);
+  renderer.present();
   // Reading waits for the frame.
   const bytes = new Uint8Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);

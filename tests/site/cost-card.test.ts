@@ -10,6 +10,7 @@ interface Splat extends HTMLElement {
   readonly ready: Promise<void>;
   readonly currentTime: number;
   readonly error: { readonly reason: string } | null;
+  readonly statistics: { readonly renderer: string } | null;
 }
 const PATIENCE = { timeout: 100_000, polling: 100 };
 

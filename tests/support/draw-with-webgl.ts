@@ -26,6 +26,7 @@ export async function drawWithWebGl(
     const order = new Uint32Array(Math.max(1, Math.ceil(packed.count / DATA_WIDTH)) * DATA_WIDTH);
     renderer.setOrder(order, new SplatOrder(positions).sort(orderView(camera, packed.origin), order));
     renderer.render({ camera, accumulation, shDegree: 3, resolutionScale: 1 });
+    renderer.present();
     const bytes = new Uint8Array(4 * width * height);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
     const row = 4 * width;

@@ -1,4 +1,4 @@
-/** Loaded only by pages that have no GPU device, or too little of it: what people read there. */
+/** What people read where there is no GPU device, or too little memory, and of other errors that few pages have. Loaded then. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 
 export function noWebGpu(): GaussianSplatError {
@@ -61,5 +61,14 @@ export function noMemory(where: string, cause: GPUError): GaussianSplatError {
     found: cause.message || 'an allocation that failed',
     remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
     cause,
+  });
+}
+
+export function sequenceWithin(url: string): GaussianSplatError {
+  return new GaussianSplatError('decode/unsupported', {
+    where: url,
+    expected: 'a scene file',
+    found: 'the manifest of a sequence',
+    remedy: 'name scene files as frames of a sequence, not other sequences',
   });
 }

@@ -21,6 +21,8 @@ import type { GlLease } from './gl-session.js';
 
 /** An order that is older when it is drawn, ms, is made anew on the page's thread, where that is known to take no longer than the second. */
 const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];
+/** Of what a whole frame takes, the share that its pixels surely do. */
+const SURE_SHARE = 0.5;
 /** 32-bit words of a splat's geometry; the first three are its position. */
 const GEOMETRY_WORDS = 8;
 
@@ -70,6 +72,8 @@ export class GlScene {
   /** The first frame is drawn. */
   readonly #shown: Promise<void>;
   #tellShown: () => void = () => undefined;
+  /** What a whole frame takes, as far as is known, ms. */
+  #wholeMs = 0;
   #rendering: Rendering = { quality: 'default', shDegree: 3 };
   #destroyed = false;
 
@@ -177,7 +181,15 @@ export class GlScene {
     // The first frame waits for an order.
     if (this.#sorted === undefined) return;
     if (onTime === undefined) return this.#draw(frame);
-    this.#lease.clock.time(() => this.#draw(frame)).then(onTime, () => undefined);
+    const { resolutionScale = 1 } = frame.levers ?? {};
+    const least = SURE_SHARE * this.#wholeMs * resolutionScale ** 2;
+    this.#lease.clock
+      .time(() => this.#draw(frame), least)
+      .then((time) => {
+        if (resolutionScale === 1) this.#wholeMs = Math.min(this.#wholeMs, time.atMost);
+        onTime(time);
+      })
+      .catch(() => undefined);
   }
 
   /** Waits for the order of the first frame, and until the GPU has drawn it. */
@@ -185,9 +197,12 @@ export class GlScene {
     this.#ask(orderView(frame.camera, this.gaussians.origin));
     await Promise.race([this.#ordered, this.lost]);
     if (this.isLost || this.#destroyed) return;
-    this.#draw(frame);
-    this.#tellShown();
+    const begin = performance.now();
+    this.#paint(frame);
     await whenDrawn(this.#lease.gl).catch(() => undefined);
+    this.#wholeMs = performance.now() - begin;
+    if (!this.isLost && !this.#destroyed) this.#show(frame);
+    this.#tellShown();
   }
 
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
@@ -229,17 +244,26 @@ export class GlScene {
     this.#frames.setOrder(order, count);
   }
 
-  #draw({ camera, levers, surface }: CanvasFrame): void {
-    const { context } = surface as CopySurface;
-    const { width, height } = camera;
+  #draw(frame: CanvasFrame): void {
+    this.#paint(frame);
+    this.#show(frame);
+  }
+
+  #paint({ camera, levers }: CanvasFrame): void {
     const { quality, shDegree } = this.#rendering;
-    this.#lease.fit(width, height);
     this.#frames.render({
       camera,
       shDegree,
       accumulation: quality === 'reference' ? 'rgba32float' : 'rgba16float',
       resolutionScale: levers?.resolutionScale ?? 1,
     });
+  }
+
+  /** Copies what was painted to the element's canvas. */
+  #show({ camera: { width, height }, surface }: CanvasFrame): void {
+    const { context } = surface as CopySurface;
+    this.#lease.fit(width, height);
+    this.#frames.present();
     const { canvas } = this.#lease.gl;
     // WebGL counts rows from below, so that is where a smaller image lies.
     context.globalCompositeOperation = 'copy';

@@ -34,8 +34,11 @@ export class GlClock {
     this.#gl = gl;
   }
 
-  /** Times what `draw` draws. Rejects where the context is lost. */
-  async time(draw: () => void): Promise<WorkTime> {
+  /**
+   * Times what `draw` draws. Rejects where the context is lost.
+   * @param least what it surely takes, ms: where a browser waits for frames on the page's thread, little else is known
+   */
+  async time(draw: () => void, least = 0): Promise<WorkTime> {
     const begin = performance.now();
     draw();
     // Where the browser draws at once, nothing else could be done meanwhile.
@@ -44,7 +47,7 @@ export class GlClock {
     const told = await drawn(this.#gl);
     this.#last = told;
     const atMost = told.now - Math.max(begin, before.since);
-    const atLeast = Math.min(atMost, Math.max(busy, told.since - Math.max(begin, before.now)));
+    const atLeast = Math.min(atMost, Math.max(least, busy, told.since - Math.max(begin, before.now)));
     return { doneAt: told.now, atLeast, atMost };
   }
 }

@@ -77,6 +77,8 @@ export class GlRenderer {
   /** Splats in the order. */
   #count = 0;
   #accumulation: Accumulation | undefined;
+  /** The last frame: as it is shown, and as it was drawn. */
+  #last: { readonly camera: Camera; readonly drawn: Camera } | undefined;
   /** What the splats were last projected with. */
   #projected = '';
 
@@ -118,20 +120,27 @@ export class GlRenderer {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, DATA_WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, order);
   }
 
-  /** Draws one frame onto the canvas. @throws GaussianSplatError `argument/camera` for a camera out of range, `out-of-memory/allocation` */
+  /** Draws one frame, for {@link present}. @throws GaussianSplatError `argument/camera` for a camera out of range, `out-of-memory/allocation` */
   render(request: GlFrameRequest): void {
     const { camera, accumulation, resolutionScale } = request;
     validateCamera(camera);
     const drawn = scaled(camera, resolutionScale);
-    const gl = this.#gl;
     this.#projectSplats(request, drawn);
     this.#drawQuads(this.#accumulationOf(camera, accumulation), drawn);
+    this.#last = { camera, drawn };
+  }
+
+  /** Composes the last frame onto the canvas, from its lower left corner on. */
+  present(): void {
+    if (this.#last === undefined || this.#accumulation === undefined) return;
+    const { camera, drawn } = this.#last;
+    const gl = this.#gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, camera.width, camera.height);
     gl.disable(gl.BLEND);
     const scale = [drawn.width / camera.width, drawn.height / camera.height];
     const used = [drawn.width, drawn.height];
-    this.#compose.use({ background: [0, 0, 0, 0], scale, used }, [this.#accumulation!.texture]);
+    this.#compose.use({ background: [0, 0, 0, 0], scale, used }, [this.#accumulation.texture]);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
