@@ -79,7 +79,7 @@ describe('a function that gives devices', () => {
     const original = GaussianSplatElement.sharedDevice;
     GaussianSplatElement.sharedDevice = new SharedDevice(request, { keepDevice: true });
     try {
-      const element = show({ src: COMPASS });
+      const element = show({ src: COMPASS, renderer: 'webgpu' });
       await element.ready;
       return element;
     } finally {

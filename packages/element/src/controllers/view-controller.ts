@@ -127,7 +127,8 @@ export class ViewController implements FrameClient {
     const source = camera.step(now, this.#host.decayMs);
     try {
       const request = this.#frameRequest(scene, pixels);
-      if (request === null) return void this.#failWithoutContext();
+      if (request === null)
+        return void why(({ noContext }) => noContext()).then((error) => this.#host.drawingFailed(error));
       this.#host.advanceScene(scene, request.camera, now);
       this.#render(scene, request, now, source !== null);
       this.#host.afterFrame(request.camera);
@@ -206,10 +207,6 @@ export class ViewController implements FrameClient {
   #applyRendering(scene: DrawnScene): void {
     const { quality, maxShDegree: shDegree } = this.#host.attributes;
     scene.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree });
-  }
-
-  async #failWithoutContext(): Promise<void> {
-    this.#host.drawingFailed(await why(({ noContext }) => noContext()));
   }
 
   #finishUnseen(): void {
