@@ -68,9 +68,9 @@ async function oraclesOf() {
 
 async function checkAll(browser, evaluate) {
   console.log(browser);
-  // Of the first view, the dearer format besides.
-  const drawn = [...oracles.slice(0, 1).map((first) => ({ ...first, wanted: 'rgba32float' })), ...oracles];
-  for (const { view, mode, oracle, wanted = 'rgba16float' } of drawn) {
+  // What the element blends in; of the first view, float16 besides.
+  const drawn = [...oracles.slice(0, 1).map((first) => ({ ...first, wanted: 'rgba16float' })), ...oracles];
+  for (const { view, mode, oracle, wanted = 'rgba32float' } of drawn) {
     const request = [`/shared/${view.file}`, view.camera, mode, wanted].map((part) => JSON.stringify(part));
     const { pixels, format, frameMs, sortMs } = JSON.parse(await evaluate(`drawView(${request.join()})`));
     const found = Float32Array.from(Buffer.from(pixels, 'base64'), (byte) => byte / 255);

@@ -1,5 +1,6 @@
 // `cull` and `project` in one: a fragment for each splat of the scene. What paints nothing has an opacity of 0.
-#import shared/visibility
+#import shared/projection
+#import shared/stored_gaussian
 #import shared/sh_color
 #import shared/splat
 #import webgl/whole_target
@@ -23,8 +24,11 @@ fn fragment(@builtin(position) position: vec4f) -> Projected {
   let i = u32(position.y) * DATA_WIDTH + u32(position.x);
   if (i >= view.splat_count) { return Projected(vec4u(0u), vec4u(0u)); }
   let found = gaussian_at(i);
-  if (!is_usable(found) || visible_depth(found, 1.0) <= 0.0) { return Projected(vec4u(0u), vec4u(0u)); }
   let g = unpack_gaussian(found);
-  let s = pack_splat(project_ellipse(view, g), splat_sh_color(i, normalize(g.position - view.eye)));
+  let depth = in_camera(view, g.position).z;
+  if (!is_usable(found) || g.opacity < ALPHA_MIN || !is_in_depth_range(view, depth)) { return Projected(vec4u(0u), vec4u(0u)); }
+  let e = project_ellipse(view, g);
+  if (!covers_a_pixel(view, e)) { return Projected(vec4u(0u), vec4u(0u)); }
+  let s = pack_splat(e, splat_sh_color(i, normalize(g.position - view.eye)));
   return Projected(bitcast<vec4u>(s.shape), s.paint);
 }

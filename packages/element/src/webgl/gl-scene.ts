@@ -254,7 +254,7 @@ export class GlScene {
     this.#frames.render({
       camera,
       shDegree,
-      accumulation: quality === 'reference' ? 'rgba32float' : 'rgba16float',
+      accumulation: quality === 'balanced' || quality === 'fast' ? 'rgba16float' : 'rgba32float',
       resolutionScale: levers?.resolutionScale ?? 1,
     });
   }
