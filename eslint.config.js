@@ -12,6 +12,7 @@ const MAY_IMPORT = {
   economise: ['core', 'formats', 'renderer'],
   element: ['core', 'formats', 'generator', 'renderer'],
   react: ['element'],
+  three: ['core', 'renderer'],
 };
 
 /** The packages that may load ONNX Runtime. */

@@ -1,45 +1,36 @@
-/** What the first page adds to the element: tabs, copying a view, opening a file, and showing an error. */
+/** What the home page adds to the element: tabs, copying a view, and opening a file. */
 import { copy } from './site/copy.js';
 import { addressOf, takeFiles } from './site/local-file.js';
 import { viewOf } from './site/view.js';
 import { bringTabsToLife } from './site/tabs.js';
 
 const byId = (id) => document.getElementById(id);
+const hero = byId('hero');
+const status = byId('own-status');
 
 bringTabsToLife(document.querySelector('.tabs'));
 
 byId('copy-view').addEventListener('click', async () => {
-  const view = Object.entries(viewOf(byId('hero'))).map(([name, value]) => `  ${name}="${value}"`);
-  const html = `<gaussian-splat src="skull.spz" alt="A skull" camera-controls\n${view.join('\n')}></gaussian-splat>`;
-  byId('snippet').textContent = `<script type="module" src="cdn/gaussian-splat.min.js"></script>\n${html}`;
+  const view = Object.entries(viewOf(hero)).map(([name, value]) => `  ${name}="${value}"`);
+  const size = '  style="width: 100%; height: auto; aspect-ratio: 4 / 3"';
+  const tag = ['<gaussian-splat src="skull.spz" alt="A skull" camera-controls', ...view, size].join('\n');
+  const html = `<script type="module" src="cdn/gaussian-splat.min.js"></script>\n${tag}></gaussian-splat>`;
+  byId('snippet').textContent = html;
   byId('copied').textContent = await copy(html);
 });
 
-takeFiles(byId('drop'), (file) => {
-  const element = byId('own-scene');
-  element.hidden = false;
-  element.src = addressOf(file);
-  byId('own-status').textContent = `Loading ${file.name}`;
+takeFiles(document.documentElement, (file) => {
+  for (const name of ['camera-orbit', 'camera-target', 'field-of-view', 'max-camera-orbit']) hero.removeAttribute(name);
+  hero.alt = file.name;
+  hero.src = addressOf(file);
+  status.textContent = `Loading ${file.name} …`;
+  hero.scrollIntoView({ block: 'nearest' });
 });
 
-/** Tells below an element what became of its source. */
-function report(element, status) {
-  element.addEventListener('load', () => {
-    const { splats, dropped, bytes } = element.statistics;
-    const left = dropped > 0 ? `, ${dropped} unusable ones left out` : '';
-    status.textContent = `${splats.toLocaleString()} splats${left}, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
-  });
-  element.addEventListener('error', () => {
-    status.textContent = element.error.message;
-  });
-}
-
-report(byId('own-scene'), byId('own-status'));
-report(byId('faulty'), byId('faulty-status'));
-
-for (const button of document.querySelectorAll('button[data-source]')) {
-  button.addEventListener('click', () => {
-    byId('faulty').hidden = false;
-    byId('faulty').src = button.dataset.source;
-  });
-}
+hero.addEventListener('load', () => {
+  if (!status.textContent.startsWith('Loading')) return;
+  const { splats, dropped, bytes } = hero.statistics;
+  const left = dropped > 0 ? `, ${dropped.toLocaleString()} unusable splats left out` : '';
+  status.textContent = `${splats.toLocaleString()} splats${left}, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
+});
+hero.addEventListener('error', () => (status.textContent = hero.error.message));

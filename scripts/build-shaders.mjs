@@ -16,18 +16,14 @@ const generatedOf = (name) => fileURLToPath(new URL(`../packages/${name}/src/gen
 const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
   'streamed-shaders': ['move_slots', 'note_wishes'],
-  'quantized-shaders': [
-    'cull_quantized',
-    'cull_serial_quantized',
-    'order_keys_quantized',
-    'project_quantized',
-    'move_quantized_slots',
-  ],
+  'quantized-shaders': ['cull_quantized', 'cull_serial_quantized', 'project_quantized', 'move_quantized_slots'],
   'probe-shaders': ['probe_depth'],
+  'depth-shaders': ['rasterize_quads_depth', 'rasterize_tiles_depth'],
+  'linear-shaders': ['compose_linear'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
 const QUANTIZED = {
-  stages: ['cull', 'cull_serial', 'order_keys', 'project'],
+  stages: ['cull', 'cull_serial', 'project'],
   replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
 };
 /** Those of another package, which takes shared parts from the renderer. */

@@ -11,7 +11,16 @@ import { ensureDependencies, noteBuilt } from './lib/prepare.mjs';
 import { must, mustSoon, root } from './lib/run.mjs';
 
 /** Scripts of pages, each beside its page. */
-const SCRIPTS = ['home.js', 'check/check.js', 'compare/compare.js', 'examples/examples.js', 'playground/playground.js'];
+const SCRIPTS = [
+  'home.js',
+  'check/check.js',
+  'compare/compare.js',
+  'docs/search.js',
+  'examples/examples.js',
+  'examples/features/features.js',
+  'playground/playground.js',
+  'three/three.js',
+];
 
 /** Texts of ONNX Runtime and of what is in it, as its releases bring them. */
 const RUNTIME_LICENCES = 'packages/element/third-party/onnxruntime';
@@ -59,7 +68,7 @@ async function buildBesideBundle() {
 function projects() {
   const names =
     extent !== 'element'
-      ? ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react']
+      ? ['core', 'formats', 'renderer', 'generator', 'check', 'economise', 'element', 'react', 'three']
       : ['element'];
   return names.map((name) => `packages/${name}`);
 }
@@ -78,6 +87,9 @@ function writeLicencesOfBundle() {
   const others = [
     ['Lit (lit-html, lit-element, @lit/reactive-element), in gaussian-splat.min.js', 'node_modules/lit/LICENSE'],
     ['fflate, in readers/', 'node_modules/fflate/LICENSE'],
+    ['three.js, in the script that is fetched for meshes', 'node_modules/three/LICENSE'],
+    // Its decoder comes with three.js, without a text beside it.
+    ['meshoptimizer, in the same', 'packages/element/third-party/meshoptimizer/LICENSE'],
     // Its npm package has neither.
     ['ONNX Runtime, in onnxruntime/', `${RUNTIME_LICENCES}/LICENSE`],
     ['What ONNX Runtime is made of', `${RUNTIME_LICENCES}/ThirdPartyNotices.txt`],
@@ -101,6 +113,8 @@ async function buildDemo() {
   rmSync(to, { recursive: true, force: true });
   const { writeSequence } = await import('../demo/site/sequence-scene.mjs');
   await writeSequence(join(to, 'scenes/knot'));
+  const { writePavilion } = await import('../demo/site/pavilion.mjs');
+  writePavilion(join(to, 'scenes/pavilion.glb'));
   // Its packages were not there when this script started on a fresh clone.
   const { bundleBench } = await import('./lib/bundle-bench.mjs');
   await bundleBench(join(to, 'bench'));

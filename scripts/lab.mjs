@@ -9,10 +9,12 @@ const IN_CHROMIUM = {
   bench: ['scripts/bench/run-bench.mjs'],
   frontier: ['scripts/frontier/run-frontier.mjs'],
   soak: ['scripts/soak/run-soak.mjs'],
+  attack: ['scripts/attack/run-attack.mjs'],
 };
 const IN_NODE = {
   fuzz: ['--import', 'tsx', 'tests/stability/fuzz/run-fuzz.ts'],
   'detail-chart': ['scripts/charts/detail.mjs'],
+  bytes: ['scripts/bytes/run-bytes.mjs'],
 };
 
 const [name, ...args] = process.argv.slice(2);

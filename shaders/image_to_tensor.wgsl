@@ -1,6 +1,6 @@
 #import shared/group
 
-// A picture to a tensor [1,3,height,width]: red, green and blue planes in 0..1, top row first. Where sizes differ each pixel is a mean
+// A picture to a tensor [views,channels,height,width]: red, green, blue and perhaps alpha planes in 0..1, top row first. Where sizes differ each pixel is a mean
 // with triangular weights, as wide as a pixel's step (antialiased bilinear); what lies outside the picture does not count.
 @group(0) @binding(0) var<uniform> image: ImageToTensor;
 @group(0) @binding(1) var picture: texture_2d<f32>;
@@ -15,6 +15,10 @@ struct ImageToTensor {
   // Width and height of the tensor.
   size: vec2u,
   is_half: u32,
+  // 3, or 4 with alpha.
+  channels: u32,
+  // Words of the tensor before this picture.
+  first_word: u32,
 }
 
 const IMAGE_GROUP = 64u;
@@ -40,7 +44,7 @@ fn mean(at: vec2u, channel: u32) -> f32 {
 
 fn element(index: u32) -> f32 {
   let plane = image.size.x * image.size.y;
-  if (index >= 3u * plane) { return 0.0; }
+  if (index >= image.channels * plane) { return 0.0; }
   let pixel = index % plane;
   return mean(vec2u(pixel % image.size.x, pixel / image.size.x), index / plane);
 }
@@ -48,10 +52,10 @@ fn element(index: u32) -> f32 {
 @compute @workgroup_size(IMAGE_GROUP)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
   let word = group_index(group) * IMAGE_GROUP + lane;
-  let elements = 3u * image.size.x * image.size.y;
+  let elements = image.channels * image.size.x * image.size.y;
   if (image.is_half == 1u) {
-    if (2u * word < elements) { tensor[word] = pack2x16float(vec2f(element(2u * word), element(2u * word + 1u))); }
+    if (2u * word < elements) { tensor[image.first_word + word] = pack2x16float(vec2f(element(2u * word), element(2u * word + 1u))); }
   } else if (word < elements) {
-    tensor[word] = bitcast<u32>(element(word));
+    tensor[image.first_word + word] = bitcast<u32>(element(word));
   }
 }

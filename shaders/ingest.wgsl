@@ -17,8 +17,9 @@ struct Ingest {
   first_row: u32,
   // 1 for float16 tensors, which are read as integers: no device feature is needed.
   is_half: u32,
-  // What `shape` holds: one of SHAPE_*.
+  // What `shape` holds: one of SHAPE_*, in so many numbers: 6 of a covariance, or the 9 of a matrix; 3 of scales, or 1 for all axes.
   shape_kind: u32,
+  shape_numbers: u32,
   // What `colors` holds: one of COLOR_*.
   color_kind: u32,
   sh_degree: u32,
@@ -123,7 +124,8 @@ fn ratio(a: f32, b: f32) -> f32 {
 // diagonal allows, so that L Lᵀ keeps the diagonal and is off by no more than the rounding was.
 fn factor_of_covariance(row: u32) -> Factor {
   let first = triple_of(SHAPES, ingest.shapes, row, 0u);
-  let last = triple_of(SHAPES, ingest.shapes, row, 3u);
+  var last = triple_of(SHAPES, ingest.shapes, row, select(3u, 4u, ingest.shape_numbers == 9u));
+  if (ingest.shape_numbers == 9u) { last.z = bits_of(SHAPES, ingest.shapes, row, 8u); }
   if (!are_finite(first) || !are_finite(last)) { return no_factor(); }
   let a = bitcast<vec3f>(first);
   let b = bitcast<vec3f>(last);
@@ -142,7 +144,8 @@ fn factor_of_covariance(row: u32) -> Factor {
 // The same from the axes themselves: the rows of R S made orthogonal one after the other, as pack/factor.ts of the renderer does
 // it, so that needles keep the digits that a covariance would lose.
 fn factor_of_axes(row: u32) -> Factor {
-  let scale_bits = triple_of(SHAPES, ingest.shapes, row, 0u);
+  var scale_bits = vec3u(bits_of(SHAPES, ingest.shapes, row, 0u));
+  if (ingest.shape_numbers == 3u) { scale_bits = triple_of(SHAPES, ingest.shapes, row, 0u); }
   let is_log = ingest.shape_kind == SHAPE_LOG_SCALE;
   // The logarithm of a scale of 0 is -infinity.
   let is_flat = (scale_bits == vec3u(0xff800000u)) & vec3<bool>(is_log);

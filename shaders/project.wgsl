@@ -15,7 +15,7 @@
 @group(0) @binding(4) var<storage, read> plan: Plan;
 @group(0) @binding(5) var<storage, read> gathered: array<u32>;
 @group(0) @binding(6) var<storage, read_write> splats: array<ProjectedSplat>;
-// Depth keys; or, where the survivors are in depth order already, the slots themselves.
+// Depth keys.
 @group(0) @binding(7) var<storage, read_write> keys: array<u32>;
 @group(0) @binding(8) var<storage, read> chunk_shares: array<f32>;
 
@@ -41,13 +41,12 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let rank = group_index(workgroup_id) * PROJECT_GROUP + lane;
   if (rank >= page.survivors) { return; }
   let slot = page.first_slot + rank;
-  // In depth order the survivors of all pages are mixed: those of others wrap around to huge numbers.
   let i = survivors[slot] - view.first_group * CULL_GROUP;
-  if (i >= view.splat_count) { return; }
   var g = unpack_gaussian(gaussian_at(i));
-  g.opacity = shared_opacity(g.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
+  g.opacity = shared_opacity(g.opacity * view.opacity, chunk_shares[view.first_group + i / CULL_GROUP]);
   let e = project_ellipse(view, g);
-  let color = splat_sh_color(i, normalize(g.position - view.eye));
+  let toward = select(g.position - view.eye, view.axis, view.is_orthographic != 0u);
+  let color = splat_sh_color(i, normalize(toward));
   splats[slot] = pack_splat(e, color);
-  keys[slot] = select(depth_key(e.depth), slot, view.is_ordered != 0u);
+  keys[slot] = depth_key(e.depth);
 }

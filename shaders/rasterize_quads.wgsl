@@ -1,27 +1,10 @@
-// Draws splats back to front as quads.
-#import shared/quad
-#import shared/plan
-
-@group(0) @binding(0) var<uniform> raster: RasterView;
-@group(0) @binding(1) var<storage, read> plan: Plan;
-@group(0) @binding(2) var<storage, read> splats: array<ProjectedSplat>;
-// Slots from near to far.
-@group(0) @binding(3) var<storage, read> order: array<u32>;
-
-struct RasterView {
-  // Pixels.
-  viewport: vec2f,
-  // Which part of the splats to draw, counted from the farthest, of how many.
-  slice: u32,
-  slices: u32,
-}
+// Draws quads of splats alone.
+#import shared/quads
+#import shared/plain_quad
 
 @vertex
 fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) instance: u32) -> Quad {
-  let rank = instance * QUAD_BATCH + vertex_index / 4u;
-  let share = (plan.visible + raster.slices - 1u) / raster.slices;
-  if (rank >= plan.visible || rank / share != raster.slice) {
-    return Quad(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), 0.0);
-  }
-  return quad_of(splats[order[plan.visible - 1u - rank]], vertex_index);
+  let slot = slot_of(vertex_index, instance);
+  if (slot == NO_SLOT) { return no_quad(); }
+  return quad_of(splats[slot], vertex_index);
 }

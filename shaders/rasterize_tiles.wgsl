@@ -1,4 +1,5 @@
 // Paints tiles and notes nothing.
+#import shared/nothing_else
 #import shared/paint_tiles
 
 const NOTES_SPLATS = false;

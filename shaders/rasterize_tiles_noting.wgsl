@@ -1,4 +1,5 @@
 // Paints tiles, and notes what each splat contributed and how deep each pixel is.
+#import shared/nothing_else
 #import shared/paint_tiles
 
 const NOTES_SPLATS = true;

@@ -1,6 +1,6 @@
 /** Two elements, one camera, one line between their pictures. */
 import { addressOf, takeFiles } from '../site/local-file.js';
-import { measureFrames } from '../site/measure.js';
+import { adapterName, measureInTurns } from '../site/measure.js';
 import { differenceOf } from './difference.js';
 import { align, keepInStep } from './in-step.js';
 
@@ -57,19 +57,20 @@ async function measure() {
   byId('status').textContent = 'Measuring…';
   byId('measure').disabled = true;
   try {
-    const times = [];
-    for (const element of sides) times.push(await measureFrames(element));
+    const times = await measureInTurns(sides);
     align(left, right);
     const { decibels, worst } = await differenceOf(left, right);
     const rows = sides.map((element, i) => [
       byId(`${element.id}-name`).textContent,
-      times[i].median.toFixed(2),
+      times[i].isEnough ? String(Number(times[i].median.toPrecision(2))) : 'too slow to tell',
       decibels === Infinity ? 'the same' : decibels.toFixed(1),
       String(worst),
     ]);
     byId('figures').tBodies[0].replaceChildren(...rows.map(rowOf));
     byId('figures').hidden = false;
-    byId('status').textContent = `${times[0].width} × ${times[0].height} pixels.`;
+    const { width, height, frames } = times[0];
+    byId('status').textContent =
+      `${width} × ${height} pixels, ${frames} frames of each in turns, on ${await adapterName()}.`;
   } catch (error) {
     byId('status').textContent = error.message;
   }

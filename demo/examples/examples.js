@@ -103,6 +103,42 @@ function conductWalker(card, joints) {
   pose();
 }
 
+/** Seconds for one round about the plinth, and how far from its middle. */
+const ROUND_SECONDS = 14;
+const ROUND_METRES = 1.35;
+/** Its middle is above its feet. */
+const HIP_METRES = 0.83;
+
+/** The avatar walks around among a scene and a mesh. */
+async function conductRound(card) {
+  const walker = card.querySelector('#walker');
+  const button = card.querySelector('[data-walk]');
+  const { contract } = await readFacts('walker');
+  const { joints } = contract.inputs.pose;
+  let [frame, seconds, last] = [0, 0, 0];
+  const put = () => {
+    const angle = (2 * Math.PI * seconds) / ROUND_SECONDS;
+    walker.position = [ROUND_METRES * Math.sin(angle), HIP_METRES, ROUND_METRES * Math.cos(angle)];
+    walker.rotation = [0, angle + Math.PI / 2, 0];
+    walker.pose = walkingPose(joints, seconds * PACES_PER_SECOND);
+  };
+  const step = (now) => {
+    seconds += Math.min(0.1, (now - last) / 1000);
+    last = now;
+    put();
+    frame = requestAnimationFrame(step);
+  };
+  put();
+  button.addEventListener('click', () => {
+    const walks = frame === 0;
+    cancelAnimationFrame(frame);
+    last = performance.now();
+    frame = walks ? requestAnimationFrame(step) : 0;
+    button.textContent = walks ? 'Stand' : 'Walk';
+    button.setAttribute('aria-pressed', String(walks));
+  });
+}
+
 /** Post-processors run where somebody asks for them: they are the examples that a slow GPU has no patience for. */
 function conductPainter(card, facts) {
   card.querySelector('[data-paint]').addEventListener('click', ({ target }) => {
@@ -137,6 +173,7 @@ function showModel(card) {
 }
 
 for (const name of ['sequence', 'plant']) conductTime(exampleOf(name));
+conductRound(exampleOf('together')).catch((error) => console.error(error));
 conductPictures(exampleOf('statue')).catch((error) => console.error(error));
 for (const card of document.querySelectorAll('[data-example]')) {
   if (card.dataset.facts) showFile(card);

@@ -24,9 +24,19 @@ export function uprightOf([a, b, c], eye) {
   return normal.map((value) => (side * value) / length);
 }
 
-/** What `up` has to say for a direction of viewer space to be up, while it says `now`. */
-function upOf(direction, now) {
-  const frame = viewerFrame(parseUp(now ?? '') ?? AS_TRAINED);
+/** What is up now: as the attribute says, or else the file. */
+const upNow = (scene) => parseUp(scene.getAttribute('up') ?? '') ?? scene.stats?.up ?? AS_TRAINED;
+
+/** A value for `up` that turns a scene on its head. */
+export function turnedOver(scene) {
+  const numbers = upNow(scene).map((value) => Number((-value).toFixed(4)));
+  const axis = numbers.findIndex((value) => Math.abs(value) === 1);
+  return axis < 0 ? numbers.join(' ') : `${numbers[axis] < 0 ? '-' : ''}${'xyz'[axis]}`;
+}
+
+/** What `up` has to say for a direction of viewer space to be up. */
+function upOf(direction, scene) {
+  const frame = viewerFrame(upNow(scene));
   return toScene(frame, direction)
     .map((value) => Number(value.toFixed(4)))
     .join(' ');
@@ -65,7 +75,7 @@ export function askForLevel(scene, say, signal) {
         if (upright !== null) {
           done.abort();
           clear();
-          return resolve(upOf(upright, scene.getAttribute('up')));
+          return resolve(upOf(upright, scene));
         }
         points.length = 0;
         clear();

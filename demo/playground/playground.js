@@ -3,7 +3,7 @@ import { copy } from '../site/copy.js';
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { viewOf } from '../site/view.js';
 import { SCRIPT, tagOf } from './html.js';
-import { askForLevel } from './level.js';
+import { askForLevel, turnedOver } from './level.js';
 
 const byId = (id) => document.getElementById(id);
 const scene = byId('scene');
@@ -82,6 +82,14 @@ async function copyView() {
   byId('copied').textContent = await copy(byId('html').textContent);
 }
 
+/** The other way up: files such as SPZ do not say which, and tools do not agree. */
+function flip() {
+  asking.abort();
+  for (const name of VIEW) form.elements[name].value = '';
+  form.elements.up.value = turnedOver(scene);
+  show();
+}
+
 let asking = new AbortController();
 
 /** Asks for three points of the floor, and says in `up` what they come to; what was said of the view meant another one. */
@@ -104,7 +112,7 @@ scene.addEventListener('loadstart', () => asking.abort());
 scene.addEventListener('load', () => {
   const { splats, bytes } = scene.statistics;
   byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
-  byId('copy-view').disabled = byId('level').disabled = false;
+  for (const name of ['copy-view', 'level', 'flip']) byId(name).disabled = false;
 });
 scene.addEventListener('loadstart', () => (byId('status').textContent = 'Loading'));
 for (const type of ['error', 'generator-error']) {
@@ -114,6 +122,7 @@ form.addEventListener('change', show);
 form.addEventListener('submit', (event) => event.preventDefault());
 byId('copy-view').addEventListener('click', copyView);
 byId('level').addEventListener('click', level);
+byId('flip').addEventListener('click', flip);
 byId('copy').addEventListener('click', async () => {
   byId('copied').textContent = await copy(byId('html').textContent);
 });

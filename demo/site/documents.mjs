@@ -4,11 +4,23 @@ import { join, posix } from 'node:path';
 import { root } from '../../scripts/lib/run.mjs';
 
 /** Sections in the order of the site. A document belongs to the first rule that matches its path, and stands in the order of the rules. */
+const guide = (name) => new RegExp(`^docs/guide/${name}`);
 const SECTIONS = [
-  ['Guide', [/^docs\/guide\/start/, /^docs\/guide\//, /^packages\/(element|react)\/README/]],
-  ['Generators', [/^docs\/contract/, /^packages\/(generator|check|exporter)\//, /^demo\/generators\/README/]],
-  ['How true, how fast', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/economise\//]],
-  ['Without the element', [/^packages\/(renderer|formats|core)\/README/, /^docs\/detail-pages/]],
+  [
+    'Guide',
+    [
+      ...['start', 'prepare', 'camera', 'loading', 'labels', 'animation', 'styling', 'events'].map(guide),
+      ...['scenes-and-meshes', 'large-scenes', 'performance', 'accessibility', 'frameworks', 'three', 'vue'].map(guide),
+      /^packages\/(element|react)\/README/,
+    ],
+  ],
+  ['Help', ['troubleshooting', 'browsers', 'limits', 'compare'].map(guide)],
+  [
+    'Generators',
+    [guide('own-generator'), /^docs\/contract/, /^packages\/(generator|check|exporter)\//, /^demo\/generators\/README/],
+  ],
+  ['Accuracy and speed', [/^docs\/accuracy/, /^docs\/benchmark/, /^docs\/stability/, /^packages\/economise\//]],
+  ['Without the element', [guide(''), /^packages\/(renderer|three|formats|core|cli)\/README/, /^docs\/detail-pages/]],
   ['For contributors', [/^CONTRIBUTING/, /^docs\/architecture/, /^packages\//, /^scripts\//, /^README/]],
   ['Decisions', [/^docs\/decisions\//]],
   ['About', [/^CHANGELOG/, /^SECURITY/, /^LICENSE/, /ATTRIBUTION/, /^docs\//]],
@@ -17,7 +29,7 @@ const TITLES = {
   'README.md': 'README',
   LICENSE: 'Licence',
   'docs/architecture.md': 'Architecture',
-  'packages/element/README.md': 'The element',
+  'packages/element/README.md': 'All attributes and methods',
   'packages/react/README.md': 'React',
   'demo/scenes/ATTRIBUTION.md': 'Attribution: scenes',
   'demo/generators/ATTRIBUTION.md': 'Attribution: generators',

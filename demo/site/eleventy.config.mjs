@@ -24,7 +24,20 @@ const COPIED = {
   'docs/frontier': 'frontier/data',
   'packages/element/cdn': 'cdn',
 };
-const STYLED = ['check', 'compare', 'examples', 'frontier', 'playground', 'reference', 'stability', 'without-webgpu'];
+const STYLED = [
+  'check',
+  'compare',
+  'docs',
+  'examples',
+  'examples/features',
+  'frontier',
+  'gallery',
+  'playground',
+  'reference',
+  'stability',
+  'three',
+  'without-webgpu',
+];
 /** HTML that is no page of the site: what is built, and what the benchmark frames. */
 const NOT_PAGES = ['demo/dist/**', 'demo/bench/peers/**', 'demo/site/layouts/**'];
 

@@ -14,7 +14,7 @@ const ADDRESSES = [
   [/^docs\/([^/]+\.png)$/, '/docs/$1'],
   [/^demo\/(scenes\/.+|generators\/.+\.(?:onnx|json|webp|png))$/, '/$1'],
   [
-    /^demo\/(bench|check|compare|examples|frontier|playground|react|reference|stability|vue|without-webgpu)\/?$/,
+    /^demo\/(bench|check|compare|examples|examples\/features|frontier|gallery|playground|react|reference|stability|vue|without-webgpu)\/?$/,
     '/$1/',
   ],
 ];

@@ -4,43 +4,69 @@ const TURN_DEGREES = 6;
 /** Most frames that are measured; the page's address may say fewer. */
 const FRAMES = Number(new URLSearchParams(location.search).get('frames') ?? 30);
 
+/** Fewer frames say little: their median is one of them. */
+const ENOUGH = 9;
+
 /**
- * Milliseconds from the submission of a frame until the GPU has finished it: the camera is turned around the scene, frame by
- * frame, and goes back to where it was. ONNX Runtime's work on the same device is in the figure.
- * @param element {HTMLElement} a `<gaussian-splat>` whose scene is on show; it is brought into sight, since nothing is drawn elsewhere.
- * @param options.frames most frames. @param options.limitMs no further frame is begun after this time.
- * @returns {Promise<{ median: number, frames: number, width: number, height: number }>}
+ * Frame times of scenes that take turns, frame by frame, so that whatever else the machine does falls on all of them. A frame's time goes from its submission until the GPU has finished it. The cameras
+ * turn around their scenes and go back in the end. One frame of each is drawn before the first that counts. ONNX Runtime's work on the same device is in the figures.
+ * @param elements {HTMLElement[]} `<gaussian-splat>` elements whose scenes are shown; they are brought into sight, since nothing is drawn elsewhere.
+ * @param options.frames most frames of each. @param options.limitMs no further round is begun after this time.
+ * @returns {Promise<{ median: number, frames: number, isEnough: boolean, width: number, height: number }[]>} of each element; `isEnough` is false below 9 frames.
  */
-export async function measureFrames(element, { frames = FRAMES, limitMs = 6000 } = {}) {
-  element.scrollIntoView({ block: 'nearest' });
+export async function measureInTurns(elements, { frames = FRAMES, limitMs = 6000 } = {}) {
+  elements[0].scrollIntoView({ block: 'nearest' });
+  const all = [];
+  try {
+    for (const element of elements) all.push(await turning(element));
+    for (const { step } of all) await step();
+    const times = all.map(() => []);
+    const started = performance.now();
+    while (times[0].length < frames && performance.now() - started < limitMs) {
+      for (const [i, { step }] of all.entries()) times[i].push(await step());
+    }
+    return elements.map((element, i) => {
+      const sorted = times[i].sort((a, b) => a - b);
+      const { width, height } = element.shadowRoot.querySelector('canvas');
+      const count = sorted.length;
+      return { median: sorted[count >> 1], frames: count, isEnough: count >= ENOUGH, width, height };
+    });
+  } finally {
+    for (const { end } of all) end();
+  }
+}
+
+/** {@link measureInTurns} of one scene. */
+export const measureFrames = async (element, options) => (await measureInTurns([element], options))[0];
+
+/** A scene whose camera is turned by hand: each `step` draws a frame and gives its milliseconds. */
+async function turning(element) {
   const lease = await element.constructor.sharedDevice.acquire();
   const { queue } = lease.device;
   const decay = element.getAttribute('interpolation-decay');
   const { theta, phi, radius } = element.getCameraOrbit();
-  const turnTo = (step) => `${theta + (step * TURN_DEGREES * Math.PI) / 180}rad ${phi}rad ${radius}m`;
-  const times = [];
-  try {
-    element.setAttribute('interpolation-decay', '0');
-    const started = performance.now();
-    while (times.length < frames && performance.now() - started < limitMs) {
+  let count = 0;
+  const turnTo = (steps) => {
+    element.setAttribute('camera-orbit', `${theta + (steps * TURN_DEGREES * Math.PI) / 180}rad ${phi}rad ${radius}m`);
+    element.jumpCameraToGoal();
+  };
+  element.setAttribute('interpolation-decay', '0');
+  return {
+    async step() {
       await queue.onSubmittedWorkDone();
       const moved = nextFrame(element);
-      element.setAttribute('camera-orbit', turnTo(times.length + 1));
-      element.jumpCameraToGoal();
+      turnTo(++count);
       const submitted = await moved;
       await queue.onSubmittedWorkDone();
-      times.push(performance.now() - submitted);
-    }
-  } finally {
-    element.setAttribute('camera-orbit', turnTo(0));
-    element.jumpCameraToGoal();
-    if (decay === null) element.removeAttribute('interpolation-decay');
-    else element.setAttribute('interpolation-decay', decay);
-    lease.release();
-  }
-  times.sort((a, b) => a - b);
-  const { width, height } = element.shadowRoot.querySelector('canvas');
-  return { median: times[times.length >> 1], frames: times.length, width, height };
+      return performance.now() - submitted;
+    },
+    end() {
+      turnTo(0);
+      if (decay === null) element.removeAttribute('interpolation-decay');
+      else element.setAttribute('interpolation-decay', decay);
+      lease.release();
+    },
+  };
 }
 
 /** When the next frame was submitted. */

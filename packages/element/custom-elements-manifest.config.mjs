@@ -60,16 +60,41 @@ const publicOnly = {
   },
 };
 
-const ENTRIES = ['src/index.ts', 'src/element.ts'];
+const ENTRIES = [
+  'src/index.ts',
+  'src/element.ts',
+  'src/scenes.ts',
+  'src/composition/splat-scene.ts',
+  'src/composition/splat-mesh.ts',
+];
 /** The life cycle of Lit and of the platform is inherited as well, and nobody's concern. */
-const LIFE_CYCLE = ['stage', 'connectedMoveCallback'];
+const LIFE_CYCLE = [
+  'stage',
+  'connectedMoveCallback',
+  'holder',
+  'place',
+  'source',
+  'liveValues',
+  'credentials',
+  'hasOwnClock',
+  'warn',
+  'table',
+];
 const isPublic = ({ name, privacy }) =>
   !name.startsWith('#') && privacy !== 'private' && privacy !== 'protected' && !LIFE_CYCLE.includes(name);
 
 const files = { outdir: '.', packageJson: false };
 
 export default {
-  globs: ['src/index.ts', 'src/element.ts', 'src/viewing.ts', 'src/media.ts', 'src/properties.ts', 'src/attributes.ts'],
+  globs: [
+    ...ENTRIES,
+    'src/viewing.ts',
+    'src/media.ts',
+    'src/properties.ts',
+    'src/attributes.ts',
+    'src/composition/child.ts',
+    'src/composition/attributes.ts',
+  ],
   outdir: '.',
   litelement: true,
   packagejson: false,

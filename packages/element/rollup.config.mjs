@@ -25,7 +25,9 @@ const plugins = [
   nodeResolve({ exportConditions: ['production', 'browser'] }),
   shortShaders(),
   shortPrivates,
-  minifyTemplateLiterals({ include: [path('./dist/styles.js'), path('./dist/template.js')] }),
+  minifyTemplateLiterals({
+    include: [path('./dist/styles.js'), path('./dist/template.js'), path('./dist/views/tour.js')],
+  }),
   // Statements compress better than what they can be joined to with commas. No property is read here for what its getter does.
   terser({
     module: true,
@@ -34,6 +36,19 @@ const plugins = [
     format: { comments: false },
   }),
 ];
+
+/** three.js has sources of its own: a map of them would weigh more than all else in the package. */
+const noMapOfThree = {
+  name: 'no-map-of-three',
+  generateBundle(_options, bundle) {
+    for (const chunk of Object.values(bundle)) {
+      if (!chunk.moduleIds?.some((id) => id.includes('/node_modules/three/build/'))) continue;
+      delete bundle[`${chunk.fileName}.map`];
+      chunk.code = chunk.code.replace(/\n\/\/# sourceMappingURL=\S+\s*$/, '\n');
+      chunk.map = null;
+    }
+  },
+};
 
 /** Chunks carry a hash in their name, so those of earlier builds would pile up. */
 const emptyFirst = { name: 'empty-first', buildStart: () => rmSync(path('./cdn'), { recursive: true, force: true }) };
@@ -69,7 +84,7 @@ export default [
     external: (id) => id.endsWith('scene-worker.js'),
     // What generators need is a chunk of its own, loaded when the first is shown; it finds the runtime beside itself.
     preserveEntrySignatures: 'allow-extension',
-    plugins: [emptyFirst, ...plugins, copyRuntime],
+    plugins: [emptyFirst, ...plugins, noMapOfThree, copyRuntime],
     // What two chunks share and is smaller than a request for it goes where the page has it already.
     output: {
       ...output,

@@ -46,7 +46,7 @@ export async function draw(device, renderer, gaussians, camera, detail = 0) {
   const contributions = device.createBuffer({ size: 4 * splats, usage: 0x80 | 0x4 });
   do renderer.render({ gaussians, camera, target, detail, notes: { contributions } });
   while (!(await renderer.isComplete()));
-  const { visible } = await renderer.readStatistics();
+  const { visible } = await renderer.statistics();
   const weights = await read(device, 4 * splats, (encoder, staging) =>
     encoder.copyBufferToBuffer(contributions, 0, staging, 0, 4 * splats),
   );

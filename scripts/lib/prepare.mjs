@@ -59,7 +59,7 @@ export function noteBuilt(extent) {
 
 function isBuilt({ stamp, sources }) {
   const path = join(root, stamp);
-  const made = stamp === PACKAGES.stamp ? 'packages/react/dist/index.js' : 'packages/element/cdn/gaussian-splat.min.js';
+  const made = stamp === PACKAGES.stamp ? 'packages/three/dist/index.js' : 'packages/element/cdn/gaussian-splat.min.js';
   if (!existsSync(path) || !existsSync(join(root, made))) return false;
   return statSync(path).mtimeMs >= Math.max(...sources.map(newestChange));
 }

@@ -10,9 +10,9 @@ import { root } from './run.mjs';
 const LABORATORY = [
   /^tests\/economise\/(?!command|live-mask)/,
   /^tests\/bench\/(scene|pages)/,
-  /^tests\/frameworks\/browser\/(react-strict|vue)/,
+  /^tests\/frameworks\/browser\/(react-strict|vue|scenes-vue)/,
   /^tests\/site\/(compare|cost-card|playground)/,
-  /^tests\/generator\/browser\/examples\/(plant|walker)/,
+  /^tests\/generator\/browser\/(scenes|examples\/(plant|walker))/,
 ];
 /** Tests in Chromium that look at what happens in time: no other page runs beside them. */
 const TIMING = [
@@ -21,7 +21,9 @@ const TIMING = [
   'tests/element/browser/lifecycle.test.ts',
   'tests/element/browser/meanwhile.test.ts',
   'tests/element/browser/pace.test.ts',
+  'tests/element/browser/picking.test.ts',
   'tests/element/browser/previews.test.ts',
+  'tests/element/browser/visitors.test.ts',
   'tests/generator/browser/element.test.ts',
   'tests/generator/browser/instances.test.ts',
   'tests/generator/browser/orbit.test.ts',
@@ -31,7 +33,12 @@ const DENSE = 'tests/element/browser/high-density.test.ts';
 /** Files of Node that take the device of tests/support share a process, and so the device and what it has compiled. */
 const SHARES_DEVICE = /^tests\/(detail|golden|stages)\//;
 /** What changes shaders for the whole process, or the shared device for good. */
-const OWN_PROCESS = ['tests/golden/frame-levers.test.ts', 'tests/golden/short-shaders.test.ts'];
+const OWN_PROCESS = [
+  'tests/golden/frame-levers.test.ts',
+  'tests/golden/host.test.ts',
+  'tests/golden/short-shaders.test.ts',
+  'tests/golden/world.test.ts',
+];
 const TAKES_DEVICE = /from '[./]*support\/(node-device|read-rows|draw-until-calm|work-counters)\.js'/;
 
 /** Where the tests of each package are; those of demo and documents are the site's. */
@@ -45,6 +52,7 @@ export const TESTS_OF = {
   cli: ['packages'],
   element: ['element', 'packages'],
   react: ['frameworks'],
+  three: ['three'],
   site: ['site'],
 };
 

@@ -19,11 +19,16 @@ export const WEBGL_SHADERS = fileURLToPath(new URL('../../packages/renderer/src/
 /** What stands in the place of WebGPU's buffers. */
 const REPLACED = { 'shared/stored_gaussian': 'webgl/textured_gaussian' };
 const STAGES = ['project', 'quads', 'compose', 'probe'];
-const ENTRIES = [['whole_target', 'vertex'], ['quads', 'vertex'], ...STAGES.map((stage) => [stage, 'fragment'])];
+/** What a stage takes as it is from WebGPU's. */
+const SHARED = ['full_screen'];
+const ENTRIES = [['full_screen', 'vertex'], ['quads', 'vertex'], ...STAGES.map((stage) => [stage, 'fragment'])];
 /** Structs of uniforms that WebGPU's stages do not have. */
 const STRUCTS = ['QuadsView', 'ProbeView'];
 
-const codeOf = (stage) => partsOf(`webgl/${stage}`, REPLACED).map(ownCode).join('\n');
+const codeOf = (stage) =>
+  partsOf(`${SHARED.includes(stage) ? 'shared' : 'webgl'}/${stage}`, REPLACED)
+    .map(ownCode)
+    .join('\n');
 
 /** Of all the WGSL, without its comments. */
 export function digestOfSource() {

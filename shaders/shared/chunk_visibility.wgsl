@@ -24,10 +24,14 @@ fn may_be_visible(view: View, c: Chunk) -> bool {
   // The Jacobian stretches a splat by at most focal / z · sqrt(1 + t²): times z, that does not depend on the point.
   let t = max(abs(view.jacobian_min), abs(view.jacobian_max));
   let reach = 1.001 * c.reach * view.stretch * view.focal * sqrt(1.0 + t * t);
-  let right = view.principal.x - view.viewport.x - MARGIN;
-  let bottom = view.principal.y - view.viewport.y - MARGIN;
-  return least(view, center, half_size, vec3f(view.focal.x, 0.0, right)) <= reach.x
-    && least(view, center, half_size, vec3f(-view.focal.x, 0.0, -view.principal.x - MARGIN)) <= reach.x
-    && least(view, center, half_size, vec3f(0.0, view.focal.y, bottom)) <= reach.y
-    && least(view, center, half_size, vec3f(0.0, -view.focal.y, -view.principal.y - MARGIN)) <= reach.y;
+  // The edges of the image, in pixels: they lie as far out as the depth says, or everywhere alike.
+  let low = -view.principal - MARGIN;
+  let high = view.principal - view.viewport - MARGIN;
+  let grows = select(1.0, 0.0, view.is_orthographic != 0u);
+  let from_low = reach - (1.0 - grows) * low;
+  let from_high = reach - (1.0 - grows) * high;
+  return least(view, center, half_size, vec3f(view.focal.x, 0.0, grows * high.x)) <= from_high.x
+    && least(view, center, half_size, vec3f(-view.focal.x, 0.0, grows * low.x)) <= from_low.x
+    && least(view, center, half_size, vec3f(0.0, view.focal.y, grows * high.y)) <= from_high.y
+    && least(view, center, half_size, vec3f(0.0, -view.focal.y, grows * low.y)) <= from_low.y;
 }

@@ -25,14 +25,15 @@ fn interpolated(position: vec2f) -> vec4f {
   return mix(top, bottom, share.y);
 }
 
+// Colour and transmittance at the centre of a pixel.
+fn painted(position: vec2f) -> vec4f {
+  if (all(compose.scale == vec2f(1.0))) { return textureLoad(accumulated, vec2u(position), 0); }
+  return interpolated(position);
+}
+
 // The target's colour at the centre of a pixel.
 fn composed(position: vec2f) -> vec4f {
-  var pixel: vec4f;
-  if (all(compose.scale == vec2f(1.0))) {
-    pixel = textureLoad(accumulated, vec2u(position), 0);
-  } else {
-    pixel = interpolated(position);
-  }
+  let pixel = painted(position);
   let transmittance = pixel.a;
   return vec4f(pixel.rgb, 1.0 - transmittance) + transmittance * compose.background;
 }

@@ -29,7 +29,8 @@ const SMALLEST_ERROR = 1e-30;
 // Pixels that an error takes on screen at most, in the middle of the image. Does not depend on where the camera looks, so that a turn
 // changes nothing.
 fn screen_error(view: View, sphere: vec4f, error: f32) -> f32 {
-  let distance = max(length(sphere.xyz - view.eye) - sphere.w, view.near / view.stretch);
+  let away = max(length(sphere.xyz - view.eye) - sphere.w, view.near / view.stretch);
+  let distance = select(away, 1.0 / view.stretch, view.is_orthographic != 0u);
   return max(view.focal.x, view.focal.y) * error / distance;
 }
 

@@ -1,6 +1,6 @@
 // Paints tiles of 16 x 16 pixels, one workgroup each and one thread a pixel, front to back in float32 registers, and stops
 // when nothing behind can be seen. Whoever imports this says what is noted on the way: `clear_notes`, `note_blend`,
-// `keep_notes` and `note_pixel`.
+// `keep_notes` and `note_pixel`; and what else is in the picture: `load_depth`, `start_pixel` and `is_hidden`.
 #import shared/bins
 #import shared/bits
 #import shared/coverage
@@ -146,6 +146,7 @@ fn found_pair(nth: u32) -> u32 {
 fn load_splat(k: u32, slot: u32, tile_corner: vec2f) {
   let s = splats[slot];
   slots[k] = slot;
+  load_depth(k, slot);
   hit_blocks(k, s, tile_corner);
   let center = s.shape.xy - tile_corner;
   let u_x = s.shape.z * BASE_2_AXIS;
@@ -183,6 +184,8 @@ fn blend(pixel: ptr<function, Pixel>, k: u32, brush: Brush, place: vec2f, least_
   let power = brush.power - u * u - v * v;
   let reaches = power >= least_power;
   let alpha = select(0.0, min(ALPHA_MAX, exp2(power)), reaches);
+  // Those behind a hidden one are hidden, too.
+  (*pixel).least = select((*pixel).least, FINISHED, is_hidden(k));
   let before = (*pixel).transmittance;
   let full_weight = before * alpha;
   let remaining = before - full_weight;
@@ -224,6 +227,7 @@ fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_in
   let range = ranges[bin.y * view.bins.x + bin.x];
 
   var pixel = Pixel(vec3f(0.0), 1.0, select(view.transmittance_min, FINISHED, is_outside));
+  if (!is_outside) { start_pixel(position); }
   let least_power = log2(ALPHA_MIN);
   if (lane == 0u) { brushes[NO_SPLAT].power = NO_POWER; }
   // First word of the window and the one behind it, and how many of the pairs found in it have been painted.

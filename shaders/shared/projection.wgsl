@@ -18,7 +18,9 @@ fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
   var p = in_camera(view, g.position);
   // What `cull` found at the near plane, `project` may find a rounding nearer, and with a plane that is very near at the camera's centre or behind it.
   p.z = max(p.z, view.near);
-  let xy = p.xy / p.z;
+  // What things shrink by.
+  let shrink = select(p.z, 1.0, view.is_orthographic != 0u);
+  let xy = p.xy / shrink;
   let t = clamp(xy, view.jacobian_min, view.jacobian_max);
 
   // Rows of J · W · L, a square root of the screen covariance; its products would lose digits too early.
@@ -29,8 +31,8 @@ fn project_ellipse(view: View, g: Gaussian) -> Ellipse {
     to_camera[2] * g.factor_z,
   );
   let a = transpose(axes);
-  let row_x = (a[0] - t.x * a[2]) * (view.focal.x / p.z);
-  let row_y = (a[1] - t.y * a[2]) * (view.focal.y / p.z);
+  let row_x = (a[0] - t.x * a[2]) * (view.focal.x / shrink);
+  let row_y = (a[1] - t.y * a[2]) * (view.focal.y / shrink);
 
   let xx = dot(row_x, row_x);
   let yy = dot(row_y, row_y);

@@ -1,15 +1,6 @@
-// A splat as a quad just large enough for alpha >= 1/255. The fragment evaluates the Gaussian at the
-// pixel centre from flat inputs, so nothing is interpolated and the maths is that of any other rasterizer. `raster` is the stage's.
+// A splat as a quad just large enough for alpha >= 1/255. `raster` is the stage's.
 #import shared/splat
 #import shared/falloff
-
-struct Quad {
-  @builtin(position) position: vec4f,
-  @location(0) @interpolate(flat, either) shape: vec4f,
-  // red, green, blue, opacity
-  @location(1) @interpolate(flat, either) color: vec4f,
-  @location(2) @interpolate(flat, either) inverse_sigma_v: f32,
-}
 
 // Pixels by which quads are larger than they need be: rasterizers snap vertices, some of them to 1/16 of a pixel, and the quad of a
 // splat whose opacity is just above ALPHA_MIN may be smaller than that.
@@ -33,20 +24,9 @@ fn quad_corner(s: ProjectedSplat, opacity: f32, corner: vec2f) -> vec2f {
   return s.shape.xy + vec2f(dx, slope * dx + corner.y * (radius * sigma_v + SNAP_MARGIN * (1.0 + abs(slope))));
 }
 
-// One of its corners, by the lower two bits of a number.
-fn quad_of(s: ProjectedSplat, number: u32) -> Quad {
-  let opacity = bitcast<f32>(s.paint.w);
-  let corner = vec2f(f32(number & 1u), f32((number >> 1u) & 1u)) * 2.0 - 1.0;
-  let pixel = quad_corner(s, opacity, corner);
-  let ndc = (pixel / raster.viewport * 2.0 - 1.0) * vec2f(1.0, -1.0);
-  return Quad(vec4f(ndc, 0.0, 1.0), s.shape, vec4f(splat_color(s), opacity), bitcast<f32>(s.paint.x));
-}
-
-@fragment
-fn fragment(quad: Quad) -> @location(0) vec4f {
-  let offset = quad.position.xy - quad.shape.xy;
-  let alpha = alpha_at(offset, quad.shape.z, quad.shape.w, quad.inverse_sigma_v, quad.color.a);
-  if (alpha < ALPHA_MIN) { discard; }
-  // Blended as colour = alpha · color + (1 - alpha) · colour and transmittance = (1 - alpha) · transmittance.
-  return vec4f(quad.color.rgb * alpha, alpha);
+// Where a vertex of a splat's quad lies: the lower two bits of its number say which corner it is.
+fn place_of(s: ProjectedSplat, vertex_index: u32) -> vec4f {
+  let corner = vec2f(f32(vertex_index & 1u), f32((vertex_index >> 1u) & 1u)) * 2.0 - 1.0;
+  let pixel = quad_corner(s, bitcast<f32>(s.paint.w), corner);
+  return vec4f((pixel / raster.viewport * 2.0 - 1.0) * vec2f(1.0, -1.0), 0.0, 1.0);
 }

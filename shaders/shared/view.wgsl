@@ -28,8 +28,6 @@ struct View {
   filter_variance: f32,
   // Bits of a depth key: 32 for those of the float32 depth itself, fewer for a share of the visible range.
   key_bits: u32,
-  // 1 if the survivors are listed in depth order already, so that they need no keys.
-  is_ordered: u32,
   // Most that the camera's matrix stretches a vector: 1 unless it is more than a rotation and a translation.
   stretch: f32,
   // 1 if the page has levels of detail.
@@ -40,6 +38,15 @@ struct View {
   detail_fade: f32,
   // Splats that the frame may look at.
   splat_budget: u32,
+  // Only splats whose centres lie between these, in page-local coordinates, are drawn.
+  crop_low: vec3f,
+  // Factor of the opacity of each splat.
+  opacity: f32,
+  crop_high: vec3f,
+  // 1 if all rays are parallel: focal lengths are then pixels for each world unit, and the Jacobian's limits 0.
+  is_orthographic: u32,
+  // Along which such rays go, in page-local coordinates.
+  axis: vec3f,
 }
 
 // From page-local coordinates to the camera's axes. What lies near the eye is subtracted from it first, which is exact: far from the page's origin both are

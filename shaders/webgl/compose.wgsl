@@ -1,6 +1,6 @@
 // `compose` onto a canvas, whose rows WebGL counts from below.
 #import shared/compose
-#import webgl/whole_target
+#import shared/full_screen
 
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {

@@ -1,7 +1,7 @@
 // What lies under a point: each fragment of a row walks one run of the splats, as each lane of `probe_depth` does.
 #import shared/probe
 #import webgl/projected_splats
-#import webgl/whole_target
+#import shared/full_screen
 
 @group(0) @binding(0) var<uniform> probed: ProbeView;
 

@@ -3,7 +3,7 @@
 #import shared/stored_gaussian
 #import shared/sh_color
 #import shared/splat
-#import webgl/whole_target
+#import shared/full_screen
 
 @group(0) @binding(0) var<uniform> view: View;
 
@@ -29,6 +29,7 @@ fn fragment(@builtin(position) position: vec4f) -> Projected {
   if (!is_usable(found) || g.opacity < ALPHA_MIN || !is_in_depth_range(view, depth)) { return Projected(vec4u(0u), vec4u(0u)); }
   let e = project_ellipse(view, g);
   if (!covers_a_pixel(view, e)) { return Projected(vec4u(0u), vec4u(0u)); }
-  let s = pack_splat(e, splat_sh_color(i, normalize(g.position - view.eye)));
+  let toward = select(g.position - view.eye, view.axis, view.is_orthographic != 0u);
+  let s = pack_splat(e, splat_sh_color(i, normalize(toward)));
   return Projected(bitcast<vec4u>(s.shape), s.paint);
 }

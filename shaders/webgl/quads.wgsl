@@ -1,5 +1,5 @@
 // `rasterize_quads` on what `project` of WebGL has left.
-#import shared/quad
+#import shared/plain_quad
 #import shared/plan
 #import webgl/projected_splats
 
@@ -17,6 +17,6 @@ struct QuadsView {
 fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) instance: u32) -> Quad {
   let rank = instance * QUAD_BATCH + vertex_index / 4u;
   let s = splat_at(raster.count - 1u - min(rank, raster.count - 1u));
-  if (rank >= raster.count || s.paint.w == 0u) { return Quad(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), 0.0); }
+  if (rank >= raster.count || s.paint.w == 0u) { return no_quad(); }
   return quad_of(s, vertex_index);
 }

@@ -1,6 +1,13 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { checkContract, resolveContract, type Contract, type OnnxHeader, type OnnxTensor } from '@gaussian-splat/core';
+import {
+  checkContract,
+  resolveContract,
+  type Contract,
+  type OnnxHeader,
+  type OnnxTensor,
+  type PackedOutputs,
+} from '@gaussian-splat/core';
 import { fixtureHeader, fixtureNames, fixtureSidecar } from '../support/generators.js';
 import { assertHelpful, brief, headerWith, PACKED, SPLIT, SPLIT_OUTPUTS, tensor } from './support.js';
 
@@ -22,6 +29,15 @@ const withSplit = (...changed: OnnxTensor[]): OnnxHeader =>
 const withInput = (binding: Contract['inputs'][string]): Contract => ({ ...PACKED, inputs: { x: binding } });
 const fed = (dims: OnnxTensor['dims'], dtype?: OnnxTensor['dtype']): OnnxHeader =>
   headerWith([tensor('x', dims, dtype)], [GAUSSIANS]);
+const LGM: Contract = {
+  ...PACKED,
+  outputs: {
+    ...(PACKED.outputs as PackedOutputs),
+    columns: ['positions', 'opacities', 'scales', 'rotations', 'colors'],
+    scaleActivation: 'linear',
+    rotationOrder: 'wxyz',
+  },
+};
 const ready = headerWith([TIME], [GAUSSIANS]);
 const symbolic = headerWith([TIME], [tensor('gaussians', ['n', 13])]);
 const external = [{ location: 'w.bin', byteLength: 100 }];
@@ -39,7 +55,10 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
   ],
   ['outputs that nobody uses', headerWith([TIME], [GAUSSIANS, tensor('more', [1])]), PACKED, []],
   ['a wrong width', headerWith([TIME], [tensor('gaussians', [10, 14])]), PACKED, ['shape gaussians']],
-  ['a wrong rank', headerWith([TIME], [tensor('gaussians', [1, 10, 13])]), PACKED, ['shape gaussians']],
+  ['a batch of one', headerWith([tensor('time', [1, 1])], [tensor('gaussians', [1, 10, 13])]), PACKED, []],
+  ['a batch of two', headerWith([TIME], [tensor('gaussians', [2, 10, 13])]), PACKED, ['shape gaussians']],
+  ['a row of LGM', headerWith([TIME], [tensor('gaussians', [1, 10, 14])]), LGM, []],
+  ['a row too short for its columns', headerWith([TIME], [tensor('gaussians', [10, 13])]), LGM, ['shape gaussians']],
   ['no shape at all', headerWith([TIME], [tensor('gaussians', undefined)]), PACKED, ['shape gaussians']],
   ['a symbolic width', headerWith([TIME], [tensor('gaussians', [10, 'd'])]), PACKED, ['shape gaussians']],
   ['a wrong type', headerWith([TIME], [tensor('gaussians', [10, 13], 'float64')]), PACKED, ['dtype gaussians']],
@@ -52,6 +71,12 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
   ['symbolic N without nMax', symbolic, PACKED, ['rows gaussians']],
   ['symbolic N with nMax', symbolic, { ...PACKED, nMax: 10 }, []],
   ['N above nMax', ready, { ...PACKED, nMax: 9 }, ['rows gaussians']],
+  [
+    'N above nMax, padded behind a count',
+    headerWith([TIME], [GAUSSIANS, tensor('n', [1], 'int64')]),
+    { ...PACKED, nMax: 9, outputs: { ...(PACKED.outputs as PackedOutputs), count: 'n' } },
+    [],
+  ],
   ['another type than declared', ready, { ...PACKED, dtype: 'float16' }, ['dtype gaussians']],
   ['harmonics declared, colours written', ready, { ...PACKED, shDegree: 2 }, ['sh-degree gaussians']],
   ['degree 0 declared, colours written', ready, { ...PACKED, shDegree: 0 }, []],
@@ -62,9 +87,34 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
   ['split, harmonics of no degree', withSplit(tensor('h', [10, 5, 3])), SPLIT, ['shape h']],
   ['split, harmonics the other way', withSplit(tensor('h', [10, 3, 9])), SPLIT, ['shape h']],
   ['split, another degree', withSplit(), { ...SPLIT, shDegree: 3 }, ['sh-degree h']],
-  ['split, a count of int64', withSplit(tensor('c', [1], 'int64')), SPLIT, ['dtype c']],
+  ['split, a count of int64', withSplit(tensor('c', [1], 'int64')), SPLIT, []],
+  ['split, one scale a splat', withSplit(tensor('s', [10, 1])), SPLIT, []],
+  ['split, in a batch', withSplit(tensor('p', [1, 10, 3]), tensor('o', [1, 10])), SPLIT, []],
+  ['split, flat harmonics', withSplit(tensor('h', [10, 27])), SPLIT, []],
   ['view', fed([4, 4]), withInput({ role: 'view' }), []],
-  ['view in a batch', fed([1, 4, 4]), withInput({ role: 'view' }), ['shape x']],
+  ['view in a batch', fed([1, 4, 4]), withInput({ role: 'view' }), []],
+  ['views of two cameras', fed([2, 4, 4]), withInput({ role: 'view' }), ['shape x']],
+  ['camera to world', fed([1, 4, 4]), withInput({ role: 'camera_to_world', axes: 'RUB' }), []],
+  ['intrinsics', fed([1, 3, 3]), withInput({ role: 'intrinsics', unit: 'normalized' }), []],
+  ['intrinsics of another size', fed([4, 4]), withInput({ role: 'intrinsics', unit: 'pixels' }), ['shape x']],
+  ['flat axis-angles', fed([1, 72]), withInput({ role: 'pose', format: 'axis-angle' }), []],
+  ['rotation matrices', fed([1, 24, 3, 3]), withInput({ role: 'pose', format: 'matrix' }), []],
+  ['flat matrices of no number of joints', fed([10]), withInput({ role: 'pose', format: 'matrix' }), ['shape x']],
+  ['pictures of two views', fed([1, 2, 3, 8, 8]), withInput({ role: 'image' }), []],
+  ['a picture with alpha', fed([1, 4, 8, 8]), withInput({ role: 'image' }), []],
+  [
+    'a state',
+    headerWith([tensor('x', [5, 3])], [GAUSSIANS, tensor('next', [5, 3])]),
+    withInput({ role: 'state', output: 'next' }),
+    [],
+  ],
+  [
+    'a state of another shape',
+    headerWith([tensor('x', [5, 3])], [GAUSSIANS, tensor('next', [5, 4])]),
+    withInput({ role: 'state', output: 'next' }),
+    ['shape next'],
+  ],
+  ['a state that no output writes', fed([5, 3]), withInput({ role: 'state', output: 'n' }), ['missing-tensor n']],
   ['view in float16', fed([4, 4], 'float16'), withInput({ role: 'view' }), ['dtype x']],
   ['frame in float', fed([1]), withInput({ role: 'frame' }), ['dtype x']],
   ['frame in int64', fed([1], 'int64'), withInput({ role: 'frame' }), []],
@@ -116,6 +166,25 @@ const CASES: readonly [what: string, header: OnnxHeader, contract: Contract, fau
     PACKED,
     ['operator operator com.nobody:Foo'],
   ],
+  ...[17, 18].map((opset): [string, OnnxHeader, Contract, string[]] => [
+    `a reduction of opset 18 in a file of opset ${opset}`,
+    {
+      ...ready,
+      opsets: new Map([['ai.onnx', opset]]),
+      nodes: [
+        {
+          name: '',
+          operator: 'ReduceL2',
+          inputs: ['x'],
+          outputs: ['y'],
+          isInner: false,
+          numbers: { noop_with_empty_axes: 0 },
+        },
+      ],
+    },
+    PACKED,
+    opset === 17 ? ['operator operator ReduceL2 (y)'] : [],
+  ]),
   [
     'operators of the file and of the runtime',
     {

@@ -157,7 +157,8 @@ test('split: scales, rotations, logits', () => {
   assert.deepEqual(found({ r: { data: new Float32Array(8) } }), ['covariance'], 'zero quaternions');
   assert.deepEqual(found({ p: { dims: [3, 2] } }), ['shape']);
   assert.deepEqual(found({ p: { dims: [3, 3], data: new Float32Array(9) } }), ['rows', 'rows', 'rows', 'rows']);
-  assert.deepEqual(found({}, { ...SPLIT, nMax: 1 }), ['rows', 'rows', 'rows', 'rows', 'rows']);
+  assert.deepEqual(found({}, { ...SPLIT, nMax: 1 }), ['count'], 'more rows live than nMax');
+  assert.deepEqual(found({ p: { dims: [1, 2, 3] }, c: { dtype: 'int64', data: [2n] as never } }), [], 'the same bytes');
 });
 
 test('declared bounds hold the centres', () => {

@@ -77,7 +77,7 @@ test('within a budget of splats and a pool that is full, a view at rest comes to
     const camera = besides([14, 0, 7], 2, angle);
     const draw = (): void => drawing.render({ gaussians: scene, camera, target: picture, detail: 0.3, splatBudget });
     const took = await live(MOST_TURNS, draw);
-    const { budgetError } = await drawing.readStatistics();
+    const { budgetError } = await drawing.statistics();
     const { pages } = scene.traffic;
     console.log(`${slots} slots: ${pages} pages in ${took} turns; within ${budgetError.toFixed(2)} pixels`);
     assert.ok(took < 0.9 * MOST_TURNS && pages < 4 * slots, `${pages} pages in ${took} turns`);

@@ -14,10 +14,11 @@ import {
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
-import { checkManifest } from '@gaussian-splat/renderer';
+import { checkManifest, decodePage } from '@gaussian-splat/renderer';
 import { pageLayout } from '@gaussian-splat/renderer/stages';
 import { writePly } from '../formats/support/ply-writer.js';
 import { inriaColumns, rawSplats } from '../formats/support/splats.js';
+import { isLab, onlyInLab } from '../support/extent.js';
 
 const folder = mkdtempSync(join(tmpdir(), 'gs-detail-'));
 after(() => rmSync(folder, { recursive: true }));
@@ -35,17 +36,17 @@ function detail(...args: string[]): { status: number | null; text: string } {
     ['packages/cli/bin/gaussian-splat.mjs', 'detail', ...args],
     {
       encoding: 'utf8',
-      timeout: 60_000,
+      timeout: isLab ? 400_000 : 60_000,
     },
   );
   return { status, text: stdout + stderr };
 }
 
 for (const [splats, ...options] of [
-  [1],
-  [257],
-  [1500, '--degree', '0'],
-  [1500, '--tile', '2x3', '--spacing', '1e5'],
+  [1, '--quantized'],
+  [257, '--quantized'],
+  [1500, '--quantized', '--degree', '0'],
+  [1500, '--quantized', '--tile', '2x3', '--spacing', '1e5'],
   [1500, '--exact', '--degree', '1'],
 ] as const) {
   test(`${splats} splats ${options.join(' ')}: every file is as long as the manifest says`, () => {
@@ -61,6 +62,24 @@ for (const [splats, ...options] of [
   });
 }
 
+test(
+  'by default files are coded, and the tool states how near they are to the scene',
+  { skip: onlyInLab },
+  async () => {
+    const out = join(folder, 'coded');
+    const { status, text } = detail(sceneOf(400), '--out', out, '--min-db', '40', '--tile', '1x2');
+    assert.equal(status, 0, text);
+    const manifest = checkManifest(JSON.parse(readFileSync(join(out, 'detail.json'), 'utf8')), 'detail.json');
+    assert.equal(manifest.version, 3);
+    for (const { file, chunks, upper } of manifest.trees.flatMap(({ pages }) => pages)) {
+      const coded = { chunks, upper, shDegree: manifest.shDegree, coding: manifest.coding! };
+      const words = await decodePage(file, new Uint8Array(readFileSync(join(out, file))), coded);
+      assert.equal(words.byteLength, 4 * pageLayout(manifest, chunks).total, file);
+    }
+    assert.ok(Number(/([\d.]+) dB to the scene/.exec(text)?.[1]) >= 40, text);
+  },
+);
+
 test('arguments that make no sense are told of in a line, without a trace of the program, and at once', () => {
   const scene = sceneOf(300);
   const out = join(folder, 'never');
@@ -72,6 +91,7 @@ test('arguments that make no sense are told of in a line, without a trace of the
     [/is not empty/, scene, '--out', folder],
     [/--spacing: expected a length/, scene, '--out', out, '--tile', '2x2', '--spacing', 'Infinity'],
     [/--spacing: expected a length/, scene, '--out', out, '--tile', '20x2', '--spacing', '1e38'],
+    [/--min-db: expected 30 to 60/, scene, '--out', out, '--min-db', '70'],
     [/--degree/, scene, '--out', out, '--degree', '4'],
   ];
   for (const [expected, ...args] of cases) {
@@ -96,7 +116,7 @@ test(
     const out = join(folder, 'ended');
     mkdirSync(join(out, 'pages'), { recursive: true });
     for (const name of ['scene-00000.bin', 'scene-00007.bin']) writeFileSync(join(out, 'pages', name), 'half');
-    const again = detail(sceneOf(300), '--out', out);
+    const again = detail(sceneOf(300), '--out', out, '--quantized');
     assert.equal(again.status, 0, again.text);
     assert.deepEqual(readdirSync(join(out, 'pages')), ['scene-00000.bin'], 'nothing of the earlier run is left');
     assert.match(detail(sceneOf(300), '--out', out).text, /is not empty/, 'a scene that is whole stays');
@@ -108,7 +128,7 @@ test(
     assert.equal(readFileSync(join(own, 'pages', 'diary.txt'), 'utf8'), 'mine');
 
     const full = join(folder, 'full');
-    const command = `ulimit -f 8; exec "${process.execPath}" packages/cli/bin/gaussian-splat.mjs detail "${sceneOf(3000)}" --out "${full}"`;
+    const command = `ulimit -f 8; exec "${process.execPath}" packages/cli/bin/gaussian-splat.mjs detail "${sceneOf(3000)}" --quantized --out "${full}"`;
     const { status, stderr } = spawnSync('bash', ['-c', command], { encoding: 'utf8' });
     assert.equal(status, 1, stderr);
     assert.match(stderr, /^EFBIG: file too large/m);

@@ -6,18 +6,11 @@ import { boundsOf, type Camera, type GaussianCloud, type Vector3 } from '@gaussi
 import { readScene } from '@gaussian-splat/formats';
 import { buildDetailTree, GaussianBuffers, packGaussians, Renderer, StreamedGaussians } from '@gaussian-splat/renderer';
 import {
-  BUFFER_USAGE,
-  cameraValues,
   constants,
-  GpuMemory,
-  layouts,
   leafLevel,
-  OrderKeysStage,
   packQuantizedChunk,
   pageLayout,
-  QUANTIZED,
   QUANTIZED_CHUNK_WORDS,
-  writeStruct,
   type SplatLevel,
 } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
@@ -28,7 +21,6 @@ import { psnr } from '../support/metrics.js';
 import { anyDevice, endNodeDevice } from '../support/node-device.js';
 import { readQuantizedChunk } from '../support/quantized-twin.js';
 import { readFrame } from '../support/read-frame.js';
-import { readBuffer } from '../support/read-rows.js';
 import { cameraAt } from '../support/scenes.js';
 import { pebbles } from '../support/scenes/pebbles.js';
 
@@ -237,7 +229,7 @@ test('copies that are moved on the GPU, and coarser levels, are what exact pages
         const scene = await StreamedGaussians.open(device, manifest, { fetchPage, arrivalMs: 0 });
         await drawUntilCalm(scene, renderer, camera, detail);
         const image = await readFrame(device, renderer, { gaussians: scene, camera, detail });
-        const { visible } = await renderer.readStatistics();
+        const { visible } = await renderer.statistics();
         scene.destroy();
         return { image, visible };
       }),
@@ -248,38 +240,6 @@ test('copies that are moved on the GPU, and coarser levels, are what exact pages
     assert.ok(close > 60, `${close} dB`);
   }
   renderer.destroy();
-});
-
-test('keys of the order that outlasts a movement are of the decoded centres', async () => {
-  const device = await anyDevice();
-  const level = randomLevel(500, 3);
-  const words = new Uint32Array(2 * QUANTIZED_CHUNK_WORDS);
-  packQuantizedChunk(level, words, 0, 0, CULL_GROUP);
-  packQuantizedChunk(level, words, QUANTIZED_CHUNK_WORDS, CULL_GROUP, 500);
-  const camera = around(pebbles(500), 0.1);
-  const bytes = new ArrayBuffer(layouts.View.size);
-  const zeros = Object.fromEntries(Object.keys(layouts.View.fields).map((name) => [name, 0]));
-  const values = { ...zeros, ...cameraValues(camera, [0, 0, 0]), splat_count: 500 } as never;
-  writeStruct(layouts.View, values, bytes);
-  const memory = new GpuMemory(device);
-  const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
-  const view = memory.buffer('view', bytes.byteLength, uniform | copyDestination, new Uint32Array(bytes));
-  const gaussians = memory.buffer('gaussians', words.byteLength, storage | copyDestination, words);
-  const keys = memory.buffer('keys', 4 * 512, storage | copySource);
-  const stage = new OrderKeysStage(device, QUANTIZED);
-  const encoder = device.createCommandEncoder();
-  const pass = encoder.beginComputePass();
-  stage.record(pass, stage.bind({ view, gaussians, keys }), 500);
-  pass.end();
-  device.queue.submit([encoder.finish()]);
-  const found = new Uint32Array(await readBuffer(keys));
-  const m = camera.worldToCamera;
-  const splats = [0, QUANTIZED_CHUNK_WORDS].flatMap((at) => readQuantizedChunk(words, at, CULL_GROUP));
-  const depths = splats.map(({ position: [x, y, z] }) => m[8] * x + m[9] * y + m[10] * z + m[11]);
-  const order = Array.from({ length: 500 }, (_, i) => i).sort((a, b) => found[a] - found[b]);
-  for (let k = 1; k < 500; k++) assert.ok(depths[order[k]] >= depths[order[k - 1]] - 1e-5, `rank ${k}`);
-  assert.ok(depths.some((depth) => depth < 0) && depths.some((depth) => depth > 0));
-  memory.destroy();
 });
 
 test('chunks whose first rows make no sense are not drawn, and spoil nothing else', async () => {
@@ -310,7 +270,7 @@ test('chunks whose first rows make no sense are not drawn, and spoil nothing els
     await drawUntilCalm(scene, renderer, camera, 0);
     const image = await readFrame(device, renderer, { gaussians: scene, camera, detail: 0 });
     assert.ok(image.every(Number.isFinite), `word ${word}`);
-    const { unusable, visible } = await renderer.readStatistics();
+    const { unusable, visible } = await renderer.statistics();
     assert.ok(unusable > 500 && visible > 300, `word ${word}: ${unusable} refused, ${visible} visible`);
     scene.destroy();
   }

@@ -103,11 +103,11 @@ test(
     for (const distance of [2, 6, 18]) {
       const camera = cameraAt([distance, -distance / 2, 0], [0, -0.5, 0], { width: 96, height: 64, near: 0.01 });
       const truth = await readFrame(device, renderer, { gaussians: finest, camera });
-      const { visible: most } = await renderer.readStatistics();
+      const { visible: most } = await renderer.statistics();
       const exact = await readFrame(device, renderer, { gaussians: levels, camera });
       assert.ok(psnr(truth, exact, { channels: 4 }) > 90);
       const picture = await readFrame(device, renderer, { gaussians: levels, camera, detail: 1 });
-      const { visible } = await renderer.readStatistics();
+      const { visible } = await renderer.statistics();
       const decibels = psnr(truth, picture, { channels: 4, mask: truth.filter((_, i) => i % 4 === 3) });
       console.log(`from ${distance}: ${visible} of ${most} splats, ${decibels.toFixed(1)} dB at 1 px`);
       assert.ok(visible / most <= last);

@@ -198,9 +198,9 @@ test('a view that turns to the scene lacks nothing, though hardly anything was v
     await device.queue.onSubmittedWorkDone();
   };
   for (let frame = 0; frame < 24; frame++) await look([-300, -5, 50]);
-  const away = await renderer.readStatistics();
+  const away = await renderer.statistics();
   await look([50, 0, 50]);
-  const towards = await renderer.readStatistics();
+  const towards = await renderer.statistics();
   console.log(`${away.visible} splats visible, then ${towards.visible}; ${towards.overflow} left out`);
   assert.ok(scene.count > 1.5e5 && away.visible === 0 && towards.visible > 100);
   assert.equal(towards.overflow + towards.pairOverflow, 0);
@@ -345,6 +345,9 @@ test('a manifest in which two pages are below one chunk, a file has two lengths,
   );
   const places = Array.from({ length: 10_000 }, (_, k) => copy([5000 + (k >> 2), k & 3]));
   assert.throws(() => check(pages, places), { code: 'decode/header', message: /at most 4194304 pages/ });
+  // A load that may take memory for fewer.
+  const refusal = { code: 'out-of-memory/budget', message: /at most 3 pages in a file of this size, found \d+/ };
+  assert.throws(() => checkManifest(folder.manifest, 'detail.json', 3), refusal);
 });
 
 /** Most that the picture of a camera at rest changes from one frame to the next, in dB, while pages come. */

@@ -11,6 +11,7 @@ import { encodingsFor, viewsAround } from '@gaussian-splat/economise';
 import { readScene } from '@gaussian-splat/formats';
 import { writeWhole } from '../../packages/cli/src/lib/output-file.mjs';
 import { smallCloud } from '../formats/support/small-cloud.js';
+import { onlyInLab } from '../support/extent.js';
 
 const script = fileURLToPath(new URL('../../packages/cli/bin/gaussian-splat.mjs', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'economise-'));
@@ -102,6 +103,23 @@ test('what it says of the written file is what a reader finds in it; splats that
   assert.match(said, new RegExp(`bytes +${bytes.length} of ${source.length} `));
   assert.match(said, /found +3\d\.\d\d dB in 2 held-out views/);
   assert.deepEqual(readFileSync(join(folder, 'broken.ply')), broken);
+});
+
+test('SOG is tuned to the figure, or to the bytes, that are asked for', { skip: onlyInLab }, async () => {
+  const asked = command('scene.ply', '--min-db', '40', '--out', 'less.sog', '--views', 'views.json');
+  assert.equal(asked.status, 0, asked.said);
+  assert.match(asked.said, /SOG version 2, steps place/);
+  assert.ok(Number(/found +([\d.]+) dB/.exec(asked.said)?.[1]) >= 40, asked.said);
+  const { length } = readFileSync(join(folder, 'less.sog'));
+  const most = Math.ceil(1.1 * length);
+  const sized = command('scene.ply', '--max-mb', String(most / 1e6), '--out', 'sized.sog', '--views', 'views.json');
+  assert.equal(sized.status, 0, sized.said);
+  assert.ok(readFileSync(join(folder, 'sized.sog')).length <= most, sized.said);
+  const found = await readScene(readFileSync(join(folder, 'sized.sog')), { name: 'sized.sog' });
+  assert.ok(found.count > 0);
+  const both = command('scene.ply', '--min-db', '40', '--max-mb', '1', '--out', 'less.sog');
+  assert.equal(both.status, 2);
+  assert.match(both.said, /one of --min-db and --max-mb/);
 });
 
 test('where writing fails, what was there stays', () => {

@@ -81,7 +81,7 @@ test('what the getters print, the attributes read back to the last bit', () => {
   const positive = fc.double({ min: 1e-9, max: 1e9, noNaN: true });
   fc.assert(
     fc.property(number, number, positive, (theta, phi, radius) => {
-      const parsed = orbit.parse(new CameraOrbit(theta, phi, radius).toString());
+      const parsed = orbit.parse(new CameraOrbit(theta, phi, radius, 1).toString());
       // Printing loses the sign of zero, which means nothing here.
       assert.deepEqual(parsed, { theta: theta + 0, phi: phi + 0, radius: { metres: radius } });
     }),

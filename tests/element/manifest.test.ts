@@ -5,6 +5,7 @@ import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import ts from 'typescript';
 import { GaussianSplatElement } from '@gaussian-splat/element/element.js';
+import { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 
 const folder = fileURLToPath(new URL('../../packages/element/', import.meta.url));
 const source = (name: string): string => readFileSync(`${folder}src/${name}`, 'utf8');
@@ -66,6 +67,24 @@ check('names the attributes that the element observes, each with a description',
   for (const { name, description } of element?.attributes ?? []) assert.ok(description, name);
 });
 
+check('names the attributes of the children, and only members that they have, each described', () => {
+  for (const [tag, kind] of [
+    ['splat-scene', SplatSceneElement],
+    ['splat-mesh', SplatMeshElement],
+  ] as const) {
+    const child = manifest?.modules.flatMap(({ declarations }) => declarations).find((d) => d.tagName === tag);
+    // `hidden` is the platform's, and in no table.
+    const observed = kind.observedAttributes.filter((name) => name !== 'hidden').sort();
+    assert.deepEqual(namesOf(child?.attributes), observed, tag);
+    const reactive = new Set([...kind.elementProperties.keys()].map(String));
+    for (const { name, description, type, return: returned } of child?.members ?? []) {
+      assert.ok(name in kind.prototype || reactive.has(name), `${tag} ${name}`);
+      assert.ok(description && (type ?? returned?.type)?.text, `${tag} ${name}: description and type`);
+    }
+    assert.ok(namesOf(child?.members).includes('currentTime'), tag);
+  }
+});
+
 check('names the events of the typed map, with their types, and every one that the sources dispatch', () => {
   const file = ts.createSourceFile('events.ts', source('events.ts'), ts.ScriptTarget.Latest, true);
   const map = file.statements.find(
@@ -86,10 +105,15 @@ check('names the events of the typed map, with their types, and every one that t
 });
 
 check('names the slots, parts, custom properties and states that there are', () => {
-  const [template, styles] = [source('template.ts'), source('styles.ts')];
+  // The bar of the views is drawn by a chunk of its own.
+  const tour = source('views/tour.ts');
+  const [template, styles] = [source('template.ts') + tour, source('styles.ts') + tour];
   const slots = matches(template, /<slot name="([a-z-]+)"/g);
   assert.deepEqual(namesOf(element?.slots), unique([...slots, 'hotspot-*']));
-  assert.deepEqual(namesOf(element?.cssParts), matches(template, /part="([a-z-]+)"/g));
+  const panelParts = matches(source('live/controls-panel.ts'), /part: '([a-z-]+)'/g);
+  assert.ok(panelParts.length > 0);
+  const parts = [/part="([a-z-]+)"/g, /button\(\s*'([a-z-]+)'/g].flatMap((pattern) => matches(template, pattern));
+  assert.deepEqual(namesOf(element?.cssParts), unique([...parts, ...panelParts]));
   assert.deepEqual(namesOf(element?.cssProperties), matches(styles, /var\((--[a-z-]+)/g));
   const [, states] = /const STATES = \[([^\]]+)\]/.exec(source('element.ts')) ?? [];
   assert.deepEqual(namesOf(element?.cssStates), matches(states, /'([a-z]+)'/g));

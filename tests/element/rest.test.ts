@@ -8,7 +8,7 @@ import {
   type PaceOptions,
 } from '../../packages/element/src/controllers/pace-controller.js';
 import { FrameScheduler } from '../../packages/element/src/gpu/frame-scheduler.js';
-import type { GpuScene } from '../../packages/element/src/gpu/gpu-scene.js';
+import type { LoadedGaussians } from '../../packages/element/src/gpu/loaded-gaussians.js';
 import type { SceneLoader } from '../../packages/element/src/loading/scene-loader.js';
 import { waitForRest } from '../../packages/element/src/pace/rest.js';
 import { COSTS, LEVELS } from '../support/pace-gpu.js';
@@ -324,7 +324,7 @@ test('levels of detail are built once pictures have moved slowly for 1.5 s, rest
     },
     ...{ memoryBudget: undefined, splatsChanged: () => undefined, warn: () => undefined },
   });
-  detail.update({ gaussians: { count: 60_000, pages: [] }, detail: {} } as unknown as GpuScene);
+  detail.update({ gaussians: { count: 60_000, pages: [] }, detail: {} } as unknown as LoadedGaussians);
   const pass = (milliseconds: number): void => {
     now += milliseconds;
     context.mock.timers.tick(milliseconds);

@@ -19,6 +19,19 @@ test('React: the component with its children, style and aria-label; the rest is 
   assert.equal(html, '<gaussian-splat aria-label="A garden" style="width:3px"><p slot="poster">A garden</p></gaussian-splat>'); // prettier-ignore
 });
 
+test('React: children that are scenes, with what is known on a server', { skip }, async () => {
+  const { GaussianSplat, SplatMesh, SplatScene } = await import('@gaussian-splat/react');
+  const children = [
+    createElement(SplatScene, { key: 0, id: 'plant', src: 'plant.spz', position: [1, 0, 0] }),
+    createElement(SplatMesh, { key: 1, src: 'chair.glb', hidden: true }),
+  ];
+  const html = renderReact(createElement(GaussianSplat, { src: 'room.sog' }, children));
+  assert.equal(
+    html,
+    '<gaussian-splat><splat-scene id="plant"></splat-scene><splat-mesh></splat-mesh></gaussian-splat>',
+  );
+});
+
 test('Vue: the tag with its attributes', { skip }, async () => {
   await import('@gaussian-splat/element');
   const onLoad = (): void => undefined;

@@ -52,7 +52,7 @@ for (const { make, frames } of [
       const next = await capture(device, renderer, { gaussians, camera });
       assert.ok(sameBytes(first, next), `frame ${frame} differs`);
     }
-    assert.ok((await renderer.readStatistics()).visible > 1000, 'the scene is visible');
+    assert.ok((await renderer.statistics()).visible > 1000, 'the scene is visible');
     renderer.destroy();
     gaussians.destroy();
   });
@@ -78,7 +78,7 @@ test('an image of no splats is the background', async () => {
   const pixels = await capture(device, renderer, { gaussians, camera, background: [0.25, 0.5, 0.125, 0.75] });
   for (let i = 0; i < pixels.length; i += 4) assert.deepEqual([...pixels.subarray(i, i + 4)], [0.25, 0.5, 0.125, 0.75]);
   const nothing = { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0 };
-  assert.deepEqual(await renderer.readStatistics(), nothing);
+  assert.deepEqual(await renderer.statistics(), nothing);
 });
 
 test('background shines through by transmittance, premultiplied', async () => {

@@ -108,7 +108,7 @@ test('quads refuse to take notes, by name', async () => {
   });
   assert.throws(() => renderer.render({ gaussians, camera: cameras[0], target, notes: {} }), {
     code: 'unsupported/limits',
-    where: 'FrameRequest.notes',
+    where: 'Picture.notes',
   });
   renderer.destroy();
   gaussians.destroy();

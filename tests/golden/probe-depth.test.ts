@@ -32,7 +32,7 @@ for (const rasterizer of RASTERIZERS) {
     const gaussians = await GaussianBuffers.upload(device, packGaussians(cloud));
     const renderer = new Renderer(device, { rasterizer });
     assert.deepEqual(
-      await renderer.probeDepth([{ x: 1, y: 1 }]),
+      await renderer.probe([{ x: 1, y: 1 }]),
       [],
       'before the first frame there is nothing to look into',
     );
@@ -43,7 +43,7 @@ for (const rasterizer of RASTERIZERS) {
         column: Math.floor(camera.width * random()),
         row: Math.floor(camera.height * random()),
       }));
-      const answers = await renderer.probeDepth(places.map(({ column, row }) => ({ x: column + 0.5, y: row + 0.5 })));
+      const answers = await renderer.probe(places.map(({ column, row }) => ({ x: column + 0.5, y: row + 0.5 })));
       for (const [j, { opacity, depth, transmittance }] of answers.entries()) {
         const alpha = pixels[4 * (places[j].row * camera.width + places[j].column) + 3];
         assert.ok(Math.abs(opacity - alpha) < 4e-3, `frame ${i}, point ${j}: opacity ${opacity}, alpha ${alpha}`);
@@ -73,7 +73,7 @@ test('a wall behind a veil: the depth is that of the wall, and only what is behi
   const camera = { ...cameraAt([0, 0, 0], [0, 0, 1]), near: 0.1 };
   await capture(device, renderer, { gaussians, camera });
   const centre = { x: camera.width / 2, y: camera.height / 2 };
-  const [before, between, behind] = await renderer.probeDepth([2, 4, 6].map((depth) => ({ ...centre, depth })));
+  const [before, between, behind] = await renderer.probe([2, 4, 6].map((depth) => ({ ...centre, depth })));
   assert.ok(behind.depth !== null && Math.abs(behind.depth - 5) < 5 / 1024, `depth ${behind.depth}`);
   assert.equal(before.transmittance, 1);
   assert.ok(between.transmittance > 0.7 && between.transmittance < 1, `veil: ${between.transmittance}`);
@@ -91,7 +91,7 @@ for (const unit of [1e-8, 1e-5, 1e5, 1e9]) {
     const camera = { ...cameraAt([0, 0, 0], [0, 0, 1], { width: 32, height: 32 }), near: 0.1 * unit };
     await capture(device, renderer, { gaussians, camera });
     const depths = [4.9, 5.1].map((depth) => ({ x: 16, y: 16, depth: depth * unit }));
-    const [before, behind] = await renderer.probeDepth(depths);
+    const [before, behind] = await renderer.probe(depths);
     assert.ok(Math.abs((behind.depth ?? 0) / unit - 5) < 5 / 1024, `depth ${behind.depth}`);
     assert.equal(before.transmittance, 1);
     assert.ok(behind.transmittance < 0.2, `behind it ${behind.transmittance}`);

@@ -67,7 +67,7 @@ async function drawTurning(device: GPUDevice, rasterizer: RasterizerName): Promi
   const renderer = new Renderer(device, { rasterizer, threads: 'serial' });
   await readFrame(device, renderer, { gaussians, camera: turnedAway(camera) });
   const pixels = await readFrame(device, renderer, { gaussians, camera });
-  const { visible } = await renderer.readStatistics();
+  const { visible } = await renderer.statistics();
   renderer.destroy();
   gaussians.destroy();
   return [pixels, visible];

@@ -128,7 +128,7 @@ test('tiles: over capacity the farthest pairs are left out, the frame says so, a
   const renderer = new Renderer(device, { rasterizer: 'tiles', onIncomplete: () => told() });
   const target = device.createTexture({ size: [320, 180], format: 'rgba16float', usage: 0x8 | 0x10 });
   renderer.render({ gaussians, camera: crowdCamera, target });
-  const first = await renderer.readStatistics();
+  const first = await renderer.statistics();
   assert.deepEqual([first.pairs, first.pairOverflow], [65_536, 72_000 - 65_536]);
   await incomplete;
   const close = closeness(
@@ -137,7 +137,7 @@ test('tiles: over capacity the farthest pairs are left out, the frame says so, a
   );
   console.log(describeCloseness('tiles with room again', close));
   assert.ok(close.psnr >= LIMITS.psnr && close.max <= worstOf(''), `${close.psnr} dB, worst ${255 * close.max}/255`);
-  const second = await renderer.readStatistics();
+  const second = await renderer.statistics();
   assert.deepEqual([second.pairs, second.pairOverflow], [72_000, 0]);
 });
 
@@ -172,11 +172,11 @@ for (const [what, cameras, pauseMs] of [
     // The third frame of a view is not looked at for its number.
     for (let frame = 0; frame < 2; frame++) {
       renderer.render({ gaussians, camera: before, target: targetOf(before) });
-      assert.equal((await renderer.readStatistics()).pairOverflow, 0);
+      assert.equal((await renderer.statistics()).pairOverflow, 0);
     }
     await pause(pauseMs);
     renderer.render({ gaussians, camera: after, target: targetOf(after) });
-    assert.ok((await renderer.readStatistics()).pairOverflow > 0);
+    assert.ok((await renderer.statistics()).pairOverflow > 0);
     await pause(50);
     assert.equal(told, 1);
   });

@@ -30,7 +30,7 @@ test('serial and parallel stages draw the same bytes, moving and turning', async
     ];
     assert.deepEqual(Buffer.from(parallel.buffer), Buffer.from(serial.buffer));
   }
-  assert.ok((await renderers[1].readStatistics()).visible > 1000);
+  assert.ok((await renderers[1].statistics()).visible > 1000);
 });
 
 test('every variant gives the known answer, and a wrong rule does not', async () => {

@@ -61,7 +61,7 @@ async function measure(options: RendererOptions): Promise<Figures> {
   const { buffersCreated, bytesAllocated } = counter.take();
   draw();
   const { buffersCreated: buffersPerFrame, bytesAllocated: bytesPerFrame, ...frame } = counter.take();
-  const { visible, ...others } = await renderer.readStatistics();
+  const { visible, ...others } = await renderer.statistics();
   const figures = {
     visible,
     ...('pairs' in others ? { pairs: others.pairs as number } : {}),
@@ -146,7 +146,7 @@ for (const [name, options] of CONFIGURATIONS) {
       const { dispatches, indirectCalls } = counter.take();
       assert.ok(dispatches > 30);
       assert.equal(indirectCalls, 0);
-      assert.ok((await renderer.readStatistics()).visible > 100, 'something is drawn');
+      assert.ok((await renderer.statistics()).visible > 100, 'something is drawn');
       renderer.destroy();
     });
   }

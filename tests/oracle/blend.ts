@@ -10,6 +10,8 @@ export interface ScreenSplat {
   readonly index: number;
   /** Splats are blended by ascending key, equal keys by index. */
   readonly key: number;
+  /** Depth in camera axes. */
+  readonly depth: number;
   readonly ellipse: Ellipse;
   readonly footprint: PixelRect;
   /** After compensation, 0..1. */
@@ -28,6 +30,8 @@ export interface OracleImage {
   readonly transmittance: Float64Array;
   /** [height, width] number of splats that were added to the pixel. */
   readonly contributors: Uint32Array;
+  /** [height, width] depth of the splat that leaves half of the light or less; 0 where none does. */
+  readonly medianDepth: Float64Array;
   /** [N] largest weight alpha·T that each splat of the cloud has in any pixel; 0 if it is not seen. */
   readonly maxWeight: Float64Array;
 }
@@ -39,6 +43,7 @@ export function emptyImage(width: number, height: number, splatCount: number): O
     color: new Float64Array(3 * width * height),
     transmittance: new Float64Array(width * height).fill(1),
     contributors: new Uint32Array(width * height),
+    medianDepth: new Float64Array(width * height),
     maxWeight: new Float64Array(splatCount),
   };
 }
@@ -48,14 +53,28 @@ export function nearestFirst(splats: readonly ScreenSplat[]): ScreenSplat[] {
   return [...splats].sort((a, b) => a.key - b.key || a.index - b.index);
 }
 
-/** Blends splats, nearest first, into the image, pixel by pixel: C += T·alpha·c, then T *= 1 - alpha. */
-export function blend(image: OracleImage, splats: readonly ScreenSplat[], rules: Rules): void {
+/**
+ * Blends splats, nearest first, into the image, pixel by pixel: C += T·alpha·c, then T *= 1 - alpha.
+ * @param limit [height, width] depth of what else is in the picture: splats behind it are hidden
+ */
+export function blend(
+  image: OracleImage,
+  splats: readonly ScreenSplat[],
+  rules: Rules,
+  limit?: ArrayLike<number>,
+): void {
   const finished = new Uint8Array(image.width * image.height);
-  for (const splat of splats) blendSplat(image, finished, splat, rules);
+  for (const splat of splats) blendSplat(image, finished, splat, rules, limit);
 }
 
-function blendSplat(image: OracleImage, finished: Uint8Array, splat: ScreenSplat, rules: Rules): void {
-  const { width, color, transmittance, contributors, maxWeight } = image;
+function blendSplat(
+  image: OracleImage,
+  finished: Uint8Array,
+  splat: ScreenSplat,
+  rules: Rules,
+  limit: ArrayLike<number> | undefined,
+): void {
+  const { width, color, transmittance, contributors, maxWeight, medianDepth } = image;
   const { index, ellipse, footprint, opacity } = splat;
   const { xx, xy, yy } = ellipse.conic;
   const [red, green, blue] = splat.color;
@@ -65,7 +84,7 @@ function blendSplat(image: OracleImage, finished: Uint8Array, splat: ScreenSplat
   for (let row = footprint.top; row < footprint.bottom; row++) {
     for (let column = footprint.left; column < footprint.right; column++) {
       const pixel = row * width + column;
-      if (finished[pixel]) continue;
+      if (finished[pixel] || (limit && splat.depth > limit[pixel])) continue;
 
       const dx = column + 0.5 - ellipse.x;
       const dy = row + 0.5 - ellipse.y;
@@ -85,6 +104,7 @@ function blendSplat(image: OracleImage, finished: Uint8Array, splat: ScreenSplat
       color[3 * pixel + 1] += weight * green;
       color[3 * pixel + 2] += weight * blue;
       transmittance[pixel] = after;
+      if (before > 0.5 && after <= 0.5) medianDepth[pixel] = splat.depth;
       contributors[pixel]++;
       if (weight > maxWeight[index]) maxWeight[index] = weight;
     }

@@ -5,12 +5,15 @@
 import {
   eyeOf,
   GaussianSplatError,
+  inverse,
+  multiply,
   normalize,
   subtract,
   validateCamera,
   validateCloud,
   type Camera,
   type GaussianCloud,
+  type Matrix4,
   type Vector3,
 } from '@gaussian-splat/core';
 import { addBackground, blend, emptyImage, nearestFirst, type OracleImage, type ScreenSplat } from './blend.js';
@@ -27,6 +30,8 @@ export interface OracleOptions {
   readonly mode: Mode;
   /** Red, green, blue behind everything; default black. */
   readonly background?: Vector3;
+  /** [height, width] depth of what else is in the picture, world units in camera axes: splats behind it are hidden. */
+  readonly depth?: ArrayLike<number>;
   /** [N] one key for each splat of the cloud, blended ascending; default float32 z in camera axes. */
   readonly depthKeys?: ArrayLike<number>;
 }
@@ -43,7 +48,40 @@ export function renderOracle(cloud: GaussianCloud, camera: Camera, options: Orac
 
   const image = emptyImage(camera.width, camera.height, cloud.count);
   const splats = screenSplats(cloud, camera, rules, options);
-  blend(image, nearestFirst(splats), rules);
+  blend(image, nearestFirst(splats), rules, options.depth);
+  if (options.background) addBackground(image, options.background);
+  return image;
+}
+
+/** A cloud that stands somewhere in a world. */
+export interface PlacedCloud {
+  readonly cloud: GaussianCloud;
+  readonly mode: Mode;
+  readonly sceneToWorld?: Matrix4;
+  readonly opacity?: number;
+  readonly crop?: { readonly min: Vector3; readonly max: Vector3 };
+}
+
+/** Draws clouds that stand in one world, blended together. Each is seen as it is in its own frame: its harmonics turn with it. */
+export function renderOracleWorld(
+  placed: readonly PlacedCloud[],
+  camera: Camera,
+  options: Pick<OracleOptions, 'rules' | 'depth' | 'background'>,
+): OracleImage {
+  const rules = typeof options.rules === 'string' ? RULES[options.rules] : options.rules;
+  let first = 0;
+  const splats = placed.flatMap(({ cloud, mode, sceneToWorld, opacity = 1, crop }) => {
+    const worldToCamera = sceneToWorld ? multiply(camera.worldToCamera, sceneToWorld) : camera.worldToCamera;
+    const isInside = (i: number): boolean =>
+      crop === undefined || worldPosition(cloud, i).every((v, axis) => v >= crop.min[axis] && v <= crop.max[axis]);
+    const faded = { ...cloud, opacities: cloud.opacities.map((own, i) => (isInside(i) ? own * opacity : 0)) };
+    const all = screenSplats(faded, { ...camera, worldToCamera }, rules, { rules, mode });
+    const start = first;
+    first += cloud.count;
+    return all.filter(({ index }) => faded.opacities[index] > 0).map((s) => ({ ...s, index: start + s.index }));
+  });
+  const image = emptyImage(camera.width, camera.height, first);
+  blend(image, nearestFirst(splats), rules, options.depth);
   if (options.background) addBackground(image, options.background);
   return image;
 }
@@ -61,6 +99,8 @@ export function toRgba({ color, transmittance }: OracleImage): Float64Array {
 /** All splats of the cloud between the near and the far plane, on the screen. */
 function screenSplats(cloud: GaussianCloud, camera: Camera, rules: Rules, options: OracleOptions): ScreenSplat[] {
   const eye = eyeOf(camera.worldToCamera);
+  const toWorld = inverse(camera.worldToCamera);
+  const axis: Vector3 = [toWorld[2], toWorld[6], toWorld[10]];
   const splats: ScreenSplat[] = [];
   for (let index = 0; index < cloud.count; index++) {
     const position = worldPosition(cloud, index);
@@ -70,10 +110,18 @@ function screenSplats(cloud: GaussianCloud, camera: Camera, rules: Rules, option
 
     const ellipse = projectEllipse(cloud, index, camera, center, rules);
     const opacity = cloud.opacities[index] * (options.mode === 'antialiased' ? ellipse.compensation : 1);
-    const color = splatColor(cloud, index, normalize(subtract(position, eye)));
+    const color = splatColor(cloud, index, normalize(camera.orthographic ? axis : subtract(position, eye)));
     const key = options.depthKeys ? options.depthKeys[index] : Math.fround(z);
     requireFinite(index, [...Object.values(ellipse.conic), ellipse.x, ellipse.y, opacity, ...color, key]);
-    splats.push({ index, key, ellipse, footprint: footprintOf(ellipse, opacity, camera, rules), opacity, color });
+    splats.push({
+      index,
+      key,
+      depth: z,
+      ellipse,
+      footprint: footprintOf(ellipse, opacity, camera, rules),
+      opacity,
+      color,
+    });
   }
   return splats;
 }

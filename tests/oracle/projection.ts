@@ -55,9 +55,10 @@ export function projectEllipse(
   const covariance = { xx: exact.xx + rules.dilation, xy: exact.xy, yy: exact.yy + rules.dilation };
   // det(Σ + d·I) = det Σ + d·trace Σ + d²: only sums of non-negative numbers, so thin ellipses keep their digits.
   const determinant = exactDeterminant + rules.dilation * (exact.xx + exact.yy) + rules.dilation ** 2;
+  const shrink = camera.orthographic ? 1 : z;
   return {
-    x: (camera.fx * x) / z + camera.cx,
-    y: (camera.fy * y) / z + camera.cy,
+    x: (camera.fx * x) / shrink + camera.cx,
+    y: (camera.fy * y) / shrink + camera.cy,
     covariance,
     conic: { xx: covariance.yy / determinant, xy: -covariance.xy / determinant, yy: covariance.xx / determinant },
     compensation: Math.sqrt(Math.max(rules.compensationFloor, exactDeterminant / determinant)),
@@ -69,6 +70,12 @@ export function projectEllipse(
  * outside the view are moved to just beyond its edge first, because the linear approximation explodes out there.
  */
 export function jacobian(camera: Camera, [x, y, z]: Vector3, rules: Rules): [number[], number[]] {
+  if (camera.orthographic) {
+    return [
+      [camera.fx, 0, 0],
+      [0, camera.fy, 0],
+    ];
+  }
   const { width, height, fx, fy, cx, cy } = camera;
   const marginX = (rules.jacobianMargin * width) / (2 * fx);
   const marginY = (rules.jacobianMargin * height) / (2 * fy);

@@ -45,7 +45,7 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
   let visit: Visit;
   before(async () => {
     open = await openSite();
-    visit = await open.visit('/compare/?src=/glossy.ply&left=default,3&right=default,0&frames=3', {
+    visit = await open.visit('/compare/?src=/glossy.ply&left=default,3&right=default,0&frames=9', {
       width: 240,
       height: 400,
       prepare: (page) => page.route('**/glossy.ply', (route) => route.fulfill({ body: glossy() })),
@@ -95,12 +95,16 @@ describe('the comparison', { skip: isBuilt ? false : 'no site: npm run build' },
       undefined,
       PATIENCE,
     );
-    assert.match((await tab.locator('#status').textContent())!, /^\d+ × \d+ pixels\.$/);
+    assert.match(
+      (await tab.locator('#status').textContent())!,
+      /^\d+ × \d+ pixels, \d+ frames of each in turns, on .+\.$/,
+    );
     const rows = await tab.locator('#figures tbody tr').allTextContents();
     const cells = await tab.locator('#figures tbody tr:first-child td').allTextContents();
     const [decibels, worst] = [Number(cells[2]), Number(cells[3])];
     assert.equal(rows.length, 2);
-    assert.ok(Number(cells[1]) > 0, 'it took time');
+    // A machine that is busy with other tests may get too few frames in the time.
+    assert.ok(Number(cells[1]) > 0 || cells[1] === 'too slow to tell', cells[1]);
     assert.ok(decibels > 5 && decibels < 40, `${decibels} dB`);
     assert.ok(worst > 5, `${worst} of 255`);
     // The same on both sides is the same picture.

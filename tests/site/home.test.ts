@@ -92,22 +92,5 @@ describe('the first page', { skip: isBuilt ? false : 'no site: npm run build' },
     assert.deepEqual(faults, []);
   });
 
-  it('says what is wrong with a scene, and shows the next one', async () => {
-    const { tab } = only;
-    const status = (pattern: RegExp): Promise<unknown> =>
-      tab.waitForFunction(
-        (source) => new RegExp(source).test(document.querySelector('#faulty-status')!.textContent!),
-        pattern.source,
-        PATIENCE,
-      );
-    await tab.click('[data-source="scenes/missing.spz"]');
-    await status(/404/);
-    await tab.click('[data-source="index.html"]');
-    await status(/web page|HTML/);
-    await tab.click('[data-source="scenes/skull.spz"]');
-    await status(/^\d+ splats/);
-    only.faults.length = 0;
-  });
-
   it('is a page as every other', () => checkPage(only));
 });

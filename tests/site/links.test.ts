@@ -24,7 +24,8 @@ function linksOf(url: string): string[] {
   const links = tags.flatMap((tag) =>
     [...tag.matchAll(/\s(?:href|src|poster|postprocess)="([^"]*)"/g)].map(([, link]) => unescape(link)),
   );
-  return links.filter((link) => !/^(https?:|data:|mailto:)/.test(link));
+  // One example shows what a file that is not there looks like.
+  return links.filter((link) => !/^(https?:|data:|mailto:)|\/missing\.spz$/.test(link));
 }
 
 const idsOf = (url: string): Set<string> => new Set([...read(url).matchAll(/\sid="([^"]+)"/g)].map(([, id]) => id));

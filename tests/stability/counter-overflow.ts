@@ -75,7 +75,7 @@ async function countPairs(count: number, side: number): Promise<void> {
   const target = device.createTexture({ size: [side, side], format: 'rgba8unorm', usage: 0x8 | 0x10 | 0x1 });
   const camera = cameraAt([0, 0, -1], [0, 0, 0], { width: side, height: side });
   renderer.render({ gaussians, camera, target });
-  const { pairs, pairOverflow } = await renderer.readStatistics();
+  const { pairs, pairOverflow } = await renderer.statistics();
   const counted = Math.min(MOST, demanded);
   holds('S13', `pairs that are counted of ${demanded.toPrecision(3)}`, pairs + pairOverflow, {
     atLeast: counted,

@@ -76,7 +76,7 @@ for (const rasterizer of RASTERIZERS) {
     for (const scene of [without(packed, bad), spoilt]) {
       const gaussians = await GaussianBuffers.upload(device, scene);
       images.push(await capture(device, renderer, { gaussians, camera }));
-      ({ unusable } = await renderer.readStatistics());
+      ({ unusable } = await renderer.statistics());
       gaussians.destroy();
     }
     holds('S5b', `bits of NaN and infinity, ${rasterizer}: differing bytes`, differingBytes(images[0], images[1]), {

@@ -41,7 +41,7 @@ test('ten times the room, at once', async () => {
   const texture = device.createTexture({ size: [width, height], format: 'rgba32float', usage: 0x10 | 0x1 | 0x8 });
   renderer.render({ gaussians, camera, target: texture });
   const first = await readImage(device, texture);
-  const { pairs, pairOverflow } = await renderer.readStatistics();
+  const { pairs, pairOverflow } = await renderer.statistics();
   holds('S10', 'pairs demanded over pairs with room', (pairs + pairOverflow) / pairs, {
     atLeast: sized(3.9, 9),
     unit: 'times',
@@ -53,7 +53,7 @@ test('ten times the room, at once', async () => {
   const close = compareImage(sampled(first, width, height, block), whole);
   holds('S10', 'the frame that lacked room, against the whole picture', close.psnr, { atLeast: 40, unit: 'dB' });
   const next = await capture(device, renderer, { gaussians, camera });
-  assert.equal((await renderer.readStatistics()).pairOverflow, 0, 'the next frame has room');
+  assert.equal((await renderer.statistics()).pairOverflow, 0, 'the next frame has room');
   const fresh = new Renderer(device, { threads: THREADS, rasterizer: 'tiles' });
   const again = await capture(device, fresh, { gaussians, camera });
   holds('S10', 'the next frame against one with room from the start: differing bytes', differingBytes(next, again), {

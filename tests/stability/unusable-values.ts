@@ -60,7 +60,7 @@ async function drawTensors(
   gaussians.ingest({ [Object.keys(writeTensors(scene.cloud, SPEC).tensors)[0]]: tensor }, count);
   const renderer = new Renderer(device, { threads: THREADS });
   const pixels = await capture(device, renderer, { gaussians, camera });
-  const { unusable } = await renderer.readStatistics();
+  const { unusable } = await renderer.statistics();
   renderer.destroy();
   gaussians.destroy();
   tensor.destroy();

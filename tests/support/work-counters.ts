@@ -29,6 +29,10 @@ type Method = (...args: never[]) => unknown;
 /** Bytes of one pixel in the formats that the renderer uses. */
 const BYTES_PER_PIXEL: Readonly<Record<string, number>> = {
   rgba8unorm: 4,
+  'rgba8unorm-srgb': 4,
+  rgba8uint: 4,
+  depth32float: 4,
+  depth24plus: 4,
   r32float: 4,
   rgba16float: 8,
   rgba32float: 16,

@@ -46,13 +46,13 @@ export async function compare(all, shares, views) {
     progress.begin(`the view at ${share} of the flight`);
     const settled = await settle(all, { camera, ...levers });
     const picture = await readPixels(all.device, all.target);
-    const { visible, budgetError } = await all.renderer.readStatistics();
+    const { visible, budgetError } = await all.renderer.statistics();
     const { resident, error } = all.scene.progress;
     const rest = { resident, poolError: rounded(error) };
     progress.begin(`the view at ${share} of the flight, four times finer`);
     const finerSettled = await settle(all, { camera, detail: detail / 4, splatBudget: 4 * splatBudget });
     const finer = await readPixels(all.device, all.target);
-    const more = await all.renderer.readStatistics();
+    const more = await all.renderer.statistics();
     views.push({
       ...{ share, settled, visible, budgetError: rounded(budgetError), ...rest },
       against: {

@@ -132,7 +132,7 @@ export class Second {
 
   /** Sends for what the GPU knows of the frames since the last look. */
   #look() {
-    this.#looks.push(this.#all.renderer.readStatistics());
+    this.#looks.push(this.#all.renderer.statistics());
     if (this.#timer) this.#passes.push(this.#timer.read());
   }
 }

@@ -68,7 +68,7 @@ export class OwnRenderer {
       splats,
       shDegree: this.#gaussians[0]?.shDegree,
       rasterizer: this.#renderer.rasterizer,
-      statistics: await this.#renderer.readStatistics(),
+      statistics: await this.#renderer.statistics(),
       bytes: { scene, renderer, perSplat: Number(((scene + renderer) / splats).toFixed(1)) },
       ignoredOptions: this.#unread(),
     };
@@ -87,7 +87,7 @@ export class OwnRenderer {
   }
 
   async #hadRoom() {
-    const { overflow, pairOverflow } = await this.#renderer.readStatistics();
+    const { overflow, pairOverflow } = await this.#renderer.statistics();
     if (overflow + pairOverflow === 0) return true;
     // Asking makes room.
     return this.#renderer.isComplete();

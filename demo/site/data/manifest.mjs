@@ -7,9 +7,8 @@ const path = join(root, 'packages/element/custom-elements.json');
 
 export default function manifest() {
   const { modules } = JSON.parse(readFileSync(path, 'utf8'));
-  const element = modules
-    .flatMap(({ declarations }) => declarations)
-    .find(({ tagName }) => tagName === 'gaussian-splat');
+  const declarations = modules.flatMap((module) => module.declarations);
+  const element = declarations.find(({ tagName }) => tagName === 'gaussian-splat');
   const members = element.members.map(describeMember);
   const ofElement = members.filter(({ isStatic }) => !isStatic);
   return {
@@ -22,7 +21,14 @@ export default function manifest() {
     parts: element.cssParts.map(describe),
     customProperties: element.cssProperties.map(describe),
     states: element.cssStates.map(describe),
+    children: declarations.filter(({ tagName }) => tagName?.startsWith('splat-')).map(describeChild),
   };
+}
+
+/** A tag among the element's children. */
+function describeChild({ tagName, attributes, members, events }) {
+  const own = members.map(describeMember).filter(({ attribute }) => attribute === '');
+  return { tag: tagName, attributes: attributes.map(describe), members: own, events: events.map(describe) };
 }
 
 function describe({ name, description = '', type, default: fallback }) {

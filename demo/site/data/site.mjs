@@ -1,20 +1,30 @@
 /** Names and ways through the site. */
 export default {
-  name: '<gaussian-splat>',
+  name: 'gaussian-splat',
+  /** Where the site will be, for crawlers and previews of links; unknown unless SITE_URL says it. */
+  address: process.env.SITE_URL ?? '',
   /** The pages that every page leads to. */
   navigation: [
-    { title: 'Examples', url: '/examples/' },
+    { title: 'Gallery', url: '/gallery/' },
+    { title: 'Examples', url: '/examples/features/' },
     { title: 'Playground', url: '/playground/' },
-    { title: 'Compare', url: '/compare/' },
-    { title: 'Speed and accuracy', url: '/frontier/' },
-    { title: 'Stability', url: '/stability/' },
-    { title: 'Benchmark', url: '/bench/' },
     { title: 'Guide', url: '/docs/' },
     { title: 'Reference', url: '/reference/' },
+    { title: 'Performance', url: '/frontier/' },
+  ],
+  /** The pages that measure, which lead to one another. */
+  measured: [
+    { title: 'Speed and accuracy', url: '/frontier/' },
+    { title: 'Compare two qualities', url: '/compare/' },
+    { title: 'Hard cases', url: '/stability/' },
+    { title: 'Measure this machine', url: '/bench/' },
   ],
   /** What the foot of every page leads to. */
   footer: [
     { title: 'Get started', url: '/docs/guide/start/' },
+    { title: 'Generators', url: '/examples/' },
+    { title: 'In three.js', url: '/three/' },
+    { title: 'Without WebGPU', url: '/without-webgpu/' },
     { title: 'Check a generator', url: '/check/' },
     { title: 'React', url: '/react/' },
     { title: 'Vue', url: '/vue/' },

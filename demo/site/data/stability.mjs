@@ -24,21 +24,39 @@ export default function stability() {
 
 const number = (value) => String(typeof value === 'number' ? Number(value.toPrecision(4)) : value);
 
+/** dB that a scene may cost a renderer against what it has on an ordinary one. */
+const MOST_LOSS = 6;
+
 function describePages(pages) {
   const subjects = subjectsOf(pages);
   const { adapter, rows } = pages[0];
   return {
     adapter: adapter === 'google swiftshader' || !adapter ? 'SwiftShader' : adapter,
     subjects: subjects.map(({ name }) => name),
-    rows: rows.map(({ row, title, least }) => ({
+    rows: rows.map(({ row, title }) => ({
       id: row === '-' ? '' : row,
       title,
-      limit: least ? `${least} dB` : '0 bytes',
-      results: subjects.map(({ results }) => {
-        const { figure, unit, passes, error } = results.get(`${row} ${title}`) ?? {};
-        return { text: error ?? (passes === undefined ? '' : `${number(figure)} ${unit}`), passes: passes ?? true };
-      }),
+      results: subjects.map(({ results }) => resultOf(results.get(`${row} ${title}`), ordinaryOf(rows, results))),
     })),
+  };
+}
+
+/** What a renderer has on the scene that is there for comparison. */
+function ordinaryOf(rows, results) {
+  const { row, title } = rows.find((each) => each.row === '-') ?? {};
+  return results.get(`${row} ${title}`)?.figure;
+}
+
+/** A figure, and what the scene costs this renderer: it is held against itself, since others' usual image is not the reference image. */
+function resultOf({ figure, unit, passes, error } = {}, ordinary) {
+  if (error !== undefined) return { text: error, isLoss: true };
+  if (passes === undefined) return { text: '', isLoss: false };
+  const loss = unit === 'dB' && typeof figure === 'number' ? ordinary - figure : undefined;
+  const isLoss = loss === undefined ? !passes : loss > MOST_LOSS;
+  return {
+    text: `${number(figure)} ${unit}`,
+    isLoss,
+    loss: isLoss && loss !== undefined ? `−${number(Math.round(loss))} dB` : '',
   };
 }
 

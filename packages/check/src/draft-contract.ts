@@ -17,6 +17,9 @@ const NAMES: Readonly<Record<string, { readonly pattern: RegExp; readonly column
   opacities: { pattern: /opac|alpha/i, columns: [1] },
 };
 
+/** Numbers of a row of scales, a quaternion and plain colours. */
+const LGM_COLUMNS = 14;
+
 /**
  * Drafts the contract that a file lacks: each input by its name and shape, each output by its name. What no header can tell (units, activations,
  * ranges) is taken as it mostly is, and asked about.
@@ -42,8 +45,16 @@ function draftInput({ name, dims, dtype }: OnnxTensor, questions: string[]): Inp
   if (shape === '4,4') {
     if (is(/view.?proj|mvp/i)) return { role: 'view_projection', order: 'row-major' };
     if (is(/proj/i)) return { role: 'projection', order: 'row-major', axes: 'RDF' };
+    if (is(/c2w|to_?world|cam(era)?_?pose/i)) {
+      questions.push(`input ${name}: camera to world, row-major, axes RDF (OpenCV)? RUB is OpenGL's`);
+      return { role: 'camera_to_world', order: 'row-major', axes: 'RDF' };
+    }
     questions.push(`input ${name}: world to camera, row-major, axes RDF (OpenCV)? RUB is OpenGL's`);
     return { role: 'view', order: 'row-major', axes: 'RDF' };
+  }
+  if ((shape === '3,3' || shape === '4') && is(/^k$|intrin/i)) {
+    questions.push(`input ${name}: in pixels, or as shares of the picture's width and height ("normalized")?`);
+    return { role: 'intrinsics', unit: 'pixels' };
   }
   if (shape === '3' && is(/cam|eye|origin/i)) return { role: 'camera_position' };
   if (shape === '2' && is(/viewport|resolution|size/i)) return { role: 'viewport' };
@@ -66,6 +77,7 @@ function draftPose(name: string, sizes: readonly unknown[], questions: string[])
     questions.push(`input ${name}: quaternions w x y z?`);
     return { role: 'pose', format: 'quaternion', quaternionOrder: 'wxyz' };
   }
+  if (sizes.length === 3 && sizes[1] === 3 && sizes[2] === 3) return { role: 'pose', format: 'matrix' };
   return { role: 'pose', format: sizes.length === 2 && sizes[1] === 3 ? 'axis-angle' : 'parameters' };
 }
 
@@ -87,6 +99,19 @@ function draftOutputs({ outputs }: OnnxHeader, questions: string[]): OutputBindi
     const color =
       columns(packed) === 13 ? ({ color: 'rgb' } as const) : ({ color: 'sh', shOrder: 'coefficient-major' } as const);
     return { layout: 'packed', gaussians: packed.name, ...color, opacityActivation: 'linear', ...counted };
+  }
+  const row = outputs.find((output) => columns(output) === LGM_COLUMNS);
+  if (row) {
+    questions.push(
+      `output ${row.name}: position 3, opacity 0..1, scale 3, rotation w x y z, colour 3, as LGM has them?`,
+    );
+    return {
+      layout: 'packed',
+      gaussians: row.name,
+      columns: ['positions', 'opacities', 'scales', 'rotations', 'colors'],
+      ...{ color: 'rgb', opacityActivation: 'linear', scaleActivation: 'linear', rotationOrder: 'wxyz' },
+      ...counted,
+    } as const;
   }
   const found: Record<string, string> = {};
   const free = outputs.filter((output) => output !== count);

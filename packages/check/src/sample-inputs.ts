@@ -91,6 +91,7 @@ function givenTensors(header: OnnxHeader, contract: Contract): Record<string, Sa
   for (const input of header.inputs) {
     const binding = contract.inputs[input.name];
     if (binding.role === 'image') tensors[input.name] = sampleImage(input);
+    if (binding.role === 'state') tensors[input.name] = sampleState(input, binding.default);
     if (binding.role === 'gaussians') tensors[input.name] = sampleGaussians(input, binding);
   }
   return tensors;
@@ -111,8 +112,14 @@ function sampleImage(input: OnnxTensor): SampleTensor {
   return toSample(
     input,
     dims,
-    Array.from({ length: size }, (_, i) => (i % dims[3]) / dims[3]),
+    Array.from({ length: size }, (_, i) => (i % dims.at(-1)!) / dims.at(-1)!),
   );
+}
+
+/** Before the first run. */
+function sampleState(input: OnnxTensor, value = 0): SampleTensor {
+  const dims = fixedDims(input, 1);
+  return toSample(input, dims, new Array<number>(dims.reduce((product, dim) => product * dim, 1)).fill(value));
 }
 
 /** Small round Gaussians along a line. */

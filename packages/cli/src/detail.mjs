@@ -1,10 +1,23 @@
 /** The work behind `gaussian-splat detail`: reads a scene, builds its levels of detail, and writes them as pages with a manifest. */
 import { existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
-import { parseArgs } from 'node:util';
-import { GaussianSplatError, shCoefficientCount } from '@gaussian-splat/core';
+import { shCoefficientCount } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
-import { buildDetailTree, cutPages, manifestOf, packPage, treeOfCopies } from '@gaussian-splat/renderer';
+import {
+  buildDetailTree,
+  codingOf,
+  cutPages,
+  deviceDescriptor,
+  manifestOf,
+  PageEncoder,
+  packPage,
+  startVariants,
+  treeOfCopies,
+  USUAL_STEPS,
+} from '@gaussian-splat/renderer';
+import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
+import { findSteps } from './lib/coded-pages.mjs';
+import { deflate } from './lib/deflate.mjs';
 import { writeWhole } from './lib/output-file.mjs';
 import { readWhole } from './lib/read-whole.mjs';
 
@@ -12,43 +25,30 @@ const USAGE = `usage: gaussian-splat detail SCENE --out FOLDER [options]
 
   --out FOLDER    an empty folder, one that does not exist yet, or one where a run was ended early: detail.json and pages/, docs/detail-pages.md describes them
   --degree D      spherical harmonics up to this degree, 0 to 3; default: those of the scene
-  --exact         centres, shapes and opacities as float32 keeps them; default: quantized, in half of the bytes, 66 dB and more from that
+  --min-db DB     PSNR to SCENE over the covered pixels of held-out views that the finest pages reach, 30 to 60 (default 50): files are as small as that allows
+  --quantized     pages as the GPU reads them, not compressed: 66 dB and more, in two to three times the bytes
+  --exact         the same with centres, shapes and opacities as float32 keeps them, in three to four times the bytes
   --tile AxB      A times B copies of the scene on a plane, to try large scenes; they share their files
   --spacing LEN   world units between copies; default: 2.5 times the radius of the scene
 `;
 
-class UsageError extends Error {}
-
-/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
-const from = process.env.INIT_CWD ?? process.cwd();
-
 function parseOptions(args) {
   const text = { type: 'string' };
-  let parsed;
-  try {
-    parsed = parseArgs({
-      args,
-      allowPositionals: true,
-      options: {
-        out: text,
-        degree: text,
-        tile: text,
-        spacing: text,
-        exact: { type: 'boolean' },
-        help: { type: 'boolean' },
-      },
-    });
-  } catch (error) {
-    throw new UsageError(error.message);
-  }
-  const { values, positionals } = parsed;
-  if (values.help) return undefined;
-  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
+  const parsed = parseSceneOptions(args, {
+    out: text,
+    degree: text,
+    tile: text,
+    spacing: text,
+    'min-db': { ...text, default: '50' },
+    quantized: { type: 'boolean' },
+    exact: { type: 'boolean' },
+  });
+  if (parsed === undefined) return undefined;
+  const { values } = parsed;
   if (values.out === undefined) throw new UsageError('--out is missing');
   const out = resolve(from, values.out);
-  const scene = resolve(from, positionals[0]);
-  if (existsSync(scene) && statSync(scene).isDirectory())
-    throw new UsageError(`${positionals[0]} is a folder, no scene`);
+  const scene = resolve(from, parsed.scene);
+  if (existsSync(scene) && statSync(scene).isDirectory()) throw new UsageError(`${parsed.scene} is a folder, no scene`);
   if (existsSync(out) && !statSync(out).isDirectory()) throw new UsageError(`--out: ${values.out} is no folder`);
   if (existsSync(out) && !isEmpty(out) && !isUnfinished(out)) throw new UsageError(`--out: ${values.out} is not empty`);
   const tile = /^([1-9]\d{0,3})x([1-9]\d{0,3})$/.exec(values.tile ?? '1x1');
@@ -61,11 +61,15 @@ function parseOptions(args) {
   if (!/^[0-3]$/.test(values.degree ?? '3'))
     throw new UsageError(`--degree: expected 0 to 3, found "${values.degree}"`);
   const degree = Number(values.degree ?? 3);
+  const minDecibels = Number(values['min-db']);
+  if (!(minDecibels >= 30 && minDecibels <= 60))
+    throw new UsageError(`--min-db: expected 30 to 60, found "${values['min-db']}"`);
   return {
     scene,
     out,
     degree,
     geometry: values.exact ? undefined : 'quantized',
+    minDecibels: values.exact || values.quantized ? undefined : minDecibels,
     columns: Number(tile[1]),
     rows: Number(tile[2]),
     spacing,
@@ -105,24 +109,52 @@ function placesOf(columns, rows, spacing) {
     .map(([x, y]) => [(x - (columns - 1) / 2) * spacing, 0, (y - (rows - 1) / 2) * spacing]);
 }
 
+/** A device, or undefined, with a word on it, where there is none to measure with. */
+async function deviceToMeasure() {
+  try {
+    const { requestNodeAdapter } = await import('./lib/node-gpu.mjs');
+    const adapter = await requestNodeAdapter({ isTrusted: true });
+    const device = await adapter.requestDevice(deviceDescriptor(adapter));
+    await startVariants(device, { format: 'rgba8unorm' });
+    return device;
+  } catch (error) {
+    console.log(`not measured: ${error.message}`);
+    return undefined;
+  }
+}
+
+/** How files are coded, and how near to the scene that is; undefined for files that are not. */
+async function chooseCoding({ tree, pages, cloud, minDecibels }) {
+  if (minDecibels === undefined) return undefined;
+  const device = await deviceToMeasure();
+  if (device === undefined) return { coding: codingOf(USUAL_STEPS) };
+  const { steps, ...found } = await findSteps({
+    ...{ tree, pages, cloud, device, minDecibels },
+    onStep: (step) => console.log(`  ${step}`),
+  });
+  return { coding: codingOf(steps), ...found };
+}
+
 /** Writes the pages of a tree and returns what the manifest says of it. */
-function writeTree(out, name, tree, pages) {
+function writeTree(out, name, tree, pages, coding) {
+  const encoder = coding && new PageEncoder(tree, coding, deflate);
   const fileOf = (p) => `pages/${name}-${String(p).padStart(5, '0')}.bin`;
   let bytes = 0;
   pages.forEach((page, p) => {
-    const words = packPage(tree, page);
-    writeFileSync(join(out, fileOf(p)), new Uint8Array(words.buffer));
-    bytes += words.byteLength;
+    const file = encoder ? encoder.encode(page) : new Uint8Array(packPage(tree, page).buffer);
+    writeFileSync(join(out, fileOf(p)), file);
+    bytes += file.length;
   });
-  return { manifest: manifestOf(tree, pages, fileOf), bytes };
+  const told = coding && { ...coding, place: undefined };
+  return { manifest: manifestOf(tree, pages, fileOf, told), bytes };
 }
 
 /** The copies and the tree above them: the pages of the copies are those of one tree. */
-function writeCopies(out, tree, places) {
+function writeCopies(out, tree, places, coding) {
   const above = treeOfCopies(tree, places);
   const abovePages = cutPages(above);
-  const top = writeTree(out, 'top', above, abovePages);
-  const part = writeTree(out, 'part', tree, cutPages(tree, false));
+  const top = writeTree(out, 'top', above, abovePages, coding);
+  const part = writeTree(out, 'part', tree, cutPages(tree, false), coding);
   const placeOf = new Map();
   abovePages.forEach(({ holds }, page) =>
     holds.forEach(([level, copy], chunk) => level === 0 && placeOf.set(copy, [page, chunk])),
@@ -153,34 +185,35 @@ function writeFolder(out, writePages) {
   }
 }
 
-async function main({ scene, out, degree, geometry, columns, rows, spacing }) {
+async function main({ scene, out, degree, geometry, minDecibels, columns, rows, spacing }) {
   const openPart = (path) => readWhole(join(dirname(scene), path));
   const cloud = upTo(degree, await readScene(await readWhole(scene), { name: scene, openPart }));
+  for (const warning of cloud.warnings ?? []) console.error(`${scene}: ${warning}`);
   const start = performance.now();
   const tree = buildDetailTree(cloud, { geometry });
   const built = performance.now();
   const isTiled = columns * rows > 1;
   if (isTiled && tree.levels.length === 1) throw new UsageError('--tile: expected a scene of more than 256 splats');
   const places = isTiled ? placesOf(columns, rows, spacing ?? 2.5 * tree.bounds.radius) : [];
+  const choice = await chooseCoding({ tree, pages: cutPages(tree), cloud, minDecibels });
+  const coded = performance.now();
   const { manifest, bytes } = writeFolder(out, () =>
-    isTiled ? writeCopies(out, tree, places) : writeTree(out, 'scene', tree, cutPages(tree)),
+    isTiled
+      ? writeCopies(out, tree, places, choice?.coding)
+      : writeTree(out, 'scene', tree, cutPages(tree), choice?.coding),
   );
   const pages = manifest.instances.reduce((sum, { tree: t }) => sum + manifest.trees[t].pages.length, 0);
   const files = manifest.trees.reduce((sum, t) => sum + t.pages.length, 0);
+  const perSplat = isTiled ? '' : `, ${(bytes / manifest.splats).toFixed(2)} bytes a splat`;
   const unusable = cloud.droppedCount > 0 ? `, ${cloud.droppedCount} unusable ones of the file left out,` : '';
   console.log(
-    `${manifest.splats} splats${unusable} in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB); levels in ` +
-      `${((built - start) / 1000).toFixed(1)} s, pages in ${((performance.now() - built) / 1000).toFixed(1)} s: ${join(out, 'detail.json')}`,
+    `${manifest.splats} splats${unusable} in ${pages} pages (${files} files, ${(bytes / 1e6).toFixed(1)} MB${perSplat}); levels in ` +
+      `${((built - start) / 1000).toFixed(1)} s, pages in ${((performance.now() - coded) / 1000).toFixed(1)} s: ${join(out, 'detail.json')}`,
   );
+  if (choice?.decibels !== undefined)
+    console.log(
+      `${choice.decibels.toFixed(2)} dB to the scene in held-out views together, ${choice.worstDecibels.toFixed(2)} dB in the worst`,
+    );
 }
 
-try {
-  const options = parseOptions(process.argv.slice(2));
-  if (options === undefined) console.log(USAGE);
-  else await main(options);
-} catch (error) {
-  if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
-  else if (error instanceof GaussianSplatError || error.syscall !== undefined) console.error(error.message);
-  else console.error(error);
-  process.exitCode = error instanceof UsageError ? 2 : 1;
-}
+await runCommand(USAGE, parseOptions, main);

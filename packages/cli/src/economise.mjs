@@ -1,8 +1,7 @@
 /** The work behind `gaussian-splat economise`: reads a scene, has it made smaller, writes it, and says what went and what it cost. */
 import { statSync } from 'node:fs';
 import { resolve } from 'node:path';
-import { parseArgs } from 'node:util';
-import { boundsOf, cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
+import { boundsOf, cameraFromCalibration } from '@gaussian-splat/core';
 import {
   dealtViewsAround,
   dealViews,
@@ -14,6 +13,8 @@ import {
   viewsBetween,
 } from '@gaussian-splat/economise';
 import { inline } from '@gaussian-splat/economise/parts';
+import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
+import { encodeWebp } from './lib/webp.mjs';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
@@ -24,7 +25,8 @@ import { ThreadPool, usualThreads } from './lib/thread-pool.mjs';
 const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [options]
 
   --min-db DB     PSNR over covered pixels of the held-out views that the written file must reach
-  --out FILE      .glb (a primitive for each degree of spherical harmonics), .spz (small; up to some 40 dB) or .ply
+  --max-mb MB     instead of it: the most accurate file of at most this size
+  --out FILE      .sog (the smallest, its bits for each attribute chosen by measurement), .glb (a primitive for each degree of spherical harmonics), .spz (up to some 40 dB) or .ply
   --views FILE    {views: [{width, height, K, worldToCamera}, ...]}: where people will look from; two of
                   ten are held out, one is for the search, in the others and between them splats are scored. Default: 248 views around the subject, 24 of them held out.
                   Larger ones are drawn with 1600 pixels a side
@@ -35,44 +37,30 @@ const USAGE = `usage: gaussian-splat economise SCENE --min-db DB --out FILE [opt
   --report FILE   the figures as JSON, with the seconds that each kind of work took; of reading, those that the GPU's device does not take meanwhile
 `;
 
-class UsageError extends Error {}
-
-/** Whether the file system says it: ENOENT, EACCES, ENOSPC. Its sentence is enough for people. */
-const isOfFiles = ({ code }) => /^E[A-Z]+$/.test(code);
-
-/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
-const from = process.env.INIT_CWD ?? process.cwd();
-
 function parseOptions(args) {
   const text = { type: 'string' };
-  let parsed;
-  try {
-    parsed = parseArgs({
-      args,
-      allowPositionals: true,
-      options: {
-        'min-db': text,
-        out: text,
-        views: text,
-        report: text,
-        scored: { ...text, default: '216' },
-        threads: { ...text, default: String(usualThreads()) },
-        merge: { type: 'boolean', default: false },
-        refine: { type: 'boolean', default: false },
-        help: { type: 'boolean' },
-      },
-    });
-  } catch (error) {
-    throw new UsageError(error.message);
-  }
-  const { values, positionals } = parsed;
-  if (values.help) return undefined;
-  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
-  const minDecibels = Number(values['min-db']);
+  const parsed = parseSceneOptions(args, {
+    'min-db': text,
+    'max-mb': text,
+    out: text,
+    views: text,
+    report: text,
+    scored: { ...text, default: '216' },
+    threads: { ...text, default: String(usualThreads()) },
+    merge: { type: 'boolean', default: false },
+    refine: { type: 'boolean', default: false },
+  });
+  if (parsed === undefined) return undefined;
+  const { values } = parsed;
+  const maxBytes = values['max-mb'] === undefined ? undefined : 1e6 * Number(values['max-mb']);
+  if (maxBytes !== undefined && !(maxBytes > 0)) throw new UsageError('--max-mb: expected megabytes, above 0');
+  if ((maxBytes === undefined) === (values['min-db'] === undefined))
+    throw new UsageError('expected one of --min-db and --max-mb');
+  const minDecibels = Number(values['min-db'] ?? FIRST_DECIBELS);
   if (!(minDecibels >= 10 && minDecibels <= 100)) throw new UsageError('--min-db: expected a number from 10 to 100');
   if (values.out === undefined) throw new UsageError('--out is missing');
   const { merge, refine } = values;
-  const [scene, out, views, report] = [positionals[0], values.out, values.views, values.report].map(
+  const [scene, out, views, report] = [parsed.scene, values.out, values.views, values.report].map(
     (path) => path && resolve(from, path),
   );
   checkFiles({ scene, out, views, report });
@@ -82,7 +70,7 @@ function parseOptions(args) {
   const threads = Number(values.threads);
   if (!(Number.isInteger(threads) && threads >= 1 && threads <= 64))
     throw new UsageError(`--threads: expected a whole number from 1 to 64, found "${values.threads}"`);
-  return { scene, out, minDecibels, views, report, scored, threads, merge, refine };
+  return { scene, out, minDecibels, maxBytes, views, report, scored, threads, merge, refine };
 }
 
 /** All that can be said of files before the work. */
@@ -146,7 +134,49 @@ async function openDevice() {
   return device;
 }
 
-async function main({ scene, out, minDecibels, views: viewsFile, report, scored, threads, merge, refine }) {
+/** Where a search by bytes begins, its steps, and how near to them it ends. */
+const FIRST_DECIBELS = 45;
+const DECIBELS_STEP = 6;
+const SEARCHES = 7;
+const FULL_ENOUGH = 0.97;
+const LEAST_DECIBELS = 15;
+
+/** The most accurate file that has so few bytes. @returns what was asked for it in dB, and it */
+async function withinBytes(reach, maxBytes, say) {
+  let [low, high, best] = [-Infinity, Infinity, undefined];
+  let decibels = FIRST_DECIBELS;
+  for (let tries = 0; tries < SEARCHES; tries++) {
+    const found = await reach(decibels).catch((error) => {
+      // More than the format has is too much as well.
+      if (error.code === 'argument/value') return undefined;
+      throw error;
+    });
+    say(`${decibels.toFixed(1)} dB: ${found ? `${found.bytes.length} bytes` : 'beyond the format'}`);
+    if (found && found.bytes.length <= maxBytes) [low, best] = [decibels, [decibels, found]];
+    else high = decibels;
+    if (best && best[1].bytes.length >= FULL_ENOUGH * maxBytes) break;
+    if (low === -Infinity) decibels = high - DECIBELS_STEP;
+    else decibels = high === Infinity ? low + DECIBELS_STEP : (low + high) / 2;
+    if (decibels < LEAST_DECIBELS) break;
+  }
+  if (best) return best;
+  throw new UsageError(
+    `--max-mb: ${(maxBytes / 1e6).toFixed(2)} MB have no room for the scene at ${LEAST_DECIBELS} dB`,
+  );
+}
+
+async function main({
+  scene,
+  out,
+  minDecibels: asked,
+  maxBytes,
+  views: viewsFile,
+  report,
+  scored,
+  threads,
+  merge,
+  refine,
+}) {
   const begun = performance.now();
   const seconds = () => (performance.now() - begun) / 1000;
   // What is wrong with it is said before the work.
@@ -165,15 +195,16 @@ async function main({ scene, out, minDecibels, views: viewsFile, report, scored,
   const read = seconds() - opened;
   const views = ownViews ?? dealtViewsAround(boundsOf(cloud), { scored });
   const measuring = await GpuEvaluator.create(device, cloud, views, { pool });
-  const mostError = 10 ** (-minDecibels / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
+  const say = (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`);
+  const mostError = 10 ** (-asked / 10) / (refine ? RefiningEvaluator.leftByRefining : 1);
   const merging = { views: views.scored, mostError, pool };
   const cutting = merge ? new MergingEvaluator(measuring, cloud, merging) : measuring;
   const evaluator = refine ? new RefiningEvaluator(cutting, cloud, { device, views: views.scored }) : cutting;
   const prepare = seconds() - read;
-  const result = await economise(cloud, {
-    ...{ minDecibels, name: out, evaluator, pool },
-    onStep: (step) => console.log(`${seconds().toFixed(1).padStart(6)} s  ${step}`),
-  });
+  const reach = (minDecibels) =>
+    economise(cloud, { ...{ minDecibels, name: out, evaluator, pool, encodeWebp }, onStep: say });
+  const [minDecibels, result] =
+    maxBytes === undefined ? [asked, await reach(asked)] : await withinBytes(reach, maxBytes, say);
   writeWhole(out, result.bytes);
   const { splats, coefficients } = result;
   const spent = { read, prepare, ...result.seconds, total: seconds() };
@@ -192,15 +223,4 @@ seconds      ${times.join(', ')}`);
   if (report) writeWhole(report, JSON.stringify(figures, null, 2));
 }
 
-try {
-  const options = parseOptions(process.argv.slice(2));
-  if (options === undefined) console.log(USAGE);
-  else await main(options);
-  // Dawn keeps Node alive.
-  process.exit(0);
-} catch (error) {
-  if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
-  else if (error instanceof GaussianSplatError || isOfFiles(error)) console.error(error.message);
-  else console.error(error);
-  process.exit(error instanceof UsageError ? 2 : 1);
-}
+await runCommand(USAGE, parseOptions, main);

@@ -1,10 +1,10 @@
 /** The work behind `gaussian-splat render`: one scene, one camera, one image, on the same renderer that the element uses. */
 import { basename, dirname, join, resolve } from 'node:path';
-import { parseArgs } from 'node:util';
 import { PNG } from 'pngjs';
-import { cameraFromCalibration, GaussianSplatError } from '@gaussian-splat/core';
+import { cameraFromCalibration, SPLAT_FILTERS } from '@gaussian-splat/core';
 import { readScene } from '@gaussian-splat/formats';
 import { capture, deviceDescriptor, GaussianBuffers, packGaussians, Renderer } from '@gaussian-splat/renderer';
+import { from, parseSceneOptions, runCommand, UsageError } from './lib/command.mjs';
 import { requestNodeAdapter } from './lib/node-gpu.mjs';
 import { isSameFile, obstacleTo, writeWhole } from './lib/output-file.mjs';
 import { readJson } from './lib/read-json.mjs';
@@ -25,50 +25,28 @@ const USAGE = `usage: gaussian-splat render SCENE --camera CAMERA.json --out IMA
   --background R,G,B   0..1; default: transparent
 `;
 
-const FILTERS = {
-  classic: { antialiased: false, filterVariance: undefined },
-  antialiased: { antialiased: true, filterVariance: undefined },
-  mip: { antialiased: true, filterVariance: 0.1 },
-};
-
-class UsageError extends Error {}
-
-/** Folder that a person's relative paths start from: npm runs scripts in the project's root. */
-const from = process.env.INIT_CWD ?? process.cwd();
-
 function parseOptions(args) {
   const text = { type: 'string' };
-  let parsed;
-  try {
-    parsed = parseArgs({
-      args,
-      allowPositionals: true,
-      options: {
-        camera: text,
-        out: text,
-        float: text,
-        view: text,
-        filter: text,
-        mode: text,
-        raster: { ...text, default: 'auto' },
-        accumulation: { ...text, default: 'auto' },
-        background: text,
-        help: { type: 'boolean' },
-      },
-    });
-  } catch (error) {
-    throw new UsageError(error.message);
-  }
-  const { values, positionals } = parsed;
-  if (values.help) return undefined;
-  if (positionals.length !== 1) throw new UsageError(`expected one SCENE, found ${positionals.length}`);
+  const parsed = parseSceneOptions(args, {
+    camera: text,
+    out: text,
+    float: text,
+    view: text,
+    filter: text,
+    mode: text,
+    raster: { ...text, default: 'auto' },
+    accumulation: { ...text, default: 'auto' },
+    background: text,
+  });
+  if (parsed === undefined) return undefined;
+  const { values } = parsed;
   if (values.camera === undefined) throw new UsageError('--camera is missing');
   if (values.out === undefined && values.float === undefined) throw new UsageError('--out or --float is missing');
   values.filter ??= values.mode;
   oneOf('--filter', values.filter, [undefined, 'classic', 'antialiased', 'mip']);
   oneOf('--raster', values.raster, ['auto', 'quads', 'tiles']);
   oneOf('--accumulation', values.accumulation, ['auto', 'rgba16float', 'rgba32float']);
-  return { ...values, scene: positionals[0], background: parseBackground(values.background) };
+  return { ...values, scene: parsed.scene, background: parseBackground(values.background) };
 }
 
 function oneOf(name, value, allowed) {
@@ -147,7 +125,8 @@ async function render(options) {
   checkFiles(options);
   const camera = readCamera(options.camera, options.view);
   const cloud = await readSceneFile(options.scene);
-  const { antialiased, filterVariance } = options.filter === undefined ? cloud : FILTERS[options.filter];
+  for (const warning of cloud.warnings ?? []) console.error(`${options.scene}: ${warning}`);
+  const { antialiased, filterVariance } = options.filter === undefined ? cloud : SPLAT_FILTERS[options.filter];
 
   const adapter = await requestNodeAdapter();
   const device = await adapter.requestDevice(deviceDescriptor(adapter));
@@ -157,7 +136,7 @@ async function render(options) {
   const renderer = new Renderer(device, { rasterizer: options.raster, accumulation });
   const gaussians = await GaussianBuffers.upload(device, packGaussians({ ...cloud, antialiased, filterVariance }));
   const pixels = await capture(device, renderer, { gaussians, camera, background: options.background });
-  const statistics = await renderer.readStatistics();
+  const statistics = await renderer.statistics();
   if (validationErrors.length > 0) throw new Error(`WebGPU: ${validationErrors.join('\n')}`);
 
   if (options.out) writeWhole(resolve(from, options.out), encodePng(pixels, camera.width, camera.height));
@@ -170,17 +149,4 @@ async function render(options) {
   );
 }
 
-try {
-  const options = parseOptions(process.argv.slice(2));
-  if (options === undefined) console.log(USAGE);
-  else await render(options);
-  // Dawn keeps Node alive.
-  process.exit(0);
-} catch (error) {
-  if (error instanceof UsageError) console.error(`${error.message}\n\n${USAGE}`);
-  // Errors of the file system name the file, all but reading a folder.
-  else if (error.code === 'EISDIR') console.error(`${error.message}: expected a file, found a folder`);
-  else if (error instanceof GaussianSplatError || error.syscall) console.error(error.message);
-  else console.error(error);
-  process.exit(error instanceof UsageError ? 2 : 1);
-}
+await runCommand(USAGE, parseOptions, render);

@@ -21,6 +21,11 @@ export interface Camera {
   readonly near: number;
   /** Centres farther than this, in world units along z, are not drawn. */
   readonly far: number;
+  /**
+   * True if all rays are parallel to the camera's axis: a world point lands on (fx·x + cx, fy·y + cy), and focal lengths are pixels for each world
+   * unit. Default: false.
+   */
+  readonly orthographic?: boolean | undefined;
 }
 
 /** Near plane of INRIA's rasterizer, which scenes are trained with, in world units. */
@@ -74,6 +79,71 @@ export function cameraFromCalibration(view: CalibratedView, where = 'camera'): C
     if (!(Math.abs(found - value) <= AFFINE_ROUNDING))
       fail(`${where}.K[${row}][${column}]`, `${value}`, describe(found));
   }
+  return camera;
+}
+
+/** How a host's projection writes depth. */
+export interface ProjectionOptions {
+  /** Image size in pixels. */
+  readonly width: number;
+  readonly height: number;
+  /** Range of depth behind the division by w: `0..1` as WebGPU has it, or `-1..1` as OpenGL does. Default: `0..1`. */
+  readonly clipDepth?: '0..1' | '-1..1';
+}
+
+/** Of the distance between the planes: where the near plane of parallel rays is put that lies at the eye or behind it. */
+const LEAST_NEAR = 1e-3;
+
+/**
+ * A camera from the two matrices of a host such as three.js, glMatrix or WebXR: x right, y up, z backward, clip space as GPUs have it.
+ *
+ * ```ts
+ * const camera = cameraFromProjection(camera3.matrixWorldInverse.elements, camera3.projectionMatrix.elements, { width, height });
+ * ```
+ * @param view world to camera, 16 numbers, column-major
+ * @param projection perspective or orthographic, 16 numbers, column-major; off-centre and reversed ones, and those without a far plane, too
+ * @throws GaussianSplatError `argument/camera` for a projection with skew, or one that is neither.
+ */
+export function cameraFromProjection(
+  view: ArrayLike<number>,
+  projection: ArrayLike<number>,
+  { width, height, clipDepth = '0..1' }: ProjectionOptions,
+): Camera {
+  const p = projection;
+  const isMatrix = (m: ArrayLike<number>): boolean =>
+    m?.length === 16 && Array.prototype.every.call(m, Number.isFinite);
+  if (!isMatrix(view)) fail('view', '16 finite numbers, column-major', describe(view));
+  if (!isMatrix(p)) fail('projection', '16 finite numbers, column-major', describe(p));
+  const orthographic = p[11] === 0 && p[15] === 1;
+  if (!orthographic && !(p[11] === -1 && p[15] === 0))
+    fail('projection', 'a last row of 0, 0, -1, 0 or 0, 0, 0, 1', describe([p[3], p[7], p[11], p[15]]));
+  const skew = Math.max(...[1, 2, 3, 4, 6, 7].map((k) => Math.abs(p[k])));
+  if (skew !== 0) fail('projection', 'no skew: 0 beside the diagonal and the centre', describe(Array.from(p)));
+  const [x, y] = orthographic ? [p[12], -p[13]] : [-p[8], p[9]];
+  const planes = (clipDepth === '0..1' ? [0, 1] : [-1, 1]).map((depth) =>
+    orthographic ? (p[14] - depth) / p[10] : p[14] / (p[10] + depth),
+  );
+  // A projection without a far plane divides by nothing, or next to it.
+  const distances = planes.map((plane) => (Number.isFinite(plane) && (orthographic || plane > 0) ? plane : Infinity));
+  const [nearest, far] = [Math.min(...distances), Math.max(...distances)];
+  const back = orthographic && nearest <= 0 ? LEAST_NEAR * (far - nearest) - nearest : 0;
+  const flip = [1, -1, -1, 1];
+  const worldToCamera = Float64Array.from(
+    { length: 16 },
+    (_, k) => flip[Math.floor(k / 4)] * view[4 * (k % 4) + Math.floor(k / 4)],
+  );
+  worldToCamera[11] += back;
+  const camera: Camera = {
+    ...{ width, height, worldToCamera },
+    fx: (p[0] * width) / 2,
+    fy: (p[5] * height) / 2,
+    cx: (width * (1 + x)) / 2,
+    cy: (height * (1 + y)) / 2,
+    near: nearest + back,
+    far: far + back,
+    ...(orthographic && { orthographic }),
+  };
+  validateCamera(camera);
   return camera;
 }
 

@@ -23,6 +23,8 @@ export interface CloudHints {
   readonly up?: Vector3;
   /** The tool that wrote the file, in its own words. */
   readonly generator?: string;
+  /** The file has triangles, too, which a cloud cannot hold. */
+  readonly meshes?: boolean;
 }
 
 /**
@@ -63,6 +65,10 @@ export interface GaussianCloud {
   readonly levelRuns?: readonly LevelRun[];
   /** Number of splats of the source that were left out because a value was not usable; see {@link keepUsable}. */
   readonly droppedCount: number;
+  /** How many of them {@link keepUsable} left out for a scale below 0, for no rotation, for no extent, and for values that are not finite or too large. */
+  readonly faults?: readonly number[] | undefined;
+  /** Sentences for people about what of the file is not drawn, or may mean something else than what is drawn. */
+  readonly warnings?: readonly string[] | undefined;
 }
 
 /**
@@ -142,8 +148,12 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
   let kept = 0;
   const runs = cloud.levelRuns?.map(({ node, level }) => ({ first: 0, count: 0, node, level }));
   let run = 0;
+  const faults = [...(cloud.faults ?? [0, 0, 0, 0])];
   for (let i = 0; i < count; i++) {
-    if (!isUsable(cloud, i)) continue;
+    if (!isUsable(cloud, i)) {
+      faults[faultOf(cloud, i)]++;
+      continue;
+    }
     if (runs) {
       while (i >= cloud.levelRuns![run].first + cloud.levelRuns![run].count) runs[++run].first = kept;
       runs[run].count++;
@@ -168,8 +178,17 @@ export function keepUsable(cloud: GaussianCloud): GaussianCloud {
     opacities: opacities.subarray(0, kept),
     sh: sh.subarray(0, shLength * kept),
     ...(runs && { levelRuns: runs }),
+    ...(kept < count && { faults }),
     droppedCount: cloud.droppedCount + count - kept,
   };
+}
+
+/** Why a splat cannot be drawn: which of {@link GaussianCloud.faults}. */
+function faultOf({ scales, rotations }: GaussianCloud, i: number): number {
+  const axes = scales.subarray(3 * i, 3 * i + 3);
+  if (Math.min(...axes) < 0) return 0;
+  if (squaredNorm(rotations, 4 * i) === 0) return 1;
+  return Math.max(...axes) < MIN_LONGEST_SCALE ? 2 : 3;
 }
 
 function normaliseQuaternion(rotations: Float32Array, at: number): void {

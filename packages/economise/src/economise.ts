@@ -8,6 +8,7 @@ import { inline, type TaskPool } from './parts/task-pool.js';
 import { degreesOf, keptCoefficients, type Cut, type ReducedCloud } from './reduce.js';
 import { cutCloud, searchRefined, type CutCloud, type Plan } from './refine/search-refined.js';
 import { encodingsFor, type Encoding } from './write/index.js';
+import type { EncodeWebp } from './write/sog.js';
 
 /** Where the time goes. */
 export class Stopwatch {
@@ -36,6 +37,8 @@ export interface EconomiseOptions {
   readonly evaluator: Evaluator;
   /** Does what comes in parts, of writing and reading the file again; default {@link inline}. */
   readonly pool?: TaskPool;
+  /** Encodes lossless WebP, of which SOG is made: for `.sog` alone. */
+  readonly encodeWebp?: EncodeWebp;
   readonly signal?: AbortSignal;
   /** Called with what is being done. */
   readonly onStep?: (step: string) => void;
@@ -77,7 +80,7 @@ const WHOLE: Plan = { trades: { cutAt: () => ({}) }, filling: 0, isRefined: fals
  */
 export async function economise(cloud: GaussianCloud, options: EconomiseOptions): Promise<Economised> {
   const { minDecibels, evaluator, pool = inline, signal, onStep = () => undefined } = options;
-  const encodings = encodingsFor(options.name, cloud);
+  const encodings = encodingsFor(options.name, cloud, options);
   const watch = new Stopwatch();
   onStep(`scoring ${cloud.count} splats`);
   const ranking = await evaluator.rank(signal);
@@ -130,14 +133,24 @@ async function chooseEncoding(
   target: number,
   options: EconomiseOptions,
 ): Promise<{ encoding: Encoding; rounding: number }> {
-  if (encodings.length === 1) return { encoding: encodings[0], rounding: 0 };
+  const [{ tune }] = encodings;
+  if (encodings.length === 1 && tune === undefined) return { encoding: encodings[0], rounding: 0 };
   const degrees = new Uint8Array(cloud.count).fill(cloud.shDegree);
   const whole = { cloud, degrees };
+  const measure = async (bytes: Uint8Array): Promise<number> => {
+    const rounded = await readScene(bytes, { name: options.name });
+    return errorTogether(await options.evaluator.compare(rounded, 'searched', options.signal), 'searched');
+  };
+  if (tune) {
+    options.onStep?.('steps of each attribute');
+    const encoding = await tune(whole, measure, ROUNDING_SHARE * target);
+    options.onStep?.(encoding.title);
+    return { encoding, rounding: await measure(await encoding.write(whole)) };
+  }
   let best = Infinity;
   for (const encoding of encodings) {
     options.onStep?.(`rounding of ${encoding.title}`);
-    const rounded = await readScene(await encoding.write(whole), { name: options.name });
-    const rounding = errorTogether(await options.evaluator.compare(rounded, 'searched', options.signal), 'searched');
+    const rounding = await measure(await encoding.write(whole));
     best = Math.min(best, rounding);
     const isLast = encoding === encodings[encodings.length - 1];
     if (rounding <= ROUNDING_SHARE * target || (isLast && rounding < 0.95 * target)) return { encoding, rounding };

@@ -17,7 +17,7 @@ export interface CutFigures {
  * Looks at a scene: says what its splats contribute, and how far pictures of what is left of it are from those of the whole. {@link GpuEvaluator} does it on the GPU.
  */
 export interface Evaluator {
-  /** Looks at the scene in the scored views. To be called once, before all else. */
+  /** Looks at the scene in the scored views. To be called before all else; the scene is looked at once. */
   rank(signal?: AbortSignal): Promise<Ranking>;
   /** Figures of a cut, in pictures of the scene. */
   cut(cut: Cut, views: JudgedViews, signal?: AbortSignal): Promise<CutFigures>;

@@ -18,3 +18,5 @@ export {
   type ViewOptions,
 } from './views.js';
 export { encodingsFor, type Encoding } from './write/index.js';
+export { allocateSteps, scaledSteps, type AllocateOptions, type Steps } from './allocate-steps.js';
+export { writeSog, type EncodeWebp, type SogOptions, type SogSteps } from './write/sog.js';

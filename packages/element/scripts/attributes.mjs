@@ -1,9 +1,26 @@
-/** What is made from the table in src/attributes.ts: the attributes of the manifest, and the rows of README.md. */
+/** What is made from the tables in src/attributes.ts and src/composition/attributes.ts: the attributes of the manifest, and rows of documents. */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 
-const README = fileURLToPath(new URL('../README.md', import.meta.url));
-const ROWS = /(<!-- attributes[^>]*-->\n)[^]*?(\n<!-- end -->)/;
+const path = (name) => fileURLToPath(new URL(name, import.meta.url));
+/** Of each tag: the table of its attributes, and the document that has their rows. */
+const TABLES = {
+  'gaussian-splat': {
+    table: 'ATTRIBUTES',
+    document: path('../README.md'),
+    rows: /(<!-- attributes: [^>]*-->\n)[^]*?(\n<!-- end -->)/,
+  },
+  'splat-scene': {
+    table: 'SCENE_ATTRIBUTES',
+    document: path('../../../docs/guide/scenes-and-meshes.md'),
+    rows: /(<!-- attributes of splat-scene: [^>]*-->\n)[^]*?(\n<!-- end -->)/,
+  },
+  'splat-mesh': {
+    table: 'MESH_ATTRIBUTES',
+    document: path('../../../docs/guide/scenes-and-meshes.md'),
+    rows: /(<!-- attributes of splat-mesh: [^>]*-->\n)[^]*?(\n<!-- end -->)/,
+  },
+};
 
 const kebab = (name) => name.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`);
 
@@ -13,51 +30,65 @@ const TYPES = { flag: 'boolean', number: 'number | string | null' };
 function typeOf(ts, { expression, typeArguments, arguments: [words] }) {
   const kind = expression.getText();
   if (/keyword$/i.test(kind)) return `${words.elements.map((word) => word.getText()).join(' | ')} | null`;
-  return TYPES[kind] ?? typeArguments?.[0].getText() ?? 'string | null';
+  return TYPES[kind] ?? typeArguments?.at(-1).getText() ?? 'string | null';
 }
 
-/** A plugin of the manifest's analyzer: adds each entry of the table to the element, as an attribute and as its property. */
+/** A plugin of the manifest's analyzer: adds each entry of a table to its element, as an attribute and as its property. */
 export function tableOfAttributes() {
-  let found = [];
+  const found = new Map();
   return {
     name: 'table-of-attributes',
     analyzePhase({ ts, node }) {
-      if (!ts.isVariableDeclaration(node) || node.name.getText() !== 'ATTRIBUTES') return;
-      found = node.initializer.properties.map((entry) => {
+      if (!ts.isVariableDeclaration(node) || !node.initializer || !ts.isObjectLiteralExpression(node.initializer))
+        return;
+      if (!/^([A-Z_]*ATTRIBUTES|PLACED)$/.test(node.name.getText())) return;
+      const entries = node.initializer.properties.flatMap((entry) => {
+        // What several tables have in common stands in one before them.
+        if (ts.isSpreadAssignment(entry)) return found.get(entry.expression.getText());
         const [{ comment, tags = [] }] = ts.getJSDocCommentsAndTags(entry).filter(ts.isJSDoc);
         const tag = tags.find(({ tagName }) => tagName.text === 'default');
         const [description, fallback] = [comment, tag?.comment].map(ts.getTextOfJSDocComment);
         const type = { text: typeOf(ts, entry.initializer) };
         return { name: entry.name.getText(), type, description, ...(fallback && { default: fallback }) };
       });
+      found.set(node.name.getText(), entries);
     },
     packageLinkPhase({ customElementsManifest: { modules } }) {
-      const element = modules
-        .flatMap(({ declarations = [] }) => declarations)
-        .find(({ tagName }) => tagName === 'gaussian-splat');
-      const names = new Set(found.map(({ name }) => name));
-      element.members = [
-        ...found.map((entry) => ({ kind: 'field', privacy: 'public', ...entry, attribute: kebab(entry.name) })),
-        ...element.members.filter(({ name }) => !names.has(name)),
-      ];
-      element.attributes = found.map((entry) => ({ ...entry, name: kebab(entry.name), fieldName: entry.name }));
+      for (const element of modules.flatMap(({ declarations = [] }) => declarations)) {
+        const entries = found.get(TABLES[element.tagName]?.table);
+        if (entries === undefined) continue;
+        const names = new Set(entries.map(({ name }) => name));
+        element.members = [
+          ...entries.map((entry) => ({ kind: 'field', privacy: 'public', ...entry, attribute: kebab(entry.name) })),
+          ...element.members.filter(({ name }) => !names.has(name)),
+        ];
+        // An attribute is text, whatever else its property takes.
+        const written = ({ text }) => ({ text: text.replace(' | readonly number[]', '') });
+        element.attributes = entries.map((entry) => ({
+          ...entry,
+          name: kebab(entry.name),
+          type: written(entry.type),
+          fieldName: entry.name,
+        }));
+      }
     },
   };
 }
 
-/** The table of README.md. */
+/** The table of a document. */
 export function attributeRows(attributes) {
   const row = ({ name, type, description, default: fallback = type.text === 'boolean' ? 'off' : '' }) =>
     `| \`${name}\` |${fallback && ` ${fallback}`} | ${description.replace(/\s*\n\s*/g, ' ')} |`;
   return ['| attribute | default | meaning |', '|---|---|---|', ...attributes.map(row)].join('\n');
 }
 
-/** Brings README.md up to date. */
+/** Brings the documents up to date. */
 export function writeAttributeRows(manifest) {
-  const { attributes } = manifest.modules
-    .flatMap(({ declarations }) => declarations)
-    .find(({ tagName }) => tagName === 'gaussian-splat');
-  const before = readFileSync(README, 'utf8');
-  const after = before.replace(ROWS, (_, begin, end) => `${begin}\n${attributeRows(attributes)}\n${end}`);
-  if (after !== before) writeFileSync(README, after);
+  const declarations = manifest.modules.flatMap((module) => module.declarations);
+  for (const [tag, { document, rows }] of Object.entries(TABLES)) {
+    const { attributes } = declarations.find(({ tagName }) => tagName === tag);
+    const before = readFileSync(document, 'utf8');
+    const after = before.replace(rows, (_, begin, end) => `${begin}\n${attributeRows(attributes)}\n${end}`);
+    if (after !== before) writeFileSync(document, after);
+  }
 }

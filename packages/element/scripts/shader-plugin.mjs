@@ -6,9 +6,15 @@ import { shortened } from './short-wgsl.mjs';
 const folder = (name) => fileURLToPath(new URL(`../../${name}/dist/generated/`, import.meta.url));
 /** Where scripts/build-shaders.mjs and the compiler put the pieces that shaders are joined of. */
 export const SHADER_FILES = [
-  ...['shaders.js', 'live-shaders.js', 'streamed-shaders.js', 'quantized-shaders.js', 'probe-shaders.js'].map(
-    (file) => folder('renderer') + file,
-  ),
+  ...[
+    'shaders.js',
+    'live-shaders.js',
+    'streamed-shaders.js',
+    'quantized-shaders.js',
+    'probe-shaders.js',
+    'depth-shaders.js',
+    'linear-shaders.js',
+  ].map((file) => folder('renderer') + file),
 ];
 
 /** What variants of shaders find by its text and replace: see `specialise` in packages/renderer/src/gpu/kernel.ts. */

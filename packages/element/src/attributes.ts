@@ -2,7 +2,7 @@
  * The attributes of `<gaussian-splat>`, each in one place: its property's type, what Lit is told of it, its grammar, its default and what people read of it. The manifest
  * for editors and the table in README.md are made from this file (`scripts/attributes.mjs`). Kinds are called without options where their type says all.
  */
-import type { ShDegree } from '@gaussian-splat/core';
+import type { ShDegree, SplatFilter } from '@gaussian-splat/core';
 import type { Quality } from '@gaussian-splat/renderer';
 import type { PropertyDeclaration, PropertyDeclarations } from 'lit';
 import {
@@ -38,8 +38,12 @@ export type DetailChoice = 'auto' | 'off' | number;
 /** What pictures are drawn with: `auto` is the true image at rest and, in motion, as much of it as there is time for. */
 export type QualityChoice = 'auto' | Quality;
 
+/** The low-pass filter that a scene was trained with: `auto` is what its file says, or else `classic`. */
+export type FilterChoice = 'auto' | SplatFilter;
 /** What draws: `auto` is WebGPU where the browser has it, else WebGL 2. */
 export type RendererChoice = 'auto' | 'webgpu' | 'webgl';
+/** When the wheel zooms, and when it is the page's. */
+export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 
 /** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
 export type Reveal = 'auto' | 'manual';
@@ -53,28 +57,29 @@ export type InteractionPromptStyle = 'wiggle' | 'basic';
 /** What the camera does under a person's hands: turn around its target, or fly. */
 export type Navigation = 'orbit' | 'fly';
 
-/** One attribute. Only types know `P`, of the property, and `V`, of what is read of it: never where the element takes the property as it is. */
-interface Attribute<P, V = never> {
+/** One attribute, as the tables of elements list them. Only types know `P`, of the property, and `V`, of what is read of it: never where the element takes the property as it is. */
+export interface Attribute<P, V = never> {
   readonly lit: PropertyDeclaration;
   readonly grammar?: AttributeGrammar<V>;
   readonly property?: P;
 }
 
 /** Taken as it is written. */
-const text = <P = string | null>(): Attribute<P> => ({ lit: {} });
+export const text = <P = string | null>(): Attribute<P> => ({ lit: {} });
 /** On wherever it is written, but for `"false"`: what frameworks write that take it for an attribute with a value. */
-const flag = (): Attribute<boolean> => ({
+export const flag = (): Attribute<boolean> => ({
   lit: {
     type: Boolean,
     converter: { fromAttribute: (value: string | null): boolean => value !== null && value !== 'false' },
   },
 });
-const read = <V, P = string | null>(grammar: AttributeGrammar<V>): Attribute<P, V> => ({ lit: {}, grammar });
+export const read = <V, P = string | null>(grammar: AttributeGrammar<V>): Attribute<P, V> => ({ lit: {}, grammar });
 const number = <V>(grammar: AttributeGrammar<V>): Attribute<number | string | null, V> => ({ lit: {}, grammar });
 /** The first is the default. */
 const keyword = <V extends string>(words: readonly V[]): Attribute<V | null, V> => read(keywordGrammar(words));
 /** `''` is what the bare attribute gives. */
-const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> => read(keywordGrammar(words));
+export const bareKeyword = <V extends string>(words: readonly V[]): Attribute<V | '' | null, V> =>
+  read(keywordGrammar(words));
 
 const map = <A, B>(grammar: AttributeGrammar<A>, to: (value: A) => B): AttributeGrammar<B> => ({
   ...grammar,
@@ -130,7 +135,7 @@ export const ATTRIBUTES = {
   cameraControls: flag(),
   /**
    * Theta, phi, radius: `deg` or `rad`; `m`, `cm`, `mm`, or `%` of the radius that frames the scene (all of a subject that stands alone, of others the 90 % of splats around the middle); `auto`, also
-   * for what is left out at the end. As in `<model-viewer>`, but for `calc()` and `env()`. Where the camera goes: see `getCameraOrbit()`.
+   * for what is left out at the end. As in `<model-viewer>`, but for `calc()` and `env()`. Setting it moves the camera, also when the value is the same as before. Where the camera goes: see `getCameraOrbit()`.
    * @default `0deg 75deg auto`
    */
   cameraOrbit: read(orbitGrammar('0deg 75deg auto')),
@@ -140,10 +145,24 @@ export const ATTRIBUTES = {
    */
   cameraTarget: read(targetGrammar),
   /**
+   * Least `camera-target`. Without this and `max-camera-target`, visitors pan within the radius that frames the scene.
+   * @default `auto`: no limit
+   */
+  minCameraTarget: read(targetGrammar),
+  /**
+   * Greatest `camera-target`.
+   * @default `auto`: no limit
+   */
+  maxCameraTarget: read(targetGrammar),
+  /**
    * Vertical angle, such as `45deg`.
    * @default `auto` (45deg)
    */
   fieldOfView: read(fieldOfViewGrammar),
+  /**
+   * Views that visitors can choose from: JSON or, as a property, a list `[{ name, orbit, target, fieldOfView }]`; or the URL of such a file, of a trainer's `cameras.json`, or of the settings of SuperSplat. Children with `data-orbit` are views, too.
+   */
+  views: text<object | string | null>(),
   /**
    * Least `camera-orbit`.
    * @default `auto`: phi 22.5deg, radius 2 %
@@ -174,18 +193,23 @@ export const ATTRIBUTES = {
    * @default `pan-y`
    */
   touchAction: keyword<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']),
+  /**
+   * When the wheel zooms: `auto` with Ctrl, while the scene has the focus, or where there is nothing to scroll; `always`; `ctrl` with Ctrl only; `none`. At the zoom limit the page scrolls. Two fingers zoom in any case.
+   * @default `auto`
+   */
+  zoom: keyword<WheelZoom>(['auto', 'always', 'ctrl', 'none']),
   /** Leaves the wheel and all that two fingers do to the page; keys do not zoom either. */
   disableZoom: flag(),
   /** Keeps the camera's target where it is. */
   disablePan: flag(),
-  /** Keeps the camera's target where it is on a double click or a double tap, which otherwise pick the point to turn around. */
+  /** Ignores a double click and a double tap, which otherwise pick the point to turn around or, beside the scene, bring the camera back. */
   disableTap: flag(),
   /**
    * `orbit` turns around the target; `fly` looks around, and flies by W, A, S, D, Q and E, with Shift faster.
    * @default `orbit`
    */
   navigation: keyword<Navigation>(['orbit', 'fly']),
-  /** Turns the camera around the scene while nobody touches it; not for people who want less motion, nor under the keyboard; visitors can stop it. */
+  /** Turns the camera around the scene until a visitor touches it. Off for visitors who want less motion, and while the scene has the keyboard; a button stops it. */
   autoRotate: flag(),
   /**
    * Rest before it turns, in milliseconds.
@@ -213,8 +237,8 @@ export const ATTRIBUTES = {
    */
   interactionPromptThreshold: number(milliseconds(3_000)),
   /**
-   * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`,
-   * `show` (`…` stands for `alt`), `loading`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
+   * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`, `keys-views`,
+   * `views`, `next-view`, `previous-view`, `show` (`…` stands for `alt`), `loading`, `reset`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
    * @default English
    */
   a11y: text<SpokenStrings | string | null>(),
@@ -252,7 +276,14 @@ export const ATTRIBUTES = {
    */
   maxShDegree: number(map(keywordGrammar(['3', '2', '1', '0']), (degree) => Number(degree) as ShDegree)),
   /**
-   * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every picture to be off by so many.
+   * The filter that the scene was trained with, for files that cannot say it: `classic` (0.3 px²), `antialiased` (0.3 px² with compensation: gsplat's and INRIA's options of that name), `mip`
+   * (0.1 px² with compensation: Mip-Splatting, Brush's mip mode). Distant splats are too thin or too thick with another one.
+   * @default `auto`: what the file says, else `classic`
+   */
+  filter: keyword<FilterChoice>(['auto', 'classic', 'antialiased', 'mip']),
+  /**
+   * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every frame an error of that size. Scenes that
+   * come in levels (`detail.json`, `lod-meta.json`) are streamed: `auto` is `1px` for them, and with `off` a `lod-meta.json` is loaded whole.
    * @default `auto`
    */
   detail: read(detailGrammar),
@@ -263,8 +294,15 @@ export const ATTRIBUTES = {
   contract: text<string | object | null>(),
   /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */
   chain: text(),
+  /**
+   * `off`: the first run of a generator on the GPU is not compared with the same run on the CPU.
+   * @default each model once on each adapter, when the page is idle
+   */
+  compare: text(),
   /** URL of a post-processor that makes the picture shown from the one drawn, or several with spaces between them. */
   postprocess: text(),
+  /** Controls for visitors, made from what the generator or post-processor takes: sliders, a pose by its joints, pictures, the time. Style them by their parts. */
+  controlsPanel: flag(),
   /** Seconds: where the scene's time is put whenever this changes. See `currentTime` for where it is. */
   time: text<number | string | null>(),
   /**
@@ -272,7 +310,7 @@ export const ATTRIBUTES = {
    * @default the rest pose
    */
   pose: text<Numbers | null>(),
-  /** Plays a scene that moves as soon as it is on show; not for people who want less motion; visitors can stop it. */
+  /** Plays a scene that moves as soon as it is shown. Off for visitors who want less motion; a button stops it. */
   autoplay: flag(),
   /** Starts again at the end. */
   loop: flag(),
@@ -312,9 +350,11 @@ const attributeOf = (property: string): string => property.replace(/[A-Z]/g, (le
 export const credentialsOf = (crossorigin: Attributes['crossorigin']): RequestCredentials =>
   crossorigin === 'use-credentials' ? 'include' : 'same-origin';
 
-/** What Lit is told of them. */
-export const declarations = (): PropertyDeclarations =>
-  Object.fromEntries(entries.map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
+/** What Lit is told of a table. */
+export const declarations = (
+  table: Readonly<Record<string, Attribute<unknown, unknown>>> = ATTRIBUTES,
+): PropertyDeclarations =>
+  Object.fromEntries(Object.entries(table).map(([name, { lit }]) => [name, { ...lit, attribute: attributeOf(name) }]));
 
 /** The properties that are on or off. */
 export const flags = entries.filter(([, { lit }]) => lit.type === Boolean).map(([name]) => name);
@@ -331,6 +371,8 @@ export function readAttributes(raw: RawAttributes, warn: (sentence: string) => v
     camera: {
       orbit: values.cameraOrbit,
       target: values.cameraTarget,
+      minTarget: values.minCameraTarget,
+      maxTarget: values.maxCameraTarget,
       fieldOfView: values.fieldOfView,
       minOrbit: values.minCameraOrbit,
       maxOrbit: values.maxCameraOrbit,

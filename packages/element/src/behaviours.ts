@@ -7,7 +7,7 @@ import type { SpokenStrings } from './words.js';
 import { AnnouncerController, type AnnouncerHost } from './controllers/announcer-controller.js';
 import { AutoRotateController, type AutoRotateHost } from './controllers/auto-rotate-controller.js';
 import type { CameraController } from './controllers/camera-controller.js';
-import { FlyController, type FlyHost } from './controllers/fly-controller.js';
+import type { FlyHost } from './controllers/fly-controller.js';
 import type { InputOptions } from './controllers/input-controller.js';
 import { MotionController, type MotionHost } from './controllers/motion-controller.js';
 import { prefersReducedMotion, reducedMotion, type Mover } from './controllers/mover.js';
@@ -29,21 +29,26 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
   readonly announcer: AnnouncerController;
   readonly motion: MotionController;
   readonly #host: BehaviourHost;
+  readonly #element: ReactiveControllerHost;
   readonly #autoRotate: AutoRotateController;
-  readonly #movers: readonly Mover[];
+  readonly #movers: Mover[];
+  #isFlyLoaded = false;
 
   constructor(element: ReactiveControllerHost & HTMLElement, host: BehaviourHost) {
     this.#host = host;
+    this.#element = element;
     this.motion = new MotionController(element, this);
     this.#autoRotate = new AutoRotateController(element, this);
     this.prompt = new PromptController(element, this);
-    const fly = new FlyController(element, this);
     this.announcer = new AnnouncerController(element, this);
-    this.#movers = [this.#autoRotate, this.prompt, fly];
+    this.#movers = [this.#autoRotate, this.prompt];
     let motion: MediaQueryList | undefined;
     const onMotion = (): void => element.requestUpdate();
     element.addController({
-      hostUpdated: () => (this.camera.pivot = this.#flies ? 'eye' : 'target'),
+      hostUpdated: () => {
+        this.camera.pivot = this.#flies ? 'eye' : 'target';
+        if (this.mayFly && !this.#isFlyLoaded) void this.#loadFly();
+      },
       hostConnected: () => {
         // From the picture to the button inside counts, too.
         element.shadowRoot?.addEventListener('focusout', this.#onBlur);
@@ -73,16 +78,12 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.#host.strings;
   }
 
-  get playback(): MotionHost['playback'] {
-    return this.#host.playback;
+  get player(): MotionHost['player'] {
+    return this.#host.player;
   }
 
   get autoRotates(): boolean {
     return this.#host.autoRotates;
-  }
-
-  get autoplays(): boolean {
-    return this.#host.autoplays;
   }
 
   get isOnShow(): boolean {
@@ -134,20 +135,43 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
     return this.attributes.navigation === 'fly';
   }
 
+  /** Few pages fly: the keys for it come later than the rest. */
+  async #loadFly(): Promise<void> {
+    this.#isFlyLoaded = true;
+    const { FlyController } = await import('./controllers/fly-controller.js');
+    this.add(new FlyController(this.#element, this));
+    this.#element.requestUpdate();
+  }
+
+  /** Something else that moves the camera by itself. */
+  add(mover: Mover): void {
+    this.#movers.push(mover);
+  }
+
+  /** What turns by itself waits once more. */
+  rest(): void {
+    this.#autoRotate.rest();
+  }
+
   /** Moves what moves by itself on to a frame. */
   advance(now: number): void {
     for (const mover of this.#movers) if (mover.advance(now)) this.requestFrame();
   }
 
-  /** A person's gesture or key. */
-  act(action: CameraAction): void {
+  /** A person's gesture or key. @returns false where it moves nothing: at the limit of the zoom */
+  act(action: CameraAction): boolean {
     const camera = this.camera;
+    const { isTouched } = camera;
     this.#touched();
+    let moves = true;
     if (action.type === 'reset') camera.reset('user-interaction');
     else if (action.type === 'pan') camera.panBy(action.right, action.up);
     else if (this.#flies) this.#fly(action);
     else if (action.type === 'orbit') camera.orbitBy(action.theta, action.phi);
-    else camera.zoomBy(action.factor);
+    else moves = camera.zoomBy(action.factor);
+    // The button that brings the camera back comes and goes with this.
+    if (camera.isTouched !== isTouched) this.#element.requestUpdate();
+    return moves;
   }
 
   /** A person picks another point to turn around: viewer space. */
@@ -166,10 +190,10 @@ export class Behaviours implements AutoRotateHost, PromptHost, FlyHost, Announce
 
   #touched(): void {
     this.prompt.dismiss();
-    this.#autoRotate.rest();
+    this.rest();
   }
 
-  readonly #onBlur = (): void => this.#autoRotate.rest();
+  readonly #onBlur = (): void => this.rest();
 }
 
 /** True while a person has come to the picture by keyboard, and nothing may move under their hands. */

@@ -35,6 +35,10 @@ export class ElementCore implements StageHost {
     return this.#host.strings;
   }
 
+  get views(): StageHost['views'] {
+    return this.#host.views;
+  }
+
   get liveValues(): StageHost['liveValues'] {
     return this.#host.liveValues;
   }
@@ -49,10 +53,6 @@ export class ElementCore implements StageHost {
 
   get autoRotates(): boolean {
     return this.#host.autoRotates;
-  }
-
-  get retargets(): boolean {
-    return this.#host.retargets;
   }
 
   get startTime(): number {

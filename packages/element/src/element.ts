@@ -1,9 +1,11 @@
-import { isServer, type PropertyValues, type TemplateResult } from 'lit';
+import { isServer, type PropertyValues, type ReactiveElement, type TemplateResult } from 'lit';
 import { adoptStyles, styles } from './styles.js';
 import { readAttributes, type Attributes } from './attributes.js';
+import type { CameraSettings } from './camera/settings.js';
 import { visitorMessage, type ElementError } from './errors.js';
 import { SharedDevice } from './gpu/shared-device.js';
 import { SceneLoader } from './loading/scene-loader.js';
+import type { GeneratorInput } from './live/inputs.js';
 import type { LiveState } from './live/live-model.js';
 import type { SceneLimits } from './loading/protocol.js';
 import { CONTROL_PREFIX, readControls, readNumbers } from './live/values.js';
@@ -26,6 +28,13 @@ export interface SceneStatistics {
   readonly renderer: 'webgpu' | 'webgl';
 }
 
+/** The properties that move the camera, and what each sets. */
+const CAMERA_SETTINGS: ReadonlyMap<unknown, keyof CameraSettings> = new Map([
+  ['cameraOrbit', 'orbit'],
+  ['cameraTarget', 'target'],
+  ['fieldOfView', 'fieldOfView'],
+]);
+
 /** Names of the custom states, for `gaussian-splat:state(ready)` in CSS. */
 const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'] as const;
 
@@ -42,15 +51,26 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @slot interaction-prompt - Shown to people who have not touched the scene yet.
  * @slot fallback - Shown where the browser has no WebGPU.
  * @slot error - Shown if the scene cannot be.
+ * @slot view - Buttons of the page for its views, each with `data-orbit`.
  * @slot hotspot-* - A label of the page at the point of the scene that its `data-position` names.
  * @csspart canvas - The picture.
  * @csspart poster - The image of the `poster` attribute.
  * @csspart poster-button - The button around it with `reveal="manual"`.
  * @csspart poster-cue - The sign in the middle of that button.
  * @csspart prompt - The default interaction prompt.
+ * @csspart reset-button - Brings the camera back: shown to visitors who have moved it with their fingers.
+ * @csspart views - The bar of the views.
+ * @csspart view-name - The name of the present view in it.
+ * @csspart previous-view - Its button for the view before.
+ * @csspart next-view - Its button for the next view.
  * @csspart pause-button - The visitor's button for what `auto-rotate` and `autoplay` move.
  * @csspart progress-track - The progress bar's ground.
  * @csspart progress-bar - The progress bar.
+ * @csspart controls-panel - The panel of the attribute `controls-panel`.
+ * @csspart control - A control in it, with its label.
+ * @csspart control-label - The label.
+ * @csspart control-input - The slider, field or button.
+ * @csspart control-value - The number beside a slider.
  * @csspart fallback - The default text where there is no WebGPU.
  * @csspart error - The default text after an error.
  * @cssproperty [--poster-fit=cover] - `object-fit` of the poster.
@@ -62,6 +82,8 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty --interaction-prompt-background - Ground of the default prompt.
  * @cssproperty --interaction-prompt-color - Its colour.
  * @cssproperty [--pause-button-display=block] - `none` takes the pause button away: for pages that bring a control of their own.
+ * @cssproperty [--reset-button-display=block] - `none` takes the reset button away.
+ * @cssproperty [--views-display=flex] - `none` takes the bar of the views away.
  * @cssproperty [--min-hotspot-opacity=0.25] - Opacity of hotspots that are hidden.
  * @cssproperty [--max-hotspot-opacity=1] - Opacity of the others.
  * @cssproperty --message-background - Ground of the default texts.
@@ -78,9 +100,11 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is on show while the rest loads.
  * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
+ * @fires {CustomEvent<ViewChangeDetail>} view-change - The camera sets out for a view of the list.
  * @fires {Event} poster-dismissed - The poster has given way to the scene.
  * @fires {CustomEvent<VisibilityDetail>} model-visibility - The element has come into sight, or left it.
  * @fires {CustomEvent<ElementError>} generator-error - A run of the generator failed; the last good frame stays.
+ * @fires {Event} inputs-change - The inputs that the page may set are others; `inputs` has them.
  * @fires {CustomEvent<FallbackDetail>} generator-fallback - The generator runs on the CPU; `detail.reason` says why.
  * @fires {Event} play - As of HTMLMediaElement, like those that follow.
  * @fires {Event} playing - The time runs.
@@ -130,6 +154,8 @@ export class GaussianSplatElement extends ViewingMethods {
   readonly #internals: ElementInternals | null;
   #liveValues: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
   #strings: SpokenStrings = {};
+  /** What the page has set of the camera since it was last applied. */
+  readonly #set = new Set<keyof CameraSettings>();
   #controlObserver: MutationObserver | undefined;
   readonly #warned = new Set<string>();
   /** @internal */
@@ -144,7 +170,7 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** True while the scene is on show. */
   get loaded(): boolean {
-    return this.stage.scene.state === 'ready';
+    return this.stage.state === 'ready';
   }
 
   /**
@@ -152,7 +178,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.scene.settled);
+    return this.updateComplete.then(() => this.stage.childrenKnown).then(() => this.stage.settled);
   }
 
   /**
@@ -165,20 +191,28 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** Why no scene is shown, or null. */
   get error(): ElementError | null {
-    return this.stage.scene.error;
+    return this.stage.error;
+  }
+
+  /** What the page may set of the models that are shown, from their contracts: for controls of one's own. Empty without a model; `inputs-change` tells of others. */
+  get inputs(): readonly GeneratorInput[] {
+    return this.stage.inputs;
   }
 
   /** Size of the scene on show, or null. */
   get statistics(): SceneStatistics | null {
-    const { scene } = this.stage.scene;
-    if (!scene) return null;
-    const { gaussians, renderer } = scene;
-    return {
-      renderer,
-      splats: gaussians.frameCount ?? gaussians.count,
-      dropped: gaussians.droppedCount ?? 0,
-      bytes: gaussians.byteLength,
-    };
+    const { shown } = this.stage;
+    if (shown.length === 0) return null;
+    const nothing: SceneStatistics = { splats: 0, dropped: 0, bytes: 0, renderer: shown[0].renderer };
+    return shown.reduce(
+      ({ splats, dropped, bytes, renderer }, { gaussians: { frameCount, count, droppedCount = 0, byteLength } }) => ({
+        renderer,
+        splats: splats + (frameCount ?? count),
+        dropped: dropped + droppedCount,
+        bytes: bytes + byteLength,
+      }),
+      nothing,
+    );
   }
 
   /**
@@ -257,7 +291,9 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   protected override render(): TemplateResult {
-    const { scene, reveal, behaviours, hotspots, progress } = this.stage;
+    const { state, progress, hasPicture, reveal, behaviours, hotspots } = this.stage;
+    // One of several scenes that fails leaves the others visible.
+    const error = hasPicture ? null : this.stage.error;
     const { prompt, promptWiggles, announcer, motion } = behaviours;
     return template({
       label: this.alt ?? this.getAttribute?.('aria-label') ?? null,
@@ -267,15 +303,17 @@ export class GaussianSplatElement extends ViewingMethods {
       posterLoading: this.#attributes.loading,
       showPoster: reveal.isCovered,
       onReveal: reveal.mayReveal ? null : this.#onReveal,
-      isLoading: scene.state === 'loading',
+      isLoading: state === 'loading',
       progress,
-      error: scene.error,
+      error,
+      hasPoster: this.#hasPoster,
       prompt: !prompt.isShown ? 'none' : promptWiggles ? 'wiggle' : 'basic',
       motion: motion.switch,
       onMotion: this.#onMotion,
+      onReset: this.stage.offersReset ? this.#onReset : null,
       strings: this.#strings,
-      spoken: scene.error ? this.#spokenError(scene.error) : announcer.text,
-      hotspots: hotspots.names,
+      spoken: error ? this.#spokenError(error) : announcer.text,
+      hotspots: hotspots?.names ?? [],
     });
   }
 
@@ -288,8 +326,9 @@ export class GaussianSplatElement extends ViewingMethods {
         return element.#attributes;
       },
       get input() {
-        const { cameraControls: enabled, disableZoom, disablePan } = element;
-        return { enabled, zoom: !disableZoom, pan: !disablePan, touchAction: element.#attributes.touchAction };
+        const { cameraControls: enabled, disableZoom, disablePan, disableTap } = element;
+        const { touchAction, zoom: wheel } = element.#attributes;
+        return { enabled, zoom: !disableZoom, pan: !disablePan, tap: !disableTap, touchAction, wheel };
       },
       get services() {
         return element.constructor as typeof GaussianSplatElement;
@@ -306,8 +345,8 @@ export class GaussianSplatElement extends ViewingMethods {
       get autoRotates() {
         return element.autoRotate;
       },
-      get retargets() {
-        return !element.disableTap && !element.disablePan;
+      get views() {
+        return element.views;
       },
       get strings() {
         return element.#strings;
@@ -328,10 +367,19 @@ export class GaussianSplatElement extends ViewingMethods {
     };
   }
 
-  /** The page's own words, where it has some. */
+  /** The page's own words, where it has some; none for a poster that stands in for the scene. */
   #spokenError(error: ElementError): string {
-    const slotted = this.querySelector(`:scope > [slot=${error.code === 'unsupported' ? 'fallback' : 'error'}]`);
-    return slotted?.textContent.trim() || visitorMessage(error, this.#strings);
+    const isUnsupported = error.code === 'unsupported';
+    const own = this.#slotted(isUnsupported ? 'fallback' : 'error')?.textContent.trim();
+    return own || (isUnsupported && this.#hasPoster ? '' : visitorMessage(error, this.#strings));
+  }
+
+  get #hasPoster(): boolean {
+    return !!this.poster || this.#slotted('poster') !== null;
+  }
+
+  #slotted(name: string): Element | null {
+    return this.querySelector?.(`:scope > [slot=${name}]`) ?? null;
   }
 
   /** A person clicked the poster: the keyboard goes on in the scene. */
@@ -340,14 +388,29 @@ export class GaussianSplatElement extends ViewingMethods {
     void this.updateComplete.then(() => this.focus());
   };
 
+  readonly #onReset = (): void => {
+    this.stage.act({ type: 'reset' });
+    // The button goes.
+    this.focus({ preventScroll: true });
+  };
+
   readonly #onMotion = (): void => void this.stage.behaviours.motion.toggle();
+
+  /** Lit passes over a value that is set again; where the camera goes, it counts: a bookmark works twice. */
+  override requestUpdate(...request: Parameters<ReactiveElement['requestUpdate']>): void {
+    const setting = CAMERA_SETTINGS.get(request[0]);
+    if (setting === undefined) return super.requestUpdate(...request);
+    this.#set.add(setting);
+    super.requestUpdate();
+  }
 
   /** Attributes count at once for those who call a method right after setting one. */
   protected override applyAttributes(): void {
     const before = this.#attributes;
     this.#attributes = this.#readAttributes();
-    if (JSON.stringify(before.camera) !== JSON.stringify(this.#attributes.camera)) {
-      this.stage.camera.applySettings(this.#attributes.camera);
+    if (this.#set.size > 0 || JSON.stringify(before.camera) !== JSON.stringify(this.#attributes.camera)) {
+      this.stage.camera.applySettings(this.#attributes.camera, this.#set);
+      this.#set.clear();
     }
   }
 
@@ -387,7 +450,7 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   #showStates(): void {
-    const { state, error } = this.stage.scene;
+    const { state, error } = this.stage;
     const active: Record<(typeof STATES)[number], boolean> = {
       loading: state === 'loading',
       preview: this.stage.scene.isPreview,

@@ -10,6 +10,13 @@ export interface CameraChangeDetail {
   readonly source: CameraChangeSource;
 }
 
+export interface ViewChangeDetail {
+  /** The view's name. */
+  readonly name: string;
+  /** Its place in the list, from 0. */
+  readonly index: number;
+}
+
 export interface LoadDetail {
   /** Absolute URL of the scene. */
   readonly url: string;
@@ -48,12 +55,16 @@ export interface GaussianSplatEventMap {
   error: CustomEvent<ElementError>;
   /** The camera has moved; at most once a frame. */
   'camera-change': CustomEvent<CameraChangeDetail>;
+  /** The camera sets out for a view of the list. */
+  'view-change': CustomEvent<ViewChangeDetail>;
   /** The poster has given way to the scene. */
   'poster-dismissed': Event;
   /** The element has come into sight, or left it. */
   'model-visibility': CustomEvent<VisibilityDetail>;
   /** A run of the generator failed; the last good frame stays, and the next change tries again. */
   'generator-error': CustomEvent<ElementError>;
+  /** The inputs that the page may set are others: see the property `inputs`. */
+  'inputs-change': Event;
   /** The generator runs on the CPU, because of the reason given. */
   'generator-fallback': CustomEvent<FallbackDetail>;
   /** Loading and time, as of HTMLMediaElement. */

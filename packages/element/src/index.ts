@@ -10,6 +10,7 @@ export type {
   HotspotVisibilityDetail,
   LoadDetail,
   PreviewDetail,
+  ViewChangeDetail,
   VisibilityDetail,
 } from './events.js';
 export { GaussianSplatElement, type SceneStatistics } from './element.js';
@@ -17,6 +18,10 @@ export type { SceneStats } from './stats.js';
 export type { PaceReport } from './controllers/pace-controller.js';
 export type { SettableProperties } from './media.js';
 export type { PictureOptions } from './viewing.js';
+export type { CameraView, LookView, MatrixView, OrbitView, TrainerView } from './views/camera-view.js';
+export type { Easing } from './views/path.js';
+export type { NamedView } from './views/read-views.js';
+export type { FlightOptions, PathOptions } from './views/tour.js';
 export type {
   InteractionPrompt,
   InteractionPromptStyle,
@@ -24,6 +29,7 @@ export type {
   Navigation,
   Reveal,
   TouchAction,
+  WheelZoom,
 } from './attributes.js';
 export type { ViewName } from './camera/spoken.js';
 export type { SpokenStrings } from './words.js';
@@ -31,7 +37,8 @@ export { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/val
 export type { HotspotPlace } from './controllers/hotspot-controller.js';
 export type { SceneBox } from './scene-queries.js';
 export { SceneTimeRanges } from './time-ranges.js';
-export type { ControlValues, Numbers, Picture } from './live/values.js';
+export type { GeneratorInput } from './live/inputs.js';
+export type { ControlValues, Numbers, Picture, Pictures } from './live/values.js';
 export type { SceneLimits } from './loading/protocol.js';
 export { SharedDevice, type DeviceLease } from './gpu/shared-device.js';
 

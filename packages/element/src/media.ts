@@ -68,7 +68,7 @@ export abstract class MediaProperties extends SplatProperties {
 
   /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is on show. */
   get readyState(): number {
-    return this.stage.scene.state === 'ready' ? HAVE_ENOUGH_DATA : HAVE_NOTHING;
+    return this.stage.state === 'ready' ? HAVE_ENOUGH_DATA : HAVE_NOTHING;
   }
 
   /** Times that can be sought: all of a scene with an end, none of others. */

@@ -45,6 +45,7 @@ export class Addresses {
       credentials: credentialsOf(crossorigin),
       sh: quality === 'reference' ? 'float16' : 'auto',
       levels: typeof detail === 'number' && detail > 0,
+      isWhole: !detail || detail === 'off',
       renderer,
       contract,
       chain: this.#chain.of(listed(chain), modifier),

@@ -40,8 +40,7 @@ export interface StageHost {
   /** The attribute `time`, in seconds; 0 without. */
   readonly startTime: number;
   readonly autoRotates: boolean;
-  /** A double click or a double tap picks the point to turn around. */
-  readonly retargets: boolean;
+  readonly views: object | string | null;
   readonly strings: SpokenStrings;
   readonly liveValues: Omit<LiveState, 'timeSeconds'>;
   readonly canvas: HTMLCanvasElement | null;

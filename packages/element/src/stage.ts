@@ -1,17 +1,18 @@
-import type { Camera } from '@gaussian-splat/core';
-import type { ProbeAnswer, ProbePoint } from '@gaussian-splat/renderer';
+import { loadModule, type Camera } from '@gaussian-splat/core';
+import { World, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
 import type { ReactiveControllerHost } from 'lit';
 import { Behaviours, type BehaviourHost } from './behaviours.js';
 import type { CameraAction } from './camera/gestures.js';
+import type { SceneBounds } from './camera/settings.js';
 import { CameraController } from './controllers/camera-controller.js';
 import { DetailController, type DetailHost } from './controllers/detail-controller.js';
-import { HotspotController, type HotspotHost } from './controllers/hotspot-controller.js';
+import type { HotspotController, HotspotHost } from './controllers/hotspot-controller.js';
 import { InputController, type InputHost } from './controllers/input-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
 import { PrintController } from './controllers/print-controller.js';
 import { RevealController, type RevealHost } from './controllers/reveal-controller.js';
-import { SceneController, type Entrance, type SceneHost } from './controllers/scene-controller.js';
+import { SceneController, type Entrance, type SceneHost, type SceneState } from './controllers/scene-controller.js';
 import { SizeController } from './controllers/size-controller.js';
 import { SourceController, type SourceHost } from './controllers/source-controller.js';
 import { ViewController, type ViewHost } from './controllers/view-controller.js';
@@ -20,10 +21,13 @@ import { ElementCore } from './element-core.js';
 import type { ElementError } from './errors.js';
 import type { CameraChangeSource } from './events.js';
 import { isGone } from './gpu/device-failures.js';
-import type { DrawnScene } from './gpu/open-scene.js';
+import type { DetailLevers, LoadedGaussians } from './gpu/loaded-gaussians.js';
+import type { GeneratorInput } from './live/inputs.js';
+import { Member } from './member.js';
 import { LiveWiring, type LiveHost } from './live/live-wiring.js';
 import { SceneQueries, type QueryHost } from './scene-queries.js';
 import type { Source, StageHost } from './stage-host.js';
+import type { Tour, TourHost } from './views/tour.js';
 import { statsOf, type ReadCounts, type SceneStats } from './stats.js';
 
 /**
@@ -43,6 +47,7 @@ export class Stage
     InputHost,
     BehaviourHost,
     QueryHost,
+    TourHost,
     LiveHost
 {
   readonly camera: CameraController;
@@ -51,18 +56,29 @@ export class Stage
   readonly playback: PlaybackController;
   readonly reveal: RevealController;
   readonly behaviours: Behaviours;
-  readonly hotspots: HotspotController;
+  /** Labels of the page, where there are some. */
+  hotspots: HotspotController | undefined;
   readonly queries: SceneQueries;
-  /** Share of the loading that is done, 0..1; null while it is not known. */
-  progress: number | null = null;
+  /** All that is drawn. */
+  readonly world = new World();
+  /** What is drawn of the element's own scene. */
+  own: Member | undefined;
+  /** Fulfils when what shows the element's children is there; undefined where it has none. */
+  composing: Promise<void> | undefined;
+  /** Share of the loading of its own scene that is done, 0..1; null while it is not known. */
+  ownProgress: number | null = null;
   readonly size: SizeController;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   drawnFrom: Camera | undefined;
   readonly #visibility: VisibilityController;
-  readonly #view: ViewController;
-  readonly #live: LiveWiring;
+  readonly view: ViewController;
+  readonly live: LiveWiring;
   readonly #source: SourceController;
+  readonly #input: InputController;
+  #tour: Promise<Tour> | undefined;
   #counts: ReadCounts | undefined;
+  #children: MutationObserver | undefined;
+  #labelling: Promise<void> | undefined;
   /** Bytes that have arrived, and how many there are. */
   #bytes: [loaded: number, total: number | undefined] = [0, undefined];
 
@@ -76,66 +92,78 @@ export class Stage
       () => this.#onSize(),
     );
     this.playback = new PlaybackController(this);
-    this.#view = new ViewController(this);
-    this.#live = new LiveWiring(this);
+    this.view = new ViewController(this);
+    this.live = new LiveWiring(this);
     this.scene = new SceneController(element, this);
     this.#source = new SourceController(this);
     this.detail = new DetailController(this);
     this.reveal = new RevealController(element, this);
     this.behaviours = new Behaviours(element, this);
-    this.hotspots = new HotspotController(element, this);
     new PrintController(element, () => this.drawNow());
     this.queries = new SceneQueries(this);
-    new InputController(element, this);
-    const onPageVisibility = (): void => this.playback.suspend();
+    this.#input = new InputController(element, this);
+    const onPageVisibility = (): void => this.suspend();
     element.addController({
       hostConnected: () => {
         document.addEventListener('visibilitychange', onPageVisibility);
+        this.#children ??= new MutationObserver(() => this.#lookAtChildren());
+        this.#children.observe(element, { childList: true, subtree: true, attributeFilter: ['slot', 'data-orbit'] });
+        this.#lookAtChildren();
         // Put back after a while, an eager element loads again though nothing has come into sight.
         this.#source.request();
       },
-      hostUpdated: () => this.#onUpdate(),
-      hostDisconnected: () => document.removeEventListener('visibilitychange', onPageVisibility),
+      hostUpdated: () => this.updated(),
+      hostDisconnected: () => {
+        document.removeEventListener('visibilitychange', onPageVisibility);
+        this.#children?.disconnect();
+      },
     });
   }
 
+  /** What flies from view to view: fetched by pages that have views, or ask for a flight. */
+  tour(): Promise<Tour> {
+    return (this.#tour ??= loadModule('the code for views', () => import('./views/tour.js')).then(
+      ({ Tour }) => new Tour(this.element, this),
+    ));
+  }
+
   /** Draws a frame now and returns its canvas, to be read within the same task; null where there is nothing to draw. */
-  drawNow(): HTMLCanvasElement | null {
-    return this.scene.isPreview ? null : this.#view.drawNow();
+  drawNow(...picture: Parameters<ViewController['drawNow']>): HTMLCanvasElement | null {
+    return this.scene.isPreview ? null : this.view.drawNow(...picture);
   }
 
   /** Frames the scene anew, as if it had just been loaded; one that a generator writes is measured first. */
   async updateFraming(): Promise<void> {
     const { scene } = this.scene;
-    if (scene === null) return;
-    const bounds = (await scene.live?.readBounds?.()) ?? scene.bounds;
-    if (this.scene.scene === scene) this.camera.frame(bounds);
+    const bounds = await this.readBounds();
+    if (bounds && this.scene.scene === scene) this.camera.frame(bounds);
   }
 
   /** What is known of the scene on show; null where there is none. */
   get stats(): SceneStats | null {
-    const { scene } = this.scene;
-    if (scene === null) return null;
-    const { quality } = this.attributes;
-    return statsOf(scene, {
-      quality,
-      pace: this.#view.pace.report,
+    const { shown } = this;
+    if (shown.length === 0) return null;
+    return statsOf(shown, {
+      quality: this.attributes.quality,
+      pace: this.view.pace.report,
       counts: this.#counts,
       isPreview: this.scene.isPreview,
+      frameBytes: this.view.painter?.byteLength ?? 0,
+      pixels: this.levels.detail,
     });
   }
 
   /** Asks the GPU for the counts of the picture on show. */
   async updateStats(): Promise<SceneStats | null> {
-    const { scene } = this.scene;
+    const { painter } = this.view;
     const camera = this.drawnFrom;
-    if (scene === null || camera === undefined) return this.stats;
+    if (painter === null || camera === undefined) return this.stats;
     try {
-      const counts = await scene.readCounts(camera);
-      if (this.scene.scene === scene) this.#counts = counts;
+      const counts = await painter.readCounts(camera);
+      if (this.view.painter === painter) this.#counts = counts;
     } catch (error) {
       // What was asked for is gone; what there is now is known without it.
-      if (!(await isGone(scene))) throw error;
+      if (!(await isGone(painter))) throw error;
     }
     return this.stats;
   }
@@ -143,7 +171,7 @@ export class Stage
   /** The scene to show. Called after every update; only changes act. */
   setSource(source: Source): void {
     this.#source.set(source);
-    this.#live.post.want(this.#source.postprocess);
+    this.live.post.want(this.#source.postprocess);
     if (!this.isLeavingFor(source)) this.playback.keepScene();
   }
 
@@ -174,18 +202,122 @@ export class Stage
 
   /** Asks for a frame: a changed attribute may concern the picture, for example its pixel ratio. */
   requestFrame(): void {
-    this.#view.requestFrame();
+    this.view.requestFrame();
   }
 
   /** The document that the element comes from has no window any more. */
   leaveWindowless(): void {
-    this.#view.renewCanvas();
+    this.view.renewCanvas();
+  }
+
+  /** Children bring what they need: few pages have any. */
+  #lookAtChildren(): void {
+    const has = (selector: string): boolean => this.element.querySelector(`:scope>:is(${selector})`) !== null;
+    if (has('splat-scene,splat-mesh')) this.compose();
+    if (has('[slot^=hotspot-]')) this.#label();
+    if (this.#tour !== undefined || has('[data-orbit]')) this.#showViews();
+  }
+
+  /** Lets more be shown than the splats of one scene. */
+  compose(): void {
+    this.composing ??= loadModule('the code that shows several scenes', () => import('./composition/compose.js')).then(
+      ({ compose }) => compose(this),
+      (error: Error) => {
+        this.composing = undefined;
+        this.warn(error.message);
+      },
+    );
+  }
+
+  /** Fulfils when the code of the element's children is there. */
+  get childrenKnown(): Promise<unknown> {
+    return Promise.all([this.composing, this.#labelling]);
+  }
+
+  #showViews(): void {
+    this.tour().then(
+      () => this.element.requestUpdate(),
+      (error: Error) => this.warn(error.message),
+    );
+  }
+
+  #label(): void {
+    this.#labelling ??= loadModule('the code of labels', () => import('./controllers/hotspot-controller.js')).then(
+      ({ HotspotController }) => {
+        this.hotspots = new HotspotController(this.element, this);
+        if (this.drawnFrom) this.hotspots.frameDrawn(this.drawnFrom);
+      },
+      (error: Error) => {
+        this.#labelling = undefined;
+        this.warn(error.message);
+      },
+    );
   }
 
   // What the controllers ask.
 
+  get state(): SceneState {
+    return this.scene.state;
+  }
+
+  /** Why nothing is shown. */
+  get error(): ElementError | null {
+    return this.scene.error;
+  }
+
+  /** Fulfils, and never rejects, once nothing is left to wait for. */
+  get settled(): Promise<void> {
+    return this.scene.settled;
+  }
+
+  /** Share of the loading that is done, 0..1; null while it is not known. */
+  get progress(): number | null {
+    return this.ownProgress;
+  }
+
+  /** The sources that are drawn. */
+  get shown(): readonly LoadedGaussians[] {
+    return this.own ? [this.own.scene] : [];
+  }
+
+  /** How much detail is drawn, at rest too. */
+  get levels(): DetailLevers {
+    return this.own?.scene.detail ?? {};
+  }
+
+  /** What the page may set of the models on show. */
+  get inputs(): readonly GeneratorInput[] {
+    return [...(this.own?.scene.live?.inputs ?? []), ...(this.view.painter?.filter?.inputs ?? [])];
+  }
+
+  /** Where all of it is, in the frame of the element's own scene; null while nothing is shown. */
+  get bounds(): SceneBounds | null {
+    return this.own?.scene.bounds ?? null;
+  }
+
+  /** The same, measured anew where a generator may have moved it. */
+  async readBounds(): Promise<SceneBounds | null> {
+    return (await this.own?.scene.live?.readBounds?.()) ?? this.bounds;
+  }
+
+  prepareFrame(): string {
+    void this.own?.placement;
+    const { layout, changes, placements } = this.world;
+    return `${layout} ${changes} ${placements.map(({ scene }) => scene.version).join()}`;
+  }
+
+  /** Looks into the last frame. Rejects if it is gone. */
+  async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
+    return (await this.view.painter?.probe(points)) ?? [];
+  }
+
   get isVisible(): boolean {
     return this.#visibility.isVisible;
+  }
+
+  /** Fingers have moved the camera, and have no Home key. */
+  get offersReset(): boolean {
+    return this.input.enabled && this.isOnShow && this.#input.isTouch && this.camera.isTouched;
   }
 
   /** Somebody would see the scene. */
@@ -202,6 +334,10 @@ export class Stage
     return this.scene.state === 'ready' || this.scene.isPreview;
   }
 
+  get player(): BehaviourHost['player'] {
+    return this.autoplays ? this.playback : undefined;
+  }
+
   get wantsPreviews(): boolean {
     return this.isVisible;
   }
@@ -210,19 +346,20 @@ export class Stage
     return {
       element: this.element,
       runtimeLocation: this.services.runtimeLocation,
-      startWorker: this.services.sceneLoader.spawn,
-      state: () => this.#live.state,
-      ownsControls: () => !this.#live.post.isWanted,
+      loader: this.services.sceneLoader,
+      state: () => this.live.state,
+      ownsControls: () => !this.live.post.isWanted,
       camera: (bounds) => {
         if (bounds) this.camera.frame(bounds);
-        return this.camera.view(...FIRST_SIZE);
+        return this.firstView;
       },
-      listeners: this.#live.listeners,
+      listeners: this.live.listeners,
     };
   }
 
-  async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
-    return (await this.scene.scene?.probe(points)) ?? [];
+  /** The camera before the picture has a size. */
+  get firstView(): Camera {
+    return this.camera.view(...FIRST_SIZE);
   }
 
   // What they tell.
@@ -231,14 +368,15 @@ export class Stage
     this.behaviours.advance(now);
   }
 
-  advanceScene(scene: DrawnScene, camera: Camera, now: number): void {
+  advanceScene(camera: Camera, now: number): void {
+    const { scene, live } = this;
     // The last picture of a scene whose place another will take stays as it is.
-    if (!this.scene.isOutgoing) this.#live.advance(scene, camera, now);
+    if (scene.scene && !scene.isOutgoing) live.advance(scene.scene, camera, now);
   }
 
   afterFrame(camera: Camera): void {
     this.drawnFrom = camera;
-    this.hotspots.frameDrawn(camera);
+    this.hotspots?.frameDrawn(camera);
   }
 
   cameraChanged(source: CameraChangeSource): void {
@@ -246,10 +384,10 @@ export class Stage
     this.dispatch(new CustomEvent('camera-change', { detail: { source } }));
   }
 
-  /** Other splats are drawn of the scene on show. */
+  /** Other splats are drawn than before. */
   splatsChanged(): void {
     this.#counts = undefined;
-    this.#view.requestFrame();
+    this.view.requestFrame();
     this.element.requestUpdate();
   }
 
@@ -267,23 +405,42 @@ export class Stage
     if (type === 'play' || type === 'pause') this.element.requestUpdate();
   }
 
-  show(scene: DrawnScene, entrance: Entrance): Promise<void> {
+  show(scene: LoadedGaussians, entrance: Entrance): Promise<void> {
     this.#counts = undefined;
-    if (entrance === 'new') this.camera.frame(scene.bounds);
-    if (entrance === 'whole') this.camera.refine(scene.bounds);
+    const { camera, view } = this;
+    if (entrance === 'new') camera.frame(scene.bounds);
+    if (entrance === 'whole') camera.refine(scene.bounds);
     this.playback.setDuration(scene.live?.duration ?? NaN);
-    this.#live.post.attach(scene);
-    return this.#view.show(scene);
+    if (scene.hasMeshes) this.compose();
+    this.own = this.enter(scene);
+    const drawn = view.show(scene);
+    this.live.post.attach(view.painter);
+    this.live.tellInputs(this.inputs);
+    return drawn;
+  }
+
+  /** Puts what is loaded into the world. */
+  enter(scene: LoadedGaussians): Member {
+    scene.onChange = () => this.requestFrame();
+    for (const warning of scene.warnings) this.warn(`<gaussian-splat>: ${warning}`);
+    return new Member(this.world, scene);
   }
 
   hide(clear: boolean): void {
-    this.#live.post.attach(null);
+    this.own?.remove();
+    this.own = undefined;
+    this.stopDrawing(clear);
+  }
+
+  /** Nothing is shown any more; the last picture stays unless it is to be cleared. */
+  stopDrawing(clear: boolean): void {
+    this.live.post.attach(null);
     this.playback.suspend();
-    if (!clear) return this.#view.pause();
+    if (!clear) return this.view.pause();
     this.playback.empty();
     this.drawnFrom = undefined;
-    this.hotspots.forget();
-    this.#view.clear();
+    this.hotspots?.forget();
+    this.view.clear();
   }
 
   loadStarted(): void {
@@ -292,13 +449,13 @@ export class Stage
 
   progressed(loaded: number, total: number | undefined, share = total ? loaded / total : undefined): void {
     this.#bytes = [loaded, total];
-    this.progress = share === undefined ? null : Math.min(1, share);
+    this.ownProgress = share === undefined ? null : Math.min(1, share);
     this.element.requestUpdate();
     const lengthComputable = total !== undefined;
     this.dispatch(new ProgressEvent('progress', { lengthComputable, loaded, total: total ?? 0 }));
   }
 
-  previewShown({ gaussians }: DrawnScene): void {
+  previewShown({ gaussians }: LoadedGaussians): void {
     this.element.requestUpdate();
     this.dispatch(new CustomEvent('preview', { detail: { splats: gaussians.count } }));
     this.progressed(...this.#bytes);
@@ -311,14 +468,14 @@ export class Stage
 
   emptied(): void {
     this.#source.needNow(false);
-    this.progress = null;
+    this.ownProgress = null;
     this.playback.empty();
     this.playback.stopWaits();
     this.dispatch(new Event('emptied'));
   }
 
   failed(error: ElementError): void {
-    this.progress = null;
+    this.ownProgress = null;
     this.dispatch(new CustomEvent('error', { detail: error }));
   }
 
@@ -326,19 +483,32 @@ export class Stage
     this.dispatch(new Event(type));
   }
 
+  /** A pause of the picture is not time that passes. */
+  suspend(): void {
+    this.playback.suspend();
+  }
+
+  /** Starts what plays by itself, where it may. */
+  autoplay(): void {
+    const { playback } = this;
+    const mayPlay = playback.canPlay && playback.paused && !prefersReducedMotion();
+    if (this.autoplays && mayPlay && !this.behaviours.motion.isHeld) playback.play();
+  }
+
   posterDismissed(): void {
     this.dispatch(new Event('poster-dismissed'));
-    const mayPlay = this.playback.canPlay && this.playback.paused && !prefersReducedMotion();
-    if (this.autoplays && mayPlay && !this.behaviours.motion.isHeld) this.playback.play();
+    this.autoplay();
   }
 
-  act(action: CameraAction): void {
-    this.behaviours.act(action);
+  act(action: CameraAction): boolean {
+    return this.behaviours.act(action);
   }
 
+  /** Beside the scene is where somebody has lost it. */
   pick(clientX: number, clientY: number): void {
     void this.queries.positionFromPoint(clientX, clientY).then((point) => {
-      if (point !== null && this.retargets) this.behaviours.aimAt([point.x, point.y, point.z]);
+      if (point === null) this.act({ type: 'reset' });
+      else if (this.input.pan) this.behaviours.aimAt([point.x, point.y, point.z]);
     });
   }
 
@@ -351,23 +521,25 @@ export class Stage
     return true;
   }
 
-  #onUpdate(): void {
+  /** Called after each update of the element. */
+  updated(): void {
+    if (this.views && this.#tour === undefined) this.#showViews();
     this.reveal.settle();
     this.detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
   }
 
   #onVisibility(): void {
     this.#source.request();
-    if (!this.#visibility.isVisible) this.playback.suspend();
+    if (!this.#visibility.isVisible) this.suspend();
     this.dispatch(new CustomEvent('model-visibility', { detail: { visible: this.#visibility.isVisible } }));
     this.element.requestUpdate();
-    this.#view.requestFrame();
+    this.view.requestFrame();
   }
 
   #onSize(): void {
     // Without a size, in a closed tab for one, there is no shape to follow.
     if (!this.size.isEmpty) this.camera.setAspect(this.size.aspect);
-    this.#view.requestFrame();
+    this.view.requestFrame();
   }
 }
 

@@ -1,6 +1,9 @@
+import type { Vector3 } from '@gaussian-splat/core';
 import type { QualityChoice } from './attributes.js';
 import type { PaceReport } from './controllers/pace-controller.js';
-import type { DrawnScene } from './gpu/open-scene.js';
+import type { SceneState } from './controllers/scene-controller.js';
+import type { ElementError } from './errors.js';
+import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 
 /** What is modelled, drawn, and seen of a scene, what it takes, and why. */
 export interface SceneStats {
@@ -29,8 +32,30 @@ export interface SceneStats {
   readonly quality: QualityChoice;
   /** What pictures at rest and in motion are drawn with. */
   readonly pace: PaceReport;
+  /** The direction of the scene's frame that its file says points up, of length 1; null where it says nothing. Of several scenes that of the first. */
+  readonly up: Vector3 | null;
+  /** What of the files is not drawn, or may mean something else than what is drawn, for people; the console has it, too. */
+  readonly warnings: readonly string[];
+  /** The element's own scene, then its children, each by itself; empty for an element without children. */
+  readonly scenes: readonly PartStats[];
   /** All that is done to the scene for the sake of time or memory, for people; empty where nothing is. */
   readonly why: readonly string[];
+}
+
+/** What a child of the element shows, and what it takes. */
+export interface PartStats {
+  /** The child; the element itself for its own scene. */
+  readonly element: HTMLElement;
+  readonly state: SceneState;
+  readonly error: ElementError | null;
+  /** Splats on the GPU; of a mesh 0. */
+  readonly splats: number;
+  /** Triangles; of a scene 0. */
+  readonly triangles: number;
+  /** Splats of the file that were left out because a value was not usable. */
+  readonly dropped: number;
+  /** Bytes of GPU memory. */
+  readonly bytes: number;
 }
 
 /** Counts that have to be read back from the GPU. */
@@ -48,26 +73,40 @@ export interface StatsContext {
   readonly pace: PaceReport;
   readonly counts: ReadCounts | undefined;
   readonly isPreview: boolean;
+  /** Bytes of GPU memory that frames are drawn with. */
+  readonly frameBytes: number;
+  /** Pixels by which pictures at rest may be off. */
+  readonly pixels: number | undefined;
 }
 
 /** Puts together what is known without asking the GPU. */
-export function statsOf(scene: DrawnScene, { quality, pace, counts, isPreview }: StatsContext): SceneStats {
-  const { gaussians } = scene;
-  const dropped = gaussians.droppedCount ?? 0;
-  const merged = scene.levels === undefined ? 0 : scene.levels.count - gaussians.count;
-  const detail = { splats: merged, pixels: scene.detail.detail ?? 0 };
+export function statsOf(
+  scenes: readonly LoadedGaussians[],
+  { quality, pace, counts, isPreview, frameBytes, pixels = 0 }: StatsContext,
+): SceneStats {
+  const sum = (of: (scene: LoadedGaussians) => number | undefined): number =>
+    scenes.reduce((total, scene) => total + (of(scene) ?? 0), 0);
+  const dropped = sum(({ gaussians }) => gaussians.droppedCount);
+  const merged = sum(({ gaussians, levels }) => levels && levels.count - gaussians.count);
+  const detail = { splats: merged, pixels };
   return {
-    renderer: scene.renderer,
+    renderer: scenes[0].renderer,
     isPreview,
-    modelled: (gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
+    modelled: sum(({ gaussians }) => gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
     dropped,
-    inMemory: gaussians.count + merged,
+    inMemory: sum(({ gaussians }) => gaussians.count) + merged,
     detail,
     drawn: counts?.drawn ?? null,
     contributed: counts?.contributed ?? null,
-    bytes: { scene: gaussians.byteLength + (scene.levels?.byteLength ?? 0), frames: scene.frameBytes },
+    bytes: {
+      scene: sum(({ gaussians }) => gaussians.byteLength) + sum(({ levels }) => levels?.byteLength),
+      frames: frameBytes,
+    },
     quality,
     pace,
+    up: scenes[0]?.bounds.up ?? null,
+    warnings: scenes.flatMap(({ warnings }) => warnings),
+    scenes: [],
     why: [
       ...whyPreview(isPreview),
       ...whyDropped(dropped),

@@ -18,7 +18,8 @@ export const styles = css`
     display: block;
     position: relative;
     width: 300px;
-    height: 150px;
+    height: auto;
+    aspect-ratio: 2;
     contain: strict;
   }
   :host([hidden]:not([hidden='until-found'])) {
@@ -40,6 +41,10 @@ export const styles = css`
   }
   .interactive:active {
     cursor: grabbing;
+  }
+  .interactive ~ #hotspots {
+    user-select: none;
+    -webkit-user-select: none;
   }
   canvas {
     display: block;
@@ -106,8 +111,9 @@ export const styles = css`
   }
   .prompt {
     display: var(--interaction-prompt-display, flex);
-    align-items: center;
+    align-items: end;
     justify-content: center;
+    padding-block-end: 8px;
   }
   [part='prompt'],
   [part='poster-cue'] {
@@ -123,8 +129,7 @@ export const styles = css`
     left: 50%;
     translate: -50% -50%;
   }
-  [part='pause-button'] {
-    display: var(--pause-button-display, block);
+  .corner {
     position: absolute;
     inset-block-end: 8px;
     inset-inline-end: 8px;
@@ -135,6 +140,13 @@ export const styles = css`
     cursor: pointer;
     background: var(--interaction-prompt-background, rgb(0 0 0 / 0.45));
     color: var(--interaction-prompt-color, rgb(255 255 255));
+  }
+  [part='pause-button'] {
+    display: var(--pause-button-display, block);
+  }
+  [part='reset-button'] {
+    display: var(--reset-button-display, block);
+    inset-inline: 8px auto;
   }
   @media (hover: hover) {
     :host(:not(:hover, :focus-within)) [part='pause-button'] {
@@ -192,6 +204,11 @@ export const styles = css`
     color: var(--message-color, rgb(30 30 30));
     font: var(--message-font, 0.875rem/1.4 system-ui, sans-serif);
     overflow-wrap: anywhere;
+  }
+  [part='fallback'] {
+    align-self: end;
+    padding: 0.3em 0.6em;
+    font: var(--message-font, 0.75rem/1.4 system-ui, sans-serif);
   }
   p {
     margin: 0;

@@ -17,11 +17,15 @@ export interface TemplateModel {
   /** Share of the loading that is done, 0..1; null while it is not known. */
   readonly progress: number | null;
   readonly error: ElementError | null;
+  /** There is a poster, of the attribute or of the page's own. */
+  readonly hasPoster: boolean;
   /** How people learn that they can move the scene. */
   readonly prompt: 'none' | 'basic' | 'wiggle';
   /** What the button for all that moves by itself does; `none` where nothing does. */
   readonly motion: 'none' | 'pause' | 'play';
   readonly onMotion: () => void;
+  /** Brings the camera back; null where no button is offered for it. */
+  readonly onReset: (() => void) | null;
   /** Words of the page in place of the English ones. */
   readonly strings: SpokenStrings;
   /** What screen readers are told: of an error, else of the camera. */
@@ -31,12 +35,15 @@ export interface TemplateModel {
 }
 
 const PLAY_SIGN = 'M8 5v14l11-7z';
+const PAUSE_SIGN = 'M6 5h4v14H6zM14 5h4v14h-4z';
+/** Four corners around the middle. */
+const FRAME_SIGN = 'M4 9V4h5v2H6v3zM15 4h5v5h-2V6h-3zM4 15h2v3h3v2H4zM18 15h2v5h-5v-2h3zM10 10h4v4h-4z';
 
 /** The element's shadow tree. */
 export function template(model: TemplateModel): TemplateResult {
   return html`
-    ${view(model)} ${hotspots(model)} ${prompt(model)} ${pauseButton(model)} ${poster(model)}
-    ${model.isLoading ? progressBar(model) : nothing} ${model.error ? message(model.error, model.strings) : nothing}
+    ${view(model)} ${hotspots(model)} ${prompt(model)} ${cornerButtons(model)} ${poster(model)}
+    ${model.isLoading ? progressBar(model) : nothing} ${model.error ? message(model, model.error) : nothing}
     <div class="for-screen-readers" role="status" lang=${languageOf(model.strings) ?? nothing}>${model.spoken}</div>
   `;
 }
@@ -95,20 +102,21 @@ function prompt({ prompt, strings }: TemplateModel): TemplateResult | typeof not
   </div>`;
 }
 
-/** Seen while the pointer is over the scene or the keyboard in it, and always where nothing hovers. */
-function pauseButton({ motion, onMotion, strings }: TemplateModel): TemplateResult | typeof nothing {
-  if (motion === 'none') return nothing;
-  return html`<button
-    type="button"
-    part="pause-button"
-    aria-label=${word(strings, motion)}
-    lang=${languageOf(strings) ?? nothing}
-    @click=${onMotion}
-  >
-    <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true" fill="currentColor">
-      <path d=${motion === 'pause' ? 'M6 5h4v14H6zM14 5h4v14h-4z' : PLAY_SIGN} />
-    </svg>
-  </button>`;
+/** One that brings the camera back, and one for what moves: seen while the pointer is over the scene or the keyboard in it, and always where nothing hovers. */
+function cornerButtons({ motion, onMotion, onReset, strings }: TemplateModel): TemplateResult {
+  const button = (part: string, name: 'reset' | 'pause' | 'play', sign: string, onClick: () => void): TemplateResult =>
+    html`<button
+      type="button"
+      class="corner"
+      part=${part}
+      aria-label=${word(strings, name)}
+      lang=${languageOf(strings) ?? nothing}
+      @click=${onClick}
+    >
+      <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true" fill="currentColor"><path d=${sign} /></svg>
+    </button>`;
+  return html`${onReset ? button('reset-button', 'reset', FRAME_SIGN, onReset) : nothing}
+  ${motion === 'none' ? nothing : button('pause-button', motion, motion === 'pause' ? PAUSE_SIGN : PLAY_SIGN, onMotion)}`;
 }
 
 /**
@@ -163,21 +171,26 @@ function progressBar({ progress, strings }: TemplateModel): TemplateResult {
 
 /**
  * What went wrong: a sentence for visitors, and the details for those who made the page. Screen readers announce only what comes into a
- * region that was there before, so the sentence is told in that, too.
+ * region that was there before, so the sentence is told in that, too. Where there is no WebGPU visitors can mend nothing: they get the poster alone, or the
+ * sentence at the edge.
  */
-function message(error: ElementError, strings: SpokenStrings): TemplateResult {
+function message({ hasPoster, strings }: TemplateModel, error: ElementError): TemplateResult {
   const lang = languageOf(strings) ?? nothing;
+  const text = html`<p lang=${lang}>${visitorMessage(error, strings)}</p>`;
+  if (error.code === 'unsupported')
+    return html`<div class="layer message">
+      <slot name="fallback">${hasPoster ? nothing : html`<div part="fallback">${text}</div>`}</slot>
+    </div>`;
   // The details are for the person who made the page, and always English.
-  const text = html`<p lang=${lang}>${visitorMessage(error, strings)}</p>
-    <details>
-      <summary lang=${lang}>${word(strings, 'details')}</summary>
-      <span lang="en">${error.message}</span>
-    </details>`;
   return html`<div class="layer message">
-    ${
-      error.code === 'unsupported'
-        ? html`<slot name="fallback"><div part="fallback">${text}</div></slot>`
-        : html`<slot name="error"><div part="error">${text}</div></slot>`
-    }
+    <slot name="error"
+      ><div part="error">
+        ${text}
+        <details>
+          <summary lang=${lang}>${word(strings, 'details')}</summary>
+          <span lang="en">${error.message}</span>
+        </details>
+      </div></slot
+    >
   </div>`;
 }

@@ -1,10 +1,10 @@
+import { loadModule } from '@gaussian-splat/core';
 import type { CameraOrbit, CameraTarget, FieldOfView, ScenePoint } from './camera/values.js';
 import type { HotspotPlace } from './controllers/hotspot-controller.js';
 import { MediaProperties } from './media.js';
 import type { SceneBox } from './scene-queries.js';
-
-/** Why there is no picture of a device that is lost. */
-const LOST = 'The GPU device was lost before the picture was drawn: take it again after the event contextrestored';
+import type { CameraView } from './views/camera-view.js';
+import type { FlightOptions, PathOptions } from './views/tour.js';
 
 /** A picture to take. */
 export interface PictureOptions {
@@ -12,6 +12,11 @@ export interface PictureOptions {
   readonly mimeType?: string;
   /** 0..1, for formats that lose some. */
   readonly qualityArgument?: number;
+  /** Pixels. Default: as large as the element is drawn; one of the two alone keeps its shape. */
+  readonly width?: number;
+  readonly height?: number;
+  /** A CSS colour behind the scene. Default: transparent. */
+  readonly background?: string;
 }
 
 /** What scripts ask of the picture: its poster, its camera, what lies under a point of it, and the picture itself. */
@@ -61,6 +66,38 @@ export abstract class ViewingMethods extends MediaProperties {
     this.stage.camera.reset('none');
   }
 
+  /**
+   * Flies to a view: one of the page's list by its name or its place in it (from 0), or any other. Waits for the scene. People who want less motion are there at once.
+   * @returns fulfils at the end: true on arrival, false where a visitor, an attribute or another flight has taken the camera. Rejects with
+   * `argument/camera` for a view that is malformed or has no such name.
+   */
+  async flyTo(view: CameraView | string | number, options?: FlightOptions): Promise<boolean> {
+    return (await this.stage.tour()).flyTo(view, options);
+  }
+
+  /** Flies to the next view of the list, after the last to the first. As {@link flyTo}. */
+  async nextView(options?: FlightOptions): Promise<boolean> {
+    return (await this.stage.tour()).step(1, options);
+  }
+
+  /** Flies to the view before. As {@link flyTo}. */
+  async previousView(options?: FlightOptions): Promise<boolean> {
+    return (await this.stage.tour()).step(-1, options);
+  }
+
+  /** Flies along all views of the list on one smooth path, or along the keyframes that its file has. As {@link flyTo}. */
+  async flyAlong(options?: PathOptions): Promise<boolean> {
+    return (await this.stage.tour()).flyAlong(options);
+  }
+
+  /**
+   * Puts the camera on that path, at once: for scenes that follow the page's scrolling.
+   * @param share 0..1, from the first view to the last
+   */
+  async showAlong(share: number): Promise<void> {
+    return (await this.stage.tour()).showAlong(share);
+  }
+
   /** Lets the interaction prompt come again, as if nobody had touched the scene. */
   resetInteractionPrompt(): void {
     this.stage.behaviours.prompt.reset();
@@ -89,36 +126,26 @@ export abstract class ViewingMethods extends MediaProperties {
 
   /** Where the hotspot of a slot is now, for example `hotspot-door`; null if there is none with a position. */
   queryHotspot(name: string): HotspotPlace | null {
-    return this.stage.hotspots.query(name);
+    return this.stage.hotspots?.query(name) ?? null;
   }
 
   /**
-   * The picture as it is now, drawn anew and read in the same task.
-   * @returns rejects with an `InvalidStateError` where no scene is on show, or the element has no size.
+   * The picture as it is on the screen now, with the CSS filters of the element, drawn anew. A colour that exceeds its alpha has no place in a transparent picture: give `background` where the scene has such.
+   * @returns rejects with an `InvalidStateError` where no scene is shown, or the element has no size; with a `RangeError` for a size that the GPU
+   * cannot draw, and a `TypeError` for a background that is no colour.
    */
-  async toBlob({ mimeType = 'image/png', qualityArgument }: PictureOptions = {}): Promise<Blob> {
-    const canvas = this.#drawnCanvas();
-    const { scene } = this.stage.scene;
-    const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, mimeType, qualityArgument));
-    // A device that was lost before it had drawn leaves an empty picture, and says so later.
-    if (scene && (await scene.wasLost())) throw new DOMException(LOST, 'InvalidStateError');
-    if (blob === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
-    return blob;
+  async toBlob(options: PictureOptions = {}): Promise<Blob> {
+    const { takePicture } = await loadModule('the code for pictures', () => import('./picture.js'));
+    this.applyAttributes();
+    return takePicture(this.stage, options);
   }
 
-  /** The same as a `data:` URL, at once. Throws an `InvalidStateError` where no scene is on show, or the element has no size. */
+  /** The same as a `data:` URL, at once and without CSS filters. Throws an `InvalidStateError` where no scene is shown, or the element has no size. */
   toDataURL(mimeType = 'image/png', qualityArgument?: number): string {
-    return this.#drawnCanvas().toDataURL(mimeType, qualityArgument);
-  }
-
-  #drawnCanvas(): HTMLCanvasElement {
     this.applyAttributes();
     const canvas = this.stage.drawNow();
     if (canvas === null)
-      throw new DOMException(
-        'There is nothing to take a picture of: expected a scene on show in an element that has a size',
-        'InvalidStateError',
-      );
-    return canvas;
+      throw new DOMException('Expected a loaded scene in an element that has a size', 'InvalidStateError');
+    return canvas.toDataURL(mimeType, qualityArgument);
   }
 }

@@ -1,30 +1,40 @@
 /**
- * Types of `<gaussian-splat>` in Vue's templates: `import type {} from '@gaussian-splat/element/vue'`. Nothing runs; tell Vue's compiler of the
- * tag with `isCustomElement: (tag) => tag === 'gaussian-splat'`.
+ * Types of `<gaussian-splat>`, `<splat-scene>` and `<splat-mesh>` in Vue's templates: `import type {} from '@gaussian-splat/element/vue'`. Nothing runs; tell Vue's compiler of the
+ * tags with `isCustomElement: (tag) => /^(gaussian-splat|splat-)/.test(tag)`.
  */
 import type { HTMLAttributes, PublicProps } from 'vue';
 import type { GaussianSplatElement } from './element.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { SettableProperties } from './media.js';
+import type {
+  ChildEventMap,
+  SettableMeshProperties,
+  SettableSceneProperties,
+  SplatMeshElement,
+  SplatSceneElement,
+} from './scenes.js';
 
 /** `camera-change` as Vue names its listeners: `onCameraChange`. */
 type ListenerName<Type extends string> = Type extends `${infer Head}-${infer Tail}`
   ? `${Capitalize<Head>}${Capitalize<Tail>}`
   : Capitalize<Type>;
-type Listeners = {
-  [Type in string & keyof GaussianSplatEventMap as `on${ListenerName<Type>}`]?: (
-    event: GaussianSplatEventMap[Type],
-  ) => void;
+type Listeners<Events> = {
+  [Type in string & keyof Events as `on${ListenerName<Type>}`]?: (event: Events[Type]) => void;
 };
 
 /** What Vue looks at in a component, for a tag of the platform. */
-type CustomElement = new () => GaussianSplatElement & {
+type CustomElement<E, Settable, Events> = new () => E & {
   /** @deprecated Only for the types of templates. */
-  readonly $props: Omit<HTMLAttributes, keyof Listeners> & Listeners & SettableProperties & PublicProps;
+  readonly $props: Omit<HTMLAttributes, keyof Listeners<Events> | keyof Settable> &
+    Listeners<Events> &
+    Settable &
+    PublicProps;
 };
 
 declare module 'vue' {
   interface GlobalComponents {
-    'gaussian-splat': CustomElement;
+    'gaussian-splat': CustomElement<GaussianSplatElement, SettableProperties, GaussianSplatEventMap>;
+    'splat-scene': CustomElement<SplatSceneElement, SettableSceneProperties, ChildEventMap>;
+    'splat-mesh': CustomElement<SplatMeshElement, SettableMeshProperties, ChildEventMap>;
   }
 }

@@ -1,6 +1,7 @@
 /** The words that the element says to people, and those that a page may put in their place. */
 import type { ViewName } from './camera/spoken.js';
 import type { ElementErrorCode } from './errors.js';
+import type { PANEL_WORDS } from './live/controls-panel.js';
 
 /** What the element says apart from the camera's places, in English; `…` stands for the scene's text alternative. The keys are those of `a11y`, too. */
 export const WORDS = {
@@ -15,14 +16,20 @@ export const WORDS = {
   'interaction-prompt': 'Drag to look around',
   show: 'Show …',
   loading: 'Loading the 3D scene',
+  reset: 'Bring the view back',
   pause: 'Stop the motion',
   play: 'Start the motion',
   details: 'Details',
 } as const;
 
+/** Words of the bar of the views, which few pages have. */
+export type ViewWord = 'views' | 'next-view' | 'previous-view' | 'keys-views';
+
 /** Strings of a page in place of the English ones; those for errors are sentences for visitors, by `element.error.code`. */
 export type SpokenStrings = Readonly<
-  Partial<Record<ViewName | keyof typeof WORDS | `error-${ElementErrorCode}`, string>>
+  Partial<
+    Record<ViewName | keyof typeof WORDS | keyof typeof PANEL_WORDS | `error-${ElementErrorCode}` | ViewWord, string>
+  >
 >;
 
 /** A word of the page, or the English one. */

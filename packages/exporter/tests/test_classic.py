@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from gaussian_exporter.checkpoints.clouds import read_cloud
 from gaussian_exporter.checkpoints.ply import read_ply
 from gaussian_exporter.conformance import check_outputs
-from gaussian_exporter.contract import METADATA_KEY
+from gaussian_exporter.contract import METADATA_KEY, Filter
 from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.classic import Cloud, export_classic
 from gaussian_exporter.outputs import Options
@@ -94,6 +95,13 @@ def test_unusable_gaussians_are_left_out_and_infinite_opacities_are_exact() -> N
     assert (rows[1, -1], rows[2, -1]) == (1, 0)
     with pytest.raises(ExportError, match=r"\[checkpoint/unreadable\]"):
         export_classic(Cloud(*(part * np.float32(np.nan) for part in vars(given).values())), FACTS)
+
+
+@pytest.mark.parametrize(("filter_", "antialiased"), [("classic", False), ("antialiased", True), ("mip", True)])
+def test_contract_says_the_filter(filter_: Filter, antialiased: bool) -> None:
+    model = export_classic(cloud(degree=0), replace(FACTS, filter=filter_))
+    contract = json.loads({prop.key: prop.value for prop in model.metadata_props}[METADATA_KEY])
+    assert (contract["filter"], contract["antialiased"]) == (filter_, antialiased)
 
 
 def test_contract_says_what_the_file_holds() -> None:

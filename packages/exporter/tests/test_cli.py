@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import onnx
 import pytest
 
 from gaussian_exporter.cli import main
@@ -40,3 +41,26 @@ def test_faults_end_with_a_message_and_no_traceback(tmp_path: Path, capsys: pyte
 def test_a_license_must_be_given(tmp_path: Path) -> None:
     with pytest.raises(SystemExit):
         main(["classic", "a.ply", str(tmp_path / "a.onnx")])
+
+
+def test_a_contract_beside_the_file_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_cloud(tmp_path / "scene.ply", cloud(50, 1))
+    assert main(["classic", str(tmp_path / "scene.ply"), str(tmp_path / "m.onnx"), *FACTS]) == 0
+    model = onnx.load(tmp_path / "m.onnx")
+    [prop] = [each for each in model.metadata_props if each.key == "gaussian_contract"]
+    (tmp_path / "m.contract.json").write_text(prop.value)
+    del model.metadata_props[:]
+    onnx.save(model, tmp_path / "m.onnx")
+    assert main(["check", str(tmp_path / "m.onnx")]) == 0
+    assert "all checks passed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "family"),
+    [("flame_param.npz", "GaussianAvatars"), ("offset.ply", "LAM"), ("other.txt", "unknown avatar")],
+)
+def test_a_folder_is_no_avatar_file(name: str, family: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / name).write_text("")
+    given = ["avatar", str(tmp_path), str(tmp_path / "o.onnx"), "--license", "MIT", "--attribution", "A"]
+    assert main(given) == 1
+    assert family in capsys.readouterr().err

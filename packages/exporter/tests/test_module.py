@@ -120,6 +120,57 @@ def test_a_decorated_function_and_class(tmp_path: Path) -> None:
     assert decorated().export(tmp_path / "b.onnx", quiet=True).contract["name"] == "b"
 
 
+class Batched(torch.nn.Module):  # type: ignore[misc]
+    """As feed-forward and avatar code writes it: a batch before everything, a flat pose of matrices, a dict."""
+
+    def forward(self, pose: Any, betas: Any, c2w: Any, k: Any) -> Any:
+        b = pose.shape[0]
+        turn = pose.view(b, 2, 3, 3)[:, 0]
+        points = torch.linspace(-1, 1, 3 * COUNT).reshape(1, COUNT, 3).expand(b, -1, -1)
+        places = points @ turn.transpose(1, 2) + 0.1 * c2w[:, None, :3, 3] + betas.sum(-1)[:, None, None] + k[:, 0, 2]
+        return {
+            "positions": places,
+            "covariances": 0.01 * torch.eye(3).expand(b, COUNT, 3, 3),
+            "sh": torch.zeros(b, COUNT, 4, 3),
+            "opacities": torch.ones(b, COUNT, 1),
+        }
+
+
+def test_a_module_that_takes_batches(tmp_path: Path) -> None:
+    inputs = {
+        "pose": gs.pose(["hip", "knee"], format="matrix", flat=True),
+        "betas": gs.shape(4),
+        "c2w": gs.camera_to_world(axes="RUB"),
+        "k": gs.intrinsics(normalized=True),
+    }
+    layout = gs.split("positions", "covariances", "sh", "opacities")
+    report = gs.export_module(Batched(), inputs, layout, out=tmp_path / "b.onnx", batched=True, quiet=True)
+    assert max(report.errors.values()) < 1e-5 and report.findings == []
+    given = {v.name: [d.dim_value for d in v.type.tensor_type.shape.dim] for v in onnx.load(report.path).graph.input}
+    assert given == {"pose": [18], "betas": [4], "c2w": [4, 4], "k": [3, 3]}
+    with pytest.raises(ExportError, match=r"pose \[18\].*Give batched=True"):
+        gs.export_module(Batched(), inputs, layout, out=tmp_path / "b.onnx", quiet=True)
+
+
+class Falling(torch.nn.Module):  # type: ignore[misc]
+    """Goes on from the heights that it wrote last."""
+
+    def forward(self, t: Any, heights: Any) -> Any:
+        lower = heights - 0.01 + 0 * t
+        flat = torch.linspace(-1, 1, COUNT)
+        places = torch.stack([flat, lower, 0 * flat], -1)
+        return places, torch.full((COUNT, 6), 0.01), torch.full((COUNT, 3), 0.5), torch.ones(COUNT, 1), lower
+
+
+def test_a_module_that_goes_on_from_what_it_wrote(tmp_path: Path) -> None:
+    layout = gs.split("positions", "covariances", "colors", "opacities", state="heights")
+    inputs = {"t": gs.time(), "heights": gs.state([COUNT], default=2.0)}
+    report = gs.export_module(Falling(), inputs, layout, out=tmp_path / "f.onnx", quiet=True)
+    assert max(report.errors.values()) < 1e-5
+    bound = contract_of(report.path)["inputs"]["heights"]
+    assert bound == {"role": "state", "default": 2.0, "output": "next_heights"}
+
+
 def test_what_does_not_fit_is_named(tmp_path: Path) -> None:
     with pytest.raises(ExportError, match=r"a role for each argument.*found t"):
         gs.export_module(Ball(), {"t": gs.time()}, out=tmp_path / "x.onnx")

@@ -8,6 +8,6 @@ import { loadDiagnosis } from './load-parts.js';
  */
 export async function checkedPart(bytes: Uint8Array, name: string): Promise<Uint8Array> {
   if (!/^(html|lfsPointer)$/.test(foreignName(bytes) ?? '')) return bytes;
-  const diagnose = await loadDiagnosis();
+  const { diagnose } = await loadDiagnosis();
   throw diagnose(bytes, name, '', 'the file that the scene names');
 }

@@ -2,6 +2,7 @@
 import { GaussianSplatError, type ErrorCode } from '@gaussian-splat/core';
 import { grouped, quote } from './bytes.js';
 import { foreignName, sampleText, type ForeignName } from './foreign-signatures.js';
+import { UNREAD_KINDS, unreadKind, type UnreadKind } from './unread-kinds.js';
 
 /** A kind of file that is recognised only to say what it is. */
 interface ForeignKind {
@@ -12,14 +13,13 @@ interface ForeignKind {
   readonly isText?: boolean;
 }
 
-const CONVERT = 'convert it to SPZ or PLY, for example with splat-transform or SuperSplat';
 const CHECK_URL = 'check the address of the scene; the server sent something else';
 const NOT_A_SCENE = 'give the address of a scene file: .ply, .compressed.ply, .spz, .sog, .splat, .ksplat or .glb';
 
-const unread = (found: string): ForeignKind => ({
+const unread = ({ found, remedy }: UnreadKind): ForeignKind => ({
   code: 'decode/unsupported',
-  found: `${found}, a format that is known but not read yet`,
-  remedy: CONVERT,
+  found: `${found}, which is known but not read`,
+  remedy,
 });
 const foreign = (found: string, isText = false): ForeignKind => ({
   code: 'decode/unknown-format',
@@ -70,21 +70,6 @@ function unsignedKind(bytes: Uint8Array): ForeignKind {
     : foreign(`bytes that begin with ${hexOf(bytes)}`);
 }
 
-/** Formats told by the name where the content has no signature. */
-const UNREAD_EXTENSIONS: ReadonlyMap<string, string> = new Map([
-  ['.rad', 'a .rad scene'],
-  ['.lcc', 'an LCC scene'],
-  ['.lcc2', 'an LCC2 scene'],
-  ['.splatv', 'a .splatv scene, which moves'],
-  ['.usd', 'a USD scene'],
-  ['.usda', 'a USD scene'],
-  ['.usdc', 'a USD scene'],
-  ['.usdz', 'a USDZ scene'],
-  ['.pt', 'a checkpoint of PyTorch'],
-  ['.npz', 'arrays of NumPy'],
-  ['.slpk', 'an I3S scene'],
-]);
-
 /** What an ONNX file begins with: field 1 (IR version) and then field 2 (producer) or 7 (graph) of its protobuf. */
 function isOnnx(bytes: Uint8Array): boolean {
   return bytes.length > 8 && bytes[0] === 8 && bytes[1] > 0 && bytes[1] < 32 && [0x12, 0x3a].includes(bytes[2]);
@@ -100,15 +85,26 @@ export function diagnose(
   expected: string = A_SCENE,
 ): GaussianSplatError {
   const signed = foreignName(bytes);
-  const known = UNREAD_EXTENSIONS.get(extension);
-  if (signed && !(signed === 'json' && known)) return refusal(SIGNED_KINDS[signed], name, bytes, expected);
-  return known === undefined ? refusal(unsignedKind(bytes), name, bytes) : refusal(unread(known), name, undefined);
+  // A JSON text may be one of them; whatever else has a signature is none.
+  const known = !signed || signed === 'json' ? unreadKind(bytes, sampleText(bytes), extension) : undefined;
+  if (known) return refusal(unread(known), name, undefined);
+  return signed
+    ? refusal(SIGNED_KINDS[signed], name, bytes, expected)
+    : refusal(unsignedKind(bytes), name, bytes, expected);
+}
+
+/** The error for an archive that is known for a path in it; undefined for all others. */
+export function diagnoseArchive(paths: readonly string[], name: string): GaussianSplatError | undefined {
+  const known = UNREAD_KINDS.find(({ within }) => within && paths.some((path) => within.test(path)));
+  return known && refusal(unread(known), name, undefined);
 }
 
 /** Names the content of a file for an error message. */
 export function describeContent(bytes: Uint8Array): string {
   if (sampleText(bytes).startsWith('ply')) return 'a PLY file';
   const signed = foreignName(bytes);
+  const known = signed ? undefined : unreadKind(bytes, sampleText(bytes), '');
+  if (known) return known.found;
   return (signed ? SIGNED_KINDS[signed] : unsignedKind(bytes)).found;
 }
 

@@ -1,4 +1,4 @@
-export type { LoadLimits } from './budget.js';
+export { LoadBudget, type LoadLimits } from './budget.js';
 export { detectFormat } from './detect.js';
 export { fetchScene, type FetchSceneOptions } from './fetch-scene.js';
 export { sceneFormats } from './formats.js';
@@ -8,7 +8,7 @@ export { readLodScene, type LodBox, type LodScene, type SogAddress, type SogRun 
 export { readCoarsest } from './lod/read-coarsest.js';
 export { SogFiles, type FetchBytes } from './lod/sog-files.js';
 export { readPrefix } from './read-prefix.js';
-export { readScene, type ReadSceneOptions } from './read-scene.js';
+export { MOST_DROPPED, readScene, type ReadSceneOptions } from './read-scene.js';
 export { isSequence } from './is-sequence.js';
 export type { FileBytes } from './bytes.js';
 export { frameAt, framePath, parseSequence, type FramePattern, type SceneSequence } from './sequence.js';

@@ -9,11 +9,8 @@ export const loadReader = ({ title, load }: SceneFormat): Promise<SceneReader> =
   loadModule(`the code that reads ${title}`, load);
 
 /** What knows files that are no scene. */
-export const loadDiagnosis = (): Promise<typeof diagnosis.diagnose> =>
-  loadModule(
-    'the code that tells what a file is that is no scene',
-    async () => (await import('./diagnose.js')).diagnose,
-  );
+export const loadDiagnosis = (): Promise<typeof diagnosis> =>
+  loadModule('the code that tells what a file is that is no scene', () => import('./diagnose.js'));
 
 /** What knows formats without a signature. */
 export const loadDetection = (): Promise<typeof detection> =>

@@ -1,5 +1,6 @@
 import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
 import { allocateCloud, type DraftCloud } from './cloud.js';
+import { warn } from './warn.js';
 import type { SceneSource } from './scene-format.js';
 
 /** Splats `first` to `first + count` of a cloud. */
@@ -22,6 +23,7 @@ export function mergeClouds(parts: readonly CloudPart[], source: Pick<SceneSourc
   merged.antialiased = parts.some(({ cloud }) => cloud.antialiased);
   merged.filterVariance = parts.find(({ cloud }) => cloud.antialiased)?.cloud.filterVariance;
   merged.hints = largest?.cloud.hints;
+  for (const { cloud } of parts) for (const sentence of cloud.warnings ?? []) warn(merged, sentence);
   let at = 0;
   for (const part of parts) {
     copyPart(part, merged, at);

@@ -8,6 +8,9 @@ import { previewWanted } from './preview-wanted.js';
 import type { OpenPart, SceneSource } from './scene-format.js';
 import { signedFormat } from './signed-format.js';
 
+/** Share of a file's splats that may be left out without a word. */
+export const MOST_DROPPED = 0.05;
+
 export interface ReadSceneOptions extends LoadLimits {
   /** File name or URL: what error messages call the file, and whose extension tells formats without a signature. */
   readonly name?: string;
@@ -35,7 +38,7 @@ export interface ReadSceneOptions extends LoadLimits {
  *
  * @param file the whole file. It is not changed, and the cloud does not refer to it.
  * @returns the splats in the shape and frame that `GaussianCloud` documents. Splats with values that cannot be drawn
- * are left out and counted in `droppedCount`.
+ * are left out and counted in `droppedCount`; `warnings` says what else of the file is not drawn.
  * @throws GaussianSplatError with a `decode/...` code that says what was expected and found, where and what to do,
  * `argument/value` for what are no bytes, `out-of-memory/budget` for what asks for more than its bytes or the limits in `options` allow, or `out-of-memory/allocation`; the reason of `signal`, usually a DOMException named AbortError, once it is aborted.
  */
@@ -48,9 +51,9 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   if (!format) {
     const { extensionOf, findFormat } = await loadDetection();
     format = findFormat(bytes, name, contentType);
-    const diagnose = format ? undefined : await loadDiagnosis();
+    const diagnosis = format ? undefined : await loadDiagnosis();
     signal?.throwIfAborted();
-    if (!format) throw diagnose!(bytes, name, extensionOf(name));
+    if (!format) throw diagnosis!.diagnose(bytes, name, extensionOf(name));
   }
   const read = await loadReader(format);
   signal?.throwIfAborted();
@@ -87,8 +90,11 @@ export async function readScene(file: FileBytes, options: ReadSceneOptions = {})
   }
   const cloud = keepUsable(whole);
   signal?.throwIfAborted();
-  if (cloud.count === 0) throw noSplats(name, cloud.droppedCount);
-  return cloud;
+  const { count, droppedCount } = cloud;
+  if (count === 0) throw noSplats(name, droppedCount);
+  if (droppedCount <= MOST_DROPPED * (count + droppedCount)) return cloud;
+  const { withLeftOut } = await loadModule('the code of warnings', () => import('./left-out.js'));
+  return withLeftOut(cloud, name);
 }
 
 function emptyFile(name: string): GaussianSplatError {

@@ -8,13 +8,20 @@ import {
   type OnnxHeader,
   type OnnxTensor,
 } from '@gaussian-splat/core';
-import { inOrder, projectionMatrix, viewMatrix, viewProjectionMatrix } from './camera-matrices.js';
+import {
+  cameraToWorld,
+  inOrder,
+  intrinsicsOf,
+  projectionMatrix,
+  viewMatrix,
+  viewProjectionMatrix,
+} from './camera-matrices.js';
 import type { InputNumbers } from './input-value.js';
 import type { GeneratorState } from './state.js';
 
 /**
- * The values of a generator's inputs, in the conventions that its contract declares. Inputs with the roles `gaussians` and
- * `image` are left out: their tensors come from another generator or from a picture.
+ * The values of a generator's inputs, in the conventions that its contract declares. Inputs with the roles `gaussians`,
+ * `image` and `state` are left out: their tensors come from another generator, from a picture or from the run before.
  *
  * @param header of a file that keeps the contract (`checkContract` found nothing); of a model of several instances that of one (`oneInstance`).
  * @throws GaussianSplatError `argument/value` if the state lacks a camera, or a value has the wrong length or is not finite.
@@ -27,7 +34,7 @@ export function bindInputs(
   const values: Record<string, InputNumbers> = {};
   for (const input of header.inputs) {
     const binding = contract.inputs[input.name];
-    if (binding.role === 'gaussians' || binding.role === 'image') continue;
+    if (binding.role === 'gaussians' || binding.role === 'image' || binding.role === 'state') continue;
     values[input.name] = toTensor(input, numbersOf(input, binding, contract, state));
   }
   return values;
@@ -35,7 +42,7 @@ export function bindInputs(
 
 function numbersOf(
   input: OnnxTensor,
-  binding: Exclude<InputBinding, { role: 'gaussians' | 'image' }>,
+  binding: Exclude<InputBinding, { role: 'gaussians' | 'image' | 'state' }>,
   contract: Contract,
   state: GeneratorState,
 ): ArrayLike<number> {
@@ -44,6 +51,10 @@ function numbersOf(
   switch (binding.role) {
     case 'view':
       return inOrder(viewMatrix(camera(), binding.axes ?? 'RDF'), binding.order ?? 'row-major');
+    case 'camera_to_world':
+      return inOrder(cameraToWorld(camera(), binding.axes ?? 'RDF'), binding.order ?? 'row-major');
+    case 'intrinsics':
+      return intrinsicsOf(camera(), binding.unit, sizeOf(input) === 9);
     case 'projection':
       return inOrder(projectionMatrix(camera(), binding.axes ?? 'RDF'), binding.order ?? 'row-major');
     case 'view_projection':
@@ -76,10 +87,11 @@ function frameAt(timeSeconds: number, { fps = 0, duration = Infinity }: Contract
   return Math.max(0, Math.min(Math.floor(timeSeconds * fps + FRAME_ROUNDING), fps > 0 ? last : 0));
 }
 
-/** Zeros, or for quaternions the identity. */
+/** Zeros, or for quaternions and matrices the identity. */
 function restPose(input: OnnxTensor, { format, quaternionOrder }: InputBinding & { role: 'pose' }): number[] {
-  const identity = quaternionOrder === 'xyzw' ? [0, 0, 0, 1] : [1, 0, 0, 0];
-  return Array.from({ length: sizeOf(input) }, (_, i) => (format === 'quaternion' ? identity[i % 4] : 0));
+  const quaternion = quaternionOrder === 'xyzw' ? [0, 0, 0, 1] : [1, 0, 0, 0];
+  const joint = { quaternion, matrix: [1, 0, 0, 0, 1, 0, 0, 0, 1], 'axis-angle': [0], parameters: [0] }[format];
+  return Array.from({ length: sizeOf(input) }, (_, i) => joint[i % joint.length]);
 }
 
 const filled = (input: OnnxTensor, value: number | ArrayLike<number>): ArrayLike<number> =>

@@ -27,20 +27,39 @@ export function bindPictures(
     if (!fits(picture, input)) throw misfit(picture, input);
     // As it is now: whoever owns it may change it.
     const { buffer, dtype, dims, version } = picture;
-    pictures[input.name] = { buffer, dtype, dims, version };
+    pictures[input.name] = { buffer, dtype, dims: dimsFor(input, dims), version };
   }
   return pictures;
 }
 
 function fits({ buffer, dtype, dims }: GpuTensor, input: OnnxTensor): boolean {
   const bytes = elementsOf(dims) * (dtype === 'float16' ? 2 : 4);
-  const sizes = input.dims ?? [];
+  const sizes = dimsFor(input, dims);
   return (
     dtype === input.dtype &&
-    dims.length === sizes.length &&
-    sizes.every((size, i) => typeof size !== 'number' || size === dims[i]) &&
+    elementsOf(sizes) === elementsOf(dims) &&
+    sizes.slice(-2).every((size, i) => size === dims[dims.length - 2 + i]) &&
     buffer.size >= Math.ceil(bytes / 4) * 4
   );
+}
+
+/** The input's own dimensions, batches of one included; sizes that it leaves open are the picture's. */
+function dimsFor({ dims: sizes = [] }: OnnxTensor, dims: readonly number[]): number[] {
+  const before = dims.length - sizes.length;
+  return sizes.map((size, i) => (typeof size === 'number' ? size : dims[before + i]));
+}
+
+/** What an input of the role `image` takes: planes, pictures, and sizes as far as the file fixes them. */
+export function pictureShapeOf({ dims = [], dtype }: OnnxTensor): {
+  readonly width: number | undefined;
+  readonly height: number | undefined;
+  readonly dtype: 'float32' | 'float16';
+  readonly channels: 3 | 4;
+  readonly views: number;
+} {
+  const [height, width] = dims.slice(-2).map((size) => (typeof size === 'number' ? size : undefined));
+  const views = dims.slice(0, -3).reduce<number>((product, size) => product * Number(size), 1);
+  return { width, height, dtype: dtype as 'float32' | 'float16', channels: dims.at(-3) === 4 ? 4 : 3, views };
 }
 
 const missing = (input: OnnxTensor): GaussianSplatError =>

@@ -1,5 +1,5 @@
 import type { Camera, CameraAxes, MatrixOrder } from '@gaussian-splat/core';
-import { multiply } from '@gaussian-splat/core';
+import { inverse, multiply } from '@gaussian-splat/core';
 
 /** Signs that turn OpenCV's camera axes (right, down, forward) into others. */
 function axisSigns(axes: CameraAxes): readonly [number, number, number] {
@@ -10,6 +10,16 @@ function axisSigns(axes: CameraAxes): readonly [number, number, number] {
 export function viewMatrix({ worldToCamera }: Camera, axes: CameraAxes): Float64Array {
   const signs = axisSigns(axes);
   return Float64Array.from({ length: 16 }, (_, i) => worldToCamera[i] * (i < 12 ? signs[Math.floor(i / 4)] : 1));
+}
+
+/** Camera to world, from the axes declared: the inverse of {@link viewMatrix}; row-major float64. */
+export const cameraToWorld = (camera: Camera, axes: CameraAxes): Float64Array => inverse(viewMatrix(camera, axes));
+
+/** fx 0 cx, 0 fy cy, 0 0 1, or fx, fy, cx, cy alone; in pixels, or as shares of the picture's sides. */
+export function intrinsicsOf(camera: Camera, unit: 'pixels' | 'normalized', isMatrix: boolean): number[] {
+  const [across, down] = unit === 'normalized' ? [camera.width, camera.height] : [1, 1];
+  const [fx, fy, cx, cy] = [camera.fx / across, camera.fy / down, camera.cx / across, camera.cy / down];
+  return isMatrix ? [fx, 0, cx, 0, fy, cy, 0, 0, 1] : [fx, fy, cx, cy];
 }
 
 /**

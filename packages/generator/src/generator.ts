@@ -70,6 +70,8 @@ export class Generator {
   readonly #runner: RunLoop<Wish> | Seat<InstanceWish>;
   #shown: Wish['inputs'] | undefined;
   #asked: Wish | undefined;
+  /** Of the last run. */
+  #timeSeconds = 0;
   #runs = 0;
 
   private constructor(chain: Chain, options: GeneratorOptions) {
@@ -192,6 +194,9 @@ export class Generator {
 
   async #run({ state, inputs }: Wish): Promise<void> {
     const start = performance.now();
+    const { timeSeconds = 0 } = state;
+    if (timeSeconds < this.#timeSeconds) this.#chain.restart();
+    this.#timeSeconds = timeSeconds;
     await this.#chain.run(inputs, (outputs) => this.#take(inputs, outputs, 0));
     this.#announce(state, start);
   }

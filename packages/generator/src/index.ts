@@ -1,4 +1,5 @@
 export { bindInputs } from './bind-inputs.js';
+export { pictureShapeOf } from './bind-pictures.js';
 export { inOrder, projectionMatrix, viewMatrix, viewProjectionMatrix } from './camera-matrices.js';
 export { groupInstances, inputsOfInstances, stackInputs } from './batch/stack-inputs.js';
 export {

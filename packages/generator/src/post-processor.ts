@@ -1,5 +1,6 @@
 import { ContractError, type ContractFault } from '@gaussian-splat/core';
 import { Chain } from './chain/chain.js';
+import { pictureShapeOf } from './bind-pictures.js';
 import { sameInputs, type GpuTensor, type Inputs } from './input-value.js';
 import { RunLoop } from './run-loop.js';
 import type { SessionKind } from './runtime/live-session.js';
@@ -8,13 +9,7 @@ import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
 
 /** The input that takes the picture. */
-export interface PictureInput {
-  readonly name: string;
-  /** Pixels; undefined where the model takes any size. */
-  readonly width: number | undefined;
-  readonly height: number | undefined;
-  readonly dtype: 'float32' | 'float16';
-}
+export type PictureInput = ReturnType<typeof pictureShapeOf> & { readonly name: string };
 
 /** A picture that a model has made, on the GPU: [1,3,H,W], planes of red, green and blue in 0..1. */
 export type FinishedPicture = GpuTensor & { readonly dtype: 'float32' | 'float16' };
@@ -150,13 +145,11 @@ function pictureInput(models: readonly GeneratorModel[]): PictureInput {
   const faults = models
     .filter(({ layout }) => layout !== undefined)
     .map((model) => unsuitable(model, 'a model that writes a picture', 'a model that writes Gaussians'));
-  if (inputs.length !== 1) {
-    faults.push(unsuitable(models[0], 'one input with the role image', `${inputs.length} of them`));
-  }
+  const pictures = inputs.reduce((sum, input) => sum + pictureShapeOf(input).views, 0);
+  if (pictures !== 1) faults.push(unsuitable(models[0], 'one input with the role image', `${pictures} pictures`));
   if (faults.length > 0) throw new ContractError(faults);
-  const [{ name, dtype, dims }] = inputs;
-  const [height, width] = dims!.slice(2).map((size) => (typeof size === 'number' ? size : undefined));
-  return { name, width, height, dtype: dtype as 'float32' | 'float16' };
+  const [input] = inputs;
+  return { name: input.name, ...pictureShapeOf(input) };
 }
 
 const unsuitable = ({ header }: GeneratorModel, expected: string, found: string): ContractFault => ({

@@ -9,6 +9,8 @@ const EVENTS = {
   onError: 'error',
   onCameraChange: 'camera-change',
   onPosterDismissed: 'poster-dismissed',
+  onInputsChange: 'inputs-change',
+  onViewChange: 'view-change',
   onModelVisibility: 'model-visibility',
   onGeneratorError: 'generator-error',
   onGeneratorFallback: 'generator-fallback',

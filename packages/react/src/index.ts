@@ -32,3 +32,12 @@ export const GaussianSplat: React.ForwardRefExoticComponent<GaussianSplatProps> 
   events: HANDLERS,
   displayName: 'GaussianSplat',
 });
+
+export {
+  SplatMesh,
+  SplatScene,
+  type SplatMeshElement,
+  type SplatMeshProps,
+  type SplatSceneElement,
+  type SplatSceneProps,
+} from './scenes.js';

@@ -1,28 +1,37 @@
 /**
- * Types of the bare tag `<gaussian-splat>` in JSX: `import type {} from '@gaussian-splat/react/jsx'`. React sets its properties; of its
+ * Types of the bare tags `<gaussian-splat>`, `<splat-scene>` and `<splat-mesh>` in JSX: `import type {} from '@gaussian-splat/react/jsx'`. React sets its properties; of its
  * events only those with handlers in small letters arrive (`onload`, `oncamera-change`), so that no other name is taken.
  */
 import type { GaussianSplatElement, GaussianSplatEventMap, SettableProperties } from '@gaussian-splat/element';
 import type * as React from 'react';
+import type {
+  ChildEventMap,
+  SettableMeshProperties,
+  SettableSceneProperties,
+  SplatMeshElement,
+  SplatSceneElement,
+} from '@gaussian-splat/element/scenes.js';
 import type { HandlerName } from './events.js';
 
-type SmallListeners = {
-  [Type in keyof GaussianSplatEventMap as `on${Type}`]?: (event: GaussianSplatEventMap[Type]) => void;
+type SmallListeners<Events> = {
+  [Type in keyof Events & string as `on${Type}`]?: (event: Events[Type]) => void;
 };
 
-type Props = Omit<
-  React.DetailedHTMLProps<React.HTMLAttributes<GaussianSplatElement>, GaussianSplatElement>,
-  HandlerName | keyof SettableProperties
+type Props<E, Settable, Events = ChildEventMap> = Omit<
+  React.DetailedHTMLProps<React.HTMLAttributes<E>, E>,
+  HandlerName | keyof Settable
 > &
-  SettableProperties &
-  SmallListeners;
+  Settable &
+  SmallListeners<Events>;
 
 declare module 'react' {
   // The way to tell React of a tag is to add it to its own namespace.
   // eslint-disable-next-line @typescript-eslint/no-namespace
   namespace JSX {
     interface IntrinsicElements {
-      'gaussian-splat': Props;
+      'gaussian-splat': Props<GaussianSplatElement, SettableProperties, GaussianSplatEventMap>;
+      'splat-scene': Props<SplatSceneElement, SettableSceneProperties>;
+      'splat-mesh': Props<SplatMeshElement, SettableMeshProperties>;
     }
   }
 }

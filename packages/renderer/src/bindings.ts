@@ -1,4 +1,3 @@
-import type { DepthOrder } from './depth-order.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import type { GeometryReading } from './geometry-reading.js';
@@ -8,12 +7,10 @@ import type { Scratch } from './scratch.js';
 import { CompactStage } from './stages/compact.js';
 import { CullChunksStage, CullStage } from './stages/cull.js';
 import { DetailBudgetStage } from './stages/detail-budget.js';
-import { PlanStage, scanBytes } from './stages/plan.js';
+import { PlanStage } from './stages/plan.js';
 import { ProjectStage } from './stages/project.js';
 import { SortStage } from './stages/sort.js';
-import { thinBlocks, ThinStage } from './stages/thin.js';
 import type { Variants } from './variants.js';
-import { constants } from './generated/shaders.js';
 
 /** The stages before the rasterizer; each is a shader of the same name. */
 export interface Stages {
@@ -21,7 +18,6 @@ export interface Stages {
   readonly cullChunks: CullChunksStage;
   readonly plan: PlanStage;
   readonly compact: CompactStage;
-  readonly thin: ThinStage;
   readonly sort: SortStage;
   /** Those that read geometry of a kind. */
   readonly reading: (kind?: GeometryReading) => ReadingStages;
@@ -43,7 +39,6 @@ export function makeStages(device: GPUDevice, { threads }: Pick<Variants, 'threa
     cullChunks: new CullChunksStage(device),
     plan: new PlanStage(device, threads),
     compact: new CompactStage(device),
-    thin: new ThinStage(device, threads),
     sort: new SortStage(device, threads),
     reading: (kind) => (kind ? readingStages(kind) : packed),
   };
@@ -78,13 +73,6 @@ export class FrameBindings {
   readonly #stages: Stages;
   readonly #scratch: Scratch;
   readonly #memory: GpuMemory;
-  readonly #ordered: {
-    blockOffsets: GPUBuffer;
-    thin: GPUBuffer;
-    limits: GPUBuffer;
-    ranges: GPUBuffer;
-  };
-  #thinned: { order: GPUBuffer; thin: ReturnType<ThinStage['bind']>; plan: GPUBindGroup } | undefined;
 
   constructor(device: GPUDevice, stages: Stages, { table, scratch }: FrameBuffers) {
     this.#stages = stages;
@@ -94,36 +82,19 @@ export class FrameBindings {
     const { groupOffsets, plan } = scratch;
     const count = table.pages.length;
     const { storage, uniform } = BUFFER_USAGE;
-    const constant = (name: string, ...words: number[]): GPUBuffer =>
-      memory.buffer(`gs.${name}`, 16, uniform, Uint32Array.from(words));
-    const ranges = (name: string, words: number[]): GPUBuffer =>
-      memory.buffer(`gs.${name}`, 8 * Math.max(1, count), storage, Uint32Array.from(words));
     const { firstGroups, groups } = table;
+    const ranges = table.pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]);
     this.detailAllow = stages.detailBudget.bindAllow({
       view: table.view(0),
       detail_counts: scratch.detailCounts,
       chunk_shares: scratch.chunkShares,
     });
     this.plan = stages.plan.bind({
-      limits: constant('plan.limits', count, scratch.capacity, groups),
+      limits: memory.buffer('gs.plan.limits', 16, uniform, Uint32Array.of(count, scratch.capacity, groups)),
       values: groupOffsets,
-      page_ranges: ranges(
-        'plan.page_groups',
-        table.pages.flatMap((_, page) => [firstGroups[page], firstGroups[page + 1]]),
-      ),
+      page_ranges: memory.buffer('gs.plan.page_groups', 8 * Math.max(1, count), storage, Uint32Array.from(ranges)),
       plan,
     });
-    const length = constants.CULL_GROUP * table.groups;
-    const blocks = thinBlocks(length);
-    this.#ordered = {
-      blockOffsets: memory.buffer('gs.thin.block_offsets', scanBytes(blocks), storage),
-      thin: constant('thin.length', length),
-      limits: constant('thin.limits', count, scratch.capacity, blocks),
-      ranges: ranges(
-        'thin.page_ranges',
-        table.pages.flatMap(() => [0, blocks]),
-      ),
-    };
   }
 
   get byteLength(): number {
@@ -138,21 +109,6 @@ export class FrameBindings {
     const made = this.#stages.sort.bind({ plan, keys, values: order, digitCounts, digitTotals }, keyBits);
     this.#sorts.set(keyBits, made);
     return made;
-  }
-
-  /** What thinning an order needs. */
-  thinned(depthOrder: DepthOrder): { thin: ReturnType<ThinStage['bind']>; plan: GPUBindGroup } {
-    const { order } = depthOrder;
-    if (order === undefined) throw new Error('the order must be recorded first');
-    if (this.#thinned?.order === order) return this.#thinned;
-    const { visibleBits, order: buffers, plan } = this.#scratch;
-    const { blockOffsets, thin, limits, ranges } = this.#ordered;
-    this.#thinned = {
-      order,
-      thin: this.#stages.thin.bind({ thin, order, visibleBits, blockOffsets, survivors: buffers[0] }),
-      plan: this.#stages.plan.bind({ limits, values: blockOffsets, page_ranges: ranges, plan }),
-    };
-    return this.#thinned;
   }
 
   destroy(): void {

@@ -1,8 +1,10 @@
-import { validateCamera } from '@gaussian-splat/core';
+import { validateCamera, type Camera } from '@gaussian-splat/core';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import type { FrameRequest } from './frame-request.js';
+import type { FrameSettings, Picture } from './picture.js';
 import type { Renderer } from './renderer.js';
-import { requireRequest, requireTextureSize } from './requirements.js';
+import { requireTextureSize } from './requirements.js';
+import type { Viewpoint } from './viewpoint.js';
 
 /** Rows of a texture copy start at multiples of this many bytes. */
 const ROW_ALIGNMENT = 256;
@@ -11,18 +13,23 @@ const BYTES_PER_PIXEL = 16;
 /** Images drawn until one had room for everything: room grows by a quarter more than was asked for. */
 const MOST_TRIES = 4;
 
+/** What to capture: a camera, what is behind the splats and the like, and the settings. */
+export interface CaptureRequest extends Omit<Picture, 'target'> {
+  readonly camera: Camera;
+  readonly settings?: FrameSettings;
+}
+
 /**
  * Draws one image and reads it back in float32, before any rounding to 8 bits. Drawn again where the renderer's buffers had no
  * room for all of it.
- * @throws GaussianSplatError as {@link Renderer.render} does, before anything is allocated.
+ * @throws GaussianSplatError as {@link Viewpoint.draw} does, before anything is allocated.
  * @returns [height, width, 4] premultiplied red, green, blue and alpha, row by row from the top.
  */
 export async function capture(
   device: GPUDevice,
-  renderer: Renderer,
-  request: Omit<FrameRequest, 'target' | 'targetFormat'>,
+  viewpoint: Viewpoint,
+  request: CaptureRequest | Omit<FrameRequest, 'target' | 'targetFormat'>,
 ): Promise<Float32Array> {
-  requireRequest(request);
   validateCamera(request.camera);
   requireTextureSize(device, request.camera);
   const { width, height } = request.camera;
@@ -40,8 +47,9 @@ export async function capture(
   });
   try {
     for (let tries = 0; tries < MOST_TRIES; tries++) {
-      renderer.render({ ...request, target: texture });
-      if (await renderer.isComplete()) break;
+      if ('gaussians' in request) (viewpoint as Renderer).render({ ...request, target: texture });
+      else viewpoint.draw(request.camera, { ...request, target: texture }, request.settings);
+      if (await viewpoint.isComplete()) break;
     }
     const encoder = device.createCommandEncoder({ label: 'gs.capture' });
     encoder.copyTextureToBuffer({ texture }, { buffer: staging, bytesPerRow }, [width, height]);

@@ -19,7 +19,7 @@ import { readPlaces } from './read-places.js';
 import { IngestStage } from './stages/ingest.js';
 import { bytesPerSplat, MemoryLedger, type Reservation } from './memory-ledger.js';
 import { cullGroups } from './stages/cull.js';
-import { ingestValues, TensorPlaces } from './tensor-places.js';
+import { countBytes, ingestValues, TensorPlaces } from './tensor-places.js';
 
 export interface DynamicGaussiansOptions {
   /** True if the model was trained with opacity compensation for the dilation. Default false. */
@@ -128,14 +128,14 @@ export class DynamicGaussians implements GaussianScene {
    * Rows from the live count on, and rows with numbers that cannot be used, are not drawn.
    * @param tensors storage buffers by the names of the layout's tensors; that of the count needs COPY_SRC. Sizes of float16 tensors
    * are rounded up to 4 bytes.
-   * @param rows number of rows that this run wrote, 0 to the layout's capacity. With 0 no tensor is needed.
+   * @param rows number of rows that this run wrote, 0 to the layout's capacity, or its padded rows. With 0 no tensor is needed.
    * @param instance of a run that wrote several scenes of `rows` rows one after the other in each tensor, which is this one; default the first.
    * A live count is then element `instance` of its tensor.
    * @throws GaussianSplatError `contract/rows` if there are more rows than capacity; `argument/value` for a tensor that is missing or
    * too small. What was shown before stays.
    */
   ingest(tensors: Readonly<Record<string, GPUBuffer>>, rows: number, instance = 0): void {
-    requireRows(rows, this.count);
+    requireRows(rows, this.layout.paddedRows ?? this.count);
     const counter = rows > 0 && this.layout.count !== undefined ? tensors[this.layout.count] : undefined;
     this.#places.check(tensors, rows, instance);
     const before = instance * rows;
@@ -145,7 +145,8 @@ export class DynamicGaussians implements GaussianScene {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.ingest' });
     if (counter) {
       const { offset } = layouts.Ingest.fields.count;
-      for (const { uniform } of this.pages) encoder.copyBufferToBuffer(counter, 4 * instance, uniform, offset, 4);
+      for (const { uniform } of this.pages)
+        encoder.copyBufferToBuffer(counter, countBytes(this.layout) * instance, uniform, offset, 4);
     }
     const pass = encoder.beginComputePass({ label: 'gs.ingest' });
     this.pages.forEach(({ count }, page) => this.#stage.record(pass, bindings[page], count));

@@ -1,43 +1,28 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { GaussianScene } from './gaussian-scene.js';
-import type { FrameTimer } from './gpu/pass-timer.js';
-import type { FrameLevers, Levers, Quality } from './levers.js';
-import type { FrameNotes } from './rasterizers/rasterizer.js';
+import type { FrameLevers } from './levers.js';
+import type { FrameSettings, Picture, Rgba } from './picture.js';
 
-/** A quality, and single levers that differ from it. */
-export interface RendererOptions extends Partial<Levers> {
-  /** Default: `default`. */
-  readonly quality?: Quality;
-  /**
-   * Called when a frame that was drawn lacked splats for want of room in the renderer's buffers. The next frame has the room: draw it.
-   */
+/** Settings, and who is called when a frame lacked room: see {@link ViewpointOptions}. */
+export interface RendererOptions extends FrameSettings {
   readonly onIncomplete?: () => void;
 }
 
 /** One image to draw. */
-export interface FrameRequest {
-  /** One scene, or several that are sorted and blended together. Order decides between equal depths. */
+export interface FrameRequest extends Pick<Picture, 'filter' | 'notes' | 'timer'> {
+  /** One scene, or several that are sorted and blended together. Of equal depths the scene that came first is in front. */
   readonly gaussians: GaussianScene | readonly GaussianScene[];
   /** Its width and height must be those of the target. */
   readonly camera: Camera;
-  /** A texture with the usage STORAGE_BINDING saves `tiles` a pass. Of one with several levels or layers the first is drawn into. */
+  /** See {@link Picture.target}. */
   readonly target: GPUTexture | GPUTextureView;
-  /** Format of a target that is a view: any colour format that WebGPU can render to. */
+  /** Format of a target that is a view. */
   readonly targetFormat?: GPUTextureFormat;
-  /** Premultiplied red, green, blue and alpha behind the splats. Default: transparent. */
-  readonly background?: readonly [red: number, green: number, blue: number, alpha: number];
+  /** See {@link Picture.over}. */
+  readonly background?: Rgba;
   /** The levers of these names, for this frame alone. */
   readonly detail?: number;
   readonly splatBudget?: number;
-  /**
-   * What to note besides the image: `tiles` only, and not for every frame: all splats are put in order for it.
-   */
-  readonly notes?: FrameNotes;
-  /**
-   * Levers of this frame alone, for pictures in motion. Give the same object for the same levers, and {@link Renderer.prepare} it: what it
-   * takes is remembered by the object.
-   */
+  /** Levers of this frame alone, for frames in motion. */
   readonly levers?: Partial<FrameLevers>;
-  /** Notes when each pass ran. */
-  readonly timer?: FrameTimer;
 }

@@ -1,17 +1,16 @@
 import { FrameBindings, type Stages } from './bindings.js';
 import { CapacityMemory, type Capacity } from './capacity-memory.js';
 import { CapacityMonitor, initialCapacity, LEAST_CAPACITY } from './capacity.js';
-import { DepthOrder } from './depth-order.js';
-import type { GaussianScene } from './gaussian-scene.js';
-import { OrderPolicy } from './order-policy.js';
 import { PageTable } from './page-table.js';
 import type { Rasterizer } from './rasterizers/rasterizer.js';
 import { maxPairs } from './rasterizers/pair-buffers.js';
 import { maxVisible, Scratch } from './scratch.js';
-import type { Threads } from './stages/plan.js';
+import type { World } from './world.js';
 
 /** Room for pairs that the pacer learns from what one costs. */
 const TELLING_ROOM = 1 << 18;
+/** Share of the room that scenes which are left must need: else it is given back. */
+const LEAST_USED = 0.5;
 /** Submissions that painting a frame may always be divided into: each takes the page's thread some tenths of a millisecond. */
 const FEW_SUBMISSIONS = 4;
 
@@ -20,14 +19,11 @@ export interface Resources {
   readonly table: PageTable;
   readonly scratch: Scratch;
   readonly bindings: FrameBindings;
-  readonly depthOrder: DepthOrder;
-  readonly orderPolicy: OrderPolicy;
   readonly monitor: CapacityMonitor;
 }
 
 export interface ResourceOptions {
   readonly stages: Stages;
-  readonly threads: Threads;
   readonly rasterizer: Rasterizer;
   /** Pairs of splat and bin that are painted in one submission. */
   readonly pairsAtOnce: () => number;
@@ -43,6 +39,8 @@ export class FrameResources {
   #capacity: Capacity | undefined;
   #memory = new CapacityMemory();
   #hasOtherPairs = false;
+  /** What the rasterizer was last bound to, of what may be replaced. */
+  #boundPlan: GPUBuffer | undefined;
   #hasQuickPairs = false;
   /** The largest budget of splats that a frame has been given. */
   #mostSplats: number | undefined;
@@ -63,38 +61,59 @@ export class FrameResources {
   }
 
   get byteLength(): number {
-    const { table, scratch, bindings, depthOrder } = this.#current ?? {};
-    return [table, scratch, bindings, depthOrder].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    const { table, scratch, bindings } = this.#current ?? {};
+    return [table, scratch, bindings].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
   }
 
   /**
    * What a frame is drawn with: allocates where the scenes or the wished room are other ones than before.
    * @param splatBudget most splats that the frame draws; 0 for no limit
    */
-  fit(scenes: readonly GaussianScene[], splatBudget: number): Resources {
+  fit(world: World, splatBudget: number): Resources {
     this.#roomFor(splatBudget);
     const current = this.#current;
-    if (current?.table.holds(scenes)) {
+    if (current?.table.isCurrent) {
       // The monitor has asked for other room.
       const hasOtherRoom = current.scratch.capacity !== this.#capacity?.visible || this.#hasOtherPairs;
       return hasOtherRoom ? this.#rebind(current.table) : current;
     }
-    this.release();
-    const table = new PageTable(this.#device, [...scenes]);
+    if (current) return this.#layAnew(current);
+    const table = new PageTable(this.#device, world);
     this.#capacity = this.#firstFor(table);
+    this.#memory = new CapacityMemory();
+    return this.#rebind(table);
+  }
+
+  /** Scenes have come or gone: what still has room stays, what has not is made larger by what came. */
+  #layAnew({ table }: Resources): Resources {
+    const before = table.splats;
+    table.lay();
+    const [now, most, first] = [this.#capacity!, this.#mostFor(table), this.#firstFor(table)];
+    const added = table.splats - before;
+    const visible =
+      added > 0
+        ? Math.min(most.visible, now.visible + initialCapacity(added, most, this.#isBudgeted(table)).visible)
+        : Math.min(now.visible, first.visible);
+    const pairs = added > 0 ? Math.max(now.pairs, first.pairs) : Math.min(now.pairs, first.pairs);
+    const isEnough = (own: number, wanted: number): boolean => wanted <= own && wanted >= own * LEAST_USED;
+    this.#capacity = {
+      visible: isEnough(now.visible, visible) ? now.visible : visible,
+      pairs: isEnough(now.pairs, pairs) ? now.pairs : pairs,
+    };
+    this.#hasOtherPairs = this.#capacity.pairs !== now.pairs;
     this.#memory = new CapacityMemory();
     return this.#rebind(table);
   }
 
   /** Frees everything. */
   release(): void {
-    const { table, scratch, bindings, depthOrder, monitor } = this.#current ?? {};
+    const { table, scratch, bindings, monitor } = this.#current ?? {};
     table?.destroy();
     scratch?.destroy();
     bindings?.destroy();
-    depthOrder?.release();
     monitor?.destroy();
     this.#current = undefined;
+    this.#boundPlan = undefined;
   }
 
   /** A larger budget of splats than before makes other room. */
@@ -131,10 +150,8 @@ export class FrameResources {
 
   /** Allocates and binds what lies between the stages, for the capacity at hand. */
   #rebind(table: PageTable): Resources {
-    const { stages, threads } = this.#options;
+    const { stages } = this.#options;
     const capacity = this.#capacity!;
-    const depthOrder = this.#current?.depthOrder ?? new DepthOrder(this.#device, table, threads);
-    const orderPolicy = this.#current?.orderPolicy ?? new OrderPolicy(table, depthOrder);
     const kept = this.#current?.scratch.capacity === capacity.visible ? this.#current.scratch : undefined;
     if (kept === undefined) this.#current?.scratch.destroy();
     this.#current?.bindings.destroy();
@@ -144,22 +161,24 @@ export class FrameResources {
     const { visible, pairs } = capacity;
     const spareBytes = this.#options.rasterizer.spareBytes({ capacity: visible, pairCapacity: pairs });
     kept?.fitSpare(spareBytes);
+    kept?.fitPages(table.groups, pages);
     const scratch = kept ?? new Scratch(this.#device, { visible, groups: table.groups, pages }, spareBytes);
-    this.#bindRasterizer(scratch, capacity);
+    const isSame = kept !== undefined && kept.plan === this.#boundPlan;
+    if (!isSame || this.#hasOtherPairs) this.#bindRasterizer(scratch, capacity);
+    this.#boundPlan = scratch.plan;
     this.#hasOtherPairs = false;
     const bindings = new FrameBindings(this.#device, stages, { table, scratch });
     const monitor = this.#watch(table, capacity);
-    this.#current = { table, scratch, bindings, depthOrder, orderPolicy, monitor };
+    this.#current = { table, scratch, bindings, monitor };
     return this.#current;
   }
 
-  #bindRasterizer({ plan, splats, order, keys, spare }: Scratch, { visible, pairs }: Capacity): void {
+  #bindRasterizer({ plan, splats, order, spare }: Scratch, { visible, pairs }: Capacity): void {
     this.#options.rasterizer.bind({
       plan,
       splats,
       spare,
-      survivors: order[0],
-      orders: { sorted: order[0], identity: keys[0] },
+      order: order[0],
       capacity: visible,
       pairCapacity: pairs,
     });

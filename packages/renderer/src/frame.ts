@@ -1,6 +1,5 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings, Stages } from './bindings.js';
-import type { DepthOrder } from './depth-order.js';
 import type { Wishes, WishLevers } from './gaussian-scene.js';
 import type { FrameTimer } from './gpu/pass-timer.js';
 import type { Levers } from './levers.js';
@@ -13,19 +12,21 @@ export interface Frame {
   readonly scratch: Scratch;
   readonly camera: Camera;
   readonly levers: WishLevers & Pick<Levers, 'depthKeyBits'>;
-  /** An order of all splats that serves the camera; without it the visible splats are sorted. */
-  readonly depthOrder?: DepthOrder;
+  /** Whether {@link Scratch.survivors} is to list the numbers of the visible splats by slot, for auxiliary outputs. */
+  readonly keepsSurvivors: boolean;
   /** Whether a page has levels of detail. */
   readonly hasDetail: boolean;
   /** Whether to keep the splats that are looked at within `Levers.splatBudget`. */
   readonly isBudgeted: boolean;
-  readonly timer?: FrameTimer;
+  /** Whether the rasterizer needs the depths of the splats: keys must be depths. */
+  readonly keepsDepths: boolean;
+  readonly timer?: FrameTimer | undefined;
 }
 
 /**
- * Records what turns Gaussians into projected splats from near to far: cull and project, then sort; or, with an order that
- * serves, thin that order and project. Counts travel in `plan`; nothing comes back to the CPU.
- * @returns what must be read after the submit: pages that streamed scenes lack
+ * Records what turns Gaussians into projected splats from near to far: cull, project, sort. Counts travel in `plan`; nothing comes back to
+ * the CPU.
+ * @returns what must be copied at the end of the frame and read after the submit: pages that streamed scenes lack
  */
 export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wishes[] {
   const { scratch, bindings, timer } = frame;
@@ -38,17 +39,15 @@ export function recordProjection(encoder: GPUCommandEncoder, frame: Frame): Wish
   const pass = encoder.beginComputePass({ label: 'gs.project', timestampWrites: timer?.timestampWrites('project') });
   if (frame.isBudgeted) keepWithinBudget(pass, frame);
   cull(pass, frame);
-  if (frame.depthOrder) listInDepthOrder(pass, frame, frame.depthOrder);
-  else listInFileOrder(pass, frame);
+  listSurvivors(pass, frame);
   for (const { reading, project, splatCount } of bindings.pages) {
-    // In depth order the survivors of all pages are mixed.
-    const most = frame.depthOrder ? scratch.capacity : Math.min(scratch.capacity, splatCount);
-    reading.project.record(pass, project, most);
+    reading.project.record(pass, project, Math.min(scratch.capacity, splatCount));
   }
   noteWishes(pass, frame, wishes);
   pass.end();
-  for (const wish of wishes) wish.copy(encoder);
-  if (!frame.depthOrder) sort(encoder, frame);
+  if (frame.keepsSurvivors) scratch.keepSurvivors(encoder);
+  if (frame.keepsDepths) scratch.keepDepths(encoder);
+  sort(encoder, frame);
   return wishes;
 }
 
@@ -78,16 +77,9 @@ function cull(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
   for (const { reading, cull: bound, splatCount } of bindings.pages) reading.cull.record(pass, bound, splatCount);
 }
 
-function listInFileOrder(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
+function listSurvivors(pass: GPUComputePassEncoder, { stages, bindings }: Frame): void {
   stages.plan.record(pass, bindings.plan);
   for (const { compact, splatCount } of bindings.pages) stages.compact.record(pass, compact, splatCount);
-}
-
-function listInDepthOrder(pass: GPUComputePassEncoder, { stages, bindings }: Frame, depthOrder: DepthOrder): void {
-  const { thin, plan } = bindings.thinned(depthOrder);
-  stages.thin.recordCount(pass, thin, depthOrder.length);
-  stages.plan.record(pass, plan);
-  stages.thin.recordWrite(pass, thin, depthOrder.length);
 }
 
 /** Orders the projected splats from near to far, equal depths in the file's order. */

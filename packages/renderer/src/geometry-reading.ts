@@ -1,4 +1,4 @@
-import { cull, cullSerial, orderKeys, project } from './generated/shaders.js';
+import { cull, cullSerial, project } from './generated/shaders.js';
 import type { ShaderDescription } from './gpu/kernel.js';
 
 /** A shader with the bindings of another. */
@@ -11,8 +11,7 @@ export interface GeometryReading {
   readonly cull: Like<typeof cull>;
   readonly cullSerial: Like<typeof cullSerial>;
   readonly project: Like<typeof project>;
-  readonly orderKeys: Like<typeof orderKeys>;
 }
 
 /** Reads `PackedGaussian`. */
-export const PACKED: GeometryReading = { cull, cullSerial, project, orderKeys };
+export const PACKED: GeometryReading = { cull, cullSerial, project };

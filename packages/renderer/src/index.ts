@@ -1,4 +1,4 @@
-export { capture } from './capture.js';
+export { capture, type CaptureRequest } from './capture.js';
 export { createRenderer } from './choice/choose.js';
 export { chooseVariants, startVariants, type ChoiceOptions, type StartOptions } from './choice/choose.js';
 export type { ChoiceStore } from './choice/kept-choice.js';
@@ -11,6 +11,7 @@ export { PassTimer, type FrameTimer, type PassTime } from './gpu/pass-timer.js';
 export { QueueClock, type WorkTime } from './gpu/queue-clock.js';
 export { SpanTimer } from './gpu/span-timer.js';
 export { QUALITIES, type FrameLevers, type Levers, type Quality } from './levers.js';
+export { LinearColours } from './linear-colours.js';
 export { packWithDetail } from './detail/pack-with-detail.js';
 export { buildPackedLevels, type PackedLevels } from './detail/packed-levels.js';
 export { packLevelRuns } from './detail/pack-runs.js';
@@ -24,9 +25,20 @@ export {
   type DetailTree,
   type DetailTreeOptions,
 } from './detail/build-pages.js';
+export { decodePage } from './detail/decode-page.js';
+export {
+  codingOf,
+  PageEncoder,
+  USUAL_STEPS,
+  type Deflate,
+  type PageSteps,
+  type WrittenCoding,
+} from './detail/encode-page.js';
+export { cloudOfChunks, type PageChunks } from './detail/page-cloud.js';
+export type { CodedFile, PageCoding } from './detail/page-coding.js';
 export { treeOfCopies } from './detail/tile-tree.js';
 export { StreamedGaussians, type PoolOptions, type StreamOptions } from './detail/streamed-gaussians.js';
-export type { PageSource, StreamedScene } from './detail/page-source.js';
+export type { FetchPage, PageSource, StreamedScene } from './detail/page-source.js';
 export { layOutLevels, type LevelBox, type LevelPage, type LevelScene } from './detail/level-pages.js';
 export { levelSource, packLevelPage } from './detail/level-source.js';
 export { checkManifest, type DetailManifest } from './detail/manifest.js';
@@ -36,8 +48,21 @@ export type { ShPrecision } from './pack/sh.js';
 export type { AccumulationFormat, FrameNotes, NotedFrame, RasterizerName } from './rasterizers/rasterizer.js';
 export { FilteredFrame, type ModelPicture } from './pictures/filtered-frame.js';
 export { PictureTensor, type PictureFit, type PictureShape } from './pictures/picture-tensor.js';
+export {
+  settings,
+  type Composer,
+  type FrameSettings,
+  type Picture,
+  type Rgba,
+  type Target,
+  type TargetView,
+} from './picture.js';
 export { Renderer } from './renderer.js';
+export { Viewpoint, type View, type ViewpointOptions } from './viewpoint.js';
+export { boundsOfWorld } from './world-bounds.js';
+export { Placement, World, type Box, type Placed } from './world.js';
 export type { FrameRequest, RendererOptions } from './frame-request.js';
+export { SceneDepth, type HostDepth, type SceneDepthOptions } from './scene-depth.js';
 export { SequenceGaussians } from './sequence-gaussians.js';
 export type { FrameStatistics } from './statistics.js';
 export type { Threads } from './stages/plan.js';

@@ -19,7 +19,7 @@ export interface Levers {
    */
   readonly accumulation: 'auto' | AccumulationFormat;
   /**
-   * Bits of the keys that splats are sorted by while the camera turns. 32 are those of the float32 depth and sort exactly; fewer
+   * Bits of the keys that splats are sorted by. 32 are those of the float32 depth and sort exactly; fewer
    * are spread over the logarithm of the visible depths.
    */
   readonly depthKeyBits: 16 | 24 | 32;
@@ -28,11 +28,6 @@ export interface Levers {
    * them too long. Frames of tiles that may have much to do are divided further without being asked. 1 to 256.
    */
   readonly submissions: number;
-  /**
-   * Radians that the camera may turn before splats are sorted again. Scenes of at most 2²⁰ splats keep an order of them all meanwhile, where the camera turns by at most
-   * half of that a frame; larger ones, and a camera that turns faster, have the visible splats sorted for each frame.
-   */
-  readonly sortAngle: number;
   /**
    * Where tiles end a pixel. Up to 1e-4, which scenes are trained with: before the splat that would leave it this transmittance or less. Above: behind that splat.
    */
@@ -64,7 +59,6 @@ const EXACT: Levers = {
   accumulation: 'auto',
   depthKeyBits: 24,
   submissions: 1,
-  sortAngle: 1e-7,
   transmittanceMin: TRAINED_TRANSMITTANCE,
   shDegree: 3,
   detail: 0,
@@ -85,7 +79,6 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
     ...EXACT,
     rasterizer: 'tiles',
     accumulation: 'rgba32float',
-    sortAngle: 0,
   },
   default: EXACT,
   balanced: {
@@ -101,23 +94,12 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
 };
 
 /**
- * The levers that single frames may set otherwise than their renderer: see {@link FrameRequest.levers}. The others decide what a renderer
- * allocates.
+ * The levers that frames may set otherwise than those before and behind them at no cost. The others decide what a viewpoint allocates.
  */
-export type FrameLevers = Pick<Levers, (typeof FRAME_LEVERS)[number]>;
-
-const FRAME_LEVERS = [
-  'depthKeyBits',
-  'sortAngle',
-  'transmittanceMin',
-  'shDegree',
-  'detail',
-  'resolutionScale',
-] as const;
+export type FrameLevers = Pick<Levers, 'depthKeyBits' | 'transmittanceMin' | 'shDegree' | 'detail' | 'resolutionScale'>;
 
 const RANGES: Readonly<Partial<Record<keyof Levers, readonly [least: number, most: number]>>> = {
   submissions: [1, 256],
-  sortAngle: [0, Math.PI],
   transmittanceMin: [0, 1],
   detail: [0, 64],
   detailFade: [0, 2],
@@ -148,18 +130,8 @@ export function leversOf(options: Partial<Levers> & { readonly quality?: Quality
   return levers;
 }
 
-/**
- * A renderer's levers with those that a frame sets otherwise.
- * @throws GaussianSplatError `argument/value` for a value out of its lever's range.
- */
-export function leversOfFrame<L extends Levers>(levers: L, changes: Partial<FrameLevers>): L {
-  const set = FRAME_LEVERS.filter((name) => changes[name] !== undefined);
-  for (const name of set) requireInRange(name, changes[name], 'FrameRequest.levers');
-  return { ...levers, ...Object.fromEntries(set.map((name) => [name, changes[name]])) };
-}
-
 /** @throws GaussianSplatError `argument/value` for a value that is not in its lever's range or none of its choices. */
-export function requireInRange(name: keyof Levers, found: unknown, where = 'RendererOptions'): void {
+export function requireInRange(name: keyof Levers, found: unknown, where = 'FrameSettings'): void {
   const choices = CHOICES[name];
   if (choices && !choices.includes(found)) throw invalid(name, choices.join(', '), found, where);
   const range = RANGES[name];
@@ -170,7 +142,7 @@ export function requireInRange(name: keyof Levers, found: unknown, where = 'Rend
   }
 }
 
-function invalid(name: string, expected: string, found: unknown, where = 'RendererOptions'): GaussianSplatError {
+function invalid(name: string, expected: string, found: unknown, where = 'FrameSettings'): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
     where: `${where}.${name}`,
     expected,

@@ -1,5 +1,5 @@
-import type { Camera, Vector3 } from '@gaussian-splat/core';
-import type { GaussianPage, GaussianScene, Wishes } from './gaussian-scene.js';
+import { multiply, SPLAT_FILTERS, type Camera, type SplatFilter, type Vector3 } from '@gaussian-splat/core';
+import type { GaussianPage, Wishes } from './gaussian-scene.js';
 import { constants, layouts } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
@@ -7,31 +7,62 @@ import { writeStruct } from './gpu/struct.js';
 import type { Levers } from './levers.js';
 import { SH_PRECISION } from './pack/sh.js';
 import { cullGroups } from './stages/cull.js';
-import { cameraValues } from './view.js';
+import { cameraValues, MAX_FLOAT32 } from './view.js';
+import type { Placement, World } from './world.js';
 
 /** Bytes between the uniforms of two pages: WebGPU's default `minUniformBufferOffsetAlignment`. */
 const VIEW_STRIDE = 256;
 
-/** The pages that are drawn together, with a `View` uniform for each. */
+/** Stands for a crop that leaves nothing out. */
+const EVERYWHERE = {
+  min: [-MAX_FLOAT32, -MAX_FLOAT32, -MAX_FLOAT32],
+  max: [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32],
+} as const;
+
+/** The pages of the visible scenes of a world, with a `View` uniform for each. */
 export class PageTable {
-  readonly pages: readonly GaussianPage[];
-  /** First group (chunk) of each page, and behind the last the number of all groups. */
-  readonly firstGroups: Uint32Array;
+  #pages: readonly GaussianPage[] = [];
+  #firstGroups: Uint32Array = new Uint32Array(1);
   readonly #device: GPUDevice;
   readonly #memory: GpuMemory;
-  readonly #uniforms: GPUBuffer;
-  readonly #uniformBytes: ArrayBuffer;
-  readonly #scenes: readonly GaussianScene[];
+  #uniforms!: GPUBuffer;
+  #uniformBytes = new ArrayBuffer(0);
+  readonly #world: World;
+  #layout = -1;
+  #placements: readonly Placement[] = [];
+  /** By page. */
+  #placementOf: readonly Placement[] = [];
 
-  constructor(device: GPUDevice, scenes: readonly GaussianScene[]) {
+  constructor(device: GPUDevice, world: World) {
     this.#device = device;
-    this.#scenes = scenes;
+    this.#world = world;
     this.#memory = new GpuMemory(device);
-    this.pages = scenes.flatMap((scene) => scene.pages);
-    this.firstGroups = firstGroups(this.pages);
-    this.#uniformBytes = new ArrayBuffer(VIEW_STRIDE * Math.max(1, this.pages.length));
+    this.lay();
+  }
+
+  /** Lays out the pages of the scenes that are visible by now. Whatever was bound to a page must be bound again; memory is kept where it suffices. */
+  lay(): void {
+    const { layout, placements } = this.#world;
+    this.#layout = layout;
+    this.#placements = placements.filter(({ visible }) => visible);
+    this.#pages = this.#placements.flatMap(({ scene }) => scene.pages);
+    this.#placementOf = this.#placements.flatMap((placement) => placement.scene.pages.map(() => placement));
+    this.#firstGroups = firstGroups(this.#pages);
+    const bytes = VIEW_STRIDE * Math.max(1, this.#pages.length);
+    if (bytes <= this.#uniformBytes.byteLength) return;
+    this.#memory.destroy();
+    this.#uniformBytes = new ArrayBuffer(bytes);
     const { uniform, copyDestination } = BUFFER_USAGE;
-    this.#uniforms = this.#memory.buffer('gs.views', this.#uniformBytes.byteLength, uniform | copyDestination);
+    this.#uniforms = this.#memory.buffer('gs.views', bytes, uniform | copyDestination);
+  }
+
+  get pages(): readonly GaussianPage[] {
+    return this.#pages;
+  }
+
+  /** First group (chunk) of each page, and behind the last the number of all groups. */
+  get firstGroups(): Uint32Array {
+    return this.#firstGroups;
   }
 
   /** Groups of all pages. */
@@ -41,17 +72,17 @@ export class PageTable {
 
   /** Where views of the scene that a page is part of say what they wish for, if it is streamed. */
   wishesOf(page: number): Wishes | undefined {
-    return this.#scenes.find(({ pages }) => pages.includes(this.pages[page]))?.wishes;
+    return this.#placementOf[page].scene.wishes;
   }
 
   /** True if a scene is streamed. */
   get isStreamed(): boolean {
-    return this.#scenes.some(({ wishes }) => wishes !== undefined);
+    return this.#placements.some(({ scene }) => scene.wishes !== undefined);
   }
 
   /** Lets streamed scenes take in what has come. */
   update(): void {
-    for (const scene of this.#scenes) scene.update?.();
+    for (const { scene } of this.#placements) scene.update?.();
   }
 
   /** True if a page has levels of detail. */
@@ -64,16 +95,6 @@ export class PageTable {
     return this.pages.reduce((sum, { count }) => sum + count, 0);
   }
 
-  /** Grows when the content of a scene changes; 0 if none ever does. */
-  get version(): number {
-    return this.#scenes.reduce((sum, { version }) => sum + version, 0);
-  }
-
-  /** World positions of the scenes' origins. */
-  get origins(): readonly Vector3[] {
-    return this.#scenes.map(({ origin }) => origin);
-  }
-
   get byteLength(): number {
     return this.#memory.byteLength;
   }
@@ -83,37 +104,42 @@ export class PageTable {
     return { buffer: this.#uniforms, offset: VIEW_STRIDE * page, size: layouts.View.size };
   }
 
-  /** True if the table was made for exactly these scenes. */
-  holds(scenes: readonly GaussianScene[]): boolean {
-    return scenes.length === this.#scenes.length && scenes.every((scene, i) => scene === this.#scenes[i]);
+  /** True while the visible scenes are those that were laid out. */
+  get isCurrent(): boolean {
+    return this.#layout === this.#world.layout;
   }
 
   /**
    * Points every page at a camera, for the commands that are submitted next.
    * @param pixelArea area of a pixel of the frame that is shown, in pixels of the camera
+   * @param filter in place of those of the scenes
    */
   look(
     camera: Camera,
     pixelArea: number,
     { shDegree, depthKeyBits, detail, detailFade, splatBudget }: Levers,
-    isOrdered: boolean,
+    filter?: SplatFilter,
   ): void {
     const shared = {
       sh_cap: shDegree,
       key_bits: depthKeyBits,
-      is_ordered: isOrdered ? 1 : 0,
       detail,
       detail_fade: detailFade,
       splat_budget: splatBudget,
     };
     let page = 0;
-    for (const scene of this.#scenes) {
+    for (const { scene, sceneToWorld, opacity, crop = EVERYWHERE } of this.#placements) {
+      const seen = sceneToWorld ? { ...camera, worldToCamera: multiply(camera.worldToCamera, sceneToWorld) } : camera;
       // The same filter whatever the frame is drawn at: in larger pixels it has less variance.
-      const values = cameraValues(camera, scene.origin, (scene.filterVariance ?? constants.DILATION) * pixelArea);
+      const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : scene;
+      const values = cameraValues(seen, scene.origin, filterVariance * pixelArea);
       const own = {
+        opacity,
+        crop_low: relative(crop.min, scene.origin),
+        crop_high: relative(crop.max, scene.origin),
         sh_degree: scene.shDegree,
         sh_encoding: SH_PRECISION[scene.shPrecision],
-        antialiased: scene.antialiased ? 1 : 0,
+        antialiased: antialiased ? 1 : 0,
       };
       for (const { count, details } of scene.pages) {
         const place = { has_detail: details ? 1 : 0, splat_count: count, page, first_group: this.firstGroups[page] };
@@ -122,13 +148,18 @@ export class PageTable {
         page++;
       }
     }
-    this.#device.queue.writeBuffer(this.#uniforms, 0, this.#uniformBytes);
+    const bytes = VIEW_STRIDE * Math.max(1, this.#pages.length);
+    this.#device.queue.writeBuffer(this.#uniforms, 0, this.#uniformBytes, 0, bytes);
   }
 
   destroy(): void {
     this.#memory.destroy();
   }
 }
+
+/** A corner of a crop in float32, from a scene's origin: infinities become numbers. */
+const relative = (corner: Vector3, origin: Vector3): number[] =>
+  corner.map((value, axis) => Math.min(MAX_FLOAT32, Math.max(-MAX_FLOAT32, value - origin[axis])));
 
 function firstGroups(pages: readonly GaussianPage[]): Uint32Array {
   const first = new Uint32Array(pages.length + 1);

@@ -1,17 +1,8 @@
 /** What a renderer asks of its device and of those who call it, and the errors that say so. */
 import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
-import type { FrameRequest } from './frame-request.js';
+import type { FrameSettings, Picture } from './picture.js';
 import { TEXTURE_USAGE } from './gpu/kernel.js';
 import type { AccumulationFormat, Rasterizer } from './rasterizers/rasterizer.js';
-
-export function missingFormat(): GaussianSplatError {
-  return new GaussianSplatError('argument/value', {
-    where: 'FrameRequest.targetFormat',
-    expected: 'the format of the target, which is a texture view',
-    found: 'undefined',
-    remedy: 'name the format, or give the texture itself',
-  });
-}
 
 export function requireTextureSize(device: GPUDevice, { width, height }: Camera): void {
   const limit = device.limits.maxTextureDimension2D;
@@ -36,11 +27,7 @@ const TARGET: readonly (readonly [property: keyof GPUTexture, expected: unknown]
  */
 export function requireTarget(target: GPUTexture | undefined, format: string, { width, height }: Camera): void {
   if (/depth|stencil|[us]int|snorm$|^(bc|etc|eac|astc)/.test(format))
-    throw missing(
-      'targetFormat',
-      'a format that colours can be drawn into: rgba8unorm, bgra8unorm, rgba16float, …',
-      format,
-    );
+    throw missing('target', 'a format that colours can be drawn into: rgba8unorm, bgra8unorm, rgba16float, …', format);
   if (target === undefined) return;
   const wrong = TARGET.find(([property, expected]) => target[property] !== expected);
   if (wrong) throw missing('target', `a texture of ${wrong[0]} ${String(wrong[1])}`, target[wrong[0]]);
@@ -57,40 +44,52 @@ export function requireTarget(target: GPUTexture | undefined, format: string, { 
 export function requireNotes({ name, takesNotes }: Rasterizer): void {
   if (takesNotes) return;
   throw new GaussianSplatError('unsupported/limits', {
-    where: 'FrameRequest.notes',
-    expected: 'a renderer with the rasterizer tiles',
+    where: 'Picture.notes',
+    expected: 'settings with the rasterizer tiles',
     found: name,
-    remedy: "make the renderer with { rasterizer: 'tiles' }",
+    remedy: "draw with settings('default', { rasterizer: 'tiles' })",
   });
 }
 
 export function requireBlendable(device: GPUDevice, format: AccumulationFormat): void {
   if (format !== 'rgba32float' || device.features.has('float32-blendable')) return;
   throw new GaussianSplatError('unsupported/limits', {
-    where: 'RendererOptions.accumulation',
+    where: 'FrameSettings.accumulation',
     expected: 'a device with the feature float32-blendable',
     found: 'a device without it',
     remedy: 'ask for the feature with deviceDescriptor(adapter), or use rgba16float',
   });
 }
 
-/** Of a request what types alone would say. @throws GaussianSplatError `argument/value` */
-export function requireRequest({ gaussians, levers, background }: Partial<FrameRequest>): void {
-  const scenes = Array.isArray(gaussians) ? (gaussians as readonly unknown[]) : [gaussians];
-  if (!scenes.every(isObject)) throw missing('gaussians', 'a scene, or a list of scenes', gaussians);
-  if (levers !== undefined && !isObject(levers)) throw missing('levers', 'an object of levers, or undefined', levers);
-  if (background === undefined) return;
-  if (background?.length !== 4 || !Array.prototype.every.call(background, Number.isFinite))
-    throw missing('background', 'four finite numbers: premultiplied red, green, blue and alpha', background);
+/** Of a picture what types alone would say. @throws GaussianSplatError `argument/value` */
+export function requirePicture({ target, over, colours }: Partial<Picture>, settings: FrameSettings): void {
+  if (!isObject(target)) throw missing('target', 'a texture, or { view, format } of one', target);
+  if (!('createView' in target) && (typeof target.format !== 'string' || !isObject(target.view)))
+    throw missing('target', 'a texture, or a view of one with its format: { view, format }', JSON.stringify(target));
+  if (!isObject(settings)) throw missing('settings', 'settings(…), or undefined', settings);
+  if (over === 'target' && !colours && formatOf(target).endsWith('-srgb'))
+    throw missing('colours', 'new LinearColours(device), to blend with what a target of linear light holds', colours);
+  if (over === undefined || over === 'target') return;
+  if (over?.length !== 4 || !Array.prototype.every.call(over, Number.isFinite))
+    throw missing('over', "'target', or four finite numbers: premultiplied red, green, blue and alpha", over);
 }
 
-const isObject = (value: unknown): boolean => typeof value === 'object' && value !== null;
+/** @throws GaussianSplatError `argument/value` */
+export function requireScenes(gaussians: unknown, levers: unknown): void {
+  const scenes = Array.isArray(gaussians) ? (gaussians as readonly unknown[]) : [gaussians];
+  if (!scenes.every(isObject)) throw missing('gaussians', 'a scene, or a list of scenes', gaussians);
+  if (levers !== undefined && !isObject(levers)) throw missing('settings', 'an object of levers, or undefined', levers);
+}
 
-function missing(name: keyof FrameRequest, expected: string, found: unknown): GaussianSplatError {
+const formatOf = (target: GPUTexture | { readonly format: GPUTextureFormat }): string => target.format;
+
+const isObject = (value: unknown): value is object => typeof value === 'object' && value !== null;
+
+function missing(name: keyof Picture | 'settings' | 'gaussians', expected: string, found: unknown): GaussianSplatError {
   return new GaussianSplatError('argument/value', {
-    where: `FrameRequest.${name}`,
+    where: name === 'settings' ? 'FrameSettings' : `Picture.${name}`,
     expected,
     found: Array.isArray(found) ? `[${found.map(String).join(', ')}]` : String(found),
-    remedy: `see FrameRequest.${name}`,
+    remedy: `see ${name === 'settings' ? 'FrameSettings' : `Picture.${name}`}`,
   });
 }

@@ -20,16 +20,16 @@ export class Scratch {
   /** Splats that may be visible at once. Survivors beyond it are not drawn, and counted in `Plan.overflow`. */
   readonly capacity: number;
   /** Share in which each chunk is drawn, and behind them, in the last word, the pixels of error that a budget asks for. */
-  readonly chunkShares: GPUBuffer;
+  chunkShares: GPUBuffer;
   /** See shaders/shared/detail_counts.wgsl. */
   readonly detailCounts: GPUBuffer;
   /** One bit for each splat. */
-  readonly visibleBits: GPUBuffer;
+  visibleBits: GPUBuffer;
   /** Survivors of each cull group, then their exclusive prefix sums and the total. */
-  readonly groupOffsets: GPUBuffer;
+  groupOffsets: GPUBuffer;
   /** See shaders/shared/gathered.wgsl. */
   readonly gathered: GPUBuffer;
-  readonly plan: GPUBuffer;
+  plan: GPUBuffer;
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Depth keys. */
@@ -41,6 +41,8 @@ export class Scratch {
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
   readonly #memory: GpuMemory;
+  #survivors: GPUBuffer | undefined;
+  #depths: GPUBuffer | undefined;
 
   /** @param spareBytes least size of {@link spare} */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
@@ -52,12 +54,13 @@ export class Scratch {
       memory.buffer(`gs.${name}`, bytes, storage | copySource | copyDestination);
     const perSplat = (name: string): GPUBuffer => buffer(name, 4 * this.capacity);
     try {
-      this.chunkShares = buffer('cull_chunks.shares', 4 * (groups + 1));
+      const sizes = groupBytes(groups, pages);
+      this.chunkShares = buffer('cull_chunks.shares', sizes.chunkShares);
       this.detailCounts = buffer('detail.counts', 4 * constants.DETAIL_COUNTS);
-      this.visibleBits = buffer('cull.visible_bits', 4 * constants.WORDS_PER_GROUP * groups);
-      this.groupOffsets = buffer('cull.group_offsets', scanBytes(groups));
+      this.visibleBits = buffer('cull.visible_bits', sizes.visibleBits);
+      this.groupOffsets = buffer('cull.group_offsets', sizes.groupOffsets);
       this.gathered = buffer('cull.gathered', 4 * constants.GATHERED_WORDS);
-      this.plan = buffer('plan.plan', PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages));
+      this.plan = buffer('plan.plan', sizes.plan);
       this.splats = buffer('project.splats', layouts.ProjectedSplat.size * this.capacity);
       this.#keys = perSplat('sort.keys');
       this.#order = perSplat('sort.order');
@@ -88,11 +91,51 @@ export class Scratch {
     return this.#spare;
   }
 
+  /** Makes room for other pages; whatever was bound to the buffers for groups and pages must be bound again. */
+  fitPages(groups: number, pages: number): void {
+    const { storage, copyDestination, copySource } = BUFFER_USAGE;
+    const grown = (buffer: GPUBuffer, bytes: number): GPUBuffer => {
+      if (buffer.size >= bytes) return buffer;
+      this.#memory.free(buffer);
+      return this.#memory.buffer(buffer.label, bytes, storage | copySource | copyDestination);
+    };
+    const sizes = groupBytes(groups, pages);
+    this.chunkShares = grown(this.chunkShares, sizes.chunkShares);
+    this.visibleBits = grown(this.visibleBits, sizes.visibleBits);
+    this.groupOffsets = grown(this.groupOffsets, sizes.groupOffsets);
+    this.plan = grown(this.plan, sizes.plan);
+  }
+
   /** Makes {@link spare} as large as a rasterizer needs it; whatever was bound to it must be bound again. */
   fitSpare(bytes: number): void {
     if (this.#spare[0].size === this.#spareSize(bytes)) return;
     for (const buffer of this.#spare) this.#memory.free(buffer);
     this.#spare = this.#makeSpare(bytes);
+  }
+
+  /** Numbers of the visible splats by slot, once {@link keepSurvivors} has been recorded: the sort overwrites what lists them. */
+  get survivors(): GPUBuffer {
+    return (this.#survivors ??= this.#makeKept('survivors'));
+  }
+
+  /** To be recorded between `compact` and the sort. */
+  keepSurvivors(encoder: GPUCommandEncoder): void {
+    encoder.copyBufferToBuffer(this.#order, 0, this.survivors, 0, 4 * this.capacity);
+  }
+
+  /** Camera depths by slot, float32, once {@link keepDepths} has been recorded. */
+  get depths(): GPUBuffer {
+    return (this.#depths ??= this.#makeKept('depths'));
+  }
+
+  /** To be recorded between `project` and the sort, which moves the keys, of a frame whose keys are depths. */
+  keepDepths(encoder: GPUCommandEncoder): void {
+    encoder.copyBufferToBuffer(this.#keys, 0, this.depths, 0, 4 * this.capacity);
+  }
+
+  #makeKept(name: string): GPUBuffer {
+    const { storage, copyDestination } = BUFFER_USAGE;
+    return this.#memory.buffer(`gs.${name}`, 4 * this.capacity, storage | copyDestination);
   }
 
   get byteLength(): number {
@@ -114,6 +157,14 @@ export class Scratch {
     return [buffer('spare_keys'), buffer('spare_order')];
   }
 }
+
+/** Bytes of the buffers whose size follows groups and pages. */
+const groupBytes = (groups: number, pages: number) => ({
+  chunkShares: 4 * (groups + 1),
+  visibleBits: 4 * constants.WORDS_PER_GROUP * groups,
+  groupOffsets: scanBytes(groups),
+  plan: PLAN_SIZE + PAGE_PLAN_SIZE * Math.max(1, pages),
+});
 
 /** Most projected splats that one storage buffer of the device can hold. */
 export function maxVisible(device: GPUDevice): number {

@@ -58,7 +58,7 @@ export class TensorPlaces {
       requireBytes(tensor, tensors[tensor], least);
     }
     if (this.#layout.count !== undefined)
-      requireBytes(this.#layout.count, tensors[this.#layout.count], 4 * (instance + 1));
+      requireBytes(this.#layout.count, tensors[this.#layout.count], countBytes(this.#layout) * (instance + 1));
   }
 
   /** The same text for the same buffers. */
@@ -109,6 +109,9 @@ export class TensorPlaces {
   }
 }
 
+/** Bytes of a live count; int64 has its lower half first. */
+export const countBytes = ({ countDtype }: GaussianLayout): number => (countDtype === 'int64' ? 8 : 4);
+
 /** Bindings begin at multiples of this many bytes: the largest that a device may ask for. */
 const ALIGNMENT = 256;
 
@@ -138,6 +141,7 @@ export function ingestValues(
     first_row: first,
     is_half: layout.dtype === 'float16' ? 1 : 0,
     shape_kind: shapeKind(slices.shapes),
+    shape_numbers: slices.shapes?.components ?? 6,
     color_kind: colorKind(slices.colors),
     sh_degree: layout.shDegree ?? 0,
     is_w_first: slices.rotations?.quaternionOrder === 'wxyz' ? 1 : 0,

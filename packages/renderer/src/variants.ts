@@ -26,9 +26,11 @@ export function remember(device: GPUDevice, variants: Variants): void {
   known(device).variants = variants;
 }
 
+/** What is known to suit a device by now. */
+export const variantsOf = (device: GPUDevice): Variants => known(device).variants;
+
 /** Levers with every `auto` replaced by what suits the device. */
-export function settle(device: GPUDevice, levers: Levers): Levers & Variants {
-  const { variants } = known(device);
+export function settle(variants: Variants, levers: Levers): Levers & Variants {
   const rasterizer = levers.rasterizer === 'auto' ? variants.rasterizer : levers.rasterizer;
   const suits = rasterizer === variants.rasterizer ? variants.accumulation : SAFE.accumulation;
   return {

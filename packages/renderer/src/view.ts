@@ -1,4 +1,4 @@
-import { eyeOf, multiply, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { eyeOf, inverse, multiply, normalize, subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
 import { constants, type layouts } from './generated/shaders.js';
 import type { StructValues } from './gpu/struct.js';
 
@@ -6,7 +6,7 @@ import type { StructValues } from './gpu/struct.js';
 const CLAMP_MARGIN = 0.3;
 
 /** WGSL lets compilers assume that there is no infinity: a far plane at infinity is as far as float32 goes. */
-const MAX_FLOAT32 = 3.4028234663852886e38;
+export const MAX_FLOAT32 = 3.4028234663852886e38;
 
 type ViewValues = StructValues<typeof layouts.View>;
 
@@ -21,11 +21,13 @@ export type CameraValues = Omit<
   | 'sh_encoding'
   | 'antialiased'
   | 'key_bits'
-  | 'is_ordered'
   | 'has_detail'
   | 'detail'
   | 'detail_fade'
   | 'splat_budget'
+  | 'opacity'
+  | 'crop_low'
+  | 'crop_high'
 >;
 
 /**
@@ -34,7 +36,7 @@ export type CameraValues = Omit<
  * @param variance what the scene's low-pass filter adds, in px²
  */
 export function cameraValues(camera: Camera, origin: Vector3, variance: number = constants.DILATION): CameraValues {
-  const { width, height, fx, fy, cx, cy, near, far, worldToCamera } = camera;
+  const { width, height, fx, fy, cx, cy, near, far, worldToCamera, orthographic = false } = camera;
   const toOrigin = [1, 0, 0, origin[0], 0, 1, 0, origin[1], 0, 0, 1, origin[2], 0, 0, 0, 1];
   const rows = multiply(worldToCamera, toOrigin);
   const columns = Array.from({ length: 16 }, (_, i) => rows[4 * (i % 4) + Math.floor(i / 4)]);
@@ -49,13 +51,21 @@ export function cameraValues(camera: Camera, origin: Vector3, variance: number =
     focal: [fx, fy],
     principal: [cx, cy],
     viewport: [width, height],
-    jacobian_min: [-cx / fx - marginX, -cy / fy - marginY],
-    jacobian_max: [(width - cx) / fx + marginX, (height - cy) / fy + marginY],
+    jacobian_min: orthographic ? [0, 0] : [-cx / fx - marginX, -cy / fy - marginY],
+    jacobian_max: orthographic ? [0, 0] : [(width - cx) / fx + marginX, (height - cy) / fy + marginY],
+    is_orthographic: orthographic ? 1 : 0,
+    axis: axisOf(worldToCamera),
     near,
     far: Math.min(far, MAX_FLOAT32),
     stretch: stretchOf(worldToCamera),
     filter_variance: variance,
   };
+}
+
+/** Along which a camera measures depth, in the coordinates that its matrix takes. */
+function axisOf(worldToCamera: Camera['worldToCamera']): Vector3 {
+  const m = inverse(worldToCamera);
+  return normalize([m[2], m[6], m[10]]);
 }
 
 /** A bound of how much longer the matrix can make a vector: the square root of the largest row sum of |W Wᵀ|. */

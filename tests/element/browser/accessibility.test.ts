@@ -1,50 +1,8 @@
 /** axe-core on the element in all its states. The pages of the site: tests/site. */
 import '@gaussian-splat/element';
 import { emulateMedia } from '@web/test-runner-commands';
+import { ELEMENT_ONLY, violations } from './support/axe.js';
 import { assert, assertEqual, COMPASS, nextEvent, show, showLoaded, until } from './support/harness.js';
-
-interface AxeResults {
-  readonly violations: readonly {
-    readonly id: string;
-    readonly help: string;
-    readonly nodes: readonly { readonly html: string }[];
-  }[];
-  readonly passes: readonly { readonly id: string }[];
-}
-interface Axe {
-  run(context: Document, options?: object): Promise<AxeResults>;
-}
-
-async function axeIn(page: Document): Promise<Axe> {
-  const scope = page.defaultView as (Window & { axe?: Axe }) | null;
-  assert(scope, 'a window');
-  if (scope.axe) return scope.axe;
-  const script = page.createElement('script');
-  script.src = '/node_modules/axe-core/axe.min.js';
-  const loaded = nextEvent(script, 'load');
-  page.head.append(script);
-  await loaded;
-  assert(scope.axe, 'axe');
-  return scope.axe;
-}
-
-async function violations(page: Document, options?: object): Promise<string[]> {
-  const { violations, passes } = await (await axeIn(page)).run(page, options);
-  assert(passes.length > 0, 'axe has looked at something');
-  return violations.map(
-    ({ id, help, nodes }) => `${id}: ${help}: ${nodes.map(({ html }) => html.slice(0, 160)).join(' | ')}`,
-  );
-}
-
-/** Only the element: the test's own page has no title, no landmarks and no heading. */
-const ELEMENT_ONLY = {
-  rules: Object.fromEntries(
-    ['document-title', 'html-has-lang', 'landmark-one-main', 'page-has-heading-one', 'region'].map((id) => [
-      id,
-      { enabled: false },
-    ]),
-  ),
-};
 
 const hotspot = (name: string): HTMLButtonElement => {
   const button = document.createElement('button');

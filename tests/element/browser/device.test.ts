@@ -210,9 +210,14 @@ describe('the loss of the device', () => {
     });
     try {
       const element = await showLoaded();
+      // The page's own words take no room.
+      element.innerHTML = '<span slot="error"></span>';
+      const before = await screenOf(element);
       devices[devices.length - 1].destroy();
       await nextEvent(element, 'error');
       assertEqual([element.error?.code, element.error?.reason], ['device-lost', 'device-lost/unrecoverable'], 'codes');
+      assert(before.middleOf(isRed), 'a picture before');
+      assertEqual((await screenOf(element)).differences(before), 0, 'colour values of the last picture that differ');
       const { message } = element.error!;
       const said =
         /lost \(reason "destroyed": Device was destroyed\), and no other in its place \(.*: the GPU process does not answer\)\. /;
@@ -323,6 +328,7 @@ describe('the loss of the device', () => {
 });
 
 describe('without WebGPU, where the page asks for it', () => {
+  const ASKED = { src: COMPASS, renderer: 'webgpu' };
   const cases: Readonly<Record<string, readonly [gpu: unknown, reason: string, text: RegExp]>> = {
     'no API': [undefined, 'unsupported/no-webgpu', /current Chrome/],
     'no adapter': [{ requestAdapter: async () => null }, 'unsupported/no-adapter', /hardware acceleration/],
@@ -339,13 +345,9 @@ describe('without WebGPU, where the page asks for it', () => {
     ],
   };
   for (const [name, [gpu, reason, text]] of Object.entries(cases)) {
-    it(`${name}: the fallback says why, the poster stays, the page lives on`, async () => {
+    it(`${name}: the fallback says why at the edge, the page lives on`, async () => {
       await withGpu(gpu, async () => {
-        const element = show({
-          src: COMPASS,
-          renderer: 'webgpu',
-          poster: 'data:image/gif;base64,R0lGODlhAQABAAAAACw=',
-        });
+        const element = show(ASKED, 'width: 400px; height: 300px');
         await nextEvent(element, 'error');
         await element.ready;
         await element.updateComplete;
@@ -353,14 +355,39 @@ describe('without WebGPU, where the page asks for it', () => {
         assert(element.matches(':state(unsupported)') && element.matches(':state(error)'), 'states');
         const fallback = element.shadowRoot?.querySelector('slot[name=fallback] [part=fallback]')?.textContent ?? '';
         assert(text.test(fallback), fallback);
-        assert(element.shadowRoot?.querySelector('.poster:not(.gone) img'), 'the poster is there');
+        const box = element.shadowRoot!.querySelector('[part=fallback]')!.getBoundingClientRect();
+        const { bottom } = element.getBoundingClientRect();
+        assert(box.bottom <= bottom && box.top > bottom - 100, `from ${box.top} to ${box.bottom} of ${bottom}`);
       });
     });
   }
 
+  it('a poster stands alone for the scene, with its name, whoever brings it', async () => {
+    await withGpu(undefined, async () => {
+      const gif = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';
+      const element = show({ ...ASKED, poster: gif, alt: 'A compass', 'camera-controls': '' });
+      const own = show({ ...ASKED, alt: 'Another' });
+      own.innerHTML = `<img slot="poster" alt="" src="${gif}">`;
+      for (const one of [element, own]) {
+        await one.ready;
+        await one.updateComplete;
+        const root = one.shadowRoot!;
+        assertEqual(one.error?.code, 'unsupported', 'error');
+        assertEqual(
+          [root.querySelector('[part=fallback]'), root.querySelector('[role=status]')?.textContent],
+          [null, ''],
+        );
+        assert(root.querySelector('.poster:not(.gone)'), 'the poster is there');
+        const view = root.querySelector('#view')!;
+        assertEqual([view.getAttribute('role'), view.getAttribute('aria-label')], ['img', one.alt]);
+        assertEqual(root.querySelector('[tabindex]'), null, 'nothing to reach by keyboard');
+      }
+    });
+  });
+
   it('an adapter that never comes is an error', async () => {
     await withGpu({ ...navigator.gpu, requestAdapter: () => new Promise(() => undefined) }, async () => {
-      const element = show({ src: COMPASS, renderer: 'webgpu' });
+      const element = show(ASKED);
       await nextEvent(element, 'error', 30_000);
       assertEqual(element.error?.reason, 'unsupported/no-adapter');
       assert(/no answer within 20 s/.test(element.error?.message ?? ''), element.error?.message ?? '');
@@ -380,7 +407,7 @@ describe('without WebGPU, where the page asks for it', () => {
 
   it("the page's own fallback takes the place of the default", async () => {
     await withGpu(undefined, async () => {
-      const element = show({ src: COMPASS, renderer: 'webgpu' });
+      const element = show(ASKED);
       const own = document.createElement('p');
       own.slot = 'fallback';
       own.textContent = 'A picture instead';
@@ -396,7 +423,7 @@ describe('without WebGPU, where the page asks for it', () => {
     Object.defineProperty(window, 'isSecureContext', { configurable: true, get: () => false });
     try {
       await withGpu(undefined, async () => {
-        const element = show({ src: COMPASS, renderer: 'webgpu' });
+        const element = show(ASKED);
         await nextEvent(element, 'error');
         assertEqual(element.error?.reason, 'unsupported/insecure-context');
       });

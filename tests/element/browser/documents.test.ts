@@ -1,7 +1,7 @@
 /** Elements in other documents than the page's: frames, and those that are gone. */
 import '@gaussian-splat/element';
 import type { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, COMPASS, delay, showLoaded, submits, hurry } from './support/harness.js';
+import { assert, assertEqual, COMPASS, delay, showLoaded, submits, hurry, until } from './support/harness.js';
 
 const canvasOf = (element: GaussianSplatElement): HTMLCanvasElement => {
   const canvas = element.shadowRoot?.querySelector('canvas');
@@ -81,11 +81,10 @@ describe('another document', () => {
       return here.call(window, callback);
     };
     try {
-      await delay(500);
+      await until(() => own > 3, 'frames of its own window');
     } finally {
       window.requestAnimationFrame = here;
     }
-    assert(own > 3, `${own} frames of its own window`);
     assertEqual(others, 0, 'frames of the page');
     frame.remove();
   });

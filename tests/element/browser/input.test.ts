@@ -76,8 +76,8 @@ describe('mouse', () => {
   });
 
   it('the right button pans, and so does Shift', async () => {
-    const element = await controlled({ 'camera-orbit': '0deg 90deg 10m' });
-    const perPixel = (2 * 10 * Math.tan(element.getFieldOfView().radians / 2)) / 100;
+    const element = await controlled({ 'camera-orbit': '0deg 90deg 4m' });
+    const perPixel = (2 * 4 * Math.tan(element.getFieldOfView().radians / 2)) / 100;
     await drag([60, 50], [80, 40], 'right');
     const place = await settled(element);
     close(place.target[0], -20 * perPixel, 'x');
@@ -90,7 +90,7 @@ describe('mouse', () => {
   });
 
   it('the wheel zooms, and the page does not scroll', async () => {
-    const element = await controlled();
+    const element = await controlled({ zoom: 'always' });
     document.body.style.height = '5000px';
     await turnWheel(60, 50, 100);
     const place = await settled(element);

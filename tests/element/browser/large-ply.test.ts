@@ -48,7 +48,7 @@ describe('a large PLY', () => {
     GaussianSplatElement.sceneLoader = original;
   });
 
-  it('is packed by several workers to the byte as by one, with previews before', async () => {
+  it('is packed by several workers to the byte as by one, with previews before, under a limit of time, too', async () => {
     const spawned: Worker[] = [];
     const loader = new Loader(() => {
       const worker = new Worker(SCRIPT, { type: 'module' });
@@ -57,7 +57,8 @@ describe('a large PLY', () => {
     });
     const previews: number[] = [];
     const start = performance.now();
-    const scene = await loader.load(request(`${FILE}&ms=2500`), signal, ignore, ({ packed }) => {
+    const limited = { ...request(`${FILE}&ms=2500`), limits: { maxSeconds: 60 } };
+    const scene = await loader.load(limited, signal, ignore, ({ packed }) => {
       console.log(`preview of ${packed.count} after ${(performance.now() - start).toFixed(0)} ms`);
       previews.push(packed.count);
     });

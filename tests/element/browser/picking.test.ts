@@ -310,6 +310,30 @@ describe('pictures', () => {
     assertEqual((await screenOf(element)).differences(screen), 0, 'the page afterwards');
   });
 
+  it('have the size and the background that are asked for, and the page shows what it showed', async () => {
+    const element = await compass({ 'camera-orbit': '30deg 70deg 8m' });
+    const before = await screenOf(element);
+    const pixelsOf = async (blob: Blob): Promise<ImageData> => {
+      const image = await createImageBitmap(blob);
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
+      context.drawImage(image, 0, 0);
+      return context.getImageData(0, 0, image.width, image.height);
+    };
+    const large = await pixelsOf(await element.toBlob({ width: 600, background: 'rgb(0 128 255)' }));
+    assertEqual([large.width, large.height], [600, 480], 'size');
+    assertEqual([...large.data.subarray(0, 4)], [0, 128, 255, 255], 'the corner');
+    assertEqual((await screenOf(element)).differences(before), 0, 'the page afterwards');
+    const wide = await pixelsOf(await element.toBlob({ width: 300, height: 100 }));
+    assertEqual([wide.width, wide.height, wide.data[3]], [300, 100, 0], 'transparent');
+    const refused = (options: object): Promise<string> => element.toBlob(options).then(() => 'none', ({ name }: Error) => name); // prettier-ignore
+    assertEqual(await refused({ width: 1e6 }), 'RangeError');
+    assertEqual(await refused({ background: 'no colour' }), 'TypeError');
+    element.style.filter = 'brightness(0)';
+    const dark = await pixelsOf(await element.toBlob());
+    const most = dark.data.reduce((found, value, i) => (i % 4 === 3 ? found : Math.max(found, value)), 0);
+    assertEqual(most, 0, 'the filter of the element');
+  });
+
   it('count attributes that were set just before', async () => {
     const element = await compass();
     element.maxPixelRatio = 0.5;

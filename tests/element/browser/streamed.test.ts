@@ -1,7 +1,8 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { MemoryLedger } from '@gaussian-splat/renderer';
+import { MemoryLedger, USUAL_STEPS } from '@gaussian-splat/renderer';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
+import { storedBlocks } from '../../support/stored-blocks.js';
 import { assert, assertEqual, claimFault, devices, nextEvent, show, until } from './support/harness.js';
 
 const folder = detailFolder(pebbles(40_000));
@@ -91,6 +92,58 @@ describe('a streamed scene', () => {
     assertEqual(own, [], 'what the page itself fetches');
     await close(element);
     stop();
+  });
+
+  it('as a child asks for what the view needs of it where it stands', async () => {
+    const { requests, stop } = await serve('/net/kept/child/');
+    const element = show({ 'camera-orbit': '200deg 80deg 30m', 'camera-target': '5 0 0', loading: 'eager' });
+    const child = document.createElement('splat-scene');
+    child.setAttribute('src', '/net/kept/child/detail.json');
+    child.setAttribute('position', '5 0 0');
+    element.append(child);
+    await element.ready;
+    assert(element.loaded, `loaded: ${element.stats?.scenes[0]?.error?.message}`);
+    const few = requests.length;
+    // Close to the scene itself; close to where it would stand without its place nothing more is asked for.
+    element.setAttribute('camera-orbit', '200deg 80deg 1m');
+    await until(() => requests.length > few + 3, 'pages for a closer view');
+    assertEqual(new Set(requests).size, requests.length, 'no page twice');
+    child.removeAttribute('src');
+    await until(() => !(child as HTMLElement & { loaded: boolean }).loaded, 'the scene is let go');
+    element.remove();
+    stop();
+  });
+
+  it('comes from coded pages, which its worker decodes', async () => {
+    const [loader, asked] = [GaussianSplatElement.sceneLoader, [] as boolean[]];
+    const coded = detailFolder(pebbles(6_000), undefined, {
+      geometry: 'quantized',
+      coded: { steps: USUAL_STEPS, deflate: storedBlocks },
+    });
+    const address = '/net/kept/coded/';
+    const put = (path: string, body: BodyInit): Promise<unknown> => fetch(address + path, { method: 'PUT', body });
+    await Promise.all([...coded.files].map(([path, bytes]) => put(path, bytes)));
+    await put('detail.json', JSON.stringify(coded.manifest));
+    loader.fetchFile = (request, signal) => {
+      asked.push(request.coded !== undefined);
+      return Object.getPrototypeOf(loader).fetchFile.call(loader, request, signal) as Promise<ArrayBuffer>;
+    };
+    const view = { 'camera-orbit': '30deg 60deg 12m', 'camera-target': '0m 0m 0m' };
+    try {
+      const element = show({ src: `${address}detail.json`, detail: '0.02px', ...view });
+      await element.ready;
+      assert(element.loaded, `loaded: ${element.error?.message}`);
+      await until(() => asked.length === coded.files.size, 'all files');
+      assert(asked.every(Boolean), 'files that the worker decodes');
+      await close(element);
+      await put(coded.manifest.trees[0].pages[0].file, 'no page');
+      const broken = show({ src: `${address}detail.json` });
+      await broken.ready;
+      assertEqual(broken.error?.reason, 'decode/corrupt');
+      broken.remove();
+    } finally {
+      Reflect.deleteProperty(loader, 'fetchFile');
+    }
   });
 
   it('stays on show where a page is missing, and fails with a name where the first is', async () => {

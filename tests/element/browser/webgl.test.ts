@@ -1,5 +1,6 @@
 /** The element where there is no WebGPU, or where a page asks for WebGL: the same scene, camera, events and questions. */
 import '@gaussian-splat/element';
+import type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
 import { GaussianSplatElement as ElementClass, type GaussianSplatElement } from '@gaussian-splat/element';
 import {
   assert,
@@ -15,6 +16,7 @@ import {
   until,
 } from './support/harness.js';
 
+const GIF = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';
 const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
 const WEBGL = { renderer: 'webgl', 'camera-orbit': '0deg 90deg 8m', ...STILL };
 /** dB between two renderers' pictures of 8 bits. */
@@ -35,8 +37,10 @@ WebGL2RenderingContext.prototype.drawElementsInstanced = function counting(...ar
   drawElements.apply(this, args);
 };
 
-async function pixelsOf(element: GaussianSplatElement): Promise<Uint8ClampedArray> {
-  const image = await createImageBitmap(await element.toBlob());
+const pixelsOf = async (element: GaussianSplatElement): Promise<Uint8ClampedArray> => pixelsIn(await element.toBlob());
+
+async function pixelsIn(picture: Blob): Promise<Uint8ClampedArray> {
+  const image = await createImageBitmap(picture);
   const canvas = new OffscreenCanvas(image.width, image.height);
   const context = canvas.getContext('2d')!;
   context.drawImage(image, 0, 0);
@@ -82,6 +86,39 @@ describe('renderer="webgl"', () => {
       await assertSame({ 'camera-orbit': orbit });
     await assertSame({ src: '/demo/dist/scenes/skull.spz', 'camera-orbit': '20deg 80deg auto' });
     await assertSame({ quality: 'reference', 'max-sh-degree': '0', src: '/demo/dist/scenes/skull.spz' });
+  });
+
+  it('draws with the filter that the page names', async () => {
+    for (const filter of ['classic', 'antialiased', 'mip'])
+      await assertSame({ filter, 'camera-orbit': '30deg 75deg 20m' });
+  });
+
+  it('pictures of any size, over a colour, are those of WebGPU', async () => {
+    const options = { width: 333, height: 111, background: 'rgb(40 80 120)' };
+    const taken = [];
+    for (const renderer of ['webgl', 'webgpu']) {
+      const element = await showLoaded({ ...WEBGL, renderer });
+      const before = await pixelsOf(element);
+      const picture = await pixelsIn(await element.toBlob(options));
+      assertEqual(picture.length, 4 * 333 * 111, 'values');
+      assert(
+        picture.every((value, i) => i % 4 !== 3 || value === 255),
+        'nothing is transparent',
+      );
+      assertEqual(decibels(await pixelsOf(element), before), Infinity, 'the picture on show stays');
+      taken.push(picture);
+      element.remove();
+    }
+    const found = decibels(taken[0], taken[1]);
+    assert(found >= LEAST_DB, `${found.toFixed(1)} dB`);
+  });
+
+  it('views, flights and the reset move its camera', async () => {
+    const element = await showLoaded(WEBGL);
+    await element.flyTo({ orbit: '90deg 70deg 6m' }, { duration: 200 });
+    assertEqual(element.getCameraOrbit().toString(), '90deg 70deg 6m', 'orbit');
+    await delay(200);
+    assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the picture');
   });
 
   it('a picture that is read at once is of the camera of now', async () => {
@@ -190,18 +227,56 @@ describe('renderer="webgl"', () => {
       [{ src: COMPASS, postprocess: `${generators}post.onnx` }, /found a post-processor/],
     ];
     for (const [attributes, text] of cases) {
-      const element = show({ ...WEBGL, ...attributes, poster: 'data:image/gif;base64,R0lGODlhAQABAAAAACw=' });
+      const element = show({ ...WEBGL, ...attributes, poster: GIF });
       await nextEvent(element, 'error');
       assertEqual(element.error?.reason, 'unsupported/webgl');
       assert(text.test(element.error?.message ?? ''), element.error?.message ?? '');
       await element.updateComplete;
       assert(element.shadowRoot?.querySelector('.poster:not(.gone) img'), 'the poster is there');
+      assertEqual(element.shadowRoot?.querySelector('[part=fallback], [part=error]'), null, 'nothing over the poster');
       element.remove();
     }
     const fetched = performance
       .getEntriesByType('resource')
       .filter(({ name }) => /packed\.onnx|post\.onnx|nowhere/.test(name));
     assertEqual(fetched.length, 0, 'requests');
+  });
+});
+
+describe('scenes and meshes beside the scene', () => {
+  const CHILDREN = `<splat-scene src="${COMPASS}"></splat-scene><splat-mesh src="/nowhere/unfetched.glb"></splat-mesh>`;
+  const reasonsOf = (element: GaussianSplatElement): (string | undefined)[] =>
+    [...element.querySelectorAll<SplatSceneElement | SplatMeshElement>('splat-scene, splat-mesh')].map(
+      ({ error }) => error?.reason,
+    );
+
+  for (const renderer of ['webgl', 'auto'])
+    it(`renderer="${renderer}": they are an error by name, each, and the poster stays`, async () => {
+      await withoutGpu(async () => {
+        for (const src of [COMPASS, '']) {
+          const element = show({ ...WEBGL, renderer, poster: GIF, ...(src && { src }) });
+          element.innerHTML = CHILDREN;
+          await until(() => reasonsOf(element).every(Boolean), 'errors of the children');
+          await until(() => element.error !== null, 'an error of the element');
+          assertEqual(reasonsOf(element), ['unsupported/webgl', 'unsupported/webgl'], 'reasons');
+          assert(/found a <splat-scene> or <splat-mesh>/.test(element.error!.message), element.error!.message);
+          await element.updateComplete;
+          const root = element.shadowRoot!;
+          assert(root.querySelector('.poster:not(.gone) img'), 'the poster is there');
+          assertEqual(root.querySelector('[part=fallback], [part=error]'), null, 'nothing over the poster');
+          element.remove();
+        }
+      });
+    });
+
+  it('one that comes later is refused, and the scene stays', async () => {
+    const element = await showLoaded(WEBGL);
+    const before = await pixelsOf(element);
+    element.innerHTML = CHILDREN;
+    await until(() => reasonsOf(element).every(Boolean), 'errors of the children');
+    assertEqual(reasonsOf(element), ['unsupported/webgl', 'unsupported/webgl'], 'reasons');
+    assertEqual([element.error, element.loaded], [null, true], 'the scene');
+    assertEqual(decibels(await pixelsOf(element), before), Infinity, 'dB');
   });
 });
 

@@ -41,3 +41,23 @@ describe('an element that something else renders', () => {
     assertEqual(element.error?.code, 'decode', 'error');
   });
 });
+
+describe('children that a server has written', () => {
+  it('are shown, whether the tags are defined before or after they are parsed', async () => {
+    for (let i = 0; i < 2; i++) {
+      const place = document.createElement('div');
+      place.setHTMLUnsafe(`<gaussian-splat alt="Two scenes" loading="eager" style="display: block; width: 60px; height: 50px">
+        <template shadowrootmode="open"><p>From the server</p></template>
+        <splat-scene src="${COMPASS}" position="-2 0 0"></splat-scene>
+        <splat-scene src="${COMPASS}" position="2 0 0"></splat-scene></gaussian-splat>`);
+      document.body.append(place);
+      const element = place.firstElementChild as GaussianSplatElement;
+      await element.ready;
+      assertEqual(
+        element.stats?.scenes.map(({ state }) => state),
+        ['ready', 'ready'],
+        'children',
+      );
+    }
+  });
+});

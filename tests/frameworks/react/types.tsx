@@ -1,5 +1,5 @@
 /** What the types of React's wrapper and of the bare tag take and refuse. Only type-checked, by types.test.ts. */
-import { GaussianSplat, type HandlerName } from '@gaussian-splat/react';
+import { GaussianSplat, SplatMesh, SplatScene, type HandlerName } from '@gaussian-splat/react';
 import type { GaussianSplatEventMap } from '@gaussian-splat/element';
 import type {} from '@gaussian-splat/react/jsx';
 import type { DOMAttributes } from 'react';
@@ -28,6 +28,29 @@ export const misspelt = <GaussianSplat onTimeupdate={() => undefined} />;
 export const readOnly = <GaussianSplat duration={1} />;
 // @ts-expect-error It is a method.
 export const method = <GaussianSplat play={async () => undefined} />;
+
+export const composed = (
+  <GaussianSplat src="room.sog">
+    <SplatScene
+      src="plant.spz"
+      position={[1, 0, 0]}
+      rotation="0 90deg 0"
+      matrix={new DOMMatrix()}
+      crop={[0, 0, 0, 1, 1, 1]}
+      controls={{ smile: 1 }}
+      hidden
+      onError={({ detail }) => console.log(detail.reason)}
+    />
+    <SplatMesh src="chair.glb" scale={2} autoplay loop onLoad={({ detail }) => console.log(detail.url)} />
+  </GaussianSplat>
+);
+// @ts-expect-error It is the scene's.
+export const cropped = <SplatMesh crop="0 0 0 1 1 1" />;
+// @ts-expect-error It can only be read.
+export const loadedScene = <SplatScene loaded />;
+export const bareScene = (
+  <splat-scene src="a.ply" position={[0, 1, 0]} onerror={({ detail }) => console.log(detail.code)} />
+);
 
 export const bare = <gaussian-splat src="a.ply" currentTime={1} onload={({ detail }) => console.log(detail.url)} />;
 // @ts-expect-error It would never fire.

@@ -317,7 +317,7 @@ describe('generators', () => {
     const renderer = new Renderer(device);
     const pixels = await capture(device, renderer, { gaussians, camera: CAMERA });
     assert(pixels.every(Number.isFinite), 'finite pixels');
-    const { unusable, visible } = await renderer.readStatistics();
+    const { unusable, visible } = await renderer.statistics();
     const covered = pixels.filter((x, i) => i % 4 === 3 && x > 0.1).length;
     assert(
       covered > 300,

@@ -71,7 +71,7 @@ function viewWords(packed: PackedGaussians, { camera, allowed, fade }: DetailVie
     layouts.View,
     {
       ...cameraValues(camera, origin),
-      ...{ splat_count: count, page: 0, first_group: 0, antialiased: 0, key_bits: 24, is_ordered: 0 },
+      ...{ splat_count: count, page: 0, first_group: 0, antialiased: 0, key_bits: 24 },
       ...{ sh_degree: shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[shPrecision] },
       ...{ ...WITHOUT_LEVERS, has_detail: 1, detail: allowed, detail_fade: fade, splat_budget: budget },
     },

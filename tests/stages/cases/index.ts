@@ -2,7 +2,6 @@ import type { StageCase } from '../../support/gpu.js';
 import { compactCases } from './compact.js';
 import { detailCases } from './detail.js';
 import { ingestCases } from './ingest.js';
-import { orderCases } from './order.js';
 import { probeCases } from './probe.js';
 import { projectionCases } from './projection.js';
 import { roundedApartCases } from './rounded-apart.js';
@@ -15,7 +14,6 @@ export const stageCases: readonly StageCase[] = [
   ...roundedApartCases,
   ...compactCases,
   ...detailCases,
-  ...orderCases,
   ...probeCases,
   ...sortCases,
   ...ingestCases,

@@ -41,7 +41,6 @@ function uploadScene(
   const flags = {
     antialiased: packed.antialiased ? 1 : 0,
     key_bits: 32,
-    is_ordered: 0,
     ...WITHOUT_LEVERS,
   };
   const sh = { sh_degree: packed.shDegree, sh_cap: 3, sh_encoding: SH_PRECISION[packed.shPrecision] };

@@ -1,14 +1,16 @@
 import { describeTensor, type OnnxDim, type OnnxHeader, type OnnxTensor } from '../onnx/header.js';
 import type { ContractFault } from './contract-error.js';
-import type { Contract, ControlInput, InputBinding, OutputBinding } from './contract.js';
+import type { Contract, ControlInput, InputBinding, OutputBinding, PoseInput, StateInput } from './contract.js';
 import { checkFile, type CheckFileOptions } from './check-file.js';
 import { checkInstances, oneInstance } from './instances.js';
 import { tensorNames } from './parse-contract.js';
 import {
+  bareDims,
   describeShapes,
   findTensor,
   inputRule,
   outputRule,
+  POSE_NUMBERS,
   shapeFits,
   shDegreeOf,
   type TensorRule,
@@ -24,20 +26,26 @@ export function checkContract(file: OnnxHeader, contract: Contract, options: Che
   return [
     ...checkFile(file, options),
     ...checkInstances(file, contract),
-    ...header.inputs.flatMap((input) => checkInput(input, contract)),
+    ...header.inputs.flatMap((input) => checkInput(input, contract, header)),
     ...missingInputs(header, contract),
     ...checkOutputTensors(header, contract.outputs),
     ...checkGaussians(header, contract),
   ];
 }
 
-function checkInput(input: OnnxTensor, { inputs }: Contract): ContractFault[] {
+function checkInput(
+  input: OnnxTensor,
+  { inputs }: Contract,
+  { outputs }: Pick<OnnxHeader, 'outputs'>,
+): ContractFault[] {
   const binding = Object.hasOwn(inputs, input.name) ? inputs[input.name] : undefined;
   if (binding === undefined) return [unboundInput(input)];
   const where = `input ${input.name} (${binding.role})`;
   const rule = inputRule(binding);
-  const faults = rule ? checkTensor(input, rule, where) : checkControl(input, where);
+  const dtypes = binding.role === 'state' ? STATE_DTYPES : CONTROL_DTYPES;
+  const faults = rule ? checkTensor(input, rule, where) : checkAnyShape(input, where, dtypes);
   if (faults.length > 0) return faults;
+  if (binding.role === 'state') return checkState(input, binding, where, outputs);
   const lengths = checkDefault(input, binding, where);
   return binding.role === 'control' ? [...lengths, ...checkWhole(input, binding, where)] : lengths;
 }
@@ -104,7 +112,10 @@ function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): Contr
       remedy,
     });
   } else if (!shapeFits(tensor.dims, rule)) {
-    const remedy = 'export the tensor in this shape; fixed sizes must be numbers, not symbols';
+    const isRow = /\(gaussians\)$/.test(where) && tensor.dims.length > 1;
+    const remedy = isRow
+      ? 'export rows of this width, or say in outputs.columns what yours hold, in their order'
+      : 'export the tensor in this shape; fixed sizes must be numbers, not symbols';
     const found = `[${tensor.dims.map((dim) => dim ?? '?').join(', ')}]`;
     faults.push({ ...common, code: 'contract/shape', expected: describeShapes(rule), found, remedy });
   }
@@ -122,6 +133,26 @@ function checkTensor(tensor: OnnxTensor, rule: TensorRule, where: string): Contr
 }
 
 const CONTROL_DTYPES: TensorRule['dtypes'] = ['float32', 'int32', 'int64'];
+const STATE_DTYPES: TensorRule['dtypes'] = ['float32', 'float16', 'int32'];
+
+/** The output that the next run takes must be as the input is. */
+function checkState(
+  input: OnnxTensor,
+  { output }: StateInput,
+  where: string,
+  outputs: readonly OnnxTensor[],
+): ContractFault[] {
+  const written = findTensor(outputs, output);
+  if (written === undefined) return [missingTensor('output', output, 'state', outputs)];
+  const isSame =
+    written.dtype === input.dtype &&
+    written.dims?.length === input.dims?.length &&
+    written.dims?.every((dim, i) => dim === input.dims?.[i]);
+  if (isSame) return [];
+  const remedy = 'export both in the same shape and element type';
+  const [expected, found] = [`${describeTensor(input)}, as the output ${output}`, describeTensor(written)];
+  return [{ code: 'contract/shape', tensor: output, where, expected, found, remedy }];
+}
 
 /** The default and both ends of the range of whole numbers are some, and int32 holds them. */
 function checkWhole(
@@ -143,10 +174,10 @@ function checkWhole(
   });
 }
 
-function checkControl(input: OnnxTensor, where: string): ContractFault[] {
+function checkAnyShape(input: OnnxTensor, where: string, dtypes: TensorRule['dtypes']): ContractFault[] {
   // The rule asks for the shape that the tensor has, if all its sizes are fixed.
   const shape = input.dims?.map((dim) => (typeof dim === 'number' && dim > 0 ? dim : 'size'));
-  return checkTensor(input, { shapes: [shape ?? ['any fixed sizes']], dtypes: CONTROL_DTYPES }, where);
+  return checkTensor(input, { shapes: [shape ?? ['any fixed sizes']], dtypes }, where);
 }
 
 /** Defaults and names must be as many as the tensor has elements. */
@@ -159,7 +190,8 @@ function checkDefault({ name, dims }: OnnxTensor, binding: InputBinding, where: 
   if (binding.role === 'pose') {
     lengths.push(['default', binding.default?.length, size]);
     if (binding.format !== 'parameters') {
-      const joints = Number(dims?.[0]);
+      const joints = size / POSE_NUMBERS[binding.format];
+      if (!Number.isInteger(joints)) return [oddPose(name, binding.format, size, where)];
       lengths.push(['joints', binding.joints?.length, joints], ['parents', binding.parents?.length, joints]);
     }
   }
@@ -174,6 +206,15 @@ function checkDefault({ name, dims }: OnnxTensor, binding: InputBinding, where: 
       remedy: `correct ${field} in the contract`,
     }));
 }
+
+const oddPose = (tensor: string, format: PoseInput['format'], size: number, where: string): ContractFault => ({
+  code: 'contract/shape',
+  tensor,
+  where,
+  expected: `${POSE_NUMBERS[format]} numbers for each joint (${format})`,
+  found: `${size} numbers`,
+  remedy: 'correct format in the contract; "parameters" are the model\'s own',
+});
 
 const lengthOf = (value: ControlInput['default']): number | undefined =>
   typeof value === 'number' ? undefined : value.length;
@@ -194,8 +235,8 @@ function checkGaussians(header: OnnxHeader, contract: Contract): ContractFault[]
   const { outputs } = contract;
   const tensors = tensorNames(outputs).flatMap(([field, name]) => {
     const tensor = findTensor(header.outputs, name);
-    const fits = tensor?.dims && shapeFits(tensor.dims, outputRule(outputs, field));
-    return tensor && fits && field !== 'count' && field !== 'image' ? [{ field, ...tensor, dims: tensor.dims! }] : [];
+    const dims = tensor?.dims && bareDims(tensor.dims, outputRule(outputs, field));
+    return tensor && dims && field !== 'count' && field !== 'image' ? [{ field, ...tensor, dims }] : [];
   });
   return [...checkRows(tensors, contract), ...checkDtypes(tensors, contract), ...checkShDegree(tensors, contract)];
 }
@@ -205,7 +246,9 @@ interface GaussianOutput extends OnnxTensor {
   readonly dims: readonly OnnxDim[];
 }
 
-function checkRows(tensors: readonly GaussianOutput[], { nMax }: Contract): ContractFault[] {
+function checkRows(tensors: readonly GaussianOutput[], { nMax, outputs }: Contract): ContractFault[] {
+  // Rows behind the living ones are padding.
+  const isCounted = outputs.layout !== 'image' && outputs.count !== undefined;
   const faults: ContractFault[] = [];
   const fixed = tensors.filter(({ dims }) => typeof dims[0] === 'number');
   const [first] = fixed;
@@ -215,8 +258,9 @@ function checkRows(tensors: readonly GaussianOutput[], { nMax }: Contract): Cont
       const expected = `N = ${first.dims[0]}, as ${first.name} has`;
       faults.push({ ...common, expected, remedy: 'write as many rows of every attribute' });
     }
-    if (nMax !== undefined && Number(dims[0]) > nMax) {
-      faults.push({ ...common, expected: `at most nMax = ${nMax} rows`, remedy: 'raise nMax in the contract' });
+    if (nMax !== undefined && Number(dims[0]) > nMax && !isCounted) {
+      const remedy = 'raise nMax in the contract, or name a count: the rows behind it are then padding';
+      faults.push({ ...common, expected: `at most nMax = ${nMax} rows`, remedy });
     }
   }
   const [symbolic] = tensors.filter(({ dims }) => typeof dims[0] !== 'number');

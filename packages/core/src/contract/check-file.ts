@@ -21,6 +21,7 @@ export function checkFile(header: OnnxHeader, { files }: CheckFileOptions): Cont
   return [
     ...checkVersions(header),
     ...checkOperators(header),
+    ...checkAttributes(header),
     ...uncastableTypes(header).map(uncastable),
     ...header.externalFiles.flatMap((file) => checkExternalFile(file, files)),
   ];
@@ -47,7 +48,7 @@ function checkVersions({ irVersion, opsets, operators }: OnnxHeader): ContractFa
       where: 'opset of ai.onnx',
       expected: `${oldestOpset} to ${newestOpset}`,
       found: opset === undefined ? 'none' : String(opset),
-      remedy: 'export the model with opset_version=17',
+      remedy: 'export the model with opset_version=18',
     });
   }
   return faults;
@@ -64,6 +65,28 @@ function checkOperators({ operators, functions }: OnnxHeader): ContractFault[] {
       found: `an operator of the domain ${name.slice(0, name.lastIndexOf(':'))}`,
       remedy: 'export the model with standard operators',
     }));
+}
+
+/**
+ * PyTorch's own exporter, asked for opset 17, writes reductions of opset 18 into the file, which ONNX Runtime refuses: found here before any
+ * runtime is fetched.
+ */
+function checkAttributes({ nodes, opsets }: OnnxHeader): ContractFault[] {
+  const opset = opsets.get('ai.onnx') ?? Infinity;
+  const later = nodes.find(({ operator, numbers }) => {
+    const since = operator === 'ReduceSum' ? 13 : 18;
+    return /^Reduce[A-Z]/.test(operator) && opset < since && numbers?.noop_with_empty_axes !== undefined;
+  });
+  if (later === undefined) return [];
+  return [
+    {
+      code: 'contract/operator',
+      where: `operator ${later.operator} (${later.outputs[0]})`,
+      expected: `attributes of opset ${opset}, as the file declares`,
+      found: 'noop_with_empty_axes, of a later opset',
+      remedy: 'export with opset_version=18: PyTorch writes 17 wrongly',
+    },
+  ];
 }
 
 const uncastable = (dtype: OnnxDtype): ContractFault => ({

@@ -5,7 +5,7 @@ import { checkRow, type RowFault, type RowReader } from './gaussian-values.js';
 import { halfToNumber } from './half.js';
 import { attributeSlices, type AttributeSlice } from './layout.js';
 import { tensorNames } from './parse-contract.js';
-import { describeShapes, outputRule, shapeFits } from './tensor-rules.js';
+import { bareDims, describeShapes, outputRule, type TensorRule } from './tensor-rules.js';
 
 /** What a run wrote to one output. */
 export interface OutputTensor {
@@ -39,9 +39,13 @@ export function checkOutputs(contract: Contract, outputs: Readonly<Record<string
   if (contract.outputs.layout === 'image') {
     return { faults: checkImage(contract.outputs.image, outputs), rows: 0, live: 0, bounds: undefined };
   }
-  const slices = attributeSlices(contract.outputs, (name) => columnsOf(outputs[name]));
-  const rows = outputs[slices[0].tensor].dims[0];
-  const { live, countFaults } = liveRows(contract.outputs.count, outputs, rows);
+  const fields = new Map(tensorNames(contract.outputs).map(([field, name]) => [name, field]));
+  const dimsOf = (name: string): readonly number[] =>
+    writtenDims(outputs[name], outputRule(contract.outputs, fields.get(name)!))!;
+  const slices = attributeSlices(contract.outputs, (name) => columnsOf(dimsOf(name)));
+  const rows = dimsOf(slices[0].tensor)[0];
+  const most = Math.min(rows, contract.nMax ?? rows);
+  const { live, countFaults } = liveRows(contract.outputs.count, outputs, most);
   const readers = slices.map((slice) => readerOf(slice, outputs[slice.tensor]));
   const rowFaults = collectRowFaults(readers, live);
   const bounds = boundsOf(
@@ -117,7 +121,17 @@ function firstDifference(a: OutputTensor, b: OutputTensor): number {
   return -1;
 }
 
-const columnsOf = ({ dims }: OutputTensor): number => dims.slice(1).reduce((product, dim) => product * dim, 1);
+const columnsOf = (dims: readonly number[]): number => dims.slice(1).reduce((product, dim) => product * dim, 1);
+
+/** Dimensions without ones before them; undefined where they are not those of the rule. No Gaussian at all is an answer; N is otherwise positive. */
+function writtenDims({ dims, data }: OutputTensor, rule: TensorRule): readonly number[] | undefined {
+  const isEmpty = data.length === 0 && dims.includes(0);
+  const filled = isEmpty ? dims.map((dim) => dim || EMPTY) : dims;
+  return (bareDims(filled, rule) as readonly number[] | undefined)?.map((dim) => (isEmpty && dim === EMPTY ? 0 : dim));
+}
+
+/** Stands for no rows, and is no size of anything else. */
+const EMPTY = 2 ** 31;
 
 /** Presence, shape and row counts of what was written; values can only be read where these are right. */
 function checkShapes(
@@ -125,6 +139,7 @@ function checkShapes(
   outputs: Readonly<Record<string, OutputTensor>>,
 ): ContractFault[] {
   let rows: { name: string; count: number } | undefined;
+  const isCounted = binding.layout !== 'image' && binding.count !== undefined;
   return tensorNames(binding).flatMap(([field, name]): ContractFault[] => {
     const where = `output ${name} (${field})`;
     const tensor = Object.hasOwn(outputs, name) ? outputs[name] : undefined;
@@ -134,24 +149,22 @@ function checkShapes(
       return [{ code: 'contract/missing-tensor', tensor: name, where, expected: 'this output', found, remedy }];
     }
     const rule = outputRule(binding, field);
-    const isEmpty = tensor.dims[0] === 0 && tensor.data.length === 0;
-    // No Gaussian at all is an answer; N is otherwise positive.
-    const dims = isEmpty && tensor.dims.length > 1 ? [1, ...tensor.dims.slice(1)] : tensor.dims;
+    const dims = writtenDims(tensor, rule);
     const length = tensor.dims.reduce((product, dim) => product * dim, 1);
-    if (!shapeFits(dims, rule) || length !== tensor.data.length) {
+    if (dims === undefined || length !== tensor.data.length) {
       const found = `[${tensor.dims.join(', ')}] with ${tensor.data.length} numbers`;
       const remedy = 'write the tensor in the shape that the contract declares';
       return [{ code: 'contract/shape', tensor: name, where, expected: describeShapes(rule), found, remedy }];
     }
     if (field === 'count' || field === 'image') return [];
-    const count = tensor.dims[0];
+    const count = dims[0];
     rows ??= { name, count };
     const common = { code: 'contract/rows', tensor: name, where, found: `${count} rows` } as const;
     if (count !== rows.count) {
       const expected = `${rows.count} rows, as ${rows.name} has`;
       return [{ ...common, expected, remedy: 'write as many rows of every attribute' }];
     }
-    return nMax !== undefined && count > nMax
+    return nMax !== undefined && count > nMax && !isCounted
       ? [{ ...common, expected: `at most nMax = ${nMax} rows`, remedy: 'raise nMax in the contract' }]
       : [];
   });
@@ -163,13 +176,14 @@ function liveRows(
   rows: number,
 ): { live: number; countFaults: ContractFault[] } {
   if (name === undefined) return { live: rows, countFaults: [] };
-  const count = outputs[name].data[0];
+  // An int64 comes as a BigInt.
+  const count = Number(outputs[name].data[0]);
   if (Number.isInteger(count) && count >= 0 && count <= rows) return { live: count, countFaults: [] };
   const fault: ContractFault = {
     code: 'contract/count',
     tensor: name,
     where: `output ${name}`,
-    expected: `a live count of 0 to ${rows}, the number of rows`,
+    expected: `a live count of 0 to ${rows}, the number of rows (or nMax)`,
     found: String(count),
     remedy: 'clamp the count in the model',
   };

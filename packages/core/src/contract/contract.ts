@@ -1,3 +1,4 @@
+import type { SplatFilter } from '../filter.js';
 import type { ShDegree } from '../gaussian-cloud.js';
 import type { Vector3 } from '../vector.js';
 
@@ -15,7 +16,7 @@ export interface Contract {
   readonly inputs: Readonly<Record<string, InputBinding>>;
   /** Where and how the Gaussians are written. */
   readonly outputs: OutputBinding;
-  /** Most Gaussians that one run writes: needed where the file leaves their number N symbolic. */
+  /** Most Gaussians that one run writes: needed where the file leaves their number N symbolic. With a `count` it may be less than N: rows behind it are padding. */
   readonly nMax?: number;
   /** Declared by a model that computes several instances of itself in one run. */
   readonly instances?: Instances;
@@ -32,6 +33,8 @@ export interface Contract {
   readonly coordinates?: Coordinates;
   /** True if trained with opacity compensation for the screen-space dilation (Mip-Splatting style). Default false. */
   readonly antialiased?: boolean;
+  /** The screen-space low-pass filter that it was trained with; counts in place of `antialiased`. */
+  readonly filter?: SplatFilter;
   /** SPDX identifier, or a few words. */
   readonly license?: string;
   /** Who is to be named. */
@@ -79,6 +82,20 @@ export interface ViewInput {
   readonly axes?: CameraAxes;
 }
 
+/** [4,4] float32: camera to world, the inverse of `view`; its last column is the eye. */
+export interface CameraToWorldInput {
+  readonly role: 'camera_to_world';
+  readonly order?: MatrixOrder;
+  readonly axes?: CameraAxes;
+}
+
+/** [3,3] float32, row-major: fx 0 cx, 0 fy cy, 0 0 1; or [4]: fx, fy, cx, cy. */
+export interface IntrinsicsInput {
+  readonly role: 'intrinsics';
+  /** `normalized`: focal lengths and principal point as shares of the picture's width and height. */
+  readonly unit: 'pixels' | 'normalized';
+}
+
 /** [4,4] float32: camera to clip space, depth 0..1 from near to far as WebGPU has it, x right and y up. */
 export interface ProjectionInput {
   readonly role: 'projection';
@@ -119,10 +136,13 @@ export interface SeedInput {
   readonly role: 'seed';
 }
 
-/** [J,3] axis-angle in radians, [J,4] quaternions, or [P] parameters of the model's own; float32. */
+/**
+ * [J,3] axis-angle in radians, [J,4] quaternions, [J,3,3] row-major rotation matrices, any of them flat ([3J], [4J], [9J]), or [P] parameters of the
+ * model's own; float32.
+ */
 export interface PoseInput {
   readonly role: 'pose';
-  readonly format: 'axis-angle' | 'quaternion' | 'parameters';
+  readonly format: 'axis-angle' | 'quaternion' | 'matrix' | 'parameters';
   /** Required for quaternions. */
   readonly quaternionOrder?: QuaternionOrder;
   /** Names of the J joints, in the tensor's order. */
@@ -155,6 +175,18 @@ export interface ControlInput {
   readonly label?: string;
 }
 
+/**
+ * What the model itself wrote in the run before this one: float32, float16 or int32 of any fixed shape, that of an output. Physics and temporal filters are
+ * such models. A run happens whenever another input changes; when the time goes back, the state begins anew.
+ */
+export interface StateInput {
+  readonly role: 'state';
+  /** Name of the output that the next run takes here. */
+  readonly output: string;
+  /** Before the first run: one number for all elements. Default 0. */
+  readonly default?: number;
+}
+
 /** Gaussians of the generator before this one in a chain, in one of the output layouts: one input for each tensor. */
 export interface GaussiansInput extends Activations {
   readonly role: 'gaussians';
@@ -162,7 +194,10 @@ export interface GaussiansInput extends Activations {
   readonly attribute: GaussianTensor;
 }
 
-/** [1,3,H,W] float32 or float16: red, green and blue planes in 0..1, top row first. */
+/**
+ * [1,3,H,W] float32 or float16: red, green and blue planes in 0..1, top row first. [1,4,H,W] has alpha, too; [V,3,H,W] are V pictures of one size, in the
+ * order in which the page names them.
+ */
 export interface ImageInput {
   readonly role: 'image';
 }
@@ -170,6 +205,8 @@ export interface ImageInput {
 /** Role of one input of the ONNX file. */
 export type InputBinding =
   | ViewInput
+  | CameraToWorldInput
+  | IntrinsicsInput
   | ProjectionInput
   | ViewProjectionInput
   | CameraPositionInput
@@ -180,6 +217,7 @@ export type InputBinding =
   | PoseInput
   | ShapeInput
   | ControlInput
+  | StateInput
   | GaussiansInput
   | ImageInput;
 
@@ -205,7 +243,7 @@ export interface Activations {
 
 /**
  * One tensor [N, D], float32 or float16: position (3), covariance xx, xy, xz, yy, yz, zz (6), colour (3) or spherical
- * harmonics (3(d+1)²), opacity (1).
+ * harmonics (3(d+1)²), opacity (1); or in the order that `columns` gives.
  */
 export interface PackedOutputs {
   readonly layout: 'packed';
@@ -215,7 +253,16 @@ export interface PackedOutputs {
   readonly opacityActivation: 'linear' | 'logit';
   /** Required with `sh`. */
   readonly shOrder?: ShOrder;
-  /** Name of an output [1] int32: how many of the N rows live. */
+  /**
+   * What a row holds, in order: positions (3), covariances (6) or scales (3) and rotations (4), colors (3) or sh, opacities (1). Default: positions, covariances,
+   * colours, opacities.
+   */
+  readonly columns?: readonly GaussianAttribute[];
+  /** Required where `columns` has scales. */
+  readonly scaleActivation?: 'linear' | 'log';
+  /** Required where `columns` has rotations. */
+  readonly rotationOrder?: QuaternionOrder;
+  /** Name of an output [1] int32 or int64: how many of the N rows live. */
   readonly count?: string;
 }
 
@@ -224,23 +271,23 @@ export interface SplitOutputs {
   readonly layout: 'split';
   /** [N,3] centres in world units. */
   readonly positions: string;
-  /** [N,6] xx, xy, xz, yy, yz, zz in square world units. Either these, or scales and rotations. */
+  /** [N,6] xx, xy, xz, yy, yz, zz in square world units, or [N,3,3]. Either these, or scales and rotations. */
   readonly covariances?: string;
-  /** [N,3] standard deviations in world units, along the axes that the rotation turns. */
+  /** [N,3] standard deviations in world units, along the axes that the rotation turns; [N,1] or [N] for all three. */
   readonly scales?: string;
   readonly scaleActivation?: 'linear' | 'log';
   /** [N,4] quaternions, local axes to world; they need not be unit. */
   readonly rotations?: string;
   readonly rotationOrder?: QuaternionOrder;
-  /** [N,3] red, green, blue in 0..1. Either these or `sh`. */
+  /** [N,3] red, green, blue in 0..1, or [N,4], whose fourth is not read. Either these or `sh`. */
   readonly colors?: string;
-  /** [N,(d+1)²,3] or [N,3,(d+1)²], as `shOrder` says. */
+  /** [N,(d+1)²,3] or [N,3,(d+1)²], as `shOrder` says, or flat. */
   readonly sh?: string;
   readonly shOrder?: ShOrder;
   /** [N] or [N,1]. */
   readonly opacities: string;
   readonly opacityActivation: 'linear' | 'logit';
-  /** Name of an output [1] int32: how many of the N rows live. */
+  /** Name of an output [1] int32 or int64: how many of the N rows live. */
   readonly count?: string;
 }
 
@@ -257,7 +304,7 @@ export interface VisionaryOutputs {
   readonly count?: string;
 }
 
-/** A post-processor: one tensor [1,3,H,W] of red, green and blue planes in 0..1. */
+/** A post-processor: one tensor [1,3,H,W] of red, green and blue planes in 0..1; a fourth is not read. */
 export interface ImageOutputs {
   readonly layout: 'image';
   readonly image: string;

@@ -64,8 +64,8 @@ function checkOpacity({ read, isHalf }: RowReader, row: number): RowFault | unde
   };
 }
 
-function checkScale({ read }: RowReader, row: number): RowFault | undefined {
-  const scales = [read(row, 0), read(row, 1), read(row, 2)];
+function checkScale({ read, components }: RowReader, row: number): RowFault | undefined {
+  const scales = Array.from({ length: components }, (_, i) => read(row, i));
   if (scales.every((scale) => scale >= 0)) return undefined;
   return {
     code: 'contract/covariance',
@@ -85,8 +85,11 @@ function checkRotation({ read }: RowReader, row: number): RowFault | undefined {
   };
 }
 
-function checkCovariance({ read, isHalf }: RowReader, row: number): RowFault | undefined {
-  const matrix = [0, 1, 2, 3, 4, 5].map((i) => read(row, i));
+/** Of a matrix of three rows. */
+const UPPER_TRIANGLE = [0, 1, 2, 4, 5, 8];
+
+function checkCovariance({ read, isHalf, components }: RowReader, row: number): RowFault | undefined {
+  const matrix = (components === 9 ? UPPER_TRIANGLE : [0, 1, 2, 3, 4, 5]).map((i) => read(row, i));
   const trace = matrix[0] + matrix[3] + matrix[5];
   const rounding = COVARIANCE_ROUNDINGS * FLOAT_ROUNDING + (isHalf ? HALF_ROUNDING : 0);
   // Rounding moves an eigenvalue by no more than the Frobenius norm of the errors.

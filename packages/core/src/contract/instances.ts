@@ -5,7 +5,7 @@ import { tensorNames } from './parse-contract.js';
 import type { OutputTensor } from './check-outputs.js';
 
 /** Inputs that come from another model or are a picture: all instances of a run share them. */
-const SHARED_ROLES: readonly string[] = ['gaussians', 'image'];
+const SHARED_ROLES: readonly string[] = ['gaussians', 'image', 'state'];
 
 /** True if a tensor has a row for each instance: its first dimension is the axis that the contract names. */
 export function hasInstances({ dims }: Pick<OnnxTensor, 'dims'>, { instances }: Contract): boolean {
@@ -65,6 +65,11 @@ export function checkInstances(header: OnnxHeader, contract: Contract): Contract
   });
   if (outputs.layout === 'image') {
     return [fault('instances', 'a model that writes Gaussians', 'a post-processor', 'leave out instances')];
+  }
+  const state = Object.entries(inputs).find(([, { role }]) => role === 'state');
+  if (state !== undefined) {
+    const remedy = 'leave out instances: each would need a state of its own';
+    return [fault(`input ${state[0]}`, 'a model without a state', 'an input with the role state', remedy, state[0])];
   }
   const names = new Set(tensorNames(outputs).map(([, name]) => name));
   const written = header.outputs.filter(({ name, dims }) => names.has(name) && dims !== undefined);

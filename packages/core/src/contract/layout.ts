@@ -2,9 +2,11 @@ import type { ShDegree } from '../gaussian-cloud.js';
 import type { OnnxHeader } from '../onnx/header.js';
 import { checkContract } from './check-contract.js';
 import { ContractError } from './contract-error.js';
-import type { Contract, GaussianAttribute, OutputBinding, QuaternionOrder, ShOrder } from './contract.js';
+import type { Activations, Contract, GaussianAttribute, OutputBinding, QuaternionOrder, ShOrder } from './contract.js';
 import { oneInstance } from './instances.js';
-import { findTensor, shDegreeOf } from './tensor-rules.js';
+import { bareDims, findTensor, outputRule, PACKED_WIDTHS, shDegreeOf } from './tensor-rules.js';
+import type { OnnxDim } from '../onnx/header.js';
+import { tensorNames } from './parse-contract.js';
 
 /**
  * Where one attribute of a Gaussian lies: in row i of `tensor` at the elements i·rowStride + offset … + components - 1. All
@@ -16,7 +18,7 @@ export interface AttributeSlice {
   readonly tensor: string;
   /** Elements before the attribute in a row. */
   readonly offset: number;
-  /** Elements of the attribute. */
+  /** Elements of the attribute: 9 of covariances that are matrices, 1 of a scale for all axes. */
   readonly components: number;
   /** Elements of a row. */
   readonly rowStride: number;
@@ -30,16 +32,20 @@ export interface AttributeSlice {
 
 /** How a file writes Gaussians, with everything resolved. */
 export interface GaussianLayout {
-  /** Rows that a run writes at most, of one instance: N, or `nMax` where N is symbolic. */
+  /** Rows that live in a run at most, of one instance: N, or `nMax` where that is less or N is symbolic. */
   readonly capacity: number;
+  /** Rows of the tensors, where padding makes them more than {@link capacity}. */
+  readonly paddedRows?: number;
   /** True if the number of rows may differ from run to run. */
   readonly isDynamic: boolean;
   readonly dtype: 'float32' | 'float16';
   /** Undefined where colours are plain. */
   readonly shDegree: ShDegree | undefined;
   readonly attributes: readonly AttributeSlice[];
-  /** Output [1] int32 that says how many rows live. */
+  /** Output that says how many rows live: [1] int32, or int64, of which the lower half is read. */
   readonly count: string | undefined;
+  /** Default int32. */
+  readonly countDtype?: 'int32' | 'int64';
 }
 
 /**
@@ -53,19 +59,25 @@ export function gaussianLayout(header: OnnxHeader, contract: Contract): Gaussian
   const { outputs: written } = oneInstance(header, contract);
   const { outputs, nMax } = contract;
   if (outputs.layout === 'image') return undefined;
-  const columnsOf = (tensor: string): number => {
-    const dims = findTensor(written, tensor)!.dims!;
-    return dims.slice(1).reduce<number>((product, dim) => product * Number(dim), 1);
-  };
+  const fields = new Map(tensorNames(outputs).map(([field, name]) => [name, field]));
+  const dimsOf = (tensor: string): readonly OnnxDim[] =>
+    bareDims(findTensor(written, tensor)!.dims!, outputRule(outputs, fields.get(tensor)!))!;
+  const columnsOf = (tensor: string): number =>
+    dimsOf(tensor)
+      .slice(1)
+      .reduce<number>((product, dim) => product * Number(dim), 1);
   const attributes = attributeSlices(outputs, columnsOf);
   const tensors = [...new Set(attributes.map(({ tensor }) => tensor))].map((name) => findTensor(written, name)!);
-  const rows = tensors.map(({ dims }) => dims![0]).find((dim) => typeof dim === 'number');
+  const rows = tensors.map(({ name }) => dimsOf(name)[0]).find((dim) => typeof dim === 'number');
   const sh = attributes.find(({ attribute }) => attribute === 'sh');
+  const count = outputs.count === undefined ? undefined : findTensor(written, outputs.count);
   return {
-    capacity: typeof rows === 'number' ? rows : nMax!,
+    capacity: Math.min(rows ?? Infinity, nMax ?? Infinity),
+    ...(rows !== undefined && nMax !== undefined && nMax < rows ? { paddedRows: rows } : {}),
+    ...(count?.dtype === 'int64' ? { countDtype: 'int64' as const } : {}),
     isDynamic: typeof rows !== 'number',
     dtype: tensors[0].dtype as 'float32' | 'float16',
-    shDegree: sh && shDegreeOf(outputs, findTensor(written, sh.tensor)!.dims!),
+    shDegree: sh && shDegreeOf(outputs, dimsOf(sh.tensor)),
     attributes,
     count: outputs.count,
   };
@@ -94,15 +106,35 @@ const linear = (attribute: GaussianAttribute, offset: number, components: number
 });
 
 function packedSlices(outputs: OutputBinding & { layout: 'packed' }, rowStride: number): AttributeSlice[] {
-  const { gaussians: tensor, color, shOrder, opacityActivation } = outputs;
-  const components = rowStride - 10;
-  const slices: Slice[] = [
-    linear('positions', 0, 3),
-    linear('covariances', 3, 6),
-    color === 'sh' ? { ...linear('sh', 9, components), shOrder } : linear('colors', 9, components),
-    { ...linear('opacities', rowStride - 1, 1), activation: opacityActivation },
-  ];
-  return slices.map((slice) => ({ ...slice, tensor, rowStride }));
+  const { gaussians: tensor, color, columns } = outputs;
+  const order = columns ?? (['positions', 'covariances', color === 'sh' ? 'sh' : 'colors', 'opacities'] as const);
+  const others = order.reduce((sum, attribute) => sum + PACKED_WIDTHS[attribute], 0);
+  const details = activationsOf(outputs);
+  let offset = 0;
+  return order.map((attribute) => {
+    const components = PACKED_WIDTHS[attribute] || rowStride - others;
+    const slice = { ...linear(attribute, offset, components), ...details[attribute], tensor, rowStride };
+    offset += components;
+    return slice;
+  });
+}
+
+/** How the numbers of each attribute are written. */
+function activationsOf({
+  scaleActivation = 'linear',
+  rotationOrder,
+  shOrder,
+  opacityActivation = 'linear',
+}: Activations): Readonly<Record<GaussianAttribute, Partial<Slice>>> {
+  return {
+    positions: {},
+    covariances: {},
+    scales: { activation: scaleActivation },
+    rotations: { quaternionOrder: rotationOrder },
+    colors: {},
+    sh: { shOrder },
+    opacities: { activation: opacityActivation },
+  };
 }
 
 function visionarySlices(
@@ -123,20 +155,13 @@ function splitSlices(
   outputs: OutputBinding & { layout: 'split' },
   columnsOf: (tensor: string) => number,
 ): AttributeSlice[] {
-  const { scaleActivation = 'linear', rotationOrder, shOrder, opacityActivation } = outputs;
-  const details: Readonly<Record<GaussianAttribute, Partial<Slice>>> = {
-    positions: {},
-    covariances: {},
-    scales: { activation: scaleActivation },
-    rotations: { quaternionOrder: rotationOrder },
-    colors: {},
-    sh: { shOrder },
-    opacities: { activation: opacityActivation },
-  };
+  const details = activationsOf(outputs);
   return (Object.keys(details) as GaussianAttribute[]).flatMap((attribute) => {
     const tensor = outputs[attribute];
     if (tensor === undefined) return [];
     const rowStride = columnsOf(tensor);
-    return [{ ...linear(attribute, 0, rowStride), ...details[attribute], tensor, rowStride }];
+    // Of colours with alpha the fourth is not read.
+    const components = attribute === 'colors' ? 3 : rowStride;
+    return [{ ...linear(attribute, 0, components), ...details[attribute], tensor, rowStride }];
   });
 }

@@ -71,6 +71,9 @@ function conflictsOf(contract: Contract, where: string): ContractFault[] {
         conflict(`inputs.${name}${field && `.${field}`}`, expected, found, remedy),
       ),
     ),
+    ...columnConflicts(contract.outputs).map(([field, expected, found, remedy]) =>
+      conflict(`outputs.${field}`, expected, found, remedy),
+    ),
     ...repeatedRoles(contract).map(([place, expected, found]) =>
       conflict(place, expected, found, 'feed one of them, and make the other a part of the model'),
     ),
@@ -132,16 +135,35 @@ function skeletonConflicts({ joints, parents }: InputBinding & { role: 'pose' })
       ];
 }
 
+/** A row must hold each of what a Gaussian is made of once. */
+function columnConflicts(outputs: OutputBinding): Conflict[] {
+  if (outputs.layout !== 'packed' || outputs.columns === undefined) return [];
+  const { columns, color, scaleActivation, rotationOrder } = outputs;
+  const colour = color === 'rgb' ? 'colors' : 'sh';
+  const shape = columns.includes('covariances') ? ['covariances'] : ['scales', 'rotations'];
+  const wanted = ['positions', ...shape, colour, 'opacities'];
+  const isComplete = columns.length === wanted.length && wanted.every((name) => columns.includes(name as 'sh'));
+  if (!isComplete) {
+    const remedy = 'name each attribute of a row once, in its order';
+    return [['columns', `${wanted.join(', ')}, in any order`, columns.join(', ') || 'none', remedy]];
+  }
+  const missing = [
+    ...(shape.length === 2 && scaleActivation === undefined ? ['scaleActivation'] : []),
+    ...(shape.length === 2 && rotationOrder === undefined ? ['rotationOrder'] : []),
+  ];
+  return missing.map((field) => [field, 'a value, since columns has scales and rotations', 'nothing', 'declare it']);
+}
+
 /** Roles that a page sets once: two inputs of the same role are a mistake. Controls and pictures are told apart by name. */
 function repeatedRoles({ inputs }: Contract): [place: string, expected: string, found: string][] {
   const seen = new Map<string, string>();
   return Object.entries(inputs).flatMap(([name, binding]) => {
-    if (binding.role === 'control' || binding.role === 'image') return [];
+    if (['control', 'image', 'state'].includes(binding.role)) return [];
     const role = binding.role === 'gaussians' ? `gaussians (${binding.attribute})` : binding.role;
     const first = seen.get(role);
     seen.set(role, name);
     // Matrices may be wanted in two conventions.
-    const isMatrix = ['view', 'projection', 'view_projection'].includes(role);
+    const isMatrix = ['view', 'camera_to_world', 'intrinsics', 'projection', 'view_projection'].includes(role);
     return first === undefined || isMatrix
       ? []
       : [[`inputs.${name}`, `one input with the role ${role}`, `${first} and ${name}`] as [string, string, string]];

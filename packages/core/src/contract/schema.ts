@@ -2,6 +2,7 @@
  * The JSON Schema of contracts, and the one place that says what a contract's JSON may hold: `parseContract` follows it, and
  * contract.schema.json is its copy for other languages (`node scripts/write-contract-schema.mjs`).
  */
+import { SPLAT_FILTERS, type SplatFilter } from '../filter.js';
 
 /** The part of JSON Schema (draft 2020-12) that the contract uses. */
 export interface Schema {
@@ -65,7 +66,7 @@ const shOrder = choice(
   'channel-major',
 );
 const color = choice('What the colour columns hold', 'rgb', 'sh');
-const count = output('[1] int32 that says how many rows live');
+const count = output('[1] int32 or int64 that says how many rows live');
 
 function variant(
   key: 'role' | 'layout',
@@ -88,6 +89,14 @@ const input: Schema = {
   description: 'What one input of the ONNX file means',
   oneOf: [
     variant('role', 'view', '[4,4] float32: world to camera', { order, axes }),
+    variant('role', 'camera_to_world', '[4,4] float32: camera to world, the inverse of view', { order, axes }),
+    variant(
+      'role',
+      'intrinsics',
+      '[3,3] float32, row-major, or [4]: fx, fy, cx, cy',
+      { unit: choice('Pixels, or shares of width and height', 'pixels', 'normalized') },
+      { required: ['unit'] },
+    ),
     variant('role', 'projection', '[4,4] float32: camera to clip, depth 0..1', { order, axes }),
     variant('role', 'view_projection', '[4,4] float32: world to clip, depth 0..1', { order }),
     variant('role', 'camera_position', '[3] float32: the eye in world units'),
@@ -104,9 +113,9 @@ const input: Schema = {
     variant(
       'role',
       'pose',
-      '[J,3] axis-angle, [J,4] quaternions or [P] parameters, float32',
+      '[J,3] axis-angle, [J,4] quaternions, [J,3,3] matrices, any of them flat, or [P] parameters; float32',
       {
-        format: choice('What the numbers are', 'axis-angle', 'quaternion', 'parameters'),
+        format: choice('What the numbers are', 'axis-angle', 'quaternion', 'matrix', 'parameters'),
         quaternionOrder,
         joints: texts('Names of the joints, in the order of the tensor'),
         parents: {
@@ -164,7 +173,18 @@ const input: Schema = {
         ],
       },
     ),
-    variant('role', 'image', '[1,3,H,W] float32 or float16: red, green and blue planes in 0..1'),
+    variant(
+      'role',
+      'state',
+      'What the model wrote in the run before: any fixed shape of float32, float16 or int32',
+      { output: output('that the next run takes'), default: { type: 'number', description: 'Before the first run' } },
+      { required: ['output'] },
+    ),
+    variant(
+      'role',
+      'image',
+      '[1,3,H,W] float32 or float16: red, green and blue planes in 0..1; [1,4,H,W] with alpha, [V,3,H,W] of V pictures',
+    ),
   ],
 };
 
@@ -174,8 +194,24 @@ const outputs: Schema = {
     variant(
       'layout',
       'packed',
-      'One tensor [N, D]: position 3, covariance 6, colour 3 or harmonics 3(d+1)^2, opacity 1',
-      { gaussians: output('with everything'), color, opacityActivation, shOrder, count },
+      'One tensor [N, D]: position 3, covariance 6, colour 3 or harmonics 3(d+1)^2, opacity 1; or as columns says',
+      {
+        gaussians: output('with everything'),
+        color,
+        opacityActivation,
+        shOrder,
+        columns: {
+          type: 'array',
+          items: choice(
+            'An attribute',
+            ...['positions', 'covariances', 'scales', 'rotations', 'colors', 'sh', 'opacities'],
+          ),
+          description: 'What a row holds, in order',
+        },
+        scaleActivation,
+        rotationOrder: quaternionOrder,
+        count,
+      },
       { required: ['gaussians', 'color', 'opacityActivation'], allOf: [requiredWhere('color', 'sh', 'shOrder')] },
     ),
     variant(
@@ -184,12 +220,12 @@ const outputs: Schema = {
       'One tensor for each attribute',
       {
         positions: output('[N,3] of centres'),
-        covariances: output('[N,6] of covariances xx, xy, xz, yy, yz, zz'),
-        scales: output('[N,3] of scales'),
+        covariances: output('[N,6] of covariances xx, xy, xz, yy, yz, zz, or [N,3,3]'),
+        scales: output('[N,3] of scales, or [N,1] for all three axes'),
         scaleActivation,
         rotations: output('[N,4] of quaternions'),
         rotationOrder: quaternionOrder,
-        colors: output('[N,3] of colours in 0..1'),
+        colors: output('[N,3] of colours in 0..1, or [N,4], whose fourth is not read'),
         sh: output('of spherical harmonics, [N,(d+1)^2,3] or [N,3,(d+1)^2]'),
         shOrder,
         opacities: output('[N] or [N,1] of opacities'),
@@ -281,6 +317,10 @@ export const CONTRACT_SCHEMA: Schema = {
       description: 'The frame that Gaussians are written in',
     },
     antialiased: { type: 'boolean', description: 'Trained with opacity compensation for the dilation; default false' },
+    filter: choice(
+      'Filter it was trained with, in place of antialiased: 0.3 px², 0.3 with compensation, 0.1 with compensation',
+      ...(Object.keys(SPLAT_FILTERS) as SplatFilter[]),
+    ),
     license: text('SPDX identifier, or a few words'),
     attribution: text('Who is to be named'),
   },

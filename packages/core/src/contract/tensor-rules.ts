@@ -1,6 +1,14 @@
 import type { ShDegree } from '../gaussian-cloud.js';
 import type { OnnxDim, OnnxDtype, OnnxTensor } from '../onnx/header.js';
-import type { Activations, GaussianTensor, InputBinding, OutputBinding } from './contract.js';
+import type {
+  Activations,
+  GaussianAttribute,
+  GaussianTensor,
+  InputBinding,
+  OutputBinding,
+  PackedOutputs,
+  PoseInput,
+} from './contract.js';
 
 /**
  * One dimension of a shape: a number; `N`, the number of Gaussians, which may stay symbolic; `H` or `W`, sizes of a picture,
@@ -30,9 +38,12 @@ const fixed = (dtypes: readonly OnnxDtype[], ...shapes: (readonly DimRule[])[]):
 export function inputRule(binding: InputBinding): TensorRule | undefined {
   switch (binding.role) {
     case 'view':
+    case 'camera_to_world':
     case 'projection':
     case 'view_projection':
       return fixed(['float32'], [4, 4]);
+    case 'intrinsics':
+      return fixed(['float32'], [3, 3], [4]);
     case 'camera_position':
       return fixed(['float32'], [3]);
     case 'viewport':
@@ -43,31 +54,63 @@ export function inputRule(binding: InputBinding): TensorRule | undefined {
     case 'seed':
       return one(INTEGERS);
     case 'pose':
-      return fixed(['float32'], { 'axis-angle': ['J', 3], quaternion: ['J', 4], parameters: ['P'] }[binding.format]);
+      return fixed(['float32'], ...POSE_SHAPES[binding.format]);
     case 'shape':
       return fixed(['float32'], ['B']);
     case 'image':
-      return fixed(FLOATS, [1, 3, 'H', 'W']);
+      return fixed(FLOATS, ...IMAGE_SHAPES, ['V', 3, 'H', 'W'], ['V', 4, 'H', 'W']);
     case 'gaussians':
-      return gaussianRule(binding.attribute, binding);
+      // Another model's count is counted in GPU memory, where there are no 64-bit integers to hand on.
+      return binding.attribute === 'count' ? one(['int32']) : gaussianRule(binding.attribute, binding);
     case 'control':
+    case 'state':
       return undefined;
   }
 }
 
-/** What a tensor of Gaussians must look like. */
-export function gaussianRule(tensor: GaussianTensor, { color, shOrder }: Activations): TensorRule {
+/** Red, green and blue planes, or those and alpha. */
+const IMAGE_SHAPES: readonly (readonly DimRule[])[] = [
+  [1, 3, 'H', 'W'],
+  [1, 4, 'H', 'W'],
+  [3, 'H', 'W'],
+  [4, 'H', 'W'],
+];
+
+/** A row for each joint, or all of them one after the other. */
+const POSE_SHAPES: Readonly<Record<PoseInput['format'], readonly (readonly DimRule[])[]>> = {
+  'axis-angle': [['J', 3], ['P']],
+  quaternion: [['J', 4], ['P']],
+  matrix: [['J', 3, 3], ['J', 9], ['P']],
+  parameters: [['P']],
+};
+
+/** Numbers of a joint; 1 where parameters are the model's own. */
+export const POSE_NUMBERS: Readonly<Record<PoseInput['format'], number>> = {
+  'axis-angle': 3,
+  quaternion: 4,
+  matrix: 9,
+  parameters: 1,
+};
+
+/** What a tensor of Gaussians must look like. @param fixedColumns of a packed tensor: those that are no colours */
+export function gaussianRule(
+  tensor: GaussianTensor,
+  { color, shOrder }: Activations,
+  fixedColumns = PACKED_FIXED_COLUMNS,
+): TensorRule {
   switch (tensor) {
     case 'packed':
       return color === 'rgb'
-        ? fixed(FLOATS, ['N', PACKED_FIXED_COLUMNS + 3])
-        : fixed(FLOATS, ...SH_DEGREES.map((degree) => ['N', PACKED_FIXED_COLUMNS + shColumns(degree)]));
+        ? fixed(FLOATS, ['N', fixedColumns + 3])
+        : fixed(FLOATS, ...SH_DEGREES.map((degree) => ['N', fixedColumns + shColumns(degree)]));
     case 'positions':
-    case 'scales':
-    case 'colors':
       return fixed(FLOATS, ['N', 3]);
+    case 'scales':
+      return fixed(FLOATS, ['N', 3], ['N', 1], ['N']);
+    case 'colors':
+      return fixed(FLOATS, ['N', 3], ['N', 4]);
     case 'covariances':
-      return fixed(FLOATS, ['N', 6]);
+      return fixed(FLOATS, ['N', 6], ['N', 3, 3]);
     case 'rotations':
       return fixed(FLOATS, ['N', 4]);
     case 'opacities':
@@ -79,26 +122,53 @@ export function gaussianRule(tensor: GaussianTensor, { color, shOrder }: Activat
           const coefficients = (degree + 1) ** 2;
           return shOrder === 'channel-major' ? ['N', 3, coefficients] : ['N', coefficients, 3];
         }),
+        ...SH_DEGREES.map((degree) => ['N', shColumns(degree)]),
       );
     case 'count':
-      return one(['int32']);
+      return one(INTEGERS);
   }
 }
 
+/** Elements of a row of a packed tensor that are no colours. */
+export function fixedColumnsOf({ columns }: Pick<PackedOutputs, 'columns'>): number {
+  return columns?.reduce((sum, attribute) => sum + PACKED_WIDTHS[attribute], 0) ?? PACKED_FIXED_COLUMNS;
+}
+
+/** Elements of each attribute in a packed row; colours are as many as the row has left. */
+export const PACKED_WIDTHS: Readonly<Record<GaussianAttribute, number>> = {
+  positions: 3,
+  covariances: 6,
+  scales: 3,
+  rotations: 4,
+  opacities: 1,
+  colors: 0,
+  sh: 0,
+};
+
 /** What the output that a field of the binding names must look like. */
 export function outputRule(binding: OutputBinding, field: string): TensorRule {
-  if (binding.layout === 'image') return fixed(FLOATS, [1, 3, 'H', 'W']);
+  if (binding.layout === 'image') return fixed(FLOATS, ...IMAGE_SHAPES);
   if (field === 'count') return gaussianRule('count', {});
-  if (binding.layout === 'packed') return gaussianRule('packed', binding);
+  if (binding.layout === 'packed') return gaussianRule('packed', binding, fixedColumnsOf(binding));
   if (binding.layout === 'split') return gaussianRule(field as GaussianTensor, binding);
   if (field === 'gaussians') return fixed(FLOATS, ['N', 10]);
   if (field === 'colors') return fixed(FLOATS, ['N', 4], ['N', 3]);
   return fixed(FLOATS, ...SH_DEGREES.map((degree) => ['N', shColumns(degree)]));
 }
 
-/** True if the file's dimensions are those of one of the shapes. */
-export function shapeFits(dims: readonly OnnxDim[], { shapes }: TensorRule): boolean {
-  return shapes.some((shape) => shape.length === dims.length && shape.every((rule, i) => dimFits(dims[i], rule)));
+/** True if the file's dimensions are those of one of the shapes, but for ones before them. */
+export function shapeFits(dims: readonly OnnxDim[], rule: TensorRule): boolean {
+  return bareDims(dims, rule) !== undefined;
+}
+
+/**
+ * A tensor's dimensions as one of the shapes has them. Ones before them, a batch of one, change no byte, and are left away: as few as it takes.
+ * @returns undefined where no shape fits.
+ */
+export function bareDims(dims: readonly OnnxDim[], { shapes }: TensorRule): readonly OnnxDim[] | undefined {
+  const fits = shapes.some((shape) => shape.length === dims.length && shape.every((rule, i) => dimFits(dims[i], rule)));
+  if (fits) return dims;
+  return dims[0] === 1 ? bareDims(dims.slice(1), { shapes, dtypes: [] }) : undefined;
 }
 
 function dimFits(dim: OnnxDim, rule: DimRule): boolean {
@@ -116,7 +186,7 @@ export function describeShapes({ shapes }: TensorRule): string {
 export function shDegreeOf(binding: OutputBinding, dims: readonly OnnxDim[]): ShDegree | undefined {
   if (binding.layout === 'image') return undefined;
   if (binding.layout === 'packed') {
-    return binding.color === 'sh' ? degreeOfColumns(Number(dims[1]) - PACKED_FIXED_COLUMNS) : undefined;
+    return binding.color === 'sh' ? degreeOfColumns(Number(dims[1]) - fixedColumnsOf(binding)) : undefined;
   }
   return degreeOfColumns(dims.slice(1).reduce<number>((product, dim) => product * Number(dim), 1));
 }

@@ -126,7 +126,7 @@ function uniformOf(memory: GpuMemory, degree: ShDegree, count: number): GPUBuffe
     layouts.Ingest,
     {
       ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 0 },
-      ...{ shape_kind: SHAPE_SCALE, color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: degree },
+      ...{ shape_kind: SHAPE_SCALE, shape_numbers: 3, color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: degree },
       ...{ positions: [0, positions], shapes: [0, scales], rotations: [0, rotations] },
       ...{ colors: [0, sh], opacities: [0, opacities] },
     },

@@ -99,6 +99,7 @@ export class GpuEvaluator implements Evaluator {
   }
 
   async rank(signal?: AbortSignal): Promise<Ranking> {
+    if (this.#ranking) return this.#ranking;
     const scorer = new SceneScorer(this.#device, this.#renderer, this.#scene, this.#views.scored);
     try {
       await scorer.run(signal);

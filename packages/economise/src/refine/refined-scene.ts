@@ -197,7 +197,12 @@ export class RefinedScene implements GaussianScene {
       rendererLayouts.Ingest,
       {
         ...{ count, rows: count, page_rows: count, first_row: 0, is_half: 0, is_w_first: 1, is_logit: 1 },
-        ...{ shape_kind: SHAPE_LOG_SCALE, color_kind: COLOR_COEFFICIENT_MAJOR, sh_degree: this.shDegree },
+        ...{
+          shape_kind: SHAPE_LOG_SCALE,
+          shape_numbers: 3,
+          color_kind: COLOR_COEFFICIENT_MAJOR,
+          sh_degree: this.shDegree,
+        },
         ...{ positions: [0, width], shapes: [SCALE_AT, width], rotations: [ROTATION_AT, width] },
         ...{ colors: [SH_AT, width], opacities: [LOGIT_AT, width] },
       },

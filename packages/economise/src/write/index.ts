@@ -4,7 +4,9 @@ import type { ReducedCloud } from '../reduce.js';
 import type { TaskPool } from '../parts/task-pool.js';
 import { writeGlb } from './glb.js';
 import { writePly } from './ply.js';
+import { tuneSog } from './tune-sog.js';
 import { fractionalBitsOf, writeSpz } from './spz.js';
+import type { EncodeWebp } from './sog.js';
 
 /** What is written of a reduced cloud. */
 export type WrittenCloud = Pick<ReducedCloud, 'cloud' | 'degrees'>;
@@ -17,6 +19,20 @@ export interface Encoding {
   readonly write: (reduced: WrittenCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
   /** True if every splat takes as many coefficients as the one with the most: fewer bands of some save nothing. */
   readonly hasOneDegree?: boolean;
+  /**
+   * Chooses how precise it is: such that the rounding of a scene is at most so much.
+   * @param measure says how much it is, a mean squared error
+   */
+  readonly tune?: (whole: WrittenCloud, measure: Measure, target: number) => Promise<Encoding>;
+}
+
+/** Says how far a written file is from the scene: a mean squared error, peak 1. */
+export type Measure = (bytes: Uint8Array) => Promise<number>;
+
+/** What formats need that no package of ours has. */
+export interface Encoders {
+  /** Of lossless WebP, for SOG. */
+  readonly encodeWebp?: EncodeWebp;
 }
 
 const spz = (shBits: number): Encoding => ({
@@ -42,21 +58,23 @@ const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
 /**
  * The ways to write a file of this name.
  * @param cloud what is to be written, as far as it is known
+ * @param encoders what `.sog` is written with
  * @throws GaussianSplatError `argument/value` for a name whose extension is none of ours, for a scene trained with antialiasing where the format cannot say so, and for one
  * that lies farther from (0, 0, 0) than the format has digits.
  */
 export function encodingsFor(
   name: string,
   cloud: Partial<Pick<GaussianCloud, 'antialiased' | 'positions' | 'origin'>> = {},
+  encoders: Encoders = {},
 ): readonly Encoding[] {
   const extension = /\.[a-z]+$/i.exec(name)?.[0].toLowerCase() ?? '';
-  const found = ENCODINGS.get(extension);
+  const found = extension === '.sog' ? [tuneSog(encoders.encodeWebp)] : ENCODINGS.get(extension);
   if (found === undefined) {
     throw new GaussianSplatError('argument/value', {
       where: name,
-      expected: `a name that ends in ${[...ENCODINGS.keys()].join(', ')}`,
+      expected: `a name that ends in ${[...ENCODINGS.keys(), '.sog'].join(', ')}`,
       found: extension || 'no extension',
-      remedy: 'choose .glb for accuracy, .spz for size, .ply for tools that know nothing else',
+      remedy: 'choose .glb for accuracy, .sog for size, .ply for tools that know nothing else',
     });
   }
   if (cloud.antialiased && extension === '.glb') {

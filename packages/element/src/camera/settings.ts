@@ -10,6 +10,8 @@ export interface CameraSettings {
   readonly minOrbit: OrbitSetting;
   readonly maxOrbit: OrbitSetting;
   readonly target: TargetSetting;
+  readonly minTarget: TargetSetting;
+  readonly maxTarget: TargetSetting;
   readonly fieldOfView: AngleSetting;
   readonly minFieldOfView: AngleSetting;
   readonly maxFieldOfView: AngleSetting;
@@ -24,7 +26,7 @@ export interface SceneBounds extends Bounds {
 }
 
 /** Rotation from the frame of a scene to viewer space. */
-export const frameOf = ({ up }: CameraSettings, bounds: SceneBounds): ViewerFrame =>
+export const frameOf = ({ up }: Pick<CameraSettings, 'up'>, bounds: Pick<SceneBounds, 'up'>): ViewerFrame =>
   viewerFrame(up ?? bounds.up ?? [0, -1, 0]);
 
 const DEGREE = Math.PI / 180;
@@ -66,28 +68,32 @@ export function poseOf(settings: CameraSettings, bounds: SceneBounds, aspect: nu
   };
 }
 
-/** The limits that the attributes ask for. An automatic limit gives way to a pose that was asked for outright. */
-export function limitsOf(settings: CameraSettings, bounds: SceneBounds, aspect: number): PoseLimits {
+/** The limits that the attributes ask for. An automatic limit gives way to a pose that was asked for outright: by the attributes, and by a flight. */
+export function limitsOf(settings: CameraSettings, bounds: SceneBounds, aspect: number, asked?: Pose): PoseLimits {
   const { minOrbit, maxOrbit } = settings;
   const pose = poseOf(settings, bounds, aspect);
+  const poses = [pose, asked ?? pose];
+  const least = (auto: number, key: keyof Pose): number => Math.min(auto, ...poses.map((each) => each[key]));
+  const most = (auto: number, key: keyof Pose): number => Math.max(auto, ...poses.map((each) => each[key]));
   const framing = framingDistance(bounds.radius, pose.fieldOfView, aspect);
-  const free = { x: Infinity, y: Infinity, z: Infinity };
+  const place = (setting: TargetSetting, auto: number): Pick<Pose, 'x' | 'y' | 'z'> => {
+    const [x, y, z] = setting.map((value) => (value === 'auto' ? auto : value));
+    return { x, y, z };
+  };
   return {
     min: {
       theta: angle(minOrbit.theta, -Infinity),
-      phi: Math.max(0, angle(minOrbit.phi, Math.min(AUTO.minPhi, pose.phi))),
-      radius: distance(minOrbit.radius, Math.min(AUTO.minFramings * framing, pose.radius), framing),
-      x: -free.x,
-      y: -free.y,
-      z: -free.z,
-      fieldOfView: angle(settings.minFieldOfView, Math.min(AUTO.minFieldOfView, pose.fieldOfView)),
+      phi: Math.max(0, angle(minOrbit.phi, least(AUTO.minPhi, 'phi'))),
+      radius: distance(minOrbit.radius, least(AUTO.minFramings * framing, 'radius'), framing),
+      ...place(settings.minTarget, -Infinity),
+      fieldOfView: angle(settings.minFieldOfView, least(AUTO.minFieldOfView, 'fieldOfView')),
     },
     max: {
       theta: angle(maxOrbit.theta, Infinity),
-      phi: Math.min(Math.PI, angle(maxOrbit.phi, Math.max(AUTO.maxPhi, pose.phi))),
-      radius: distance(maxOrbit.radius, Math.max(AUTO.maxFramings * framing, pose.radius), framing),
-      ...free,
-      fieldOfView: angle(settings.maxFieldOfView, Math.max(AUTO.maxFieldOfView, pose.fieldOfView)),
+      phi: Math.min(Math.PI, angle(maxOrbit.phi, most(AUTO.maxPhi, 'phi'))),
+      radius: distance(maxOrbit.radius, most(AUTO.maxFramings * framing, 'radius'), framing),
+      ...place(settings.maxTarget, Infinity),
+      fieldOfView: angle(settings.maxFieldOfView, most(AUTO.maxFieldOfView, 'fieldOfView')),
     },
   };
 }

@@ -2,10 +2,11 @@
 
 /** Where the camera is, around its target. */
 export class CameraOrbit {
-  constructor(theta: number, phi: number, radius: number) {
+  constructor(theta: number, phi: number, radius: number, framingRadius: number) {
     this.theta = theta;
     this.phi = phi;
     this.radius = radius;
+    this.framingRadius = framingRadius;
   }
   /** Azimuth in radians: 0 on the +z side of viewer space, growing towards +x. */
   readonly theta: number;
@@ -13,6 +14,8 @@ export class CameraOrbit {
   readonly phi: number;
   /** Distance to the target in metres (world units). */
   readonly radius: number;
+  /** The distance that frames the scene in this shape of the picture: `100%` of `camera-orbit`. */
+  readonly framingRadius: number;
 
   /** A value for `camera-orbit`. Radians and metres, since only they survive the way there and back unrounded. */
   toString(): string {

@@ -16,6 +16,8 @@ const INTERVAL_MS = 700;
 export class AnnouncerController implements ReactiveController {
   readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: AnnouncerHost;
+  /** A flight says itself where it has gone. */
+  isQuiet = false;
   #text = '';
   #spoken: ViewName | undefined;
   #timer: ReturnType<typeof setTimeout> | undefined;
@@ -45,7 +47,7 @@ export class AnnouncerController implements ReactiveController {
 
   /** The camera is somewhere else. */
   cameraMoved(): void {
-    if (this.#timer !== undefined || !this.#of.isFocused) return;
+    if (this.isQuiet || this.#timer !== undefined || !this.#of.isFocused) return;
     this.#timer = setTimeout(this.#speak, INTERVAL_MS);
   }
 
@@ -54,7 +56,7 @@ export class AnnouncerController implements ReactiveController {
     const name = this.#of.viewName;
     if (!this.#of.isFocused || name === this.#spoken) return;
     this.#spoken = name;
-    this.#say(viewSentence(name, this.#of.strings));
+    this.say(viewSentence(name, this.#of.strings));
   };
 
   /** The picture's name and keys are read on focus; only moves are news. */
@@ -65,10 +67,11 @@ export class AnnouncerController implements ReactiveController {
   readonly #onBlur = (): void => {
     clearTimeout(this.#timer);
     this.#timer = undefined;
-    this.#say('');
+    this.say('');
   };
 
-  #say(text: string): void {
+  /** Puts a sentence into the live region. */
+  say(text: string): void {
     if (text === this.#text) return;
     this.#text = text;
     this.#host.requestUpdate();

@@ -1,9 +1,10 @@
-import type { Camera, Vector3 } from '@gaussian-splat/core';
-import { cameraOfPose, nearPlane, type ViewerFrame } from '../camera/orbit.js';
+import { subtract, type Camera, type Vector3 } from '@gaussian-splat/core';
+import { cameraOfPose, framingDistance, nearPlane, toViewer, type Pose, type ViewerFrame } from '../camera/orbit.js';
 import { OrbitCamera, type Pivot } from '../camera/orbit-camera.js';
 import { frameOf, limitsOf, poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
 import { CameraOrbit, CameraTarget, FieldOfView } from '../camera/values.js';
 import type { CameraChangeSource } from '../events.js';
+import type { ViewContext } from '../views/camera-view.js';
 
 /** All of a subject that stands alone is shown, of other scenes their middle. */
 const framed = (bounds: SceneBounds): SceneBounds => ({ ...bounds, ...bounds.subject });
@@ -33,6 +34,8 @@ export class CameraController {
   /** The element itself has turned it. */
   #isTurned = false;
   #jumped = false;
+  /** Where a flight has put the camera: automatic limits give way to it. */
+  #asked: Pose | undefined;
   #lastStep: number | undefined;
 
   /** @param onChange the camera is no longer where it was drawn. */
@@ -40,12 +43,12 @@ export class CameraController {
     this.#settings = settings;
     this.#onChange = onChange;
     this.#camera = new OrbitCamera(poseOf(settings, UNKNOWN_BOUNDS, 1));
-    this.#camera.limits = limitsOf(settings, UNKNOWN_BOUNDS, 1);
+    this.#limit();
   }
 
   get orbit(): CameraOrbit {
-    const { theta, phi, radius } = this.#camera.now;
-    return new CameraOrbit(theta, phi, radius);
+    const { theta, phi, radius, fieldOfView } = this.#camera.now;
+    return new CameraOrbit(theta, phi, radius, framingDistance(this.#bounds.radius, fieldOfView, this.#aspect));
   }
 
   get target(): CameraTarget {
@@ -72,6 +75,32 @@ export class CameraController {
     this.#camera.pivot = pivot;
   }
 
+  /** A person has moved the camera since it stood where the page put it. */
+  get isTouched(): boolean {
+    return this.#isTouched;
+  }
+
+  /** Where it is going. */
+  get goal(): Pose {
+    return this.#camera.goal;
+  }
+
+  /** What views are read against. */
+  get context(): ViewContext {
+    const [settings, bounds, aspect, from] = [this.#settings, this.#bounds, this.#aspect, this.#camera.goal];
+    return { settings, bounds, frame: this.viewerFrame, aspect, from };
+  }
+
+  /** Puts the camera there at once, within the limits that the page has set: a step of a flight. */
+  moveTo(pose: Pose): void {
+    this.#source = 'none';
+    this.#userDistance = this.#isTouched = true;
+    this.#asked = pose;
+    this.#limit();
+    this.#camera.setGoal(pose);
+    this.jumpToGoal();
+  }
+
   get isMoving(): boolean {
     return this.#camera.moving;
   }
@@ -81,13 +110,17 @@ export class CameraController {
     return cameraOfPose(this.#camera.now, this.viewerFrame, width, height, nearPlane(this.#bounds));
   }
 
-  /** New attributes. What did not change keeps the place that a person may have given it. */
-  applySettings(settings: CameraSettings): void {
+  /**
+   * New attributes. What was not set keeps the place that a person may have given it.
+   * @param set what the page has set, be it to the value that it had
+   */
+  applySettings(settings: CameraSettings, set: ReadonlySet<keyof CameraSettings> = new Set()): void {
     const old = this.#settings;
     this.#settings = settings;
-    this.#camera.limits = limitsOf(settings, this.#bounds, this.#aspect);
+    this.#limit();
     const { theta, phi, radius, x, y, z, fieldOfView } = poseOf(settings, this.#bounds, this.#aspect);
-    const changed = (key: keyof CameraSettings): boolean => JSON.stringify(old[key]) !== JSON.stringify(settings[key]);
+    const changed = (key: keyof CameraSettings): boolean =>
+      set.has(key) || JSON.stringify(old[key]) !== JSON.stringify(settings[key]);
     this.#source = 'none';
     if (changed('up')) return this.#reframe('none');
     if (changed('fieldOfView')) this.#camera.setGoal({ fieldOfView });
@@ -112,7 +145,7 @@ export class CameraController {
   /** More of the scene is known: the camera goes where it would have stood, unless a person has moved it. */
   refine(bounds: SceneBounds): void {
     this.#bounds = framed(bounds);
-    this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect);
+    this.#limit();
     if (!this.#isTouched) {
       this.#source = 'automatic';
       const { theta, ...pose } = poseOf(this.#settings, this.#bounds, this.#aspect);
@@ -125,7 +158,7 @@ export class CameraController {
   setAspect(aspect: number): void {
     if (aspect === this.#aspect) return;
     this.#aspect = aspect;
-    this.#camera.limits = limitsOf(this.#settings, this.#bounds, aspect);
+    this.#limit();
     if (this.#userDistance) return;
     this.#camera.setGoal({ radius: poseOf(this.#settings, this.#bounds, aspect).radius });
     if (!this.#camera.moving) return;
@@ -136,7 +169,9 @@ export class CameraController {
   /** Where the attributes put the camera, whatever a person did since. */
   reset(source: CameraChangeSource): void {
     this.#source = source;
-    this.#userDistance = false;
+    this.#userDistance = this.#isTouched = false;
+    this.#asked = undefined;
+    this.#limit();
     this.#camera.setGoal(poseOf(this.#settings, this.#bounds, this.#aspect));
     this.#camera.unwind();
     this.#onChange();
@@ -166,16 +201,21 @@ export class CameraController {
     this.#moveByUser();
   }
 
-  /** A person changes the distance by a factor. */
-  zoomBy(factor: number): void {
-    this.#userDistance = true;
+  /** A person changes the distance by a factor. @returns false at the limit */
+  zoomBy(factor: number): boolean {
+    const { radius } = this.#camera.goal;
     this.#camera.zoomBy(factor);
+    if (this.#camera.goal.radius === radius) return false;
+    this.#userDistance = true;
     this.#moveByUser();
+    return true;
   }
 
   /** A person moves the camera sideways, in shares of the picture's height. */
   panBy(right: number, up: number): void {
+    const { x, y, z } = this.#camera.goal;
     this.#camera.panBy(right, up);
+    this.#keepNear([x, y, z]);
     this.#moveByUser();
   }
 
@@ -213,14 +253,30 @@ export class CameraController {
     return changed ? this.#source : null;
   }
 
+  /** Keeps the target in the ball that is framed, so that no pan loses the scene. One that was farther out stays where it was. Limits that the page has set count alone. */
+  #keepNear(before: Vector3): void {
+    const { minTarget, maxTarget } = this.#settings;
+    if (this.#camera.pivot === 'eye' || [...minTarget, ...maxTarget].some((limit) => limit !== 'auto')) return;
+    const middle = toViewer(this.viewerFrame, this.#bounds.center);
+    const { x, y, z } = this.#camera.goal;
+    const [from, to] = [before, [x, y, z] as const].map((place) => subtract(place, middle));
+    const share = Math.max(this.#bounds.radius, Math.hypot(...from)) / Math.hypot(...to);
+    if (share >= 1) return;
+    const [nearX, nearY, nearZ] = middle.map((value, axis) => value + share * to[axis]);
+    this.#camera.setGoal({ x: nearX, y: nearY, z: nearZ });
+  }
+
   #moveByUser(): void {
     this.#isTouched = true;
     this.#source = 'user-interaction';
     this.#onChange();
   }
 
+  #limit(): void {
+    this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect, this.#asked);
+  }
+
   #reframe(source: CameraChangeSource): void {
-    this.#camera.limits = limitsOf(this.#settings, this.#bounds, this.#aspect);
     this.reset(source);
     this.#jumped = true;
     this.jumpToGoal();

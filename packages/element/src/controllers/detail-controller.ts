@@ -1,6 +1,5 @@
 import type { Attributes, DetailChoice } from '../attributes.js';
-import type { DetailLevers, GpuScene, OwnedGaussians } from '../gpu/gpu-scene.js';
-import type { DrawnScene } from '../gpu/open-scene.js';
+import type { DetailLevers, LoadedGaussians, OwnedGaussians } from '../gpu/loaded-gaussians.js';
 import { LatestTask } from '../latest-task.js';
 import type { Services } from '../stage-host.js';
 
@@ -26,7 +25,7 @@ export interface DetailHost {
 /** Sees to levels of detail: built when the page asks for them, or when pictures in motion cannot be drawn whole; and drawn as far as the page allows. */
 export class DetailController {
   readonly #host: DetailHost;
-  #scene: DrawnScene | null = null;
+  #scene: LoadedGaussians | null = null;
   /** What a streamed scene came with. */
   #own: DetailLevers = {};
   /** Splats whose levels are there, on their way, or not to be had. */
@@ -44,7 +43,7 @@ export class DetailController {
   }
 
   /** Looks at the scene that is on show whole, or null for none, and at the attribute. Safe to call as often as one likes. */
-  update(scene: DrawnScene | null): void {
+  update(scene: LoadedGaussians | null): void {
     if (scene !== this.#scene) this.#begin(scene);
     if (scene === null || scene.isDestroyed || scene.live !== undefined) return;
     this.#allow(scene, this.#host.attributes.detail);
@@ -65,7 +64,7 @@ export class DetailController {
     if (this.#scene) this.update(this.#scene);
   }
 
-  #begin(scene: DrawnScene | null): void {
+  #begin(scene: LoadedGaussians | null): void {
     this.#stop();
     this.#slowMs = 0;
     this.#isPressed = false;
@@ -80,7 +79,7 @@ export class DetailController {
   }
 
   /** Lets pictures be off by so much from now on. */
-  #allow(scene: DrawnScene, choice: DetailChoice): void {
+  #allow(scene: LoadedGaussians, choice: DetailChoice): void {
     if (choice === this.#choice) return;
     this.#choice = choice;
     const pixels = choice === 'auto' ? this.#own.detail : choice === 'off' ? 0 : choice;
@@ -88,17 +87,17 @@ export class DetailController {
     this.#host.splatsChanged();
   }
 
-  #dismiss(scene: DrawnScene): void {
+  #dismiss(scene: LoadedGaussians): void {
     this.#stop();
     scene.setLevels(undefined);
   }
 
-  #isWorthIt({ gaussians: { count } }: GpuScene): boolean {
+  #isWorthIt({ gaussians: { count } }: LoadedGaussians): boolean {
     if (typeof this.#choice === 'number') return this.#choice > 0;
     return this.#isPressed && count >= LEAST_SPLATS && count <= MOST_SPLATS;
   }
 
-  #build(scene: GpuScene): void {
+  #build(scene: LoadedGaussians): void {
     const { gaussians } = scene;
     this.#of = gaussians;
     this.#building.run(

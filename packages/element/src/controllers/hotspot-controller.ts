@@ -26,7 +26,7 @@ export interface HotspotPlace {
   readonly canvasPosition: { readonly x: number; readonly y: number } | null;
   /** False where its normal points away from the camera. */
   readonly facingCamera: boolean;
-  /** False where it faces away, is hidden by scenery, or is behind the camera. */
+  /** False where it faces away, is hidden by scenery, or is behind the camera or outside of the frame. */
   readonly visible: boolean;
 }
 
@@ -77,7 +77,7 @@ export class HotspotController implements ReactiveController {
 
   hostConnected(): void {
     this.#observer = new MutationObserver(() => this.#collect());
-    const attributeFilter = ['slot', 'data-position', 'data-normal'];
+    const attributeFilter = ['slot', 'data-position', 'data-normal', 'data-orbit'];
     this.#observer.observe(this.#host, { childList: true, subtree: true, attributeFilter });
     this.#collect();
   }
@@ -126,8 +126,8 @@ export class HotspotController implements ReactiveController {
     this.#hotspots = new Map(
       [...groupBySlot(children)].map(([name, elements]) => [name, this.#read(elements, before.get(name))]),
     );
-    if (before.size + this.#hotspots.size === 0) return;
     this.#host.requestUpdate();
+    if (before.size + this.#hotspots.size === 0) return;
     // Where they are now is known once their boxes are.
     void this.#host.updateComplete.then(() => this.#look());
   }
@@ -183,8 +183,11 @@ export class HotspotController implements ReactiveController {
   }
 
   #show(hotspot: Hotspot, box: HTMLElement): void {
-    const isVisible = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
-    box.classList.toggle('hidden', !isVisible);
+    const { x, y } = hotspot;
+    const isOpen = hotspot.depth > 0 && hotspot.facesCamera && !hotspot.isOccluded;
+    // Of a label whose point has left the frame a part may still be there to read.
+    box.classList.toggle('hidden', !isOpen);
+    const isVisible = isOpen && x >= 0 && y >= 0 && x <= this.#host.clientWidth && y <= this.#host.clientHeight;
     hotspot.isVisible = isVisible;
     for (const element of hotspot.elements) {
       if (this.#told.get(element) === isVisible) continue;

@@ -1,4 +1,5 @@
 import type { ReactiveController, ReactiveControllerHost } from 'lit';
+import type { WheelZoom } from '../attributes.js';
 import { DoubleTap } from '../camera/double-tap.js';
 import {
   isCameraDrag,
@@ -17,6 +18,10 @@ export interface InputOptions {
   readonly enabled: boolean;
   readonly zoom: boolean;
   readonly pan: boolean;
+  /** A double click or a double tap means something. */
+  readonly tap: boolean;
+  /** When the wheel zooms. */
+  readonly wheel: WheelZoom;
   /** CSS touch-action of the picture: which one-finger moves stay the page's. */
   readonly touchAction: string;
 }
@@ -25,9 +30,12 @@ export interface InputOptions {
 export interface InputHost {
   /** The element that is dragged and focused, once it is rendered. */
   readonly surface: HTMLElement | null;
+  /** Holds the labels of the page, on which a drag may begin. */
+  readonly hotspotLayer: HTMLElement | null;
   /** Read after every update of the element. */
   readonly input: InputOptions;
-  act(action: CameraAction): void;
+  /** @returns false where it moves nothing */
+  act(action: CameraAction): boolean;
   /** A double click or a double tap, in CSS pixels of the page. */
   pick(clientX: number, clientY: number): void;
   /** The space bar; false if it means nothing here. */
@@ -39,27 +47,40 @@ const RIGHT_BUTTON = 2;
 
 /** A pointer that is down on the picture. */
 interface Pointer extends Point {
+  readonly start: Point;
   readonly pans: boolean;
-  /** Whose its moves are: of one finger this is known only once it has set out. */
+  /** Whose its moves are: of one finger, and of what begins on a label, this is known only once it has set out. */
   readonly owner: 'camera' | 'page' | 'undecided';
 }
 
-/** Listens to mouse, pen, touch, wheel and keys on the picture, and turns them into camera actions. */
+/** Parts of a label that have their own use for a drag. */
+const DRAGGED = 'input, select, textarea, video, audio, [contenteditable]';
+
+/** Listens to mouse, pen, touch, wheel and keys on the picture and its labels, and turns them into camera actions. */
 export class InputController implements ReactiveController {
+  readonly #host: ReactiveControllerHost & HTMLElement;
   readonly #of: InputHost;
   readonly #pointers = new Map<number, Pointer>();
   readonly #doubleTap = new DoubleTap();
   /** The last pointer was a finger: whether its second tap is a double click, too, differs from browser to browser, and it counts once. */
-  #isTouched = false;
+  #isTouch = false;
+  /** CSS pixels that a pointer has gone from where it came down. */
+  #way = 0;
   /** The space bar meant something when it was pressed. */
   #toggles = false;
   #surface: HTMLElement | null = null;
   #listening: AbortController | undefined;
   #wheel: AbortController | undefined;
 
-  constructor(host: ReactiveControllerHost, of: InputHost) {
+  constructor(host: ReactiveControllerHost & HTMLElement, of: InputHost) {
+    this.#host = host;
     this.#of = of;
     host.addController(this);
+  }
+
+  /** The last pointer that came down was a finger. */
+  get isTouch(): boolean {
+    return this.#isTouch;
   }
 
   hostConnected(): void {
@@ -76,34 +97,42 @@ export class InputController implements ReactiveController {
 
   #sync(): void {
     this.#surface = this.#of.surface;
-    if (this.#surface === null) return;
-    const { enabled, zoom, touchAction } = this.#of.input;
-    this.#surface.style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
-    if (!enabled) return this.#stop();
-    this.#listening ??= this.#listen(this.#surface);
+    const layer = this.#of.hotspotLayer;
+    if (this.#surface === null || layer === null) return;
+    const { enabled, zoom, wheel, touchAction } = this.#of.input;
+    const targets = [this.#surface, layer];
+    for (const { style } of targets) style.touchAction = !enabled ? '' : zoom ? touchAction : withPinch(touchAction);
+    // An element that has left the page is updated once more; the listener of its document would keep it for good.
+    if (!enabled || !this.#surface.isConnected) return this.#stop();
+    this.#listening ??= this.#listen(this.#surface, targets);
     // A wheel listener that may prevent scrolling costs the page; it exists only where the wheel zooms.
-    if (zoom) this.#wheel ??= this.#listenToWheel(this.#surface);
+    if (zoom && wheel !== 'none') this.#wheel ??= this.#listenToWheel(targets);
     else this.#stopWheel();
   }
 
-  #listen(surface: HTMLElement): AbortController {
+  #listen(surface: HTMLElement, targets: readonly HTMLElement[]): AbortController {
     const listening = new AbortController();
     const { signal } = listening;
-    surface.addEventListener('pointerdown', this.#onDown, { signal });
-    surface.addEventListener('pointermove', this.#onMove, { signal });
-    for (const type of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
-      surface.addEventListener(type, this.#onUp, { signal });
+    for (const target of targets) {
+      target.addEventListener('pointerdown', this.#onDown, { signal });
+      target.addEventListener('pointermove', this.#onMove, { signal });
+      for (const type of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
+        target.addEventListener(type, this.#onUp, { signal });
+      }
+      target.addEventListener('click', this.#onClick, { signal, capture: true });
+      target.addEventListener('contextmenu', this.#onContextMenu, { signal });
+      target.addEventListener('touchmove', this.#onTouchMove, { signal, passive: false });
     }
     surface.addEventListener('keydown', this.#onKey, { signal });
     surface.addEventListener('dblclick', this.#onDoubleClick, { signal });
-    surface.addEventListener('contextmenu', this.#onContextMenu, { signal });
-    surface.addEventListener('touchmove', this.#onTouchMove, { signal, passive: false });
+    surface.ownerDocument.addEventListener('dragstart', this.#onDragStart, { signal });
     return listening;
   }
 
-  #listenToWheel(surface: HTMLElement): AbortController {
+  #listenToWheel(targets: readonly HTMLElement[]): AbortController {
     const listening = new AbortController();
-    surface.addEventListener('wheel', this.#onWheel, { signal: listening.signal, passive: false });
+    const options = { signal: listening.signal, passive: false };
+    for (const target of targets) target.addEventListener('wheel', this.#onWheel, options);
     return listening;
   }
 
@@ -122,12 +151,19 @@ export class InputController implements ReactiveController {
 
   readonly #onDown = (event: PointerEvent): void => {
     if (event.button !== LEFT_BUTTON && event.button !== RIGHT_BUTTON) return;
+    const isOnLabel = event.currentTarget !== this.#surface;
+    if (isOnLabel && (event.defaultPrevented || (event.target as Element).closest(DRAGGED))) return;
     const pans = event.button === RIGHT_BUTTON || event.shiftKey || event.ctrlKey || event.metaKey;
-    this.#isTouched = event.pointerType === 'touch';
-    if (this.#isTouched) this.#doubleTap.down(positionOf(event), event.timeStamp, this.#pointers.size === 0);
-    const owner = this.#isTouched ? 'undecided' : 'camera';
-    this.#pointers.set(event.pointerId, { ...positionOf(event), pans, owner });
-    this.#capture(event.pointerId);
+    const isTouch = event.pointerType === 'touch';
+    if (isTouch !== this.#isTouch) this.#host.requestUpdate();
+    this.#isTouch = isTouch;
+    if (this.#pointers.size === 0) this.#way = 0;
+    if (isTouch && !isOnLabel) this.#doubleTap.down(positionOf(event), event.timeStamp, this.#pointers.size === 0);
+    const owner = isTouch || isOnLabel ? 'undecided' : 'camera';
+    const start = positionOf(event);
+    this.#pointers.set(event.pointerId, { ...start, start, pans, owner });
+    // A label whose pointer is captured would never hear of its click.
+    if (!isOnLabel) this.#capture(event.pointerId);
   };
 
   /** Keeps a drag going outside of the element. */
@@ -149,18 +185,20 @@ export class InputController implements ReactiveController {
 
   #follow(event: PointerEvent, from: Pointer, height: number): void {
     const to = positionOf(event);
+    this.#way = Math.max(this.#way, Math.hypot(to.x - from.start.x, to.y - from.start.y));
     const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
-    if (!other && from.owner === 'undecided') return this.#decide(event.pointerId, from, to);
+    if (!other && from.owner === 'undecided') return this.#decide(event, from, to);
     this.#pointers.set(event.pointerId, { ...from, ...to });
     if (other) this.#movePair([from, other], [to, other], height);
     else if (from.owner === 'camera') this.#perform(from.pans ? panOf(from, to, height) : orbitOf(from, to, height));
   }
 
   /** Finds out whose a finger is; its drag counts from here on, so that the camera does not jump. */
-  #decide(pointerId: number, from: Pointer, to: Point): void {
+  #decide({ pointerId, pointerType }: PointerEvent, from: Pointer, to: Point): void {
     if (Math.hypot(to.x - from.x, to.y - from.y) < TOUCH_SLOP) return;
-    const owner = isCameraDrag(this.#of.input.touchAction, from, to) ? 'camera' : 'page';
-    this.#pointers.set(pointerId, { ...from, ...to, owner });
+    const isCamera = pointerType !== 'touch' || isCameraDrag(this.#of.input.touchAction, from, to);
+    this.#pointers.set(pointerId, { ...from, ...to, owner: isCamera ? 'camera' : 'page' });
+    if (isCamera) this.#capture(pointerId);
   }
 
   readonly #onUp = (event: PointerEvent): void => {
@@ -183,17 +221,41 @@ export class InputController implements ReactiveController {
   };
 
   readonly #onDoubleClick = (event: MouseEvent): void => {
-    if (!this.#isTouched) this.#pick(event);
+    if (!this.#isTouch) this.#pick(event);
   };
 
   #pick({ clientX, clientY }: MouseEvent): void {
-    this.#of.pick(clientX, clientY);
+    if (this.#of.input.tap) this.#of.pick(clientX, clientY);
   }
 
-  readonly #onWheel = (event: WheelEvent): void => {
-    event.preventDefault();
-    this.#perform(wheelOf(event));
+  /** What ends a drag is no click: around the scene there may be a link. */
+  readonly #onClick = (event: Event): void => {
+    if (this.#way > TOUCH_SLOP) {
+      event.preventDefault();
+      event.stopImmediatePropagation();
+    }
+    this.#way = 0;
   };
+
+  /** The browser's own dragging of a link or an image would end the camera's. */
+  readonly #onDragStart = (event: Event): void => {
+    if (this.#pointers.size > 0) event.preventDefault();
+  };
+
+  /** At the limit the page scrolls. With Ctrl it would zoom, which nobody has asked for. */
+  readonly #onWheel = (event: WheelEvent): void => {
+    if (!this.#wheelZooms(event)) return;
+    if (this.#of.act(wheelOf(event)) || event.ctrlKey) event.preventDefault();
+  };
+
+  #wheelZooms({ ctrlKey, metaKey, target, currentTarget }: WheelEvent): boolean {
+    const { wheel } = this.#of.input;
+    if (ctrlKey || metaKey || wheel === 'always') return true;
+    if (wheel !== 'auto') return false;
+    // A label may have a box of its own to scroll.
+    if (currentTarget !== this.#surface && scrollsAround(target as Element, this.#host)) return false;
+    return this.#host.matches(':focus-within') || !scrollsAround(this.#host);
+  }
 
   /** The right button pans, so it opens no menu. */
   readonly #onContextMenu = (event: Event): void => {
@@ -218,6 +280,16 @@ export class InputController implements ReactiveController {
     return true;
   }
 }
+
+/** Whether there is anything to scroll: a box between a node and another, or, up to the page, the page itself or that of a frame around it. */
+function scrollsAround(node: Element | null, end: Element | null = null): boolean {
+  if (node === end) return end === null && self !== top;
+  const { scrollHeight, clientHeight, ownerDocument, parentElement } = node!;
+  const isBox = node === ownerDocument.scrollingElement || /auto|scroll/.test(getComputedStyle(node!).overflowY);
+  return (scrollHeight > clientHeight && isBox) || scrollsAround(parentElement ?? hostOf(node!), end);
+}
+
+const hostOf = (node: Element): Element | null => (node.getRootNode() as Partial<ShadowRoot>).host ?? null;
 
 /** A CSS touch-action that leaves pinches to the page, too. */
 const withPinch = (touchAction: string): string =>

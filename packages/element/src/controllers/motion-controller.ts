@@ -5,11 +5,10 @@ import type { PlaybackController } from './playback-controller.js';
 export interface MotionHost {
   /** The page asks the camera to turn by itself. */
   readonly autoRotates: boolean;
-  /** The page asks a scene that moves to play by itself. */
-  readonly autoplays: boolean;
   /** There is a picture to be seen that could move. */
   readonly isOnShow: boolean;
-  readonly playback: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'>;
+  /** What the page asks to play by itself; undefined for nothing. */
+  readonly player: Pick<PlaybackController, 'canPlay' | 'paused' | 'play' | 'pause'> | undefined;
   /** Lets the camera turn at once. */
   startTurning(): void;
 }
@@ -37,7 +36,7 @@ export class MotionController implements ReactiveController {
   /** What the visitor's switch does now; `none` where nothing moves by itself, and in a player, which has a button of its own. */
   get switch(): 'none' | 'pause' | 'play' {
     if (!this.#of.isOnShow || this.#host.slot === 'media' || !(this.#canTurn || this.#canPlay)) return 'none';
-    const isPlaying = this.#canPlay && !this.#of.playback.paused;
+    const isPlaying = this.#canPlay && !this.#of.player!.paused;
     return isPlaying || (this.#canTurn && !this.#isHeld) ? 'pause' : 'play';
   }
 
@@ -46,7 +45,7 @@ export class MotionController implements ReactiveController {
     const action = this.switch;
     if (action === 'none') return false;
     this.#isHeld = action === 'pause';
-    if (this.#canPlay) this.#of.playback[action]();
+    if (this.#canPlay) this.#of.player![action]();
     if (action === 'play') this.#of.startTurning();
     this.#host.requestUpdate();
     return true;
@@ -54,7 +53,7 @@ export class MotionController implements ReactiveController {
 
   /** Attributes that are taken away and set again are the page's word, later than the visitor's. */
   hostUpdated(): void {
-    if (!this.#of.autoRotates && !this.#of.autoplays) this.#isHeld = false;
+    if (!this.#of.autoRotates && !this.#of.player) this.#isHeld = false;
   }
 
   get #canTurn(): boolean {
@@ -63,6 +62,6 @@ export class MotionController implements ReactiveController {
 
   /** Also for people who want less motion, for whom nothing plays by itself: they may want this. */
   get #canPlay(): boolean {
-    return this.#of.autoplays && this.#of.playback.canPlay;
+    return this.#of.player?.canPlay ?? false;
   }
 }

@@ -17,6 +17,8 @@ export interface PromptHost {
 const WIGGLE_ANGLE = Math.PI / 18;
 /** Once to and fro, twice over; then the prompt stands still: less than 5 s, so that nobody has to look for a way to stop it. */
 const WIGGLE_MS = 4_500;
+/** Then it has been seen. */
+const SHOWN_MS = 5_000;
 
 /** Turn of the camera at a moment of the wiggle, radians: 0 at its start and its end. */
 export function wiggleAt(elapsedMs: number): number {
@@ -54,7 +56,7 @@ export class PromptController implements ReactiveController, Mover {
     if (this.#state !== 'done') this.#set('idle');
   }
 
-  /** A person has moved the camera, and needs no prompt any more. */
+  /** A person has moved the camera, or has seen it long enough, and needs no prompt any more. */
   dismiss(): void {
     if (this.#state !== 'done') this.#set('done');
   }
@@ -79,6 +81,7 @@ export class PromptController implements ReactiveController, Mover {
       this.#start = undefined;
       this.#turned = 0;
       this.#set('shown');
+      this.#timer = setTimeout(() => this.dismiss(), SHOWN_MS);
       if (this.#of.promptWiggles) this.#of.requestFrame();
     }, this.#of.attributes.interactionPromptThreshold);
   }

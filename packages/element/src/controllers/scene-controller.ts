@@ -4,7 +4,8 @@ import type { ReactiveController, ReactiveControllerHost } from 'lit';
 import { toElementError, type ElementError } from '../errors.js';
 import type * as comeBack from '../gpu/come-back.js';
 import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/device-failures.js';
-import { isStreamed, openScene, type DrawnScene, type OpenOptions } from '../gpu/open-scene.js';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import { isStreamed, openScene, type openGaussians, type OpenOptions } from '../gpu/open-scene.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { LatestTask } from '../latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
@@ -28,12 +29,14 @@ export interface SceneHost {
   readonly memoryBudget: number | undefined;
   /** What a generator needs to know beyond the request. */
   readonly liveRequest: ReturnType<OpenOptions['live']>;
+  /** Opens what is no scene of splats. */
+  readonly open?: typeof openGaussians;
   /** Shows a scene; fulfils once its first frame is drawn. */
-  show(scene: DrawnScene, entrance: Entrance): Promise<void>;
+  show(scene: LoadedGaussians, entrance: Entrance): Promise<void>;
   /** The scene on show is about to be destroyed, with (`clear`) or without its picture. */
   hide(clear: boolean): void;
   /** A preview of the scene is on show. */
-  previewShown(preview: DrawnScene): void;
+  previewShown(preview: LoadedGaussians): void;
   loadStarted(): void;
   progressed(...progress: Parameters<ProgressListener>): void;
   loaded(url: string): void;
@@ -74,7 +77,7 @@ export class SceneController implements ReactiveController {
   readonly #of: SceneHost;
   #state: SceneState = 'empty';
   #error: ElementError | null = null;
-  #scene: DrawnScene | null = null;
+  #scene: LoadedGaussians | null = null;
   #isPreview = false;
   /** What the scene on show was asked for by. */
   #shownRequest: SceneRequest | null = null;
@@ -101,8 +104,13 @@ export class SceneController implements ReactiveController {
     return this.#error;
   }
 
+  /** Absolute address of what was asked for last; empty for nothing. */
+  get url(): string {
+    return this.#request?.url ?? '';
+  }
+
   /** The scene on show. */
-  get scene(): DrawnScene | null {
+  get scene(): LoadedGaussians | null {
     return this.#scene;
   }
 
@@ -149,11 +157,14 @@ export class SceneController implements ReactiveController {
     if (this.#state === 'waiting' && mayStart) void this.#load(request);
   }
 
-  /** Gives up: the scene cannot be drawn. */
-  fail(error: unknown): void {
+  /**
+   * Gives up: the scene cannot be drawn.
+   * @param clear false keeps the last picture
+   */
+  fail(error: unknown, clear = true): void {
     this.#running.renew();
     const wasShown = this.#state === 'ready' || (this.#scene !== null && !this.isOutgoing);
-    this.#drop(true);
+    this.#drop(clear);
     this.#error = toElementError(error);
     this.#setState('failed');
     if (wasShown) this.#of.emptied();
@@ -228,7 +239,7 @@ export class SceneController implements ReactiveController {
         () => import('../gpu/come-back.js'),
       );
       if (given.aborted) return;
-      this.fail(unrecoverable(error, loss));
+      this.fail(unrecoverable(error, loss), this.isOutgoing);
       if (mayReturn) void this.#comeBack(request, deviceBack);
     } catch (missing) {
       if (!given.aborted) this.fail(missing);
@@ -278,7 +289,7 @@ export class SceneController implements ReactiveController {
 
   async #open(request: SceneRequest, signal: AbortSignal, isNew: boolean, onProgress: ProgressListener): Promise<void> {
     const { services, memoryBudget, wantsPreviews } = this.#of;
-    const onPreview = isNew && wantsPreviews ? (preview: DrawnScene) => this.#showPreview(preview) : undefined;
+    const onPreview = isNew && wantsPreviews ? (preview: LoadedGaussians) => this.#showPreview(preview) : undefined;
     const beforeUpload = (byteLength: number): void => {
       if (signal.aborted) return;
       const isSmall = this.isPreview && byteLength >= MIN_GROWTH * (this.#scene?.gaussians.byteLength ?? 0);
@@ -287,6 +298,7 @@ export class SceneController implements ReactiveController {
     };
     this.#spare(true);
     const scene = await openScene(request, {
+      open: this.#of.open,
       device: services.sharedDevice,
       loader: services.sceneLoader,
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
@@ -310,7 +322,7 @@ export class SceneController implements ReactiveController {
     });
   }
 
-  #showPreview(preview: DrawnScene): void {
+  #showPreview(preview: LoadedGaussians): void {
     const entrance = this.#isPreview ? 'whole' : 'new';
     this.#replace(preview, true);
     void this.#of.show(preview, entrance).then(
@@ -322,7 +334,7 @@ export class SceneController implements ReactiveController {
   }
 
   /** Another scene in place of the one on show, whose picture stays until the first of the new one. */
-  #replace(scene: DrawnScene, isPreview: boolean): void {
+  #replace(scene: LoadedGaussians, isPreview: boolean): void {
     this.#drop(false);
     this.#scene = scene;
     this.#shownRequest = this.#request;

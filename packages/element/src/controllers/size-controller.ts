@@ -94,8 +94,12 @@ export class SizeController implements ReactiveController {
 
   #update(entry: ResizeObserverEntry): void {
     const exact = entry.devicePixelContentBoxSize?.[0];
-    if (exact) this.#set({ width: exact.inlineSize, height: exact.blockSize });
-    else this.#setFromCss(entry.contentRect.width, entry.contentRect.height);
+    const { width, height } = entry.contentRect;
+    // Under an emulated pixel ratio (DevTools, Playwright) Chromium counts CSS pixels as device pixels.
+    const isEmulated =
+      this.#pixelRatio !== 1 && exact?.inlineSize === Math.round(width) && exact.blockSize === Math.round(height);
+    if (exact && !isEmulated) return this.#set({ width: exact.inlineSize, height: exact.blockSize });
+    this.#setFromCss(width, height);
   }
 
   #setFromCss(width: number, height: number): void {

@@ -3,8 +3,7 @@ import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
-import type { CanvasFrame, Surface } from '../gpu/gpu-scene.js';
-import type { DrawnScene } from '../gpu/open-scene.js';
+import type { CanvasFrame, Contents, Painter, Place, Surface } from '../gpu/painter.js';
 import { why } from '../gpu/request-device.js';
 import { LADDER } from '../pace/ladder.js';
 import type { CameraController } from './camera-controller.js';
@@ -12,8 +11,8 @@ import { PaceController } from './pace-controller.js';
 import type { PixelSize, SizeController } from './size-controller.js';
 
 /** What the view needs to know of its element. */
-export interface ViewHost {
-  readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'maxPixelRatio' | 'frameBudget'>;
+export interface ViewHost extends Contents {
+  readonly attributes: Pick<Attributes, 'quality' | 'maxShDegree' | 'filter' | 'maxPixelRatio' | 'frameBudget'>;
   readonly camera: CameraController;
   readonly size: SizeController;
   readonly scheduler: FrameScheduler;
@@ -25,7 +24,7 @@ export interface ViewHost {
   /** Called once a frame before the camera steps: what moves it by itself does so now. */
   beforeFrame(now: number): void;
   /** Called once a frame, before it is drawn, with the camera that it is drawn from: a scene that moves goes on. */
-  advanceScene(scene: DrawnScene, camera: Camera, now: number): void;
+  advanceScene(camera: Camera, now: number): void;
   /** Called once a frame, after it was submitted, with the camera that it is drawn from. */
   afterFrame(camera: Camera): void;
   cameraChanged(source: CameraChangeSource): void;
@@ -51,13 +50,13 @@ export class ViewController implements FrameClient {
   /** What frames in motion are drawn with. */
   readonly pace: PaceController;
   readonly #host: ViewHost;
-  #scene: DrawnScene | null = null;
-  /** What is drawn into, and the scene that it was set up for. */
+  #painter: Painter | null = null;
+  /** What is drawn into, and the device that it was set up for. */
   #surface: Surface | null = null;
-  #surfaceOf: DrawnScene | null = null;
+  #surfaceOf: GPUDevice | null = null;
   /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
   #first: Settle | undefined;
-  #drawnVersion = 0;
+  #drawnContent = '';
   #preparing: ReturnType<typeof setTimeout> | undefined;
 
   constructor(host: ViewHost) {
@@ -76,14 +75,24 @@ export class ViewController implements FrameClient {
     if (this.#isDrawable) this.#host.scheduler.request(this);
   }
 
+  /** What frames are drawn with; null while nothing is. */
+  get painter(): Painter | null {
+    return this.#painter;
+  }
+
   /**
-   * Takes a scene over. Fulfils once its first frame is drawn, or at once where there is no pixel to draw; rejects with
-   * GaussianSplatError `out-of-memory/*`.
+   * Draws what is to be shown from now on, or what has been added to it. Fulfils once the first frame of it is drawn, or at once where there is no pixel to draw;
+   * rejects with GaussianSplatError `out-of-memory/*`.
    */
-  show(scene: DrawnScene): Promise<void> {
-    this.#scene = scene;
-    scene.onIncomplete = () => this.requestFrame();
-    scene.onError = (error) => this.#scene === scene && this.#host.drawingFailed(error);
+  show(place: Place): Promise<void> {
+    if (place.device !== this.#painter?.device) {
+      this.#painter?.destroy();
+      const painter = place.openPainter(this.#host, {
+        onIncomplete: () => this.requestFrame(),
+        onError: (error) => this.#painter === painter && this.#host.drawingFailed(error),
+      });
+      this.#painter = painter;
+    }
     this.pace.reset();
     return new Promise((resolve, reject) => {
       this.#first = { resolve, reject };
@@ -93,7 +102,10 @@ export class ViewController implements FrameClient {
 
   /** Stops drawing. The last picture stays, so that the next scene can replace it without a gap. */
   pause(): void {
-    this.#scene = null;
+    this.#painter?.destroy();
+    this.#painter = null;
+    // Nobody need wait for it.
+    this.#first?.resolve();
     this.#first = undefined;
     this.pace.stop();
     this.#host.scheduler.cancel(this);
@@ -116,21 +128,21 @@ export class ViewController implements FrameClient {
   }
 
   drawFrame(now: number): void {
-    const scene = this.#scene;
+    const painter = this.#painter;
     // It may have left the viewport since it asked.
-    if (scene === null || !this.#isDrawable) return;
+    if (painter === null || !this.#isDrawable) return;
     const { camera } = this.#host;
-    const pixels = this.#pixelsOf(scene);
+    const pixels = this.#pixelsOf(painter);
     // Without a size nothing is drawn; the observer of the size asks again when there is one.
     if (pixels === null) return this.#finishUnseen();
     this.#host.beforeFrame(now);
     const source = camera.step(now, this.#host.decayMs);
     try {
-      const request = this.#frameRequest(scene, pixels);
+      const request = this.#frameRequest(painter, pixels);
       if (request === null)
         return void why(({ noContext }) => noContext()).then((error) => this.#host.drawingFailed(error));
-      this.#host.advanceScene(scene, request.camera, now);
-      this.#render(scene, request, now, source !== null);
+      this.#host.advanceScene(request.camera, now);
+      this.#render(painter, request, now, source !== null);
       this.#host.afterFrame(request.camera);
     } catch (error) {
       return this.#host.drawingFailed(error);
@@ -141,40 +153,42 @@ export class ViewController implements FrameClient {
 
   /**
    * Draws a frame within the running task, for those who read the canvas before it ends: afterwards a WebGPU canvas is blank to readers.
+   * @param size of the picture; default that of the element
+   * @param background premultiplied, behind the splats
    * @returns the canvas, or null where there is nothing to draw.
    */
-  drawNow(): HTMLCanvasElement | null {
-    const scene = this.#scene;
+  drawNow(size?: PixelSize, background?: CanvasFrame['background']): HTMLCanvasElement | null {
+    const painter = this.#painter;
     const canvas = this.#host.canvas;
-    if (scene === null || scene.isLost || this.#first !== undefined || canvas === null) return null;
-    const pixels = this.#pixelsOf(scene);
-    if (pixels === null) return null;
-    this.#applyRendering(scene);
-    const request = this.#frameRequest(scene, pixels);
+    if (painter === null || painter.isLost || this.#first !== undefined || canvas === null) return null;
+    const own = this.#pixelsOf(painter);
+    if (own === null) return null;
+    this.#applyRendering(painter);
+    const request = this.#frameRequest(painter, size ?? own);
     if (request === null) return null;
-    scene.render({ ...request, isRead: true });
+    painter.render({ ...request, background, isRead: true }, this.#host.prepareFrame());
     return request.surface.canvas as HTMLCanvasElement;
   }
 
   /** There is a scene, and somebody sees it or waits for its first frame. A document without a window, as of a frame that was taken away, shows none. */
   get #isDrawable(): boolean {
     const { canvas, isVisible } = this.#host;
-    if (this.#scene?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
+    if (this.#painter?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
     return this.#first !== undefined || isVisible;
   }
 
   /** null where there is no size. */
-  #pixelsOf({ device }: DrawnScene): PixelSize | null {
+  #pixelsOf({ device }: Painter): PixelSize | null {
     return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, device.limits.maxTextureDimension2D);
   }
 
-  #render(scene: DrawnScene, request: CanvasFrame, now: number, cameraMoved: boolean): void {
+  #render(painter: Painter, request: CanvasFrame, now: number, cameraMoved: boolean): void {
     const first = this.#first;
     this.#first = undefined;
-    this.#applyRendering(scene);
-    const { version } = scene.gaussians;
-    const hasChanged = first === undefined && (cameraMoved || version !== this.#drawnVersion);
-    this.#drawnVersion = version;
+    this.#applyRendering(painter);
+    const content = this.#host.prepareFrame();
+    const hasChanged = first === undefined && (cameraMoved || content !== this.#drawnContent);
+    this.#drawnContent = content;
     const pixels = request.camera.width * request.camera.height;
     const goesOn = this.#host.camera.isMoving;
     const plan = this.pace.plan({ now, pixels, hasChanged, goesOn });
@@ -183,30 +197,31 @@ export class ViewController implements FrameClient {
     const onTime =
       this.#host.attributes.quality === 'auto' ? (time: WorkTime) => this.pace.sample(plan, time) : undefined;
     if (first !== undefined) {
-      scene.renderFirst(request).then(() => this.#afterFirst(scene, first), first.reject);
+      painter.renderFirst(request, content).then(() => this.#afterFirst(painter, first), first.reject);
       return;
     }
-    scene.render({ ...request, levers }, onTime);
-    this.#prepareSoon(scene);
+    painter.render({ ...request, levers }, content, onTime);
+    this.#prepareSoon(painter);
   }
 
-  #afterFirst(scene: DrawnScene, { resolve }: Settle): void {
+  #afterFirst(painter: Painter, { resolve }: Settle): void {
     resolve();
-    this.#prepareSoon(scene);
+    this.#prepareSoon(painter);
   }
 
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
-  #prepareSoon(scene: DrawnScene): void {
-    if (scene.isPrepared || this.#host.attributes.quality !== 'auto') return;
+  #prepareSoon(painter: Painter): void {
+    if (painter.isPrepared || this.#host.attributes.quality !== 'auto') return;
     this.#preparing ??= setTimeout(() => {
       this.#preparing = undefined;
-      if (this.#scene === scene) scene.prepare(MOVING_LEVERS);
+      if (this.#painter === painter) painter.prepare(MOVING_LEVERS);
     }, PREPARE_AFTER_MS);
   }
 
-  #applyRendering(scene: DrawnScene): void {
-    const { quality, maxShDegree: shDegree } = this.#host.attributes;
-    scene.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree });
+  #applyRendering(painter: Painter): void {
+    const { quality, maxShDegree: shDegree, filter } = this.#host.attributes;
+    const trained = filter === 'auto' ? undefined : filter;
+    painter.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, filter: trained });
   }
 
   #finishUnseen(): void {
@@ -215,8 +230,8 @@ export class ViewController implements FrameClient {
     this.#first = undefined;
   }
 
-  #frameRequest(scene: DrawnScene, { width, height }: PixelSize): CanvasFrame | null {
-    const surface = this.#surfaceFor(scene);
+  #frameRequest(painter: Painter, { width, height }: PixelSize): CanvasFrame | null {
+    const surface = this.#surfaceFor(painter);
     if (surface === null) return null;
     const { canvas } = surface;
     // Setting a canvas's size clears it, even to the same size; here a frame follows at once.
@@ -226,14 +241,14 @@ export class ViewController implements FrameClient {
   }
 
   /** null where the browser shows nothing of the kind on a canvas. */
-  #surfaceFor(scene: DrawnScene): Surface | null {
-    const take = (): Surface | null => (this.#surface = scene.surfaceOn(this.#host.canvas!));
-    if (this.#surfaceOf !== scene && take() === null) {
+  #surfaceFor(painter: Painter): Surface | null {
+    const take = (): Surface | null => (this.#surface = painter.surfaceOn(this.#host.canvas!));
+    if (this.#surfaceOf !== painter.device && take() === null) {
       // What has drawn on this canvas keeps it.
       this.renewCanvas();
       take();
     }
-    this.#surfaceOf = scene;
+    this.#surfaceOf = painter.device;
     return this.#surface;
   }
 }

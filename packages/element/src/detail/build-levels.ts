@@ -1,6 +1,6 @@
 /** Loaded only where levels of detail are asked for, or the GPU is too slow without. */
 import { DetailedGaussians, readPacked, type PackedLevels } from '@gaussian-splat/renderer';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import { buffersOf } from '../loading/buffers-of.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 
@@ -11,7 +11,7 @@ import type { SceneLoader } from '../loading/scene-loader.js';
  * @throws GaussianSplatError `out-of-memory/*`, or the signal's reason
  */
 export async function buildLevels(
-  scene: GpuScene,
+  scene: LoadedGaussians,
   loader: SceneLoader,
   memoryBudget: number | undefined,
   signal: AbortSignal,

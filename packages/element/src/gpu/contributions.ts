@@ -1,5 +1,8 @@
 /** Loaded only when a page asks what its splats contribute. */
-import { Renderer, type FrameRequest, type GaussianScene, type RendererOptions } from '@gaussian-splat/renderer';
+import type { Camera } from '@gaussian-splat/core';
+import { Viewpoint } from '@gaussian-splat/renderer';
+import type { ReadCounts } from '../stats.js';
+import type { Viewport } from './viewport.js';
 
 /** Weight, alpha times transmittance, from which on a splat can be told on a display of 8 bits: half a step. */
 const LEAST_WEIGHT = 0.5 / 255;
@@ -8,37 +11,41 @@ const CHUNK = 256;
 /** Frames until buffers have room for all. */
 const MOST_TRIES = 4;
 
-/** A picture at rest. */
-export interface View
-  extends Pick<FrameRequest, 'camera' | 'detail' | 'splatBudget'>, Pick<RendererOptions, 'quality'> {
-  readonly gaussians: GaussianScene;
+/** Counts of the last frame of a viewport, and of a view. Reads back from the GPU: for panels, not for frames. */
+export async function readCounts(viewport: Viewport, camera: Camera): Promise<ReadCounts> {
+  const { visible, overflow } = await viewport.viewpoint.statistics();
+  if (viewport.isDestroyed) throw new Error('the picture is gone');
+  return { drawn: visible, left: overflow, contributed: await countContributing(viewport, camera) };
 }
 
 /**
  * Counts the splats that some pixel of a view shows. Draws the view with the compute rasterizer, whatever the page uses, and reads all weights back: for
  * panels, not for frames.
  */
-export async function countContributing(device: GPUDevice, { quality, ...view }: View): Promise<number> {
+async function countContributing({ device, view }: Viewport, camera: Camera): Promise<number> {
+  const { world, settings, filter } = view;
   const { STORAGE, COPY_SRC, COPY_DST, MAP_READ } = GPUBufferUsage;
   const size =
     4 *
     CHUNK *
     Math.max(
       1,
-      view.gaussians.pages.reduce((sum, { count }) => sum + Math.ceil(count / CHUNK), 0),
+      world.placements
+        .flatMap(({ scene, visible }) => (visible ? scene.pages : []))
+        .reduce((sum, { count }) => sum + Math.ceil(count / CHUNK), 0),
     );
-  const renderer = new Renderer(device, { quality, rasterizer: 'tiles' });
+  const viewpoint = new Viewpoint(device, world, { settings: { ...settings, rasterizer: 'tiles' } });
   const contributions = device.createBuffer({ label: 'gs.contributions', size, usage: STORAGE | COPY_SRC });
   const staging = device.createBuffer({ label: 'gs.contributions.read', size, usage: MAP_READ | COPY_DST });
   const target = device.createTexture({
-    size: [view.camera.width, view.camera.height],
+    size: [camera.width, camera.height],
     format: 'rgba16float',
     usage: GPUTextureUsage.RENDER_ATTACHMENT,
   });
   try {
     for (let tries = 0; tries < MOST_TRIES; tries++) {
-      renderer.render({ ...view, target, notes: { contributions } });
-      if (await renderer.isComplete()) break;
+      viewpoint.draw(camera, { target, filter, notes: { contributions } });
+      if (await viewpoint.isComplete()) break;
     }
     const encoder = device.createCommandEncoder({ label: 'gs.contributions' });
     encoder.copyBufferToBuffer(contributions, 0, staging, 0, size);
@@ -49,7 +56,7 @@ export async function countContributing(device: GPUDevice, { quality, ...view }:
       0,
     );
   } finally {
-    renderer.destroy();
+    viewpoint.destroy();
     for (const resource of [contributions, staging, target]) resource.destroy();
   }
 }

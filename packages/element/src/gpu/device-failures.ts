@@ -1,6 +1,6 @@
 /** What a scene's life knows of devices that are lost. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { DrawnScene } from './open-scene.js';
+import type { Painter } from './painter.js';
 
 /** The device went away before the scene was seen. */
 export class DeviceLostError extends Error {
@@ -24,10 +24,18 @@ export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
 /** How long it takes at most until a lost device says so, ms: its buffers fail before. */
 const LOSS_MS = 200;
 
-/** Whether what failed did so because its scene was given up, or lost its device. */
-export async function isGone(scene: DrawnScene): Promise<boolean> {
-  if (!scene.isDestroyed) await Promise.race([scene.lost, delay(LOSS_MS)]);
-  return scene.isDestroyed || scene.isLost;
+/** Whether what failed did so because frames are no longer drawn, or the device was lost. */
+export async function isGone(painter: Pick<Painter, 'isDestroyed' | 'isLost'>): Promise<boolean> {
+  if (!painter.isDestroyed && !painter.isLost) await delay(LOSS_MS);
+  return painter.isDestroyed || painter.isLost;
+}
+
+/** Whether the device was lost before all that was submitted was done. */
+export async function wasLost(painter: Pick<Painter, 'device' | 'isLost'>): Promise<boolean> {
+  await painter.device.queue.onSubmittedWorkDone().catch(() => undefined);
+  // The loss is told a little later.
+  await new Promise((resolve) => setTimeout(resolve));
+  return painter.isLost;
 }
 
 export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));

@@ -53,22 +53,20 @@ export const noDevice = (cause: unknown): GaussianSplatError =>
     cause,
   });
 
-/** Of a frame for which memory was lacking. */
-export function noMemory(where: string, cause: GPUError): GaussianSplatError {
-  return new GaussianSplatError('out-of-memory/allocation', {
+/** @param where what could not be drawn */
+export const outOfMemory = (where: string, cause: GPUError): GaussianSplatError =>
+  new GaussianSplatError('out-of-memory/allocation', {
     where,
     expected: 'enough free GPU memory',
     found: cause.message || 'an allocation that failed',
     remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
     cause,
   });
-}
 
-export function sequenceWithin(url: string): GaussianSplatError {
-  return new GaussianSplatError('decode/unsupported', {
+export const sequenceWithin = (url: string): GaussianSplatError =>
+  new GaussianSplatError('decode/unsupported', {
     where: url,
     expected: 'a scene file',
     found: 'the manifest of a sequence',
     remedy: 'name scene files as frames of a sequence, not other sequences',
   });
-}

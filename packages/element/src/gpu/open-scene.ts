@@ -3,14 +3,14 @@ import { startVariants } from '@gaussian-splat/renderer';
 import type { LiveModel, LiveRequest } from '../live/live-model.js';
 import type { LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
-import type { GlScene } from '../webgl/gl-scene.js';
 import { chooseAtRest } from './choose-at-rest.js';
-import { canvasFormat, GpuScene } from './gpu-scene.js';
+import { LoadedGaussians } from './loaded-gaussians.js';
 import { limitScenes, loadBytes } from './memory-budget.js';
 import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 import { byteLengthOf, upload } from './upload.js';
+import { canvasFormat } from './viewport.js';
 
 export interface OpenOptions {
   readonly device: SharedDevice;
@@ -22,26 +22,26 @@ export interface OpenOptions {
   readonly loops: () => boolean;
   readonly onProgress: ProgressListener;
   /** Called with what can be shown of a scene that is still loading; the scene is the callee's. Absent: previews are not wanted. */
-  readonly onPreview?: (preview: DrawnScene) => void;
+  readonly onPreview?: (preview: LoadedGaussians) => void;
   /** Called when the new scene is about to be uploaded: the moment to free an old one, so that both never coexist. Gets its bytes. */
   readonly beforeUpload: (byteLength: number) => void;
   /** Bytes of GPU memory that the scene may take; undefined for no limit but the device's. */
   readonly memoryBudget: number | undefined;
   /** Submissions that the painting of a frame is divided into. */
   readonly submissions: number;
+  /** Opens what is no scene of splats. */
+  readonly open: typeof openGaussians | undefined;
   /** What a generator needs to know beyond the request. */
   readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }
 
-/** A scene, by what draws it. */
-export type DrawnScene = GpuScene | GlScene;
-
 /** Opens what is asked for, with WebGL where there is no WebGPU and the request lets it. Rejects with GaussianSplatError or the signal's reason. */
-export async function openScene(request: SceneRequest, options: OpenOptions): Promise<DrawnScene> {
+export async function openScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
+  const { open = openGaussians } = options;
   let reason: unknown;
   if (request.renderer !== 'webgl')
     try {
-      return await openGpuScene(request, options);
+      return await open(request, options);
     } catch (error) {
       reason = error;
       if (request.renderer !== 'auto' || (error as Partial<GaussianSplatError>).family !== 'unsupported') throw error;
@@ -55,8 +55,8 @@ const limited = (request: SceneRequest, { memoryBudget }: OpenOptions): SceneReq
   limits: { maxBytes: loadBytes(memoryBudget), ...request.limits },
 });
 
-/** What its device is served best with is looked for later. */
-async function openGpuScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+/** Opens what is asked for with WebGPU; what its device is served best with is looked for later. Rejects with GaussianSplatError or the signal's reason. */
+export async function openGaussians(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   // Known at once, and then not a byte is fetched.
   await assertWebGpu();
   const open = isGenerator(request) ? openLiveScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
@@ -66,7 +66,7 @@ async function openGpuScene(request: SceneRequest, options: OpenOptions): Promis
 }
 
 /** Device and file at the same time, then the upload. */
-async function openLoadedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+async function openLoadedScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   // Whichever of the two fails ends the other: without a GPU the bytes are of no use.
   const abort = new AbortController();
   const giveUp = (): void => abort.abort(options.signal.reason);
@@ -108,7 +108,7 @@ async function openSequence(
   lease: DeviceLease,
   sequence: LoadedSequence,
   options: OpenOptions,
-): Promise<GpuScene> {
+): Promise<LoadedGaussians> {
   const { SequencePlayer } = await loadModule(
     'the code that plays sequences',
     () => import('../live/sequence-player.js'),
@@ -116,7 +116,7 @@ async function openSequence(
   const { listeners } = options.live();
   const player = await SequencePlayer.open(sequence, { ...options, request, device: lease.device, listeners });
   const { gaussians, bounds } = player;
-  const scene = new GpuScene(lease, gaussians, bounds, options.submissions, { live: player });
+  const scene = new LoadedGaussians(lease, gaussians, bounds, options.submissions, { live: player });
   player.scene = scene;
   return scene;
 }
@@ -127,7 +127,7 @@ async function openSequence(
  */
 const WARM_UP = 0.25;
 
-async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+async function openLiveScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   const { signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
   const opening = loadModule('the code that runs generators', () => import('../live/open-live-model.js'));
   const acquiring = options.device.acquire();
@@ -145,7 +145,7 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
     );
     await starting;
     beforeUpload(live.gaussians.byteLength);
-    return new GpuScene(lease, live.gaussians, live.bounds, submissions, { live });
+    return new LoadedGaussians(lease, live.gaussians, live.bounds, submissions, { live });
   } catch (error) {
     live?.close();
     live?.gaussians.destroy();
@@ -155,33 +155,32 @@ async function openLiveScene(request: SceneRequest, options: OpenOptions): Promi
 }
 
 /**
- * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, of which levels may be wanted or not.
+ * A folder that `gaussian-splat detail` wrote is known by the name of its manifest, and so is streamed SOG, which may be wanted whole.
  */
-export function isStreamed({ url, levels }: SceneRequest): boolean {
-  return (
-    URL.canParse(url) && (levels ? /(^|\/)(detail|lod-meta)\.json$/ : /(^|\/)detail\.json$/).test(new URL(url).pathname)
-  );
+export function isStreamed({ url, isWhole }: SceneRequest): boolean {
+  const name = URL.canParse(url) && /(^|\/)(detail|lod-meta)\.json$/.exec(new URL(url).pathname)?.[2];
+  return name === 'detail' || (!!name && !isWhole);
 }
 
-async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<GpuScene> {
+async function openStreamedScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   const { loader, signal, onProgress, beforeUpload, memoryBudget, submissions } = options;
   const opening = loadModule('the code that streams scenes', () => import('./open-streamed.js'));
   const acquiring = options.device.acquire();
   opening.catch(ignore);
   const lease = await acquiring;
-  let scene: GpuScene | undefined;
+  let scene: LoadedGaussians | undefined;
   try {
     await startVariants(lease.device, pictures()).catch(unlessWrong);
     limitScenes(lease.device, memoryBudget);
     const { openStreamed } = await opening;
     signal.throwIfAborted();
-    const onChange = (): void => scene?.onIncomplete();
+    const onChange = (): void => scene?.onChange();
     // How much of it fits is decided when its manifest is there.
     beforeUpload(memoryBudget ?? 0);
     const { gaussians, detail } = await openStreamed(request, lease.device, {
       ...{ loader, signal, onProgress, memoryBudget, onChange },
     });
-    scene = new GpuScene(lease, gaussians, gaussians.bounds, submissions, { detail });
+    scene = new LoadedGaussians(lease, gaussians, gaussians.bounds, submissions, { detail });
     return scene;
   } catch (error) {
     lease.release();
@@ -189,6 +188,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
   }
 }
 
+/** What the canvas is made of. */
 const pictures = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
 
 /** That no variant draws the right image ends the loading; that none could be timed does not. */

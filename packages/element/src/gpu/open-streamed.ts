@@ -1,9 +1,9 @@
 /** Scenes that are streamed: page by page (docs/detail-pages.md), or streamed SOG box by box. */
 import { partRequest } from '@gaussian-splat/core';
 import { levelSource, MemoryLedger, StreamedGaussians, type PoolOptions } from '@gaussian-splat/renderer';
-import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
+import type { ProgressListener, SceneLimits, SceneRequest } from '../loading/protocol.js';
 import type { Here, SceneLoader } from '../loading/scene-loader.js';
-import type { DetailLevers } from './gpu-scene.js';
+import type { DetailLevers } from './loaded-gaussians.js';
 import { isHandheld } from './memory-budget.js';
 
 export interface StreamedOptions {
@@ -58,6 +58,31 @@ export async function openStreamed(
   throw signal.reason;
 }
 
+/** What one scene may fetch: the limits count for all of its parts together, each once however often it comes and goes. */
+class Allowance {
+  readonly #limits: SceneLimits;
+  readonly #bytes = new Map<string, number>();
+  #sum = 0;
+
+  constructor(limits: SceneLimits = {}) {
+    this.#limits = limits;
+  }
+
+  /** The limits that are left for a part. */
+  of(part: string): SceneLimits {
+    const { maxBytes = Infinity } = this.#limits;
+    const others = this.#sum - (this.#bytes.get(part) ?? 0);
+    return { ...this.#limits, maxBytes: Math.max(0, maxBytes - others) };
+  }
+
+  async note(part: string, coming: Promise<ArrayBuffer>): Promise<ArrayBuffer> {
+    const bytes = await coming;
+    this.#sum += bytes.byteLength - (this.#bytes.get(part) ?? 0);
+    this.#bytes.set(part, bytes.byteLength);
+    return bytes;
+  }
+}
+
 type Open = (
   request: SceneRequest,
   device: GPUDevice,
@@ -67,6 +92,7 @@ type Open = (
 
 const openPages: Open = async (request, device, { loader, signal, onProgress }, pool) => {
   const { limits = {} } = request;
+  const allowance = new Allowance(limits);
   const manifest = await loader.ask(
     { type: 'manifest', request },
     signal,
@@ -75,8 +101,11 @@ const openPages: Open = async (request, device, { loader, signal, onProgress }, 
   );
   return StreamedGaussians.open(device, manifest, {
     ...pool,
-    fetchPage: async (page, aborted) =>
-      loader.fetchFile({ ...partRequest(page, request, limits.origins), limits }, aborted),
+    isDecoded: true,
+    fetchPage: async (page, aborted, coded) => {
+      const part = partRequest(page, request, limits.origins);
+      return allowance.note(part.url, loader.fetchFile({ ...part, limits: allowance.of(part.url), coded }, aborted));
+    },
   });
 };
 
@@ -87,12 +116,14 @@ const openBoxes: Open = async (request, device, { loader, signal, onProgress }, 
     ({ openBoxes }) => openBoxes(request, signal, onProgress),
     { onProgress },
   );
-  const { credentials, limits } = request;
+  const { credentials } = request;
+  const allowance = new Allowance(request.limits);
   const source = levelSource(levels, async (page, aborted) => {
     const run = runs[page.box][page.level];
-    const box = { run, page, scene: levels.scene, credentials, limits };
+    const part = `${page.box} ${page.level}`;
+    const box = { run, page, scene: levels.scene, credentials, limits: allowance.of(part) };
     const here = ({ readBox }: Here): Promise<ArrayBuffer> => readBox(box, aborted);
-    return new Uint32Array(await loader.ask({ type: 'box', request: box }, aborted, here));
+    return new Uint32Array(await allowance.note(part, loader.ask({ type: 'box', request: box }, aborted, here)));
   });
   return StreamedGaussians.openSource(device, source, pool);
 };

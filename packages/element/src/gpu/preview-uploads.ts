@@ -1,5 +1,5 @@
 import type { LoadedScene } from '../loading/protocol.js';
-import type { GpuScene } from './gpu-scene.js';
+import type { LoadedGaussians } from './loaded-gaussians.js';
 import type { SharedDevice } from './shared-device.js';
 import { upload, type SceneUploadOptions } from './upload.js';
 
@@ -7,7 +7,7 @@ export interface PreviewUploadOptions extends SceneUploadOptions {
   readonly device: SharedDevice;
   /** Fulfils when the device is ready to draw. */
   readonly ready: Promise<unknown>;
-  readonly onPreview: (preview: GpuScene) => void;
+  readonly onPreview: (preview: LoadedGaussians) => void;
 }
 
 /** Puts the previews of one load on the GPU, one at a time; of those that come meanwhile the latest is next. */

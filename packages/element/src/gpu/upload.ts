@@ -1,6 +1,6 @@
 import { GaussianBuffers } from '@gaussian-splat/renderer';
 import type { LoadedScene } from '../loading/protocol.js';
-import { GpuScene } from './gpu-scene.js';
+import { LoadedGaussians } from './loaded-gaussians.js';
 import type { DeviceLease } from './shared-device.js';
 
 export interface SceneUploadOptions {
@@ -14,11 +14,11 @@ export interface SceneUploadOptions {
 /** Puts a scene on the GPU, which then owns the lease. Rejects with GaussianSplatError `out-of-memory/*` or the signal's reason. */
 export async function upload(
   lease: DeviceLease,
-  { packed, bounds }: LoadedScene,
+  { packed, bounds, warnings, hasMeshes }: LoadedScene,
   { signal, memoryBudget, submissions }: SceneUploadOptions,
-): Promise<GpuScene> {
+): Promise<LoadedGaussians> {
   const gaussians = await GaussianBuffers.upload(lease.device, packed, { memoryBudget });
-  if (!signal.aborted) return new GpuScene(lease, gaussians, bounds, submissions);
+  if (!signal.aborted) return new LoadedGaussians(lease, gaussians, bounds, submissions, { warnings, hasMeshes });
   gaussians.destroy();
   throw signal.reason;
 }

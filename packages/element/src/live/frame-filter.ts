@@ -1,10 +1,21 @@
-import type { FrameRequest } from '@gaussian-splat/renderer';
+import type { Camera } from '@gaussian-splat/core';
+import type { FrameLevers, Rgba } from '@gaussian-splat/renderer';
+import type { GeneratorInput } from './inputs.js';
 
-/** A frame without the Gaussians. */
-export type Frame = Omit<FrameRequest, 'gaussians'> & { readonly target: GPUTexture };
+/** A frame to draw. */
+export interface Frame {
+  readonly camera: Camera;
+  readonly target: GPUTexture;
+  /** Premultiplied. */
+  readonly background?: Rgba | undefined;
+  /** What is other than at rest. */
+  readonly levers?: Partial<FrameLevers> | undefined;
+}
 
 /** Something between the renderer and the canvas. Knows no runtime: what does is loaded when first needed. */
 export interface FrameFilter {
+  /** What the page may set. */
+  readonly inputs: readonly GeneratorInput[];
   /** Bytes of GPU memory that its own pictures take. */
   readonly byteLength: number;
   /**

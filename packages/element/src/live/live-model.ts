@@ -1,6 +1,9 @@
 import type { Camera } from '@gaussian-splat/core';
 import type { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
+import type { GeneratorInput } from './inputs.js';
+import type { SceneLimits } from '../loading/protocol.js';
+import type { SceneLoader } from '../loading/scene-loader.js';
 import type { ReadControls } from './values.js';
 
 /** What a page says about a model, apart from the camera. Small and capital letters of names are the same. */
@@ -28,8 +31,12 @@ export interface LiveListeners {
 export interface Timeline {
   /** Bounds of the Gaussians as they are now; absent where those of the first frame count. */
   readBounds?(): Promise<SceneBounds>;
+  /** Where the Gaussians are: as the contract declares, or as of the last runs. */
+  readonly bounds?: SceneBounds;
   /** Seconds; Infinity where the contract declares none. */
   readonly duration: number;
+  /** What the page may set; absent where there is nothing. */
+  readonly inputs?: readonly GeneratorInput[];
   /** Inputs that `control-NAME` sets; absent where there are none. */
   readonly settable?: readonly string[];
   /** Asks for the Gaussians of a state; the latest request wins, and an unchanged one costs nothing. */
@@ -57,8 +64,10 @@ export interface LiveRequest {
   readonly element: HTMLElement;
   /** Folder of the runtime's files; null for the one beside the bundle. */
   readonly runtimeLocation: string | null;
-  /** Starts a worker that runs a model on the CPU when asked. */
-  readonly startWorker: () => Worker;
+  /** Has workers: one that reads the header, and one that runs a model on the CPU when asked. */
+  readonly loader: SceneLoader;
+  /** What the model may cost. */
+  readonly limits?: SceneLimits | undefined;
   readonly state: () => LiveState;
   /** False where controls may be another model's, which then reports what neither knows. */
   readonly ownsControls: () => boolean;

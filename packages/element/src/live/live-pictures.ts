@@ -1,8 +1,8 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { GeneratorModel, GpuTensor } from '@gaussian-splat/generator';
+import { pictureShapeOf, type GeneratorModel, type GpuTensor } from '@gaussian-splat/generator';
 import { PictureTensor, type PictureShape } from '@gaussian-splat/renderer';
 import { fetchBeside } from './fetch-beside.js';
-import { valueOf, type Picture } from './values.js';
+import { valueOf, type Picture, type Pictures } from './values.js';
 
 export interface LivePicturesOptions {
   readonly credentials: RequestCredentials;
@@ -15,14 +15,14 @@ export interface LivePicturesOptions {
 }
 
 /** Size of a tensor as far as the model fixes it. */
-type WantedShape = { readonly [Side in 'width' | 'height']: number | undefined } & Pick<PictureShape, 'dtype'>;
+type WantedShape = ReturnType<typeof pictureShapeOf>;
 
 /** The pictures that models take as inputs: fetched, cut to the model's proportions and resampled on the GPU whenever the page names others. */
 export class LivePictures {
   readonly #device: GPUDevice;
   readonly #options: LivePicturesOptions;
   readonly #shapes = new Map<string, WantedShape>();
-  readonly #sources = new Map<string, Picture>();
+  readonly #sources = new Map<string, Pictures>();
   readonly #tensors: Record<string, PictureTensor> = {};
   readonly #loading = new Set<Promise<void>>();
   #isDestroyed = false;
@@ -37,10 +37,9 @@ export class LivePictures {
     this.#device = device;
     this.#options = options;
     for (const { header, contract } of models) {
-      for (const { name, dims, dtype } of header.inputs) {
-        if (contract.inputs[name].role !== 'image' || given.has(name)) continue;
-        const [height, width] = dims!.slice(2).map((size) => (typeof size === 'number' ? size : undefined));
-        this.#shapes.set(name, { width, height, dtype: dtype as PictureShape['dtype'] });
+      for (const input of header.inputs) {
+        if (contract.inputs[input.name].role !== 'image' || given.has(input.name)) continue;
+        this.#shapes.set(input.name, pictureShapeOf(input));
       }
     }
   }
@@ -61,10 +60,10 @@ export class LivePictures {
   }
 
   /** The pictures that the page names now; only new ones are loaded. */
-  update(pictures: Readonly<Record<string, Picture>>): void {
+  update(pictures: Readonly<Record<string, Pictures>>): void {
     for (const name of this.#shapes.keys()) {
       const source = valueOf(pictures, name);
-      if (source === undefined || source === this.#sources.get(name)) continue;
+      if (source === undefined || isSame(source, this.#sources.get(name))) continue;
       this.#sources.set(name, source);
       const loading: Promise<void> = this.#load(name, source).finally(() => {
         this.#loading.delete(loading);
@@ -80,15 +79,24 @@ export class LivePictures {
     void this.#options.whenIdle().then(() => Object.values(this.#tensors).forEach((tensor) => tensor.destroy()));
   }
 
-  async #load(name: string, source: Picture): Promise<void> {
+  async #load(name: string, source: Pictures): Promise<void> {
     try {
-      const pixels = await pixelsOf(name, source, this.#options);
+      const sources = listed(name, source, this.#shapes.get(name)!.views);
+      const made: ImageBitmap[] = [];
       try {
+        const all = await Promise.all(
+          sources.map(async (each) => {
+            const pixels = await pixelsOf(name, each, this.#options);
+            if (pixels !== each && pixels instanceof ImageBitmap) made.push(pixels);
+            return pixels;
+          }),
+        );
         if (this.#isDestroyed || this.#sources.get(name) !== source) return;
-        this.#tensorFor(name, pixels).upload(pixels);
+        const tensor = this.#tensorFor(name, all[0]);
+        all.forEach((pixels, view) => tensor.upload(pixels, 'cover', view));
       } finally {
         // Made here, whether or not another has taken its place.
-        if (pixels !== source && pixels instanceof ImageBitmap) pixels.close();
+        for (const pixels of made) pixels.close();
       }
     } catch (error) {
       if (!this.#isDestroyed && !this.#options.signal.aborted) this.#options.onError(error);
@@ -98,12 +106,31 @@ export class LivePictures {
   #tensorFor(name: string, pixels: GPUCopyExternalImageSource): PictureTensor {
     const wanted = this.#shapes.get(name)!;
     const own = ownSize(pixels);
-    const shape = { width: wanted.width ?? own.width, height: wanted.height ?? own.height, dtype: wanted.dtype };
+    const shape: PictureShape = { ...wanted, width: wanted.width ?? own.width, height: wanted.height ?? own.height };
     const found = this.#tensors[name] as PictureTensor | undefined;
     if (found?.shape.width === shape.width && found.shape.height === shape.height) return found;
     void this.#options.whenIdle().then(() => found?.destroy());
     return (this.#tensors[name] = new PictureTensor(this.#device, shape));
   }
+}
+
+/** As many pictures as the input takes: a list, or addresses with spaces between them. */
+function listed(name: string, source: Pictures, views: number): readonly Picture[] {
+  const text = typeof source === 'string' && views > 1 ? source.trim().split(/\s+/) : source;
+  const list = Array.isArray(text) ? (text as readonly Picture[]) : [text as Picture];
+  if (list.length === views) return list;
+  throw new GaussianSplatError('argument/value', {
+    where: `control ${name}`,
+    expected: `${views} picture${views > 1 ? 's' : ''}`,
+    found: `${list.length}`,
+    remedy: views > 1 ? 'name all of them, with spaces between their addresses, or as a list' : 'name one',
+  });
+}
+
+/** Lists are new objects whenever a page sets its controls. */
+function isSame(a: Pictures, b: Pictures | undefined): boolean {
+  if (!Array.isArray(a) || !Array.isArray(b)) return a === b;
+  return a.length === b.length && a.every((each, i) => each === (b as readonly Picture[])[i]);
 }
 
 async function pixelsOf(

@@ -3,7 +3,7 @@ import { credentialsOf } from '../attributes.js';
 import type { PlaybackController } from '../controllers/playback-controller.js';
 import { toElementError } from '../errors.js';
 import type { GaussianSplatEventMap } from '../events.js';
-import type { DrawnScene } from '../gpu/open-scene.js';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { StageHost } from '../stage-host.js';
 import type { LiveListeners, LiveState } from './live-model.js';
 import { PostController, type PostHost } from './post-controller.js';
@@ -11,7 +11,10 @@ import { PostController, type PostHost } from './post-controller.js';
 /** Whom the models of an element meet. */
 export interface LiveHost extends Pick<StageHost, 'attributes' | 'services' | 'liveValues'> {
   readonly playback: PlaybackController;
+  /** The sources that are drawn. */
+  readonly shown: readonly LoadedGaussians[];
   requestFrame(): void;
+  readonly element: HTMLElement;
   dispatch(event: GaussianSplatEventMap[keyof GaussianSplatEventMap]): void;
 }
 
@@ -20,6 +23,8 @@ export class LiveWiring implements PostHost {
   readonly post: PostController;
   readonly #host: LiveHost;
   #lastFault = '';
+  /** How many inputs there were last. */
+  #inputs = 0;
 
   constructor(host: LiveHost) {
     this.#host = host;
@@ -27,12 +32,15 @@ export class LiveWiring implements PostHost {
   }
 
   get postRequest(): PostHost['postRequest'] {
-    const { attributes, services } = this.#host;
+    const { attributes, services, element } = this.#host;
     return {
+      element,
       credentials: credentialsOf(attributes.crossorigin),
       runtimeLocation: services.runtimeLocation,
-      startWorker: services.sceneLoader.spawn,
+      loader: services.sceneLoader,
+      limits: services.sceneLimits,
       state: () => this.state,
+      others: () => this.#host.shown.flatMap(({ live }) => live?.settable ?? []),
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
     };
@@ -42,20 +50,27 @@ export class LiveWiring implements PostHost {
     this.#host.requestFrame();
   }
 
+  /** What the page may set is another thing than before, once what is told of is on show. */
+  tellInputs(inputs: { readonly length: number } = [0]): void {
+    if (inputs.length + this.#inputs > 0) queueMicrotask(() => this.#host.dispatch(new Event('inputs-change')));
+    this.#inputs = inputs.length;
+  }
+
   /** What the page says about the models at this time. */
   get state(): LiveState {
     return { ...this.#host.liveValues, timeSeconds: this.#host.playback.currentTime };
   }
 
   get listeners(): LiveListeners {
-    const { playback } = this.#host;
+    // Which clock a scene follows may change.
+    const onShown = (timeSeconds: number): void => this.#host.playback.frameShown(timeSeconds);
     return {
       onFrame: (timeSeconds) => {
         this.#lastFault = '';
         this.requestFrame();
-        playback.frameShown(timeSeconds);
+        onShown(timeSeconds);
       },
-      onShown: (timeSeconds) => playback.frameShown(timeSeconds),
+      onShown,
       onError: (error) => this.#fail(error),
       onFallback: (reason) => this.#fallBack(reason),
       onInput: () => this.requestFrame(),
@@ -63,7 +78,7 @@ export class LiveWiring implements PostHost {
   }
 
   /** Before a frame of a scene that moves: its clock goes on, and its generator hears of it. The frame does not wait. */
-  advance({ live }: DrawnScene, camera: Camera, now: number): void {
+  advance({ live }: LoadedGaussians, camera: Camera, now: number): void {
     if (live === undefined) return;
     this.#host.playback.tick(now);
     try {

@@ -1,10 +1,14 @@
 /** Loaded only when a generator is shown: what knows `@gaussian-splat/generator` is behind this module and post-view.ts. */
+import { SPLAT_FILTERS } from '@gaussian-splat/core';
 import { Generator, setRuntimeLocation, type GeneratorModel, type ModelSource } from '@gaussian-splat/generator';
 import { DynamicGaussians } from '@gaussian-splat/renderer';
 import type { ProgressListener } from '../loading/protocol.js';
 import { fetchBeside } from './fetch-beside.js';
+import { inputsOf } from './inputs.js';
 import type { LiveModel, LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
+import { compareOf, offerPanel } from './of-element.js';
+import { readsHeaders } from './read-header.js';
 import { StateReader } from './read-state.js';
 import { RunWatch } from './run-watch.js';
 import type { Contract, Vector3 } from '@gaussian-splat/core';
@@ -46,8 +50,7 @@ export async function openLiveModel(
       watch?.frameMade();
     },
     onError: (error) => (isOpen ? listeners.onError(error) : (firstFailure = error)),
-    // Anything but "off" is what it is without the attribute.
-    compare: request.element.getAttribute('compare')?.trim() === 'off' ? false : request.startWorker,
+    compare: compareOf(request),
     onFallback: (reason) => {
       listeners.onFallback(reason);
       listeners.onInput();
@@ -62,7 +65,7 @@ export async function openLiveModel(
     const { models, model } = generator;
     for (const { notes, url } of models) for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
     gaussians = await DynamicGaussians.create(device, model.layout, {
-      antialiased: model.contract.antialiased,
+      ...(model.contract.filter ? SPLAT_FILTERS[model.contract.filter] : { antialiased: model.contract.antialiased }),
       memoryBudget: request.memoryBudget,
     });
     generator.sink = gaussians;
@@ -79,14 +82,21 @@ export async function openLiveModel(
     await generator.idle;
     signal.throwIfAborted();
     if (firstFailure !== undefined) throw asError(firstFailure);
-    const bounds = declared ?? (await live.readBounds!());
+    let bounds = declared ?? (await live.readBounds!());
     signal.throwIfAborted();
     isOpen = true;
-    watch = new RunWatch(gaussians, model.header.name, onError);
+    offerPanel(request.element);
+    watch = new RunWatch(gaussians, model.header.name, onError, (now, isFirst) => {
+      // The contract speaks of all times.
+      if (declared === undefined || isFirst) bounds = { ...now, up: upOf(model.contract) };
+      if (isFirst) void (request.element as Framed).updateFraming?.();
+    });
     watch.frameMade();
     return {
       ...live,
-      bounds,
+      get bounds() {
+        return bounds;
+      },
       close: () => {
         watch?.close();
         live.close();
@@ -111,6 +121,7 @@ function liveModel(
   const reader = new StateReader(models, listeners.onError);
   return {
     gaussians,
+    inputs: inputsOf(models),
     settable: reader.settable,
     readBounds: async () => ({ ...(await gaussians.readBounds()), up }),
     duration: models.some(takesTime)
@@ -134,7 +145,8 @@ function liveModel(
 async function sourcesOf(request: LiveRequest, signal: AbortSignal): Promise<ModelSource[]> {
   const { url, chain = [], credentials } = request;
   const contract = await contractOf(request, signal);
-  return [{ url, credentials, contract }, ...chain.map((next) => ({ url: next, credentials }))];
+  const openHeader = readsHeaders(request.loader, request.limits);
+  return [{ url, credentials, contract, openHeader }, ...chain.map((next) => ({ url: next, credentials, openHeader }))];
 }
 
 async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<unknown> {
@@ -155,5 +167,10 @@ async function contractOf(request: LiveRequest, signal: AbortSignal): Promise<un
 /** False for what the clock changes nothing of: it has nothing to play. Without `fps` no time tells a frame. */
 const takesTime = ({ contract: { inputs, fps } }: GeneratorModel): boolean =>
   Object.values(inputs).some(({ role }) => role === 'time' || (role === 'frame' && fps !== undefined));
+
+/** The element, as far as it frames its scene: one within another does not. */
+interface Framed extends HTMLElement {
+  updateFraming?(): Promise<void>;
+}
 
 const asError = (error: unknown): Error => (error instanceof Error ? error : new Error(String(error)));

@@ -1,19 +1,21 @@
 import { loadModule } from '@gaussian-splat/core';
-import type { DrawnScene } from '../gpu/open-scene.js';
+import type { Painter } from '../gpu/painter.js';
 import { LatestTask } from '../latest-task.js';
 import type { PostRequest } from './post-view.js';
 
 export interface PostHost {
   /** What a post-processor needs to know beyond its address. */
-  readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange' | 'others'>;
+  readonly postRequest: Omit<PostRequest, 'urls' | 'signal' | 'onChange'>;
   requestFrame(): void;
+  /** There is another filter, or none. */
+  tellInputs(): void;
 }
 
-/** Puts the post-processor of the attribute between the scene on show and the canvas. Until it is there, frames are shown as they are drawn. */
+/** Puts the post-processor of the attribute between the frames and the canvas. Until it is there, frames are shown as they are drawn. */
 export class PostController {
   readonly #host: PostHost;
   #urls: readonly string[] = [];
-  #scene: DrawnScene | null = null;
+  #painter: Painter | null = null;
   readonly #opening = new LatestTask();
 
   constructor(host: PostHost) {
@@ -32,24 +34,27 @@ export class PostController {
     this.#open();
   }
 
-  /** A scene is on show, or none any more. A scene that is destroyed closes its processor itself. */
-  attach(scene: DrawnScene | null): void {
-    this.#scene = scene;
+  /** Frames are drawn, or none any more. A painter that is destroyed closes its processor itself. */
+  attach(painter: Painter | null): void {
+    this.#painter = painter;
     this.#open();
   }
 
   #open(): void {
     this.#opening.renew();
-    const scene = this.#scene;
-    if (scene === null) return;
-    if (scene.filter) this.#host.requestFrame();
-    scene.setFilter(undefined);
+    const painter = this.#painter;
+    if (painter === null) return;
+    if (painter.filter) {
+      this.#host.requestFrame();
+      this.#host.tellInputs();
+    }
+    painter.setFilter(undefined);
     if (this.#urls.length === 0) return;
     const options = this.#host.postRequest;
-    this.#opening.run((signal) => this.#load(scene, options, signal), options.onError);
+    this.#opening.run((signal) => this.#load(painter, options, signal), options.onError);
   }
 
-  async #load(scene: DrawnScene, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
+  async #load(painter: Painter, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
     const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
     if (signal.aborted) return;
     const view = await PostView.open(
@@ -57,14 +62,14 @@ export class PostController {
         ...options,
         urls: this.#urls,
         signal,
-        others: () => scene.live?.settable ?? [],
         onError: (error) => (signal.aborted ? undefined : options.onError(error)),
         onChange: () => this.#host.requestFrame(),
       },
-      scene.device,
+      painter.device,
     );
-    if (signal.aborted || scene.isDestroyed) return view.close();
-    scene.setFilter(view);
+    if (signal.aborted || painter.isDestroyed) return view.close();
+    painter.setFilter(view);
+    this.#host.tellInputs();
     this.#host.requestFrame();
   }
 }

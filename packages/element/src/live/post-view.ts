@@ -2,11 +2,17 @@
 import { PostProcessor, setRuntimeLocation, type GpuTensor } from '@gaussian-splat/generator';
 import { FilteredFrame } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from './frame-filter.js';
+import { inputsOf, type GeneratorInput } from './inputs.js';
 import type { LiveRequest } from './live-model.js';
 import { LivePictures } from './live-pictures.js';
+import { compareOf, offerPanel } from './of-element.js';
+import { readsHeaders } from './read-header.js';
 import { StateReader } from './read-state.js';
 
-export interface PostRequest extends Pick<LiveRequest, 'credentials' | 'runtimeLocation' | 'startWorker' | 'state'> {
+export interface PostRequest extends Pick<
+  LiveRequest,
+  'credentials' | 'element' | 'runtimeLocation' | 'loader' | 'limits' | 'state'
+> {
   /** One post-processor, or several one after the other. */
   readonly urls: readonly string[];
   readonly signal: AbortSignal;
@@ -69,11 +75,11 @@ export class PostView implements FrameFilter {
     if (runtimeLocation !== null) setRuntimeLocation(new URL(runtimeLocation, document.baseURI));
     let view: PostView | undefined;
     const post = await PostProcessor.open(
-      urls.map((url) => ({ url, credentials })),
+      urls.map((url) => ({ url, credentials, openHeader: readsHeaders(request.loader, request.limits) })),
       device,
       {
         signal,
-        compare: request.startWorker,
+        compare: compareOf(request),
         onFallback,
         onPicture: (picture) => {
           if (view) view.#accept(picture);
@@ -87,11 +93,17 @@ export class PostView implements FrameFilter {
     );
     for (const { notes, url } of post.models)
       for (const note of notes) console.warn(`<gaussian-splat>: ${url}: ${note}.`);
+    offerPanel(request.element);
     return (view = new PostView(device, request, post));
   }
 
   get byteLength(): number {
     return this.#surface?.byteLength ?? 0;
+  }
+
+  /** What the page sets, the picture apart. */
+  get inputs(): readonly GeneratorInput[] {
+    return inputsOf(this.#post.models).filter(({ name }) => name !== this.#post.input.name);
   }
 
   render(frame: Frame, content: string, draw: (frame: Frame) => void): void {
@@ -153,8 +165,8 @@ export class PostView implements FrameFilter {
     const state = this.#request.state();
     this.#pictures.update(state.pictures);
     if (this.#tensor === undefined || this.#handed !== this.#drawn) {
-      const { width = surface.width, height = surface.height, dtype } = input;
-      this.#tensor = surface.handOver({ width, height, dtype });
+      const { width = surface.width, height = surface.height, dtype, channels } = input;
+      this.#tensor = surface.handOver({ width, height, dtype, channels });
       this.#handed = this.#drawn;
     }
     this.#pending = surface;

@@ -11,18 +11,29 @@ export interface Watched {
   readBounds(): Promise<Bounds>;
 }
 
-/** Says once that what a generator writes cannot be drawn at all, for then nothing is seen and nothing has failed; and again after it could. */
+/**
+ * Looks at where Gaussians are once runs have come to rest. Says once that what a generator writes cannot be drawn at all, for then nothing is seen and nothing
+ * has failed; and again after it could.
+ */
 export class RunWatch {
   readonly #gaussians: Watched;
   readonly #where: string;
   readonly #onError: (error: unknown) => void;
+  readonly #onBounds: (bounds: Bounds, isFirst: boolean) => void;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #isEmpty = false;
 
-  constructor(gaussians: Watched, where: string, onError: (error: unknown) => void) {
+  /** @param onBounds gets where they are, and whether none could be drawn at the look before */
+  constructor(
+    gaussians: Watched,
+    where: string,
+    onError: (error: unknown) => void,
+    onBounds: (bounds: Bounds, isFirst: boolean) => void,
+  ) {
     this.#gaussians = gaussians;
     this.#where = where;
     this.#onError = onError;
+    this.#onBounds = onBounds;
   }
 
   /** A run is on show. Returns at once. */
@@ -43,6 +54,7 @@ export class RunWatch {
     // Rows that cannot be drawn are at the origin; one Gaussian alone may be there by right.
     const isEmpty = this.#gaussians.count > 1 && [...bounds.min, ...bounds.max].every((side) => side === 0);
     if (isEmpty && !this.#isEmpty) this.#onError(unusable(this.#where));
+    if (!isEmpty) this.#onBounds(bounds, this.#isEmpty);
     this.#isEmpty = isEmpty;
   }
 }

@@ -2,7 +2,7 @@
 import { partRequest, type Bounds } from '@gaussian-splat/core';
 import { frameAt, framePath, type SceneSequence } from '@gaussian-splat/formats';
 import { SequenceGaussians, type PackedGaussians } from '@gaussian-splat/renderer';
-import type { GpuScene } from '../gpu/gpu-scene.js';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
 import type { LoadedScene, LoadedSequence, ProgressListener, SceneRequest } from '../loading/protocol.js';
 import type { SceneLoader } from '../loading/scene-loader.js';
 import { FrameRoom } from './frame-room.js';
@@ -49,7 +49,7 @@ export class SequencePlayer implements Timeline {
   readonly duration: number;
   readonly bounds: Bounds;
   /** Set once, by whoever makes the scene of it. */
-  scene: GpuScene | undefined;
+  scene: LoadedGaussians | undefined;
   readonly #sequence: SceneSequence;
   readonly #options: SequenceOptions;
   readonly #slots = new Map<number, Slot>();

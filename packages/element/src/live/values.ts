@@ -39,13 +39,16 @@ export const CONTROL_PREFIX = 'control-';
 /** A picture for a model: its URL, or what holds its pixels. */
 export type Picture = string | Blob | GPUCopyExternalImageSource;
 
-/** Controls as a page gives them, by the names of the model's inputs: numbers, and pictures for inputs that take one. */
-export type ControlValues = Readonly<Record<string, Numbers | Picture>>;
+/** Of an input that takes several, a list, or addresses with spaces between them. */
+export type Pictures = Picture | readonly Picture[];
+
+/** Controls as a page gives them, by the names of the model's inputs: numbers, and pictures for inputs that take some. */
+export type ControlValues = Readonly<Record<string, Numbers | Pictures>>;
 
 /** Controls, sorted by what they hold. */
 export interface ReadControls {
   readonly controls: Readonly<Record<string, readonly number[]>>;
-  readonly pictures: Readonly<Record<string, Picture>>;
+  readonly pictures: Readonly<Record<string, Pictures>>;
 }
 
 /**
@@ -57,25 +60,27 @@ export function readControls(
   property: ControlValues | null | undefined,
   warn: (sentence: string) => void,
 ): ReadControls {
-  const written: [string, Numbers | Picture][] = [];
+  const written: [string, Numbers | Pictures][] = [];
   for (const { name, value } of attributes) {
     if (name.startsWith(CONTROL_PREFIX)) written.push([name.slice(CONTROL_PREFIX.length), value]);
   }
   const controls: Record<string, number[]> = {};
-  const pictures: Record<string, Picture> = {};
+  const pictures: Record<string, Pictures> = {};
   for (const [name, value] of [...written, ...Object.entries(property ?? {})]) {
     const numbers = isPixels(value) ? undefined : readNumbers(value as Numbers);
     delete controls[name];
     delete pictures[name];
     if (numbers) controls[name] = numbers;
-    else if (isPixels(value) || (typeof value === 'string' && value !== '')) pictures[name] = value as Picture;
+    else if (isPixels(value) || (typeof value === 'string' && value !== '')) pictures[name] = value as Pictures;
     else warn(`<gaussian-splat>: control ${name} expects numbers, found ${JSON.stringify(value)}; its default counts.`);
   }
   return { controls, pictures };
 }
 
 const isPixels = (value: unknown): boolean =>
-  typeof value === 'object' && value !== null && !Array.isArray(value) && !ArrayBuffer.isView(value);
+  Array.isArray(value)
+    ? value.some((each) => typeof each === 'string' || isPixels(each))
+    : typeof value === 'object' && value !== null && !ArrayBuffer.isView(value);
 
 /** The value of a name; attributes have no capital letters. */
 export const valueOf = <T>(values: Readonly<Record<string, T>>, name: string): T | undefined =>

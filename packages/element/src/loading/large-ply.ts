@@ -1,6 +1,6 @@
 /** Loaded by the worker for large PLYs: their rows are packed by several workers while the rest is on its way. */
 import { boundsOf } from '@gaussian-splat/core';
-import { splatRanges, type SplatRanges } from '@gaussian-splat/formats';
+import { MOST_DROPPED, splatRanges, type LoadLimits, type SplatRanges } from '@gaussian-splat/formats';
 import { joinShares, packGaussians, SHARE_SPLATS, type PackedShare, type ShPrecision } from '@gaussian-splat/renderer';
 import type { LoadListeners } from './load-scene.js';
 import { packRows, type ShareAnswer, type ShareRequest } from './pack-shares.js';
@@ -24,9 +24,11 @@ interface Helper {
 
 /** One PLY on its way. */
 export class LargePly {
+  readonly #name: string;
   readonly #rows: Rows;
   readonly #count: number;
   readonly #sh: SceneRequest['sh'];
+  readonly #limits: () => LoadLimits;
   readonly #signal: AbortSignal;
   readonly #listeners: LoadListeners;
   readonly #answers: (ShareAnswer | undefined)[];
@@ -50,27 +52,33 @@ export class LargePly {
     beginning: Uint8Array,
     total: number,
     name: string,
-    { sh, limits: { maxSplats = Infinity } = {} }: SceneRequest,
+    { sh }: SceneRequest,
+    limits: () => LoadLimits,
     signal: AbortSignal,
     listeners: LoadListeners,
   ): Promise<LargePly | undefined> {
+    const { maxSplats = Infinity } = limits();
     // What is wrong with a header, or more than the page allows, those say who read it whole. The download keeps the limit of bytes.
     const { rows, count = 0 } = (await splatRanges(beginning, name).catch(() => undefined)) ?? {};
     const isWhole =
       rows !== undefined && count > 0 && count <= maxSplats && rows.start + count * rows.byteLength <= total;
-    return isWhole ? new LargePly(rows, count, sh, signal, listeners) : undefined;
+    return isWhole ? new LargePly(name, rows, count, sh, limits, signal, listeners) : undefined;
   }
 
   private constructor(
+    name: string,
     rows: Rows,
     count: number,
     sh: SceneRequest['sh'],
+    limits: () => LoadLimits,
     signal: AbortSignal,
     listeners: LoadListeners,
   ) {
+    this.#name = name;
     this.#rows = rows;
     this.#count = count;
     this.#sh = sh;
+    this.#limits = limits;
     this.#signal = signal;
     this.#listeners = listeners;
     this.#precision = sh === 'auto' ? 'int8' : sh;
@@ -101,24 +109,33 @@ export class LargePly {
     if (this.#arrived < this.#answers.length) return undefined;
     for (;;) {
       await this.#packAll();
+      // Who reads it whole says that there is no time left.
+      if (this.#isLate) return undefined;
       const shares = this.#answers.map((answer) => answer?.packed);
       const first = this.#answers.find((answer) => answer?.packed);
       if (!first || shares.includes(undefined)) return undefined;
-      const { shDegree = 0, antialiased = false, filterVariance, origin = [0, 0, 0], up } = first;
+      const { shDegree = 0, antialiased = false, filterVariance, origin = [0, 0, 0], up, warnings } = first;
       const packed = shares as PackedShare[];
       const droppedCount = this.#count - packed.reduce((sum, { count }) => sum + count, 0);
+      // Who reads it whole says why.
+      if (droppedCount > MOST_DROPPED * this.#count) return undefined;
       this.#listeners.onReading?.(true);
       const facts = { shDegree, antialiased, filterVariance, origin, droppedCount };
       const joined = joinShares(packed, { sh: this.#sh }, facts);
       if (typeof joined !== 'string') {
         const { positions, opacities } = joined;
         const bounds = boundsOf({ count: opacities.length, positions, opacities, origin });
-        return { packed: joined.packed, bounds: { ...bounds, up } };
+        return { packed: joined.packed, bounds: { ...bounds, up }, warnings };
       }
       // Its colours need another precision than was taken for granted.
       this.#precision = joined;
       this.#forget();
     }
+  }
+
+  get #isLate(): boolean {
+    const { maxSeconds = Infinity } = this.#limits();
+    return maxSeconds <= 0;
   }
 
   /** Shares of which all bytes are there. */
@@ -189,7 +206,7 @@ export class LargePly {
     const bytes = new Uint8Array(start + rows.length);
     bytes.set(this.#bytes.subarray(0, start));
     bytes.set(rows, start);
-    return { share, bytes, shPrecision: this.#precision };
+    return { share, bytes, shPrecision: this.#precision, name: this.#name };
   }
 
   async #packHere(share: number): Promise<void> {
@@ -201,6 +218,7 @@ export class LargePly {
   async #packAll(): Promise<void> {
     for (;;) {
       this.#signal.throwIfAborted();
+      if (this.#isLate) return;
       this.#feed();
       const share = this.#take();
       if (share !== undefined) {

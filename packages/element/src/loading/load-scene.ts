@@ -60,6 +60,8 @@ export async function loadScene(
     const pack = (cloud: GaussianCloud): LoadedScene => ({
       packed: packGaussians(cloud, { sh: request.sh }),
       bounds: { ...boundsOf(cloud), up: cloud.hints?.up },
+      warnings: cloud.warnings,
+      hasMeshes: cloud.hints?.meshes,
     });
     const start = performance.now();
     let loading: Promise<PreviewSchedule> | undefined;
@@ -67,7 +69,7 @@ export async function loadScene(
       (loading ??= import('./preview-schedule.js').then(
         (code) => new code.PreviewSchedule(name, signal, start, (cloud) => onPreview?.(pack(cloud)), onReading),
       ));
-    const shared = askForHelp && new SharedReading(request, name, signal, listeners);
+    const shared = askForHelp && new SharedReading(request, name, limits, signal, listeners);
     const onArrival = async (bytes: Uint8Array, total: number | undefined): Promise<void> => {
       // Of a PLY that is large there are previews of its own.
       if (shared?.mayBeShared(bytes, total)) await (await shared.plyIn(bytes, total))?.onArrival(bytes);
@@ -123,18 +125,29 @@ const LARGE_BYTES = 1 << 25;
 
 /** Finds out whether a file that is on its way is a PLY whose rows several workers can share. */
 class SharedReading {
-  readonly #of: readonly [name: string, request: SceneRequest, signal: AbortSignal, listeners: LoadListeners];
+  readonly #of: readonly [
+    name: string,
+    request: SceneRequest,
+    limits: () => LoadLimits,
+    signal: AbortSignal,
+    listeners: LoadListeners,
+  ];
   #isRefused = false;
   /** Undefined for any other. */
   ply: Promise<LargePly | undefined> | undefined;
 
-  constructor(request: SceneRequest, name: string, signal: AbortSignal, listeners: LoadListeners) {
-    this.#of = [name, request, signal, listeners];
+  constructor(
+    request: SceneRequest,
+    name: string,
+    limits: () => LoadLimits,
+    signal: AbortSignal,
+    listeners: LoadListeners,
+  ) {
+    this.#of = [name, request, limits, signal, listeners];
   }
 
-  /** True of large PLYs, but for those whose rows must be read in order, and where the page has set a limit of time, which one reader keeps. */
+  /** True of large PLYs, but for those whose rows must be read in order. */
   mayBeShared(bytes: Uint8Array, total = 0): boolean {
-    if (this.#of[1].limits?.maxSeconds !== undefined) return false;
     return total >= LARGE_BYTES && bytes[0] === 0x70 && bytes[1] === 0x6c && bytes[2] === 0x79 && !this.#isRefused;
   }
 

@@ -1,12 +1,16 @@
 /** Loaded by the worker when the first streamed scene is asked for. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import { fetchScene } from '@gaussian-splat/formats';
+import { fetchScene, LoadBudget } from '@gaussian-splat/formats';
 import { checkManifest, type DetailManifest } from '@gaussian-splat/renderer';
 import { fileName, named, throttled } from './load-scene.js';
 import type { FileRequest, ProgressListener } from './protocol.js';
 
-/** As of the index of streamed SOG. A page takes some 50 bytes. */
-const MAX_BYTES = 1 << 26;
+export { decodePage } from '@gaussian-splat/renderer';
+
+/** A file takes some 50 bytes, for 5 pages; and the page's thread gets a copy of what they say. */
+const MAX_BYTES = 1 << 24;
+/** What a page takes of the page's memory before it is there. */
+const PAGE_BYTES = 128;
 
 /**
  * Fetches and checks a `detail.json`. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/allocation`), or the signal's reason once that is aborted.
@@ -17,7 +21,7 @@ export async function openManifest(
   onProgress: ProgressListener,
 ): Promise<DetailManifest> {
   try {
-    const { maxBytes, maxSeconds } = limits;
+    const { maxBytes, maxSeconds, maxSplats = Infinity } = limits;
     const report = throttled(onProgress);
     const bytes = await fetchScene(url, {
       mode: 'cors',
@@ -27,12 +31,23 @@ export async function openManifest(
       maxBytes,
       maxSeconds,
     });
-    return checkManifest(parsed(bytes, url), url);
+    const { allowed } = new LoadBudget(bytes.length, limits);
+    const manifest = checkManifest(parsed(bytes, url), url, Math.floor(allowed / PAGE_BYTES));
+    if (manifest.splats > maxSplats) throw tooMany(url, manifest.splats, maxSplats);
+    return manifest;
   } catch (error) {
     signal.throwIfAborted();
     throw named(error, fileName(url));
   }
 }
+
+const tooMany = (where: string, splats: number, most: number): GaussianSplatError =>
+  new GaussianSplatError('out-of-memory/budget', {
+    where,
+    expected: `at most ${most} splats`,
+    found: String(splats),
+    remedy: 'use a smaller scene, or allow for more',
+  });
 
 function parsed(bytes: Uint8Array, where: string): unknown {
   if (bytes.length > MAX_BYTES) throw wrong(where, `${bytes.length} bytes of it`);

@@ -6,4 +6,5 @@ import type { LoadedScene, SceneRequest } from './protocol.js';
 export const packLevels = (cloud: GaussianCloud, sh: SceneRequest['sh']): LoadedScene => ({
   packed: packLevelRuns(cloud, { sh }),
   bounds: { ...boundsOf(cloud), up: cloud.hints?.up },
+  warnings: cloud.warnings,
 });

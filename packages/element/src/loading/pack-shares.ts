@@ -10,6 +10,8 @@ export interface ShareRequest {
   /** A PLY: the file's header, and these rows alone. */
   readonly bytes: Uint8Array<ArrayBuffer>;
   readonly shPrecision: ShPrecision;
+  /** Of the file. */
+  readonly name: string;
 }
 
 /** What became of them. */
@@ -25,15 +27,17 @@ export interface ShareAnswer {
   /** What the file says points up. */
   readonly up?: Vector3 | undefined;
   readonly origin?: Vector3;
+  /** What of the file is not drawn. */
+  readonly warnings?: readonly string[] | undefined;
 }
 
 /** Reads and packs some rows. Never throws for what is in them. */
-export async function packRows({ share, bytes, shPrecision }: ShareRequest): Promise<ShareAnswer> {
-  const cloud = await readPrefix(bytes, { name: 'share.ply' });
+export async function packRows({ share, bytes, shPrecision, name }: ShareRequest): Promise<ShareAnswer> {
+  const cloud = await readPrefix(bytes, { name });
   if (cloud === undefined) return { share };
-  const { shDegree, antialiased, filterVariance, origin, hints } = cloud;
+  const { shDegree, antialiased, filterVariance, origin, hints, warnings } = cloud;
   return {
-    ...{ share, shDegree, antialiased, filterVariance, origin, up: hints?.up },
+    ...{ share, shDegree, antialiased, filterVariance, origin, up: hints?.up, warnings },
     packed: packShare(cloud, shPrecision),
     preview: samplePreview(cloud),
   };

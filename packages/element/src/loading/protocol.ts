@@ -1,10 +1,17 @@
 /** What the page and the scene worker say to each other. */
-import type { ErrorData } from '@gaussian-splat/core';
+import type { ErrorData, ModelPlace } from '@gaussian-splat/core';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
 import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
-import type { LevelPage, LevelScene, PackedGaussians, ShPrecision, StreamedScene } from '@gaussian-splat/renderer';
+import type {
+  CodedFile,
+  LevelPage,
+  LevelScene,
+  PackedGaussians,
+  ShPrecision,
+  StreamedScene,
+} from '@gaussian-splat/renderer';
 
 /** A file to fetch. */
 export interface FileRequest {
@@ -13,12 +20,20 @@ export interface FileRequest {
   /** Fetch's credentials mode, from the `crossorigin` attribute. */
   readonly credentials: RequestCredentials;
   readonly limits?: SceneLimits | undefined;
+  /** What a file of pages that is coded is decoded by. */
+  readonly coded?: CodedFile | undefined;
 }
 
 /** What loads of a page may cost, and whom they may ask: see `GaussianSplatElement.sceneLimits`. */
 export interface SceneLimits extends LoadLimits {
   /** Origins of other servers that manifests may name files on, such as `https://cdn.example`; they get no cookies. Default: none but the manifest's own. */
   readonly origins?: readonly string[];
+}
+
+/** A model whose header is to be read. */
+export interface ModelRequest {
+  readonly place: ModelPlace;
+  readonly limits?: SceneLimits | undefined;
 }
 
 /** A scene to fetch. */
@@ -29,6 +44,8 @@ export interface SceneRequest extends FileRequest {
   readonly levels?: boolean;
   /** What is to draw it; without it, WebGPU. */
   readonly renderer?: RendererChoice;
+  /** Whether a streamed SOG scene is loaded whole, in its finest level. */
+  readonly isWhole?: boolean;
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
   readonly contract?: unknown;
   /** Absolute URLs of models that each take the Gaussians of the one before, the first those of `url`. */
@@ -39,6 +56,10 @@ export interface SceneRequest extends FileRequest {
 export interface LoadedScene {
   readonly packed: PackedGaussians;
   readonly bounds: SceneBounds;
+  /** What of the file is not drawn: see `GaussianCloud.warnings`. */
+  readonly warnings?: readonly string[] | undefined;
+  /** The file has triangles, too. */
+  readonly hasMeshes?: boolean | undefined;
 }
 
 /** The manifest of scenes that follow one another in time, in place of a scene. Its paths are relative to its own address. */
@@ -79,7 +100,8 @@ export type WorkerRequest =
   | { readonly type: 'file'; readonly request: FileRequest }
   | { readonly type: 'manifest'; readonly request: FileRequest }
   | { readonly type: 'boxes'; readonly request: SceneRequest }
-  | { readonly type: 'box'; readonly request: BoxRequest };
+  | { readonly type: 'box'; readonly request: BoxRequest }
+  | { readonly type: 'model'; readonly request: ModelRequest };
 
 export type PageMessage =
   | (WorkerRequest & { readonly id: number })

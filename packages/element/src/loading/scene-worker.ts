@@ -2,7 +2,7 @@
  * The module worker that loads scenes. Where a page refuses workers it imports this same module and calls
  * {@link loadScene} and the others itself; then nothing here listens.
  */
-import { loadModule } from '@gaussian-splat/core';
+import { loadModule, type OpenedModel } from '@gaussian-splat/core';
 import type { DetailManifest } from '@gaussian-splat/renderer';
 import { buffersOf } from './buffers-of.js';
 import { fetchFile } from './fetch-file.js';
@@ -12,6 +12,7 @@ import type {
   BoxRequest,
   FileRequest,
   LoadedBoxes,
+  ModelRequest,
   PageMessage,
   ProgressListener,
   SceneRequest,
@@ -40,6 +41,11 @@ export const openManifest = async (
 ): Promise<DetailManifest> => {
   const code = await loadModule('the code that streams scenes', () => import('./open-manifest.js'));
   return code.openManifest(request, signal, onProgress);
+};
+
+export const openModel = async (request: ModelRequest, signal: AbortSignal): Promise<OpenedModel> => {
+  const code = await loadModule('the code that reads models', () => import('./open-model.js'));
+  return code.openModel(request, signal);
 };
 
 /** The part of a worker's global scope that is used here; TypeScript's page types do not know it. */
@@ -104,6 +110,10 @@ function serve(scope: WorkerScope): void {
     scope.postMessage({ type: 'reading', id });
     if (message.type === 'levels') return buildLevels(message, signal);
     if (message.type === 'box') return whole(readBox(message.request, signal));
+    if (message.type === 'model') {
+      const model = await openModel(message.request, signal);
+      return [model, model.whole ? [model.whole.buffer as ArrayBuffer] : []];
+    }
     if (message.type === 'manifest') return [await openManifest(message.request, signal, progressOf(id))];
     const opened = await openBoxes(message.request, signal, progressOf(id));
     return [opened, buffersOf(opened.levels)];

@@ -4,7 +4,7 @@ import { GaussianSplatError } from '@gaussian-splat/core';
 export const cannotShow = (what: string, cause?: unknown): GaussianSplatError =>
   new GaussianSplatError('unsupported/webgl', {
     where: 'this page, which draws with WebGL 2 in place of WebGPU',
-    expected: 'one scene file that fits into memory',
+    expected: 'one scene file, alone, that fits into memory',
     found: what,
     remedy: 'use a browser with WebGPU, or show a scene file here',
     cause,

@@ -1,21 +1,17 @@
 /** One WebGL context for all elements of a page: browsers end the oldest of more than 8 or 16. Elements show copies of what it draws. */
 import { GlClock } from '@gaussian-splat/renderer/webgl';
+import type { DeviceLease } from '../gpu/shared-device.js';
 import { cannotShow } from './errors.js';
 
-/** A share in the page's context. */
-export interface GlLease {
+/** A share in the page's context. Its `device` stands where one of WebGPU is asked for. */
+export interface GlLease extends DeviceLease {
   readonly gl: WebGL2RenderingContext;
   readonly clock: GlClock;
-  /** Stands where a WebGPU device is asked for. */
-  readonly device: GPUDevice;
-  readonly isLost: boolean;
-  /** Fulfils when the context is lost. */
-  readonly lost: Promise<void>;
   /** Makes the canvas at least so large, in pixels. Clears it if it has to grow. */
   fit(width: number, height: number): void;
-  /** Gives the share back; the last one frees the context. Further calls do nothing. */
-  release(): void;
 }
+
+const LOSS = { reason: 'unknown', message: 'the WebGL context was lost' } as GPUDeviceLostInfo;
 
 class GlSession {
   readonly gl: WebGL2RenderingContext;
@@ -31,7 +27,10 @@ class GlSession {
     this.clock = new GlClock(gl);
     const [width, height] = gl.getParameter(gl.MAX_VIEWPORT_DIMS) as Int32Array;
     const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
-    this.device = limitsAlone({ limits: { maxTextureDimension2D: Math.min(width, height, side) } });
+    this.device = limitsAlone({
+      limits: { maxTextureDimension2D: Math.min(width, height, side) },
+      queue: { onSubmittedWorkDone: async () => undefined },
+    });
     gl.canvas.addEventListener('webglcontextlost', () => {
       this.isLost = true;
       if (current === this) current = undefined;
@@ -49,7 +48,7 @@ class GlSession {
   lease(): GlLease {
     this.#users++;
     let tell: () => void = () => undefined;
-    const lost = new Promise<void>((resolve) => (tell = resolve));
+    const lost = new Promise<GPUDeviceLostInfo>((resolve) => (tell = () => resolve(LOSS)));
     this.#listeners.add(tell);
     let isReleased = false;
     const isLost = (): boolean => this.isLost;
@@ -78,7 +77,7 @@ class GlSession {
   }
 }
 
-/** Has the limits of a device; whatever else is asked of it is an error by name. Models that run on the GPU need WebGPU. */
+/** Has the limits of a device, and is done with all work; whatever else is asked of it is an error by name. Models that run on the GPU need WebGPU. */
 const limitsAlone = (known: object): GPUDevice =>
   new Proxy(known, {
     get: (target, key) => {

@@ -1,43 +1,4 @@
 """Trained Gaussian models, and PyTorch modules of your own, to ONNX Gaussian Generators."""
 
-from .module import (
-    ExportReport,
-    camera,
-    control,
-    export_module,
-    frame,
-    generator,
-    image,
-    image_output,
-    packed,
-    pose,
-    projection,
-    seed,
-    shape,
-    split,
-    time,
-    view,
-    view_projection,
-    viewport,
-)
-
-__all__ = [
-    "ExportReport",
-    "camera",
-    "control",
-    "export_module",
-    "frame",
-    "generator",
-    "image",
-    "image_output",
-    "packed",
-    "pose",
-    "projection",
-    "seed",
-    "shape",
-    "split",
-    "time",
-    "view",
-    "view_projection",
-    "viewport",
-]
+from .module import *  # noqa: F403
+from .module import __all__ as __all__

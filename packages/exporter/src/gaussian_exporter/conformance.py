@@ -35,8 +35,14 @@ def _default(value: onnx.ValueInfoProto, binding: Json | None, contract: Json) -
         low, high = np.array(box["min"]), np.array(box["max"])
         eye: AnyArray = (low + high) / 2 - [0, 0, np.linalg.norm(high - low) + 5]
         return eye.astype(dtype).reshape(shape)
-    if binding["role"] in ("view", "projection", "view_projection"):
-        return np.eye(4).astype(dtype)
+    if binding["role"] in ("view", "camera_to_world", "projection", "view_projection"):
+        return np.eye(4).astype(dtype).reshape(shape)
+    if binding["role"] == "intrinsics":
+        return np.array([1, 0, 0.5, 0, 1, 0.5, 0, 0, 1] if _flat(shape) == 9 else [1, 1, 0.5, 0.5], dtype).reshape(
+            shape
+        )
+    if binding.get("format") == "matrix" and "default" not in binding:
+        return np.tile(np.eye(3).reshape(-1), _flat(shape) // 9).astype(dtype).reshape(shape)
     if binding["role"] == "image":
         return np.random.default_rng(0).random(shape).astype(dtype)
     return np.broadcast_to(np.asarray(binding.get("default", 0.0)).astype(dtype).reshape(-1), _flat(shape)).reshape(
@@ -94,7 +100,10 @@ def _checks(outputs: dict[str, Any], values: dict[str, AnyArray], instances: boo
     covariances: AnyArray | None
     # Rows of all instances, one after the other.
     flat = {name: array.reshape(-1, *array.shape[2:]) if instances else array for name, array in values.items()}
-    values = flat
+    # A batch of one is no other Gaussians.
+    values = {name: array[0] if array.ndim > 2 and array.shape[0] == 1 else array for name, array in flat.items()}
+    if outputs["layout"] == "packed" and "columns" in outputs:
+        return
     if outputs["layout"] == "packed":
         rows = values[outputs["gaussians"]]
         covariances, opacities = rows[:, 3:9], rows[:, -1]
@@ -117,7 +126,8 @@ def _check_opacities(opacities: AnyArray) -> None:
 
 
 def _check_covariances(covariances: AnyArray) -> None:
-    full = covariances.astype(np.float64)[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+    wide = covariances.astype(np.float64)
+    full = wide if wide.shape[-2:] == (3, 3) else wide[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
     values = np.linalg.eigvalsh(full)
     wrong = values[:, 0] < -_NEGATIVE[str(covariances.dtype)] * np.maximum(values[:, 2], 1e-30)
     if wrong.any():

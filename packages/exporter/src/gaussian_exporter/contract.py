@@ -22,6 +22,7 @@ Shape = Literal["covariances", "axes"]
 ScaleActivation = Literal["linear", "log"]
 OpacityActivation = Literal["linear", "logit"]
 DType = Literal["float32", "float16"]
+Filter = Literal["classic", "antialiased", "mip"]
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Json = dict[str, object]
 
@@ -91,6 +92,8 @@ class Facts:
     license: str
     attribution: str
     antialiased: bool = False
+    # The filter it was trained with, where antialiased does not say all.
+    filter: Filter | None = None
     coordinates: Coordinates = field(default_factory=Coordinates)
     duration: float | None = None
     fps: float | None = None
@@ -155,7 +158,8 @@ def gaussian_contract(facts: Facts, inputs: Sequence[Input], outputs: GaussianOu
         "bounds": {"min": list(low), "max": list(high)},
         **playing,
         "coordinates": facts.coordinates.json(),
-        "antialiased": facts.antialiased,
+        "antialiased": facts.antialiased or facts.filter in ("antialiased", "mip"),
+        **({} if facts.filter is None else {"filter": facts.filter}),
         "license": facts.license,
         "attribution": facts.attribution,
     }

@@ -40,10 +40,31 @@ export function openContainer(source: JsonSource): GltfFile {
     ? extensionsRequired.find((extension) => typeof extension !== 'string' || !HARMLESS.test(extension))
     : undefined;
   if (unknown !== undefined) {
-    const expected = 'extensions that are known here, or that splats can do without';
-    throw damaged(`${name}, extensionsRequired`, expected, show(unknown), 'decode/unsupported');
+    throw new GaussianSplatError('decode/unsupported', {
+      where: `${name}, extensionsRequired`,
+      expected: 'extensions that are known here, or that splats can do without',
+      found: show(unknown),
+      remedy: WITHOUT.find(([extension]) => extension.test(String(unknown)))?.[1] ?? CONVERT,
+    });
   }
   return file;
+}
+
+const CONVERT =
+  'convert the scene to SPZ or PLY with a tool that knows the extension, or export it with KHR_gaussian_splatting alone';
+/** What to do about extensions that are in use. */
+const WITHOUT: readonly (readonly [extension: RegExp, remedy: string])[] = [
+  [
+    /meshopt/i,
+    'write the file again without compression ("gltf-transform copy" decodes meshopt), or convert it to SPZ or PLY',
+  ],
+  [/spz/i, 'export the scene again with KHR_gaussian_splatting_compression_spz_2, or give the SPZ that it was made of'],
+];
+
+/** Extensions that a file uses, and that are not known here: what they add is not drawn. */
+export function unknownExtensions({ extensionsUsed }: Json): string[] {
+  const used: unknown[] = Array.isArray(extensionsUsed) ? extensionsUsed : [];
+  return [...new Set(used.map(String))].filter((extension) => !HARMLESS.test(extension));
 }
 
 function tileset(name: string): GaussianSplatError {

@@ -1,7 +1,10 @@
 /** What the header of a PLY says beside its numbers. Loaded only for files that have comments, or properties that change what the others mean. */
 import { GaussianSplatError, normalize, type Vector3 } from '@gaussian-splat/core';
+import { grouped } from '../bytes.js';
 import type { DraftCloud } from '../cloud.js';
+import { DEGREE_4, warn } from '../warn.js';
 import type { PlyHeader } from './header.js';
+import { OFFSETS, PLAIN } from './load-meaning.js';
 
 /** Variance in px² with which Mip-Splatting and Brush's mip mode train. */
 export const MIP_VARIANCE = 0.1;
@@ -66,6 +69,37 @@ export function fuseFilter(cloud: DraftCloud, filter: Float32Array): void {
   }
 }
 
+/** Properties that are read here, and others that say nothing about what is drawn: labels and measures of training. */
+const READ =
+  /^(filter_3D|f_rest_\d+|alpha|(obj|sem|semantic|instance|label|class|object|segment|confidence|kl|id)(_.*)?)$/i;
+
+/** Says what of a file of splats is not drawn, and what may mean something else than what is drawn. */
+export function noteLeftOut(cloud: DraftCloud, { elements }: PlyHeader, fileName: string): void {
+  const properties = (name: string): string[] =>
+    elements
+      .filter((element) => element.name === name)
+      .flatMap((own) => own.properties.map((property) => property.name));
+  const names = properties('vertex');
+  if ([...names, ...properties('sh')].includes('f_rest_45')) warn(cloud, DEGREE_4);
+  const unread = names.filter((name) => !PLAIN.test(name) && !READ.test(name));
+  if (unread.length > 0) {
+    const listed = unread.slice(0, 6).join(', ') + (unread.length > 6 ? `, ... (${unread.length})` : '');
+    warn(
+      cloud,
+      `Properties of splats that are not known are left out: ${listed}. If they move or recolour the splats, what is drawn is not what was trained.`,
+    );
+  }
+  for (const { name, count } of elements) {
+    if (/^(face|tristrips)$/.test(name) && count > 0)
+      warn(cloud, `${grouped(count)} rows of "${name}" are left out: only splats are drawn, not meshes.`);
+  }
+  if (OFFSETS.test(fileName))
+    warn(
+      cloud,
+      'Files of this name by LAM hold offsets from a head mesh in place of positions. If this is one, export the positions (offset2xyz=False, rgb2sh=True).',
+    );
+}
+
 /** Kinds of splats that are no plain ones though their names may be the same: told by a name that no other kind has. */
 const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; readonly remedy: string }[] = [
   {
@@ -77,6 +111,11 @@ const OTHER_MEANINGS: readonly { readonly mark: RegExp; readonly found: string; 
     mark: /^(f_anchor_feat_\d+|f_offset_\d+)$/,
     found: 'anchors of Scaffold-GS, from which a network makes splats for each view',
     remedy: 'export its network as a generator, or bake the splats of one view into a PLY',
+  },
+  {
+    mark: /^binding_\d+$/,
+    found: 'splats of GaussianAvatars, whose places are local to the triangles of a head mesh',
+    remedy: 'export the splats of one pose as PLY, or a generator that holds the mesh',
   },
   {
     mark: /^codebook_centers$/,

@@ -41,7 +41,9 @@ export async function readCompressedPly(source: SceneSource): Promise<GaussianCl
   source.signal?.throwIfAborted();
   const cloud = allocateCloud(count, keptDegree(degree), source);
   unpackSplats(words, chunkBounds, cloud);
-  (await loadMeaning(header))?.readComments(cloud, header.comments);
+  const meaning = await loadMeaning(header, source.name);
+  meaning?.readComments(cloud, header.comments);
+  meaning?.noteLeftOut(cloud, header, source.name);
   if (sh && !source.isPrefix) readHarmonics(source, header, degree, cloud);
   return cloud;
 }

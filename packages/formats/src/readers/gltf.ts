@@ -1,8 +1,11 @@
 import { GaussianSplatError, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
-import { openContainer, type Json } from '../gltf/container.js';
+import { openContainer, unknownExtensions, type Json } from '../gltf/container.js';
 import { GltfDocument } from '../gltf/document.js';
 import { multiply, placedMeshes, type Affine } from '../gltf/nodes.js';
 import { isSplats, isUncompressed, readPrimitive, splatsIn } from '../gltf/primitive.js';
+import { grouped } from '../bytes.js';
+import type { DraftCloud } from '../cloud.js';
+import { warn } from '../warn.js';
 import { isObject } from '../json.js';
 import { mergeClouds } from '../merge-clouds.js';
 import type { SceneSource, SplatRange } from '../scene-format.js';
@@ -21,7 +24,7 @@ const SAMPLES = 4096;
 /**
  * Reads glTF 2 and GLB with `KHR_gaussian_splatting`: all primitives of the default scene that hold splats, each moved by its nodes
  * (spherical harmonics turn along), uncompressed or as SPZ. Degrees may differ. Meshes and points without the extension,
- * cameras, lights and animations are left out.
+ * cameras, lights and animations are left out; `hints.meshes` says that there are some of the first.
  */
 export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
   const { name, signal, range } = source;
@@ -40,11 +43,29 @@ export async function readGltf(source: SceneSource): Promise<GaussianCloud> {
     splats += own?.count ?? cloud.count;
     clouds.push(moved(cloud, multiply(TO_CLOUD, toScene)));
   }
-  if (clouds.length === 1) return clouds[0];
-  return mergeClouds(
-    clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
-    source,
-  );
+  const whole =
+    clouds.length === 1
+      ? { ...clouds[0] }
+      : mergeClouds(
+          clouds.map((cloud) => ({ cloud, first: 0, count: cloud.count })),
+          source,
+        );
+  if (others > 0) whole.hints = { ...whole.hints, meshes: true };
+  noteLeftOut(whole, document.json, others > 0);
+  return whole;
+}
+
+/** Extensions that are named, at most. */
+const MOST_NAMED = 6;
+
+/** Says what of the file is not drawn. What else a file with meshes means is for those to say who draw them. */
+function noteLeftOut(cloud: DraftCloud, json: Json, hasMeshes: boolean): void {
+  const unknown = hasMeshes ? [] : unknownExtensions(json);
+  const named = unknown.slice(0, MOST_NAMED).map((extension) => extension.slice(0, 80));
+  if (unknown.length > 0) warn(cloud, `Extensions of glTF that are not known are left out: ${named.join(', ')}.`);
+  const { animations } = json;
+  if (Array.isArray(animations) && animations.length > 0)
+    warn(cloud, `${grouped(animations.length)} animations are left out for splats: they are drawn as they stand.`);
 }
 
 /** True if a node moves so far, as georeferenced ones do, that float32 would round what it moves by more than a few hundredths of a millimetre. */
@@ -152,6 +173,6 @@ function noSplats({ meshes }: Json, name: string, others: number): GaussianSplat
     remedy:
       hidden > 0
         ? 'name the scene that shows them in "scene", or put their node into the one that is named'
-        : 'show meshes with <model-viewer>, or export the scene with KHR_gaussian_splatting',
+        : 'show meshes with <splat-mesh src> in a <gaussian-splat>, or export the scene with KHR_gaussian_splatting',
   });
 }

@@ -1,6 +1,6 @@
 import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
 import { findFormat } from '../detect.js';
-import { loadReader } from '../load-parts.js';
+import { loadDiagnosis, loadReader } from '../load-parts.js';
 import { MAX_INDEX_BYTES } from '../lod/meta.js';
 import type { SceneSource } from '../scene-format.js';
 import { MAX_META_BYTES } from '../sog/meta.js';
@@ -28,6 +28,7 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
   const { name } = source;
   const archive = new Archive(source);
   const path = mainFile(archive, name);
+  if (path === undefined) throw await noSceneIn(archive, name);
   const folder = path.slice(0, path.lastIndexOf('/') + 1);
   const inner = archive.open(path);
   const format = findFormat(inner, path, '');
@@ -43,7 +44,8 @@ export async function readZip(source: SceneSource): Promise<GaussianCloud> {
 /** Marks an archive within an archive. */
 const WITHIN = async (): Promise<Uint8Array> => new Uint8Array(0);
 
-function mainFile(archive: Archive, name: string): string {
+/** Undefined where there is none. */
+function mainFile(archive: Archive, name: string): string | undefined {
   const paths = relevant(archive.paths);
   for (const [description, most] of DESCRIPTIONS) {
     // Other programs have a meta.json, too.
@@ -63,9 +65,13 @@ function mainFile(archive: Archive, name: string): string {
   // glTF names its other files, scenes among them.
   const gltf = scenes.filter((path) => /\.gltf$/i.test(path));
   if (gltf.length === 1) return gltf[0];
-  throw scenes.length === 0
-    ? noScene(name, undefined, `a ZIP archive with ${listed(paths)}`)
-    : severalScenes(name, scenes);
+  if (scenes.length > 0) throw severalScenes(name, scenes);
+  return undefined;
+}
+
+async function noSceneIn({ paths }: Archive, name: string): Promise<GaussianSplatError> {
+  const { diagnoseArchive } = await loadDiagnosis();
+  return diagnoseArchive(paths, name) ?? noScene(name, undefined, `a ZIP archive with ${listed(relevant(paths))}`);
 }
 
 /** Of the same scene after some numbers of iterations, the one after most; undefined for others. */

@@ -9,22 +9,28 @@ export const RIGHT_UP_BACK: AxisSigns = [1, -1, -1];
 
 /** Adobe's record of the frame a file is in, one of 16 in the numbering of SPZ's `CoordinateSystem`. */
 const COORDINATE_SYSTEM = 0xadbe0003;
+/** Padding; and Adobe's record of where cameras may go, which changes no splat. */
+const MEANINGLESS = new Set([0, 0xadbe0002]);
+const MOST_SKIPPED = 8;
 
 /**
  * Finds the frame that extension records name: `[uint32 type][uint32 length][payload]`, one after another. Records of
- * other types are skipped. Systems 1 to 8 differ from ours in signs only, bit 0 of (system - 1) meaning right, bit 1
+ * other types are skipped, and listed. Systems 1 to 8 differ from ours in signs only, bit 0 of (system - 1) meaning right, bit 1
  * up and bit 2 forward; the rest swap axes, which `decode/unsupported` says.
  */
-export function axesOfExtensions(records: Uint8Array, name: string): AxisSigns {
+export function readExtensions(records: Uint8Array, name: string): { axes: AxisSigns; skipped: readonly number[] } {
   const view = viewOf(records);
+  const skipped = new Set<number>();
+  let axes: AxisSigns | undefined;
   for (let at = 0; at + 8 <= records.length;) {
     const type = view.getUint32(at, true);
     const length = view.getUint32(at + 4, true);
     if (at + 8 + length > records.length) break;
-    if (type === COORDINATE_SYSTEM && length >= 4) return axesOfSystem(view.getUint32(at + 8, true), name);
+    if (type === COORDINATE_SYSTEM && length >= 4) axes ??= axesOfSystem(view.getUint32(at + 8, true), name);
+    else if (!MEANINGLESS.has(type) && skipped.size < MOST_SKIPPED) skipped.add(type);
     at += 8 + length;
   }
-  return RIGHT_UP_BACK;
+  return { axes: axes ?? RIGHT_UP_BACK, skipped: [...skipped] };
 }
 
 function axesOfSystem(system: number, name: string): AxisSigns {

@@ -1,6 +1,7 @@
 import { shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
 import { viewOf } from '../bytes.js';
 import { allocateCloud, expInPlace, keptDegree } from '../cloud.js';
+import { DEGREE_4, warn } from '../warn.js';
 import { float16 } from '../float16.js';
 import { harmonicSigns, quaternionSigns, type AxisSigns } from './axes.js';
 import { bytesPerSplat, type SpzHeader } from './header.js';
@@ -13,11 +14,13 @@ const COLOUR_SCALE = 0.15;
 /** Unpacks all attributes into a cloud (the definition is `unpackGaussians` in SPZ's `src/cc/load-spz.cc`). */
 export function unpackSplats(
   header: SpzHeader,
-  { attributes, axes }: PackedScene,
+  { attributes, axes, skipped = [] }: PackedScene,
   source: Pick<SceneSource, 'budget' | 'name'>,
 ): GaussianCloud {
   const cloud = allocateCloud(header.count, keptDegree(header.degree), source);
   cloud.antialiased = header.antialiased;
+  if (header.degree === 4) warn(cloud, DEGREE_4);
+  for (const type of skipped) warn(cloud, `The SPZ extension 0x${type.toString(16)} is not known and is left out.`);
   if (header.version === 1) unpackHalfPositions(attributes.positions, axes, cloud.positions);
   else unpackFixedPositions(attributes.positions, header.fractionalBits, axes, cloud.positions);
   for (let i = 0; i < cloud.scales.length; i++) cloud.scales[i] = attributes.scales[i] / 16 - 10;

@@ -9,12 +9,15 @@ import { sumProgress } from '../runtime/sum-progress.js';
 import type { GeneratorState } from '../state.js';
 import { connect } from './connect.js';
 import { HandOver } from './hand-over.js';
+import { StateOf } from './state-of.js';
 
 /** One model, or several of which each takes what the one before it writes. */
 export class Chain {
   readonly device: GPUDevice;
   readonly #leases: readonly SessionLease[];
   readonly #handOvers: readonly HandOver[];
+  /** What each model keeps from run to run; undefined where it keeps nothing. */
+  readonly #states: readonly (StateOf | undefined)[];
   /** Inputs of the page that each model ran with last; undefined where what it wrote last is not to be relied on. */
   readonly #ran: (Inputs | undefined)[] = [];
   readonly #endProgress: () => void;
@@ -26,6 +29,7 @@ export class Chain {
     const models = leases.map(({ session }) => session.model);
     requireNoneBefore(models[0]);
     if (models.length > 1) requireNoInstances(models);
+    this.#states = models.map((model) => StateOf.of(model, device));
     this.#handOvers = models.slice(1).map((after, i) => new HandOver(device, models[i], connect(models[i], after)));
   }
 
@@ -80,6 +84,11 @@ export class Chain {
     return this.#leases.map(({ session }, i) => session.bind(state, this.#handOvers[i - 1]?.inputs));
   }
 
+  /** Models that keep a state begin anew. */
+  restart(): void {
+    for (const state of this.#states) state?.reset();
+  }
+
   /**
    * Runs what the change of inputs asks for: a model whose inputs are those of its last run, and those before it, are left out.
    * @throws as `GeneratorSession.run`.
@@ -92,7 +101,11 @@ export class Chain {
       if (before?.rows === 0) return use({ tensors: {}, dims: {}, rows: 0 });
       this.#ran.length = i;
       const take = i === last ? use : (outputs: RunOutputs) => this.#handOvers[i].take(outputs);
-      await this.#session(i).run({ ...inputs[i], ...before?.tensors }, take);
+      const state = this.#states[i];
+      await this.#session(i).run({ ...inputs[i], ...before?.tensors, ...state?.tensors }, (outputs) => {
+        take(outputs);
+        state?.take(outputs);
+      });
       this.#ran[i] = inputs[i];
     }
   }
@@ -106,7 +119,7 @@ export class Chain {
   release(idle: Promise<void> = Promise.resolve()): void {
     this.#endProgress();
     for (const { release } of this.#leases) release();
-    void idle.then(() => this.#handOvers.forEach((handOver) => handOver.destroy()));
+    void idle.then(() => [...this.#handOvers, ...this.#states].forEach((kept) => kept?.destroy()));
   }
 
   #session(i: number): GeneratorSession {

@@ -45,6 +45,7 @@ function gaussiansFor({ layout, contract }: GeneratorModel, wanted: GaussiansInp
   if (wanted.attribute === 'count') return { output: layout?.count };
   if (wanted.attribute === 'packed') {
     if (outputs.layout !== 'packed') return { misfit: `the layout ${outputs.layout}` };
+    if (outputs.columns !== undefined) return { misfit: 'columns of an order of their own' };
     const same = (['color', 'opacityActivation', 'shOrder'] as const).find((key) => outputs[key] !== wanted[key]);
     return same ? { misfit: `${same} ${outputs[same]}, not ${wanted[same]}` } : { output: outputs.gaussians };
   }

@@ -1,11 +1,11 @@
-import { ContractError } from '@gaussian-splat/core';
+import { ContractError, numberToHalf } from '@gaussian-splat/core';
 import { bufferBytes, TENSOR_USAGE } from '../runtime/tensor-bytes.js';
 import { elementsOf, type GpuTensor, type Inputs } from '../input-value.js';
 import type { RunOutputs } from '../runtime/live-session.js';
 import type { GeneratorModel } from '../runtime/open-model.js';
 import type { Connection } from './connect.js';
 
-/** What lies between two models of a chain: the first one's outputs, kept on the GPU until the second has run. */
+/** What lies between two models of a chain, or two runs of one model: the first one's outputs, kept on the GPU until the second has run. */
 export class HandOver {
   readonly #device: GPUDevice;
   readonly #model: GeneratorModel;
@@ -43,7 +43,8 @@ export class HandOver {
    */
   take({ tensors, dims, rows }: RunOutputs): void {
     const { layout, header } = this.#model;
-    if (layout !== undefined && rows > layout.capacity) throw tooManyRows(header.name, layout.capacity, rows);
+    const most = layout?.paddedRows ?? layout?.capacity ?? Infinity;
+    if (rows > most) throw tooManyRows(header.name, most, rows);
     this.#version++;
     this.#rows = rows;
     const encoder = this.#device.createCommandEncoder({ label: 'gs.generator.hand-over' });
@@ -59,13 +60,24 @@ export class HandOver {
     this.#tensors = taken;
   }
 
+  /** Until the first has run, a tensor has one number in every place. */
+  fill(input: string, { dtype, dims }: Pick<GpuTensor, 'dtype' | 'dims'>, value: number): void {
+    const length = elementsOf(dims);
+    const buffer = this.#bufferOf(input, bufferBytes(dtype, length));
+    const words = new Uint32Array(buffer.size / 4).fill(wordOf(dtype, value));
+    this.#device.queue.writeBuffer(buffer, 0, words);
+    this.#tensors = { ...this.#tensors, [input]: { buffer, dtype, dims, version: ++this.#version } };
+  }
+
   destroy(): void {
     for (const buffer of this.#buffers.values()) buffer.destroy();
     this.#buffers.clear();
   }
 
   #shaped(input: string, output: string, dims: readonly number[]): GpuTensor {
-    const { dtype, most } = this.#model.outputs.find(({ name }) => name === output)!;
+    const { dtype: written, most } = this.#model.outputs.find(({ name }) => name === output)!;
+    // A count of 64 bits feeds no input: `connect` wants the same type on both sides.
+    const dtype = written as GpuTensor['dtype'];
     const buffer = this.#bufferOf(input, bufferBytes(dtype, most ?? elementsOf(dims)));
     return { buffer, dtype, dims, version: this.#version };
   }
@@ -84,6 +96,13 @@ export class HandOver {
     this.#buffers.set(input, buffer);
     return buffer;
   }
+}
+
+/** A number in each place of a word. */
+function wordOf(dtype: GpuTensor['dtype'], value: number): number {
+  if (dtype === 'float16') return numberToHalf(value) * 0x1_0001;
+  const Numbers = dtype === 'int32' ? Int32Array : Float32Array;
+  return new Uint32Array(Numbers.of(value).buffer)[0];
 }
 
 const usedBytes = ({ dtype, dims }: GpuTensor): number =>

@@ -3,7 +3,7 @@ import type { Evidence } from '../proof/prove.js';
 import type { FixedOutput, RunOutputs } from './live-session.js';
 import type { GeneratorModel } from './open-model.js';
 import { readTensors } from './read-tensors.js';
-import { TENSOR_USAGE } from './tensor-bytes.js';
+import { ELEMENT_BYTES, TENSOR_USAGE } from './tensor-bytes.js';
 
 /** Bytes of a piece of an output in which runs are compared, and how many pieces at most, spread over the output. */
 const PIECE_BYTES = 65_536;
@@ -22,13 +22,15 @@ export async function readRun(
   { tensors, dims }: RunOutputs,
 ): Promise<WrittenRun> {
   const parts = outputs.flatMap(({ name: tensor, dtype }) => {
-    const bytes = elementsOf(dims[tensor]) * (dtype === 'float16' ? 2 : 4);
+    const bytes = elementsOf(dims[tensor]) * ELEMENT_BYTES[dtype];
     // More rows than declared are not there, and refused later.
     const size = Math.min(bytes - (bytes % 4), tensors[tensor].size);
     const pieces = Math.min(MOST_PIECES, Math.ceil(size / PIECE_BYTES));
     return Array.from({ length: Math.max(1, pieces) }, (_, i) => {
       const offset = pieces > 1 ? Math.floor(((size - PIECE_BYTES) * i) / (pieces - 1) / 4) * 4 : 0;
-      return { tensor, dtype, offset, size: Math.min(PIECE_BYTES, size), buffer: tensors[tensor] };
+      // A count of 64 bits is compared as two of 32.
+      const compared = dtype === 'int64' ? ('int32' as const) : dtype;
+      return { tensor, dtype: compared, offset, size: Math.min(PIECE_BYTES, size), buffer: tensors[tensor] };
     });
   });
   const read = await readTensors(device, parts);

@@ -9,6 +9,7 @@ import type { GeneratorModel } from './open-model.js';
 import { earlierVerdict, prove, type Evidence } from '../proof/prove.js';
 import type { StartWorker } from '../proof/run-on-cpu.js';
 import type { Verdict } from '../proof/record.js';
+import { ELEMENT_BYTES } from './tensor-bytes.js';
 import { runFault, startSession } from './start-session.js';
 
 /** Runs that may fail one after the other before a model is given up, or, if it has run before, left alone for a while. */
@@ -245,7 +246,7 @@ export class GeneratorSession {
 /** The runtime keeps each output in one buffer. */
 function requireRoom({ header, outputs }: GeneratorModel, { limits }: GPUDevice): void {
   for (const { name, dtype, most = 0 } of outputs) {
-    const bytes = most * (dtype === 'float16' ? 2 : 4);
+    const bytes = most * ELEMENT_BYTES[dtype];
     if (bytes <= limits.maxBufferSize) continue;
     throw new GaussianSplatError('out-of-memory/buffer-limit', {
       where: `output ${name} of ${header.name}`,

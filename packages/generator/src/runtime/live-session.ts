@@ -46,8 +46,7 @@ export class LiveSession {
   readonly #session: InferenceSession;
   readonly #device: GPUDevice;
   readonly #outputs: readonly ModelOutput[];
-  /** Which dimension of an output counts rows. */
-  readonly #rowAxis: 0 | 1;
+  readonly #instances: number;
   readonly #names: readonly string[];
   readonly #fixed: Readonly<FixedOutputs>;
   readonly #buffers: SessionBuffers;
@@ -70,7 +69,7 @@ export class LiveSession {
     this.#session = session;
     this.#device = device;
     this.#outputs = outputs;
-    this.#rowAxis = instances === undefined ? 0 : 1;
+    this.#instances = instances ?? 1;
     // A run that is asked for nothing would compute nothing.
     this.#fixed = outputs.every(({ name }) => name in fixed) ? {} : fixed;
     this.#names = outputs.map(({ name }) => name).filter((name) => !(name in this.#fixed));
@@ -155,7 +154,7 @@ export class LiveSession {
       const dims = Object.fromEntries(
         this.#outputs.map(({ name }) => [name, this.#fixed[name]?.dims ?? results[name].dims]),
       );
-      use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(dims, this.#outputs, this.#rowAxis) });
+      use({ tensors: this.#buffersOf(results), dims, rows: rowsOf(dims, this.#outputs, this.#instances) });
     } finally {
       // Recycled for what is submitted later; a captured session writes the same buffers for ever.
       if (this.kind === 'webgpu') for (const name of this.#names) disposeGpu(results[name]);
@@ -239,20 +238,22 @@ function disposeGpu(tensor: Tensor): void {
 function rowsOf(
   dims: Readonly<Record<string, readonly number[]>>,
   outputs: readonly ModelOutput[],
-  axis: 0 | 1,
+  instances: number,
 ): number {
-  const [first, ...others] = outputs.filter(({ kind }) => kind === 'gaussians').map(({ name }) => name);
-  if (first === undefined) return 1;
-  const rows = dims[first][axis];
-  for (const tensor of others) {
-    if (dims[tensor][axis] === rows) continue;
+  const counts = outputs
+    .filter(({ kind }) => kind === 'gaussians')
+    .map(({ name, rowElements = 1 }) => ({ tensor: name, count: elementsOf(dims[name]) / rowElements / instances }));
+  if (counts.length === 0) return 1;
+  const [{ tensor: first, count: rows }] = counts;
+  for (const { tensor, count } of counts) {
+    if (count === rows) continue;
     throw new ContractError([
       {
         code: 'contract/rows',
         tensor,
         where: `output ${tensor}`,
         expected: `${rows} rows, as ${first} has`,
-        found: `${dims[tensor][axis]} rows`,
+        found: `${count} rows`,
         remedy: 'write as many rows of every attribute',
       },
     ]);

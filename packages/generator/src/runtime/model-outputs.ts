@@ -4,8 +4,10 @@ import { elementsOf } from '../input-value.js';
 /** An output that is asked for. */
 export interface ModelOutput {
   readonly name: string;
-  readonly kind: 'gaussians' | 'count' | 'image';
-  readonly dtype: 'float32' | 'float16' | 'int32';
+  readonly kind: 'gaussians' | 'count' | 'image' | 'state';
+  readonly dtype: 'float32' | 'float16' | 'int32' | 'int64';
+  /** Elements of a row of Gaussians. */
+  readonly rowElements?: number;
   /** Elements that a run writes at most; undefined for a picture whose size only the run tells. */
   readonly most: number | undefined;
 }
@@ -13,16 +15,28 @@ export interface ModelOutput {
 /** The outputs that a contract names. @param layout of the Gaussians, if the model writes any */
 export function modelOutputs(
   header: OnnxHeader,
-  { outputs }: Contract,
+  contract: Contract,
   layout: GaussianLayout | undefined,
 ): ModelOutput[] {
-  if (outputs.layout === 'image') return [imageOutput(header, outputs.image)];
-  const { attributes = [], capacity = 0, dtype = 'float32', count } = layout ?? {};
-  const strides = new Map(attributes.map(({ tensor, rowStride }) => [tensor, rowStride]));
-  const found: ModelOutput[] = [...strides].map(([name, stride]) => {
-    return { name, kind: 'gaussians', dtype, most: capacity * stride };
+  const written = writtenOutputs(header, contract, layout);
+  const states = Object.values(contract.inputs).flatMap((input): ModelOutput[] => {
+    if (input.role !== 'state' || written.some(({ name }) => name === input.output)) return [];
+    const { dims, dtype } = header.outputs.find(({ name }) => name === input.output)!;
+    return [
+      { name: input.output, kind: 'state', dtype: dtype as ModelOutput['dtype'], most: elementsOf(dims as number[]) },
+    ];
   });
-  if (count !== undefined) found.push({ name: count, kind: 'count', dtype: 'int32', most: 1 });
+  return [...written, ...states];
+}
+
+function writtenOutputs(header: OnnxHeader, { outputs }: Contract, layout: GaussianLayout | undefined): ModelOutput[] {
+  if (outputs.layout === 'image') return [imageOutput(header, outputs.image)];
+  const { attributes = [], capacity = 0, paddedRows = capacity, dtype = 'float32', count, countDtype } = layout ?? {};
+  const strides = new Map(attributes.map(({ tensor, rowStride }) => [tensor, rowStride]));
+  const found: ModelOutput[] = [...strides].map(([name, rowElements]) => {
+    return { name, kind: 'gaussians', dtype, most: paddedRows * rowElements, rowElements };
+  });
+  if (count !== undefined) found.push({ name: count, kind: 'count', dtype: countDtype ?? 'int32', most: 1 });
   return found;
 }
 

@@ -1,22 +1,20 @@
 import {
-  bytesSource,
   carriesContract,
   checkContract,
   ContractError,
   gaussianLayout,
   GaussianSplatError,
-  openUrl,
-  readOnnxHeader,
   resolveContract,
+  openHeader,
   partUrl,
   sidecarName,
-  type ByteSource,
   type Contract,
   type ContractFault,
   type GaussianLayout,
+  type ModelPlace,
   type OnnxHeader,
+  type OpenedModel,
   type ResolvedContract,
-  type UrlSource,
 } from '@gaussian-splat/core';
 import { fetchBytes, type FetchOptions } from './fetch-bytes.js';
 import { modelOutputs, type ModelOutput } from './model-outputs.js';
@@ -29,6 +27,8 @@ export interface ModelSource {
   /** The contract, as JSON text or as the object; default: what the model itself carries, else a file beside it. */
   readonly contract?: unknown;
   readonly credentials?: 'omit' | 'same-origin' | 'include';
+  /** Reads the header elsewhere than on the caller's thread. It may take the bytes that it gets, and gives them back as `whole`. Default: core's `openHeader`. */
+  readonly openHeader?: ((place: ModelPlace, signal?: AbortSignal) => Promise<OpenedModel>) | undefined;
 }
 
 /** A model that keeps its contract, with all of its bytes, and without any runtime. */
@@ -58,10 +58,12 @@ export async function openModel(
   source: ModelSource,
   options: Pick<FetchOptions, 'signal' | 'onProgress'> = {},
 ): Promise<GeneratorModel> {
-  const { credentials = 'same-origin' } = source;
+  const { credentials = 'same-origin', openHeader: open = openHeader } = source;
   const request = { credentials, signal: options.signal };
-  const url = await openUrl(source.url, request);
-  const header = await readOnnxHeader(url);
+  // A worker's own address is not the page's.
+  const base = globalThis.location?.href;
+  const address = URL.canParse(source.url, base) ? new URL(source.url, base).href : source.url;
+  const { header, size, whole } = await open({ url: address, credentials }, options.signal);
   const { contract, notes } = await contractOf(source, header, request);
   const faults = checkContract(header, contract);
   if (faults.length > 0) throw new ContractError(faults);
@@ -70,11 +72,13 @@ export async function openModel(
   const reports = sumProgress(externalFiles.length + 1, options.onProgress ?? (() => undefined));
   // What is known beforehand: the sum of all has a length before the first of them has come.
   externalFiles.forEach(({ byteLength }, i) => reports[i](0, byteLength));
-  reports[externalFiles.length](0, url.size);
+  reports[externalFiles.length](0, size);
   const externalData = await fetchExternal(source, header, contract, request, reports);
-  const bytes = await wholeFile(url, source.url, { ...request, onProgress: reports[externalFiles.length] });
+  const onProgress = reports[externalFiles.length];
+  if (whole) onProgress(whole.length, whole.length);
+  const fetched = whole ?? (await fetchBytes(source.url, { ...request, onProgress, expected: size }));
   // What was fetched piece by piece may have been replaced since.
-  await readOnnxHeader(bytesSource(bytes, header.name));
+  const bytes = whole ?? (await open({ bytes: fetched, name: header.name }, options.signal)).whole ?? fetched;
   return {
     url: source.url,
     header,
@@ -87,12 +91,24 @@ export async function openModel(
   };
 }
 
+/** A contract has some kilobytes, a rest pose among them. */
+const MOST_CONTRACT_BYTES = 1 << 20;
+
+const longContract = (where: string, found: number): GaussianSplatError =>
+  new GaussianSplatError('out-of-memory/budget', {
+    where: `${where}, the contract beside it`,
+    expected: `at most ${MOST_CONTRACT_BYTES} bytes`,
+    found: String(found),
+    remedy: 'write the contract without what no reader needs',
+  });
+
 async function contractOf(source: ModelSource, header: OnnxHeader, request: FetchOptions): Promise<ResolvedContract> {
   const explicit = source.contract;
   if (explicit !== undefined && explicit !== null) return resolveContract({ header, explicit });
   if (carriesContract(header)) return resolveContract({ header });
   if (/^(data|blob):/.test(source.url)) return resolveContract({ header });
   const bytes = await fetchBytes(sidecarName(source.url), { ...request, mayBeMissing: true });
+  if (bytes && bytes.length > MOST_CONTRACT_BYTES) throw longContract(source.url, bytes.length);
   const text = bytes && new TextDecoder().decode(bytes);
   // Servers of single-page applications answer with their page where there is no file.
   const sidecar = text === undefined || /^\s*</.test(text) ? undefined : text;
@@ -139,13 +155,4 @@ async function fetchExternal(
   const faults: ContractFault[] = files.length > 0 ? checkContract(header, contract, { files: sizes }) : [];
   if (faults.length > 0) throw new ContractError(faults);
   return found;
-}
-
-/** Reading the header may have fetched all of it already. */
-async function wholeFile(opened: UrlSource & ByteSource, url: string, request: FetchOptions): Promise<Uint8Array> {
-  const { size, chunk, whole } = opened;
-  const known = whole ?? (size <= chunk ? await opened.read(0, size) : undefined);
-  if (known === undefined) return fetchBytes(url, { ...request, expected: size });
-  request.onProgress?.(known.length, known.length);
-  return known;
 }

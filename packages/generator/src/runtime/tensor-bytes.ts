@@ -1,5 +1,5 @@
 /** Bytes of one element of the element types that inputs and outputs of generators have. */
-const ELEMENT_BYTES: Readonly<Record<string, number>> = { float32: 4, int32: 4, float16: 2, int64: 8 };
+export const ELEMENT_BYTES: Readonly<Record<string, number>> = { float32: 4, int32: 4, float16: 2, int64: 8 };
 
 /** Bytes of a GPU buffer for a tensor: the runtime copies in pieces of 16. */
 export function bufferBytes(dtype: string, elements: number): number {

@@ -5,8 +5,10 @@ import { constants } from '../generated/shaders.js';
 import { mortonOrder } from '../pack/morton.js';
 import { packKept, type PackedGaussians } from '../pack/pack.js';
 import type { ShPrecision } from '../pack/sh.js';
-import type { RendererOptions } from '../frame-request.js';
-import { Renderer } from '../renderer.js';
+import type { GaussianScene } from '../gaussian-scene.js';
+import type { FrameSettings } from '../picture.js';
+import { Viewpoint } from '../viewpoint.js';
+import { World } from '../world.js';
 
 /** Most that a pixel of the answer may be off: float16 blending stays a tenth under it. */
 const TOLERANCE = 0.02;
@@ -14,19 +16,26 @@ const SPLATS = 64;
 const { ALPHA_MIN, ALPHA_MAX, DILATION, SH_C0, SH_C1 } = constants;
 
 /** True if a renderer with these options draws the image that the mathematics ask for. */
-export async function givesKnownAnswer(device: GPUDevice, options: RendererOptions): Promise<boolean> {
+export async function givesKnownAnswer(device: GPUDevice, options: FrameSettings): Promise<boolean> {
   const cloud = sphereCloud(SPLATS, 1);
   const camera = shearedCamera(48, 32);
   const gaussians = await GaussianBuffers.upload(device, packSpheres(cloud, 'float16'));
-  const renderer = new Renderer(device, options);
+  const renderer = viewpointOf(device, gaussians, options);
   try {
-    const pixels = await capture(device, renderer, { gaussians, camera });
+    const pixels = await capture(device, renderer, { camera });
     const expected = drawSpheres(cloud, camera);
     return pixels.every((value, i) => Math.abs(value - expected[i]) <= TOLERANCE);
   } finally {
     renderer.destroy();
     gaussians.destroy();
   }
+}
+
+/** A viewpoint of one scene alone. */
+export function viewpointOf(device: GPUDevice, scene: GaussianScene, settings: FrameSettings): Viewpoint {
+  const world = new World();
+  world.add({ scene });
+  return new Viewpoint(device, world, { settings });
 }
 
 /** A camera that looks at the spheres askew, so that a transposed matrix shows. */

@@ -1,11 +1,11 @@
 /** What a device is asked before it draws for anybody: whether a variant is right, and how fast. */
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
-import { Renderer } from '../renderer.js';
-import { OrderKeysStage } from '../stages/order-keys.js';
+import { Viewpoint } from '../viewpoint.js';
+import { World } from '../world.js';
 import type { Variants } from '../variants.js';
 import type { FrameClock } from './frame-clock.js';
-import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud } from './known-answer.js';
+import { givesKnownAnswer, packSpheres, probeCamera, sphereCloud, viewpointOf } from './known-answer.js';
 
 /** Frames of a trial. */
 export const FRAMES = 4;
@@ -29,10 +29,9 @@ export const isRight = (device: GPUDevice, variants: Variants, format?: GPUTextu
 
 /** Asks for the pipelines of a first picture. */
 function prepare(device: GPUDevice, variants: Variants, format: GPUTextureFormat): void {
-  const renderer = new Renderer(device, variants);
+  const renderer = new Viewpoint(device, new World(), { settings: variants });
   renderer.prepare([{}], format);
   renderer.destroy();
-  new OrderKeysStage(device);
 }
 
 /** Whether an answer is right, and WebGPU had nothing to say against the way to it. */
@@ -61,11 +60,11 @@ export async function timeFrames(
 ): Promise<number> {
   const size = Math.cbrt(400 / splats);
   const gaussians = await GaussianBuffers.upload(device, packSpheres(sphereCloud(splats, size), 'int8'));
-  const renderer = new Renderer(device, variants);
+  const renderer = viewpointOf(device, gaussians, variants);
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);
-  const draw = (): void => renderer.render({ gaussians, camera, target: texture });
-  // The first frame also makes pipelines and orders everything.
+  const draw = (): void => renderer.draw(camera, { target: texture });
+  // The first frame also makes pipelines.
   await clock.time(1, draw);
   const time = await clock.time(FRAMES, draw);
   texture.destroy();

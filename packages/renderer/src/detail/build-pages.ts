@@ -7,6 +7,7 @@ import { choosePrecision, noiseIn, type ShPrecision } from '../pack/sh.js';
 import { levelsAbove } from './build-levels.js';
 import { boundLevel, detailRows, leafErrors, parentErrors, DETAIL_NUMBERS, type ChunkErrors } from './chunk-detail.js';
 import { pageLayout, type DetailManifest } from './manifest.js';
+import type { PageCoding } from './page-coding.js';
 import { packFiller, packLevelGeometry, packLevelSh } from './pack-level.js';
 import { CENTER_ROUNDING, packQuantizedChunk, QUANTIZED_CHUNK_WORDS, widenReach } from './quantized-geometry.js';
 import { shellOrder } from './shell-order.js';
@@ -169,16 +170,18 @@ export function manifestOf(
   tree: DetailTree,
   pages: readonly BuiltPage[],
   fileOf: (page: number) => string,
+  coding?: PageCoding,
 ): DetailManifest {
   const { splats, shPrecision, geometry, antialiased, filterVariance, origin, bounds, levels } = tree;
   return {
     ...{
       format: 'gaussian-splat-detail',
-      version: geometry ? 2 : 1,
+      version: coding ? 3 : geometry ? 2 : 1,
       splats,
       shDegree: levels[0].shDegree,
     },
-    ...{ shPrecision, ...(geometry && { geometry }), antialiased, filterVariance, origin, bounds },
+    ...{ shPrecision: coding ? 'int8' : shPrecision, ...(geometry && { geometry }), ...(coding && { coding }) },
+    ...{ antialiased, filterVariance, origin, bounds },
     trees: [
       {
         pages: pages.map(({ chunks, upper, parent }, p) => ({

@@ -1,9 +1,10 @@
-import { GaussianSplatError, type Bounds, type ShDegree, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, type Bounds, type ErrorCode, type ShDegree, type Vector3 } from '@gaussian-splat/core';
 import { constants } from '../generated/shaders.js';
 import { CHUNK_NUMBERS } from '../pack/chunks.js';
 import { GEOMETRY_WORDS } from '../pack/pack.js';
 import { shWords, type ShPrecision } from '../pack/sh.js';
 import { DETAIL_NUMBERS } from './chunk-detail.js';
+import { CLASSES, CLASS_STEP, LEAST_OPACITY_STEP, type PageCoding } from './page-coding.js';
 import { QUANTIZED_CHUNK_WORDS } from './quantized-geometry.js';
 
 /** Chunks that stand for the same one, at most: those of a page, which fill a slot of the pool. */
@@ -44,14 +45,16 @@ export interface TreeInstance {
  */
 export interface DetailManifest {
   readonly format: 'gaussian-splat-detail';
-  /** 2 if {@link geometry} is given. */
-  readonly version: 1 | 2;
+  /** 2 if {@link geometry} is given, 3 if {@link coding} is, too. */
+  readonly version: 1 | 2 | 3;
   /** Splats of the finest level. */
   readonly splats: number;
   readonly shDegree: ShDegree;
   readonly shPrecision: ShPrecision;
   /** How centres, shapes and opacities are stored: {@link packQuantizedChunk}. Default: as `PackedGaussian`, in twice the bytes. */
   readonly geometry?: 'quantized';
+  /** How files are coded: `decodePage` makes the words of them. Default: they are the words. */
+  readonly coding?: PageCoding;
   readonly antialiased: boolean;
   /** Variance in px² of the screen-space low-pass filter that the scene was trained with; undefined is the classic 0.3. */
   readonly filterVariance?: number | undefined;
@@ -90,12 +93,13 @@ function shown(value: unknown): string {
 
 /**
  * Checks what was read from a `detail.json`.
- * @throws GaussianSplatError `decode/unsupported` for another format or version, `decode/header` for anything else that is wrong.
+ * @param mostPages pages that the load may take memory for
+ * @throws GaussianSplatError `out-of-memory/budget` for more, `decode/unsupported` for another format or version, `decode/header` for anything else that is wrong.
  */
-export function checkManifest(value: unknown, where: string): DetailManifest {
+export function checkManifest(value: unknown, where: string, mostPages = MOST_PAGES): DetailManifest {
   const manifest = (typeof value === 'object' && value !== null ? value : {}) as Partial<DetailManifest>;
-  const fail = (path: string, expected: string, found: unknown, code = 'decode/header'): never => {
-    throw new GaussianSplatError(code as 'decode/header', {
+  const fail = (path: string, expected: string, found: unknown, code: ErrorCode = 'decode/header'): never => {
+    throw new GaussianSplatError(code, {
       where: `${where}, ${path}`,
       expected,
       found: shown(found),
@@ -105,12 +109,13 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
   const { format, version, splats, shDegree, shPrecision, geometry, antialiased, origin, bounds } = manifest;
   const { trees, instances } = manifest;
   if (format !== 'gaussian-splat-detail') fail('format', 'gaussian-splat-detail', format, 'decode/unsupported');
-  if (version !== 1 && version !== 2) fail('version', '1 or 2', version, 'decode/unsupported');
+  if (version !== 1 && version !== 2 && version !== 3) fail('version', '1, 2 or 3', version, 'decode/unsupported');
   if (!isCount(splats)) fail('splats', 'a number of splats', splats);
   if (![0, 1, 2, 3].includes(shDegree as number)) fail('shDegree', '0, 1, 2 or 3', shDegree);
   if (shPrecision !== 'int8' && shPrecision !== 'float16') fail('shPrecision', 'int8 or float16', shPrecision);
   const kind = version === 1 ? undefined : 'quantized';
   if (geometry !== kind) fail('geometry', kind ?? 'nothing in version 1', geometry, 'decode/unsupported');
+  checkCoding(manifest, fail);
   if (typeof antialiased !== 'boolean') fail('antialiased', 'true or false', antialiased);
   const { filterVariance } = manifest;
   if (filterVariance !== undefined && !(filterVariance >= 0 && filterVariance <= 1)) {
@@ -134,12 +139,33 @@ export function checkManifest(value: unknown, where: string): DetailManifest {
       (i === 0 || isPlace(instance.parent, trees![instances![0].tree].pages));
     if (!isFine) fail(`instances[${i}]`, 'a tree, where it stands, and the chunk above it', instance);
   });
-  checkPages(manifest as DetailManifest, fail);
+  checkPages(manifest as DetailManifest, fail, Math.min(MOST_PAGES, mostPages));
   return manifest as DetailManifest;
 }
 
+/** Least and most of what a coding says; colours may be of any size. */
+const CODING_RANGES: Readonly<Record<keyof PageCoding, readonly [least: number, most: number]>> = {
+  size: [1 / 48, 1],
+  directions: [3, 255],
+  opacity: [LEAST_OPACITY_STEP, 512],
+  color: [0, 1e6],
+  chroma: [0, 1e6],
+  scale: [0, 255 - CLASS_STEP * (CLASSES - 1)],
+};
+
+function checkCoding({ version, coding, shPrecision }: Partial<DetailManifest>, fail: Fail): void {
+  if (version !== 3) return void (coding === undefined || fail('coding', 'nothing before version 3', coding));
+  if (shPrecision !== 'int8') fail('shPrecision', 'int8 where files are coded', shPrecision);
+  for (const [key, [least, most]] of Object.entries(CODING_RANGES)) {
+    const value = coding?.[key as keyof PageCoding];
+    const isFine = typeof value === 'number' && value >= least && value <= most;
+    const isWhole = ['directions', 'opacity', 'scale'].includes(key);
+    if (!isFine || (isWhole && !Number.isInteger(value))) fail(`coding.${key}`, `${least} to ${most}`, value);
+  }
+}
+
 /** What files and instances must agree in, each of which is fine by itself. */
-function checkPages({ trees, instances }: DetailManifest, fail: Fail): void {
+function checkPages({ trees, instances }: DetailManifest, fail: Fail, mostPages: number): void {
   const lengths = new Map<string, number>();
   const taken = trees.map((tree, t) => {
     const places = new Places(tree);
@@ -158,6 +184,8 @@ function checkPages({ trees, instances }: DetailManifest, fail: Fail): void {
   const counts = trees.map(({ pages }) => pages.reduce((sum, file) => sum + pagesIn(file), 0));
   const count = instances.reduce((sum, { tree }) => sum + counts[tree], 0);
   if (count > MOST_PAGES) fail('instances', `at most ${MOST_PAGES} pages`, count);
+  if (count > mostPages)
+    fail('instances', `at most ${mostPages} pages in a file of this size`, count, 'out-of-memory/budget');
 }
 
 /** Pages that lie in a file. */
@@ -181,7 +209,7 @@ class Places {
   }
 }
 
-type Fail = (path: string, expected: string, found: unknown) => never;
+type Fail = (path: string, expected: string, found: unknown, code?: ErrorCode) => never;
 
 function checkTree(tree: Tree, fail: Fail): void {
   if (!Array.isArray(tree?.pages) || tree.pages.length === 0) fail('pages', 'one file or more', tree);

@@ -1,5 +1,7 @@
-import { GaussianSplatError, type Vector3 } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, type Vector3 } from '@gaussian-splat/core';
+import type * as decoder from './decode-page.js';
 import { pageLayout, type DetailManifest, type PageFormat } from './manifest.js';
+import type { CodedFile } from './page-coding.js';
 import { PageFiles } from './page-files.js';
 import { listPages, type PageList } from './page-list.js';
 import { chunkLayout, type SlotWords } from './slot-words.js';
@@ -26,32 +28,55 @@ export interface PageSource {
 /** Bytes of files that are kept: what is below a page is often wished for as soon as the page is there, and lies in the same file. */
 const KEPT_BYTES = 64e6;
 
-/** The pages of a folder that `gaussian-splat detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again. */
-export function folderSource(
-  manifest: DetailManifest,
-  fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>,
-): PageSource {
+/**
+ * Brings a file of pages.
+ * @param coded what {@link decodePage} needs to know of it; undefined where files are not coded
+ */
+export type FetchPage = (
+  file: string,
+  signal: AbortSignal,
+  coded?: CodedFile,
+) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>;
+
+/**
+ * The pages of a folder that `gaussian-splat detail` wrote. A file of the wrong length is not kept: the next time it is asked for it is fetched again.
+ * @param isDecoded whether `fetchPage` decodes files that are coded
+ */
+export function folderSource(manifest: DetailManifest, fetchPage: FetchPage, isDecoded = false): PageSource {
   const list = listPages(manifest);
-  const lengthOf = (chunks: number): number => 4 * pageLayout(manifest, chunks).total;
-  const lengths = new Map(
-    manifest.trees.flatMap(({ pages }) => pages.map(({ file, chunks }) => [file, lengthOf(chunks)])),
-  );
+  const { coding, shDegree } = manifest;
+  const files = new Map(manifest.trees.flatMap(({ pages }) => pages.map((page) => [page.file, page])));
   const layout = chunkLayout(manifest);
+  const fetchWords = async (file: string, signal: AbortSignal): Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>> => {
+    if (coding === undefined) return fetchPage(file, signal);
+    const { chunks, upper } = files.get(file)!;
+    const coded = { chunks, upper, shDegree, coding };
+    const found = await fetchPage(file, signal, coded);
+    if (isDecoded) return found;
+    const bytes = ArrayBuffer.isView(found)
+      ? new Uint8Array(found.buffer, found.byteOffset, found.byteLength)
+      : new Uint8Array(found);
+    return (await loadDecoder()).decodePage(file, bytes, coded);
+  };
   const fetchWhole = async (file: string, signal: AbortSignal): Promise<ArrayBuffer> => {
-    const bytes = wholeFile(file, lengths.get(file)!, await fetchPage(file, signal));
+    const { chunks } = files.get(file)!;
+    const bytes = wholeFile(file, 4 * pageLayout(manifest, chunks).total, await fetchWords(file, signal));
     requireBounds(file, new Float32Array(bytes, 0, (layout.chunks * bytes.byteLength) / (4 * layout.total)));
     return bytes;
   };
-  const files = new PageFiles(fetchWhole, KEPT_BYTES);
+  const kept = new PageFiles(fetchWhole, KEPT_BYTES);
   const fetch = async (page: number, signal: AbortSignal): Promise<SlotWords[]> => {
     const { file, first, chunks } = list.place(page);
-    const bytes = await files.get(file.file, signal);
+    const bytes = await kept.get(file.file, signal);
     signal.throwIfAborted();
     return [{ words: new Uint32Array(bytes), of: file.chunks, first, chunks }];
   };
-  const isAtHand = (page: number): boolean => files.has(list.place(page).file.file);
+  const isAtHand = (page: number): boolean => kept.has(list.place(page).file.file);
   return { scene: manifest, list, fetch, isAtHand, translate: list.translate };
 }
+
+const loadDecoder = (): Promise<typeof decoder> =>
+  loadModule('the code that decodes pages', () => import('./decode-page.js'));
 
 /** The bytes of a file in a buffer of their own, whatever view of one they came in. */
 function wholeFile(where: string, length: number, bytes: ArrayBuffer | ArrayBufferView<ArrayBuffer>): ArrayBuffer {

@@ -17,6 +17,8 @@ const {
   QUANTIZED_OPAQUE,
 } = constants;
 
+/** Codes of a splat: see {@link putRow}. */
+export const ROW_CODES = 10;
 /** 32-bit words of a chunk. */
 export const QUANTIZED_CHUNK_WORDS = 4 * QUANTIZED_CHUNK_ROWS;
 const CENTER_STEPS = 65535;
@@ -47,7 +49,7 @@ const codeOf = (value: number, least: number, step: number, most: number): numbe
   step > 0 ? Math.min(most, Math.max(0, Math.round((value - least) / step))) : 0;
 
 /** Lengths of the rows of a factor (xx, yx, yy, zx, zy, zz) from number `f` on. */
-function rowLengths(factors: Float32Array, f: number, lengths: Float64Array): void {
+export function rowLengths(factors: Float32Array, f: number, lengths: Float64Array): void {
   lengths[0] = Math.abs(factors[f]);
   lengths[1] = Math.hypot(factors[f + 1], factors[f + 2]);
   lengths[2] = Math.hypot(factors[f + 3], factors[f + 4], factors[f + 5]);
@@ -87,6 +89,7 @@ export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: nu
   floats[at + 3] = least;
   floats[at + 7] = roundedUp((largest - floats[at + 3]) / QUANTIZED_SIZES);
   const lengths = new Float64Array(3);
+  const codes = new Int32Array(ROW_CODES);
   const code = (k: number, value: number, most: number): number =>
     codeOf(value, floats[at + k], floats[at + 4 + k], most);
   for (let i = from; i < end; i++) {
@@ -99,11 +102,33 @@ export function packQuantizedChunk(level: SplatLevel, words: Uint32Array, at: nu
     const t = directionIn2(first * factors[f + 1], factors[f + 2]);
     const [u, v] = directionIn3(first * factors[f + 3], second * factors[f + 4], factors[f + 5]);
     const row = at + 4 * (QUANTIZED_HEAD_ROWS + i - from);
-    words[row] = x | (y << 16);
-    words[row + 1] = z | (u << 16) | (t << 29);
-    words[row + 2] = size(0) | (size(1) << 10) | (size(2) << 20) | ((t >>> 3) << 30);
-    words[row + 3] = v | (opacityCode(opacities[i]) << 13) | ((t >>> 5) << 25);
+    codes.set([x, y, z, size(0), size(1), size(2), t, u, v, opacityCode(opacities[i])]);
+    putRow(words, row, codes);
   }
+}
+
+/** Writes a splat: x, y, z, three sizes, t, u, v, opacity. */
+export function putRow(words: Uint32Array, row: number, codes: Int32Array): void {
+  const t = codes[6];
+  words[row] = codes[0] | (codes[1] << 16);
+  words[row + 1] = codes[2] | (codes[7] << 16) | (t << 29);
+  words[row + 2] = codes[3] | (codes[4] << 10) | (codes[5] << 20) | ((t >>> 3) << 30);
+  words[row + 3] = codes[8] | (codes[9] << 13) | ((t >>> 5) << 25);
+}
+
+/** Reads what {@link putRow} wrote. */
+export function readRow(words: Uint32Array, row: number, codes: Int32Array): void {
+  const [a, b, c, d] = [words[row], words[row + 1], words[row + 2], words[row + 3]];
+  codes[0] = a & 0xffff;
+  codes[1] = a >>> 16;
+  codes[2] = b & 0xffff;
+  codes[3] = c & 1023;
+  codes[4] = (c >>> 10) & 1023;
+  codes[5] = (c >>> 20) & 1023;
+  codes[6] = (b >>> 29) | ((c >>> 30) << 3) | ((d >>> 25) << 5);
+  codes[7] = (b >>> 16) & 0x1fff;
+  codes[8] = d & 0x1fff;
+  codes[9] = (d >>> 13) & 0xfff;
 }
 
 /** Makes the bounds of a chunk, which begin at number `at`, those of its quantized splats. */
@@ -118,14 +143,14 @@ function opacityCode(opacity: number): number {
 }
 
 /** The direction of (x, |y|): where it meets the line |x| + y = 1. */
-function directionIn2(x: number, y: number): number {
+export function directionIn2(x: number, y: number): number {
   const sum = Math.abs(x) + Math.abs(y);
   if (!(sum > 0)) return QUANTIZED_T_ZERO;
   return QUANTIZED_T_ZERO + Math.round((QUANTIZED_T_ZERO * x) / sum);
 }
 
 /** The direction of (x, y, |z|): the octahedral map of the half sphere, turned by 45° so that it fills a square (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors"). */
-function directionIn3(x: number, y: number, z: number): readonly [u: number, v: number] {
+export function directionIn3(x: number, y: number, z: number): readonly [u: number, v: number] {
   const sum = Math.abs(x) + Math.abs(y) + Math.abs(z);
   if (!(sum > 0)) return [QUANTIZED_UV_ZERO, QUANTIZED_UV_ZERO];
   const coded = (value: number): number => QUANTIZED_UV_ZERO + Math.round((QUANTIZED_UV_ZERO * value) / sum);

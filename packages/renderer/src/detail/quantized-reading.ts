@@ -1,9 +1,4 @@
-import {
-  cullQuantized,
-  cullSerialQuantized,
-  orderKeysQuantized,
-  projectQuantized,
-} from '../generated/quantized-shaders.js';
+import { cullQuantized, cullSerialQuantized, projectQuantized } from '../generated/quantized-shaders.js';
 import type { GeometryReading } from '../geometry-reading.js';
 
 /** Reads what {@link packQuantizedChunk} of quantized-geometry.ts writes. */
@@ -11,5 +6,4 @@ export const QUANTIZED: GeometryReading = {
   cull: cullQuantized,
   cullSerial: cullSerialQuantized,
   project: projectQuantized,
-  orderKeys: orderKeysQuantized,
 };

@@ -8,7 +8,7 @@ import { ARRIVAL_MS, Arrivals } from './arrivals.js';
 import { SLOT_CHUNKS, type DetailManifest } from './manifest.js';
 import { NONE } from './page-list.js';
 import { PagePool, poolBytes, poolSize, slotBytes } from './page-pool.js';
-import { folderSource, type PageSource } from './page-source.js';
+import { folderSource, type FetchPage, type PageSource } from './page-source.js';
 import { PageTraffic } from './page-traffic.js';
 import { PlacedRows } from './placed-rows.js';
 import { Residency } from './residency.js';
@@ -37,7 +37,9 @@ export interface StreamOptions extends PoolOptions {
    * Fetches a file of pages, named relative to the manifest; 64 at a time at most. Aborted when no view wishes for any of them any more, and when the scene is destroyed. Best done in a
    * worker: reading a response costs a thread more than all else that a page needs.
    */
-  readonly fetchPage: (file: string, signal: AbortSignal) => Promise<ArrayBuffer | ArrayBufferView<ArrayBuffer>>;
+  readonly fetchPage: FetchPage;
+  /** Whether {@link fetchPage} decodes the files of a manifest that has a `coding`, by `decodePage` and what it is told of them. Default: they are decoded here. */
+  readonly isDecoded?: boolean;
 }
 
 /** Fits a phone. */
@@ -164,7 +166,7 @@ export class StreamedGaussians implements GaussianScene {
    * is no time; the reason of `signal`.
    */
   static open(device: GPUDevice, manifest: DetailManifest, options: StreamOptions): Promise<StreamedGaussians> {
-    return this.openSource(device, folderSource(manifest, options.fetchPage), options);
+    return this.openSource(device, folderSource(manifest, options.fetchPage, options.isDecoded), options);
   }
 
   /**

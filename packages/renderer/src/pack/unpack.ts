@@ -60,7 +60,11 @@ function halfTable(): Float32Array {
 export type ShReader = (first: number, count: number, out: Float32Array) => void;
 
 /** Reads packed harmonics. */
-export function shReader({ sh, shDegree, shPrecision }: PackedGaussians): ShReader {
+export function shReader({
+  sh,
+  shDegree,
+  shPrecision,
+}: Pick<PackedGaussians, 'sh' | 'shDegree' | 'shPrecision'>): ShReader {
   return shPrecision === 'float16' ? halfReader(sh, shDegree) : int8Reader(sh, shDegree);
 }
 

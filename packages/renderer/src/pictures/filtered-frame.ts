@@ -9,7 +9,7 @@ import { PictureTensor, type PictureShape } from './picture-tensor.js';
 export interface ModelPicture {
   readonly buffer: GPUBuffer;
   readonly dtype: 'float32' | 'float16';
-  /** [1, 3, height, width] */
+  /** [1, 3, height, width]; a batch of one may be missing, and a fourth plane is not read. */
   readonly dims: readonly number[];
 }
 
@@ -73,8 +73,9 @@ export class FilteredFrame {
    * the next call.
    */
   handOver(shape: PictureShape): PictureTensor {
-    const { width, height, dtype } = this.#tensor?.shape ?? {};
-    if (width !== shape.width || height !== shape.height || dtype !== shape.dtype) {
+    const { width, height, dtype, channels } = this.#tensor?.shape ?? {};
+    const isSame = width === shape.width && height === shape.height && dtype === shape.dtype;
+    if (!isSame || channels !== shape.channels) {
       this.#tensor?.destroy();
       this.#tensor = new PictureTensor(this.#device, shape);
     }
@@ -89,7 +90,11 @@ export class FilteredFrame {
   /** Takes over what the model made of the frame handed over last; submits its work before it returns. */
   accept({ buffer, dtype, dims }: ModelPicture): void {
     const bytes = new ArrayBuffer(layouts.TensorToImage.size);
-    writeStruct(layouts.TensorToImage, { size: [dims[3], dims[2]], is_half: dtype === 'float16' ? 1 : 0 }, bytes);
+    writeStruct(
+      layouts.TensorToImage,
+      { size: [dims.at(-1)!, dims.at(-2)!], is_half: dtype === 'float16' ? 1 : 0 },
+      bytes,
+    );
     this.#device.queue.writeBuffer(this.#uniform, 0, bytes);
     const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.accept' });
     this.#paint.record(encoder, this.#bindingsOf(buffer), this.#filteredView, FORMAT);

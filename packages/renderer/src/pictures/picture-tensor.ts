@@ -5,11 +5,15 @@ import { BUFFER_USAGE, kernelOf, TEXTURE_USAGE, type ComputeKernel } from '../gp
 import { GpuMemory } from '../gpu/memory.js';
 import { writeStruct } from '../gpu/struct.js';
 
-/** Size and element type of a tensor [1,3,height,width]. */
+/** Size and element type of a tensor [views,channels,height,width]. */
 export interface PictureShape {
   readonly width: number;
   readonly height: number;
   readonly dtype: 'float32' | 'float16';
+  /** 4 with alpha. Default 3. */
+  readonly channels?: 3 | 4;
+  /** Pictures, one after the other. Default 1. */
+  readonly views?: number;
 }
 
 /**
@@ -19,13 +23,13 @@ export interface PictureShape {
 export type PictureFit = 'stretch' | 'cover';
 
 /**
- * A picture as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1 as they are encoded (sRGB), top row first, over
+ * A picture, or several, as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1 as they are encoded (sRGB), top row first, over
  * black where the picture is transparent. Pictures of another size are resampled: bilinear, antialiased where they shrink.
  */
 export class PictureTensor {
   readonly shape: PictureShape;
-  /** [1, 3, height, width] */
-  readonly dims: readonly [1, 3, number, number];
+  /** [views, channels, height, width] */
+  readonly dims: readonly [number, 3 | 4, number, number];
   /** The elements; float16 two to a word. */
   readonly buffer: GPUBuffer;
   readonly #device: GPUDevice;
@@ -33,20 +37,27 @@ export class PictureTensor {
   readonly #memory: GpuMemory;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.ImageToTensor.size);
+  /** Of one picture. */
+  readonly #words: number;
   readonly #bindings = new WeakMap<GPUTexture, GPUBindGroup>();
   #version = 0;
 
-  /** @throws GaussianSplatError `out-of-memory/buffer-limit` for a size that the device does not allow. */
+  /**
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` for a size that the device does not allow; `argument/value` for several pictures of
+   * float16 with an odd number of elements.
+   */
   constructor(device: GPUDevice, shape: PictureShape) {
+    const { width, height, dtype, channels = 3, views = 1 } = shape;
     this.shape = shape;
-    this.dims = [1, 3, shape.height, shape.width];
+    this.dims = [views, channels, height, width];
+    this.#words = (channels * width * height) / (dtype === 'float16' ? 2 : 1);
+    if (views > 1 && !Number.isInteger(this.#words)) throw oddHalves(width, height);
     this.#device = device;
     this.#kernel = kernelOf(device, imageToTensor);
     this.#memory = new GpuMemory(device);
     const { storage, uniform, copySource, copyDestination } = BUFFER_USAGE;
-    const bytes = 3 * shape.width * shape.height * (shape.dtype === 'float16' ? 2 : 4);
     // Whole pieces of 16 bytes: ONNX Runtime copies no smaller ones.
-    const size = Math.ceil(bytes / 16) * 16;
+    const size = Math.ceil((4 * views * this.#words) / 16) * 16;
     this.buffer = this.#memory.buffer('gs.picture.tensor', size, storage | copySource | copyDestination);
     const usage = uniform | copyDestination;
     this.#uniform = this.#memory.buffer('gs.picture.uniform', layouts.ImageToTensor.size, usage);
@@ -69,9 +80,10 @@ export class PictureTensor {
   /**
    * Takes a picture over from a texture with the usage TEXTURE_BINDING: encodes and submits one compute pass; nothing is read back.
    * Textures with alpha hold premultiplied colours.
+   * @param view which of several pictures it is, from 0
    */
-  write(texture: GPUTexture, fit: PictureFit = 'stretch'): void {
-    this.#writeUniform(texture.width, texture.height, fit);
+  write(texture: GPUTexture, fit: PictureFit = 'stretch', view = 0): void {
+    this.#writeUniform(texture.width, texture.height, fit, view);
     let bindings = this.#bindings.get(texture);
     if (bindings === undefined) {
       bindings = this.#kernel.bind({ image: this.#uniform, picture: texture.createView(), tensor: this.buffer });
@@ -79,9 +91,7 @@ export class PictureTensor {
     }
     const encoder = this.#device.createCommandEncoder({ label: 'gs.picture' });
     const pass = encoder.beginComputePass({ label: 'gs.picture' });
-    const { width, height, dtype } = this.shape;
-    const words = Math.ceil((3 * width * height) / (dtype === 'float16' ? 2 : 1));
-    this.#kernel.dispatch(pass, bindings, Math.ceil(words / constants.IMAGE_GROUP));
+    this.#kernel.dispatch(pass, bindings, Math.ceil(this.#words / constants.IMAGE_GROUP));
     pass.end();
     this.#device.queue.submit([encoder.finish()]);
     this.#version++;
@@ -91,7 +101,7 @@ export class PictureTensor {
    * Takes over what a browser can draw (an ImageBitmap, an image, a canvas, a frame of a video), without reading it back.
    * @throws GaussianSplatError `argument/value` for a picture without pixels, or larger than the device's textures.
    */
-  upload(source: GPUCopyExternalImageSource, fit: PictureFit = 'cover'): void {
+  upload(source: GPUCopyExternalImageSource, fit: PictureFit = 'cover', view = 0): void {
     const { width, height } = sizeOf(source);
     const most = this.#device.limits.maxTextureDimension2D;
     if (!(width > 0 && height > 0 && width <= most && height <= most)) throw wrongSize(width, height, most);
@@ -103,7 +113,7 @@ export class PictureTensor {
       usage: copyDestination | textureBinding | renderAttachment,
     });
     this.#device.queue.copyExternalImageToTexture({ source }, { texture, premultipliedAlpha: true }, [width, height]);
-    this.write(texture, fit);
+    this.write(texture, fit, view);
     // What has been submitted still finds it.
     texture.destroy();
   }
@@ -112,12 +122,15 @@ export class PictureTensor {
     this.#memory.destroy();
   }
 
-  #writeUniform(width: number, height: number, fit: PictureFit): void {
-    const { width: columns, height: rows, dtype } = this.shape;
+  #writeUniform(width: number, height: number, fit: PictureFit, view: number): void {
+    const { width: columns, height: rows, dtype, channels = 3 } = this.shape;
     let [across, down] = [width / columns, height / rows];
     if (fit === 'cover') across = down = Math.min(across, down);
     const corner = [(width - across * columns) / 2, (height - down * rows) / 2];
-    const values = { corner, step: [across, down], size: [columns, rows], is_half: dtype === 'float16' ? 1 : 0 };
+    const values = {
+      ...{ corner, step: [across, down], size: [columns, rows], is_half: dtype === 'float16' ? 1 : 0 },
+      ...{ channels, first_word: view * this.#words },
+    };
     writeStruct(layouts.ImageToTensor, values, this.#uniformBytes);
     this.#device.queue.writeBuffer(this.#uniform, 0, this.#uniformBytes);
   }
@@ -130,6 +143,14 @@ function sizeOf(source: GPUCopyExternalImageSource): { width: number; height: nu
   if ('naturalWidth' in source) return { width: source.naturalWidth, height: source.naturalHeight };
   return { width: source.width, height: source.height };
 }
+
+const oddHalves = (width: number, height: number): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: 'several pictures of float16',
+    expected: 'an even number of elements in each',
+    found: `${width} x ${height}`,
+    remedy: 'export the model for pictures of an even width',
+  });
 
 const wrongSize = (width: number, height: number, most: number): GaussianSplatError =>
   new GaussianSplatError('argument/value', {

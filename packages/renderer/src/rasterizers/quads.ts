@@ -1,7 +1,14 @@
 import { constants, layouts, rasterizeQuads } from '../generated/shaders.js';
 import { BUFFER_USAGE, perDevice, SHADER_STAGE, ShaderProgram } from '../gpu/kernel.js';
 import { writeStruct } from '../gpu/struct.js';
-import type { AccumulationFormat, OrderKind, Painting, Rasterizer, RasterizerInputs, Slice } from './rasterizer.js';
+import type {
+  AccumulationFormat,
+  Painting,
+  QuadsWithDepth,
+  Rasterizer,
+  RasterizerInputs,
+  Slice,
+} from './rasterizer.js';
 
 const { QUAD_BATCH } = constants;
 /** Two triangles. */
@@ -19,8 +26,8 @@ export class QuadsRasterizer implements Rasterizer {
   readonly #indices: GPUBuffer;
   readonly #uniform: GPUBuffer;
   readonly #uniformBytes = new ArrayBuffer(layouts.RasterView.size);
-  #bindings: Readonly<Record<OrderKind, GPUBindGroup>> | undefined;
-  #capacity = 0;
+  #bindings: GPUBindGroup | undefined;
+  #inputs: RasterizerInputs | undefined;
 
   constructor(device: GPUDevice, format: AccumulationFormat) {
     this.#device = device;
@@ -53,14 +60,10 @@ export class QuadsRasterizer implements Rasterizer {
     return 0;
   }
 
-  bind({ plan, splats, orders, capacity }: RasterizerInputs): void {
-    this.#capacity = capacity;
-    const bindTo = (order: GPUBuffer): GPUBindGroup =>
-      this.#program.bind({ raster: this.#uniform, plan, splats, order });
-    this.#bindings = {
-      sorted: bindTo(orders.sorted),
-      identity: bindTo(orders.identity),
-    };
+  bind(inputs: RasterizerInputs): void {
+    this.#inputs = inputs;
+    const { plan, splats, order } = inputs;
+    this.#bindings = this.#program.bind({ raster: this.#uniform, plan, splats, order });
   }
 
   /** One pipeline serves all levers. */
@@ -71,7 +74,7 @@ export class QuadsRasterizer implements Rasterizer {
   /** Quads are drawn from what the stages before have left. */
   prepareFrame(): void {}
 
-  record(encoder: GPUCommandEncoder, { surface, order, timer }: Painting, slice: Slice): void {
+  record(encoder: GPUCommandEncoder, { surface, timer, depth, depths }: Painting, slice: Slice): void {
     const { view, width, height } = surface;
     writeStruct(
       layouts.RasterView,
@@ -92,14 +95,17 @@ export class QuadsRasterizer implements Rasterizer {
       ],
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    if (this.#bindings !== undefined) {
+    if (this.#bindings !== undefined && this.#inputs !== undefined) {
+      const { plan, splats, order, capacity } = this.#inputs;
+      const deep = depth?.quadsProgram;
+      const resources = { raster: this.#uniform, plan, splats, order };
       // The image may be a part of the texture.
       pass.setViewport(0, 0, width, height, 0, 1);
-      pass.setPipeline(this.#pipeline());
-      pass.setBindGroup(0, this.#bindings[order]);
+      pass.setPipeline(this.#pipeline(deep));
+      pass.setBindGroup(0, deep && depths ? deep.bind(resources, depth!, depths) : this.#bindings);
       pass.setIndexBuffer(this.#indices, 'uint16');
       // As many as there is room for: the vertices of those that are not there lie outside.
-      pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(this.#capacity / QUAD_BATCH));
+      pass.drawIndexed(QUAD_BATCH * INDICES_PER_QUAD, Math.ceil(capacity / QUAD_BATCH));
     }
     pass.end();
   }
@@ -108,14 +114,18 @@ export class QuadsRasterizer implements Rasterizer {
     this.#uniform.destroy();
   }
 
-  #pipeline(): GPURenderPipeline {
-    return perDevice(this.#device, `quads ${this.#format}`, () =>
-      makePipeline(this.#device, this.#program, this.#format),
+  #pipeline(deep?: QuadsWithDepth): GPURenderPipeline {
+    return perDevice(this.#device, `quads ${this.#format}${deep?.name ?? ''}`, () =>
+      makePipeline(this.#device, deep ?? this.#program, this.#format),
     );
   }
 }
 
-function makePipeline(device: GPUDevice, program: Program, format: AccumulationFormat): GPURenderPipeline {
+function makePipeline(
+  device: GPUDevice,
+  program: Pick<Program, 'module' | 'pipelineLayout'>,
+  format: AccumulationFormat,
+): GPURenderPipeline {
   const { module, pipelineLayout } = program;
   const blend: GPUBlendState = {
     color: { srcFactor: 'one', dstFactor: 'one-minus-src-alpha', operation: 'add' },

@@ -1,14 +1,14 @@
 import type { FrameTimer } from '../gpu/pass-timer.js';
+import type { Camera } from '@gaussian-splat/core';
+import type { ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
 import type { Levers } from '../levers.js';
+import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
 export type RasterizerName = 'quads' | 'tiles';
 
 /** Formats of the accumulation texture. Quads blend into `rgba32float` only with the feature `float32-blendable`. */
 export type AccumulationFormat = 'rgba16float' | 'rgba32float';
-
-/** Buffers that list slots from near to far: the one that a sort leaves, and the one for slots that are in that order themselves. */
-export type OrderKind = 'sorted' | 'identity';
 
 /** What every rasterizer reads. */
 export interface RasterizerInputs {
@@ -17,9 +17,7 @@ export interface RasterizerInputs {
   /** array<ProjectedSplat> by slot. */
   readonly splats: GPUBuffer;
   /** Slots from near to far. */
-  readonly orders: Readonly<Record<OrderKind, GPUBuffer>>;
-  /** Numbers of the visible splats by slot, for frames whose order is `identity`. */
-  readonly survivors: GPUBuffer;
+  readonly order: GPUBuffer;
   /** Of at least {@link Rasterizer.spareBytes} each: nobody else's once splats are in order, until the next frame. */
   readonly spare: readonly [GPUBuffer, GPUBuffer];
   /** Most splats that can be visible. */
@@ -71,21 +69,49 @@ export interface NotedFrame {
   readonly survivors: GPUBuffer;
 }
 
+/** What a frame has to do with depth besides its own. `SceneDepth` is one; pictures bring it, so that pages without it load none of its code. */
+export interface PaintingDepth {
+  /** Called before a frame is recorded, with the pixels that are drawn. @throws GaussianSplatError for a frame that it does not fit */
+  prepare(
+    camera: Camera,
+    drawn: { readonly width: number; readonly height: number },
+    rasterizer: RasterizerName,
+    notes: FrameNotes | undefined,
+  ): void;
+  tilesKernel(variant: RasterizeVariant): RasterizeKernel;
+  bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup;
+  readonly quadsProgram: QuadsWithDepth;
+}
+
+/** Quads that read depths: what a pipeline is made of, and what is bound to it. */
+export interface QuadsWithDepth extends Pick<ShaderProgram<ShaderDescription>, 'module' | 'pipelineLayout'> {
+  readonly name: string;
+  bind(
+    resources: Readonly<Record<'raster' | 'plan' | 'splats' | 'order', GPUBuffer>>,
+    depth: PaintingDepth,
+    depths: GPUBuffer,
+  ): GPUBindGroup;
+}
+
 /** Levers that rasterizers know. */
 export type PaintingLevers = Pick<Levers, 'transmittanceMin'>;
 
 /** One frame to draw. */
 export interface Painting {
-  readonly notes?: FrameNotes;
+  readonly notes?: FrameNotes | undefined;
+  /** Numbers of the visible splats by slot; with {@link notes}. */
+  readonly survivors?: GPUBuffer | undefined;
   readonly surface: Surface;
-  readonly order: OrderKind;
   readonly levers: PaintingLevers;
   /**
    * Premultiplied colour to lay the splats over; the surface is then the final image. Without it the surface receives colour, and
    * transmittance in the alpha channel. Only for surfaces that the rasterizer `finishes`.
    */
   readonly background?: readonly [number, number, number, number];
-  readonly timer?: FrameTimer;
+  readonly timer?: FrameTimer | undefined;
+  readonly depth?: PaintingDepth | undefined;
+  /** Camera depths of the splats by slot; with {@link depth}. */
+  readonly depths?: GPUBuffer | undefined;
 }
 
 /** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */

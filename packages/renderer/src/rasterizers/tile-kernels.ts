@@ -1,6 +1,13 @@
 /** The pipelines of the rasterizer `tiles`. */
 import { binCount, binEmit, binIndex, binPlan, rasterizeTiles, rasterizeTilesNoting } from '../generated/shaders.js';
-import { ComputeKernel, kernelOf, perDevice, storingInto } from '../gpu/kernel.js';
+import {
+  ComputeKernel,
+  kernelOf,
+  perDevice,
+  storingInto,
+  type Overrides,
+  type ShaderDescription,
+} from '../gpu/kernel.js';
 
 /** Those that list splats for bins: the same whatever the image. */
 export interface ListingKernels {
@@ -32,13 +39,19 @@ export interface RasterizeVariant {
 }
 
 /** The pipeline for a variant; made once for each device. */
-export function rasterizeKernel(device: GPUDevice, variant: RasterizeVariant): RasterizeKernel {
+export function rasterizeKernel(
+  device: GPUDevice,
+  variant: RasterizeVariant,
+  other?: ShaderDescription,
+  overrides: Overrides = {},
+): RasterizeKernel {
   const { format, isFinal, isNoting, refusesLast } = variant;
-  const shader = isNoting ? (rasterizeTilesNoting as unknown as typeof rasterizeTiles) : rasterizeTiles;
+  const shader = (other ?? (isNoting ? rasterizeTilesNoting : rasterizeTiles)) as typeof rasterizeTiles;
   const [writesHalf, writesBytes] = [format === 'rgba16float', format.endsWith('8unorm')];
   const constants = {
     ...{ refuses_last: +refusesLast, is_final: +isFinal },
     ...{ writes_half: +writesHalf, writes_bytes: +writesBytes },
+    ...overrides,
   };
   const key = `${shader.name} ${format} ${JSON.stringify(constants)}`;
   return perDevice(device, key, () => new ComputeKernel(device, storingInto(shader, format), constants));

@@ -9,7 +9,6 @@ import type {
   AccumulationFormat,
   FrameNotes,
   NotedFrame,
-  OrderKind,
   Painting,
   PaintingLevers,
   Rasterizer,
@@ -37,7 +36,8 @@ interface Grid {
 interface GridBindings {
   readonly grid: Grid;
   readonly ranges: GPUBuffer;
-  readonly listing: Readonly<Record<OrderKind, { readonly count: GPUBindGroup; readonly emit: GPUBindGroup }>>;
+  readonly count: GPUBindGroup;
+  readonly emit: GPUBindGroup;
   readonly plan: GPUBindGroup;
   readonly sort: SortBindings;
   readonly index: GPUBindGroup;
@@ -127,27 +127,26 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   /** Lists the splats for the bins. */
-  prepareFrame(encoder: GPUCommandEncoder, { surface, order, levers, background, timer }: Painting): void {
+  prepareFrame(encoder: GPUCommandEncoder, { surface, levers, background, timer }: Painting): void {
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const buffers = this.#buffers;
     const bound = this.#gridFor(surface, this.#inputs, buffers);
     this.#writeView(surface, bound.grid, [0, 0], levers, background);
 
     const { count, plan, emit, index } = this.#kernels;
-    const listing = bound.listing[order];
     const bin = encoder.beginComputePass({ label: 'gs.bin', timestampWrites: timer?.timestampWrites('bin') });
     // As many as there is room for: groups beyond the splats and pairs that are there end at once.
     const groups = groupsOf(this.#inputs.capacity);
-    count.dispatch(bin, listing.count, groups);
+    count.dispatch(bin, bound.count, groups);
     plan.dispatch(bin, bound.plan, 1);
-    emit.dispatch(bin, listing.emit, groups);
+    emit.dispatch(bin, bound.emit, groups);
     this.#sort.record(bin, bound.sort, this.#inputs.pairCapacity);
     index.dispatch(bin, bound.index, Math.ceil(this.#inputs.pairCapacity / PROJECT_GROUP));
     bin.end();
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, levers, background, notes, timer } = painting;
+    const { surface, levers, background, notes, survivors, timer, depth, depths } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
     const { format, width, height } = surface;
@@ -159,15 +158,17 @@ export class TilesRasterizer implements Rasterizer {
       label: 'gs.rasterize',
       timestampWrites: timer?.timestampWrites('rasterize'),
     });
-    const kernel = rasterizeKernel(this.#device, {
-      format,
-      isFinal: background !== undefined,
-      isNoting: notes !== undefined,
+    const variant = {
+      ...{ format, isFinal: background !== undefined, isNoting: notes !== undefined },
       refusesLast: refusesLast(levers),
-    });
-    const image = notes
-      ? this.#bindNoting(kernel, bound, surface.view, notes)
-      : this.#imageBindings(kernel, bound, surface.view);
+    };
+    const kernel = depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant);
+    const image =
+      depth && depths
+        ? depth.bindTiles(kernel, this.#painted(bound, surface.view), depths)
+        : notes && survivors
+          ? this.#bindNoting(kernel, bound, surface.view, { ...notes, survivors })
+          : this.#imageBindings(kernel, bound, surface.view);
     kernel.dispatchGrid(paint, image, columns, rows);
     paint.end();
   }
@@ -205,7 +206,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   #bindings(
-    { plan, splats, orders }: RasterizerInputs,
+    { plan, splats, order }: RasterizerInputs,
     { rects, groupPairs, plan: pairPlan, bins, pairs, digitCounts, digitTotals }: PairBuffers,
     bits: number,
     ranges: GPUBuffer,
@@ -213,18 +214,10 @@ export class TilesRasterizer implements Rasterizer {
     const view = this.#view;
     const sorted = sortedIn(bits);
     const { count, plan: planKernel, emit, index } = this.#kernels;
-    const listing = (order: GPUBuffer): GridBindings['listing'][OrderKind] => {
-      const shared = { view, plan, order, rects, group_pairs: groupPairs };
-      return {
-        count: count.bind({ ...shared, splats }),
-        emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }),
-      };
-    };
+    const shared = { view, plan, order, rects, group_pairs: groupPairs };
     return {
-      listing: {
-        sorted: listing(orders.sorted),
-        identity: listing(orders.identity),
-      },
+      count: count.bind({ ...shared, splats }),
+      emit: emit.bind({ ...shared, bins: bins[0], pairs: pairs[0] }),
       plan: planKernel.bind({ values: groupPairs, view, pair_plan: pairPlan, ranges }),
       sort: this.#sort.bind({ plan: pairPlan, keys: bins, values: pairs, digitCounts, digitTotals }, bits),
       index: index.bind({
@@ -266,7 +259,7 @@ export class TilesRasterizer implements Rasterizer {
     kernel: RasterizeKernel,
     bound: GridBindings,
     image: GPUTextureView,
-    { contributions, depth }: FrameNotes,
+    { contributions, depth, survivors }: FrameNotes & { readonly survivors: GPUBuffer },
   ): GPUBindGroup {
     this.#nowhere ??= {
       contributions: this.#memory.buffer('gs.rasterize.no_contributions', 4, BUFFER_USAGE.storage),
@@ -278,7 +271,7 @@ export class TilesRasterizer implements Rasterizer {
       }),
     };
     return (kernel as unknown as ComputeKernel<typeof rasterizeTilesNoting>).bind({
-      ...(this.#noted = { ...this.#painted(bound, image), survivors: this.#inputs!.survivors }),
+      ...(this.#noted = { ...this.#painted(bound, image), survivors }),
       contributions: contributions ?? this.#nowhere.contributions,
       depths: (depth ?? this.#nowhere.depth).createView(),
     });

@@ -4,6 +4,8 @@ import { ComputeKernel, perDevice, SHADER_STAGE, ShaderProgram, storingInto, typ
 import type { Surface } from '../rasterizers/rasterizer.js';
 
 const { COMPOSE_SIDE } = constants;
+/** Premultiplied colour over what is there. */
+const OVER: GPUBlendComponent = { srcFactor: 'one', dstFactor: 'one-minus-src-alpha', operation: 'add' };
 
 /** What is composed, bound for drawing; for storing it is bound to each view of a target when that is first met. */
 export interface ComposeBindings {
@@ -39,13 +41,20 @@ export class ComposeStage {
     else this.#pipeline(format);
   }
 
-  draw(encoder: GPUCommandEncoder, bindings: ComposeBindings, { view, format }: Surface, timer?: FrameTimer): void {
+  /** @param keeps lays the splats over what the target holds, in place of a background */
+  draw(
+    encoder: GPUCommandEncoder,
+    bindings: ComposeBindings,
+    { view, format }: Surface,
+    timer?: FrameTimer,
+    keeps = false,
+  ): void {
     const pass = encoder.beginRenderPass({
       label: 'gs.compose',
-      colorAttachments: [{ view, loadOp: 'clear', storeOp: 'store' }],
+      colorAttachments: [{ view, loadOp: keeps ? 'load' : 'clear', storeOp: 'store' }],
       timestampWrites: timer?.timestampWrites('compose'),
     });
-    pass.setPipeline(this.#pipeline(format));
+    pass.setPipeline(this.#pipeline(format, keeps));
     pass.setBindGroup(0, bindings.drawn);
     pass.draw(3);
     pass.end();
@@ -72,15 +81,16 @@ export class ComposeStage {
     );
   }
 
-  #pipeline(format: GPUTextureFormat): GPURenderPipeline {
+  #pipeline(format: GPUTextureFormat, keeps = false): GPURenderPipeline {
+    const blend = keeps ? { color: OVER, alpha: OVER } : undefined;
     const { module, pipelineLayout } = this.#program;
-    return perDevice(this.#device, `compose ${format}`, () =>
+    return perDevice(this.#device, `compose ${format} ${keeps}`, () =>
       this.#device.createRenderPipeline({
         label: `gs.compose.${format}`,
         layout: pipelineLayout,
         vertex: { module, entryPoint: 'vertex' },
         fragment: {
-          ...{ module, entryPoint: 'fragment', targets: [{ format }] },
+          ...{ module, entryPoint: 'fragment', targets: [{ format, blend }] },
           constants: { is_encoding: Number(format.endsWith('-srgb')) },
         },
         primitive: { topology: 'triangle-list' },

@@ -1,9 +1,10 @@
-import { validateCamera, type Camera, type ShDegree } from '@gaussian-splat/core';
+import { SPLAT_FILTERS, validateCamera, type Camera, type ShDegree, type SplatFilter } from '@gaussian-splat/core';
 import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
 import { constants, layouts } from '../generated/shaders.js';
 import { SH_PRECISION } from '../pack/sh.js';
+import type { Rgba } from '../picture.js';
 import type { AccumulationFormat } from '../rasterizers/rasterizer.js';
-import { cameraValues, scaled } from '../view.js';
+import { cameraValues, MAX_FLOAT32, scaled } from '../view.js';
 import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
 import { rowsOf, type GlGaussians } from './gl-gaussians.js';
 import { probeSplats } from './gl-probe.js';
@@ -16,12 +17,15 @@ import {
   quadsFragment,
   QuadsView,
   quadsVertex,
-  wholeTargetVertex,
+  fullScreenVertex,
 } from './shaders.js';
 
 const { QUAD_BATCH } = constants;
 /** Two triangles. */
 const INDICES_PER_QUAD = 6;
+const TRANSPARENT: Rgba = [0, 0, 0, 0];
+/** A corner of a box that has everything in it. */
+const EVERYWHERE = [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32];
 const SPLAT_TEXTURES = ['shapes', 'paints', 'order'];
 
 /** Formats that splats are blended in: `rgba8unorm` where the browser blends no floats. */
@@ -35,6 +39,8 @@ export interface GlFrameRequest {
   readonly camera: Camera;
   /** Spherical harmonics above this degree are not evaluated. */
   readonly shDegree: ShDegree;
+  /** In place of the scene's own. */
+  readonly filter?: SplatFilter | undefined;
   /** `rgba32float` where the browser blends it. */
   readonly accumulation: AccumulationFormat;
   /** Share of the canvas's width and height that is really drawn. */
@@ -88,9 +94,9 @@ export class GlRenderer {
   constructor(gl: WebGL2RenderingContext, gaussians: GlGaussians) {
     this.#gl = gl;
     this.#gaussians = gaussians;
-    this.#project = new GlProgram(gl, [wholeTargetVertex, projectFragment], layouts.View, ['geometry', 'harmonics']);
+    this.#project = new GlProgram(gl, [fullScreenVertex, projectFragment], layouts.View, ['geometry', 'harmonics']);
     this.#quads = new GlProgram(gl, [quadsVertex, quadsFragment], QuadsView, SPLAT_TEXTURES);
-    this.#compose = new GlProgram(gl, [wholeTargetVertex, composeFragment], layouts.Compose, ['accumulated']);
+    this.#compose = new GlProgram(gl, [fullScreenVertex, composeFragment], layouts.Compose, ['accumulated']);
     [this.#corners, this.#indices] = makeCorners(gl);
     const size = [DATA_WIDTH, rowsOf(gaussians.facts.count)] as const;
     this.#shapes = makeTexture(gl, gl.RGBA32UI, size);
@@ -130,8 +136,11 @@ export class GlRenderer {
     this.#last = { camera, drawn };
   }
 
-  /** Composes the last frame onto the canvas, from its lower left corner on. */
-  present(): void {
+  /**
+   * Composes the last frame onto the canvas, from its lower left corner on.
+   * @param background premultiplied
+   */
+  present(background: Rgba = TRANSPARENT): void {
     if (this.#last === undefined || this.#accumulation === undefined) return;
     const { camera, drawn } = this.#last;
     const gl = this.#gl;
@@ -140,7 +149,7 @@ export class GlRenderer {
     gl.disable(gl.BLEND);
     const scale = [drawn.width / camera.width, drawn.height / camera.height];
     const used = [drawn.width, drawn.height];
-    this.#compose.use({ background: [0, 0, 0, 0], scale, used }, [this.#accumulation.texture]);
+    this.#compose.use({ background, scale, used }, [this.#accumulation.texture]);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
@@ -149,7 +158,7 @@ export class GlRenderer {
    */
   probe(points: readonly ProbePoint[]): ProbeAnswer[] {
     const gl = this.#gl;
-    this.#probe ??= new GlProgram(gl, [wholeTargetVertex, probeFragment], ProbeView, SPLAT_TEXTURES);
+    this.#probe ??= new GlProgram(gl, [fullScreenVertex, probeFragment], ProbeView, SPLAT_TEXTURES);
     return probeSplats({ gl, program: this.#probe, textures: this.#splatTextures, count: this.#count }, points);
   }
 
@@ -181,19 +190,21 @@ export class GlRenderer {
     return [this.#shapes, this.#paints, this.#order];
   }
 
-  #projectSplats({ camera, shDegree }: GlFrameRequest, drawn: Camera): void {
-    const what = JSON.stringify([camera, drawn.width, drawn.height, shDegree]);
+  #projectSplats({ camera, shDegree, filter }: GlFrameRequest, drawn: Camera): void {
+    const what = JSON.stringify([camera, drawn.width, drawn.height, shDegree, filter]);
     if (what === this.#projected) return;
     this.#projected = what;
     const gl = this.#gl;
     const { facts, geometry, sh } = this.#gaussians;
     const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
+    const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : facts;
     const values = {
-      ...cameraValues(drawn, facts.origin, (facts.filterVariance ?? constants.DILATION) * pixelArea),
+      ...cameraValues(drawn, facts.origin, filterVariance * pixelArea),
       ...{ splat_count: facts.count, page: 0, first_group: 0 },
       ...{ sh_degree: facts.shDegree, sh_cap: shDegree, sh_encoding: SH_PRECISION[facts.shPrecision] },
-      ...{ antialiased: facts.antialiased ? 1 : 0, key_bits: 32, is_ordered: 0 },
+      ...{ antialiased: antialiased ? 1 : 0, key_bits: 32 },
       ...{ has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },
+      ...{ opacity: 1, crop_low: EVERYWHERE.map((side) => -side), crop_high: EVERYWHERE },
     };
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#splats);
     gl.viewport(0, 0, DATA_WIDTH, rowsOf(facts.count));

@@ -33,6 +33,35 @@ export function developmentScript() {
   return script;
 }
 
+const bundles = new Map();
+
+/** A module of tests/frameworks/browser/support with all that it imports: browsers cannot read React's own modules. */
+export function frameworkScript(name) {
+  if (!bundles.has(name)) {
+    const options = {
+      entryPoints: [join(root, 'tests/frameworks/browser/support', name)],
+      bundle: true,
+      write: false,
+      splitting: false,
+      format: 'esm',
+      target: 'es2022',
+      jsx: 'automatic',
+      define: {
+        'process.env.NODE_ENV': '"production"',
+        __VUE_OPTIONS_API__: 'true',
+        __VUE_PROD_DEVTOOLS__: 'false',
+        __VUE_PROD_HYDRATION_MISMATCH_DETAILS__: 'false',
+      },
+      conditions: ['production', 'browser'],
+    };
+    bundles.set(
+      name,
+      build(options).then(({ outputFiles }) => outputFiles[0].text),
+    );
+  }
+  return bundles.get(name);
+}
+
 /** What the apps of React and Vue do, in plain HTML around the CDN build at an address. */
 export function plainApp(address) {
   return `<!doctype html><html lang="en"><title>Plain</title>

@@ -6,7 +6,7 @@ import { Readable } from 'node:stream';
 import { setTimeout as delay } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
-import { DEVELOPMENT_APP, developmentScript, plainApp } from './apps.mjs';
+import { DEVELOPMENT_APP, developmentScript, frameworkScript, plainApp } from './apps.mjs';
 
 const root = fileURLToPath(new URL('../../../../', import.meta.url));
 const fixtures = fileURLToPath(new URL('../fixtures/', import.meta.url));
@@ -37,6 +37,23 @@ let held = { file: '', ms: 0 };
 
 /** By folder: what tests have put there, and what was asked for. */
 const kept = new Map();
+
+/** Bytes a second of the link behind `/net/metered/`: 20 Mbit. */
+const METERED_RATE = 2.5e6;
+/** By the name of a link: bytes that have gone through it, and the time, ms, at which it is free. */
+const links = new Map();
+
+/** Lets bytes through a link, one piece after the other whoever asks for them. */
+async function* throughLink(link, bytes) {
+  for (let at = 0; at < bytes.length; at += 16_384) {
+    const piece = bytes.subarray(at, at + 16_384);
+    const now = performance.now();
+    link.freeAt = Math.max(now, link.freeAt) + (1000 * piece.length) / METERED_RATE;
+    await delay(link.freeAt - now);
+    link.sent += piece.length;
+    yield piece;
+  }
+}
 
 const ANSWERS = {
   status(context, code) {
@@ -230,6 +247,18 @@ const ANSWERS = {
     context.body = context.status === 200 ? createReadStream(path) : 'absent';
   },
 
+  /** The same through a link of 20 Mbit/s that a test names: `/net/metered/LINK/PATH`. `sent` tells the bytes that have gone through it. */
+  metered(context, path) {
+    const [name, ...rest] = path.split('/');
+    const link = links.get(name) ?? links.set(name, { sent: 0, freeAt: 0 }).get(name);
+    if (rest.join() === 'sent') return void (context.body = String(link.sent));
+    const file = join(sharedData, normalize(`/${rest.join('/')}`));
+    context.status = existsSync(file) && statSync(file).isFile() ? 200 : 404;
+    if (context.status !== 200) return void (context.body = 'absent');
+    context.set('Content-Length', String(statSync(file).size));
+    context.body = Readable.from(throughLink(link, readFileSync(file)));
+  },
+
   /** Files that a test has put there with PUT; DELETE takes one away. `log` tells the paths that were asked for, in order. */
   async kept(context, path) {
     const [folder, ...rest] = path.split('/');
@@ -310,6 +339,12 @@ const ANSWERS = {
   async 'react-development'(context, name) {
     context.type = name === 'app.js' ? 'text/javascript' : 'text/html';
     context.body = name === 'app.js' ? await developmentScript() : DEVELOPMENT_APP;
+  },
+
+  /** Modules of frameworks with what they import. */
+  async 'framework-scenes'(context, name) {
+    context.type = 'text/javascript';
+    context.body = await frameworkScript(name);
   },
 
   /** The same app without any framework. */

@@ -16,6 +16,8 @@ from .files import existing
 
 def read_avatar(path: Path) -> Avatar:
     """Reads an avatar; numbers become float32."""
+    if path.is_dir():
+        raise _folder(path)
     arrays = read_npz(path)
     known = fields(Avatar)
     missing = [field.name for field in known if field.default is MISSING and field.name not in arrays]
@@ -30,6 +32,29 @@ def read_avatar(path: Path) -> Avatar:
     given = {field.name: arrays[field.name] for field in known if field.name in arrays}
     lists = {"parents": [int(x) for x in given["parents"]], "joint_names": [str(x) for x in given["joint_names"]]}
     return Avatar(**{k: np.asarray(v, np.float32) for k, v in given.items() if k not in lists}, **lists)  # type: ignore[arg-type]
+
+
+# What avatar repositories leave in their folders: a name that only they write, and what to do.
+_FOLDERS = (
+    ("**/flame_param.npz", "GaussianAvatars", "it moves FLAME"),
+    ("**/mlp_ckpt", "GauHuman", "its network moves SMPL"),
+    ("**/offset.ply", "LAM", "skin.glb and animation.glb beside offset.ply are a mesh of FLAME"),
+    ("**/smplx_params*", "an avatar of SMPL-X (ExAvatar, LHM)", "its network moves SMPL-X"),
+    ("**/transforms_train.json", "a data set", "it holds pictures, not an avatar"),
+)
+
+
+def _folder(path: Path) -> ExportError:
+    found = next(((name, why) for pattern, name, why in _FOLDERS if next(path.glob(pattern), None)), None)
+    archives = sorted(str(each.relative_to(path)) for each in path.rglob("*.npz"))[:4]
+    name, why = found or ("an unknown avatar", f"a folder with {listed(archives)}" if archives else "no .npz in it")
+    return ExportError(
+        "checkpoint/other-family",
+        where=str(path),
+        expected="one .npz file with the arrays of gaussian_exporter.families.avatar.Avatar",
+        found=f"a folder of {name}: {why}",
+        remedy="export a module that holds the body: gaussian_exporter.export_module, inputs {'pose': pose(joints)}",
+    )
 
 
 def read_npz(path: Path) -> dict[str, AnyArray]:

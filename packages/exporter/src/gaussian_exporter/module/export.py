@@ -16,7 +16,7 @@ import numpy as np
 import onnx
 
 from ..arrays import AnyArray
-from ..contract import Coordinates, Json, metadata
+from ..contract import Coordinates, Filter, Json, metadata
 from ..errors import ExportError
 from ..placement import RULES, Finding, gpu_findings
 from .finish import finish_graph
@@ -67,14 +67,18 @@ def export_module(
     n_max: int | None = None,
     coordinates: Coordinates | None = None,
     antialiased: bool = False,
+    filter: Filter | None = None,
     fps: float | None = None,
+    batched: bool = False,
     quiet: bool = False,
 ) -> ExportReport:
     """Writes a torch.nn.Module as a generator with its contract, compares it with PyTorch, and prints what came of it.
 
     `inputs`: a role for each argument of `forward`, in its order: {"t": time(), "twist": control(-1, 1)}. `outputs`:
     what it returns, split() by default: positions, scales, rotations, colors, opacities. Both of PyTorch's exporters
-    are tried; the first whose file computes what the module computes is kept. Raises graph/invalid where neither does.
+    are tried; the first whose file computes what the module computes is kept. `batched`: the module takes a batch
+    before every input, [1,72] where the role says [72]; pictures have one anyway. Raises graph/invalid where neither
+    exporter does.
     """
     import torch
 
@@ -82,19 +86,26 @@ def export_module(
     module = module if isinstance(module, torch.nn.Module) else _module_of(module, torch)
     module.eval()
     refuse_other_arguments(module, inputs)
-    wrapped = _wrapped(module, layout, torch)
+    stays = [role.binding["role"] in ("image", "state") or not batched for role in inputs.values()]
+    wrapped = _wrapped(module, layout, stays, torch)
     tries = _tries(inputs)
-    expected = [_in_torch(wrapped, values, torch) for values in tries]
+    try:
+        expected = [_in_torch(wrapped, values, torch) for values in tries]
+    except ExportError:
+        raise
+    except Exception as error:  # whatever the module says of what it is given
+        raise _does_not_take(module, inputs, batched, error) from error
     _require_finite(expected[0], layout)
     given = {"version": 1, "name": name or path.stem}
-    contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **_facts(inputs, n_max, fps, antialiased)}
+    facts = _facts(inputs, n_max, fps, antialiased, filter)
+    contract: Json = {**given, "inputs": {}, "outputs": layout.json(), **facts}
     contract |= {"coordinates": (coordinates or Coordinates()).json(), "license": license, "attribution": attribution}
     refusals = []
     for exporter in _OPSETS:
         try:
             model = _export(wrapped, inputs, layout, exporter, torch)
             finish_graph(model, layout, inputs, expected, n_max)
-            contract["inputs"] = _bindings(model, inputs)
+            contract["inputs"] = _bindings(model, inputs, layout)
             complete = contract | _bounds(wrapped, inputs, layout, torch) | _rows(model, layout, n_max, expected)
             onnx.helper.set_model_props(model, metadata(complete))
             errors = _errors(model, tries, expected, layout)
@@ -160,15 +171,31 @@ def _module_of(function: Callable[..., Any], torch: Any) -> Any:
     return Function()
 
 
-def _wrapped(module: Any, layout: Layout, torch: Any) -> Any:
+def _does_not_take(module: Any, inputs: Mapping[str, Role], batched: bool, error: Exception) -> ExportError:
+    given = ", ".join(f"{name} {[1, *r.shape] if batched else list(r.shape)}" for name, r in inputs.items())
+    if batched:
+        remedy = "leave batched out, if it takes no batch; time(shape=...) and control(shape=...) say other shapes"
+    else:
+        remedy = "give batched=True, if it takes a batch; time(shape=...) and control(shape=...) say other shapes"
+    return ExportError(
+        "argument/value",
+        where=f"module {type(module).__name__}, run with its inputs' defaults: {given}",
+        expected="tensors",
+        found=f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}",
+        remedy=remedy,
+    )
+
+
+def _wrapped(module: Any, layout: Layout, stays: Sequence[bool], torch: Any) -> Any:
     class Named(torch.nn.Module):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__()
             self.module = module
 
         def forward(self, *given: Any) -> Any:
-            tensors = tensors_of(self.module(*given), layout)
-            return tuple(fitted(n, t, layout, torch) for n, t in zip(layout.names, tensors, strict=True))
+            taken = [x if stay else x[None] for x, stay in zip(given, stays, strict=True)]
+            tensors = tensors_of(self.module(*taken), layout)
+            return tuple(fitted(n, t, layout, torch) for n, t in zip(layout.outputs, tensors, strict=True))
 
     return Named().eval()
 
@@ -185,7 +212,7 @@ def _in_torch(wrapped: Any, values: Mapping[str, AnyArray], torch: Any) -> list[
 
 
 def _require_finite(tensors: Sequence[AnyArray], layout: Layout) -> None:
-    for name, values in zip(layout.names, tensors, strict=True):
+    for name, values in zip(layout.outputs, tensors, strict=True):
         wrong = int((~np.isfinite(values)).sum())
         if wrong:
             raise ExportError(
@@ -199,7 +226,7 @@ def _require_finite(tensors: Sequence[AnyArray], layout: Layout) -> None:
 
 def _export(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, exporter: str, torch: Any) -> onnx.ModelProto:
     args = tuple(torch.from_numpy(role.default.copy()) for role in inputs.values())
-    names = {"input_names": list(inputs), "output_names": list(layout.names), "opset_version": _OPSETS[exporter]}
+    names = {"input_names": list(inputs), "output_names": list(layout.outputs), "opset_version": _OPSETS[exporter]}
     # What an exporter has to say of its failures is said in their errors.
     logging.getLogger("torch").setLevel(logging.CRITICAL)
     with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
@@ -212,21 +239,25 @@ def _export(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, exporter: 
         return onnx.load_from_string(file.getvalue())
 
 
-def _bindings(model: onnx.ModelProto, inputs: Mapping[str, Role]) -> Json:
+def _bindings(model: onnx.ModelProto, inputs: Mapping[str, Role], layout: Layout) -> Json:
     there = {value.name for value in model.graph.input}
     return {
         name: {key: value for key, value in role.binding.items() if not key.startswith("_")}
+        | ({"output": layout.outputs[-1]} if role.binding["role"] == "state" else {})
         for name, role in inputs.items()
         if name in there
     }
 
 
-def _facts(inputs: Mapping[str, Role], n_max: int | None, fps: float | None, antialiased: bool) -> Json:
+def _facts(
+    inputs: Mapping[str, Role], n_max: int | None, fps: float | None, antialiased: bool, filter: Filter | None
+) -> Json:
     durations = [role.binding["_duration"] for role in inputs.values() if role.binding.get("_duration")]
     facts: Json = {"duration": durations[0]} if durations else {}
     if fps is not None:
         facts["fps"] = fps
-    return {**facts, "antialiased": antialiased}
+    compensates = antialiased or filter in ("antialiased", "mip")
+    return {**facts, "antialiased": compensates, **({} if filter is None else {"filter": filter})}
 
 
 def _bounds(wrapped: Any, inputs: Mapping[str, Role], layout: Layout, torch: Any) -> Json:
@@ -279,10 +310,10 @@ def _errors(
     options.log_severity_level = 4
     session = ort.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
     there = {value.name for value in session.get_inputs()}
-    errors = dict.fromkeys(layout.names, 0.0)
+    errors = dict.fromkeys(layout.outputs, 0.0)
     for values, wanted in zip(tries, expected, strict=True):
         feeds = {name: value for name, value in values.items() if name in there}
-        for name, mine, theirs in zip(layout.names, session.run(list(layout.names), feeds), wanted, strict=True):
+        for name, mine, theirs in zip(layout.outputs, session.run(list(layout.outputs), feeds), wanted, strict=True):
             errors[name] = max(errors[name], _difference(np.asarray(mine, np.float64), np.asarray(theirs, np.float64)))
     return errors
 

@@ -25,7 +25,7 @@ def finish_graph(
     """Changes the model in place."""
     model.ir_version = min(model.ir_version, RULES["newestIr"], 10)
     graph = model.graph
-    for value, wanted in zip(graph.output, layout.names, strict=True):
+    for value, wanted in zip(graph.output, layout.outputs, strict=True):
         if value.name != wanted:
             _name_output(graph, value, wanted)
     for index, value in enumerate(graph.output):
@@ -44,8 +44,9 @@ def _name_output(graph: onnx.GraphProto, value: onnx.ValueInfoProto, wanted: str
 def _declare(value: onnx.ValueInfoProto, seen: Sequence[AnyArray], layout: Layout) -> None:
     """The shape that the output had in PyTorch; where the number of rows differs, or the file says that it may, N."""
     shape = value.type.tensor_type.shape
+    is_state = layout.state is not None and value.name == layout.outputs[-1]
     is_open = len({len(tensor) for tensor in seen}) > 1 or (
-        len(shape.dim) > 0 and not shape.dim[0].HasField("dim_value") and layout.kind != "image"
+        not is_state and len(shape.dim) > 0 and not shape.dim[0].HasField("dim_value") and layout.kind != "image"
     )
     first = ["N"] if is_open and value.name != "count" else [seen[0].shape[0]]
     dims = [*first, *seen[0].shape[1:]]

@@ -19,6 +19,13 @@ class Layout:
     kind: Literal["split", "packed", "image"]
     names: tuple[str, ...]
     words: Json
+    # The input that takes an output behind all others in the next run.
+    state: str | None = None
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """All outputs of the file."""
+        return self.names if self.state is None else (*self.names, f"next_{self.state}")
 
     def json(self) -> Json:
         """The contract's `outputs`."""
@@ -34,10 +41,12 @@ def split(
     rotations: Literal["wxyz", "xyzw"] = "wxyz",
     sh: Literal["coefficient-major", "channel-major"] = "coefficient-major",
     count: bool = False,
+    state: str | None = None,
 ) -> Layout:
     """A tensor for each attribute: split("positions", "scales", "rotations", "colors", "opacities") in the order that
     the module returns them (of a module that returns a dict, any). `scales="log"` and `opacities="logit"` for numbers
-    before their activation. Without names: those five."""
+    before their activation. Without names: those five. `state`: the input with the role state() that takes, in the
+    next run, what the module returns last."""
     given = names or ("positions", "scales", "rotations", "colors", "opacities")
     unknown = [name for name in given if name not in ATTRIBUTES]
     if unknown:
@@ -49,7 +58,7 @@ def split(
         words["shOrder"] = sh
     if count:
         words["count"] = "count"
-    return Layout("split", (*given, "count") if count else given, words)
+    return Layout("split", (*given, "count") if count else given, words, state)
 
 
 def packed(
@@ -74,19 +83,21 @@ def tensors_of(result: Any, layout: Layout) -> list[Any]:
     if hasattr(result, "_asdict"):
         result = result._asdict()
     if isinstance(result, dict):
-        missing = [name for name in layout.names if name not in result]
+        missing = [name for name in layout.outputs if name not in result]
         if missing:
             raise _mismatch(f"a tensor {missing[0]!r} in the dict", ", ".join(map(str, result)))
-        return [result[name] for name in layout.names]
+        return [result[name] for name in layout.outputs]
     tensors = list(result) if isinstance(result, (tuple, list)) else [result]
-    if len(tensors) != len(layout.names):
-        raise _mismatch(f"{len(layout.names)} tensors ({', '.join(layout.names)})", str(len(tensors)))
+    if len(tensors) != len(layout.outputs):
+        raise _mismatch(f"{len(layout.outputs)} tensors ({', '.join(layout.outputs)})", str(len(tensors)))
     return tensors
 
 
 def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
     """The tensor in the contract's shape, where that is the same numbers: a leading 1 dropped, covariances as their
     upper triangle, one scale a splat three times, colours without their alpha."""
+    if layout.state is not None and name == layout.outputs[-1]:
+        return tensor
     if name == "count":
         return tensor.reshape(1).to(torch.int32)
     x = tensor.float() if tensor.dtype != torch.float32 else tensor

@@ -72,16 +72,18 @@ def pose(
     joints: int | Sequence[str],
     parents: Sequence[int] | None = None,
     *,
-    format: Literal["axis-angle", "quaternion", "parameters"] = "axis-angle",
+    format: Literal["axis-angle", "quaternion", "matrix", "parameters"] = "axis-angle",
     rest: Sequence[float] | None = None,
+    flat: bool = False,
 ) -> Role:
-    """[J,3] axis-angle in radians, [J,4] quaternions w x y z, or [P] parameters; joints by name, or how many."""
+    """[J,3] axis-angle in radians, [J,4] quaternions w x y z, [J,3,3] rotation matrices, or [P] parameters; joints by
+    name, or how many. `flat`: all in one row, [72] of 24 joints."""
     count = joints if isinstance(joints, int) else len(joints)
-    width = {"axis-angle": 3, "quaternion": 4, "parameters": 1}[format]
-    sizes = (count,) if format == "parameters" else (count, width)
-    still = np.zeros(sizes, np.float32)
-    if format == "quaternion":
-        still[:, 0] = 1
+    joint: tuple[int, ...] = {"axis-angle": (3,), "quaternion": (4,), "matrix": (3, 3), "parameters": ()}[format]
+    sizes = (count * int(np.prod(joint)),) if flat or not joint else (count, *joint)
+    units: dict[str, list[float]] = {"quaternion": [1, 0, 0, 0], "matrix": [1, 0, 0, 0, 1, 0, 0, 0, 1]}
+    unit = units.get(format, [0])
+    still = np.tile(np.asarray(unit, np.float32), count * int(np.prod(joint)) // len(unit)).reshape(sizes)
     if rest is not None:
         still = np.asarray(rest, np.float32).reshape(sizes)
     binding: Json = {"role": "pose", "format": format}
@@ -92,9 +94,16 @@ def pose(
     if parents is not None:
         binding["parents"] = [int(parent) for parent in parents]
     binding["default"] = [float(x) for x in still.reshape(-1)]
+    return Role(binding, sizes, [still, *(_bent(still, size, format) for size in (0.2, 0.6))])
+
+
+def _bent(still: AnyArray, size: float, format: str) -> AnyArray:
     rng = np.random.default_rng(0)
-    bent = [(still + size * rng.normal(size=sizes)).astype(np.float32) for size in (0.2, 0.6)]
-    return Role(binding, sizes, [still, *bent])
+    if format != "matrix":
+        return (still + size * rng.normal(size=still.shape)).astype(np.float32)
+    turns = [np.linalg.qr(m + size * rng.normal(size=(3, 3)))[0] for m in still.reshape(-1, 3, 3)]
+    proper = [turn * np.sign(np.linalg.det(turn)) for turn in turns]
+    return np.asarray(proper, np.float32).reshape(still.shape)
 
 
 def shape(count: int, names: Sequence[str] | None = None) -> Role:
@@ -124,6 +133,28 @@ def view(axes: str = "RDF", column_major: bool = False) -> Role:
     order = "column-major" if column_major else "row-major"
     matrices = [matrix.T.copy() if column_major else matrix for matrix in _matrices()]
     return Role({"role": "view", "order": order, "axes": axes}, (4, 4), matrices)
+
+
+def camera_to_world(axes: str = "RDF") -> Role:
+    """[4,4] camera to world, the inverse of view(); its last column is the eye."""
+    inverses = [np.linalg.inv(matrix).astype(np.float32) for matrix in _matrices()]
+    return Role({"role": "camera_to_world", "order": "row-major", "axes": axes}, (4, 4), inverses)
+
+
+def intrinsics(normalized: bool = False) -> Role:
+    """[3,3]: fx 0 cx, 0 fy cy, 0 0 1, in pixels or as shares of the picture's width and height."""
+    unit = "normalized" if normalized else "pixels"
+    sides = [(1.0, 1.0)] if normalized else [(640.0, 480.0), (1920.0, 1080.0)]
+    found = [[[0.8 * w, 0, w / 2], [0, 0.8 * w, h / 2], [0, 0, 1]] for w, h in sides]
+    return Role({"role": "intrinsics", "unit": unit}, (3, 3), _floats((3, 3), *found))
+
+
+def state(shape: Sequence[int], default: float = 0.0) -> Role:
+    """What the module itself returned in the run before, under the name that split(state=...) gives it."""
+    sizes = tuple(shape)
+    rng = np.random.default_rng(0)
+    binding: Json = {"role": "state", "default": default}
+    return Role(binding, sizes, [*_floats(sizes, default), rng.normal(size=sizes).astype(np.float32)])
 
 
 def projection(axes: str = "RDF") -> Role:

@@ -1,0 +1,80 @@
+/** How coarse the pages of a streamed scene may be: measured in pictures of them, attribute by attribute. */
+import { boundsOf } from '@gaussian-splat/core';
+import { allocateSteps, GpuEvaluator, scaledSteps, viewsAround } from '@gaussian-splat/economise';
+import { cloudOfChunks, codingOf, decodePage, manifestOf, PageEncoder, USUAL_STEPS } from '@gaussian-splat/renderer';
+import { deflateQuickly } from './deflate.mjs';
+
+/** Numbers of a splat that each step is that of; of harmonics half, for many are 0 anyway. */
+const numbersOf = (degree) => ({
+  ...{ place: 3, size: 3, direction: 3, opacity: 1, color: 1, chroma: 2 },
+  ...(degree > 0 && { harmonics: 1.5 * ((degree + 1) ** 2 - 1) }),
+});
+
+/** How near to the figure a search ends. */
+const NEAR_ENOUGH = 0.93;
+const MOST_TRIES = 5;
+const decibels = (error) => -10 * Math.log10(error);
+const meanOf = (errors) => errors.reduce((sum, error) => sum + error, 0) / errors.length;
+
+/** Pictures of what pages hold, against those of the scene. */
+class PageJudge {
+  #tree;
+  #pages;
+  #evaluator;
+
+  constructor(tree, pages, evaluator) {
+    this.#tree = tree;
+    this.#evaluator = evaluator;
+    this.#pages = pages.filter(({ holds }) => holds.some(([level]) => level === 0));
+  }
+
+  /** Mean squared errors of each view, peak 1. */
+  async errors(steps, views) {
+    const coding = codingOf(steps);
+    const encoder = new PageEncoder(this.#tree, coding, deflateQuickly);
+    const scene = manifestOf(this.#tree, [], String, coding);
+    const parts = [];
+    for (const page of this.#pages) {
+      const { chunks, upper, holds } = page;
+      const file = { chunks, upper, shDegree: scene.shDegree, coding };
+      const words = new Uint32Array(await decodePage('page', encoder.encode(page), file));
+      const leaves = holds.flatMap(([level], chunk) => (level === 0 ? [chunk] : []));
+      parts.push({ words, of: chunks, chunks: leaves });
+    }
+    return this.#evaluator.compare(cloudOfChunks(scene, parts), views);
+  }
+}
+
+/**
+ * Steps with which the finest pages of a scene are so near to it in held-out views, and where errors of all attributes cost the same: an attribute whose rounding
+ * shows little has larger ones.
+ * @param onStep hears what was found
+ * @returns the steps, and dB over covered pixels of all held-out views together, and of the worst
+ */
+export async function findSteps({ tree, pages, cloud, device, minDecibels, onStep }) {
+  const around = (count, seed) => viewsAround(boundsOf(cloud), count, { seed });
+  const views = { scored: around(1, 10), searched: around(4, 1), heldOut: around(12, 2) };
+  const evaluator = await GpuEvaluator.create(device, cloud, views);
+  const judge = new PageJudge(tree, pages, evaluator);
+  const target = 10 ** (-minDecibels / 10);
+  const measure = async (steps) => meanOf(await judge.errors(steps, 'searched'));
+  const numbers = numbersOf(tree.levels[0].shDegree);
+  let steps = await allocateSteps({ usual: USUAL_STEPS, numbers, measure, target });
+  let best;
+  for (let tries = 0; tries < MOST_TRIES; tries++) {
+    const errors = await judge.errors(steps, 'heldOut');
+    const error = meanOf(errors);
+    const found = { steps, decibels: decibels(error), worstDecibels: decibels(Math.max(...errors)) };
+    onStep(`${found.decibels.toFixed(2)} dB in held-out views`);
+    if (
+      best === undefined ||
+      (error <= target ? best.decibels < minDecibels || error > best.error : error < best.error)
+    )
+      best = { ...found, error };
+    if (error <= target && error >= NEAR_ENOUGH * target) break;
+    const factor = Math.sqrt((0.975 * target) / error);
+    steps = scaledSteps(steps, factor);
+  }
+  evaluator.destroy();
+  return best;
+}

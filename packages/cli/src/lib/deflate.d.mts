@@ -1,0 +1,2 @@
+export function deflate(bytes: Uint8Array): Uint8Array;
+export function deflateQuickly(bytes: Uint8Array): Uint8Array;

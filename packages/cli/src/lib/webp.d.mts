@@ -1,0 +1,2 @@
+import type { EncodeWebp } from '@gaussian-splat/economise';
+export const encodeWebp: EncodeWebp;

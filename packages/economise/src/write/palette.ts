@@ -1,0 +1,125 @@
+/** Groups of vectors that are alike, and which each belongs to. */
+export interface Palette {
+  /** [size, width] means of the groups. */
+  readonly entries: Float32Array;
+  readonly labels: Uint32Array;
+  readonly size: number;
+}
+
+interface Group {
+  readonly members: Uint32Array;
+  readonly mean: Float64Array;
+  /** Weighted sum of squared distances from the mean. */
+  readonly error: number;
+}
+
+/** Turns of the power iteration that finds along what a group is longest. */
+const TURNS = 3;
+
+/**
+ * Divides vectors into at most `size` groups: the one with the largest error is cut at its mean, across the direction in which it is longest, until there are enough.
+ * @param vectors [N, width]
+ * @param weights [N] how much an error of each counts
+ */
+export function findPalette(vectors: Float32Array, width: number, weights: Float32Array, size: number): Palette {
+  const count = weights.length;
+  const groupOf = (members: Uint32Array): Group => {
+    const mean = new Float64Array(width);
+    let all = 0;
+    for (const i of members) {
+      all += weights[i];
+      for (let k = 0; k < width; k++) mean[k] += weights[i] * vectors[width * i + k];
+    }
+    if (all > 0) for (let k = 0; k < width; k++) mean[k] /= all;
+    let error = 0;
+    for (const i of members) {
+      let square = 0;
+      for (let k = 0; k < width; k++) square += (vectors[width * i + k] - mean[k]) ** 2;
+      error += weights[i] * square;
+    }
+    return { members, mean, error };
+  };
+  const heap = new GroupHeap();
+  heap.push(groupOf(Uint32Array.from({ length: count }, (_, i) => i)));
+  const done: Group[] = [];
+  while (heap.size + done.length < size && heap.size > 0) {
+    const group = heap.pop();
+    const parts = group.error > 0 ? cut(group, vectors, width, weights) : undefined;
+    if (parts === undefined) done.push(group);
+    else parts.forEach((members) => heap.push(groupOf(members)));
+  }
+  const groups = [...heap.all, ...done];
+  const labels = new Uint32Array(count);
+  const entries = new Float32Array(width * groups.length);
+  groups.forEach(({ members, mean }, label) => {
+    entries.set(mean, width * label);
+    for (const i of members) labels[i] = label;
+  });
+  return { entries, labels, size: groups.length };
+}
+
+/** The two halves of a group; undefined where one would be empty. */
+function cut(
+  { members, mean }: Group,
+  vectors: Float32Array,
+  width: number,
+  weights: Float32Array,
+): readonly [Uint32Array, Uint32Array] | undefined {
+  let axis = Float64Array.from({ length: width }, (_, k) => 1 + (k % 7) / 7);
+  const along = (i: number): number => {
+    let sum = 0;
+    for (let k = 0; k < width; k++) sum += axis[k] * (vectors[width * i + k] - mean[k]);
+    return sum;
+  };
+  for (let turn = 0; turn < TURNS; turn++) {
+    const next = new Float64Array(width);
+    for (const i of members) {
+      const share = weights[i] * along(i);
+      for (let k = 0; k < width; k++) next[k] += share * (vectors[width * i + k] - mean[k]);
+    }
+    const length = Math.hypot(...next);
+    if (!(length > 0)) return undefined;
+    axis = next.map((x) => x / length);
+  }
+  const isFirst = Uint8Array.from(members, (i) => (along(i) < 0 ? 1 : 0));
+  const first = members.filter((_, k) => isFirst[k] === 1);
+  if (first.length === 0 || first.length === members.length) return undefined;
+  return [first, members.filter((_, k) => isFirst[k] === 0)];
+}
+
+/** The group with the largest error first. */
+class GroupHeap {
+  readonly all: Group[] = [];
+
+  get size(): number {
+    return this.all.length;
+  }
+
+  push(group: Group): void {
+    const { all } = this;
+    let at = all.push(group) - 1;
+    while (at > 0) {
+      const above = (at - 1) >> 1;
+      if (all[above].error >= all[at].error) return;
+      [all[above], all[at]] = [all[at], all[above]];
+      at = above;
+    }
+  }
+
+  pop(): Group {
+    const { all } = this;
+    const top = all[0];
+    const last = all.pop()!;
+    if (all.length === 0) return top;
+    all[0] = last;
+    for (let at = 0; ;) {
+      let largest = at;
+      for (const below of [2 * at + 1, 2 * at + 2]) {
+        if (below < all.length && all[below].error > all[largest].error) largest = below;
+      }
+      if (largest === at) return top;
+      [all[largest], all[at]] = [all[at], all[largest]];
+      at = largest;
+    }
+  }
+}

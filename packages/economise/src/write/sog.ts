@@ -1,0 +1,221 @@
+import { GaussianSplatError, shCoefficientCount, type GaussianCloud } from '@gaussian-splat/core';
+import { packedOrder } from '@gaussian-splat/renderer';
+import type { Steps } from '../allocate-steps.js';
+import { findPalette } from './palette.js';
+import { writeZip } from './zip.js';
+
+/**
+ * Encodes an image as lossless WebP, pixels of alpha 0 with their colours.
+ * @param rgba [height, width, 4]
+ * @param effort 0 to 1: how much time there is to make it small
+ */
+export type EncodeWebp = (
+  rgba: Uint8ClampedArray,
+  width: number,
+  height: number,
+  effort: number,
+) => Promise<Uint8Array>;
+
+/**
+ * Steps of what is rounded: SOG has bytes for all of it, and images of fewer values are smaller. `place` in 1/65,535 of the scene's logarithmic box, `size` in octaves, `turn` and `opacity` in 1/255,
+ * `color` in units of the constant coefficient.
+ */
+export type SogSteps = Steps<'place' | 'size' | 'turn' | 'opacity' | 'color'>;
+
+export interface SogOptions {
+  readonly steps: SogSteps;
+  /** Entries of the palette of harmonics, at most 65,536. */
+  readonly palette: number;
+  readonly encodeWebp: EncodeWebp;
+  /** See {@link EncodeWebp}; default 0.7: with 1 it takes twenty times as long, for 1 % less. */
+  readonly effort?: number;
+}
+
+const USUAL_EFFORT = 0.7;
+/** As fine as SOG has it. */
+const MOST_PLACES = 65_535;
+const PALETTE_ROW = 64;
+/** Codes of a codebook; where steps leave more, larger ones are taken. */
+const MOST_CODES = 255;
+const LN2 = Math.LN2;
+
+/** Writes SOG version 2 as a bundle. */
+export async function writeSog(cloud: GaussianCloud, options: SogOptions): Promise<Uint8Array<ArrayBuffer>> {
+  const { steps } = options;
+  const order = packedOrder(cloud);
+  if (order.length === 0) throw nothingToWrite();
+  const images = new Map<string, Image>();
+  const means = putMeans(cloud, order, steps.place, images);
+  const scales = codebook(order, 3, (i, k) => Math.log(cloud.scales[3 * i + k]), LN2 * steps.size);
+  const stride = 3 * shCoefficientCount(cloud.shDegree);
+  const colors = codebook(order, 3, (i, k) => cloud.sh[stride * i + k], steps.color);
+  const opacities = Uint8Array.from(order, (i) => roundedByte(255 * cloud.opacities[i], steps.opacity));
+  images.set(
+    'scales.webp',
+    ofSplats(order.length, (k, c) => (c < 3 ? scales.codes[3 * k + c] : 255)),
+  );
+  images.set('quats.webp', quatsOf(cloud, order, steps.turn));
+  images.set(
+    'sh0.webp',
+    ofSplats(order.length, (k, c) => (c < 3 ? colors.codes[3 * k + c] : opacities[k])),
+  );
+  const harmonics = cloud.shDegree > 0 ? putHarmonics(cloud, order, options, images) : undefined;
+  const meta = {
+    version: 2,
+    count: order.length,
+    ...(cloud.antialiased && { antialias: true }),
+    ...(cloud.antialiased && cloud.filterVariance === 0.1 && { model: 'antialiased' }),
+    means: { ...means, files: ['means_l.webp', 'means_u.webp'] },
+    scales: { codebook: scales.values, files: ['scales.webp'] },
+    quats: { files: ['quats.webp'] },
+    sh0: { codebook: colors.values, files: ['sh0.webp'] },
+    ...(harmonics && { shN: { ...harmonics, files: ['shN_centroids.webp', 'shN_labels.webp'] } }),
+  };
+  const files = new Map<string, Uint8Array>([['meta.json', new TextEncoder().encode(JSON.stringify(meta))]]);
+  for (const [name, { rgba, width, height }] of images) {
+    files.set(name, await options.encodeWebp(rgba, width, height, options.effort ?? USUAL_EFFORT));
+  }
+  return writeZip(files);
+}
+
+interface Image {
+  readonly rgba: Uint8ClampedArray;
+  readonly width: number;
+  readonly height: number;
+}
+
+function imageOf(width: number, height: number): Image {
+  return { rgba: new Uint8ClampedArray(4 * width * height), width, height };
+}
+
+/** An image with a pixel for each splat. */
+function ofSplats(count: number, channel: (k: number, c: number) => number): Image {
+  const width = 4 * Math.ceil(Math.sqrt(count) / 4);
+  const image = imageOf(width, Math.ceil(count / width));
+  for (let k = 0; k < count; k++) for (let c = 0; c < 4; c++) image.rgba[4 * k + c] = channel(k, c);
+  return image;
+}
+
+const roundedByte = (value: number, step: number): number =>
+  Math.min(255, Math.max(0, Math.round(Math.round(value / step) * step)));
+
+const logPlace = (x: number): number => Math.sign(x) * Math.log1p(Math.abs(x));
+
+function putMeans(
+  { positions, origin }: GaussianCloud,
+  order: Uint32Array,
+  step: number,
+  images: Map<string, Image>,
+): { mins: number[]; maxs: number[] } {
+  const codes = new Uint16Array(3 * order.length);
+  const [mins, maxs]: [number[], number[]] = [[], []];
+  // Whole numbers of codes, so that the lower bytes of places have few values.
+  const whole = Math.max(1, Math.round(step));
+  for (let axis = 0; axis < 3; axis++) {
+    const values = Float64Array.from(order, (i) => logPlace(positions[3 * i + axis] + origin[axis]));
+    const low = values.reduce((least, value) => Math.min(least, value), Infinity);
+    const high = values.reduce((most, value) => Math.max(most, value), -Infinity);
+    mins.push(low);
+    maxs.push(high);
+    const scale = high > low ? MOST_PLACES / (high - low) : 0;
+    values.forEach((value, k) => {
+      codes[3 * k + axis] = Math.min(MOST_PLACES, whole * Math.round(((value - low) * scale) / whole));
+    });
+  }
+  const byte = (shift: number) => (k: number, c: number) => (c < 3 ? (codes[3 * k + c] >> shift) & 255 : 255);
+  images.set('means_l.webp', ofSplats(order.length, byte(0)));
+  images.set('means_u.webp', ofSplats(order.length, byte(8)));
+  return { mins, maxs };
+}
+
+/** The three components besides the largest, which alpha names. */
+function quatsOf({ rotations }: GaussianCloud, order: Uint32Array, step: number): Image {
+  const codes = new Uint8Array(4 * order.length);
+  order.forEach((i, k) => {
+    const q = rotations.subarray(4 * i, 4 * i + 4);
+    let largest = 0;
+    for (let n = 1; n < 4; n++) if (Math.abs(q[n]) > Math.abs(q[largest])) largest = n;
+    const sign = q[largest] < 0 ? -1 : 1;
+    let at = 4 * k;
+    // About the middle, so that what is not turned stays so.
+    for (let n = 0; n < 4; n++) {
+      if (n !== largest) codes[at++] = 128 + signedByte(sign * q[n] * Math.SQRT2 * 127.5 - 0.5, step);
+    }
+    codes[at] = 252 + largest;
+  });
+  return ofSplats(order.length, (k, c) => codes[4 * k + c]);
+}
+
+const signedByte = (value: number, step: number): number =>
+  Math.min(127, Math.max(-128, Math.round(Math.round(value / step) * step)));
+
+/** Evenly spaced values, and the nearest of them of each number. */
+function codebook(
+  order: Uint32Array,
+  width: number,
+  of: (i: number, k: number) => number,
+  step: number,
+): { values: number[]; codes: Uint8Array } {
+  let [low, high] = [Infinity, -Infinity];
+  for (const i of order) {
+    for (let k = 0; k < width; k++) {
+      const value = of(i, k);
+      if (!Number.isFinite(value)) continue;
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    }
+  }
+  const spacing = Math.max(step, (high - low) / MOST_CODES) || 1;
+  const count = Math.min(MOST_CODES, Math.ceil((high - low) / spacing)) + 1;
+  const codes = new Uint8Array(width * order.length);
+  order.forEach((i, n) => {
+    for (let k = 0; k < width; k++) {
+      codes[width * n + k] = Math.min(count - 1, Math.max(0, Math.round((of(i, k) - low) / spacing)));
+    }
+  });
+  return { values: Array.from({ length: count }, (_, code) => Math.fround(low + spacing * code)), codes };
+}
+
+function putHarmonics(
+  { sh, shDegree, opacities, scales }: GaussianCloud,
+  order: Uint32Array,
+  { palette: size }: SogOptions,
+  images: Map<string, Image>,
+): { count: number; bands: number; codebook: number[] } {
+  const width = 3 * (shCoefficientCount(shDegree) - 1);
+  const vectors = new Float32Array(width * order.length);
+  const weights = new Float32Array(order.length);
+  order.forEach((i, k) => {
+    vectors.set(sh.subarray((width + 3) * i + 3, (width + 3) * (i + 1)), width * k);
+    const [a, b, c] = scales.subarray(3 * i, 3 * i + 3);
+    // What an error shows: opacity squared, times the area.
+    weights[k] = opacities[i] ** 2 * (Math.max(a * b, b * c, a * c) + 1e-20);
+  });
+  const palette = findPalette(vectors, width, weights, size);
+  const { labels } = palette;
+  const entries = Uint32Array.from({ length: palette.size }, (_, k) => k);
+  const { values, codes } = codebook(entries, width, (i, k) => palette.entries[width * i + k], 0);
+  const image = imageOf((PALETTE_ROW * width) / 3, Math.ceil(palette.size / PALETTE_ROW));
+  for (let entry = 0; entry < palette.size; entry++) {
+    const first = ((Math.floor(entry / PALETTE_ROW) * PALETTE_ROW + (entry % PALETTE_ROW)) * width) / 3;
+    for (let k = 0; k < width / 3; k++) {
+      const at = 4 * (first + k);
+      image.rgba.set([...codes.subarray(width * entry + 3 * k, width * entry + 3 * k + 3), 255], at);
+    }
+  }
+  images.set('shN_centroids.webp', image);
+  images.set(
+    'shN_labels.webp',
+    ofSplats(order.length, (k, c) => [labels[k] & 255, labels[k] >> 8, 0, 255][c]),
+  );
+  return { count: palette.size, bands: shDegree, codebook: values };
+}
+
+function nothingToWrite(): GaussianSplatError {
+  return new GaussianSplatError('argument/cloud', {
+    where: 'scene that is written as SOG',
+    expected: '1 splat or more that can be drawn',
+    found: '0',
+    remedy: 'ask for a higher figure',
+  });
+}

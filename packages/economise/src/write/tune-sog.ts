@@ -1,0 +1,81 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { allocateSteps, scaledSteps } from '../allocate-steps.js';
+import type { Encoding, Measure, WrittenCloud } from './index.js';
+import { writeSog, type EncodeWebp, type SogSteps } from './sog.js';
+
+const USUAL: SogSteps = { place: 4, size: 1 / 12, turn: 4, opacity: 4, color: 1 / 32 };
+/** Numbers of a splat that each is the step of. */
+const NUMBERS: SogSteps = { place: 3, size: 3, turn: 3, opacity: 1, color: 3 };
+/** As fine as files can have them. */
+const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3 };
+const PALETTES = [1024, 4096, 16_384, 65_536];
+/** Share of the error that goes to the palette at most, if a larger one makes less. */
+const PALETTE_SHARE = 0.4;
+const MOST_TRIES = 4;
+/** How near to what is allowed a search ends. */
+const NEAR_ENOUGH = 0.9;
+/** For files that are measured and thrown away. */
+const QUICK = 0;
+
+/**
+ * SOG whose steps, and whose palette, are as coarse as measurements allow.
+ * @param encodeWebp undefined where only names are looked at
+ */
+export function tuneSog(encodeWebp: EncodeWebp | undefined): Encoding {
+  return {
+    title: 'SOG version 2',
+    hasOneDegree: true,
+    write: () => {
+      throw withoutWebp();
+    },
+    tune: async (whole, measure, target) => {
+      if (encodeWebp === undefined) throw withoutWebp();
+      return tuned(whole, measure, target, encodeWebp);
+    },
+  };
+}
+
+async function tuned(
+  { cloud }: WrittenCloud,
+  measure: Measure,
+  target: number,
+  encodeWebp: EncodeWebp,
+): Promise<Encoding> {
+  const errorOf = async (steps: SogSteps, palette: number): Promise<number> =>
+    measure(await writeSog(cloud, { steps, palette, encodeWebp, effort: QUICK }));
+  let palette = PALETTES[0];
+  let rest = target;
+  if (cloud.shDegree > 0) {
+    for (palette of PALETTES) {
+      const error = await errorOf(FINEST, palette);
+      rest = target - error;
+      if (error <= PALETTE_SHARE * target) break;
+    }
+  }
+  const least = (1 - PALETTE_SHARE) * target * 0.25;
+  const share = cloud.shDegree > 0 ? Math.max(least, rest) : target;
+  // Where harmonics are what is rounded most, the others are told apart without them.
+  const measured = (steps: SogSteps): Promise<number> => errorOf(steps, palette);
+  let steps = await allocateSteps({ usual: USUAL, numbers: NUMBERS, measure: measured, target: share });
+  for (let tries = 0; tries < MOST_TRIES; tries++) {
+    const error = await measured(steps);
+    if (error <= target && error >= NEAR_ENOUGH * target) break;
+    const own = Math.max(error - (target - share), 0.1 * error);
+    steps = scaledSteps(steps, Math.min(3, Math.max(1 / 3, Math.sqrt((0.95 * share) / own))));
+  }
+  return {
+    title: `SOG version 2, steps ${Object.entries(steps)
+      .map(([name, step]) => `${name} ${step.toPrecision(2)}`)
+      .join(', ')}${cloud.shDegree > 0 ? `, palette ${palette}` : ''}`,
+    hasOneDegree: true,
+    write: (reduced) => writeSog(reduced.cloud, { steps, palette, encodeWebp }),
+  };
+}
+
+const withoutWebp = (): GaussianSplatError =>
+  new GaussianSplatError('argument/value', {
+    where: 'SOG',
+    expected: 'an encoder of lossless WebP',
+    found: 'none',
+    remedy: 'pass encodeWebp, or use the command gaussian-splat economise, which has one',
+  });

@@ -1,0 +1,86 @@
+/** A ZIP archive of files that are not compressed: they are already. */
+const LOCAL = 0x04034b50;
+const CENTRAL = 0x02014b50;
+const END = 0x06054b50;
+/** Version 2.0, and 1980-01-01: archives of the same files are the same bytes. */
+const VERSION = 20;
+const DATE = 0x21;
+
+const CRC_TABLE = Uint32Array.from({ length: 256 }, (_, byte) => {
+  let code = byte;
+  for (let bit = 0; bit < 8; bit++) code = code & 1 ? (code >>> 1) ^ 0xedb88320 : code >>> 1;
+  return code;
+});
+
+function crc32(bytes: Uint8Array): number {
+  let code = 0xffffffff;
+  for (const byte of bytes) code = CRC_TABLE[(code ^ byte) & 255] ^ (code >>> 8);
+  return ~code >>> 0;
+}
+
+/** @param files by their names */
+export function writeZip(files: ReadonlyMap<string, Uint8Array>): Uint8Array<ArrayBuffer> {
+  const entries = [...files].map(([name, bytes]) => ({ name: new TextEncoder().encode(name), bytes }));
+  const total = entries.reduce((sum, { name, bytes }) => sum + 30 + 46 + 2 * name.length + bytes.length, 22);
+  const zip = new Uint8Array(total);
+  const view = new DataView(zip.buffer);
+  let at = 0;
+  const put = (fields: readonly (readonly [bytes: 2 | 4, value: number])[]): void => {
+    for (const [size, value] of fields) {
+      if (size === 2) view.setUint16(at, value, true);
+      else view.setUint32(at, value, true);
+      at += size;
+    }
+  };
+  const append = (bytes: Uint8Array): void => {
+    zip.set(bytes, at);
+    at += bytes.length;
+  };
+  const places = entries.map(({ name, bytes }) => {
+    const [place, facts] = [at, factsOf(name, bytes)];
+    put([[4, LOCAL], [2, VERSION], ...facts]);
+    append(name);
+    append(bytes);
+    return place;
+  });
+  const start = at;
+  entries.forEach(({ name, bytes }, k) => {
+    put([[4, CENTRAL], [2, VERSION], [2, VERSION], ...factsOf(name, bytes)]);
+    // No comment, first disk, no attributes.
+    put([
+      [2, 0],
+      [2, 0],
+      [2, 0],
+      [4, 0],
+      [4, places[k]],
+    ]);
+    append(name);
+  });
+  const length = at - start;
+  put([
+    [4, END],
+    [2, 0],
+    [2, 0],
+    [2, entries.length],
+    [2, entries.length],
+    [4, length],
+    [4, start],
+    [2, 0],
+  ]);
+  return zip;
+}
+
+/** Flags (names are UTF-8), method, time, date, checksum, sizes, lengths of the name and of what else there is. */
+function factsOf(name: Uint8Array, bytes: Uint8Array): (readonly [2 | 4, number])[] {
+  return [
+    [2, 0x800],
+    [2, 0],
+    [2, 0],
+    [2, DATE],
+    [4, crc32(bytes)],
+    [4, bytes.length],
+    [4, bytes.length],
+    [2, name.length],
+    [2, 0],
+  ];
+}

@@ -1,0 +1,267 @@
+import type { Matrix4, Vector3 } from '@gaussian-splat/core';
+import { ReactiveElement, type PropertyDeclarations } from 'lit';
+import type { Box } from '@gaussian-splat/renderer';
+import { declarations, type Attribute, type Attributes } from '../attributes.js';
+import { readAttribute } from '../camera/grammar.js';
+import { notPlayed } from '../controllers/playback-controller.js';
+import type { ElementError } from '../errors.js';
+import type { GaussianSplatEventMap } from '../events.js';
+import type { LiveState } from '../live/live-model.js';
+import type { Source } from '../stage-host.js';
+import { adopt } from './adopt.js';
+import type { MESH_ATTRIBUTES, PropertiesOf } from './attributes.js';
+import type { Part } from './part.js';
+import { matrixOf, readMatrix } from './placing.js';
+
+type Written = string | number | ArrayLike<number | string> | null | undefined;
+
+/** Numbers of a property, as an attribute would have them. */
+const written = (value: Written, unit = ''): string | number | null | undefined =>
+  typeof value === 'object' && value !== null ? Array.from(value, (each) => `${each}${unit}`).join(' ') : value;
+
+/** Where a child is, and how it is drawn. */
+export interface ChildPlace {
+  /** From its own frame, once that is turned so that y is up, to viewer space. */
+  readonly placed: Matrix4;
+  readonly up: Vector3 | undefined;
+  readonly opacity: number;
+  readonly crop: Box | undefined;
+  readonly hidden: boolean;
+}
+
+/** As glTF has it. */
+const UP: Vector3 = [0, 1, 0];
+const NO_VALUES: Omit<LiveState, 'timeSeconds'> = { pose: undefined, controls: {}, pictures: {} };
+
+/** Events of a child of `<gaussian-splat>`, with the meanings that they have there. None of them bubbles. */
+export type ChildEventMap = Omit<
+  GaussianSplatEventMap,
+  | 'camera-change'
+  | 'poster-dismissed'
+  | 'model-visibility'
+  | 'contextlost'
+  | 'contextrestored'
+  | 'loadeddata'
+  | 'canplay'
+>;
+
+/** The properties that a page may set, for the typings of frameworks. */
+export type SettableOf<Table> = Partial<
+  PropertiesOf<Table> & Pick<SplatChild, 'matrix' | 'currentTime' | 'playbackRate'> & { hidden: boolean }
+>;
+
+/** What all children have: a source, a place, and what is known of it. */
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
+export abstract class SplatChild extends ReactiveElement {
+  /** What stands for it among all that its `<gaussian-splat>` shows. @internal */
+  abstract readonly holder: Part;
+  /** @internal */
+  protected abstract readonly table: Readonly<Record<string, Attribute<unknown, unknown>>>;
+  readonly #warned = new Set<string>();
+  #isDriven = false;
+  #place: ChildPlace | undefined;
+
+  constructor() {
+    super();
+    // Boolean properties start as booleans: frameworks look at them to decide what a bare attribute means.
+    Object.assign(this, { autoplay: false, loop: false, hidden: false });
+  }
+
+  /**
+   * All of its place at once, above `position`, `rotation` and `scale`: 16 numbers of an affine matrix, row after row, or a `DOMMatrix`; from its own frame, y up, to viewer space. null for none.
+   */
+  declare matrix: ArrayLike<number> | DOMMatrixReadOnly | null;
+
+  /** True while it is shown. */
+  get loaded(): boolean {
+    return this.holder.state === 'ready';
+  }
+
+  /** Fulfils, and never rejects, when there is nothing left to wait for: it is shown ({@link loaded}), it cannot be ({@link error}), or it has no source. */
+  get ready(): Promise<void> {
+    return this.updateComplete.then(() => this.holder.settled);
+  }
+
+  /** Why it is not shown, or null. */
+  get error(): ElementError | null {
+    return this.holder.error;
+  }
+
+  /** Share of the loading that is done, 0..1. */
+  get progress(): number {
+    return this.loaded ? 1 : (this.holder.progress ?? 0);
+  }
+
+  /** Fetches it again, as if `src` had just been set. */
+  load(): void {
+    this.holder.reload();
+  }
+
+  /** Seconds into what moves; setting it seeks, and gives it a clock of its own. What has none follows that of its `<gaussian-splat>`. */
+  get currentTime(): number {
+    return this.holder.playback.currentTime;
+  }
+
+  set currentTime(seconds: number) {
+    if (seconds === null || seconds === undefined) return;
+    this.#drive();
+    this.holder.playback.currentTime = seconds;
+  }
+
+  /** Seconds; NaN while nothing moves, Infinity for what has no end. */
+  get duration(): number {
+    return this.holder.duration;
+  }
+
+  /** Whether its time stands still. */
+  get paused(): boolean {
+    return this.holder.playback.paused;
+  }
+
+  /** Speed of its own clock; 1 is that of the clock. */
+  get playbackRate(): number {
+    return this.holder.playback.playbackRate;
+  }
+
+  set playbackRate(rate: number) {
+    if (rate === null || rate === undefined) return;
+    this.#drive();
+    this.holder.playback.playbackRate = rate;
+  }
+
+  /**
+   * Lets its time run, on a clock of its own, once it is there.
+   * @returns rejects with a `NotSupportedError` where nothing moves, and with an `AbortError` if `pause()` or another `src` comes before it does.
+   */
+  async play(): Promise<void> {
+    this.#drive();
+    const { playback } = this.holder;
+    const { pauses } = playback;
+    await this.updateComplete;
+    if (playback.pauses !== pauses) throw notPlayed();
+    await playback.waitFor(this.ready);
+    if (!playback.canPlay) throw new DOMException('There is nothing that moves', 'NotSupportedError');
+    playback.play();
+  }
+
+  /** Lets its time stand still. */
+  pause(): void {
+    this.#drive();
+    this.holder.playback.pause();
+  }
+
+  /** From now on it has a clock of its own. */
+  #drive(): void {
+    this.#isDriven = true;
+    this.holder.hasBegun = true;
+  }
+
+  /** It has a clock of its own: it plays by itself, starts again by itself, or a script has moved its time. @internal */
+  get hasOwnClock(): boolean {
+    return this.autoplay || this.loop || this.#isDriven;
+  }
+
+  /** @internal */
+  abstract get source(): Source;
+
+  /** @internal */
+  get liveValues(): Omit<LiveState, 'timeSeconds'> {
+    return NO_VALUES;
+  }
+
+  /** @internal */
+  get credentials(): Attributes['crossorigin'] {
+    return this.read('crossorigin', this.crossorigin);
+  }
+
+  /** @internal */
+  get place(): ChildPlace {
+    return (this.#place ??= this.readPlace());
+  }
+
+  /** @internal */
+  protected readPlace(): ChildPlace {
+    return { placed: this.#readPlaced(), up: UP, opacity: 1, crop: undefined, hidden: Boolean(this.hidden) };
+  }
+
+  protected override willUpdate(): void {
+    this.#place = undefined;
+  }
+
+  /** Its place in viewer space. */
+  #readPlaced(): Matrix4 {
+    if (this.matrix !== null && this.matrix !== undefined) {
+      const matrix = readMatrix(this.matrix);
+      if (matrix) return matrix;
+      this.warn(
+        `<${this.localName}> matrix: expected 16 numbers, the last row 0 0 0 1, or a DOMMatrix; the place is used.`,
+      );
+    }
+    return matrixOf({
+      position: this.read<Vector3>('position', written(this.position)),
+      rotation: this.read<Vector3>('rotation', written(this.rotation, 'rad')),
+      scale: this.read<Vector3>('scale', written(this.scale)),
+    });
+  }
+
+  /** An attribute by its grammar; a malformed one counts as absent, with a warning. @internal */
+  protected read<T>(name: string, value: Written): T {
+    const grammar = this.table[name].grammar!;
+    return readAttribute(name, written(value), grammar, (sentence) =>
+      this.warn(sentence.replace('<gaussian-splat>', `<${this.localName}>`)),
+    ) as T;
+  }
+
+  /** @internal */
+  warn(sentence: string): void {
+    if (this.#warned.has(sentence)) return;
+    this.#warned.add(sentence);
+    console.warn(sentence);
+  }
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    adopt(this);
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    // With its element around it, it stays what it is, and goes when that does.
+    if (this.parentElement !== this.holder.owner) this.holder.attach(null);
+  }
+
+  /** It shows nothing of its own. */
+  protected override createRenderRoot(): HTMLElement {
+    return this;
+  }
+
+  protected override updated(): void {
+    this.holder.update();
+  }
+}
+
+// eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
+export interface SplatChild extends Omit<PropertiesOf<typeof MESH_ATTRIBUTES>, 'src'> {
+  addEventListener<K extends keyof ChildEventMap>(
+    type: K,
+    listener: (this: this, event: ChildEventMap[K]) => unknown,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+}
+
+/** What Lit is told of a child's properties. */
+export const childDeclarations = (
+  table: Readonly<Record<string, Attribute<unknown, unknown>>>,
+): PropertyDeclarations => ({
+  ...declarations(table),
+  matrix: { attribute: false },
+  hidden: { type: Boolean, reflect: true },
+  // Accessors: named here so that what a page sets before the element is defined reaches them.
+  currentTime: { attribute: false, noAccessor: true },
+  playbackRate: { attribute: false, noAccessor: true },
+});

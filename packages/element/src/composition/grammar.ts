@@ -1,0 +1,58 @@
+/** Grammar of the attributes that place a child: see ../camera/grammar.ts. */
+import type { Vector3 } from '@gaussian-splat/core';
+import { angleGrammar, parsePoint, type AttributeGrammar } from '../camera/grammar.js';
+
+const terms = (text: string): string[] => text.trim().split(/\s+/);
+
+/** `position`. */
+export const pointGrammar: AttributeGrammar<Vector3> = {
+  expected: '"x y z" in metres (or with m, cm or mm)',
+  fallback: '0 0 0',
+  parse: parsePoint,
+};
+
+const { parse: parseAngle } = angleGrammar('0');
+
+/** `rotation`: radians. */
+export const anglesGrammar: AttributeGrammar<Vector3> = {
+  expected: '"x y z", angles with deg or rad',
+  fallback: '0 0 0',
+  parse: (text) => {
+    const [x, y, z, ...rest] = terms(text.toLowerCase()).map(parseAngle);
+    const isWhole = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' && rest.length === 0;
+    return isWhole ? [x, y, z] : null;
+  },
+};
+
+/** `scale`. */
+export const scaleGrammar: AttributeGrammar<Vector3> = {
+  expected: 'a number, or "x y z"',
+  fallback: '1',
+  parse: (text) => {
+    const numbers = terms(text).map(Number);
+    const [x, y = x, z = x] = numbers;
+    return (numbers.length === 1 || numbers.length === 3) && numbers.every(Number.isFinite) ? [x, y, z] : null;
+  },
+};
+
+/** `opacity`. */
+export const opacityGrammar: AttributeGrammar<number> = {
+  expected: 'a number from 0 to 1',
+  fallback: '1',
+  parse: (text) => {
+    const value = text.trim() === '' ? NaN : Number(text);
+    return value >= 0 && value <= 1 ? value : null;
+  },
+};
+
+/** `crop`: two corners; undefined for all. */
+export const boxGrammar: AttributeGrammar<readonly number[] | undefined> = {
+  expected: '"x y z x y z" in metres, two corners of a box, the least first',
+  fallback: 'none',
+  parse: (text) => {
+    if (text === 'none') return undefined;
+    const each = terms(text);
+    const [min, max] = [parsePoint(each.slice(0, 3).join(' ')), parsePoint(each.slice(3).join(' '))];
+    return min && max && min.every((least, axis) => least <= max[axis]) ? [...min, ...max] : null;
+  },
+};

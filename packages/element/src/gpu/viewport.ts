@@ -1,0 +1,211 @@
+import { loadModule, type Camera, type SplatFilter } from '@gaussian-splat/core';
+import {
+  QueueClock,
+  Viewpoint,
+  type FrameLevers,
+  type FrameSettings,
+  type ProbeAnswer,
+  type ProbePoint,
+  type WorkTime,
+  type World,
+} from '@gaussian-splat/renderer';
+import type { Frame, FrameFilter } from '../live/frame-filter.js';
+import type { ReadCounts } from '../stats.js';
+import type { CanvasFrame, Contents, Painter, PainterEvents, Place, Rendering, Surface } from './painter.js';
+import { why } from './request-device.js';
+
+/** Draws frames on one WebGPU device: a viewpoint, whose buffers fit the frame's size, and what stands between it and the canvas. */
+export class Viewport implements Painter {
+  readonly viewpoint: Viewpoint;
+  readonly #place: Place;
+  readonly #contents: Contents;
+  readonly #events: PainterEvents;
+  readonly #clock: QueueClock;
+  #rendering: Rendering = { quality: 'default', shDegree: 3 };
+  #filter: FrameFilter | undefined;
+  #isDestroyed = false;
+  #isPrepared = false;
+  /** Size of the last frame; empty if the next one may need other buffers, whatever its size. */
+  #drawnSize = '';
+  #layout = 0;
+
+  constructor(place: Place, contents: Contents, events: PainterEvents) {
+    this.#place = place;
+    this.#contents = contents;
+    this.#events = events;
+    this.viewpoint = new Viewpoint(place.device, contents.world, {
+      settings: this.#settings(),
+      onIncomplete: () => {
+        this.#drawnSize = '';
+        this.#filter?.invalidate();
+        events.onIncomplete();
+      },
+    });
+    this.#clock = QueueClock.of(place.device);
+  }
+
+  get byteLength(): number {
+    return this.viewpoint.byteLength + (this.#filter?.byteLength ?? 0);
+  }
+
+  get device(): GPUDevice {
+    return this.#place.device;
+  }
+
+  get isDestroyed(): boolean {
+    return this.#isDestroyed;
+  }
+
+  get isLost(): boolean {
+    return this.#place.isLost;
+  }
+
+  setRendering(rendering: Rendering): void {
+    const { quality, shDegree } = this.#rendering;
+    // A filter takes effect with the next frame, whatever draws it.
+    this.#rendering = rendering;
+    if (rendering.quality === quality && rendering.shDegree === shDegree) return;
+    this.#isPrepared = false;
+    this.viewpoint.settings = this.#settings();
+    this.#drawnSize = '';
+  }
+
+  get filter(): FrameFilter | undefined {
+    return this.#filter;
+  }
+
+  setFilter(filter: FrameFilter | undefined): void {
+    this.#filter?.close();
+    this.#filter = filter;
+    if (filter) this.#clock.isShared = true;
+    this.#drawnSize = '';
+  }
+
+  /** Settings of a frame; with levers of motion where there are some. */
+  #settings(levers?: Partial<FrameLevers>): FrameSettings {
+    const { detail = 0, splatBudget = 0 } = this.#contents.levels;
+    const { submissions } = this.#place;
+    const { quality, shDegree } = this.#rendering;
+    // Whichever leaves out more: what the page asks for, or the pace.
+    const most = Math.max(detail, levers?.detail ?? 0);
+    return { quality, shDegree, submissions, ...levers, detail: most, splatBudget };
+  }
+
+  get isPrepared(): boolean {
+    return this.#isPrepared;
+  }
+
+  prepare(levers: readonly Partial<FrameLevers>[]): void {
+    if (this.isLost || this.#isDestroyed) return;
+    this.#isPrepared = true;
+    this.viewpoint.prepare(
+      levers.map((each) => this.#settings(each)),
+      canvasFormat(),
+    );
+  }
+
+  /** Premultiplied alpha lets the page show through. */
+  surfaceOn(canvas: HTMLCanvasElement): Surface | null {
+    const context = canvas.getContext('webgpu');
+    const [format, { device }] = [canvasFormat(), this];
+    context?.configure({ device, format, usage: canvasUsage(device, format), alphaMode: 'premultiplied' });
+    return context;
+  }
+
+  render(request: CanvasFrame, content: string, onTime?: (time: WorkTime) => void): void {
+    const frame = frameOf(request);
+    const size = sizeOf(frame);
+    const { layout } = this.#contents.world;
+    if (layout === this.#layout && size === this.#drawnSize) return this.#renderOnce(frame, content, onTime);
+    this.#drawnSize = size;
+    void this.#withRefusal(() => this.#renderOnce(frame, content, onTime)).then(async (error) => {
+      const reason = error && (await why(({ outOfMemory }) => outOfMemory(`frame of ${size} pixels`, error)));
+      if (reason && !this.#isDestroyed) this.#events.onError(reason);
+    });
+  }
+
+  #renderOnce(frame: Frame, content: string, onTime: ((time: WorkTime) => void) | undefined): void {
+    // A lost device has been noticed elsewhere.
+    if (onTime) this.#clock.time(() => this.#draw(frame, content)).then(onTime, () => undefined);
+    else this.#draw(frame, content);
+  }
+
+  #draw(frame: Frame, content: string): void {
+    this.#layout = this.#contents.world.layout;
+    const settings = this.#settings(frame.levers);
+    const { filter } = this.#rendering;
+    const draw = (drawn: Frame): void => {
+      const { camera, target, background: over } = drawn;
+      this.viewpoint.draw(camera, { target, over, filter, ...this.#contents.drawBeneath?.(drawn) }, settings);
+    };
+    if (this.#filter) this.#filter.render(frame, `${content} ${filter} ${JSON.stringify(settings)}`, draw);
+    else draw(frame);
+  }
+
+  /**
+   * Renders the first frame, for which the renderer allocates its buffers, and waits until the GPU has finished it.
+   * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU tells of a failed allocation only through a scope.
+   */
+  async renderFirst(request: CanvasFrame, content: string): Promise<void> {
+    const frame = frameOf(request);
+    this.#drawnSize = sizeOf(frame);
+    const error = await this.#withRefusal(() => this.#draw(frame, content));
+    if (error) throw await why(({ outOfMemory }) => outOfMemory('first frame', error));
+    await this.device.queue.onSubmittedWorkDone().catch(() => undefined);
+    // The GPU has nothing to do now. Nobody waits for it.
+    this.#clock.calibrate().catch(() => undefined);
+  }
+
+  /** Fulfils with what the device says if memory was lacking for some work. */
+  #withRefusal(work: () => void): Promise<GPUError | null> {
+    const { device } = this;
+    // A lost device closes no scopes; its loss is reported elsewhere.
+    const refusal = (): Promise<GPUError | null> => device.popErrorScope().catch(() => null);
+    device.pushErrorScope('out-of-memory');
+    try {
+      work();
+    } catch (error) {
+      void refusal();
+      throw error;
+    }
+    return refusal();
+  }
+
+  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
+    return this.viewpoint.probe(points);
+  }
+
+  async readCounts(camera: Camera): Promise<ReadCounts> {
+    const { readCounts } = await loadModule('the code that counts splats', () => import('./contributions.js'));
+    return readCounts(this, camera);
+  }
+
+  /** What it draws at rest. */
+  get view(): { readonly world: World; readonly settings: FrameSettings; readonly filter: SplatFilter | undefined } {
+    return { world: this.#contents.world, settings: this.#settings(), filter: this.#rendering.filter };
+  }
+
+  destroy(): void {
+    if (this.#isDestroyed) return;
+    this.#isDestroyed = true;
+    this.setFilter(undefined);
+    this.viewpoint.destroy();
+  }
+}
+
+const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
+
+/** What the canvas is made of. */
+export const canvasFormat = (): GPUTextureFormat => navigator.gpu.getPreferredCanvasFormat();
+
+const frameOf = ({ surface, ...frame }: CanvasFrame): Frame => ({
+  ...frame,
+  target: (surface as GPUCanvasContext).getCurrentTexture(),
+});
+
+/** Compute shaders may then write the canvas itself, where the device lets them. */
+function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsageFlags {
+  const { RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
+  const isStorable = format === 'rgba8unorm' || device.features.has('bgra8unorm-storage');
+  return isStorable ? RENDER_ATTACHMENT | STORAGE_BINDING : RENDER_ATTACHMENT;
+}

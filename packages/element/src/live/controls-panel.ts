@@ -1,0 +1,251 @@
+/** Loaded only for the attribute `controls-panel`, and where a model takes anything. */
+import { readSpokenStrings, type SpokenStrings } from '../words.js';
+import type { GeneratorInput } from './inputs.js';
+import { poseOf } from './pose-of.js';
+import { readNumbers, valueOf, type ControlValues, type Numbers } from './values.js';
+
+/** What the panel says, in English. The keys are those of `a11y`, too. */
+export const PANEL_WORDS = {
+  'controls-panel': 'Controls',
+  'controls-reset': 'Reset',
+  'controls-time': 'Time',
+  'controls-joint': 'Joint',
+} as const;
+
+/** Numbers of one input that get a slider each; more are a page's own business. */
+const MOST_SLIDERS = 24;
+/** Of coefficients whose range no contract says: standard deviations of bodies. */
+const SHAPE_RANGE = [-3, 3] as const;
+const SLIDER_STEPS = 200;
+const SLIDES = ['control', 'shape'];
+
+const STYLE = `
+  [part='controls-panel'] {
+    position: absolute;
+    inset-block-start: 8px;
+    inset-inline-end: 8px;
+    box-sizing: border-box;
+    inline-size: min(17em, 45%);
+    max-block-size: calc(100% - 16px);
+    overflow: auto;
+    padding: 0.5em 0.75em;
+    border-radius: 6px;
+    background: var(--message-background, rgb(255 255 255 / 0.92));
+    color: var(--message-color, rgb(30 30 30));
+    font: var(--message-font, 0.875rem/1.4 system-ui, sans-serif);
+  }
+  [part='controls-panel'] summary { cursor: pointer; min-block-size: 24px; }
+  [part='control'] { display: grid; grid-template-columns: 1fr auto; gap: 0 0.5em; margin-block: 0.4em; }
+  [part='control-input'] { grid-column: 1 / -1; inline-size: 100%; min-block-size: 24px; box-sizing: border-box; }
+  [part='control-value'] { font-variant-numeric: tabular-nums; }
+`;
+
+/** What the panel sees of its element. */
+interface PanelHost extends HTMLElement {
+  readonly inputs: readonly GeneratorInput[];
+  readonly controlsPanel: boolean;
+  readonly a11y: unknown;
+  readonly duration: number;
+  currentTime: number;
+  controls: ControlValues | null;
+  pose: Numbers | null;
+}
+
+const panels = new WeakMap<PanelHost, ControlsPanel>();
+
+/** Controls for visitors, made from what the models on show take. */
+export class ControlsPanel {
+  readonly #element: PanelHost;
+  readonly #strings: SpokenStrings;
+  readonly #box: HTMLElement;
+  /** Rotations of joints as people turn them, axis-angle, by the name of the input. */
+  readonly #turns = new Map<string, number[]>();
+  #told = '';
+
+  private constructor(element: PanelHost) {
+    this.#element = element;
+    this.#strings = readSpokenStrings(element.a11y) ?? {};
+    this.#box = make('section', { part: 'controls-panel' });
+    const root = element.shadowRoot!;
+    const sheet = new (element.ownerDocument.defaultView ?? window).CSSStyleSheet();
+    sheet.replaceSync(STYLE);
+    root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
+    root.append(this.#box);
+    element.addEventListener('inputs-change', () => this.#update());
+    element.addEventListener('timeupdate', () => this.#showTime());
+    element.addEventListener('emptied', () => this.#update());
+    new MutationObserver(() => this.#update()).observe(element, { attributeFilter: ['controls-panel'] });
+  }
+
+  /** The panel of an element: made at the first call. */
+  static show(element: PanelHost): void {
+    const panel = panels.get(element) ?? new ControlsPanel(element);
+    panels.set(element, panel);
+    panel.#update();
+  }
+
+  /** Builds the controls anew where there are others than before. */
+  #update(): void {
+    const { inputs, controlsPanel } = this.#element;
+    this.#box.hidden = !controlsPanel || inputs.length === 0;
+    const told = JSON.stringify(inputs);
+    if (told === this.#told || this.#box.hidden) return;
+    this.#told = told;
+    this.#turns.clear();
+    const controls = inputs.flatMap((input) => this.#controlsOf(input));
+    const title = this.#word('controls-panel');
+    this.#box.setAttribute('aria-label', title);
+    if (Object.keys(this.#strings).length === 0) this.#box.lang = 'en';
+    const details = make('details', {});
+    details.open = true;
+    const summary = make('summary', { textContent: title });
+    const reset = make('button', { type: 'button', part: 'control-input', textContent: this.#word('controls-reset') });
+    reset.addEventListener('click', () => this.#reset());
+    details.append(summary, ...controls, reset);
+    this.#box.replaceChildren(details);
+    this.#box.hidden = controls.length === 0;
+  }
+
+  #controlsOf(input: GeneratorInput): HTMLElement[] {
+    if (SLIDES.includes(input.role)) return this.#sliders(input);
+    if (input.role === 'image') return [this.#picture(input)];
+    if (input.role === 'pose') return this.#pose(input);
+    return input.role === 'time' && Number.isFinite(this.#element.duration) ? [this.#time()] : [];
+  }
+
+  #sliders(input: GeneratorInput): HTMLElement[] {
+    const { name, label, size, range = SHAPE_RANGE, step = (range[1] - range[0]) / SLIDER_STEPS, names } = input;
+    const initial = numbersOf(input);
+    return Array.from({ length: Math.min(size, MOST_SLIDERS) }, (_, i) => {
+      const title = names?.[i] ?? (size > 1 ? `${label} ${i + 1}` : label);
+      const now = (): readonly number[] => this.#valuesOf(name) ?? initial;
+      return slider(title, range, step, now()[i] ?? now()[0], (value) => {
+        const values = Array.from({ length: size }, (__, k) => now()[k] ?? now()[0]);
+        values[i] = value;
+        this.#set(name, values);
+      });
+    });
+  }
+
+  #picture({ name, label, views = 1 }: GeneratorInput): HTMLElement {
+    const field = make('input', { type: 'file', accept: 'image/*', multiple: views > 1, part: 'control-input' });
+    field.addEventListener('change', () => {
+      const files = [...(field.files ?? [])].slice(0, views);
+      if (files.length === views) this.#set(name, views > 1 ? files : files[0]);
+    });
+    return labelled(label, field);
+  }
+
+  /** A joint is chosen, and turned around its three axes. */
+  #pose(input: GeneratorInput): HTMLElement[] {
+    const { name, format = 'parameters', joints, size } = input;
+    const perJoint = { 'axis-angle': 3, quaternion: 4, matrix: 9, parameters: 0 }[format];
+    if (perJoint === 0) return [];
+    const count = size / perJoint;
+    const turns = new Array<number>(3 * count).fill(0);
+    this.#turns.set(name, turns);
+    const choice = make('select', { part: 'control-input' });
+    choice.append(
+      ...Array.from({ length: count }, (_, i) =>
+        make('option', { value: String(i), textContent: joints?.[i] ?? `${this.#word('controls-joint')} ${i + 1}` }),
+      ),
+    );
+    const axes = ['x', 'y', 'z'].map((axis, k) =>
+      slider(axis, [-Math.PI, Math.PI], Math.PI / SLIDER_STEPS, 0, (value) => {
+        turns[3 * Number(choice.value) + k] = value;
+        this.#element.pose = poseOf(turns, input);
+      }),
+    );
+    choice.addEventListener('change', () =>
+      axes.forEach((axis, k) => showValue(axis, turns[3 * Number(choice.value) + k])),
+    );
+    return [labelled(this.#word('controls-joint'), choice), ...axes];
+  }
+
+  #time(): HTMLElement {
+    const { duration, currentTime } = this.#element;
+    const control = slider(this.#word('controls-time'), [0, duration], duration / 1000, currentTime, (value) => {
+      this.#element.currentTime = value;
+    });
+    control.dataset.of = 'time';
+    return control;
+  }
+
+  #showTime(): void {
+    const control = this.#box.querySelector<HTMLElement>('[data-of=time]');
+    if (control) showValue(control, this.#element.currentTime);
+  }
+
+  #reset(): void {
+    const { controls } = this.#element;
+    const names = this.#element.inputs.map(({ name }) => name);
+    const others = Object.entries(controls ?? {}).filter(([name]) => !names.includes(name));
+    this.#element.controls = others.length > 0 ? Object.fromEntries(others) : null;
+    if (this.#turns.size > 0) this.#element.pose = null;
+    this.#told = '';
+    this.#update();
+    this.#box.querySelector('summary')?.focus();
+  }
+
+  /** What the page has set of an input. */
+  #valuesOf(name: string): readonly number[] | undefined {
+    const set = valueOf(this.#element.controls ?? {}, name);
+    return readNumbers((set as Numbers | undefined) ?? this.#element.getAttribute(`control-${name.toLowerCase()}`));
+  }
+
+  #set(name: string, value: ControlValues[string]): void {
+    this.#element.controls = { ...this.#element.controls, [name]: value };
+  }
+
+  #word(key: keyof typeof PANEL_WORDS): string {
+    return (this.#strings as Readonly<Record<string, string | undefined>>)[key] ?? PANEL_WORDS[key];
+  }
+}
+
+/** All numbers of an input where nothing is set. */
+const numbersOf = ({ default: initial = 0 }: GeneratorInput): readonly number[] =>
+  typeof initial === 'number' ? [initial] : initial;
+
+function slider(
+  title: string,
+  [min, max]: readonly [min: number, max: number],
+  step: number,
+  value: number,
+  onValue: (value: number) => void,
+): HTMLElement {
+  const field = make('input', { type: 'range', part: 'control-input' });
+  Object.assign(field, { min: String(min), max: String(max), step: String(step) });
+  // Not an output: a label is that of the first such element in it. A range says its value itself.
+  const shown = make('span', { part: 'control-value', ariaHidden: 'true' });
+  const control = labelled(title, field, shown);
+  field.addEventListener('input', () => {
+    shown.textContent = short(field.valueAsNumber);
+    onValue(field.valueAsNumber);
+  });
+  showValue(control, value);
+  return control;
+}
+
+function showValue(control: HTMLElement, value: number): void {
+  control.querySelector('input')!.value = String(value);
+  control.querySelector('[part=control-value]')!.textContent = short(value);
+}
+
+function labelled(title: string, ...fields: HTMLElement[]): HTMLElement {
+  const control = make('label', { part: 'control' });
+  const [field, ...shown] = fields;
+  control.append(make('span', { part: 'control-label', textContent: title }), ...shown, field);
+  return control;
+}
+
+const short = (value: number): string => String(Number(value.toPrecision(3)));
+
+function make<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  properties: Readonly<Record<string, string | boolean>>,
+): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  const { part, ...others } = properties;
+  if (typeof part === 'string') element.setAttribute('part', part);
+  return Object.assign(element, others);
+}

@@ -1,0 +1,35 @@
+/** Loaded by the worker when the first generator is asked for: headers of models are strangers' files, too. */
+import { GaussianSplatError, openHeader, type OnnxHeader, type OpenedModel } from '@gaussian-splat/core';
+import { fileLimits, fileName, limitsFrom, named } from './load-scene.js';
+import type { ModelRequest } from './protocol.js';
+
+/** Nodes, tensors and values of a graph that the page's thread gets at most: it looks at each of them. Real ones have thousands. */
+const MOST_PARTS = 200_000;
+
+/** Reads the header of a model. Throws GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or the signal's reason once that is aborted. */
+export async function openModel({ place, limits }: ModelRequest, signal: AbortSignal): Promise<OpenedModel> {
+  const name = 'url' in place ? fileName(place.url) : place.name;
+  const { maxBytes = Infinity, maxSeconds = Infinity } = fileLimits(limitsFrom({ limits })());
+  const limit = maxSeconds < 2e6 ? AbortSignal.timeout(1000 * Math.max(0, maxSeconds)) : undefined;
+  try {
+    const model = await openHeader(place, limit ? AbortSignal.any([signal, limit]) : signal);
+    const beside = model.header.externalFiles.reduce((sum, { byteLength }) => sum + byteLength, 0);
+    if (model.size + beside > maxBytes) throw tooMuch(name, `at most ${maxBytes} bytes`, `${model.size + beside}`);
+    const parts = partsOf(model.header);
+    if (parts > MOST_PARTS) throw tooMuch(name, `at most ${MOST_PARTS} nodes and tensors`, String(parts));
+    return model;
+  } catch (error) {
+    signal.throwIfAborted();
+    if (limit?.aborted) throw tooMuch(name, `at most ${maxSeconds} s`, 'more');
+    throw named(error, name);
+  }
+}
+
+const partsOf = ({ nodes, stored, values, metadata, inputs, outputs, externalFiles }: OnnxHeader): number =>
+  nodes.length + stored.size + values.size + metadata.size + inputs.length + outputs.length + externalFiles.length;
+
+const tooMuch = (where: string, expected: string, found: string): GaussianSplatError =>
+  new GaussianSplatError('out-of-memory/budget', {
+    ...{ where, expected, found },
+    remedy: 'use a smaller model, or allow for more',
+  });

@@ -1,0 +1,39 @@
+import type { Placed, Placement, World } from '@gaussian-splat/renderer';
+import type { SceneBounds } from './camera/settings.js';
+import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
+
+/** A loaded source in the world. */
+export class Member {
+  readonly scene: LoadedGaussians;
+  readonly #world: World;
+  #placement: Placement;
+  #bounds: SceneBounds;
+
+  constructor(world: World, scene: LoadedGaussians) {
+    this.#world = world;
+    this.scene = scene;
+    this.#bounds = scene.bounds;
+    this.#placement = this.#add({ bounds: this.#bounds });
+  }
+
+  /** How it stands in the world. Other splats of the source may be drawn now than in the last frame: levels of detail, or a sequence's next buffers. */
+  get placement(): Placement {
+    const before = this.#placement;
+    if (before.scene !== this.scene.drawn) {
+      this.remove();
+      const { sceneToWorld, opacity, crop, visible, bounds } = before;
+      this.#placement = this.#add({ sceneToWorld, opacity, crop, visible, bounds });
+    }
+    const { bounds } = this.scene;
+    if (bounds !== this.#bounds) this.#placement.bounds = this.#bounds = bounds;
+    return this.#placement;
+  }
+
+  remove(): void {
+    this.#world.remove(this.#placement);
+  }
+
+  #add(placed: Omit<Placed, 'scene'>): Placement {
+    return this.#world.add({ ...placed, scene: this.scene.drawn });
+  }
+}

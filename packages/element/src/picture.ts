@@ -1,0 +1,90 @@
+/** Pictures for scripts: of any size, over a colour, and with the filters that the page's CSS puts on the element. */
+import type { PixelSize } from './controllers/size-controller.js';
+import type { ViewController } from './controllers/view-controller.js';
+import { wasLost } from './gpu/device-failures.js';
+import type { PictureOptions } from './viewing.js';
+
+export interface PictureHost {
+  readonly element: HTMLElement;
+  readonly canvas: HTMLCanvasElement | null;
+  readonly view: Pick<ViewController, 'painter'>;
+  warn(sentence: string): void;
+  /** Draws a frame into the element's canvas now; null where there is nothing to draw. */
+  drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
+}
+
+/** Premultiplied, 0..1. */
+export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
+
+/** Why there is no picture of a device that is lost. */
+const LOST = 'The GPU device was lost before the picture was drawn: take it again after the event contextrestored';
+
+export async function takePicture(host: PictureHost, options: PictureOptions): Promise<Blob> {
+  const { mimeType = 'image/png', qualityArgument, background } = options;
+  const { painter } = host.view;
+  const pixels = painter && sizeOf(options, host.canvas, painter.device.limits.maxTextureDimension2D);
+  const drawn = host.drawNow(pixels ?? undefined, background === undefined ? undefined : rgbaOf(background));
+  if (drawn === null) throw nothingToDraw();
+  const blob = new Promise<Blob | null>((resolve) =>
+    withFilters(host, drawn).toBlob(resolve, mimeType, qualityArgument),
+  );
+  // The page goes on showing what it showed: nothing is presented before this task ends.
+  if (pixels || background !== undefined) host.drawNow();
+  const taken = await blob;
+  // A device that was lost before it had drawn leaves an empty picture, and says so later.
+  if (painter && (await wasLost(painter))) throw new DOMException(LOST, 'InvalidStateError');
+  if (taken === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
+  return taken;
+}
+
+export const nothingToDraw = (): DOMException =>
+  new DOMException(
+    'There is nothing to take a picture of: expected a loaded scene in an element that has a size',
+    'InvalidStateError',
+  );
+
+/** One side alone keeps the shape of the element. null without either. */
+function sizeOf({ width, height }: PictureOptions, canvas: HTMLCanvasElement | null, most: number): PixelSize | null {
+  if (canvas === null || (width === undefined && height === undefined)) return null;
+  const aspect = canvas.width / canvas.height;
+  const size = { width: Math.round(width ?? height! * aspect), height: Math.round(height ?? width! / aspect) };
+  const isDrawable = (side: number): boolean => side >= 1 && side <= most;
+  if (!isDrawable(size.width) || !isDrawable(size.height))
+    throw new RangeError(
+      `toBlob(): expected a picture of 1 to ${most} pixels to a side, which is what this GPU can draw, found ${size.width} x ${size.height}`,
+    );
+  return size;
+}
+
+function rgbaOf(color: string): Rgba {
+  if (!CSS.supports('color', color))
+    throw new TypeError(`toBlob(): expected a CSS colour as background, found "${color}"`);
+  const context = paper(1, 1);
+  context.fillStyle = color;
+  context.fillRect(0, 0, 1, 1);
+  const [red, green, blue, alpha] = Array.from(context.getImageData(0, 0, 1, 1).data, (value) => value / 255);
+  return [red * alpha, green * alpha, blue * alpha, alpha];
+}
+
+/** What the screen shows of a canvas whose element the page's CSS filters. */
+function withFilters(host: PictureHost, drawn: HTMLCanvasElement): HTMLCanvasElement {
+  const filter = [drawn, host.element]
+    .map((node) => getComputedStyle(node).filter)
+    .filter((text) => text !== '' && text !== 'none')
+    .join(' ');
+  if (filter === '') return drawn;
+  const context = paper(drawn.width, drawn.height);
+  if (!('filter' in context)) {
+    host.warn('<gaussian-splat> toBlob(): this browser cannot apply CSS filters to a picture; it is without them.');
+    return drawn;
+  }
+  context.filter = filter;
+  context.drawImage(drawn, 0, 0);
+  return context.canvas;
+}
+
+function paper(width: number, height: number): CanvasRenderingContext2D {
+  const context = Object.assign(document.createElement('canvas'), { width, height }).getContext('2d');
+  if (context === null) throw nothingToDraw();
+  return context;
+}

@@ -1,0 +1,183 @@
+/** Places for the camera, in all the forms that pages and files have them, and the poses that they mean. */
+import { GaussianSplatError, inverse, length, normalize, subtract, type Vector3 } from '@gaussian-splat/core';
+import { fieldOfViewGrammar, orbitGrammar, targetGrammar, type AttributeGrammar } from '../camera/grammar.js';
+import { toViewer, type Pose, type ViewerFrame } from '../camera/orbit.js';
+import { poseOf, type CameraSettings, type SceneBounds } from '../camera/settings.js';
+
+/** A view in the words of the attributes. What is left out stays as it is. */
+export interface OrbitView {
+  /** As `camera-orbit`. */
+  readonly orbit?: string;
+  /** As `camera-target`. */
+  readonly target?: string;
+  /** As `field-of-view`. */
+  readonly fieldOfView?: string;
+}
+
+/** A camera of a trainer's `cameras.json`: in the scene's own frame, OpenCV axes (x right, y down, z forward). */
+export interface TrainerView {
+  /** Where the eye is, world units. */
+  readonly position: readonly number[];
+  /** 3x3 camera to world, rows outermost: its columns are the camera's axes. */
+  readonly rotation: readonly (readonly number[])[];
+  /** Image height and focal length in pixels, for the field of view; without both it stays. */
+  readonly height?: number;
+  readonly fy?: number;
+}
+
+/** A camera by its matrix: in the scene's own frame, OpenCV axes. 16 numbers row by row, or four rows of four. */
+export interface MatrixView {
+  readonly worldToCamera: readonly number[] | readonly (readonly number[])[];
+  /** 3x3 intrinsics in pixels, and the image's height, for the field of view; without both it stays. */
+  readonly K?: readonly (readonly number[])[];
+  readonly height?: number;
+}
+
+/** A camera by eye and target, as three numbers each. */
+export interface LookView {
+  readonly position: readonly number[];
+  readonly lookAt: readonly number[];
+  /** Whose numbers these are. Default: `viewer`, the space of `camera-target`. The viewer of SuperSplat turns every scene by half a turn around z. */
+  readonly space?: 'viewer' | 'supersplat';
+  /** Degrees, along the longer side of the picture; without it the field of view stays. */
+  readonly fov?: number;
+}
+
+/**
+ * A place for the camera. The camera stands upright: the roll of a matrix is left out.
+ */
+export type CameraView = OrbitView | TrainerView | MatrixView | LookView;
+
+/** What a view is read against. */
+export interface ViewContext {
+  readonly settings: CameraSettings;
+  readonly bounds: SceneBounds;
+  readonly frame: ViewerFrame;
+  /** Width / height of the picture. */
+  readonly aspect: number;
+  /** Where the camera is going now: parts that a view leaves out stay. */
+  readonly from: Pose;
+}
+
+/** The pose of a view. Throws `argument/camera` for one that is malformed. */
+export function poseOfView(view: CameraView, context: ViewContext): Pose {
+  if (typeof view !== 'object' || view === null) throw fail('view', FORMS, view);
+  if ('worldToCamera' in view) return ofMatrix(view, context);
+  if ('rotation' in view) return ofTrainer(view, context);
+  if ('lookAt' in view) return ofLook(view, context);
+  return ofOrbit(view, context);
+}
+
+const FORMS =
+  '{ orbit, target, fieldOfView } as of the attributes, { position, lookAt }, { position, rotation } of a cameras.json, or { worldToCamera }';
+
+function ofOrbit({ orbit, target, fieldOfView }: OrbitView, { settings, bounds, aspect, from }: ViewContext): Pose {
+  if (orbit === undefined && target === undefined && fieldOfView === undefined)
+    throw fail('view', FORMS, 'none of these');
+  const read = <T>(name: string, text: string | undefined, grammar: AttributeGrammar<T>): T | undefined => {
+    if (text === undefined) return undefined;
+    const value = grammar.parse(String(text));
+    if (value === null) throw fail(`view.${name}`, grammar.expected, text);
+    return value;
+  };
+  const wanted = {
+    orbit: read('orbit', orbit, orbitGrammar('auto')),
+    target: read('target', target, targetGrammar),
+    fieldOfView: read('fieldOfView', fieldOfView, fieldOfViewGrammar),
+  };
+  const pose = poseOf(
+    {
+      ...settings,
+      orbit: wanted.orbit ?? settings.orbit,
+      target: wanted.target ?? settings.target,
+      // The radius that frames the scene depends on it.
+      fieldOfView: wanted.fieldOfView ?? from.fieldOfView,
+    },
+    bounds,
+    aspect,
+  );
+  const { theta, phi, radius, x, y, z } = pose;
+  return {
+    ...from,
+    ...(wanted.orbit && { theta, phi, radius }),
+    ...(wanted.target && { x, y, z }),
+    fieldOfView: pose.fieldOfView,
+  };
+}
+
+function ofTrainer({ position, rotation, height, fy }: TrainerView, context: ViewContext): Pose {
+  const eye = vector('view.position', position);
+  if (!isRows(rotation, 3)) throw fail('view.rotation', 'a 3x3 array of numbers, camera to world', rotation);
+  const forward: Vector3 = [rotation[0][2], rotation[1][2], rotation[2][2]];
+  return ofRay(toViewer(context.frame, eye), toViewer(context.frame, forward), vertical(height, fy), context);
+}
+
+function ofMatrix({ worldToCamera, K, height }: MatrixView, context: ViewContext): Pose {
+  const m = (worldToCamera as unknown[]).flat?.() as number[];
+  const isMatrix = m?.length === 16 && m.every(Number.isFinite) && Math.hypot(m[12], m[13], m[14], m[15] - 1) < 1e-6;
+  if (!isMatrix) throw fail('view.worldToCamera', 'a 4x4 array of numbers with the last row 0, 0, 0, 1', worldToCamera);
+  const back = inverse(m);
+  return ofRay(
+    toViewer(context.frame, [back[3], back[7], back[11]]),
+    toViewer(context.frame, [m[8], m[9], m[10]]),
+    vertical(height, K?.[1]?.[1]),
+    context,
+  );
+}
+
+function ofLook({ position, lookAt, space, fov }: LookView, context: ViewContext): Pose {
+  const [eye, target] = [vector('view.position', position), vector('view.lookAt', lookAt)].map((point) =>
+    space === 'supersplat' ? toViewer(context.frame, [-point[0], -point[1], point[2]]) : point,
+  );
+  const way = subtract(target, eye);
+  if (!(length(way) > 0)) throw fail('view.lookAt', 'another point than view.position', lookAt);
+  // The longer side of the picture has the angle; ours is the vertical one.
+  const half = fov === undefined ? undefined : Math.tan((fov * Math.PI) / 360) / Math.max(1, context.aspect);
+  const pose = ofRay(eye, way, half === undefined ? undefined : 2 * Math.atan(half), context);
+  return { ...pose, radius: length(way), x: target[0], y: target[1], z: target[2] };
+}
+
+/** Vertical angle of a calibrated camera. */
+const vertical = (height: number | undefined, focal: number | undefined): number | undefined =>
+  height! > 0 && focal! > 0 ? 2 * Math.atan(height! / (2 * focal!)) : undefined;
+
+/** Closest that the point to turn around may be ahead of the eye, in radii of the scene. */
+const LEAST_AHEAD = 0.1;
+
+/** A camera at an eye that looks along a direction turns around the point ahead of it that is nearest to the middle of the scene. */
+function ofRay(eye: Vector3, direction: Vector3, fieldOfView: number | undefined, context: ViewContext): Pose {
+  const { bounds, frame, from } = context;
+  const forward = normalize(direction);
+  const toMiddle = subtract(toViewer(frame, bounds.center), eye);
+  const along = toMiddle[0] * forward[0] + toMiddle[1] * forward[1] + toMiddle[2] * forward[2];
+  const radius = Math.max(LEAST_AHEAD * bounds.radius, along);
+  const [x, y, z] = eye.map((value, axis) => value + radius * forward[axis]);
+  return {
+    theta: Math.atan2(-forward[0], -forward[2]),
+    phi: Math.acos(Math.min(1, Math.max(-1, -forward[1]))),
+    radius,
+    ...{ x, y, z },
+    fieldOfView: fieldOfView ?? from.fieldOfView,
+  };
+}
+
+const isRows = (rows: unknown, size: number): boolean =>
+  Array.isArray(rows) &&
+  rows.length === size &&
+  rows.every((row) => Array.isArray(row) && row.length === size && row.every(Number.isFinite));
+
+function vector(where: string, value: readonly number[]): Vector3 {
+  if (!Array.isArray(value) || value.length !== 3 || !value.every(Number.isFinite))
+    throw fail(where, 'three numbers', value);
+  return value as unknown as Vector3;
+}
+
+export function fail(where: string, expected: string, found: unknown): GaussianSplatError {
+  const text = typeof found === 'string' ? found : (JSON.stringify(found) ?? 'nothing');
+  return new GaussianSplatError('argument/camera', {
+    where,
+    expected,
+    found: text.length > 120 ? `${text.slice(0, 120)}…` : text,
+    remedy: 'see "Views and flights" in the README of the element',
+  });
+}

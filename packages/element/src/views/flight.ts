@@ -1,0 +1,69 @@
+/** One motion of the camera along a path of time: from a frame to the next, until it has arrived or somebody else moves the camera. */
+import type { Pose } from '../camera/orbit.js';
+import type { CameraController } from '../controllers/camera-controller.js';
+
+/** How long after its end a flight whose frames do not come is over, ms. */
+const GRACE_MS = 100;
+
+export class Flight {
+  readonly #camera: CameraController;
+  readonly #path: (elapsedMs: number) => Pose;
+  readonly #durationMs: number;
+  #start: number | undefined;
+  #placed: Pose | undefined;
+  #end: ((arrived: boolean) => void) | undefined;
+  readonly #timer: ReturnType<typeof setTimeout> | undefined;
+  /** Fulfils at the end: whether it has arrived. */
+  readonly finished: Promise<boolean>;
+
+  /** @param durationMs 0 jumps; Infinity never arrives */
+  constructor(camera: CameraController, path: (elapsedMs: number) => Pose, durationMs: number) {
+    this.#camera = camera;
+    this.#path = path;
+    this.#durationMs = durationMs;
+    this.finished = new Promise((resolve) => (this.#end = resolve));
+    if (durationMs === 0) this.#arrive();
+    else if (Number.isFinite(durationMs)) this.#timer = setTimeout(() => this.#arrive(), durationMs + GRACE_MS);
+  }
+
+  get isOver(): boolean {
+    return this.#end === undefined;
+  }
+
+  /** @param now requestAnimationFrame's clock, ms */
+  advance(now: number): void {
+    if (this.isOver) return;
+    // Hands, attributes, another scene: whoever moves the camera has it.
+    if (this.#isElsewhere) return this.cancel();
+    this.#start ??= now;
+    const elapsed = now - this.#start;
+    if (elapsed >= this.#durationMs) this.#arrive();
+    else this.#place(elapsed);
+  }
+
+  cancel(): void {
+    this.#finish(false);
+  }
+
+  #arrive(): void {
+    if (this.#isElsewhere) return this.cancel();
+    this.#place(this.#durationMs);
+    this.#finish(true);
+  }
+
+  get #isElsewhere(): boolean {
+    const [placed, goal] = [this.#placed, this.#camera.goal];
+    return placed !== undefined && Object.entries(placed).some(([key, value]) => goal[key as keyof Pose] !== value);
+  }
+
+  #place(elapsedMs: number): void {
+    this.#camera.moveTo(this.#path(elapsedMs));
+    this.#placed = this.#camera.goal;
+  }
+
+  #finish(arrived: boolean): void {
+    clearTimeout(this.#timer);
+    this.#end?.(arrived);
+    this.#end = undefined;
+  }
+}

@@ -1,0 +1,345 @@
+import { css, html, nothing, render, type ReactiveController, type ReactiveControllerHost } from 'lit';
+import type { Behaviours } from '../behaviours.js';
+import type { Pose } from '../camera/orbit.js';
+import type { CameraController } from '../controllers/camera-controller.js';
+import { prefersReducedMotion, type Mover } from '../controllers/mover.js';
+import type { GaussianSplatEventMap } from '../events.js';
+import { languageOf, type SpokenStrings, type ViewWord } from '../words.js';
+import { fail, poseOfView, type CameraView } from './camera-view.js';
+import { Flight } from './flight.js';
+import { easingOf, poseAlong, unwound, type Easing } from './path.js';
+import { readViews, type NamedView, type ViewList } from './read-views.js';
+
+/** How a flight goes. */
+export interface FlightOptions {
+  /** Milliseconds; 0 jumps. Default 1200. */
+  readonly duration?: number;
+  /** Default `ease-in-out`. */
+  readonly easing?: Easing;
+}
+
+/** How a flight along a path goes. */
+export interface PathOptions {
+  /** Milliseconds for all of the path. Default: what its keyframes say, else 3000 for each of its parts. */
+  readonly duration?: number;
+  /** Default `linear`. */
+  readonly easing?: Easing;
+  /** Begins again at the end, until somebody takes the camera. */
+  readonly loop?: boolean;
+}
+
+export interface TourHost {
+  readonly camera: CameraController;
+  readonly behaviours: Behaviours;
+  /** Fulfils, and never rejects, once nothing is left to wait for. */
+  readonly settled: Promise<void>;
+  readonly surface: HTMLElement | null;
+  readonly strings: SpokenStrings;
+  readonly views: object | string | null;
+  /** Somebody sees the scene. */
+  readonly isOnShow: boolean;
+  warn(sentence: string): void;
+  requestFrame(): void;
+  dispatch(event: GaussianSplatEventMap['view-change']): void;
+}
+
+const DURATION_MS = 1_200;
+const PART_MS = 3_000;
+
+const WORDS: Readonly<Record<ViewWord, string>> = {
+  views: 'Views',
+  'next-view': 'Next view',
+  'previous-view': 'Previous view',
+  'keys-views': 'N and P show the next and the previous view, 1 to 9 the first ones.',
+};
+
+const STYLES = css`
+  [part='views'] {
+    display: var(--views-display, flex);
+    position: absolute;
+    inset: 8px 8px auto;
+    justify-content: center;
+    align-items: center;
+    flex-wrap: wrap;
+    gap: 4px;
+    pointer-events: none;
+    font: var(--message-font, 0.875rem/1.4 system-ui, sans-serif);
+  }
+  [part='views'] > button,
+  [part='view-name'] {
+    pointer-events: auto;
+    padding: 8px;
+    border: 0;
+    border-radius: 18px;
+    line-height: 20px;
+    background: var(--interaction-prompt-background, rgb(0 0 0 / 0.6));
+    color: var(--interaction-prompt-color, rgb(255 255 255));
+  }
+  [part='views'] > button {
+    line-height: 0;
+    cursor: pointer;
+  }
+  [part='views'] ::slotted(*) {
+    pointer-events: auto;
+  }
+`;
+
+/** The views of an element: its list, the flights between them, and the bar, the keys and the words with which people choose. */
+export class Tour implements ReactiveController, Mover {
+  readonly #element: ReactiveControllerHost & HTMLElement;
+  readonly #of: TourHost;
+  #flight: Flight | undefined;
+  #source: unknown;
+  #list: Promise<ViewList> = Promise.resolve(NO_VIEWS);
+  #views: readonly NamedView[] = [];
+  #children: readonly HTMLElement[] = [];
+  #current = -1;
+  #bar: HTMLElement | undefined;
+  #keys: AbortController | undefined;
+
+  constructor(element: ReactiveControllerHost & HTMLElement, of: TourHost) {
+    this.#element = element;
+    this.#of = of;
+    of.behaviours.add(this);
+    element.addController(this);
+    element.addEventListener('click', this.#onClick);
+    this.hostUpdated();
+  }
+
+  hostUpdated(): void {
+    this.#readChildren();
+    if (this.#of.views !== this.#source) {
+      this.#source = this.#of.views;
+      this.#list = this.#load(this.#of.views);
+    }
+    this.#show();
+  }
+
+  hostDisconnected(): void {
+    this.#flight?.cancel();
+  }
+
+  advance(now: number): boolean {
+    const flight = this.#flight;
+    if (flight === undefined || flight.isOver) return false;
+    // What turns by itself waits until the camera has arrived.
+    this.#of.behaviours.rest();
+    flight.advance(now);
+    return !flight.isOver;
+  }
+
+  async flyTo(view: CameraView | string | number, options: FlightOptions = {}): Promise<boolean> {
+    const { views } = await this.#ready();
+    if (typeof view === 'object') return this.#fly(view, options, -1);
+    const index = typeof view === 'number' ? view : views.findIndex(({ name }) => name === view);
+    if (!views[index]) throw fail('flyTo', `one of ${JSON.stringify(views.map(({ name }) => name))}`, view);
+    return this.#fly(views[index].view, options, index);
+  }
+
+  async step(by: number, options: FlightOptions = {}): Promise<boolean> {
+    const { views } = await this.#ready();
+    if (views.length === 0) return false;
+    // From nowhere the next one is the first, and the one before is the last.
+    const from = this.#current < 0 && by < 0 ? 0 : this.#current;
+    return this.flyTo((from + by + views.length) % views.length, options);
+  }
+
+  async flyAlong({ duration, easing = 'linear', loop = false }: PathOptions = {}): Promise<boolean> {
+    const path = await this.#path();
+    if (path === null) return false;
+    const length = duration ?? path.seconds * 1_000;
+    const ease = easingOf(easing);
+    const place = (elapsed: number): Pose => path.at(ease(loop ? (elapsed % length) / length : elapsed / length));
+    this.#current = -1;
+    if (prefersReducedMotion() || !(length > 0)) return this.#start(() => path.at(1), 0);
+    return this.#start(place, loop ? Infinity : length);
+  }
+
+  async showAlong(share: number): Promise<void> {
+    const path = await this.#path();
+    if (path === null) return;
+    this.#flight?.cancel();
+    this.#of.camera.moveTo(path.at(Math.min(1, Math.max(0, share))));
+  }
+
+  /** The list, once it and the scene are there: what is in percent or `auto` is known then. */
+  async #ready(): Promise<ViewList> {
+    await this.#element.updateComplete;
+    await this.#of.settled;
+    this.#readChildren();
+    const { path } = await this.#list;
+    return { views: this.#views, path };
+  }
+
+  async #path(): Promise<{ at: (share: number) => Pose; seconds: number } | null> {
+    const { views, path } = await this.#ready();
+    const stops = path.length > 0 ? path : views.map(({ view }, i) => ({ time: (i * PART_MS) / 1_000, view }));
+    if (stops.length === 0) return null;
+    const poses = stops.map(({ view }) => poseOfView(view, this.#of.camera.context));
+    const times = stops.map(({ time }) => time);
+    const [first, seconds] = [times[0], times[times.length - 1] - times[0]];
+    return { at: (share) => poseAlong(poses, times, first + share * seconds), seconds };
+  }
+
+  #fly(
+    view: CameraView,
+    { duration = DURATION_MS, easing = 'ease-in-out' }: FlightOptions,
+    index: number,
+  ): Promise<boolean> {
+    const { camera } = this.#of;
+    const from = camera.goal;
+    const to = unwound(poseOfView(view, camera.context), from);
+    const ease = easingOf(easing);
+    const path = (elapsed: number): Pose =>
+      elapsed >= duration ? to : poseAlong([from, to], [0, 1], ease(elapsed / duration));
+    this.#choose(index);
+    const isSeen = this.#of.isOnShow && !prefersReducedMotion();
+    return this.#start(path, isSeen ? Math.max(0, duration) : 0, index);
+  }
+
+  async #start(path: (elapsed: number) => Pose, duration: number, index = -1): Promise<boolean> {
+    this.#flight?.cancel();
+    const { behaviours, camera } = this.#of;
+    const flight = (this.#flight = new Flight(camera, duration === 0 ? () => path(Infinity) : path, duration));
+    behaviours.rest();
+    behaviours.announcer.isQuiet = true;
+    this.#of.requestFrame();
+    const arrived = await flight.finished;
+    if (this.#flight === flight) behaviours.announcer.isQuiet = false;
+    const view = this.#views[index];
+    if (arrived && view) behaviours.announcer.say(`${view.name} (${index + 1}/${this.#views.length})`);
+    return arrived;
+  }
+
+  #choose(index: number): void {
+    this.#current = index;
+    this.#show();
+    if (index < 0) return;
+    const { name } = this.#views[index];
+    this.#of.dispatch(new CustomEvent('view-change', { detail: { name, index } }));
+  }
+
+  async #load(source: object | string | null): Promise<ViewList> {
+    const isCurrent = (): boolean => this.#source === source;
+    try {
+      const json = typeof source === 'string' ? await readJson(source, this.#element.baseURI) : source;
+      const list = json ? readViews(json) : NO_VIEWS;
+      if (isCurrent()) this.#setViews(list.views);
+      return list;
+    } catch (error) {
+      if (isCurrent()) {
+        this.#setViews([]);
+        this.#of.warn(`<gaussian-splat> views: ${error instanceof Error ? error.message : String(error)}`);
+      }
+      return NO_VIEWS;
+    }
+  }
+
+  #listed: readonly NamedView[] = [];
+
+  #setViews(views: readonly NamedView[]): void {
+    this.#listed = views;
+    this.#join();
+  }
+
+  /** Children of the page with `data-orbit`: hotspots, and buttons of the slot `view`. A hotspot without a target looks at its point. */
+  #readChildren(): void {
+    this.#children = [...this.#element.querySelectorAll<HTMLElement>(':scope > [data-orbit]')];
+    this.#join();
+  }
+
+  #join(): void {
+    const own = this.#children.map((child) => {
+      const { orbit, target, position, fieldOfView, view } = child.dataset;
+      const looksAt = target ?? position;
+      return {
+        name: view ?? child.getAttribute('aria-label') ?? child.textContent.trim(),
+        view: { orbit, ...(looksAt && { target: looksAt }), ...(fieldOfView && { fieldOfView }) },
+      };
+    });
+    this.#views = [...own, ...this.#listed];
+    this.#show();
+  }
+
+  readonly #onClick = (event: Event): void => {
+    const index = this.#children.findIndex((child) => child.contains(event.target as Node));
+    if (index >= 0) this.#go(index);
+  };
+
+  #go(index: number): void {
+    this.flyTo(index).catch((error: Error) => this.#of.warn(`<gaussian-splat> views: ${error.message}`));
+  }
+
+  #show(): void {
+    const root = this.#element.shadowRoot;
+    const { surface } = this.#of;
+    if (root === null || surface === null) return;
+    this.#children.forEach((child, i) => {
+      if (i === this.#current) child.setAttribute('aria-current', 'true');
+      else child.removeAttribute('aria-current');
+    });
+    this.#bar ??= addBar(root);
+    this.#listen(surface);
+    const { isOnShow } = this.#of;
+    render(isOnShow && this.#views.length > 0 ? this.#template() : nothing, this.#bar);
+    if (this.#bar.querySelector('#view-keys') && surface.getAttribute('aria-describedby') === 'keys')
+      surface.setAttribute('aria-describedby', 'keys view-keys');
+  }
+
+  #template(): unknown {
+    const { strings } = this.#of;
+    const word = (key: ViewWord): string => strings[key] ?? WORDS[key];
+    const lang = languageOf(strings) ?? nothing;
+    const hasSlot = this.#children.some(({ slot }) => slot === 'view');
+    const name = this.#views[this.#current]?.name ?? `${this.#views.length}`;
+    const button = (key: 'next-view' | 'previous-view', by: number, sign: string): unknown =>
+      html`<button type="button" part=${key} aria-label=${word(key)} lang=${lang} @click=${() => void this.step(by)}>
+        <svg viewBox="0 0 24 24" width="20" height="20" aria-hidden="true" fill="currentColor"><path d=${sign} /></svg>
+      </button>`;
+    return html`<div part="views" role="group" aria-label=${word('views')} lang=${lang}>
+        ${button('previous-view', -1, 'M15 5v14l-9-7z')}
+        ${hasSlot ? html`<slot name="view"></slot>` : html`<span part="view-name" lang="">${name}</span>`}
+        ${button('next-view', 1, 'M9 5v14l9-7z')}
+      </div>
+      <span id="view-keys" hidden lang=${lang}>${word('keys-views')}</span>`;
+  }
+
+  #listen(surface: HTMLElement): void {
+    if (this.#keys !== undefined) return;
+    this.#keys = new AbortController();
+    surface.addEventListener('keydown', this.#onKey, { signal: this.#keys.signal });
+  }
+
+  readonly #onKey = (event: KeyboardEvent): void => {
+    if (event.ctrlKey || event.altKey || event.metaKey || this.#views.length === 0) return;
+    const key = event.key.toLowerCase();
+    const index = Number(key) - 1;
+    if (key === 'n' || key === 'p') void this.step(key === 'n' ? 1 : -1);
+    else if (index >= 0 && index < this.#views.length) this.#go(index);
+    else return;
+    event.preventDefault();
+  };
+}
+
+const NO_VIEWS: ViewList = { views: [], path: [] };
+
+async function readJson(source: string, base: string): Promise<unknown> {
+  if (/^\s*[[{]/.test(source)) return JSON.parse(source);
+  const url = new URL(source, base);
+  const response = await fetch(url);
+  if (!response.ok) throw new Error(`expected a JSON file at ${url.href}, found status ${response.status}`);
+  return response.json();
+}
+
+/** Beside what Lit renders, with a style sheet of its own. */
+function addBar(root: ShadowRoot): HTMLElement {
+  const bar = root.ownerDocument.createElement('div');
+  root.append(bar);
+  const view = root.ownerDocument.defaultView as (Window & typeof globalThis) | null;
+  if (view) {
+    const sheet = new view.CSSStyleSheet();
+    sheet.replaceSync(STYLES.cssText);
+    root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
+  }
+  return bar;
+}

@@ -1,0 +1,82 @@
+/** Files of splats, or beside them, that are known but not read: how they are told, and what to do. Loaded with diagnose.ts, when a file has been refused. */
+import { startsWith } from './bytes.js';
+
+/** A kind of file that is recognised only to say what it is. */
+export interface UnreadKind {
+  readonly found: string;
+  readonly remedy: string;
+  /** Ends of the file's name, without the dot. */
+  readonly extensions?: RegExp;
+  /** Tells it by its bytes, or by its first words. */
+  readonly fits?: (bytes: Uint8Array, text: string) => boolean;
+  /** A path that an archive of this kind has. */
+  readonly within?: RegExp;
+}
+
+const CONVERT = 'convert it to SPZ or PLY, for example with splat-transform or SuperSplat';
+const EXPORT = 'save the splats as PLY with the trainer that wrote it, and give that file';
+
+export const UNREAD_KINDS: readonly UnreadKind[] = [
+  { found: 'a .rad scene of Spark', remedy: CONVERT, extensions: /^rad$/ },
+  {
+    found: 'an LCC2 scene of XGRIDS',
+    remedy: CONVERT,
+    extensions: /^lcc2$/,
+    within: /\.lcc2$/i,
+  },
+  {
+    found: 'an LCC scene of XGRIDS',
+    remedy: CONVERT,
+    extensions: /^lcc$/,
+    fits: (_, text) => /"totalSplats"\s*:/.test(text),
+    within: /\.lcc$/i,
+  },
+  {
+    found: 'a .splatv scene, whose splats move',
+    remedy: 'export each moment as a PLY or SPZ of its own, and show them as a sequence',
+    extensions: /^splatv$/,
+    // The number 0x674b in 32 bits.
+    fits: (bytes) => startsWith(bytes, [0x4b, 0x67, 0, 0]),
+  },
+  {
+    found: 'a scene of OpenUSD (USD, USDZ)',
+    remedy: 'save its splats (ParticleField3DGaussianSplat) as PLY or SPZ with the tool that wrote it',
+    extensions: /^usd[acz]?$/,
+    fits: (bytes, text) => startsWith(bytes, 'PXR-USDC') || text.startsWith('#usda'),
+    within: /\.usd[ac]?$/i,
+  },
+  {
+    found: 'a checkpoint of PyTorch',
+    remedy: EXPORT,
+    extensions: /^(pt|pth|ckpt)$/,
+    within: /(^|\/)data\.pkl$/,
+  },
+  {
+    found: 'arrays of NumPy',
+    remedy: EXPORT,
+    extensions: /^np[yz]$/,
+    fits: (bytes) => startsWith(bytes, '\x93NUMPY'),
+    within: /\.npy$/i,
+  },
+  {
+    found: 'an I3S scene layer',
+    remedy: CONVERT,
+    extensions: /^(slpk|i3s)$/,
+    within: /(^|\/)3dSceneLayer\.json(\.gz)?$/i,
+  },
+  {
+    found: 'a tileset of 3D Tiles',
+    remedy: 'give one of the .glb files that it names, or convert the tiles to SPZ or PLY',
+    extensions: /^(3tz|b3dm|pnts|i3dm|cmpt)$/,
+    fits: (_, text) => /"geometricError"\s*:/.test(text),
+    within: /(^|\/)(tileset\.json|@3dtilesIndex1@)$/i,
+  },
+];
+
+/** The kind of a file; undefined for all others. */
+export function unreadKind(bytes: Uint8Array, text: string, extension: string): UnreadKind | undefined {
+  const end = extension.slice(1);
+  return (
+    UNREAD_KINDS.find(({ extensions }) => extensions?.test(end)) ?? UNREAD_KINDS.find(({ fits }) => fits?.(bytes, text))
+  );
+}

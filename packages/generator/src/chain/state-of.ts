@@ -1,0 +1,49 @@
+import type { StateInput } from '@gaussian-splat/core';
+import type { GpuTensor, Inputs } from '../input-value.js';
+import type { RunOutputs } from '../runtime/live-session.js';
+import type { GeneratorModel } from '../runtime/open-model.js';
+import { HandOver } from './hand-over.js';
+
+/** What one model keeps from run to run: outputs that its next run takes. */
+export class StateOf {
+  readonly #model: GeneratorModel;
+  readonly #kept: HandOver;
+
+  private constructor(model: GeneratorModel, device: GPUDevice) {
+    this.#model = model;
+    const connections = statesOf(model).map(([input, { output }]) => ({ input, output }));
+    this.#kept = new HandOver(device, model, connections);
+    this.reset();
+  }
+
+  /** Undefined for a model that keeps nothing. */
+  static of(model: GeneratorModel, device: GPUDevice): StateOf | undefined {
+    return statesOf(model).length > 0 ? new StateOf(model, device) : undefined;
+  }
+
+  /** As of the last run. */
+  get tensors(): Inputs {
+    return this.#kept.tensors;
+  }
+
+  /** The next run is the first. */
+  reset(): void {
+    const { header } = this.#model;
+    for (const [name, { default: value = 0 }] of statesOf(this.#model)) {
+      const { dtype, dims } = header.inputs.find((input) => input.name === name)!;
+      this.#kept.fill(name, { dtype: dtype as GpuTensor['dtype'], dims: dims as number[] }, value);
+    }
+  }
+
+  /** Copies what a run wrote for the next one. */
+  take(outputs: RunOutputs): void {
+    this.#kept.take(outputs);
+  }
+
+  destroy(): void {
+    this.#kept.destroy();
+  }
+}
+
+const statesOf = ({ contract }: GeneratorModel): [name: string, binding: StateInput][] =>
+  Object.entries(contract.inputs).filter((entry): entry is [string, StateInput] => entry[1].role === 'state');

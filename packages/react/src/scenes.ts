@@ -1,0 +1,73 @@
+'use client';
+/** `<splat-scene>` and `<splat-mesh>` for React 18 and 19: children of {@link GaussianSplat}. Only apps that use them bundle them. */
+import {
+  SplatMeshElement,
+  SplatSceneElement,
+  type ChildEventMap,
+  type SettableMeshProperties,
+  type SettableSceneProperties,
+} from '@gaussian-splat/element/scenes.js';
+import { createComponent, type EventName } from '@lit/react';
+import * as React from 'react';
+
+export type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
+
+const EVENTS = {
+  onLoad: 'load',
+  onProgress: 'progress',
+  onPreview: 'preview',
+  onError: 'error',
+  onGeneratorError: 'generator-error',
+  onGeneratorFallback: 'generator-fallback',
+  onPlay: 'play',
+  onPlaying: 'playing',
+  onPause: 'pause',
+  onTimeUpdate: 'timeupdate',
+  onSeeking: 'seeking',
+  onSeeked: 'seeked',
+  onEnded: 'ended',
+  onRateChange: 'ratechange',
+  onDurationChange: 'durationchange',
+  onLoadedMetadata: 'loadedmetadata',
+  onLoadStart: 'loadstart',
+  onEmptied: 'emptied',
+} as const satisfies Readonly<Record<`on${string}`, keyof ChildEventMap>>;
+
+type ChildHandler = keyof typeof EVENTS;
+type EventOf<Name extends ChildHandler> = ChildEventMap[(typeof EVENTS)[Name]];
+type ChildListeners = { [Name in ChildHandler]?: (event: EventOf<Name>) => void };
+
+/** What a child takes: its element's properties, handlers of its own events, what React gives every tag, and `ref`. */
+type ChildProps<E, Settable> = Omit<React.HTMLAttributes<E>, ChildHandler | keyof Settable> &
+  ChildListeners &
+  Settable &
+  React.RefAttributes<E>;
+
+export type SplatSceneProps = ChildProps<SplatSceneElement, SettableSceneProperties>;
+export type SplatMeshProps = ChildProps<SplatMeshElement, SettableMeshProperties>;
+
+const shared = { react: React, events: EVENTS as unknown as { [Name in ChildHandler]: EventName<EventOf<Name>> } };
+
+/**
+ * A scene among others.
+ *
+ * ```tsx
+ * <GaussianSplat src="room.sog" cameraControls>
+ *   <SplatScene src="plant.spz" position={[1.2, 0, 0]} onError={({ detail }) => console.warn(detail.message)} />
+ * </GaussianSplat>
+ * ```
+ */
+export const SplatScene: React.ForwardRefExoticComponent<SplatSceneProps> = /* @__PURE__ */ createComponent({
+  ...shared,
+  tagName: 'splat-scene',
+  elementClass: SplatSceneElement,
+  displayName: 'SplatScene',
+});
+
+/** A triangle mesh among scenes: `<SplatMesh src="chair.glb" autoplay loop />`. */
+export const SplatMesh: React.ForwardRefExoticComponent<SplatMeshProps> = /* @__PURE__ */ createComponent({
+  ...shared,
+  tagName: 'splat-mesh',
+  elementClass: SplatMeshElement,
+  displayName: 'SplatMesh',
+});

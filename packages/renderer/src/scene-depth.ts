@@ -1,0 +1,212 @@
+import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
+import { rasterizeQuadsDepth, rasterizeTilesDepth } from './generated/depth-shaders.js';
+import { layouts } from './generated/shaders.js';
+import {
+  BUFFER_USAGE,
+  perDevice,
+  SHADER_STAGE,
+  ShaderProgram,
+  TEXTURE_USAGE,
+  type ComputeKernel,
+} from './gpu/kernel.js';
+import { writeStruct } from './gpu/struct.js';
+import type { FrameNotes, PaintingDepth, QuadsWithDepth, RasterizerName } from './rasterizers/rasterizer.js';
+import { rasterizeKernel, type RasterizeKernel, type RasterizeVariant } from './rasterizers/tile-kernels.js';
+
+/** Depth that a host has drawn, for splats to be hidden by. */
+export interface HostDepth {
+  /** Of the formats `depth32float`, `depth24plus`, `depth16unorm`, with or without stencil, or `r32float`; one sample; usage TEXTURE_BINDING; of any size: the image lies on all of it. */
+  readonly texture: GPUTexture;
+  /**
+   * What the values are. `device`: 0 at the near plane and 1 at the far one, as GPUs write. `linear`: world units along the camera's axis, 0 where
+   * there is nothing. Default: `linear` for `r32float`, else `device`.
+   */
+  readonly values?: 'device' | 'linear' | undefined;
+  /** True if `device` values are 1 at the near plane and 0 at the far one. */
+  readonly reversed?: boolean | undefined;
+  /** Planes of the host's projection, world units; default: the camera's. `far` may be Infinity. */
+  readonly near?: number | undefined;
+  readonly far?: number | undefined;
+}
+
+/** What a picture has to do with depth: at least one of the two. */
+export interface SceneDepthOptions {
+  /** What else is in the picture: a pixel of splats ends there. */
+  readonly host?: HostDepth | undefined;
+  /**
+   * Receives the median depth of the splats: where half of the light is gone, in world units along the camera's axis; 0 where more passes. Of the target's size, format
+   * `r32float`, usage STORAGE_BINDING. Asks for the rasterizer `tiles`.
+   */
+  readonly out?: GPUTexture | undefined;
+}
+
+const FORMATS = /^(depth(32float|24plus|16unorm)(-stencil8)?|r32float)$/;
+
+/**
+ * Depth in and out of a picture: give one object for the same textures, and it is bound once.
+ *
+ * ```ts
+ * const depth = new SceneDepth(device, { host: { texture: depthTexture } });
+ * viewpoint.draw(camera, { target, over: 'target', depth });
+ * ```
+ *
+ * Frames with depth sort their splats by all 32 bits of it, and keep 8 bytes more for each visible splat. Pages without it load nothing of this.
+ */
+export class SceneDepth implements PaintingDepth {
+  readonly #outTexture: GPUTexture | undefined;
+  readonly #device: GPUDevice;
+  readonly #host: HostDepth | undefined;
+  readonly #stored: GPUTextureView;
+  readonly #out: GPUTextureView;
+  readonly #uniform: GPUBuffer;
+  readonly #bytes = new ArrayBuffer(layouts.SceneDepth.size);
+  #tiles: { readonly key: readonly unknown[]; readonly group: GPUBindGroup } | undefined;
+  #quads: { readonly key: readonly unknown[]; readonly group: GPUBindGroup } | undefined;
+
+  /** @throws GaussianSplatError `argument/value` for a texture that cannot be read or written. */
+  constructor(device: GPUDevice, { host, out }: SceneDepthOptions) {
+    if (!host && !out) throw wrong('SceneDepth', 'host, out or both', 'neither');
+    if (host) requireHost(host);
+    if (out) requireOut(out);
+    this.#device = device;
+    this.#host = host;
+    this.#outTexture = out;
+    this.#stored = host ? viewOf(host.texture) : nothing(device);
+    this.#out = (out ?? nowhere(device)).createView();
+    const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
+    this.#uniform = device.createBuffer({ label: 'gs.scene_depth', size: layouts.SceneDepth.size, usage });
+  }
+
+  /** @throws GaussianSplatError `unsupported/limits` for median depth of quads; `argument/value` for one of another size, or beside auxiliary outputs. */
+  prepare(
+    camera: Camera,
+    { width, height }: { readonly width: number; readonly height: number },
+    rasterizer: RasterizerName,
+    notes: FrameNotes | undefined,
+  ): void {
+    const host = this.#host;
+    if (notes) throw wrong('Picture.depth', 'no depth in a picture with notes', 'both');
+    if (this.#outTexture) requireRoom(this.#outTexture, width, height, rasterizer);
+    const scale = host ? [host.texture.width / width, host.texture.height / height] : [1, 1];
+    writeStruct(layouts.SceneDepth, { ...readingOf(host, camera), scale }, this.#bytes);
+    this.#device.queue.writeBuffer(this.#uniform, 0, this.#bytes);
+  }
+
+  tilesKernel(variant: RasterizeVariant): RasterizeKernel {
+    const overrides = { tests_depth: +(this.#host !== undefined), tells_depth: +(this.#outTexture !== undefined) };
+    return rasterizeKernel(this.#device, variant, rasterizeTilesDepth, overrides) as unknown as RasterizeKernel;
+  }
+
+  bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup {
+    const key = [kernel, depths, ...Object.values(painted)];
+    if (!isSame(this.#tiles?.key, key)) {
+      const own = { scene: this.#uniform, depths, stored_depth: this.#stored, median_depth: this.#out };
+      const deep = kernel as unknown as ComputeKernel<typeof rasterizeTilesDepth>;
+      this.#tiles = { key, group: deep.bind({ ...painted, ...own }) };
+    }
+    return this.#tiles!.group;
+  }
+
+  get quadsProgram(): QuadsWithDepth {
+    const both = SHADER_STAGE.vertex | SHADER_STAGE.fragment;
+    return perDevice(this.#device, 'quads depth', () => {
+      const program = new ShaderProgram(this.#device, rasterizeQuadsDepth, both);
+      return {
+        ...{ module: program.module, pipelineLayout: program.pipelineLayout, name: ' depth' },
+        bind: (resources, depth, depths) => (depth as SceneDepth).#bindQuads(program, resources, depths),
+      };
+    });
+  }
+
+  /** Frees what little it holds. The textures are the host's. */
+  destroy(): void {
+    this.#uniform.destroy();
+  }
+
+  #bindQuads(
+    program: ShaderProgram<typeof rasterizeQuadsDepth>,
+    resources: Parameters<QuadsWithDepth['bind']>[0],
+    depths: GPUBuffer,
+  ): GPUBindGroup {
+    const key = [depths, ...Object.values(resources)];
+    if (!isSame(this.#quads?.key, key)) {
+      const own = { scene: this.#uniform, depths, stored_depth: this.#stored };
+      this.#quads = { key, group: program.bind({ ...resources, ...own }) };
+    }
+    return this.#quads!.group;
+  }
+}
+
+const isSame = (a: readonly unknown[] | undefined, b: readonly unknown[]): boolean =>
+  a?.length === b.length && a.every((value, k) => value === b[k]);
+
+/** How stored values become camera depths. */
+function readingOf(host: HostDepth | undefined, camera: Camera): { inverse: number[]; nothing: number } {
+  if (host === undefined || valuesOf(host) === 'linear') return { inverse: [1, 0, 0, 1], nothing: 0 };
+  const { reversed = false, near = camera.near, far = camera.far } = host;
+  // From 0 at one plane to 1 at the other.
+  const [from, to] = reversed ? [far, near] : [near, far];
+  const nothing = reversed ? 0 : 1;
+  if (camera.orthographic) return { inverse: [to - from, from, 0, 1], nothing };
+  // 1 / depth is linear.
+  const [a, b] = [1 / from, 1 / to];
+  return { inverse: [0, 1, b - a, a], nothing };
+}
+
+const valuesOf = ({ values, texture }: HostDepth): 'device' | 'linear' =>
+  values ?? (texture.format === 'r32float' ? 'linear' : 'device');
+
+const viewOf = (texture: GPUTexture): GPUTextureView =>
+  texture.createView({
+    ...{ dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 },
+    ...(texture.format === 'r32float' ? {} : { aspect: 'depth-only' }),
+  });
+
+const nothing = (device: GPUDevice): GPUTextureView =>
+  perDevice(device, 'no depth', () => small(device, TEXTURE_USAGE.textureBinding).createView());
+
+const nowhere = (device: GPUDevice): GPUTexture =>
+  perDevice(device, 'no depth out', () => small(device, TEXTURE_USAGE.storageBinding));
+
+const small = (device: GPUDevice, usage: number): GPUTexture =>
+  device.createTexture({ label: 'gs.no_depth', size: [1, 1], format: 'r32float', usage });
+
+function requireHost({ texture, near, far }: HostDepth): void {
+  const { format, sampleCount, usage } = texture ?? {};
+  if (!FORMATS.test(format))
+    throw wrong('HostDepth.texture', 'depth32float, depth24plus, depth16unorm or r32float', String(format));
+  if (sampleCount !== 1)
+    throw wrong('HostDepth.texture', 'a texture of sampleCount 1: resolve the depth first', sampleCount);
+  if ((usage & TEXTURE_USAGE.textureBinding) === 0)
+    throw wrong('HostDepth.texture', 'a texture with the usage TEXTURE_BINDING', `usage ${usage}`);
+  for (const [name, plane] of Object.entries({ near, far })) {
+    if (plane !== undefined && !(plane > 0)) throw wrong(`HostDepth.${name}`, 'a distance above 0', plane);
+  }
+}
+
+function requireOut({ format, usage }: GPUTexture): void {
+  if (format !== 'r32float') throw wrong('SceneDepth.out', 'a texture of the format r32float', format);
+  if ((usage & TEXTURE_USAGE.storageBinding) === 0)
+    throw wrong('SceneDepth.out', 'a texture with the usage STORAGE_BINDING', `usage ${usage}`);
+}
+
+/** @param width pixels that are drawn, across */
+function requireRoom(out: GPUTexture, width: number, height: number, rasterizer: RasterizerName): void {
+  if (rasterizer !== 'tiles')
+    throw new GaussianSplatError('unsupported/limits', {
+      where: 'SceneDepth.out',
+      expected: 'settings with the rasterizer tiles',
+      found: rasterizer,
+      remedy: "draw with settings('default', { rasterizer: 'tiles' })",
+    });
+  if (out.width === width && out.height === height) return;
+  const expected = `a texture of ${width} x ${height} pixels, as many as are drawn`;
+  throw wrong('SceneDepth.out', expected, `${out.width} x ${out.height}`);
+}
+
+function wrong(where: string, expected: string, found: unknown): GaussianSplatError {
+  return new GaussianSplatError('argument/value', {
+    ...{ where, expected, found: String(found) },
+    remedy: `see ${where}`,
+  });
+}

@@ -1,0 +1,485 @@
+import { loadModule, validateCamera, type Camera } from '@gaussian-splat/core';
+import { AccumulationTexture } from './accumulation.js';
+import { makeStages, type Stages } from './bindings.js';
+import type { ProbeAnswer, ProbePoint } from './depth-probe.js';
+import { recordProjection } from './frame.js';
+import { FrameResources, type Resources } from './frame-resources.js';
+import type { Wishes } from './gaussian-scene.js';
+import { layouts } from './generated/shaders.js';
+import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
+import { GpuMemory } from './gpu/memory.js';
+import { writeStruct } from './gpu/struct.js';
+import { leversOf, type Levers } from './levers.js';
+import type { FrameSettings, Picture, Target } from './picture.js';
+import { makeRasterizer } from './rasterizers/make-rasterizer.js';
+import type { NotedFrame, Painting, Rasterizer, RasterizerName } from './rasterizers/rasterizer.js';
+import { requireNotes, requirePicture, requireTarget, requireTextureSize } from './requirements.js';
+import type { Scratch } from './scratch.js';
+import { ComposeStage, type ComposeBindings } from './stages/compose.js';
+import { SubmissionPacer, type SubmissionWatch } from './submission-pacer.js';
+import { copyCounts, readStatistics, type FrameStatistics } from './statistics.js';
+import { settle, variantsOf, type Variants } from './variants.js';
+import { scaled } from './view.js';
+import type { World } from './world.js';
+
+/** What an image size needs where the rasterizer cannot write the target. */
+interface Accumulation {
+  readonly texture: AccumulationTexture;
+  readonly compose: ComposeBindings;
+}
+
+/** In how many parts the painting of a frame is handed over, and who times them. */
+interface Submissions {
+  readonly parts: number;
+  readonly watch?: SubmissionWatch;
+}
+
+const TRANSPARENT = [0, 0, 0, 0] as const;
+/** Of a target: a view of more than that is none to draw into. */
+const ONE_PICTURE: GPUTextureViewDescriptor = { dimension: '2d', mipLevelCount: 1, arrayLayerCount: 1 };
+
+/** Options of a {@link Viewpoint}. */
+export interface ViewpointOptions {
+  /** Settings of frames that are given none. They decide what is allocated. */
+  readonly settings?: FrameSettings;
+  /**
+   * Called when a frame that was drawn lacked splats for want of room in the viewpoint's buffers. The next frame has the room: draw it.
+   */
+  readonly onIncomplete?: () => void;
+}
+
+/** One of several views: see {@link Viewpoint.drawAll}. */
+export interface View {
+  readonly camera: Camera;
+  readonly picture: Picture;
+}
+
+/** A frame that has been encoded. */
+interface Encoded {
+  /** The encoder to go on with. */
+  readonly last: GPUCommandEncoder;
+  /** Its counts are to be read. */
+  readonly isWatched: boolean;
+  readonly submissions: Submissions;
+  /** Pages that streamed scenes ask for are to be read. */
+  readonly wishes: readonly Wishes[];
+  readonly resources: Resources;
+}
+
+/** What depends on the rasterizer, the format that it accumulates in, and how stages share their work. */
+interface Engine {
+  readonly levers: Levers & Variants;
+  readonly stages: Stages;
+  readonly rasterizer: Rasterizer;
+  readonly resources: FrameResources;
+}
+
+/**
+ * Draws a world, on a device of yours.
+ *
+ * ```ts
+ * const world = new World();
+ * world.add({ scene: await GaussianBuffers.upload(device, packGaussians(cloud)) });
+ * const viewpoint = new Viewpoint(device, world);
+ * viewpoint.draw(camera, { target: texture });
+ * ```
+ *
+ * Memory is allocated when scenes come, and when the image size or the share of visible splats changes, never while only the camera or a scene moves; no frame
+ * waits for a read-back. Each frame sorts the splats that it shows.
+ */
+export class Viewpoint {
+  readonly world: World;
+  readonly #device: GPUDevice;
+  /** Of settings that have been met. */
+  #known = new WeakMap<FrameSettings, Levers & Variants>();
+  /** What `auto` means, until the settings are other ones: no frame changes it. */
+  #variants: Variants;
+  readonly #compose: ComposeStage;
+  readonly #pacer: SubmissionPacer;
+  readonly #onIncomplete: () => void;
+  readonly #memory: GpuMemory;
+  readonly #composeUniform: GPUBuffer;
+  readonly #composeBytes = new ArrayBuffer(layouts.Compose.size);
+  readonly #views = new WeakMap<GPUTexture, GPUTextureView>();
+  #settings: FrameSettings;
+  #engine: Engine;
+  /** By size, the one used last at the end. */
+  readonly #accumulations = new Map<string, Accumulation>();
+  #mostSizes = 1;
+  /** The buffers of the last frame, and its pixels for each of the target; undefined before there is one. */
+  #last: { readonly scratch: Scratch; readonly scale: number } | undefined;
+
+  /** @throws GaussianSplatError `unsupported/limits` if settings need a feature that the device lacks. */
+  constructor(device: GPUDevice, world: World, { settings = {}, onIncomplete }: ViewpointOptions = {}) {
+    this.#device = device;
+    this.world = world;
+    this.#variants = variantsOf(device);
+    this.#settings = settings;
+    this.#onIncomplete = onIncomplete ?? (() => undefined);
+    this.#compose = new ComposeStage(device);
+    this.#pacer = new SubmissionPacer(device);
+    this.#memory = new GpuMemory(device);
+    const usage = BUFFER_USAGE.uniform | BUFFER_USAGE.copyDestination;
+    this.#composeUniform = this.#memory.buffer('gs.compose.uniform', layouts.Compose.size, usage);
+    this.#engine = this.#makeEngine(this.#leversOf(settings));
+  }
+
+  /** Settings of frames that are given none. */
+  get settings(): FrameSettings {
+    return this.#settings;
+  }
+
+  set settings(settings: FrameSettings) {
+    if (settings === this.#settings) return;
+    this.#variants = variantsOf(this.#device);
+    this.#known = new WeakMap();
+    const levers = this.#leversOf(settings);
+    this.#settings = settings;
+    this.#useEngine(levers);
+  }
+
+  /** The levers that {@link settings} come to on this device; nothing is left `auto`. */
+  get levers(): Levers & Variants {
+    return this.#leversOf(this.#settings);
+  }
+
+  /** Name of the rasterizer in use. */
+  get rasterizer(): RasterizerName {
+    return this.#engine.rasterizer.name;
+  }
+
+  /** Bytes of GPU memory held between frames, scenes not counted. */
+  get byteLength(): number {
+    const textures = [...this.#accumulations.values()].map(({ texture }) => texture);
+    const parts = [this.#memory, this.#engine.resources, this.#engine.rasterizer, ...textures];
+    return parts.reduce((sum, { byteLength }) => sum + byteLength, 0);
+  }
+
+  /** What the last frame that took notes was painted from; undefined before there is one. */
+  get noted(): NotedFrame | undefined {
+    return this.#engine.rasterizer.noted;
+  }
+
+  /**
+   * Makes what frames with other settings need, so that none of them has to. Their memory, next to nothing, comes with the next frame.
+   * @param targetFormat format of the targets
+   * @throws GaussianSplatError `argument/value` for a lever out of range.
+   */
+  prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
+    const { rasterizer } = this.#engine;
+    const all = settings.map((each) => this.#leversOf(each));
+    for (const levers of all) rasterizer.prepare(levers, targetFormat);
+    const isSmaller = all.some(({ resolutionScale }) => resolutionScale < 1);
+    if (isSmaller) this.#compose.prepare(targetFormat, rasterizer.finishes(targetFormat));
+  }
+
+  /**
+   * Encodes and submits one frame.
+   * @throws GaussianSplatError `argument/camera` for a camera out of range; `argument/value` for another argument; `out-of-memory/buffer-limit` if the scenes
+   * need a larger buffer than the device allows.
+   */
+  draw(camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
+    const { timer } = picture;
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.frame' });
+    const encoded = this.#encode(encoder, camera, picture, settings, true);
+    const { last, isWatched, submissions, wishes, resources } = encoded;
+    timer?.endFrame?.(last);
+    for (const wish of wishes) wish.copy(last);
+    if (isWatched) this.#watch(last, resources);
+    this.#submit(last, submissions);
+    timer?.submitted?.();
+    const counts = isWatched ? resources.monitor.read() : undefined;
+    if (counts && submissions.watch) {
+      void this.#pacer.learn(
+        submissions.watch,
+        counts.then((painted) => painted?.pairs),
+      );
+    }
+    for (const wish of wishes) wish.read();
+  }
+
+  /**
+   * Records one frame into a host's encoder, between its passes, and submits nothing. The host submits within the same task: what the viewpoint learns of a frame
+   * (how much room it needs, which pages it asks for) it reads in the next one. Record a viewpoint once for each submission: its uniforms are those of
+   * the last frame that was recorded. `submissions` of the settings, and `timer` of the picture, are the host's.
+   * @throws GaussianSplatError as {@link draw} does.
+   */
+  record(encoder: GPUCommandEncoder, camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
+    const hosted = { ...picture, timer: undefined };
+    const encoded = this.#encode(encoder, camera, hosted, settings, false);
+    if (encoded.isWatched || encoded.wishes.length > 0) setTimeout(() => this.#readLater(encoded));
+  }
+
+  /**
+   * Draws several views of the world, such as both eyes or thumbnails: sizes that come again keep their buffers.
+   * @throws GaussianSplatError as {@link draw} does.
+   */
+  drawAll(views: readonly View[], settings: FrameSettings = this.#settings): void {
+    const sizes = new Set(views.map(({ camera: { width, height } }) => `${width} ${height}`));
+    this.#mostSizes = Math.max(1, sizes.size);
+    for (const { camera, picture } of views) this.draw(camera, picture, settings);
+  }
+
+  #encode(
+    encoder: GPUCommandEncoder,
+    camera: Camera,
+    picture: Picture,
+    settings: FrameSettings,
+    mayDivide: boolean,
+  ): Encoded {
+    const { notes, timer, depth } = picture;
+    requirePicture(picture, settings);
+    validateCamera(camera);
+    requireTextureSize(this.#device, camera);
+    const target = this.#targetOf(picture, camera);
+    const asked = this.#leversOf(settings);
+    // Sorted exactly, so that a pixel may end at the first splat that is hidden.
+    const levers = depth ? { ...asked, depthKeyBits: 32 as const } : asked;
+    const { resources: all, rasterizer, stages } = this.#useEngine(levers);
+    if (notes) requireNotes(rasterizer);
+    const drawn = scaled(camera, levers.resolutionScale);
+    depth?.prepare(camera, drawn, rasterizer.name, notes);
+    const resources = all.fit(this.world, levers.splatBudget);
+    const { table, scratch, bindings, monitor } = resources;
+    table.update();
+    timer?.startFrame();
+    const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
+    table.look(drawn, pixelArea, levers, picture.filter);
+    const wishes = recordProjection(encoder, {
+      stages,
+      bindings,
+      scratch,
+      camera: drawn,
+      levers,
+      keepsSurvivors: notes !== undefined,
+      hasDetail: table.hasDetail,
+      isBudgeted: levers.splatBudget > 0 && table.hasDetail,
+      keepsDepths: depth !== undefined,
+      timer,
+    });
+    const isWatched = monitor.isDue(rasterizer.pairPlan !== undefined, {
+      pixels: drawn.width * drawn.height,
+      wholePixels: camera.width * camera.height,
+      isWhole: isWhole(levers, this.levers),
+    });
+    const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
+    const how = { levers, notes, survivors: notes && scratch.survivors, timer, depth, depths: depth && scratch.depths };
+    const last = this.#paint(encoder, target, drawn, how, picture, submissions);
+    this.#last = { scratch, scale: drawn.width / camera.width };
+    return { last, isWatched, submissions, wishes, resources };
+  }
+
+  #watch(encoder: GPUCommandEncoder, { monitor, scratch }: Resources): void {
+    monitor.record(encoder, scratch.plan, this.#engine.rasterizer.pairPlan);
+  }
+
+  /** Reads what a frame left that a host has submitted. */
+  #readLater({ resources, isWatched, wishes }: Encoded): void {
+    if (this.#engine.resources.current !== resources) return;
+    const encoder = this.#device.createCommandEncoder({ label: 'gs.read' });
+    for (const wish of wishes) wish.copy(encoder);
+    if (isWatched) this.#watch(encoder, resources);
+    this.#device.queue.submit([encoder.finish()]);
+    if (isWatched) void resources.monitor.read();
+    for (const wish of wishes) wish.read();
+  }
+
+  /** Counts of the last frame. Reads back from the GPU: for tests and panels, not for every frame. */
+  async statistics(): Promise<FrameStatistics> {
+    const resources = this.#engine.resources.current;
+    if (resources === undefined)
+      return { visible: 0, overflow: 0, pairs: 0, pairOverflow: 0, unusable: 0, budgetError: 0 };
+    const { plan, gathered, chunkShares } = resources.scratch;
+    return readStatistics(this.#device, { plan, gathered, chunkShares, pairPlan: this.#engine.rasterizer.pairPlan });
+  }
+
+  /**
+   * Whether the last frame had room for all that it should show; if not, the next one will. Reads back from the GPU: for single
+   * images, not for every frame.
+   */
+  async isComplete(): Promise<boolean> {
+    if (this.#engine.resources.current === undefined) return true;
+    const { visible, overflow, pairs, pairOverflow } = await this.statistics();
+    return this.hadRoom(Uint32Array.of(visible, overflow, pairs, pairOverflow));
+  }
+
+  /**
+   * Copies the counts that {@link hadRoom} judges into 16 bytes of a buffer, for those who draw many images before they read anything back.
+   * @param offset bytes, a multiple of 4
+   */
+  copyCounts(encoder: GPUCommandEncoder, buffer: GPUBuffer, offset: number): void {
+    const { scratch } = this.#engine.resources.current ?? {};
+    if (scratch) copyCounts(encoder, scratch.plan, this.#engine.rasterizer.pairPlan, buffer, offset);
+  }
+
+  /** Whether the frame that these four counts are from had room for all that it should show; if not, those that follow will. */
+  hadRoom([visible, overflow, pairs, pairOverflow]: Uint32Array): boolean {
+    if (overflow + pairOverflow === 0) return true;
+    this.#engine.resources.current?.monitor.judge({ visible: visible + overflow, pairs: pairs + pairOverflow }, false);
+    return false;
+  }
+
+  /**
+   * Looks into the last frame at single points of it: how opaque it is there, where its surface lies, what hides a given depth. The same
+   * for all rasterizers. Reads back from the GPU: for clicks and labels, not for every frame. Rejects if the device is lost meanwhile,
+   * and with GaussianSplatError `network/unreachable` if the code for it cannot be loaded.
+   * @returns an answer for each point; none before the first frame.
+   */
+  async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
+    const { probe } = await loadModule('the code that looks into a picture', () => import('./depth-probe.js'));
+    if (this.#last === undefined || this.#last.scratch !== this.#engine.resources.current?.scratch) return [];
+    const { scale, scratch } = this.#last;
+    const { plan, splats, order } = scratch;
+    const drawn = points.map(({ x, y, depth }) => ({ x: x * scale, y: y * scale, depth }));
+    return probe(this.#device, { plan, splats, order: order[0] }, drawn);
+  }
+
+  /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
+  destroy(): void {
+    this.#destroyEngine();
+    this.#memory.destroy();
+  }
+
+  #paint(
+    encoder: GPUCommandEncoder,
+    target: Target,
+    camera: Camera,
+    how: Pick<Painting, 'levers' | 'notes' | 'survivors' | 'timer' | 'depth' | 'depths'>,
+    { over, colours }: Picture,
+    submissions: Submissions,
+  ): GPUCommandEncoder {
+    const keeps = over === 'target';
+    const background = keeps ? TRANSPARENT : (over ?? TRANSPARENT);
+    const isFullSize = camera.width === target.width && camera.height === target.height;
+    const isStored = target.isStorable && !keeps && !colours && this.#engine.rasterizer.finishes(target.format);
+    if (isFullSize && isStored) {
+      return this.#recordParts(encoder, { ...how, surface: target, background }, submissions);
+    }
+    const { texture, compose } = this.#accumulationOf(camera, target);
+    const scale = [camera.width / target.width, camera.height / target.height];
+    const used = [camera.width, camera.height];
+    writeStruct(layouts.Compose, { background, scale, used }, this.#composeBytes);
+    this.#device.queue.writeBuffer(this.#composeUniform, 0, this.#composeBytes);
+    const { view, format } = texture;
+    const surface = { view, format, width: camera.width, height: camera.height };
+    const last = this.#recordParts(encoder, { ...how, surface }, submissions);
+    if (colours) colours.compose(last, compose.resources, target, keeps);
+    else if (isStored) this.#compose.store(last, compose, target, how.timer);
+    else this.#compose.draw(last, compose, target, how.timer, keeps);
+    return last;
+  }
+
+  /** How this frame is handed over: in one submission, or in as many as keep each short. */
+  #submissionsFor(isWatched: boolean): Submissions {
+    const least = Math.ceil(this.levers.submissions);
+    if (this.#engine.rasterizer.pairPlan === undefined) return { parts: least };
+    const pairs = this.#engine.resources.pairCapacity;
+    const watch = isWatched && this.#pacer.wantsToKnow(pairs) ? this.#pacer.watch() : undefined;
+    return { parts: Math.max(least, this.#pacer.partsFor(pairs)), watch };
+  }
+
+  #submit(encoder: GPUCommandEncoder, { watch }: Submissions): void {
+    this.#device.queue.submit([encoder.finish()]);
+    watch?.note();
+  }
+
+  /** Records the painting, in several submissions where that is asked for. @returns the encoder to go on with */
+  #recordParts(encoder: GPUCommandEncoder, painting: Painting, submissions: Submissions): GPUCommandEncoder {
+    const { parts: count } = submissions;
+    this.#engine.rasterizer.prepareFrame(encoder, painting);
+    let current = encoder;
+    for (let index = 0; index < count; index++) {
+      // What comes before the painting is a submission of its own, too.
+      if (count > 1) {
+        this.#submit(current, submissions);
+        current = this.#device.createCommandEncoder({ label: `gs.frame.${index}` });
+      }
+      this.#engine.rasterizer.record(current, painting, { index, count });
+    }
+    return current;
+  }
+
+  #leversOf(settings: FrameSettings): Levers & Variants {
+    const known = this.#known.get(settings);
+    if (known) return known;
+    const made = settle(this.#variants, leversOf(settings));
+    this.#known.set(settings, made);
+    return made;
+  }
+
+  /** What frames of these levers are drawn with: made anew where they ask for another rasterizer. */
+  #useEngine(levers: Levers & Variants): Engine {
+    const { levers: own } = this.#engine;
+    const isOwn =
+      own.rasterizer === levers.rasterizer &&
+      own.accumulation === levers.accumulation &&
+      own.threads === levers.threads;
+    if (isOwn) return this.#engine;
+    const engine = this.#makeEngine(levers);
+    this.#destroyEngine();
+    this.#engine = engine;
+    return engine;
+  }
+
+  #makeEngine(levers: Levers & Variants): Engine {
+    const stages = makeStages(this.#device, levers);
+    const rasterizer = makeRasterizer(this.#device, levers);
+    const resources = new FrameResources(this.#device, {
+      ...{ stages, rasterizer },
+      pairsAtOnce: () => this.#pacer.pairsAtOnce,
+      onIncomplete: this.#onIncomplete,
+    });
+    return { levers, stages, rasterizer, resources };
+  }
+
+  #destroyEngine(): void {
+    this.#engine.resources.release();
+    this.#engine.rasterizer.destroy();
+    for (const { texture } of this.#accumulations.values()) texture.destroy();
+    this.#accumulations.clear();
+    this.#last = undefined;
+  }
+
+  #targetOf({ target }: Picture, camera: Camera): Target {
+    const { width, height } = camera;
+    if (!isTexture(target)) {
+      requireTarget(undefined, target.format, camera);
+      return { view: target.view, format: target.format, isStorable: false, width, height };
+    }
+    requireTarget(target, target.format, camera);
+    let view = this.#views.get(target);
+    if (view === undefined) this.#views.set(target, (view = target.createView(ONE_PICTURE)));
+    const isStorable = (target.usage & TEXTURE_USAGE.storageBinding) !== 0;
+    return { view, texture: target, format: target.format, isStorable, width, height };
+  }
+
+  /** As large as frames of this target are without levers of their own: one with fewer pixels paints a part of it. */
+  #accumulationOf(drawn: Camera, target: Target): Accumulation {
+    const share = this.levers.resolutionScale;
+    const width = Math.max(drawn.width, Math.round(target.width * share));
+    const height = Math.max(drawn.height, Math.round(target.height * share));
+    const key = `${width} ${height}`;
+    const known = this.#accumulations.get(key);
+    if (known) {
+      this.#accumulations.delete(key);
+      this.#accumulations.set(key, known);
+      return known;
+    }
+    for (const old of this.#accumulations.keys()) {
+      if (this.#accumulations.size < this.#mostSizes) break;
+      this.#accumulations.get(old)!.texture.destroy();
+      this.#accumulations.delete(old);
+    }
+    const texture = new AccumulationTexture(this.#device, this.#engine.levers.accumulation, width, height);
+    const compose = this.#compose.bind({ compose: this.#composeUniform, accumulated: texture.view });
+    const made = { texture, compose };
+    this.#accumulations.set(key, made);
+    return made;
+  }
+}
+
+/** Whether a frame is drawn as one at rest is: with fewer pixels, or painted less far, it says less of what a frame needs. */
+const isWhole = (levers: Levers, base: Levers): boolean =>
+  levers.resolutionScale >= base.resolutionScale && levers.transmittanceMin <= base.transmittanceMin;
+
+const isTexture = (target: Picture['target']): target is GPUTexture => 'createView' in target;

@@ -1,0 +1,181 @@
+import { GaussianSplatError, type Bounds, type Matrix4, type Vector3 } from '@gaussian-splat/core';
+import type { GaussianScene } from './gaussian-scene.js';
+
+/** An axis-aligned box. */
+export interface Box {
+  readonly min: Vector3;
+  readonly max: Vector3;
+}
+
+/** How a scene stands in a {@link World}. */
+export interface Placed {
+  readonly scene: GaussianScene;
+  /** Scene to world, row-major 4x4, last row (0, 0, 0, 1), float64: any affine matrix that can be inverted. Default: the identity. */
+  readonly sceneToWorld?: Matrix4 | undefined;
+  /** Factor of the opacity of each splat, 0 to 1. Default: 1. */
+  readonly opacity?: number | undefined;
+  /** Only splats whose centres lie in this box, in the scene's own frame, are drawn. */
+  readonly crop?: Box | undefined;
+  /** Default: true. */
+  readonly visible?: boolean | undefined;
+  /** Bounds in the scene's own frame, for {@link boundsOfWorld}. */
+  readonly bounds?: Bounds | undefined;
+}
+
+/** A scene in a {@link World}. What is set here holds from the next frame on. */
+export class Placement implements Placed {
+  readonly scene: GaussianScene;
+  /** @internal Called where a frame of the placement would differ; with true where the list of visible scenes does. */
+  readonly #onChange: (ofList: boolean) => void;
+  #sceneToWorld: Matrix4 | undefined;
+  #opacity = 1;
+  #crop: Box | undefined;
+  #visible: boolean;
+  /** Bounds in the scene's own frame, for {@link boundsOfWorld}. */
+  bounds: Bounds | undefined;
+
+  /** Made by {@link World.add}. */
+  constructor(placed: Placed, onChange: (ofList: boolean) => void) {
+    this.#onChange = () => undefined;
+    this.scene = placed.scene;
+    this.bounds = placed.bounds;
+    this.sceneToWorld = placed.sceneToWorld;
+    this.opacity = placed.opacity ?? 1;
+    this.crop = placed.crop;
+    this.#visible = placed.visible ?? true;
+    this.#onChange = onChange;
+  }
+
+  /**
+   * Scene to world; undefined where they are the same. The matrix is copied.
+   * @throws GaussianSplatError `argument/value` for one that is not affine, not finite or cannot be inverted.
+   */
+  get sceneToWorld(): Matrix4 | undefined {
+    return this.#sceneToWorld;
+  }
+
+  set sceneToWorld(matrix: Matrix4 | undefined) {
+    if (matrix) requireAffine(matrix);
+    const before = this.#sceneToWorld;
+    if (before === matrix || (matrix && before?.every((value, k) => value === matrix[k]))) return;
+    this.#sceneToWorld = matrix && Float64Array.from(matrix);
+    this.#onChange(false);
+  }
+
+  /** @throws GaussianSplatError `argument/value` for a number below 0 or above 1. */
+  get opacity(): number {
+    return this.#opacity;
+  }
+
+  set opacity(opacity: number) {
+    if (!(opacity >= 0 && opacity <= 1)) throw wrong('opacity', 'a number from 0 to 1', opacity);
+    if (opacity === this.#opacity) return;
+    this.#opacity = opacity;
+    this.#onChange(false);
+  }
+
+  /** @throws GaussianSplatError `argument/value` for corners that are not three numbers each. */
+  get crop(): Box | undefined {
+    return this.#crop;
+  }
+
+  set crop(crop: Box | undefined) {
+    const isBox = crop === undefined || [crop.min, crop.max].every((p) => p?.length === 3 && !p.some(Number.isNaN));
+    if (!isBox) throw wrong('crop', '{ min, max } of three numbers each', JSON.stringify(crop));
+    if (crop === this.#crop) return;
+    this.#crop = crop;
+    this.#onChange(false);
+  }
+
+  get visible(): boolean {
+    return this.#visible;
+  }
+
+  set visible(visible: boolean) {
+    if (visible === this.#visible) return;
+    this.#visible = visible;
+    this.#onChange(true);
+  }
+}
+
+/**
+ * Scenes that are drawn together: sorted once, so that they hide one another. Any number of {@link Viewpoint}s may draw one world.
+ *
+ * ```ts
+ * const world = new World();
+ * const room = world.add({ scene: roomGaussians });
+ * const plant = world.add({ scene: plantGaussians, sceneToWorld: [1, 0, 0, 1.2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1] });
+ * plant.opacity = 0.8;
+ * ```
+ *
+ * A world holds no memory of its own: scenes belong to those who made them, and must live as long as they are in it.
+ */
+export class World {
+  #placements: readonly Placement[] = [];
+  #layout = 0;
+  #changes = 0;
+
+  /** All scenes, visible or not, in the order in which they were added: it decides between equal depths. */
+  get placements(): readonly Placement[] {
+    return this.#placements;
+  }
+
+  /** Grows when scenes are added, removed, shown or hidden. */
+  get layout(): number {
+    return this.#layout;
+  }
+
+  /** Grows when a scene is placed otherwise than before. */
+  get changes(): number {
+    return this.#changes;
+  }
+
+  /**
+   * Adds a scene. The same scene may stand in several places.
+   * @throws GaussianSplatError `argument/value` for a placement out of range.
+   */
+  add(placed: Placed): Placement {
+    if (typeof placed?.scene !== 'object' || !Array.isArray(placed.scene?.pages))
+      throw wrong('scene', 'a GaussianScene: GaussianBuffers, DynamicGaussians, …', placed?.scene);
+    const placement = new Placement(placed, (ofList) => {
+      // One that was removed changes nothing.
+      if (!this.#placements.includes(placement)) return;
+      if (ofList) this.#layout++;
+      else this.#changes++;
+    });
+    this.#placements = [...this.#placements, placement];
+    this.#layout++;
+    return placement;
+  }
+
+  /** Takes a scene out. Its memory stays: it belongs to whoever made it. */
+  remove(placement: Placement): void {
+    const left = this.#placements.filter((other) => other !== placement);
+    if (left.length === this.#placements.length) return;
+    this.#placements = left;
+    this.#layout++;
+  }
+}
+
+function requireAffine(m: Matrix4): void {
+  const isAffine =
+    m.length === 16 && m.every(Number.isFinite) && m[12] === 0 && m[13] === 0 && m[14] === 0 && m[15] === 1;
+  const determinant = isAffine
+    ? m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) + m[2] * (m[4] * m[9] - m[5] * m[8])
+    : NaN;
+  if (Number.isFinite(1 / determinant)) return;
+  throw wrong(
+    'sceneToWorld',
+    '16 finite numbers, row-major, last row 0, 0, 0, 1, of a matrix that can be inverted',
+    `[${Array.from(m).join(', ')}]`,
+  );
+}
+
+function wrong(name: keyof Placed, expected: string, found: unknown): GaussianSplatError {
+  return new GaussianSplatError('argument/value', {
+    where: `Placement.${name}`,
+    expected,
+    found: String(found),
+    remedy: `see Placed.${name}`,
+  });
+}

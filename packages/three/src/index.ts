@@ -1,0 +1,2 @@
+export { SplatRenderer, type SplatRendererOptions } from './splat-renderer.js';
+export { SplatScene, type SplatSceneOptions } from './splat-scene.js';

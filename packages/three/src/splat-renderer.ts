@@ -1,0 +1,169 @@
+import { cameraFromProjection, GaussianSplatError } from '@gaussian-splat/core';
+import { LinearColours, SceneDepth, type FrameSettings } from '@gaussian-splat/renderer';
+import { texture } from 'three/tsl';
+import {
+  DepthTexture,
+  FloatType,
+  HalfFloatType,
+  NodeMaterial,
+  QuadMesh,
+  RenderTarget,
+  Vector2,
+  WebGPUCoordinateSystem,
+  type Camera,
+  type Object3D,
+  type Texture,
+  type WebGPURenderer,
+} from 'three/webgpu';
+import { SplatWorld } from './splat-world.js';
+
+export interface SplatRendererOptions {
+  /** How frames are drawn: `settings(…)` of `@gaussian-splat/renderer`. */
+  readonly settings?: FrameSettings;
+  /** Called when a frame that was drawn lacked splats for want of room. The next frame has the room: draw it. */
+  readonly onIncomplete?: () => void;
+}
+
+/**
+ * Draws a three.js scene with the splats in it: each {@link SplatScene} is hidden by meshes in front of it, and hides those behind it.
+ *
+ * ```ts
+ * const renderer = new WebGPURenderer({ canvas });
+ * await renderer.init();
+ * const splats = new SplatRenderer(renderer);
+ * renderer.setAnimationLoop(() => splats.render(scene, camera));
+ * ```
+ *
+ * Transparent meshes are drawn before the splats. Memory is kept for each camera: {@link dispose} frees it.
+ */
+export class SplatRenderer {
+  readonly #renderer: WebGPURenderer;
+  readonly #device: GPUDevice;
+  readonly #options: SplatRendererOptions;
+  readonly #colours: LinearColours;
+  readonly #worlds = new Map<Object3D, Map<Camera, SplatWorld>>();
+  readonly #depths = new WeakMap<GPUTexture, Map<boolean, SceneDepth>>();
+  readonly #size = new Vector2();
+  #frame: { readonly target: RenderTarget; readonly material: NodeMaterial; readonly quad: QuadMesh } | undefined;
+
+  /** @throws GaussianSplatError `argument/value` for a renderer that is not initialised, or does not draw with WebGPU. */
+  constructor(renderer: WebGPURenderer, options: SplatRendererOptions = {}) {
+    const { device, isWebGPUBackend = false } = renderer.backend;
+    if (!isWebGPUBackend || !device)
+      throw wrong(
+        'renderer',
+        'a WebGPURenderer that draws with WebGPU and is initialised',
+        isWebGPUBackend ? 'one that is not initialised' : 'one that draws with WebGL',
+        'await renderer.init() first, and see whether the browser has WebGPU',
+      );
+    this.#renderer = renderer;
+    this.#device = device;
+    this.#options = options;
+    this.#colours = new LinearColours(device);
+  }
+
+  /** Draws meshes and splats to where the renderer draws: a render target, or the canvas with its tone mapping and colour space. */
+  render(scene: Object3D, camera: Camera): void {
+    const renderer = this.#renderer;
+    const { target, quad } = this.#frameOf();
+    const before = renderer.getRenderTarget();
+    renderer.setRenderTarget(target);
+    renderer.render(scene, camera);
+    renderer.setRenderTarget(before);
+    this.draw(scene, camera, target);
+    quad.render(renderer);
+  }
+
+  /**
+   * Draws the splats alone over what a render target holds, for pipelines of one's own: `renderer.setRenderTarget(target)`, `renderer.render(scene, camera)`, then this. The target
+   * holds linear light, one sample a pixel, and has a `depthTexture`, or splats hide all meshes.
+   * @throws GaussianSplatError `argument/value` for another target; `argument/camera` for a camera with a skewed projection.
+   */
+  draw(scene: Object3D, camera: Camera, target: RenderTarget): void {
+    const world = this.#worldOf(scene, camera);
+    world.follow(scene, camera);
+    if (world.isEmpty) return;
+    const view = cameraFromProjection(camera.matrixWorldInverse.elements, camera.projectionMatrix.elements, {
+      ...{ width: target.width, height: target.height },
+      clipDepth: camera.coordinateSystem === WebGPUCoordinateSystem ? '0..1' : '-1..1',
+    });
+    const depth = target.depthTexture ? this.#depthOf(this.#gpu(target.depthTexture), camera) : undefined;
+    const picture = { target: this.#gpu(target.texture), over: 'target', colours: this.#colours, depth } as const;
+    world.viewpoint.draw(view, picture);
+  }
+
+  /** Frees the memory of a camera, or of all; what is drawn afterwards allocates anew. */
+  dispose(camera?: Camera): void {
+    for (const worlds of this.#worlds.values()) {
+      for (const [own, { viewpoint }] of worlds) {
+        if (camera !== undefined && own !== camera) continue;
+        viewpoint.destroy();
+        worlds.delete(own);
+      }
+    }
+    if (camera !== undefined) return;
+    this.#colours.destroy();
+    this.#frame?.target.depthTexture?.dispose();
+    this.#frame?.target.dispose();
+    this.#frame?.material.dispose();
+    this.#frame = undefined;
+  }
+
+  #worldOf(scene: Object3D, camera: Camera): SplatWorld {
+    let worlds = this.#worlds.get(scene);
+    if (worlds === undefined) this.#worlds.set(scene, (worlds = new Map<Camera, SplatWorld>()));
+    let world = worlds.get(camera);
+    if (world === undefined) {
+      const { settings = {}, onIncomplete = () => undefined } = this.#options;
+      worlds.set(camera, (world = new SplatWorld(this.#device, settings, onIncomplete)));
+    }
+    return world;
+  }
+
+  /** Where a whole frame is drawn before it goes to the canvas. */
+  #frameOf() {
+    const to = this.#renderer.getRenderTarget() ?? drawingBuffer(this.#renderer, this.#size);
+    if (this.#frame === undefined) {
+      const depthTexture = new DepthTexture(to.width, to.height, FloatType);
+      const target = new RenderTarget(to.width, to.height, { type: HalfFloatType, depthTexture });
+      const material = new NodeMaterial();
+      material.fragmentNode = texture(target.texture);
+      material.depthTest = false;
+      material.depthWrite = false;
+      this.#frame = { target, material, quad: new QuadMesh(material) };
+    }
+    this.#frame.target.setSize(to.width, to.height);
+    return this.#frame;
+  }
+
+  #depthOf(stored: GPUTexture, { reversedDepth = false }: Camera): SceneDepth {
+    let known = this.#depths.get(stored);
+    if (known === undefined) this.#depths.set(stored, (known = new Map<boolean, SceneDepth>()));
+    let depth = known.get(reversedDepth);
+    if (depth === undefined) {
+      const host = { texture: stored, values: 'device', reversed: reversedDepth } as const;
+      known.set(reversedDepth, (depth = new SceneDepth(this.#device, { host })));
+    }
+    return depth;
+  }
+
+  #gpu(of: Texture): GPUTexture {
+    const { texture: made } = this.#renderer.backend.get(of);
+    if (made === undefined)
+      throw wrong(
+        'target',
+        'a render target that the renderer has drawn into',
+        'one without a texture on the GPU',
+        'draw the scene into the target first: renderer.setRenderTarget(target); renderer.render(scene, camera)',
+      );
+    return made;
+  }
+}
+
+const drawingBuffer = (renderer: WebGPURenderer, size: Vector2): { width: number; height: number } => {
+  const { x, y } = renderer.getDrawingBufferSize(size);
+  return { width: x, height: y };
+};
+
+const wrong = (where: string, expected: string, found: string, remedy: string): GaussianSplatError =>
+  new GaussianSplatError('argument/value', { where: `SplatRenderer.${where}`, expected, found, remedy });

@@ -1,0 +1,37 @@
+import type { Box, GaussianScene } from '@gaussian-splat/renderer';
+import { Object3D } from 'three/webgpu';
+
+export interface SplatSceneOptions {
+  /** Factor of the opacity of each splat, 0 to 1. Default: 1. */
+  readonly opacity?: number;
+  /** Only splats whose centres lie in this box, in the scene's own frame, are drawn. */
+  readonly crop?: Box;
+}
+
+/**
+ * Gaussian splats as an object of a three.js scene: its matrix places them, `visible` and `layers` hide them. A {@link SplatRenderer} draws them.
+ *
+ * ```ts
+ * const splats = new SplatScene(await GaussianBuffers.upload(renderer.backend.device, packGaussians(cloud)));
+ * splats.rotation.x = Math.PI; // captures have y down
+ * scene.add(splats);
+ * ```
+ */
+export class SplatScene extends Object3D {
+  readonly isSplatScene = true;
+  /** What is drawn. It belongs to whoever made it. */
+  gaussians: GaussianScene;
+  opacity: number;
+  crop: Box | undefined;
+
+  constructor(gaussians: GaussianScene, { opacity = 1, crop }: SplatSceneOptions = {}) {
+    super();
+    this.type = 'SplatScene';
+    this.gaussians = gaussians;
+    this.opacity = opacity;
+    this.crop = crop;
+  }
+}
+
+/** Whether an object is a {@link SplatScene}, of whichever copy of this package. */
+export const isSplatScene = (object: object): object is SplatScene => 'isSplatScene' in object;

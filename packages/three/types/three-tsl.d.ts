@@ -1,0 +1,3 @@
+import type { Texture } from './three-webgpu.js';
+
+export function texture(value: Texture): unknown;

@@ -1,0 +1,222 @@
+/**
+ * `npm run lab:bytes`: bytes against accuracy of scene files, ours and others', on the captured scenes of ../shared/data. Each is read, drawn in held-out views, and held against the scene that it was made of.
+ * What takes long to make is kept in --work and taken from there the next time.
+ */
+import { spawnSync } from 'node:child_process';
+import { existsSync, mkdirSync, readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
+import { basename, join, resolve } from 'node:path';
+import { parseArgs } from 'node:util';
+import { boundsOf } from '@gaussian-splat/core';
+import { encodingsFor, GpuEvaluator, viewsAround } from '@gaussian-splat/economise';
+import { readScene } from '@gaussian-splat/formats';
+import { cloudOfChunks, decodePage, deviceDescriptor, startVariants } from '@gaussian-splat/renderer';
+import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
+import { encodeWebp } from '../../packages/cli/src/lib/webp.mjs';
+import { root } from '../lib/run.mjs';
+import { drawChart } from './chart.mjs';
+import { writeSplat } from './splat.mjs';
+
+const USAGE = `usage: npm run lab:bytes -- [options]
+
+  --data FOLDER    the captured scenes (default ../shared/data)
+  --work FOLDER    where files that are made are kept (default bench-results/bytes)
+  --out FOLDER     where bytes.json and bytes.svg go (default docs/frontier)
+  --scenes A,B     of skull, playbot3, st-peter (default all); others keep their figures
+  --views N        held-out views (default 8)
+  --kept           of what takes long to make only what is in --work
+`;
+
+/** Bytes a second of 20 Mbit/s. */
+const RATE = 2.5e6;
+/** The tool of others that writes their formats, by npx. */
+const TRANSFORM = '@playcanvas/splat-transform@3.7.0';
+
+const SCENES = {
+  'st-peter': { source: 'scenes/st-peter.sog', files: { 'SOG (its own)': 'scenes/st-peter.sog' } },
+  playbot3: {
+    source: 'formats/playbot3.ply',
+    files: {
+      'PLY, float32': 'formats/playbot3.ply',
+      'compressed PLY': 'formats/playbot3.compressed.ply',
+      'SPZ 3': 'formats/playbot3.niantic-v3.spz',
+      'SPZ 4': 'formats/playbot3.niantic-v4.spz',
+      'ksplat 0': 'formats/playbot3.c0.sh2.ksplat',
+      'ksplat 1': 'formats/playbot3.c1.sh2.ksplat',
+      'ksplat 2, SH1': 'formats/playbot3.c2.sh1.ksplat',
+    },
+  },
+  skull: { source: 'scenes/skull.ply', files: { 'PLY, float32': 'scenes/skull.ply' } },
+};
+/** What others' tool makes of a scene that has no such file. */
+const TRANSFORMED = { SOG: 'sog', 'compressed PLY': 'compressed.ply', 'SPZ 4': 'spz' };
+const DECIBELS = [40, 50];
+
+const text = (fallback) => ({ type: 'string', default: fallback });
+const { values } = parseArgs({
+  options: {
+    data: text(join(root, '../shared/data')),
+    work: text(join(root, 'bench-results/bytes')),
+    out: text(join(root, 'docs/frontier')),
+    scenes: text(Object.keys(SCENES).join(',')),
+    views: text('8'),
+    kept: { type: 'boolean' },
+    help: { type: 'boolean' },
+  },
+});
+
+/** Runs a command that makes a file, unless that is there; false where it fails. */
+function make(path, command, args) {
+  if (existsSync(path) || values.kept) return existsSync(path);
+  console.log(`  ${basename(path)} ...`);
+  const { status, stderr } = spawnSync(command, args, { encoding: 'utf8', cwd: root });
+  if (status === 0) return true;
+  console.log(`  not made: ${(stderr ?? '').trim().split('\n').at(-1)}`);
+  return false;
+}
+
+const own = (...args) => [join(root, 'packages/cli/bin/gaussian-splat.mjs'), ...args];
+
+async function read(path) {
+  const openPart = async (part) => new Uint8Array(readFileSync(join(path, '..', part)));
+  return readScene(new Uint8Array(readFileSync(path)), { name: basename(path), openPart });
+}
+
+/** The least of three times, ms, and what was read. */
+async function timed(work) {
+  let [least, found] = [Infinity, undefined];
+  for (let k = 0; k < 3; k++) {
+    const start = performance.now();
+    found = await work();
+    least = Math.min(least, performance.now() - start);
+  }
+  return [least, found];
+}
+
+/** Pages of a folder, decoded: the finest of them as a cloud, and how many bytes there are of all and of the first. */
+async function readFolder(folder) {
+  const manifest = JSON.parse(readFileSync(join(folder, 'detail.json'), 'utf8'));
+  const { coding, shDegree, trees } = manifest;
+  const [{ pages }] = trees;
+  const isParent = new Set(pages.flatMap(({ parent }) => (parent ? [`${parent}`] : [])));
+  const parts = [];
+  for (const [p, { file, chunks, upper }] of pages.entries()) {
+    const bytes = new Uint8Array(readFileSync(join(folder, file)));
+    const words = new Uint32Array(await decodePage(file, bytes, { chunks, upper, shDegree, coding }));
+    // The finest: nothing is below them, in this file or in another.
+    const leaves = Array.from({ length: chunks }, (_, c) => c).filter(
+      (c) => !isParent.has(`${[p, c]}`) && 4 * c >= chunks - upper,
+    );
+    parts.push({ words, of: chunks, chunks: leaves });
+  }
+  const sizes = pages.map(({ file }) => statSync(join(folder, file)).size);
+  const index = statSync(join(folder, 'detail.json')).size;
+  return {
+    cloud: cloudOfChunks(manifest, parts),
+    bytes: index + sizes.reduce((sum, size) => sum + size, 0),
+    first: index + sizes[0],
+  };
+}
+
+async function measure(scene, { source, files }, device) {
+  const path = (file) => join(values.data, file);
+  const made = (file) => join(values.work, `${scene}.${file}`);
+  const cloud = await read(path(source));
+  const around = (count, seed) => viewsAround(boundsOf(cloud), count, { seed });
+  const views = { scored: around(1, 10), searched: around(2, 1), heldOut: around(Number(values.views), 5) };
+  const evaluator = await GpuEvaluator.create(device, cloud, views);
+  const rows = [];
+  const note = async (name, isOwn, bytes, first, decodeMs, found) => {
+    const errors = await evaluator.compare(found, 'heldOut');
+    const dB = (error) => Math.min(99, -10 * Math.log10(error + 1e-12));
+    const mean = errors.reduce((sum, error) => sum + error, 0) / errors.length;
+    // A whole file is decoded before its first frame; of a folder the first page is.
+    const firstMs = (1000 * first) / RATE + (first < bytes ? (decodeMs * first) / bytes : decodeMs);
+    rows.push({
+      name,
+      isOwn,
+      bytes,
+      decodeMs,
+      firstBytes: first,
+      firstMs,
+      decibels: dB(mean),
+      worst: dB(Math.max(...errors)),
+    });
+    const { worst } = rows.at(-1);
+    console.log(
+      `  ${name.padEnd(28)} ${(bytes / cloud.count).toFixed(2)} bytes a splat, ${worst.toFixed(2)} dB, ${decodeMs.toFixed(0)} ms`,
+    );
+  };
+  const file = async (name, isOwn, at) => {
+    const [ms, found] = await timed(() => read(at));
+    const { size } = statSync(at);
+    await note(name, isOwn, size, size, ms, found);
+  };
+  for (const [name, at] of Object.entries(files)) await file(name, false, path(at));
+  for (const [name, extension] of Object.entries(TRANSFORMED)) {
+    if (Object.keys(files).some((other) => other.startsWith(name))) continue;
+    const args = ['--yes', TRANSFORM, '-q', '-w', '-g', 'cpu', path(source), made(extension)];
+    if (make(made(extension), 'npx', args)) await file(name, false, made(extension));
+  }
+  writeFileSync(made('splat'), writeSplat(cloud));
+  await file('splat', false, made('splat'));
+  const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(cloud.shDegree) };
+  for (const encoding of encodingsFor('a.spz').filter((_, k, all) => k === 0 || k === all.length - 1)) {
+    const at = made(`own-${/\d+ bits/.exec(encoding.title)?.[0].replace(' ', '-')}.spz`);
+    writeFileSync(at, await encoding.write(whole));
+    await file(`SPZ 3, ours, ${/\d+ bits/.exec(encoding.title)?.[0]}`, true, at);
+  }
+  const measured = async (bytes) => {
+    const errors = await evaluator.compare(await readScene(bytes, { name: 'tuned.sog' }), 'searched');
+    return errors.reduce((sum, error) => sum + error, 0) / errors.length;
+  };
+  for (const dB of DECIBELS) {
+    const [{ tune }] = encodingsFor('a.sog', cloud, { encodeWebp });
+    const at = made(`tuned-${dB}.sog`);
+    writeFileSync(at, await (await tune(whole, measured, 10 ** (-dB / 10))).write(whole));
+    await file(`SOG, ours, no splat dropped, ${dB} dB`, true, at);
+    const folder = made(`pages-${dB}`);
+    if (make(folder, process.execPath, own('detail', path(source), '--out', folder, '--min-db', String(dB)))) {
+      const [ms, found] = await timed(() => readFolder(folder));
+      await note(`our pages, ${dB} dB`, true, found.bytes, found.first, ms, found.cloud);
+    }
+    const smaller = made(`own-${dB}.sog`);
+    const options = ['--min-db', String(dB), '--scored', '24', '--out', smaller];
+    if (make(smaller, process.execPath, own('economise', path(source), ...options)))
+      await file(`SOG, ours, pruned, ${dB} dB`, true, smaller);
+  }
+  evaluator.destroy();
+  return { name: scene, source, splats: cloud.count, shDegree: cloud.shDegree, rows };
+}
+
+if (values.help) {
+  console.log(USAGE);
+  process.exit(0);
+}
+for (const key of ['data', 'work', 'out']) values[key] = resolve(process.env.INIT_CWD ?? process.cwd(), values[key]);
+mkdirSync(values.work, { recursive: true });
+const adapter = await requestNodeAdapter({ isTrusted: true });
+const device = await adapter.requestDevice(deviceDescriptor(adapter));
+await startVariants(device, { format: 'rgba8unorm' });
+const json = join(values.out, 'bytes.json');
+const before = existsSync(json) ? JSON.parse(readFileSync(json, 'utf8')).scenes : [];
+const scenes = [];
+const write = () => {
+  const named = new Set(scenes.map(({ name }) => name));
+  const report = {
+    ...{ kind: 'bytes', date: new Date().toISOString(), views: Number(values.views), rate: RATE },
+    scenes: [...before.filter(({ name }) => !named.has(name)), ...scenes],
+  };
+  writeFileSync(json, `${JSON.stringify(report, null, 2)}\n`);
+  writeFileSync(join(values.out, 'bytes.svg'), drawChart(report));
+};
+for (const name of values.scenes.split(',')) {
+  if (!(name in SCENES) || !existsSync(join(values.data, SCENES[name].source))) {
+    console.log(`${name}: no such scene in ${values.data}: ${readdirSync(values.data).join(' ')}`);
+    continue;
+  }
+  console.log(name);
+  scenes.push(await measure(name, SCENES[name], device));
+  write();
+}
+console.log(json);
+process.exit(0);

@@ -1,0 +1,186 @@
+/** Coded pages: what they decode to is what pages that are not coded say, to the steps that were asked for; and what is no such file is refused. */
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+import { deflateRawSync } from 'node:zlib';
+import {
+  boundsOf,
+  GaussianSplatError,
+  shCoefficientCount,
+  type GaussianCloud,
+  type ShDegree,
+} from '@gaussian-splat/core';
+import {
+  buildDetailTree,
+  checkManifest,
+  cloudOfChunks,
+  codingOf,
+  cutPages,
+  decodePage,
+  GaussianBuffers,
+  manifestOf,
+  packGaussians,
+  packPage,
+  PageEncoder,
+  Renderer,
+  StreamedGaussians,
+  USUAL_STEPS,
+  type PageSteps,
+} from '@gaussian-splat/renderer';
+import { constants, pageLayout } from '@gaussian-splat/renderer/stages';
+import { deflate } from '../../packages/cli/src/lib/deflate.mjs';
+import { detailFolder } from '../support/detail-folder.js';
+import { drawUntilCalm } from '../support/draw-until-calm.js';
+import { randomSource } from '../support/gpu.js';
+import { psnr } from '../support/metrics.js';
+import { anyDevice, endNodeDevice } from '../support/node-device.js';
+import { readFrame } from '../support/read-frame.js';
+import { cameraAt } from '../support/scenes.js';
+import { pebbles } from '../support/scenes/pebbles.js';
+
+after(endNodeDevice);
+
+/** As fine as files can have it. */
+const FINE: PageSteps = {
+  ...{ place: 0.001, size: 1 / 48, direction: 1 / 255, opacity: 1 / 93, color: 1 / 1000, chroma: 1 / 1000 },
+  harmonics: 1 / 1000,
+};
+
+/** Colours that depend on the view, those of three channels mostly alike. */
+function withHarmonics(cloud: GaussianCloud, shDegree: ShDegree): GaussianCloud {
+  const [from, to] = [cloud.shDegree, shDegree].map((degree) => 3 * shCoefficientCount(degree));
+  const random = randomSource(9);
+  const sh = new Float32Array(to * cloud.count);
+  for (let i = 0; i < cloud.count; i++) {
+    for (let k = 0; k < to; k += 3) {
+      const luma = 0.3 * (random() - 0.5) * random();
+      for (let c = 0; c < 3; c++) {
+        sh[to * i + k + c] = k === 0 ? cloud.sh[from * i + c] : luma + 0.05 * (random() - 0.5);
+      }
+    }
+  }
+  return { ...cloud, shDegree, sh };
+}
+
+for (const degree of [0, 1, 2, 3] as const) {
+  test(`degree ${degree}: rows are those of pages that are not coded, and splats are where they were`, async () => {
+    const cloud = withHarmonics(pebbles(6_000), degree);
+    const tree = buildDetailTree(cloud, { geometry: 'quantized' });
+    const coding = codingOf(FINE);
+    const encoder = new PageEncoder(tree, coding, deflate);
+    const scene = manifestOf(tree, [], String, coding);
+    const parts = [];
+    for (const page of cutPages(tree)) {
+      const { chunks, upper, holds } = page;
+      const file = { chunks, upper, shDegree: degree, coding };
+      const words = new Uint32Array(await decodePage('page', encoder.encode(page), file));
+      const plain = packPage({ ...tree, shPrecision: 'int8' }, page);
+      assert.equal(words.length, plain.length);
+      const layout = pageLayout(scene, chunks);
+      const rows = (all: Uint32Array): Uint32Array => all.subarray(layout.chunks, layout.chunks + layout.details);
+      assert.deepEqual(rows(words), rows(plain), 'spheres, errors and children');
+      const [found, asked] = [words, plain].map((all) => new Float32Array(all.buffer, 0, layout.chunks));
+      found.forEach((number, k) => {
+        const size = Math.max(1e-3, Math.abs(asked[k]));
+        assert.ok(Math.abs(number - asked[k]) <= 0.03 * size, `bound ${k}: ${number}, not ${asked[k]}`);
+      });
+      const leaves = holds.flatMap(([level], chunk) => (level === 0 ? [chunk] : []));
+      parts.push({ words, of: chunks, chunks: leaves });
+    }
+    const decoded = cloudOfChunks(scene, parts);
+    const sums = (values: Float32Array): number => values.reduce((sum, value) => sum + value, 0);
+    const visible = tree.levels[0].opacities.filter((opacity) => Math.round(opacity * 93.75) > 0).length;
+    assert.equal(decoded.count, visible);
+    for (const [found, asked] of [
+      [decoded.opacities, cloud.opacities],
+      [decoded.scales, cloud.scales],
+      [decoded.sh, cloud.sh],
+    ]) {
+      const most = Math.max(1, sums(asked.map(Math.abs)));
+      assert.ok(Math.abs(sums(found) - sums(asked)) < 0.02 * most, `${sums(found)}, not ${sums(asked)}`);
+    }
+  });
+}
+
+/** dB of a streamed scene, all of whose pages are there, from the scene that was loaded whole. */
+async function closenessOf(cloud: GaussianCloud, steps: PageSteps): Promise<{ decibels: number; bytes: number }> {
+  const device = await anyDevice();
+  const { manifest, files, fetchPage } = detailFolder(cloud, undefined, {
+    geometry: 'quantized',
+    coded: { steps, deflate },
+  });
+  checkManifest(manifest, 'detail.json');
+  const whole = await GaussianBuffers.upload(device, packGaussians(cloud));
+  const scene = await StreamedGaussians.open(device, manifest, { fetchPage, arrivalMs: 0 });
+  const renderer = new Renderer(device, { threads: 'serial', rasterizer: 'quads' });
+  const { center, radius } = boundsOf(cloud);
+  const eye = [center[0] + radius, center[1] - 0.3 * radius, center[2] + radius] as const;
+  const camera = cameraAt(eye, center, { width: 120, height: 80, fovXDegrees: 60, near: 0.01 });
+  await drawUntilCalm(scene, renderer, camera, 0);
+  assert.equal(scene.progress.resident, scene.progress.total);
+  const [expected, drawn] = [
+    await readFrame(device, renderer, { gaussians: whole, camera, detail: 0 }),
+    await readFrame(device, renderer, { gaussians: scene, camera, detail: 0 }),
+  ];
+  [renderer, scene, whole].forEach((owner) => owner.destroy());
+  const bytes = [...files.values()].reduce((sum, file) => sum + file.byteLength, 0) / cloud.count;
+  return { decibels: psnr(expected, drawn, { channels: 4 }), bytes };
+}
+
+test('a scene streamed from coded pages is as near to the whole one as its steps are fine', async () => {
+  const cloud = withHarmonics(pebbles(6_000), 2);
+  const [usual, fine] = [await closenessOf(cloud, USUAL_STEPS), await closenessOf(cloud, FINE)];
+  console.log(
+    [usual, fine]
+      .map(({ decibels, bytes }) => `${decibels.toFixed(1)} dB, ${bytes.toFixed(1)} bytes a splat`)
+      .join('; '),
+  );
+  assert.ok(usual.decibels > 38 && usual.bytes < 30, 'the usual steps');
+  assert.ok(fine.decibels > 55 && fine.decibels > usual.decibels + 8, 'fine steps');
+});
+
+test('what is no coded page is refused, and no more is decompressed than a page can have', async () => {
+  const tree = buildDetailTree(withHarmonics(pebbles(1_500), 1), { geometry: 'quantized' });
+  const coding = codingOf(USUAL_STEPS);
+  const [page] = cutPages(tree);
+  const whole = new PageEncoder(tree, coding, deflate).encode(page);
+  const file = { chunks: page.chunks, upper: page.upper, shDegree: 1, coding } as const;
+  const refused = async (bytes: Uint8Array, codes: RegExp): Promise<void> => {
+    await assert.rejects(decodePage('page', new Uint8Array(bytes), file), (error) => {
+      assert.ok(error instanceof GaussianSplatError, String(error));
+      assert.match(error.code, codes);
+      return true;
+    });
+  };
+  await decodePage('page', whole, file);
+  await refused(new Uint8Array(0), /^decode\/(corrupt|truncated)$/);
+  await refused(whole.subarray(0, whole.length / 2), /^decode\/(corrupt|truncated)$/);
+  await refused(deflateRawSync(new Uint8Array(100)), /^decode\/truncated$/);
+  await refused(deflateRawSync(new Uint8Array(2 ** 26)), /^decode\/corrupt$/);
+  // Any bytes at all end in words of a page or in an error of this kind.
+  for (let k = 0; k < 60; k++) {
+    const broken = whole.slice();
+    broken[(k * 977) % broken.length] ^= 1 << (k % 8);
+    await decodePage('page', broken, file).catch((error: unknown) => assert.ok(error instanceof GaussianSplatError));
+  }
+});
+
+test('a manifest says how its files are coded', () => {
+  const tree = buildDetailTree(pebbles(600), { geometry: 'quantized' });
+  const manifest = JSON.parse(
+    JSON.stringify(manifestOf(tree, cutPages(tree), String, codingOf(USUAL_STEPS))),
+  ) as object;
+  assert.equal(checkManifest(manifest, 'detail.json').version, 3);
+  const { coding } = manifest as { coding: object };
+  for (const wrong of [
+    { ...manifest, coding: undefined },
+    { ...manifest, version: 2 },
+    { ...manifest, shPrecision: 'float16' },
+    { ...manifest, coding: { ...coding, opacity: 3 } },
+    { ...manifest, coding: { ...coding, directions: 7.5 } },
+    { ...manifest, coding: { ...coding, scale: 255 } },
+    { ...manifest, coding: { ...coding, color: null } },
+  ]) {
+    assert.throws(() => checkManifest(wrong, 'detail.json'), { code: /^decode\// });
+  }
+  assert.equal(constants.CULL_GROUP, 256, 'counts of splats are a byte');
+});

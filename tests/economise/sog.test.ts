@@ -1,0 +1,104 @@
+/** SOG as economise writes it: what is read again is what was rounded, and steps and palettes are as coarse as errors allow. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { shCoefficientCount, type GaussianCloud, type ShDegree } from '@gaussian-splat/core';
+import { allocateSteps, encodingsFor, writeSog, type SogSteps } from '@gaussian-splat/economise';
+import { readScene } from '@gaussian-splat/formats';
+import { packedOrder } from '@gaussian-splat/renderer';
+import { encodeWebp } from '../../packages/cli/src/lib/webp.mjs';
+import { randomSource } from '../support/gpu.js';
+import { pebbles } from '../support/scenes/pebbles.js';
+
+const FINEST: SogSteps = { place: 1, size: 1e-3, turn: 1, opacity: 1, color: 1e-3 };
+
+/** Stones whose colours are of a few kinds, so that a palette of as many holds them. */
+function ofKinds(count: number, shDegree: ShDegree, kinds: number): GaussianCloud {
+  const cloud = pebbles(count);
+  const random = randomSource(3);
+  const width = 3 * shCoefficientCount(shDegree);
+  const palette = Float32Array.from({ length: kinds * width }, () => random() - 0.5);
+  const sh = new Float32Array(width * count);
+  for (let i = 0; i < count; i++) {
+    sh.set(palette.subarray(width * (i % kinds), width * ((i % kinds) + 1)), width * i);
+    sh.set(cloud.sh.subarray((cloud.sh.length / count) * i, (cloud.sh.length / count) * i + 3), width * i);
+  }
+  return { ...cloud, shDegree, sh };
+}
+
+const read = (bytes: Uint8Array): Promise<GaussianCloud> => readScene(bytes, { name: 'written.sog' });
+
+for (const degree of [0, 1, 3] as const) {
+  test(`degree ${degree}: each splat comes back, to the steps of the format`, async () => {
+    const cloud = ofKinds(3_000, degree, 40);
+    const found = await read(await writeSog(cloud, { steps: FINEST, palette: 64, encodeWebp, effort: 0 }));
+    const order = packedOrder(cloud);
+    assert.equal(found.count, order.length);
+    const width = 3 * shCoefficientCount(degree);
+    const range = (values: Float32Array): number =>
+      values.reduce((a, b) => Math.max(a, b), -Infinity) - values.reduce((a, b) => Math.min(a, b), Infinity);
+    const [positions, logs, colors] = [range(cloud.positions), range(cloud.scales.map(Math.log)), range(cloud.sh)];
+    order.forEach((i, k) => {
+      for (let n = 0; n < 3; n++) {
+        assert.ok(Math.abs(found.positions[3 * k + n] - cloud.positions[3 * i + n]) <= (2 * positions) / 65_535);
+        assert.ok(Math.abs(Math.log(found.scales[3 * k + n] / cloud.scales[3 * i + n])) <= logs / 500);
+      }
+      assert.ok(Math.abs(found.opacities[k] - cloud.opacities[i]) <= 0.51 / 255);
+      const dot = [0, 1, 2, 3].reduce((sum, n) => sum + found.rotations[4 * k + n] * cloud.rotations[4 * i + n], 0);
+      assert.ok(Math.abs(dot) > 0.9995, `turned by ${Math.acos(Math.abs(dot))}`);
+      for (let n = 0; n < width; n++) {
+        assert.ok(Math.abs(found.sh[width * k + n] - cloud.sh[width * i + n]) <= colors / 250, `coefficient ${n}`);
+      }
+    });
+  });
+}
+
+test('coarser steps and smaller palettes make smaller files, and a flag for antialiasing stays', async () => {
+  const cloud = { ...ofKinds(3_000, 2, 400), antialiased: true };
+  const write = (steps: SogSteps, palette: number): Promise<Uint8Array> =>
+    writeSog(cloud, { steps, palette, encodeWebp, effort: 0.3 });
+  const coarse: SogSteps = { place: 64, size: 0.2, turn: 16, opacity: 16, color: 0.1 };
+  const [fine, rough, few] = [await write(FINEST, 512), await write(coarse, 512), await write(FINEST, 16)];
+  assert.ok(rough.length < 0.75 * fine.length, `${rough.length} of ${fine.length}`);
+  assert.ok(few.length < fine.length, `${few.length} of ${fine.length}`);
+  assert.equal((await read(rough)).antialiased, true);
+});
+
+test('each step makes as much of the error as it has numbers, whatever errors are', async () => {
+  const weights = { a: 4, b: 0.01, c: 1 };
+  const errorOf = (steps: Readonly<Record<'a' | 'b' | 'c', number>>): number =>
+    weights.a * steps.a ** 2 + weights.b * steps.b ** 2 + weights.c * steps.c ** 2;
+  const usual = { a: 0.1, b: 0.1, c: 0.1 };
+  const numbers = { a: 3, b: 3, c: 6 };
+  const steps = await allocateSteps({ usual, numbers, measure: async (s) => errorOf(s), target: 0.02 });
+  assert.ok(Math.abs(errorOf(steps) - 0.02) < 0.006, `${errorOf(steps)}`);
+  assert.ok(steps.b > steps.c && steps.c > steps.a, JSON.stringify(steps));
+});
+
+test('a scene is tuned until its rounding is what it may be, and without an encoder that is said', async () => {
+  const cloud = ofKinds(2_000, 1, 40);
+  const order = packedOrder(cloud);
+  const measure = async (bytes: Uint8Array): Promise<number> => {
+    const found = await read(bytes);
+    let sum = 0;
+    order.forEach((i, k) => {
+      for (let n = 0; n < 3; n++) {
+        sum += (found.sh[12 * k + n] - cloud.sh[12 * i + n]) ** 2;
+        sum += (found.positions[3 * k + n] - cloud.positions[3 * i + n]) ** 2;
+        sum += Math.log(found.scales[3 * k + n] / cloud.scales[3 * i + n]) ** 2;
+      }
+      sum += (found.opacities[k] - cloud.opacities[i]) ** 2;
+    });
+    return sum / order.length;
+  };
+  const whole = { cloud, degrees: new Uint8Array(cloud.count).fill(1) };
+  const sizes: number[] = [];
+  for (const target of [1e-2, 1e-3]) {
+    const [{ tune }] = encodingsFor('a.sog', cloud, { encodeWebp });
+    const bytes = await (await tune!(whole, measure, target)).write(whole);
+    const error = await measure(bytes);
+    assert.ok(error <= 1.2 * target && error > 0.2 * target, `${error}, not ${target}`);
+    sizes.push(bytes.length);
+  }
+  assert.ok(sizes[0] < 0.9 * sizes[1], `${sizes}`);
+  await assert.rejects(encodingsFor('a.sog')[0].tune!(whole, measure, 1e-3), { code: 'argument/value' });
+});

@@ -1,0 +1,182 @@
+/** Triangle meshes among scenes: `<splat-mesh>` children, and glTF files that hold both. */
+import '@gaussian-splat/element/scenes.js';
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import type { SplatMeshElement } from '@gaussian-splat/element/scenes.js';
+import { isLab } from '../../support/extent-in-pages.js';
+import { boxGlb, type BoxOptions } from './support/glb.js';
+import { holdings } from './support/ledger.js';
+import { assert, assertEqual, COMPASS, delay, devices, FIXTURES, frames, nextEvent, until } from './support/harness.js';
+import { isBlue, isGreen, isRed, screenOf, type Rgb } from './support/screen.js';
+
+const GREEN = `${FIXTURES}green.splat`;
+const VIEW = {
+  'camera-orbit': '0deg 90deg 10m',
+  'camera-target': '0 0 0',
+  'field-of-view': '45deg',
+  quality: 'default',
+};
+const METRE = 50 / Math.tan(Math.PI / 8) / 10;
+
+function place(attributes: Readonly<Record<string, string>> = {}): GaussianSplatElement {
+  const element = document.createElement('gaussian-splat');
+  for (const [name, value] of Object.entries({ ...VIEW, ...attributes })) element.setAttribute(name, value);
+  element.style.cssText = 'display: block; width: 120px; height: 100px';
+  document.body.append(element);
+  return element;
+}
+
+function mesh(options: BoxOptions, attributes: Readonly<Record<string, string>> = {}): SplatMeshElement {
+  const child = document.createElement('splat-mesh') as SplatMeshElement;
+  child.src = boxGlb(options);
+  for (const [name, value] of Object.entries(attributes)) child.setAttribute(name, value);
+  return child;
+}
+
+const placeOf = async (element: Element, isPicked: (colour: Rgb) => boolean): Promise<number[] | null> => {
+  const middle = (await screenOf(element)).middleOf(isPicked);
+  return middle && [(middle.x - 60) / METRE, (50 - middle.y) / METRE];
+};
+
+function assertNear(
+  actual: readonly number[] | null,
+  expected: readonly number[],
+  what: string,
+  tolerance = 0.15,
+): void {
+  const isNear = actual?.every((value, k) => Math.abs(value - expected[k]) <= tolerance);
+  assert(isNear, `${what}: expected ${expected.join()}, found ${actual?.map((v) => v.toFixed(2)).join() ?? 'nothing'}`);
+}
+
+describe('meshes', () => {
+  it('stand where their attributes say, and hide splats as these hide them', async () => {
+    const element = place();
+    const ball = document.createElement('splat-scene');
+    ball.setAttribute('src', GREEN);
+    ball.setAttribute('scale', '2');
+    const behind = mesh({ colour: [0, 0, 1], half: [1, 1, 0.1] }, { position: '2 0 -3' });
+    const before = mesh({ half: [0.2, 0.2, 0.1] }, { position: '0 0 3m' });
+    element.append(ball, behind, before);
+    await element.ready;
+    assertEqual([behind.error?.message ?? null, behind.loaded, before.loaded], [null, true, true], 'loaded');
+    const screen = await screenOf(element);
+    const at = (x: number): Rgb => screen.at(60 + x * METRE, 50);
+    assert(isRed(at(0)), `the near box hides the ball: ${at(0).join()}`);
+    assert(isGreen(at(-0.5)), `beside it the ball: ${at(-0.5).join()}`);
+    // A metre is 10/13 as long as far away.
+    assert(isGreen(at(0.9)), `before the far box is the ball: ${at(0.9).join()}`);
+    assert(isBlue(at(2.15)), `the far box beside the ball: ${at(2.15).join()}`);
+    const colour = (await screenOf(element)).at(60, 50);
+    assert(colour[0] > 230 && colour[1] < 60 && colour[2] < 60, `its own colour: ${colour.join()}`);
+    before.remove();
+    await frames();
+    assert(isGreen((await screenOf(element)).at(60, 50)), 'taken away');
+    behind.rotation = [0, Math.PI / 2, 0];
+    await behind.updateComplete;
+    await frames();
+    assert(!isBlue((await screenOf(element)).at(60 + 2.15 * METRE, 50)), 'turned to its edge');
+  });
+
+  it('alone, without splats, and with a scene that comes later', async () => {
+    const element = place();
+    element.append(mesh({ half: [1, 0.5, 0.5] }, { position: '0 1 0' }));
+    await element.ready;
+    assert(element.loaded, 'loaded');
+    assertNear(await placeOf(element, isRed), [0, 1], 'the box');
+    assertEqual(
+      element.stats?.scenes.map(({ triangles }) => triangles),
+      [12],
+      'triangles',
+    );
+    element.src = GREEN;
+    await nextEvent(element, 'load');
+    assert(await placeOf(element, isGreen), 'the scene');
+    assertNear(await placeOf(element, isRed), [0, 1.2], 'the box', 0.4);
+  });
+
+  it('move: by their own clock, or by that of the element', async () => {
+    const element = place({ src: COMPASS });
+    const follower = mesh({ moves: 4, colour: [1, 0, 1], half: [0.3, 0.3, 0.3] }, { position: '-2 2 0' });
+    element.append(follower);
+    await element.ready;
+    assertEqual([element.duration, follower.duration], [1, 1], 'durations');
+    const isPink = ([r, g, b]: Rgb): boolean => r > 150 && b > 150 && g < 110;
+    assertNear(await placeOf(element, isPink), [-2, 2], 'at first');
+    const seeked = nextEvent(element, 'seeked');
+    element.currentTime = 0.5;
+    await seeked;
+    assertNear(await placeOf(element, isPink), [0, 2], 'half of the way');
+    follower.autoplay = true;
+    follower.loop = true;
+    await until(() => !follower.paused && follower.currentTime > 0.1, 'its own clock');
+    assertEqual(element.paused, true, 'the clock of the element');
+    follower.pause();
+  });
+
+  it('of a file that has splats, too, are shown with them', async () => {
+    const src = URL.createObjectURL(boxGlb({ splat: [2, 1, 0], half: [0.5, 0.5, 0.5] }));
+    const element = place();
+    const child = document.createElement('splat-scene');
+    child.setAttribute('src', `${src}#both.glb`);
+    // glTF shows its front where a scene of a trainer has its back.
+    child.setAttribute('rotation', '0 180deg 0');
+    element.append(child);
+    await element.ready;
+    assert(child.error === null, `${child.error?.message}`);
+    await until(() => (element.stats?.scenes[0].triangles ?? 0) > 0, 'the triangles');
+    await frames();
+    assertNear(await placeOf(element, isRed), [0, 0], 'triangles');
+    assertNear(await placeOf(element, isGreen), [2, 1], 'splats', 0.3);
+    const own = place({ src: `${src}#both.glb`, 'camera-orbit': '180deg 90deg 10m' });
+    await own.ready;
+    await until(() => (own.stats?.scenes[0]?.triangles ?? 0) > 0, 'the triangles of its own file');
+    await frames();
+    assertNear(await placeOf(own, isRed), [0, 0], 'triangles');
+    assertNear(await placeOf(own, isGreen), [2, 1], 'splats', 0.3);
+  });
+
+  it('are picked, and hide labels', async () => {
+    const element = place({ src: GREEN });
+    element.insertAdjacentHTML('beforeend', '<b slot="hotspot-ball" data-position="0 0 1.5">o</b>');
+    const box = mesh({ half: [0.5, 0.5, 0.5] }, { position: '0 0 4' });
+    await element.ready;
+    await until(() => element.queryHotspot('hotspot-ball')?.visible === true, 'the label');
+    element.append(box);
+    await nextEvent(box, 'load');
+    await until(() => element.queryHotspot('hotspot-ball')?.visible === false, 'the label to be hidden');
+    const { left, top } = element.getBoundingClientRect();
+    const point = await element.positionFromPoint(left + 60, top + 50);
+    assert(point && Math.abs(point.z - 4.5) < 0.02, `picked: ${point?.toString()}`);
+  });
+
+  it('that cannot be read leave the others; a lost device brings them back; nothing stays behind', async () => {
+    const before = GaussianSplatElement.releaseDelay;
+    GaussianSplatElement.releaseDelay = 0;
+    try {
+      document.body.replaceChildren();
+      await until(() => holdings().objects === 0, 'what others leave to go');
+      const element = place({ src: GREEN });
+      const broken = mesh({}, {});
+      broken.src = new File([new Uint8Array(100)], 'broken.glb');
+      const missing = mesh({}, {});
+      missing.src = '/net/missing.glb';
+      const good = mesh({}, { position: '3 0 0' });
+      element.append(broken, missing, good);
+      await element.ready;
+      assertEqual([broken.error?.reason, missing.error?.reason], ['decode/corrupt', 'network/status'], 'errors');
+      assert(good.loaded && element.error === null, 'the others');
+      const picture = await screenOf(element);
+      for (let i = 0; i < (isLab ? 3 : 1); i++) {
+        const restored = nextEvent(element, 'contextrestored', 60_000);
+        devices.at(-1)!.destroy();
+        await restored;
+        await frames();
+        assertEqual((await screenOf(element)).differences(picture, 2), 0, 'the picture is back');
+      }
+      document.body.replaceChildren();
+      await delay(300);
+      assertEqual(holdings(), { objects: 0, bytes: 0 }, 'what lives on the GPU');
+    } finally {
+      GaussianSplatElement.releaseDelay = before;
+    }
+  });
+});

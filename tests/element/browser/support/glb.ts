@@ -1,0 +1,115 @@
+/** Small GLB files, made here. */
+
+/** Corners of a box's faces, and their normals. */
+function box([hx, hy, hz]: readonly number[]): { positions: number[]; normals: number[]; indices: number[] } {
+  const [positions, normals, indices]: number[][] = [[], [], []];
+  for (const axis of [0, 1, 2]) {
+    for (const side of [-1, 1]) {
+      const first = positions.length / 3;
+      for (const [u, v] of [
+        [-1, -1],
+        [1, -1],
+        [1, 1],
+        [-1, 1],
+      ]) {
+        const corner = [0, 0, 0];
+        corner[axis] = side;
+        corner[(axis + 1) % 3] = u * side;
+        corner[(axis + 2) % 3] = v;
+        positions.push(corner[0] * hx, corner[1] * hy, corner[2] * hz);
+        normals.push(...[0, 1, 2].map((k) => (k === axis ? side : 0)));
+      }
+      indices.push(...[0, 1, 2, 0, 2, 3].map((k) => first + k));
+    }
+  }
+  return { positions, normals, indices };
+}
+
+export interface BoxOptions {
+  /** Half of each side, metres. */
+  readonly half?: readonly [number, number, number];
+  /** Linear red, green, blue; it shines by itself, so that no light changes it. */
+  readonly colour?: readonly [number, number, number];
+  /** It moves by so much along x within a second. */
+  readonly moves?: number;
+  /** A splat besides, at this place. */
+  readonly splat?: readonly [number, number, number];
+}
+
+/** A box that shines. */
+export function boxGlb({ half = [0.5, 0.5, 0.5], colour = [1, 0, 0], moves, splat }: BoxOptions = {}): File {
+  const { positions, normals, indices } = box(half);
+  const parts: Uint8Array[] = [];
+  const views: object[] = [];
+  const accessors: object[] = [];
+  const add = (values: Float32Array | Uint16Array, type: string, more: object = {}): number => {
+    const components = { SCALAR: 1, VEC3: 3, VEC4: 4 }[type]!;
+    const byteOffset = parts.reduce((sum, { byteLength }) => sum + byteLength, 0);
+    views.push({ buffer: 0, byteOffset, byteLength: values.byteLength });
+    parts.push(new Uint8Array(values.buffer));
+    const componentType = values instanceof Uint16Array ? 5123 : 5126;
+    accessors.push({ bufferView: views.length - 1, componentType, count: values.length / components, type, ...more });
+    return accessors.length - 1;
+  };
+  const floats = (values: readonly number[], type: string, more?: object): number =>
+    add(Float32Array.from(values), type, more);
+  const range = { min: half.map((h) => -h), max: [...half] };
+  const triangles = {
+    attributes: { POSITION: floats(positions, 'VEC3', range), NORMAL: floats(normals, 'VEC3') },
+    indices: add(Uint16Array.from(indices), 'SCALAR'),
+    material: 0,
+  };
+  const primitives: object[] = [triangles];
+  if (splat) {
+    const attributes = {
+      POSITION: floats(splat, 'VEC3', { min: splat, max: splat }),
+      'KHR_gaussian_splatting:ROTATION': floats([0, 0, 0, 1], 'VEC4'),
+      'KHR_gaussian_splatting:SCALE': floats([0.2, 0.2, 0.2], 'VEC3'),
+      'KHR_gaussian_splatting:OPACITY': floats([0.99], 'SCALAR'),
+      'KHR_gaussian_splatting:SH_DEGREE_0_COEF_0': floats([-1.7, 1.7, -1.7], 'VEC3'),
+    };
+    const extension = { kernel: 'ellipse', colorSpace: 'srgb_rec709_display' };
+    primitives.push({ attributes, mode: 0, extensions: { KHR_gaussian_splatting: extension } });
+  }
+  const animations = moves === undefined ? [] : [animation(moves, floats)];
+  const json = {
+    asset: { version: '2.0' },
+    scene: 0,
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0 }],
+    meshes: [{ primitives }],
+    materials: [{ emissiveFactor: colour, pbrMetallicRoughness: { baseColorFactor: [0, 0, 0, 1], metallicFactor: 0 } }],
+    ...(splat && { extensionsUsed: ['KHR_gaussian_splatting'] }),
+    ...(animations.length > 0 && { animations }),
+    accessors,
+    bufferViews: views,
+    buffers: [{ byteLength: parts.reduce((sum, { byteLength }) => sum + byteLength, 0) }],
+  };
+  return new File([glb(json, parts)], 'box.glb');
+}
+
+function animation(moves: number, floats: (values: readonly number[], type: string, more?: object) => number): object {
+  const input = floats([0, 1], 'SCALAR', { min: [0], max: [1] });
+  const output = floats([0, 0, 0, moves, 0, 0], 'VEC3');
+  return { channels: [{ sampler: 0, target: { node: 0, path: 'translation' } }], samplers: [{ input, output }] };
+}
+
+/** JSON and its bytes as one file. */
+function glb(json: object, parts: readonly Uint8Array[]): Blob {
+  const padded = (bytes: Uint8Array, fill: number): Uint8Array => {
+    const whole = new Uint8Array(4 * Math.ceil(bytes.length / 4)).fill(fill);
+    whole.set(bytes);
+    return whole;
+  };
+  const text = padded(new TextEncoder().encode(JSON.stringify(json)), 0x20);
+  const size = parts.reduce((sum, { byteLength }) => sum + byteLength, 0);
+  const body = new Uint8Array(4 * Math.ceil(size / 4));
+  let offset = 0;
+  for (const part of parts) {
+    body.set(part, offset);
+    offset += part.byteLength;
+  }
+  const head = Uint32Array.of(0x46546c67, 2, 12 + 8 + text.length + 8 + body.length);
+  const chunk = (length: number, kind: number): Uint32Array => Uint32Array.of(length, kind);
+  return new Blob([head, chunk(text.length, 0x4e4f534a), text, chunk(body.length, 0x004e4942), body] as BlobPart[]);
+}

@@ -1,0 +1,95 @@
+/** A generator, a file, a sequence and a mesh in one element: added, moved, played and removed, with devices that go; nothing is wrong and nothing stays. */
+import '@gaussian-splat/element/scenes.js';
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
+import { boxGlb } from '../../element/browser/support/glb.js';
+import { holdings } from '../../element/browser/support/ledger.js';
+import {
+  assert,
+  assertEqual,
+  COMPASS,
+  devices,
+  FIXTURES as SCENES,
+  frames,
+  nextEvent,
+  until,
+} from '../../element/browser/support/harness.js';
+import { screenOf } from '../../element/browser/support/screen.js';
+import { isLab } from '../../support/extent-in-pages.js';
+import { FIXTURES } from './support.js';
+
+GaussianSplatElement.runtimeLocation = '/net/compressed/onnxruntime-web/dist/';
+
+const LOSSES = isLab ? 5 : 1;
+/** How long all of it plays and moves, ms. */
+const PLAYS_MS = isLab ? 60_000 : 1_500;
+
+const scene = (src: string, position: string): SplatSceneElement => {
+  const child = document.createElement('splat-scene') as SplatSceneElement;
+  child.setAttribute('src', src);
+  child.setAttribute('position', position);
+  return child;
+};
+
+describe('generators among other scenes', () => {
+  it('play, move, come and go, and come back after losses', async () => {
+    const { releaseDelay } = GaussianSplatElement;
+    GaussianSplatElement.releaseDelay = 0;
+    try {
+      const element = document.createElement('gaussian-splat');
+      element.style.cssText = 'display: block; width: 120px; height: 100px';
+      for (const [name, value] of Object.entries({
+        ...{ src: COMPASS, 'camera-orbit': '0deg 90deg 12m', 'camera-target': '0 0 0', 'field-of-view': '45deg' },
+        quality: 'default',
+      }))
+        element.setAttribute(name, value);
+      document.body.append(element);
+      const generator = scene(`${FIXTURES}packed.onnx`, '-3 0 0');
+      const movie = scene('/net/sequence/movie.json', '3 0 0');
+      const box = document.createElement('splat-mesh') as SplatMeshElement;
+      box.src = boxGlb({ moves: 2, half: [0.4, 0.4, 0.4] });
+      box.position = [0, 2.5, 0];
+      element.append(generator, movie, box);
+      await element.ready;
+      for (const child of [generator, movie, box]) assert(child.loaded, child.error?.message ?? child.localName);
+      assert(Number.isFinite(movie.duration) && !Number.isNaN(generator.duration), 'both have a time');
+      const still = await screenOf(element);
+      element.loop = true;
+      await element.play();
+      const end = performance.now() + PLAYS_MS;
+      for (let i = 0; performance.now() < end; i++) {
+        box.rotation = [0, i / 10, 0];
+        generator.position = [-3, Math.sin(i / 10), 0];
+        if (i % 20 === 10) movie.remove();
+        if (i % 20 === 19) element.append(movie);
+        await frames(1);
+      }
+      assert(element.currentTime > 0, 'the time goes on');
+      element.pause();
+      element.append(movie);
+      box.rotation = null;
+      generator.position = '-3 0 0';
+      element.currentTime = 0;
+      await nextEvent(element, 'seeked');
+      for (let i = 0; i < LOSSES; i++) {
+        const restored = nextEvent(element, 'contextrestored', 60_000);
+        devices.at(-1)!.destroy();
+        await restored;
+      }
+      await element.ready;
+      const isBack = async (): Promise<boolean> => (await screenOf(element)).differences(still, 3) === 0;
+      let same = false;
+      await until(() => {
+        void isBack().then((is) => (same ||= is));
+        return same;
+      }, 'the picture of the beginning');
+      element.append(scene(`${SCENES}green.splat`, '0 -2 0'));
+      await element.ready;
+      assertEqual(element.stats?.scenes.length, 5, 'the own scene and four children');
+    } finally {
+      document.body.replaceChildren();
+      await until(() => holdings().objects === 0, 'the memory to be given back');
+      GaussianSplatElement.releaseDelay = releaseDelay;
+    }
+  });
+});

@@ -1,0 +1,109 @@
+/** Shapes and roles of real models on the GPU; a model that goes on from what it wrote; what the element tells of inputs, and its panel. */
+import '@gaussian-splat/element';
+import { GaussianSplatElement } from '@gaussian-splat/element';
+import { Generator } from '@gaussian-splat/generator';
+import { assert, assertEqual, COMPASS, show, showLoaded, until } from '../../element/browser/support/harness.js';
+import { CAMERA, FIXTURES, makeDevice, numbersOf, ReadingSink, relativeError, runOnCpu } from './support.js';
+
+GaussianSplatElement.runtimeLocation = '/node_modules/onnxruntime-web/dist/';
+
+it('batches, matrices, a camera to world and a count of 64 bits: the numbers of the CPU, on the GPU', async () => {
+  const device = await makeDevice();
+  const sink = new ReadingSink(device);
+  const url = `${FIXTURES}shaped.onnx`;
+  const generator = await Generator.open({ url }, device, { onError: reportError, compare: false });
+  generator.sink = sink;
+  const c = Math.cos(1);
+  const s = Math.sin(1);
+  const camera = { ...CAMERA, worldToCamera: [c, 0, s, 1, 0, 1, 0, 2, -s, 0, c, 5, 0, 0, 0, 1] as const };
+  const pose = [0, 1, 0, -1, 0, 0, 0, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1];
+  for (const state of [{ camera: CAMERA }, { camera, pose, timeSeconds: 1 }]) {
+    generator.request(state);
+    await generator.idle;
+    const wanted = await runOnCpu(url, state);
+    const { rows, tensors } = sink.runs.at(-1)!;
+    assertEqual(rows, 64, 'rows of the tensors');
+    for (const name of ['means', 'covs', 'rgba', 'alpha']) {
+      const { values } = wanted[name];
+      const found = numbersOf(await tensors[name], 'float32').slice(0, values.length);
+      assert(relativeError(found, values) < 1e-4, `${name}: ${relativeError(found, values)}`);
+    }
+    assertEqual((await tensors.alive)[0], 40, 'living rows');
+  }
+  const { layout } = generator.model;
+  assertEqual([layout.capacity, layout.paddedRows, layout.countDtype], [48, 64, 'int64']);
+  generator.close();
+});
+
+it('a model goes on from what it wrote in the run before, and begins anew when the time goes back', async () => {
+  const device = await makeDevice();
+  const sink = new ReadingSink(device);
+  const url = `${FIXTURES}state.onnx`;
+  const generator = await Generator.open({ url }, device, { onError: reportError, compare: false });
+  generator.sink = sink;
+  const nexts: number[] = [];
+  for (const state of [
+    { timeSeconds: 0 },
+    { timeSeconds: 1 },
+    { timeSeconds: 2, controls: { push: 1 } },
+    { timeSeconds: 0 },
+  ]) {
+    generator.request(state);
+    await generator.idle;
+    nexts.push(numbersOf(await sink.runs.at(-1)!.tensors.next, 'float32')[0]);
+  }
+  assertEqual(nexts, [0.75, 1, 2, 0.75]);
+  generator.close();
+});
+
+describe('what models take, told to the page', () => {
+  it('inputs, an event when they are others, and none of a scene file', async () => {
+    const element = show({ src: `${FIXTURES}state.onnx` });
+    let told = 0;
+    element.addEventListener('inputs-change', () => told++);
+    await element.ready;
+    await until(() => told === 1, 'the event');
+    assertEqual(element.inputs, [
+      { label: 'time', unit: 'seconds', name: 'time', role: 'time', size: 1 } as never,
+      { label: 'Push', range: [0, 1], default: 0.25, step: 0.25, name: 'push', role: 'control', size: 1 },
+    ]);
+    element.src = `${FIXTURES}shaped.onnx`;
+    await until(() => element.inputs.some(({ name }) => name === 'pose'), 'the pose');
+    const pose = element.inputs.find(({ name }) => name === 'pose');
+    assertEqual([pose?.format, pose?.joints, pose?.parents, pose?.size], ['matrix', ['hip', 'knee'], [-1, 0], 18]);
+    element.src = COMPASS;
+    await until(() => element.inputs.length === 0, 'no inputs');
+  });
+
+  it('a panel of controls: sliders by their names, joints, a reset, and gone with its attribute', async () => {
+    const element = await showLoaded({ src: `${FIXTURES}state.onnx`, 'controls-panel': '' });
+    const part = (name: string): HTMLElement | null => element.shadowRoot!.querySelector(`[part=${name}]`);
+    await until(() => part('controls-panel') !== null, 'the panel');
+    const labels = (): string[] =>
+      [...element.shadowRoot!.querySelectorAll('[part=control-label]')].map(({ textContent }) => textContent);
+    assertEqual(labels(), ['Time', 'Push']);
+    const slider = element.shadowRoot!.querySelectorAll<HTMLInputElement>('[part=control-input]')[1];
+    assertEqual(
+      [slider.value, slider.min, slider.max, slider.step, slider.labels?.length],
+      ['0.25', '0', '1', '0.25', 1],
+    );
+    slider.value = '0.75';
+    slider.dispatchEvent(new Event('input'));
+    assertEqual(element.controls, { push: [0.75] });
+    part('controls-panel')!.querySelector('button')!.click();
+    assertEqual(element.controls, null);
+    element.src = `${FIXTURES}shaped.onnx`;
+    await until(() => labels().includes('Joint'), 'the joints');
+    const fields = element.shadowRoot!.querySelectorAll<HTMLInputElement>('[part=control-input]');
+    fields[2].value = String(Math.PI / 2);
+    fields[2].dispatchEvent(new Event('input'));
+    const pose = element.pose as readonly number[];
+    assertEqual(pose.length, 18);
+    assert(
+      Math.abs(pose[4]) < 0.01 && Math.abs(pose[5] + 1) < 0.01,
+      `a quarter turn around x: ${pose.slice(0, 9).join(' ')}`,
+    );
+    element.removeAttribute('controls-panel');
+    await until(() => part('controls-panel')!.hidden === true, 'no panel');
+  });
+});

@@ -1,0 +1,167 @@
+/** Splats in three.js's own canvas, on its device: as the renderer draws them alone, and hidden by meshes where those are nearer. */
+import { cameraFromProjection, type GaussianCloud } from '@gaussian-splat/core';
+import {
+  capture,
+  GaussianBuffers,
+  packGaussians,
+  settings,
+  Viewpoint,
+  World,
+  type RasterizerName,
+} from '@gaussian-splat/renderer';
+import { SplatRenderer, SplatScene } from '@gaussian-splat/three';
+import {
+  BoxGeometry,
+  Color,
+  Mesh,
+  MeshBasicMaterial,
+  OrthographicCamera,
+  PerspectiveCamera,
+  Scene,
+  WebGPURenderer,
+} from 'three/webgpu';
+import { assert } from '../../element/browser/support/harness.js';
+
+const [WIDTH, HEIGHT] = [192, 128];
+const BACKGROUND = [0.1, 0.3, 0.2] as const;
+
+/** A wall of faint and opaque balls that faces the z axis; y up. */
+function wall(): GaussianCloud {
+  const [columns, rows] = [24, 16];
+  const count = columns * rows;
+  const fill = (width: number, value: (i: number, k: number) => number): Float32Array =>
+    Float32Array.from({ length: width * count }, (_, n) => value(Math.floor(n / width), n % width));
+  return {
+    ...{ count, shDegree: 0, antialiased: false, origin: [0, 0, 0], droppedCount: 0 },
+    positions: fill(3, (i, k) => [((i % columns) - 11.5) / 8, (Math.floor(i / columns) - 7.5) / 8, 0.002 * (i % 7)][k]),
+    scales: fill(3, () => 0.06),
+    rotations: fill(4, (_, k) => (k === 0 ? 1 : 0)),
+    opacities: fill(1, (i) => (i % columns < 12 ? 0.99 : 0.5)),
+    sh: fill(3, (i, k) => 1.5 * Math.sin(i + 2 * k)),
+  };
+}
+
+async function renderer3(antialias = false) {
+  const canvas = document.createElement('canvas');
+  document.body.append(canvas);
+  const renderer = new WebGPURenderer({ canvas, antialias });
+  renderer.setSize(WIDTH, HEIGHT, false);
+  await renderer.init();
+  return { renderer, canvas };
+}
+
+/** What a canvas shows, read in the task in which it was drawn. */
+function shown(canvas: HTMLCanvasElement): Uint8ClampedArray {
+  const context = new OffscreenCanvas(WIDTH, HEIGHT).getContext('2d')!;
+  context.drawImage(canvas, 0, 0);
+  return context.getImageData(0, 0, WIDTH, HEIGHT).data;
+}
+
+const at = (pixels: ArrayLike<number>, x: number, y: number): number[] =>
+  [0, 1, 2].map((k) => pixels[4 * (WIDTH * y + x) + k]);
+
+const worst = (a: ArrayLike<number>, b: ArrayLike<number>): number => {
+  let most = 0;
+  for (let i = 0; i < a.length; i++) if (i % 4 < 3) most = Math.max(most, Math.abs(a[i] - b[i]));
+  return most;
+};
+
+/** Many frames: room is learnt. */
+const FRAMES = 3;
+
+describe('splats in a three.js scene', () => {
+  for (const rasterizer of ['quads', 'tiles'] as const satisfies readonly RasterizerName[]) {
+    it(`${rasterizer}: on three's canvas as the renderer draws them, and a bar through them is hidden where it is behind`, async () => {
+      const { renderer, canvas } = await renderer3();
+      const device = renderer.backend.device!;
+      device.pushErrorScope('validation');
+      const how = settings('default', { rasterizer });
+      const gaussians = await GaussianBuffers.upload(device, packGaussians(wall()));
+      const splats = new SplatRenderer(renderer, { settings: how });
+      const scene = new Scene();
+      scene.background = new Color().setRGB(...BACKGROUND, 'srgb');
+      const placed = new SplatScene(gaussians);
+      placed.position.set(0.2, -0.1, 0);
+      placed.rotation.set(0.1, 0.4, 0.05);
+      placed.scale.setScalar(0.8);
+      scene.add(placed);
+      const perspective = new PerspectiveCamera(50, WIDTH / HEIGHT, 0.1, 100);
+      perspective.position.set(0.3, 0.2, 2.6);
+      perspective.lookAt(0, 0, 0);
+      const parallel = new OrthographicCamera(-1.8, 1.8, 1.2, -1.2, 0.1, 100);
+      parallel.position.set(-0.4, 0.3, 3);
+      parallel.lookAt(0, 0, 0);
+      for (const camera of [perspective, parallel]) {
+        splats.render(scene, camera);
+        const world = new World();
+        const matrix: number[] = placed.matrixWorld.elements;
+        const sceneToWorld = matrix.map((_, k) => matrix[4 * (k % 4) + Math.floor(k / 4)]);
+        world.add({ scene: gaussians, sceneToWorld });
+        const view = cameraFromProjection(camera.matrixWorldInverse.elements, camera.projectionMatrix.elements, {
+          width: WIDTH,
+          height: HEIGHT,
+        });
+        const alone = new Viewpoint(device, world, { settings: how });
+        const expected = await capture(device, alone, { camera: view, over: [...BACKGROUND, 1] });
+        for (let k = 0; k < FRAMES; k++) splats.render(scene, camera);
+        const found = shown(canvas);
+        const bytes = expected.map((value) => Math.round(255 * Math.min(1, value)));
+        assert(worst(found, bytes) <= 1, `${rasterizer}: ${worst(found, bytes)} / 255`);
+        alone.destroy();
+      }
+
+      // The bar stands across the wall: its left end in front, its right end behind.
+      placed.position.set(0, 0, 0);
+      placed.rotation.set(0, 0, 0);
+      const bar = new Mesh(new BoxGeometry(2.2, 0.2, 0.05), new MeshBasicMaterial({ color: 0xff2000 }));
+      bar.rotation.y = 0.5;
+      scene.add(bar);
+      perspective.position.set(0, 0, 2.6);
+      perspective.lookAt(0, 0, 0);
+      splats.render(scene, perspective);
+      splats.render(scene, perspective);
+      const crossed = shown(canvas);
+      placed.visible = false;
+      splats.render(scene, perspective);
+      const barAlone = shown(canvas);
+      placed.visible = true;
+      bar.visible = false;
+      splats.render(scene, perspective);
+      const wallAlone = shown(canvas);
+      const isNear = (a: number[], b: number[], most: number): boolean => a.every((v, k) => Math.abs(v - b[k]) <= most);
+      const y = HEIGHT / 2;
+      // With rotation.y the end at -x comes towards the viewer or goes away; whichever it is, one is in front.
+      const [left, right] = [WIDTH / 2 - 30, WIDTH / 2 + 30];
+      const [front, back] = isNear(at(crossed, left, y), at(barAlone, left, y), 1) ? [left, right] : [right, left];
+      assert(isNear(at(barAlone, front, y), [255, 32, 0], 2), `the bar is there: ${at(barAlone, front, y)}`);
+      assert(isNear(at(crossed, front, y), at(barAlone, front, y), 1), `in front: ${at(crossed, front, y)}`);
+      assert(!isNear(at(crossed, back, y), at(barAlone, back, y), 30), `behind: ${at(crossed, back, y)}`);
+      if (back < WIDTH / 2) assert(isNear(at(crossed, back, y), at(wallAlone, back, y), 4), 'the opaque half hides it');
+
+      // Hiding, and a second camera, cost the first one nothing of its picture.
+      bar.visible = true;
+      splats.render(scene, parallel);
+      splats.render(scene, perspective);
+      assert(worst(shown(canvas), crossed) <= 1, 'after another camera as before');
+      scene.remove(placed);
+      splats.render(scene, perspective);
+      assert(worst(shown(canvas), barAlone) <= 1, 'removed from the graph, gone from the picture');
+      const error = await device.popErrorScope();
+      assert(error === null, error?.message ?? '');
+      splats.dispose();
+      gaussians.destroy();
+      renderer.dispose();
+      canvas.remove();
+    });
+  }
+
+  it('names what a renderer lacks', () => {
+    let code = '';
+    try {
+      new SplatRenderer(new WebGPURenderer());
+    } catch (error) {
+      code = (error as { code: string }).code;
+    }
+    assert(code === 'argument/value', code);
+  });
+});
