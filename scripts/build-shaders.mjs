@@ -5,14 +5,13 @@
  * picture models do, `streamed-shaders.ts` what only streamed scenes do: pages without them never load these. The stages of economise are in its own
  * package, with the structs and constants that only they have.
  */
-import { mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
+import { mkdirSync, readdirSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
-import { ResourceType, WgslReflect } from 'wgsl_reflect/wgsl_reflect.module.js';
+import { ResourceType } from 'wgsl_reflect/wgsl_reflect.module.js';
+import { ownCode, partsOf, reflect, reflectStruct, shaderFolder } from './lib/shader-source.mjs';
 
-const shaderFolder = fileURLToPath(new URL('../shaders/', import.meta.url));
 const generatedOf = (name) => fileURLToPath(new URL(`../packages/${name}/src/generated/`, import.meta.url));
 
-const textOf = (path) => readFileSync(`${shaderFolder}${path}.wgsl`, 'utf8');
 /** Stages that few pages need, by the file that has them. */
 const RARE = {
   'live-shaders': ['image_to_tensor', 'ingest', 'present', 'tensor_to_image'],
@@ -42,44 +41,6 @@ RARE[ECONOMISE] = [
   'refine_step',
 ];
 const fileOf = (stage) => Object.keys(RARE).find((file) => RARE[file].includes(stage)) ?? 'shaders';
-const IMPORT = /^#import (\S+)$/gm;
-
-/** A shader and all files that it imports, each once, before whoever asks for it, with others in place of some. */
-function partsOf(path, replaced, seen = new Set()) {
-  if (seen.has(path)) return [];
-  seen.add(path);
-  const imported = [...textOf(path).matchAll(IMPORT)].flatMap(([, name]) =>
-    partsOf(replaced[name] ?? name, replaced, seen),
-  );
-  return [...imported, path];
-}
-
-/** A file's own lines. Its imports come first, as they would in any language. */
-function ownCode(path) {
-  const code = strip(textOf(path));
-  if (/\n(?!#import)[^\n]*\n#import/.test(`\n${code}`)) throw new Error(`shaders/${path}.wgsl: #import behind code`);
-  return code.replace(IMPORT, '').trim();
-}
-
-/** Comments and indentation are for readers of shaders/, not for the bytes that a page loads. */
-function strip(code) {
-  return code
-    .split('\n')
-    .map((line) => line.replace(/\/\/.*$/, '').trim())
-    .filter((line) => line !== '')
-    .join('\n');
-}
-
-function reflect(stage, code) {
-  try {
-    return new WgslReflect(code);
-  } catch (error) {
-    // The parser's own stack trace prints its whole minified source.
-    const line = Number(/Line: (\d+)/.exec(error.message)?.[1]);
-    throw new Error(`shaders/${stage}.wgsl: ${error.message} near "${code.split('\n')[line - 1]}"`);
-  }
-}
-
 /** What a binding holds, in the words of GPUBindGroupLayoutEntry. */
 function resourceOf({ resourceType, type, access }) {
   if (resourceType === ResourceType.Texture) return { type: 'texture' };
@@ -109,14 +70,6 @@ function reflectConstants(code) {
     if (/^[\d\s+\-*/().e]+$/.test(expression)) constants[name] = Number(new Function(`return ${expression}`)());
   }
   return constants;
-}
-
-function reflectStruct(struct) {
-  const fields = struct.members.map((member) => [
-    member.name,
-    { offset: member.offset, type: member.type.getTypeName() },
-  ]);
-  return { size: struct.size, fields: Object.fromEntries(fields) };
 }
 
 function note(named, name, value, file) {

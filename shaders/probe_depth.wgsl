@@ -1,7 +1,6 @@
 // What lies under single points of the last frame: picking, and labels that scenery hides. One workgroup a point; each
 // lane walks one run of the splats, from near to far, so that a prefix product of 64 runs is all that is left to join.
-#import shared/splat
-#import shared/falloff
+#import shared/probe
 #import shared/plan
 
 @group(0) @binding(0) var<storage, read> plan: Plan;
@@ -10,13 +9,6 @@
 @group(0) @binding(2) var<storage, read> order: array<u32>;
 @group(0) @binding(3) var<storage, read> points: array<ProbePoint>;
 @group(0) @binding(4) var<storage, read_write> answers: array<ProbeAnswer>;
-
-struct ProbePoint {
-  // Pixels of the image that was drawn.
-  pixel: vec2f,
-  // World units along the camera's axis.
-  depth: f32,
-}
 
 struct ProbeAnswer {
   // 1 - transmittance of all splats.
@@ -32,12 +24,6 @@ const PROBE_LANES = 64u;
 
 var<workgroup> runs: array<f32, PROBE_LANES>;
 var<workgroup> runs_in_front: array<f32, PROBE_LANES>;
-
-// Share of the light that a splat lets through at a pixel.
-fn passes(s: ProjectedSplat, point: ProbePoint) -> f32 {
-  let alpha = alpha_at(point.pixel - s.shape.xy, s.shape.z, s.shape.w, bitcast<f32>(s.paint.x), bitcast<f32>(s.paint.w));
-  return select(1.0, 1.0 - alpha, alpha >= ALPHA_MIN);
-}
 
 @compute @workgroup_size(PROBE_LANES)
 fn main(@builtin(workgroup_id) workgroup_id: vec3u, @builtin(local_invocation_index) lane: u32) {

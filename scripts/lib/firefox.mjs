@@ -9,14 +9,30 @@ import { join } from 'node:path';
 
 const START_MS = 60_000;
 
-/** @param preferences of `about:config`, by name */
-export async function launchFirefox({ executable = 'firefox-esr', preferences = {}, env = {} } = {}) {
+/**
+ * @param preferences of `about:config`, by name
+ * @param isHeadless false for a window: on a display that `env` or this process names
+ */
+export async function launchFirefox({
+  executable = 'firefox-esr',
+  preferences = {},
+  env = {},
+  isHeadless = true,
+} = {}) {
   const profile = mkdtempSync(join(tmpdir(), 'firefox-'));
   const lines = Object.entries(preferences).map(([name, value]) => `user_pref("${name}", ${JSON.stringify(value)});`);
   writeFileSync(join(profile, 'user.js'), lines.join('\n'));
   const child = spawn(
     executable,
-    ['--headless', '--no-remote', '--profile', profile, '--remote-debugging-port', '0', 'about:blank'],
+    [
+      ...(isHeadless ? ['--headless'] : []),
+      '--no-remote',
+      '--profile',
+      profile,
+      '--remote-debugging-port',
+      '0',
+      'about:blank',
+    ],
     { env: { ...process.env, ...env }, stdio: ['ignore', 'ignore', 'pipe'] },
   );
   const close = () =>
@@ -35,6 +51,24 @@ export async function launchFirefox({ executable = 'firefox-esr', preferences = 
   } catch (error) {
     await close();
     throw error;
+  }
+}
+
+/** Runs with a display for windows: the machine's own, or one of Xvfb (Debian: xvfb). Without one Firefox has no WebGL. @param body gets the environment */
+export async function withDisplay(body) {
+  if (process.env.DISPLAY) return body({ DISPLAY: process.env.DISPLAY });
+  const screen = spawn('Xvfb', ['-displayfd', '3', '-screen', '0', '1280x1024x24'], {
+    stdio: ['ignore', 'ignore', 'ignore', 'pipe'],
+  });
+  try {
+    const number = await new Promise((resolve, reject) => {
+      screen.once('error', () => reject(new Error('no display, and no Xvfb to make one: apt-get install xvfb')));
+      screen.once('exit', (code) => reject(new Error(`Xvfb ended with ${code}`)));
+      screen.stdio[3].once('data', (data) => resolve(String(data).trim()));
+    });
+    return await body({ DISPLAY: `:${number}` });
+  } finally {
+    screen.kill();
   }
 }
 

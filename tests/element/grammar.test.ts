@@ -143,6 +143,7 @@ test('a malformed attribute takes its default with one warning that says what wa
     'max-pixel-ratio': 'maxPixelRatio',
     'frame-budget': 'frameBudget',
     quality: 'quality',
+    renderer: 'renderer',
     'max-sh-degree': 'maxShDegree',
   })) {
     const warnings: string[] = [];

@@ -2,7 +2,7 @@
 import manifest from './manifest.mjs';
 
 const GROUPS = {
-  Picture: ['quality', 'max-sh-degree', 'detail', 'max-pixel-ratio', 'frame-budget', 'postprocess'],
+  Picture: ['quality', 'max-sh-degree', 'detail', 'max-pixel-ratio', 'frame-budget', 'renderer', 'postprocess'],
   Camera: ['camera-controls', 'camera-orbit', 'camera-target', 'field-of-view', 'up', 'navigation'],
   'Scene and page': ['alt', 'poster', 'loading', 'reveal', 'crossorigin'],
   Motion: ['auto-rotate', 'auto-rotate-delay', 'rotation-per-second', 'interpolation-decay'],

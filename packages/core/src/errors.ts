@@ -37,6 +37,8 @@ export type ErrorCode =
   | 'unsupported/limits'
   /** Every variant of the renderer fails its known answer on this device: its shader compiler or driver errs. */
   | 'unsupported/wrong-image'
+  /** There is no WebGPU, and WebGL 2 in its place cannot show what is asked for, or fails. */
+  | 'unsupported/webgl'
   /** The scene needs more GPU memory than a buffer or the device may hold. */
   | 'out-of-memory/buffer-limit'
   | 'out-of-memory/budget'

@@ -40,6 +40,8 @@ export type QualityChoice = 'auto' | Quality;
 
 /** The low-pass filter that a scene was trained with: `auto` is what its file says, or else `classic`. */
 export type FilterChoice = 'auto' | SplatFilter;
+/** What draws: `auto` is WebGPU where the browser has it, else WebGL 2. */
+export type RendererChoice = 'auto' | 'webgpu' | 'webgl';
 /** When the wheel zooms, and when it is the page's. */
 export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 
@@ -263,6 +265,11 @@ export const ATTRIBUTES = {
    * @default `auto`
    */
   quality: keyword<QualityChoice>(['auto', 'default', 'reference', 'balanced', 'fast']),
+  /**
+   * What draws: `auto` is WebGPU and, in browsers without it, WebGL 2, which shows scene files alone; `webgpu` and `webgl` are that one or an error.
+   * @default `auto`
+   */
+  renderer: keyword<RendererChoice>(['auto', 'webgpu', 'webgl']),
   /**
    * Highest degree of spherical harmonics that colours are made of: 0, the same from everywhere, to 3. Whatever the file has beyond it is kept, but not evaluated.
    * @default `3`

@@ -24,6 +24,8 @@ export interface SceneStatistics {
   readonly dropped: number;
   /** Bytes of GPU memory that the splats take. */
   readonly bytes: number;
+  /** What draws: WebGPU, or WebGL 2 where there is none. */
+  readonly renderer: 'webgpu' | 'webgl';
 }
 
 /** The properties that move the camera, and what each sets. */
@@ -199,11 +201,12 @@ export class GaussianSplatElement extends ViewingMethods {
 
   /** Size of the scene on show, or null. */
   get statistics(): SceneStatistics | null {
-    const all = this.stage.shown.map(({ gaussians }) => gaussians);
-    if (all.length === 0) return null;
-    const nothing: SceneStatistics = { splats: 0, dropped: 0, bytes: 0 };
-    return all.reduce(
-      ({ splats, dropped, bytes }, { frameCount, count, droppedCount = 0, byteLength }) => ({
+    const { shown } = this.stage;
+    if (shown.length === 0) return null;
+    const nothing: SceneStatistics = { splats: 0, dropped: 0, bytes: 0, renderer: shown[0].renderer };
+    return shown.reduce(
+      ({ splats, dropped, bytes, renderer }, { gaussians: { frameCount, count, droppedCount = 0, byteLength } }) => ({
+        renderer,
         splats: splats + (frameCount ?? count),
         dropped: dropped + droppedCount,
         bytes: bytes + byteLength,

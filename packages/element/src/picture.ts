@@ -7,7 +7,7 @@ import type { PictureOptions } from './viewing.js';
 export interface PictureHost {
   readonly element: HTMLElement;
   readonly canvas: HTMLCanvasElement | null;
-  readonly view: Pick<ViewController, 'viewport'>;
+  readonly view: Pick<ViewController, 'painter'>;
   warn(sentence: string): void;
   /** Draws a frame into the element's canvas now; null where there is nothing to draw. */
   drawNow(pixels?: PixelSize, background?: Rgba): HTMLCanvasElement | null;
@@ -21,8 +21,8 @@ const LOST = 'The GPU device was lost before the picture was drawn: take it agai
 
 export async function takePicture(host: PictureHost, options: PictureOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
-  const { viewport } = host.view;
-  const pixels = viewport && sizeOf(options, host.canvas, viewport.device.limits.maxTextureDimension2D);
+  const { painter } = host.view;
+  const pixels = painter && sizeOf(options, host.canvas, painter.device.limits.maxTextureDimension2D);
   const drawn = host.drawNow(pixels ?? undefined, background === undefined ? undefined : rgbaOf(background));
   if (drawn === null) throw nothingToDraw();
   const blob = new Promise<Blob | null>((resolve) =>
@@ -32,7 +32,7 @@ export async function takePicture(host: PictureHost, options: PictureOptions): P
   if (pixels || background !== undefined) host.drawNow();
   const taken = await blob;
   // A device that was lost before it had drawn leaves an empty picture, and says so later.
-  if (viewport && (await wasLost(viewport))) throw new DOMException(LOST, 'InvalidStateError');
+  if (painter && (await wasLost(painter))) throw new DOMException(LOST, 'InvalidStateError');
   if (taken === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
   return taken;
 }

@@ -20,7 +20,7 @@ export interface QueryHost {
   readonly bounds: SceneBounds | null;
   /** Looks into the last frame. Rejects if it is gone. */
   probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]>;
-  readonly view: Pick<ViewController, 'viewport'>;
+  readonly view: Pick<ViewController, 'painter'>;
   /** The camera of the last frame, in its pixels; undefined before there is one. */
   readonly drawnFrom: Camera | undefined;
   readonly element: HTMLElement;
@@ -51,9 +51,9 @@ export class SceneQueries {
    */
   async positionFromPoint(clientX: number, clientY: number): Promise<ScenePoint | null> {
     const { camera, view, drawnFrom: drawn, element } = this.#host;
-    const { viewport } = view;
+    const { painter } = view;
     const { left, top, width, height } = element.getBoundingClientRect();
-    if (drawn === undefined || viewport === null || element.clientWidth === 0) return null;
+    if (drawn === undefined || painter === null || element.clientWidth === 0) return null;
     // The page's pixels are the element's own, scaled by transforms and zooms around it.
     const ownX = ((clientX - left) * element.offsetWidth) / width;
     const ownY = ((clientY - top) * element.offsetHeight) / height;
@@ -67,7 +67,7 @@ export class SceneQueries {
       return new ScenePoint(...toViewer(camera.viewerFrame, point));
     } catch (error) {
       // A device that was lost meanwhile has nothing more to say, and its loss is told elsewhere.
-      if (await isGone(viewport)) return null;
+      if (await isGone(painter)) return null;
       throw error;
     }
   }

@@ -35,7 +35,7 @@ export class Addresses {
   /** The scene that is asked for; null for none. */
   request(
     { src, contract, chain }: Source,
-    { crossorigin, quality, detail }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail'>,
+    { crossorigin, quality, detail, renderer }: Pick<Attributes, 'crossorigin' | 'quality' | 'detail' | 'renderer'>,
     modifier: UrlModifier,
   ): SceneRequest | null {
     const [url] = this.#src.of(src ? [src] : [], modifier);
@@ -46,6 +46,7 @@ export class Addresses {
       sh: quality === 'reference' ? 'float16' : 'auto',
       levels: typeof detail === 'number' && detail > 0,
       isWhole: !detail || detail === 'off',
+      renderer,
       contract,
       chain: this.#chain.of(listed(chain), modifier),
     };

@@ -148,23 +148,22 @@ export class Stage
       pace: this.view.pace.report,
       counts: this.#counts,
       isPreview: this.scene.isPreview,
-      frameBytes: this.view.viewport?.byteLength ?? 0,
+      frameBytes: this.view.painter?.byteLength ?? 0,
       pixels: this.levels.detail,
     });
   }
 
   /** Asks the GPU for the counts of the picture on show. */
   async updateStats(): Promise<SceneStats | null> {
-    const { viewport } = this.view;
+    const { painter } = this.view;
     const camera = this.drawnFrom;
-    if (viewport === null || camera === undefined) return this.stats;
+    if (painter === null || camera === undefined) return this.stats;
     try {
-      const { readCounts } = await loadModule('the code that counts splats', () => import('./gpu/contributions.js'));
-      const counts = await readCounts(viewport, camera);
-      if (this.view.viewport === viewport) this.#counts = counts;
+      const counts = await painter.readCounts(camera);
+      if (this.view.painter === painter) this.#counts = counts;
     } catch (error) {
       // What was asked for is gone; what there is now is known without it.
-      if (!(await isGone(viewport))) throw error;
+      if (!(await isGone(painter))) throw error;
     }
     return this.stats;
   }
@@ -288,7 +287,7 @@ export class Stage
 
   /** What the page may set of the models on show. */
   get inputs(): readonly GeneratorInput[] {
-    return [...(this.own?.scene.live?.inputs ?? []), ...(this.view.viewport?.filter?.inputs ?? [])];
+    return [...(this.own?.scene.live?.inputs ?? []), ...(this.view.painter?.filter?.inputs ?? [])];
   }
 
   /** Where all of it is, in the frame of the element's own scene; null while nothing is shown. */
@@ -309,7 +308,7 @@ export class Stage
 
   /** Looks into the last frame. Rejects if it is gone. */
   async probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
-    return (await this.view.viewport?.viewpoint.probe(points)) ?? [];
+    return (await this.view.painter?.probe(points)) ?? [];
   }
 
   get isVisible(): boolean {
@@ -415,7 +414,7 @@ export class Stage
     if (scene.hasMeshes) this.compose();
     this.own = this.enter(scene);
     const drawn = view.show(scene);
-    this.live.post.attach(view.viewport);
+    this.live.post.attach(view.painter);
     this.live.tellInputs(this.inputs);
     return drawn;
   }

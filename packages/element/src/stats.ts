@@ -7,6 +7,8 @@ import type { LoadedGaussians } from './gpu/loaded-gaussians.js';
 
 /** What is modelled, drawn, and seen of a scene, what it takes, and why. */
 export interface SceneStats {
+  /** What draws. */
+  readonly renderer: 'webgpu' | 'webgl';
   /** Splats that the file has, or a generator writes at most. */
   readonly modelled: number;
   /** What is on show is a part of a scene that is still loading; all counts are those of the part. */
@@ -61,7 +63,8 @@ export interface ReadCounts {
   readonly drawn: number;
   /** Visible, but without room in what the device allows a buffer to hold. */
   readonly left: number;
-  readonly contributed: number;
+  /** null where it is not counted: with WebGL. */
+  readonly contributed: number | null;
 }
 
 /** What is known besides the scene. */
@@ -87,6 +90,7 @@ export function statsOf(
   const merged = sum(({ gaussians, levels }) => levels && levels.count - gaussians.count);
   const detail = { splats: merged, pixels };
   return {
+    renderer: scenes[0].renderer,
     isPreview,
     modelled: sum(({ gaussians }) => gaussians.frameCount ?? gaussians.leafCount ?? gaussians.count) + dropped,
     dropped,

@@ -3,6 +3,7 @@ import type { GaussianPage, GaussianScene } from './gaussian-scene.js';
 import { constants } from './generated/shaders.js';
 import { BUFFER_USAGE } from './gpu/kernel.js';
 import { GpuMemory, withMemoryCheck } from './gpu/memory.js';
+import { turn } from './gpu/turn.js';
 import { MemoryLedger, type Reservation } from './memory-ledger.js';
 import { DETAIL_NUMBERS } from './detail/chunk-detail.js';
 import { CHUNK_NUMBERS } from './pack/chunks.js';
@@ -140,18 +141,6 @@ async function writeInTurns({ queue }: GPUDevice, contents: readonly Content[]):
       queue.writeBuffer(buffer, 4 * first, words, first, count);
       [first, left] = [first + count, left - count];
     }
-}
-
-/** Lets other tasks have the thread. Timers would wait long where the page is hidden. */
-function turn(): Promise<void> {
-  const { port1, port2 } = new MessageChannel();
-  return new Promise((resolve) => {
-    port1.onmessage = () => {
-      port1.close();
-      resolve();
-    };
-    port2.postMessage(null);
-  });
 }
 
 /** Splats in a page of so many bytes a splat: what the limits allow, in whole chunks, of which one dispatch takes a row. */

@@ -79,7 +79,7 @@ describe('a function that gives devices', () => {
     const original = GaussianSplatElement.sharedDevice;
     GaussianSplatElement.sharedDevice = new SharedDevice(request, { keepDevice: true });
     try {
-      const element = show({ src: COMPASS });
+      const element = show({ src: COMPASS, renderer: 'webgpu' });
       await element.ready;
       return element;
     } finally {
@@ -327,7 +327,8 @@ describe('the loss of the device', () => {
   });
 });
 
-describe('without WebGPU', () => {
+describe('without WebGPU, where the page asks for it', () => {
+  const ASKED = { src: COMPASS, renderer: 'webgpu' };
   const cases: Readonly<Record<string, readonly [gpu: unknown, reason: string, text: RegExp]>> = {
     'no API': [undefined, 'unsupported/no-webgpu', /current Chrome/],
     'no adapter': [{ requestAdapter: async () => null }, 'unsupported/no-adapter', /hardware acceleration/],
@@ -346,7 +347,7 @@ describe('without WebGPU', () => {
   for (const [name, [gpu, reason, text]] of Object.entries(cases)) {
     it(`${name}: the fallback says why at the edge, the page lives on`, async () => {
       await withGpu(gpu, async () => {
-        const element = show({ src: COMPASS }, 'width: 400px; height: 300px');
+        const element = show(ASKED, 'width: 400px; height: 300px');
         await nextEvent(element, 'error');
         await element.ready;
         await element.updateComplete;
@@ -364,8 +365,8 @@ describe('without WebGPU', () => {
   it('a poster stands alone for the scene, with its name, whoever brings it', async () => {
     await withGpu(undefined, async () => {
       const gif = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';
-      const element = show({ src: COMPASS, poster: gif, alt: 'A compass', 'camera-controls': '' });
-      const own = show({ src: COMPASS, alt: 'Another' });
+      const element = show({ ...ASKED, poster: gif, alt: 'A compass', 'camera-controls': '' });
+      const own = show({ ...ASKED, alt: 'Another' });
       own.innerHTML = `<img slot="poster" alt="" src="${gif}">`;
       for (const one of [element, own]) {
         await one.ready;
@@ -386,7 +387,7 @@ describe('without WebGPU', () => {
 
   it('an adapter that never comes is an error', async () => {
     await withGpu({ ...navigator.gpu, requestAdapter: () => new Promise(() => undefined) }, async () => {
-      const element = show({ src: COMPASS });
+      const element = show(ASKED);
       await nextEvent(element, 'error', 30_000);
       assertEqual(element.error?.reason, 'unsupported/no-adapter');
       assert(/no answer within 20 s/.test(element.error?.message ?? ''), element.error?.message ?? '');
@@ -396,7 +397,7 @@ describe('without WebGPU', () => {
   it('not a byte of the scene is fetched', async () => {
     await withGpu(undefined, async () => {
       const src = `${COMPASS}?unfetched`;
-      const element = show({ src });
+      const element = show({ src, renderer: 'webgpu' });
       await nextEvent(element, 'error');
       await delay(200);
       const fetched = performance.getEntriesByType('resource').filter(({ name }) => name.includes('unfetched'));
@@ -406,7 +407,7 @@ describe('without WebGPU', () => {
 
   it("the page's own fallback takes the place of the default", async () => {
     await withGpu(undefined, async () => {
-      const element = show({ src: COMPASS });
+      const element = show(ASKED);
       const own = document.createElement('p');
       own.slot = 'fallback';
       own.textContent = 'A picture instead';
@@ -422,7 +423,7 @@ describe('without WebGPU', () => {
     Object.defineProperty(window, 'isSecureContext', { configurable: true, get: () => false });
     try {
       await withGpu(undefined, async () => {
-        const element = show({ src: COMPASS });
+        const element = show(ASKED);
         await nextEvent(element, 'error');
         assertEqual(element.error?.reason, 'unsupported/insecure-context');
       });

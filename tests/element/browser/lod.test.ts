@@ -101,6 +101,15 @@ describe('a streamed SOG scene', () => {
     await close(element);
   });
 
+  it('with WebGL loads its finest level whole', async () => {
+    const served = await serve('webgl');
+    const element = show({ src: served.src, 'camera-orbit': NEAR, renderer: 'webgl' });
+    await element.ready;
+    assertEqual([element.error, element.stats?.renderer, element.stats?.modelled], [null, 'webgl', 14_000], 'on show');
+    assertEqual((await served.log()).at(-1), '0_0/meta.json', 'asked for last');
+    await close(element);
+  });
+
   it('of 500,000 splats through 20 Mbit/s has its first frame after a twentieth of the bytes', async function () {
     const src = '/net/metered/captured/scenes/playbot-streamed/lod-meta.json';
     if (!(await fetch('/net/shared/scenes/playbot-streamed/lod-meta.json')).ok) return this.skip();

@@ -8,7 +8,7 @@ import type { PlaybackController } from '../controllers/playback-controller.js';
 import type { Entrance, SceneState } from '../controllers/scene-controller.js';
 import type { ElementError } from '../errors.js';
 import type { DetailLevers, LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import type { Place } from '../gpu/viewport.js';
+import type { Place } from '../gpu/painter.js';
 import type * as meshes from '../meshes/open-mesh.js';
 import type { Frame } from '../live/frame-filter.js';
 import type { Stage } from '../stage.js';
@@ -155,9 +155,9 @@ export class Composition {
 
   async #draw(place: Place): Promise<void> {
     const { view, live } = this.stage;
-    const before = view.viewport;
+    const before = view.painter;
     const drawn = view.show(place);
-    if (view.viewport !== before) live.post.attach(view.viewport);
+    if (view.painter !== before) live.post.attach(view.painter);
     await drawn;
   }
 

@@ -5,7 +5,7 @@ import { toElementError, type ElementError } from '../errors.js';
 import type * as comeBack from '../gpu/come-back.js';
 import { delay, DeviceLostError, isDeviceFailure, pageVisible } from '../gpu/device-failures.js';
 import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
-import { isStreamed, openGaussians, type OpenOptions } from '../gpu/open-scene.js';
+import { isStreamed, openScene, type openGaussians, type OpenOptions } from '../gpu/open-scene.js';
 import type { ProgressListener, SceneRequest } from '../loading/protocol.js';
 import { LatestTask } from '../latest-task.js';
 import { isSameContract } from '../loading/same-contract.js';
@@ -209,10 +209,11 @@ export class SceneController implements ReactiveController {
     const { shPrecision, shDegree } = scene.gaussians;
     if (request.sh === 'auto' || request.sh === shPrecision || shDegree === 0) return;
     const signal = this.#running.renew();
+    const again: SceneRequest = { ...request, renderer: scene.renderer };
     try {
-      await this.#open(request, signal, false, () => undefined);
+      await this.#open(again, signal, false, () => undefined);
     } catch {
-      if (!signal.aborted && this.#scene !== scene) await this.#attempt(request, signal, false, () => undefined);
+      if (!signal.aborted && this.#scene !== scene) await this.#attempt(again, signal, false, () => undefined);
     }
   }
 
@@ -296,8 +297,8 @@ export class SceneController implements ReactiveController {
       if (!isSmall) this.#drop(false);
     };
     this.#spare(true);
-    const open = this.#of.open ?? openGaussians;
-    const scene = await open(request, {
+    const scene = await openScene(request, {
+      open: this.#of.open,
       device: services.sharedDevice,
       loader: services.sceneLoader,
       frameUrl: (url) => this.#of.services.urlModifier?.(url) ?? url,
@@ -316,7 +317,8 @@ export class SceneController implements ReactiveController {
       if (this.#scene !== scene) return;
       // What will take its place has its own way back.
       if (this.isOutgoing) this.#drop(false);
-      else void this.#restore(this.#request ?? request, loss);
+      // What comes back is drawn by what has drawn it.
+      else void this.#restore({ ...(this.#request ?? request), renderer: scene.renderer }, loss);
     });
   }
 
@@ -381,5 +383,6 @@ export class SceneController implements ReactiveController {
 const isSame = (a: SceneRequest, b: SceneRequest | null): boolean =>
   a.url === b?.url &&
   a.credentials === b.credentials &&
+  a.renderer === b.renderer &&
   isSameContract(a.contract, b.contract) &&
   (a.chain ?? []).join(' ') === (b.chain ?? []).join(' ');

@@ -75,7 +75,10 @@ export class SizeController implements ReactiveController {
   }
 
   #observe(): void {
-    this.#canvas = this.#canvasOf();
+    const canvas = this.#canvasOf();
+    // Another one may have taken its place.
+    if (canvas !== this.#canvas) this.hostDisconnected();
+    this.#canvas = canvas;
     if (this.#canvas === null || this.#observer !== undefined) return;
     const { ResizeObserver } = windowOf(this.#canvas);
     if (!ResizeObserver) return;

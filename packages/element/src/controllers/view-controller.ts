@@ -1,10 +1,10 @@
-import { GaussianSplatError, type Camera } from '@gaussian-splat/core';
+import type { Camera } from '@gaussian-splat/core';
 import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { Attributes } from '../attributes.js';
 import type { CameraChangeSource } from '../events.js';
 import type { FrameClient, FrameScheduler } from '../gpu/frame-scheduler.js';
-import { Viewport, type Contents, type Place } from '../gpu/viewport.js';
-import type { Frame } from '../live/frame-filter.js';
+import type { CanvasFrame, Contents, Painter, Place, Surface } from '../gpu/painter.js';
+import { why } from '../gpu/request-device.js';
 import { LADDER } from '../pace/ladder.js';
 import type { CameraController } from './camera-controller.js';
 import { PaceController } from './pace-controller.js';
@@ -50,9 +50,10 @@ export class ViewController implements FrameClient {
   /** What frames in motion are drawn with. */
   readonly pace: PaceController;
   readonly #host: ViewHost;
-  #viewport: Viewport | null = null;
-  #context: GPUCanvasContext | null = null;
-  #configured: GPUDevice | null = null;
+  #painter: Painter | null = null;
+  /** What is drawn into, and the device that it was set up for. */
+  #surface: Surface | null = null;
+  #surfaceOf: GPUDevice | null = null;
   /** Waits for the first frame of a new scene, which is drawn also where the element is out of sight. */
   #first: Settle | undefined;
   #drawnContent = '';
@@ -75,8 +76,8 @@ export class ViewController implements FrameClient {
   }
 
   /** What frames are drawn with; null while nothing is. */
-  get viewport(): Viewport | null {
-    return this.#viewport;
+  get painter(): Painter | null {
+    return this.#painter;
   }
 
   /**
@@ -84,13 +85,13 @@ export class ViewController implements FrameClient {
    * rejects with GaussianSplatError `out-of-memory/*`.
    */
   show(place: Place): Promise<void> {
-    if (place.device !== this.#viewport?.device) {
-      this.#viewport?.destroy();
-      const viewport = new Viewport(place, this.#host, {
+    if (place.device !== this.#painter?.device) {
+      this.#painter?.destroy();
+      const painter = place.openPainter(this.#host, {
         onIncomplete: () => this.requestFrame(),
-        onError: (error) => this.#viewport === viewport && this.#host.drawingFailed(error),
+        onError: (error) => this.#painter === painter && this.#host.drawingFailed(error),
       });
-      this.#viewport = viewport;
+      this.#painter = painter;
     }
     this.pace.reset();
     return new Promise((resolve, reject) => {
@@ -101,8 +102,8 @@ export class ViewController implements FrameClient {
 
   /** Stops drawing. The last picture stays, so that the next scene can replace it without a gap. */
   pause(): void {
-    this.#viewport?.destroy();
-    this.#viewport = null;
+    this.#painter?.destroy();
+    this.#painter = null;
     // Nobody need wait for it.
     this.#first?.resolve();
     this.#first = undefined;
@@ -113,32 +114,35 @@ export class ViewController implements FrameClient {
   /** Stops drawing and clears the canvas. */
   clear(): void {
     this.pause();
-    this.#context?.unconfigure();
-    this.#configured = null;
+    this.#surface?.unconfigure();
+    this.#surfaceOf = null;
   }
 
-  /** Puts another canvas in the place of one whose document has lost its window: that one never shows a picture again. */
+  /** Puts another canvas in the place of one that never shows a picture again: its document has lost its window, or something else draws now. */
   renewCanvas(): void {
     const canvas = this.#host.canvas;
     canvas?.replaceWith(canvas.cloneNode());
-    this.#context = null;
-    this.#configured = null;
+    this.#host.size.hostUpdated();
+    this.#surface = null;
+    this.#surfaceOf = null;
   }
 
   drawFrame(now: number): void {
-    const viewport = this.#viewport;
+    const painter = this.#painter;
     // It may have left the viewport since it asked.
-    if (viewport === null || !this.#isDrawable) return;
+    if (painter === null || !this.#isDrawable) return;
     const { camera } = this.#host;
-    const pixels = this.#pixelsOf(viewport);
+    const pixels = this.#pixelsOf(painter);
     // Without a size nothing is drawn; the observer of the size asks again when there is one.
     if (pixels === null) return this.#finishUnseen();
     this.#host.beforeFrame(now);
     const source = camera.step(now, this.#host.decayMs);
     try {
-      const request = this.#frameRequest(viewport, pixels);
+      const request = this.#frameRequest(painter, pixels);
+      if (request === null)
+        return void why(({ noContext }) => noContext()).then((error) => this.#host.drawingFailed(error));
       this.#host.advanceScene(request.camera, now);
-      this.#render(viewport, request, now, source !== null);
+      this.#render(painter, request, now, source !== null);
       this.#host.afterFrame(request.camera);
     } catch (error) {
       return this.#host.drawingFailed(error);
@@ -153,33 +157,35 @@ export class ViewController implements FrameClient {
    * @param background premultiplied, behind the splats
    * @returns the canvas, or null where there is nothing to draw.
    */
-  drawNow(size?: PixelSize, background?: Frame['background']): HTMLCanvasElement | null {
-    const viewport = this.#viewport;
+  drawNow(size?: PixelSize, background?: CanvasFrame['background']): HTMLCanvasElement | null {
+    const painter = this.#painter;
     const canvas = this.#host.canvas;
-    if (viewport === null || viewport.isLost || this.#first !== undefined || canvas === null) return null;
-    const own = this.#pixelsOf(viewport);
+    if (painter === null || painter.isLost || this.#first !== undefined || canvas === null) return null;
+    const own = this.#pixelsOf(painter);
     if (own === null) return null;
-    this.#applyRendering(viewport);
-    viewport.render({ ...this.#frameRequest(viewport, size ?? own), background }, this.#host.prepareFrame());
-    return canvas;
+    this.#applyRendering(painter);
+    const request = this.#frameRequest(painter, size ?? own);
+    if (request === null) return null;
+    painter.render({ ...request, background, isRead: true }, this.#host.prepareFrame());
+    return request.surface.canvas as HTMLCanvasElement;
   }
 
   /** There is a scene, and somebody sees it or waits for its first frame. A document without a window, as of a frame that was taken away, shows none. */
   get #isDrawable(): boolean {
     const { canvas, isVisible } = this.#host;
-    if (this.#viewport?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
+    if (this.#painter?.isLost !== false || canvas?.ownerDocument.defaultView === null) return false;
     return this.#first !== undefined || isVisible;
   }
 
   /** null where there is no size. */
-  #pixelsOf({ device }: Viewport): PixelSize | null {
+  #pixelsOf({ device }: Painter): PixelSize | null {
     return this.#host.size.pixelSize(this.#host.attributes.maxPixelRatio, device.limits.maxTextureDimension2D);
   }
 
-  #render(viewport: Viewport, request: Frame, now: number, cameraMoved: boolean): void {
+  #render(painter: Painter, request: CanvasFrame, now: number, cameraMoved: boolean): void {
     const first = this.#first;
     this.#first = undefined;
-    this.#applyRendering(viewport);
+    this.#applyRendering(painter);
     const content = this.#host.prepareFrame();
     const hasChanged = first === undefined && (cameraMoved || content !== this.#drawnContent);
     this.#drawnContent = content;
@@ -191,31 +197,31 @@ export class ViewController implements FrameClient {
     const onTime =
       this.#host.attributes.quality === 'auto' ? (time: WorkTime) => this.pace.sample(plan, time) : undefined;
     if (first !== undefined) {
-      viewport.renderFirst(request, content).then(() => this.#afterFirst(viewport, request, first), first.reject);
+      painter.renderFirst(request, content).then(() => this.#afterFirst(painter, first), first.reject);
       return;
     }
-    viewport.render({ ...request, levers }, content, onTime);
-    this.#prepareSoon(viewport, request);
+    painter.render({ ...request, levers }, content, onTime);
+    this.#prepareSoon(painter);
   }
 
-  #afterFirst(viewport: Viewport, request: Frame, { resolve }: Settle): void {
+  #afterFirst(painter: Painter, { resolve }: Settle): void {
     resolve();
-    this.#prepareSoon(viewport, request);
+    this.#prepareSoon(painter);
   }
 
   /** Pictures in motion must not wait for pipelines: those that they may need are made soon after the first picture, and after a change of the quality to `auto`. */
-  #prepareSoon(viewport: Viewport, { target: { format } }: Frame): void {
-    if (viewport.isPrepared || this.#host.attributes.quality !== 'auto') return;
+  #prepareSoon(painter: Painter): void {
+    if (painter.isPrepared || this.#host.attributes.quality !== 'auto') return;
     this.#preparing ??= setTimeout(() => {
       this.#preparing = undefined;
-      if (this.#viewport === viewport) viewport.prepare(MOVING_LEVERS, format);
+      if (this.#painter === painter) painter.prepare(MOVING_LEVERS);
     }, PREPARE_AFTER_MS);
   }
 
-  #applyRendering(viewport: Viewport): void {
+  #applyRendering(painter: Painter): void {
     const { quality, maxShDegree: shDegree, filter } = this.#host.attributes;
     const trained = filter === 'auto' ? undefined : filter;
-    viewport.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, filter: trained });
+    painter.setRendering({ quality: quality === 'auto' ? 'default' : quality, shDegree, filter: trained });
   }
 
   #finishUnseen(): void {
@@ -224,44 +230,25 @@ export class ViewController implements FrameClient {
     this.#first = undefined;
   }
 
-  #frameRequest(viewport: Viewport, { width, height }: PixelSize): Frame {
-    const context = this.#contextFor(viewport.device);
-    const canvas = context.canvas;
+  #frameRequest(painter: Painter, { width, height }: PixelSize): CanvasFrame | null {
+    const surface = this.#surfaceFor(painter);
+    if (surface === null) return null;
+    const { canvas } = surface;
     // Setting a canvas's size clears it, even to the same size; here a frame follows at once.
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
-    const texture = context.getCurrentTexture();
-    return {
-      camera: this.#host.camera.view(width, height),
-      target: texture,
-    };
+    return { camera: this.#host.camera.view(width, height), surface };
   }
 
-  /** The canvas's context, set up for the device. Premultiplied alpha lets the page show through. */
-  #contextFor(device: GPUDevice): GPUCanvasContext {
-    const context = (this.#context ??= this.#host.canvas?.getContext('webgpu') ?? null);
-    if (context === null) throw noContext();
-    if (this.#configured !== device) {
-      const format = navigator.gpu.getPreferredCanvasFormat();
-      context.configure({ device, format, usage: canvasUsage(device, format), alphaMode: 'premultiplied' });
-      this.#configured = device;
+  /** null where the browser shows nothing of the kind on a canvas. */
+  #surfaceFor(painter: Painter): Surface | null {
+    const take = (): Surface | null => (this.#surface = painter.surfaceOn(this.#host.canvas!));
+    if (this.#surfaceOf !== painter.device && take() === null) {
+      // What has drawn on this canvas keeps it.
+      this.renewCanvas();
+      take();
     }
-    return context;
+    this.#surfaceOf = painter.device;
+    return this.#surface;
   }
-}
-
-/** Compute shaders may then write the canvas itself, where the device lets them. */
-function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsageFlags {
-  const { RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
-  const isStorable = format === 'rgba8unorm' || device.features.has('bgra8unorm-storage');
-  return isStorable ? RENDER_ATTACHMENT | STORAGE_BINDING : RENDER_ATTACHMENT;
-}
-
-function noContext(): GaussianSplatError {
-  return new GaussianSplatError('unsupported/no-webgpu', {
-    where: 'canvas',
-    expected: 'a WebGPU canvas context',
-    found: 'none',
-    remedy: 'use a browser that shows WebGPU on a canvas',
-  });
 }

@@ -1,6 +1,6 @@
 /** What a scene's life knows of devices that are lost. */
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type { Viewport } from './viewport.js';
+import type { Painter } from './painter.js';
 
 /** The device went away before the scene was seen. */
 export class DeviceLostError extends Error {
@@ -25,17 +25,17 @@ export function isDeviceFailure(error: unknown, isNew: boolean): boolean {
 const LOSS_MS = 200;
 
 /** Whether what failed did so because frames are no longer drawn, or the device was lost. */
-export async function isGone(viewport: Pick<Viewport, 'isDestroyed' | 'isLost'>): Promise<boolean> {
-  if (!viewport.isDestroyed && !viewport.isLost) await delay(LOSS_MS);
-  return viewport.isDestroyed || viewport.isLost;
+export async function isGone(painter: Pick<Painter, 'isDestroyed' | 'isLost'>): Promise<boolean> {
+  if (!painter.isDestroyed && !painter.isLost) await delay(LOSS_MS);
+  return painter.isDestroyed || painter.isLost;
 }
 
 /** Whether the device was lost before all that was submitted was done. */
-export async function wasLost(viewport: Pick<Viewport, 'device' | 'isLost'>): Promise<boolean> {
-  await viewport.device.queue.onSubmittedWorkDone().catch(() => undefined);
+export async function wasLost(painter: Pick<Painter, 'device' | 'isLost'>): Promise<boolean> {
+  await painter.device.queue.onSubmittedWorkDone().catch(() => undefined);
   // The loss is told a little later.
   await new Promise((resolve) => setTimeout(resolve));
-  return viewport.isLost;
+  return painter.isLost;
 }
 
 export const delay = (ms: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, ms));

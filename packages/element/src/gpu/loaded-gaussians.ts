@@ -1,7 +1,9 @@
 import { QueueClock, type FrameSettings, type GaussianScene } from '@gaussian-splat/renderer';
 import type { SceneBounds } from '../camera/settings.js';
 import type { Timeline } from '../live/live-model.js';
+import type { Contents, Painter, PainterEvents } from './painter.js';
 import type { DeviceLease } from './shared-device.js';
+import { Viewport } from './viewport.js';
 
 /** How much detail is drawn of a scene that has levels of it. */
 export type DetailLevers = Pick<FrameSettings, 'detail' | 'splatBudget'>;
@@ -36,6 +38,8 @@ export interface MeshModel {
 
 /** What one source has on the GPU: its splats, levels of detail of them, what writes them, and the lease that keeps the device. */
 export class LoadedGaussians {
+  /** What draws it. */
+  readonly renderer: 'webgpu' | 'webgl' = 'webgpu';
   readonly #bounds: SceneBounds;
   /** The generator or sequence that writes the Gaussians; undefined for those of a file. */
   readonly live: Timeline | undefined;
@@ -128,6 +132,11 @@ export class LoadedGaussians {
     this.setLevels(undefined);
     this.#gaussians.destroy();
     this.#gaussians = gaussians;
+  }
+
+  /** What draws frames where it is. */
+  openPainter(contents: Contents, events: PainterEvents): Painter {
+    return new Viewport(this, contents, events);
   }
 
   get device(): GPUDevice {

@@ -1,4 +1,4 @@
-/** Loaded only by pages that have no GPU device, or too little of its memory: what people read there. */
+/** What people read where there is no GPU device, or too little memory, and of other errors that few pages have. Loaded then. */
 import { GaussianSplatError } from '@gaussian-splat/core';
 
 export function noWebGpu(): GaussianSplatError {
@@ -35,6 +35,14 @@ export const noLimits = (error: unknown): GaussianSplatError =>
     cause: error,
   });
 
+export const noContext = (): GaussianSplatError =>
+  new GaussianSplatError('unsupported/no-webgpu', {
+    where: 'canvas',
+    expected: 'a canvas context to draw into',
+    found: 'none',
+    remedy: 'use a browser that shows WebGPU on a canvas',
+  });
+
 /** Of a page's own device, or of a browser that does not answer. */
 export const noDevice = (cause: unknown): GaussianSplatError =>
   new GaussianSplatError('unsupported/no-adapter', {
@@ -53,4 +61,12 @@ export const outOfMemory = (where: string, cause: GPUError): GaussianSplatError 
     found: cause.message || 'an allocation that failed',
     remedy: 'show a smaller scene, or close other pages and elements that use the GPU',
     cause,
+  });
+
+export const sequenceWithin = (url: string): GaussianSplatError =>
+  new GaussianSplatError('decode/unsupported', {
+    where: url,
+    expected: 'a scene file',
+    found: 'the manifest of a sequence',
+    remedy: 'name scene files as frames of a sequence, not other sequences',
   });

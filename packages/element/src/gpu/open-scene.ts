@@ -10,6 +10,7 @@ import { PreviewUploads } from './preview-uploads.js';
 import { assertWebGpu } from './request-device.js';
 import type { DeviceLease, SharedDevice } from './shared-device.js';
 import { byteLengthOf, upload } from './upload.js';
+import { canvasFormat } from './viewport.js';
 
 export interface OpenOptions {
   readonly device: SharedDevice;
@@ -28,17 +29,38 @@ export interface OpenOptions {
   readonly memoryBudget: number | undefined;
   /** Submissions that the painting of a frame is divided into. */
   readonly submissions: number;
+  /** Opens what is no scene of splats. */
+  readonly open: typeof openGaussians | undefined;
   /** What a generator needs to know beyond the request. */
   readonly live: () => Omit<LiveRequest, 'url' | 'chain' | 'contract' | 'credentials' | 'memoryBudget'>;
 }
 
-/** Opens what is asked for; what its device is served best with is looked for later. Rejects with GaussianSplatError or the signal's reason. */
+/** Opens what is asked for, with WebGL where there is no WebGPU and the request lets it. Rejects with GaussianSplatError or the signal's reason. */
+export async function openScene(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
+  const { open = openGaussians } = options;
+  let reason: unknown;
+  if (request.renderer !== 'webgl')
+    try {
+      return await open(request, options);
+    } catch (error) {
+      reason = error;
+      if (request.renderer !== 'auto' || (error as Partial<GaussianSplatError>).family !== 'unsupported') throw error;
+    }
+  const { openGlScene } = await loadModule('the code that draws with WebGL', () => import('../webgl/open-gl-scene.js'));
+  return openGlScene(limited(request, options), options, reason);
+}
+
+const limited = (request: SceneRequest, { memoryBudget }: OpenOptions): SceneRequest => ({
+  ...request,
+  limits: { maxBytes: loadBytes(memoryBudget), ...request.limits },
+});
+
+/** Opens what is asked for with WebGPU; what its device is served best with is looked for later. Rejects with GaussianSplatError or the signal's reason. */
 export async function openGaussians(request: SceneRequest, options: OpenOptions): Promise<LoadedGaussians> {
   // Known at once, and then not a byte is fetched.
   await assertWebGpu();
   const open = isGenerator(request) ? openLiveScene : isStreamed(request) ? openStreamedScene : openLoadedScene;
-  const limits = { maxBytes: loadBytes(options.memoryBudget), ...request.limits };
-  const scene = await open({ ...request, limits }, options);
+  const scene = await open(limited(request, options), options);
   chooseAtRest(scene.device);
   return scene;
 }
@@ -75,7 +97,7 @@ async function openLoadedScene(request: SceneRequest, options: OpenOptions): Pro
 }
 
 /** Generators are known by the name of the file, or by the contract that the page gives along. */
-function isGenerator({ url, contract }: SceneRequest): boolean {
+export function isGenerator({ url, contract }: SceneRequest): boolean {
   if (contract !== undefined && contract !== null && contract !== '') return true;
   const { pathname, protocol, hash } = URL.canParse(url) ? new URL(url) : { pathname: url, protocol: '', hash: '' };
   return /\.onnx$/i.test(protocol === 'blob:' ? hash : pathname);
@@ -167,7 +189,7 @@ async function openStreamedScene(request: SceneRequest, options: OpenOptions): P
 }
 
 /** What the canvas is made of. */
-const pictures = (): { format: GPUTextureFormat } => ({ format: navigator.gpu.getPreferredCanvasFormat() });
+const pictures = (): { format: GPUTextureFormat } => ({ format: canvasFormat() });
 
 /** That no variant draws the right image ends the loading; that none could be timed does not. */
 function unlessWrong(error: unknown): void {

@@ -2,9 +2,9 @@ import { loadModule, type GaussianSplatError } from '@gaussian-splat/core';
 import { deviceDescriptor } from '@gaussian-splat/renderer';
 import type * as reasons from './no-device.js';
 
-/** Why this page has no device, for people. */
+/** An error whose text few pages need. */
 export const why = async (reason: (of: typeof reasons) => GaussianSplatError): Promise<GaussianSplatError> =>
-  reason(await loadModule('what is to be said of a page without a GPU', () => import('./no-device.js')));
+  reason(await loadModule('the text of an error', () => import('./no-device.js')));
 
 /** Rejects with the reason, if there is one, why this page has no WebGPU at all. */
 export async function assertWebGpu(): Promise<void> {

@@ -1,58 +1,25 @@
-import type { GaussianSplatError, ShDegree, SplatFilter } from '@gaussian-splat/core';
+import { loadModule, type Camera, type SplatFilter } from '@gaussian-splat/core';
 import {
   QueueClock,
   Viewpoint,
   type FrameLevers,
   type FrameSettings,
-  type Picture,
-  type Quality,
+  type ProbeAnswer,
+  type ProbePoint,
   type WorkTime,
   type World,
 } from '@gaussian-splat/renderer';
 import type { Frame, FrameFilter } from '../live/frame-filter.js';
-import type { DetailLevers, LoadedGaussians } from './loaded-gaussians.js';
+import type { ReadCounts } from '../stats.js';
+import type { CanvasFrame, Contents, Painter, PainterEvents, Place, Rendering, Surface } from './painter.js';
 import { why } from './request-device.js';
 
-/** How frames are drawn. */
-export interface Rendering {
-  readonly quality: Quality;
-  /** Spherical harmonics above this degree are not evaluated. */
-  readonly shDegree: ShDegree;
-  /** In place of those of the scenes. */
-  readonly filter?: SplatFilter | undefined;
-}
-
-/** Where frames are drawn: what keeps the device. */
-export type Place = Pick<LoadedGaussians, 'device' | 'isLost' | 'submissions'>;
-
-/** What frames show, as of now. */
-export interface Contents {
-  readonly world: World;
-  /** How much detail is drawn, at rest too. */
-  readonly levels: DetailLevers;
-  /**
-   * Called before each frame: puts into the world what is to be drawn.
-   * @returns what changes whenever the frame would
-   */
-  prepareFrame(): string;
-  /** Draws what is no splats, before these are drawn over it. @returns where the splats are drawn, as far as that differs */
-  drawBeneath?(frame: Frame): Partial<Picture>;
-}
-
-/** What a viewport tells. */
-export interface ViewportEvents {
-  /** The frame just drawn lacked something that the next one will have. */
-  readonly onIncomplete: () => void;
-  /** A later frame than the first needs more memory than there is: `out-of-memory/allocation`. */
-  readonly onError: (error: GaussianSplatError) => void;
-}
-
-/** Draws frames on one device: a viewpoint, whose buffers fit the frame's size, and what stands between it and the canvas. */
-export class Viewport {
+/** Draws frames on one WebGPU device: a viewpoint, whose buffers fit the frame's size, and what stands between it and the canvas. */
+export class Viewport implements Painter {
   readonly viewpoint: Viewpoint;
   readonly #place: Place;
   readonly #contents: Contents;
-  readonly #events: ViewportEvents;
+  readonly #events: PainterEvents;
   readonly #clock: QueueClock;
   #rendering: Rendering = { quality: 'default', shDegree: 3 };
   #filter: FrameFilter | undefined;
@@ -62,7 +29,7 @@ export class Viewport {
   #drawnSize = '';
   #layout = 0;
 
-  constructor(place: Place, contents: Contents, events: ViewportEvents) {
+  constructor(place: Place, contents: Contents, events: PainterEvents) {
     this.#place = place;
     this.#contents = contents;
     this.#events = events;
@@ -77,7 +44,6 @@ export class Viewport {
     this.#clock = QueueClock.of(place.device);
   }
 
-  /** Bytes of GPU memory that frames are drawn with, the splats not counted. */
   get byteLength(): number {
     return this.viewpoint.byteLength + (this.#filter?.byteLength ?? 0);
   }
@@ -94,7 +60,6 @@ export class Viewport {
     return this.#place.isLost;
   }
 
-  /** Draws the frames to come like this. */
   setRendering(rendering: Rendering): void {
     const { quality, shDegree } = this.#rendering;
     // A filter takes effect with the next frame, whatever draws it.
@@ -105,12 +70,10 @@ export class Viewport {
     this.#drawnSize = '';
   }
 
-  /** What stands between the renderer and the canvas; undefined for frames as they are drawn. */
   get filter(): FrameFilter | undefined {
     return this.#filter;
   }
 
-  /** It closes its filter when it gets another one, and when it is destroyed. */
   setFilter(filter: FrameFilter | undefined): void {
     this.#filter?.close();
     this.#filter = filter;
@@ -128,27 +91,29 @@ export class Viewport {
     return { quality, shDegree, submissions, ...levers, detail: most, splatBudget };
   }
 
-  /** True if there is what frames with other levers need. */
   get isPrepared(): boolean {
     return this.#isPrepared;
   }
 
-  /** Makes what frames with other levers need, so that none of them has to. */
-  prepare(levers: readonly Partial<FrameLevers>[], format: GPUTextureFormat): void {
+  prepare(levers: readonly Partial<FrameLevers>[]): void {
     if (this.isLost || this.#isDestroyed) return;
     this.#isPrepared = true;
     this.viewpoint.prepare(
       levers.map((each) => this.#settings(each)),
-      format,
+      canvasFormat(),
     );
   }
 
-  /**
-   * Encodes and submits one frame.
-   * @param content what `Contents.prepareFrame` has just returned
-   * @param onTime gets how long the frame kept the GPU, some frames later
-   */
-  render(frame: Frame, content: string, onTime?: (time: WorkTime) => void): void {
+  /** Premultiplied alpha lets the page show through. */
+  surfaceOn(canvas: HTMLCanvasElement): Surface | null {
+    const context = canvas.getContext('webgpu');
+    const [format, { device }] = [canvasFormat(), this];
+    context?.configure({ device, format, usage: canvasUsage(device, format), alphaMode: 'premultiplied' });
+    return context;
+  }
+
+  render(request: CanvasFrame, content: string, onTime?: (time: WorkTime) => void): void {
+    const frame = frameOf(request);
     const size = sizeOf(frame);
     const { layout } = this.#contents.world;
     if (layout === this.#layout && size === this.#drawnSize) return this.#renderOnce(frame, content, onTime);
@@ -181,7 +146,8 @@ export class Viewport {
    * Renders the first frame, for which the renderer allocates its buffers, and waits until the GPU has finished it.
    * @throws GaussianSplatError `out-of-memory/allocation`: WebGPU tells of a failed allocation only through a scope.
    */
-  async renderFirst(frame: Frame, content: string): Promise<void> {
+  async renderFirst(request: CanvasFrame, content: string): Promise<void> {
+    const frame = frameOf(request);
     this.#drawnSize = sizeOf(frame);
     const error = await this.#withRefusal(() => this.#draw(frame, content));
     if (error) throw await why(({ outOfMemory }) => outOfMemory('first frame', error));
@@ -205,12 +171,20 @@ export class Viewport {
     return refusal();
   }
 
+  probe(points: readonly ProbePoint[]): Promise<readonly ProbeAnswer[]> {
+    return this.viewpoint.probe(points);
+  }
+
+  async readCounts(camera: Camera): Promise<ReadCounts> {
+    const { readCounts } = await loadModule('the code that counts splats', () => import('./contributions.js'));
+    return readCounts(this, camera);
+  }
+
   /** What it draws at rest. */
   get view(): { readonly world: World; readonly settings: FrameSettings; readonly filter: SplatFilter | undefined } {
     return { world: this.#contents.world, settings: this.#settings(), filter: this.#rendering.filter };
   }
 
-  /** Frees the GPU memory. What it draws is its owner's. */
   destroy(): void {
     if (this.#isDestroyed) return;
     this.#isDestroyed = true;
@@ -220,3 +194,18 @@ export class Viewport {
 }
 
 const sizeOf = ({ camera: { width, height } }: Frame): string => `${width} x ${height}`;
+
+/** What the canvas is made of. */
+export const canvasFormat = (): GPUTextureFormat => navigator.gpu.getPreferredCanvasFormat();
+
+const frameOf = ({ surface, ...frame }: CanvasFrame): Frame => ({
+  ...frame,
+  target: (surface as GPUCanvasContext).getCurrentTexture(),
+});
+
+/** Compute shaders may then write the canvas itself, where the device lets them. */
+function canvasUsage(device: GPUDevice, format: GPUTextureFormat): GPUTextureUsageFlags {
+  const { RENDER_ATTACHMENT, STORAGE_BINDING } = GPUTextureUsage;
+  const isStorable = format === 'rgba8unorm' || device.features.has('bgra8unorm-storage');
+  return isStorable ? RENDER_ATTACHMENT | STORAGE_BINDING : RENDER_ATTACHMENT;
+}

@@ -7,7 +7,7 @@ export interface Frame {
   readonly camera: Camera;
   readonly target: GPUTexture;
   /** Premultiplied. */
-  readonly background?: Rgba;
+  readonly background?: Rgba | undefined;
   /** What is other than at rest. */
   readonly levers?: Partial<FrameLevers> | undefined;
 }

@@ -1,5 +1,5 @@
 import { loadModule } from '@gaussian-splat/core';
-import type { Viewport } from '../gpu/viewport.js';
+import type { Painter } from '../gpu/painter.js';
 import { LatestTask } from '../latest-task.js';
 import type { PostRequest } from './post-view.js';
 
@@ -15,7 +15,7 @@ export interface PostHost {
 export class PostController {
   readonly #host: PostHost;
   #urls: readonly string[] = [];
-  #viewport: Viewport | null = null;
+  #painter: Painter | null = null;
   readonly #opening = new LatestTask();
 
   constructor(host: PostHost) {
@@ -34,27 +34,27 @@ export class PostController {
     this.#open();
   }
 
-  /** Frames are drawn, or none any more. A viewport that is destroyed closes its processor itself. */
-  attach(viewport: Viewport | null): void {
-    this.#viewport = viewport;
+  /** Frames are drawn, or none any more. A painter that is destroyed closes its processor itself. */
+  attach(painter: Painter | null): void {
+    this.#painter = painter;
     this.#open();
   }
 
   #open(): void {
     this.#opening.renew();
-    const viewport = this.#viewport;
-    if (viewport === null) return;
-    if (viewport.filter) {
+    const painter = this.#painter;
+    if (painter === null) return;
+    if (painter.filter) {
       this.#host.requestFrame();
       this.#host.tellInputs();
     }
-    viewport.setFilter(undefined);
+    painter.setFilter(undefined);
     if (this.#urls.length === 0) return;
     const options = this.#host.postRequest;
-    this.#opening.run((signal) => this.#load(viewport, options, signal), options.onError);
+    this.#opening.run((signal) => this.#load(painter, options, signal), options.onError);
   }
 
-  async #load(viewport: Viewport, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
+  async #load(painter: Painter, options: PostHost['postRequest'], signal: AbortSignal): Promise<void> {
     const { PostView } = await loadModule('the code that runs post-processors', () => import('./post-view.js'));
     if (signal.aborted) return;
     const view = await PostView.open(
@@ -65,10 +65,10 @@ export class PostController {
         onError: (error) => (signal.aborted ? undefined : options.onError(error)),
         onChange: () => this.#host.requestFrame(),
       },
-      viewport.device,
+      painter.device,
     );
-    if (signal.aborted || viewport.isDestroyed) return view.close();
-    viewport.setFilter(view);
+    if (signal.aborted || painter.isDestroyed) return view.close();
+    painter.setFilter(view);
     this.#host.tellInputs();
     this.#host.requestFrame();
   }

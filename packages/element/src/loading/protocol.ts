@@ -1,6 +1,7 @@
 /** What the page and the scene worker say to each other. */
 import type { ErrorData, ModelPlace } from '@gaussian-splat/core';
 import type { CpuRunMessage } from '@gaussian-splat/generator';
+import type { RendererChoice } from '../attributes.js';
 import type { SceneBounds } from '../camera/settings.js';
 import type { LoadLimits, SceneSequence, SogRun } from '@gaussian-splat/formats';
 import type {
@@ -43,6 +44,8 @@ export interface SceneRequest extends FileRequest {
   readonly sh: ShPrecision | 'auto';
   /** Whether levels of detail are wanted that the file has, besides the finest. */
   readonly levels?: boolean;
+  /** What is to draw it; without it, WebGPU. */
+  readonly renderer?: RendererChoice;
   /** Whether a streamed SOG scene is loaded whole, in its finest level. */
   readonly isWhole?: boolean;
   /** The contract of a generator, where the page gives one: an address, JSON text, or the object. */
@@ -111,6 +114,8 @@ export type PageMessage =
   | { readonly type: 'helper'; readonly id: number; readonly port: MessagePort }
   /** Pack what comes through the port. */
   | { readonly type: 'pack'; readonly port: MessagePort }
+  /** Sort splats, at these positions, for the views that come through the port. */
+  | { readonly type: 'sort'; readonly port: MessagePort; readonly positions: Float32Array }
   /** Run a generator once on the CPU, in a worker that is started for it. */
   | CpuRunMessage;
 

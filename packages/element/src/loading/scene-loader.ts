@@ -1,4 +1,5 @@
-import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
+import { loadModule } from '@gaussian-splat/core';
+import { why } from '../gpu/request-device.js';
 import type {
   FileRequest,
   LoadedScene,
@@ -71,7 +72,7 @@ export class SceneLoader {
     onPreview?: PreviewListener,
   ): Promise<LoadedScene> {
     const loaded = await this.open(request, signal, onProgress, onPreview);
-    if ('frames' in loaded) throw sequenceWithin(request.url);
+    if ('frames' in loaded) throw await why(({ sequenceWithin }) => sequenceWithin(request.url));
     return loaded;
   }
 
@@ -132,13 +133,4 @@ async function withFile<T extends { readonly request: FileRequest }>(asked: T): 
     () => undefined,
   );
   return { ...asked, request: { ...asked.request, file } };
-}
-
-function sequenceWithin(url: string): GaussianSplatError {
-  return new GaussianSplatError('decode/unsupported', {
-    where: url,
-    expected: 'a scene file',
-    found: 'the manifest of a sequence',
-    remedy: 'name scene files as frames of a sequence, not other sequences',
-  });
 }

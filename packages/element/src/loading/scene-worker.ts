@@ -143,6 +143,8 @@ function serve(scope: WorkerScope): void {
     else if (data.type === 'cancel') running.get(data.id)?.abort.abort();
     else if (data.type === 'helper') running.get(data.id)?.onHelper?.(data.port);
     else if (data.type === 'pack') void import('./pack-shares.js').then(({ packShares }) => packShares(data.port));
+    else if (data.type === 'sort')
+      void import('./sort-splats.js').then(({ sortSplats }) => sortSplats(data.port, data.positions));
     else if (data.type === 'run-on-cpu')
       void import('@gaussian-splat/generator').then(({ answerCpuRun }) => answerCpuRun(data));
     else void run(data.id, data);

@@ -1,4 +1,4 @@
-import { GaussianSplatError, loadModule } from '@gaussian-splat/core';
+import { loadModule } from '@gaussian-splat/core';
 import { BUFFER_USAGE, perDevice } from '../gpu/kernel.js';
 import { LIKELY, remember, SAFE, type Variants } from '../variants.js';
 import { FrameClock } from './frame-clock.js';
@@ -99,22 +99,13 @@ async function noPause(): Promise<void> {
 
 /** Loaded when it runs: most visits know what suits their device. */
 async function search(device: GPUDevice, pause: () => Promise<void>): Promise<Variants> {
-  const { searchVariants } = await loadModule('the code that tries variants', () => import('./search.js'));
-  return (await searchVariants(device, pause)) ?? giveUp(device);
-}
-
-/** A wrong picture is worse than none. A lost device draws none, and says so itself. */
-async function giveUp(device: GPUDevice): Promise<Variants> {
+  const { searchVariants, wrongImage } = await loadModule('the code that tries variants', () => import('./search.js'));
+  const found = await searchVariants(device, pause);
+  if (found) return found;
+  // A wrong picture is worse than none. A lost device draws none, and says so itself.
   if (!(await isAlive(device))) return SAFE;
-  const { vendor = '', architecture = '', description = '' } = device.adapterInfo ?? {};
-  throw new GaussianSplatError('unsupported/wrong-image', {
-    where: `the graphics adapter ${[vendor, architecture, description].filter(Boolean).join(' ') || '(unnamed)'}`,
-    expected: 'the known picture of 64 spheres',
-    found: 'another picture from every variant of the renderer',
-    remedy: 'update the browser and the graphics driver, and report it with this message',
-  });
+  throw wrongImage(device);
 }
-
 /** Whether a device still answers, and so did before: one that is lost stays lost. */
 async function isAlive(device: GPUDevice): Promise<boolean> {
   const buffer = device.createBuffer({ label: 'gs.probe.alive', size: 4, usage: BUFFER_USAGE.mapRead });

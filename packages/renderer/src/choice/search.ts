@@ -1,4 +1,5 @@
 /** The search for what a device is served best with: a second of trials, once for each adapter and origin. */
+import { GaussianSplatError } from '@gaussian-splat/core';
 import { LIKELY, SAFE, type Variants } from '../variants.js';
 import { FrameClock } from './frame-clock.js';
 import { FRAMES, isRight, timeFrames, type Trial } from './trials.js';
@@ -74,4 +75,15 @@ async function chooseFastest(
     left = left.filter(({ time }) => best < MEASURABLE || time <= HOPELESS * best);
   }
   return left[0].variants;
+}
+
+/** That no variant draws the right image. */
+export function wrongImage({ adapterInfo }: GPUDevice): GaussianSplatError {
+  const { vendor = '', architecture = '', description = '' } = adapterInfo ?? {};
+  return new GaussianSplatError('unsupported/wrong-image', {
+    where: `the graphics adapter ${[vendor, architecture, description].filter(Boolean).join(' ') || '(unnamed)'}`,
+    expected: 'the known picture of 64 spheres',
+    found: 'another picture from every variant of the renderer',
+    remedy: 'update the browser and the graphics driver, and report it with this message',
+  });
 }

@@ -1,0 +1,25 @@
+/** Sorts the splats of one scene for the WebGL renderer, view by view. Loaded by a worker that is started for it. */
+import { SplatOrder, type OrderView } from '@gaussian-splat/renderer/webgl';
+
+export interface SortRequest {
+  readonly view: OrderView;
+  /** What is written into, and comes back. */
+  readonly order: Uint32Array<ArrayBuffer>;
+}
+
+export interface SortAnswer extends SortRequest {
+  readonly count: number;
+  /** What sorting took, ms. */
+  readonly milliseconds: number;
+}
+
+/** Answers what comes through a port. @param positions [N, 3] */
+export function sortSplats(port: MessagePort, positions: Float32Array): void {
+  const splats = new SplatOrder(positions);
+  port.onmessage = ({ data: { view, order } }: MessageEvent<SortRequest>) => {
+    const begin = performance.now();
+    const count = splats.sort(view, order);
+    const answer: SortAnswer = { view, order, count, milliseconds: performance.now() - begin };
+    port.postMessage(answer, [order.buffer]);
+  };
+}

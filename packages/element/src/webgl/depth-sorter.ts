@@ -1,0 +1,178 @@
+import { DATA_WIDTH, SplatOrder, type OrderView } from '@gaussian-splat/renderer/webgl';
+import type { PageMessage, WorkerMessage } from '../loading/protocol.js';
+import type { SortAnswer, SortRequest } from '../loading/sort-splats.js';
+
+/** How long an order may be waited for, ms: a worker that has not begun by then may never do. */
+const LATE_MS = 2_000;
+
+/** The worker that sorts for all scenes of a page. */
+class SortWorker {
+  static #current: SortWorker | undefined;
+  /** Rejects where the page refuses it. */
+  readonly ready: Promise<Worker>;
+  readonly #spawn: () => Worker;
+  #worker: Worker | undefined;
+  #users = 0;
+
+  private constructor(spawn: () => Worker) {
+    this.#spawn = spawn;
+    this.ready = new Promise((resolve, reject) => {
+      const worker = (this.#worker = spawn());
+      worker.addEventListener('message', ({ data }: MessageEvent<WorkerMessage>) => {
+        if (data.type === 'ready') resolve(worker);
+      });
+      worker.addEventListener('error', (event) => {
+        event.preventDefault();
+        this.#end();
+        reject(new Error(event.message));
+      });
+    });
+    this.ready.catch(() => undefined);
+  }
+
+  static acquire(spawn: () => Worker): SortWorker {
+    const known = this.#current;
+    const worker = known && known.#spawn === spawn ? known : new SortWorker(spawn);
+    this.#current = worker;
+    worker.#users++;
+    return worker;
+  }
+
+  release(): void {
+    if (--this.#users === 0) this.#end();
+  }
+
+  #end(): void {
+    if (SortWorker.#current === this) SortWorker.#current = undefined;
+    this.#worker?.terminate();
+  }
+}
+
+/** A view, and when its order was asked for, by the page's clock. */
+interface Asked {
+  readonly view: OrderView;
+  readonly askedAt: number;
+}
+
+/** An order, and the view that it is of. */
+export interface SortedSplats extends Asked {
+  /** Numbers of splats from near to far, in whole rows of `DATA_WIDTH`. */
+  readonly order: Uint32Array;
+  readonly count: number;
+}
+
+export interface DepthSorterOptions {
+  /** [N, 3] relative to the scene's origin */
+  readonly positions: Float32Array;
+  readonly spawn: () => Worker;
+  /** Gets each order as it comes; its buffer is only lent. */
+  readonly onOrder: (sorted: SortedSplats) => void;
+}
+
+/**
+ * Has a worker sort splats, one view at a time: of those that are asked for meanwhile the latest is next. Where the page refuses the worker, or that does not
+ * answer, the page's own thread sorts.
+ */
+export class DepthSorter {
+  readonly #options: DepthSorterOptions;
+  readonly #worker: SortWorker;
+  #port: MessagePort | undefined;
+  #here: SplatOrder | undefined;
+  /** Lent to the worker while it sorts. */
+  #buffer: Uint32Array<ArrayBuffer>;
+  #sorting: Asked | undefined;
+  #next: Asked | undefined;
+  #isHere = false;
+  #isOver = false;
+  readonly #late: ReturnType<typeof setTimeout>;
+  /** What the last order took the worker. */
+  milliseconds = Infinity;
+
+  constructor(options: DepthSorterOptions) {
+    this.#options = options;
+    this.#buffer = this.#makeBuffer();
+    this.#worker = SortWorker.acquire(options.spawn);
+    this.#late = setTimeout(this.#giveUp, LATE_MS);
+    this.#worker.ready.then((worker) => this.#connect(worker), this.#giveUp);
+  }
+
+  /** Asks for the order of a view. */
+  request(view: OrderView): void {
+    this.#next = { view, askedAt: performance.now() };
+    this.#proceed();
+  }
+
+  /** The order of a view, at once. */
+  sortNow(view: OrderView): SortedSplats {
+    this.#here ??= new SplatOrder(this.#options.positions);
+    // Its own buffer may be away.
+    const order = this.#buffer.length > 0 ? this.#buffer : this.#makeBuffer();
+    return { view, askedAt: performance.now(), order, count: this.#here.sort(view, order) };
+  }
+
+  destroy(): void {
+    if (this.#isOver) return;
+    this.#isOver = true;
+    clearTimeout(this.#late);
+    this.#next = undefined;
+    this.#port?.close();
+    this.#worker.release();
+  }
+
+  #makeBuffer(): Uint32Array<ArrayBuffer> {
+    const count = this.#options.positions.length / 3;
+    return new Uint32Array(Math.max(1, Math.ceil(count / DATA_WIDTH)) * DATA_WIDTH);
+  }
+
+  #connect(worker: Worker): void {
+    if (this.#isOver || this.#isHere) return;
+    const { port1, port2 } = new MessageChannel();
+    const { positions } = this.#options;
+    worker.postMessage({ type: 'sort', port: port2, positions } satisfies PageMessage, [port2]);
+    port1.onmessage = ({ data }: MessageEvent<SortAnswer>) => this.#take(data);
+    this.#port = port1;
+    this.#proceed();
+  }
+
+  #proceed(): void {
+    const next = this.#next;
+    if (next === undefined || this.#sorting !== undefined) return;
+    if (this.#isHere) return void setTimeout(this.#sortHere);
+    // It comes, or is given up.
+    if (this.#port === undefined) return;
+    this.#next = undefined;
+    this.#sorting = next;
+    const order = this.#buffer;
+    this.#buffer = new Uint32Array(0);
+    this.#port.postMessage({ view: next.view, order } satisfies SortRequest, [order.buffer]);
+  }
+
+  #take({ view, order, count, milliseconds }: SortAnswer): void {
+    if (this.#isHere || this.#isOver) return;
+    this.milliseconds = milliseconds;
+    clearTimeout(this.#late);
+    const { askedAt = 0 } = this.#sorting ?? {};
+    this.#sorting = undefined;
+    this.#buffer = order;
+    this.#options.onOrder({ view, askedAt, order, count });
+    this.#proceed();
+  }
+
+  readonly #sortHere = (): void => {
+    const next = this.#next;
+    this.#next = undefined;
+    if (next !== undefined) this.#options.onOrder(this.sortNow(next.view));
+  };
+
+  /** No worker answers: the page's thread sorts from now on. */
+  readonly #giveUp = (): void => {
+    if (this.#isOver || this.#isHere) return;
+    this.#isHere = true;
+    clearTimeout(this.#late);
+    this.#port?.close();
+    this.#next ??= this.#sorting;
+    this.#sorting = undefined;
+    if (this.#buffer.length === 0) this.#buffer = this.#makeBuffer();
+    this.#proceed();
+  };
+}

@@ -1,0 +1,194 @@
+import type { ProbeAnswer, ProbePoint, WorkTime } from '@gaussian-splat/renderer';
+import { isSameView, orderView, drawn as whenDrawn, type OrderView } from '@gaussian-splat/renderer/webgl';
+import type { CanvasFrame, Painter, PainterEvents, Rendering, Surface } from '../gpu/painter.js';
+import type { ReadCounts } from '../stats.js';
+import { DepthSorter, type SortedSplats } from './depth-sorter.js';
+import { cannotShow } from './errors.js';
+import type { GlLoaded } from './gl-loaded.js';
+
+/** An order that is older when it is drawn, ms, is made anew on the page's thread, where that is known to take no longer than the second. */
+const [OLDEST_MS, LONGEST_SORT_MS] = [80, 30];
+/** Of what a whole frame takes, the share that its pixels surely do. */
+const SURE_SHARE = 0.5;
+
+/** A canvas that shows copies of what the page's context draws. */
+interface CopySurface extends Surface {
+  readonly context: CanvasRenderingContext2D;
+}
+
+/** Draws one scene with WebGL, in orders that a worker finds. */
+export class GlPainter implements Painter {
+  readonly filter = undefined;
+  readonly isPrepared = true;
+  readonly #scene: GlLoaded;
+  readonly #sorter: DepthSorter;
+  /** The view that the order on the GPU is of. */
+  #sorted: OrderView | undefined;
+  /** When it was asked for, by the page's clock. */
+  #sortedAt = 0;
+  /** The view that was asked for last. */
+  #asked: OrderView | undefined;
+  /** The first order is there. */
+  readonly #ordered: Promise<void>;
+  /** The first frame is drawn. */
+  readonly #shown: Promise<void>;
+  #tellShown: () => void = () => undefined;
+  /** What a whole frame takes, as far as is known, ms. */
+  #wholeMs = 0;
+  #rendering: Rendering = { quality: 'default', shDegree: 3 };
+  #isDestroyed = false;
+
+  constructor(scene: GlLoaded, events: PainterEvents) {
+    this.#scene = scene;
+    let tellOrdered: () => void;
+    this.#ordered = new Promise((resolve) => (tellOrdered = resolve));
+    this.#shown = new Promise((resolve) => (this.#tellShown = resolve));
+    const { positions, spawn } = scene;
+    this.#sorter = new DepthSorter({
+      positions,
+      spawn,
+      onOrder: (sorted) => {
+        const isFirst = this.#sorted === undefined;
+        this.#setOrder(sorted);
+        tellOrdered();
+        if (!isFirst) events.onIncomplete();
+      },
+    });
+  }
+
+  /** Its limits alone. */
+  get device(): GPUDevice {
+    return this.#scene.device;
+  }
+
+  get byteLength(): number {
+    return this.#scene.frames.byteLength;
+  }
+
+  get isLost(): boolean {
+    return this.#scene.isLost;
+  }
+
+  get isDestroyed(): boolean {
+    return this.#isDestroyed;
+  }
+
+  prepare(): void {}
+
+  setFilter(filter: Parameters<Painter['setFilter']>[0]): void {
+    if (filter === undefined) return;
+    filter.close();
+    throw cannotShow('a post-processor');
+  }
+
+  setRendering(rendering: Rendering): void {
+    this.#rendering = rendering;
+  }
+
+  surfaceOn(canvas: HTMLCanvasElement): CopySurface | null {
+    const context = canvas.getContext('2d');
+    return context && { canvas, context, unconfigure: () => context.clearRect(0, 0, canvas.width, canvas.height) };
+  }
+
+  render(frame: CanvasFrame, _: string, onTime?: (time: WorkTime) => void): void {
+    if (this.isLost) return;
+    const view = this.#viewOf(frame);
+    if (this.#sorted === undefined || !isSameView(view, this.#sorted)) {
+      // Who reads the picture at once cannot wait for the worker.
+      if (frame.isRead || this.#isOld) {
+        this.#asked = view;
+        this.#setOrder(this.#sorter.sortNow(view));
+      } else this.#ask(view);
+    }
+    // The first frame waits for an order.
+    if (this.#sorted === undefined) return;
+    if (onTime === undefined) return this.#draw(frame);
+    const { resolutionScale = 1 } = frame.levers ?? {};
+    const least = SURE_SHARE * this.#wholeMs * resolutionScale ** 2;
+    this.#scene.lease.clock
+      .time(() => this.#draw(frame), least)
+      .then((time) => {
+        if (resolutionScale === 1) this.#wholeMs = Math.min(this.#wholeMs, time.atMost);
+        onTime(time);
+      })
+      .catch(() => undefined);
+  }
+
+  /** Waits for the order of the first frame, and until the GPU has drawn it. */
+  async renderFirst(frame: CanvasFrame): Promise<void> {
+    this.#ask(this.#viewOf(frame));
+    await Promise.race([this.#ordered, this.#scene.lost]);
+    if (this.isLost || this.#isDestroyed) return;
+    const begin = performance.now();
+    this.#paint(frame);
+    await whenDrawn(this.#scene.lease.gl).catch(() => undefined);
+    this.#wholeMs = performance.now() - begin;
+    if (!this.isLost && !this.#isDestroyed) this.#show(frame);
+    this.#tellShown();
+  }
+
+  async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
+    await Promise.race([this.#shown, this.#scene.lost]);
+    return this.isLost || this.#isDestroyed ? [] : this.#scene.frames.probe(points);
+  }
+
+  async readCounts(): Promise<ReadCounts> {
+    return { drawn: this.#scene.frames.countDrawn(), left: 0, contributed: null };
+  }
+
+  destroy(): void {
+    if (this.#isDestroyed) return;
+    this.#isDestroyed = true;
+    this.#tellShown();
+    this.#sorter.destroy();
+  }
+
+  get #isOld(): boolean {
+    const age = performance.now() - this.#sortedAt;
+    return this.#sorted !== undefined && age > OLDEST_MS && this.#sorter.milliseconds <= LONGEST_SORT_MS;
+  }
+
+  #viewOf({ camera }: CanvasFrame): OrderView {
+    return orderView(camera, this.#scene.gaussians.origin);
+  }
+
+  #ask(view: OrderView): void {
+    if (this.#asked && isSameView(view, this.#asked)) return;
+    this.#asked = view;
+    this.#sorter.request(view);
+  }
+
+  #setOrder({ view, order, count, askedAt }: SortedSplats): void {
+    // What was sorted at once meanwhile is newer.
+    if (this.isLost || this.#isDestroyed || askedAt < this.#sortedAt) return;
+    this.#sorted = view;
+    this.#sortedAt = askedAt;
+    this.#scene.frames.setOrder(order, count);
+  }
+
+  #draw(frame: CanvasFrame): void {
+    this.#paint(frame);
+    this.#show(frame);
+  }
+
+  #paint({ camera, levers }: CanvasFrame): void {
+    const { quality, shDegree, filter } = this.#rendering;
+    this.#scene.frames.render({
+      ...{ camera, shDegree, filter },
+      accumulation: quality === 'balanced' || quality === 'fast' ? 'rgba16float' : 'rgba32float',
+      resolutionScale: levers?.resolutionScale ?? 1,
+    });
+  }
+
+  /** Copies what was painted to the element's canvas. */
+  #show({ camera: { width, height }, background, surface }: CanvasFrame): void {
+    const { context } = surface as CopySurface;
+    const { lease } = this.#scene;
+    lease.fit(width, height);
+    this.#scene.frames.present(background);
+    const { canvas } = lease.gl;
+    // WebGL counts rows from below, so that is where a smaller image lies.
+    context.globalCompositeOperation = 'copy';
+    context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
+  }
+}

@@ -1,0 +1,106 @@
+/** One WebGL context for all elements of a page: browsers end the oldest of more than 8 or 16. Elements show copies of what it draws. */
+import { GlClock } from '@gaussian-splat/renderer/webgl';
+import type { DeviceLease } from '../gpu/shared-device.js';
+import { cannotShow } from './errors.js';
+
+/** A share in the page's context. Its `device` stands where one of WebGPU is asked for. */
+export interface GlLease extends DeviceLease {
+  readonly gl: WebGL2RenderingContext;
+  readonly clock: GlClock;
+  /** Makes the canvas at least so large, in pixels. Clears it if it has to grow. */
+  fit(width: number, height: number): void;
+}
+
+const LOSS = { reason: 'unknown', message: 'the WebGL context was lost' } as GPUDeviceLostInfo;
+
+class GlSession {
+  readonly gl: WebGL2RenderingContext;
+  readonly clock: GlClock;
+  readonly device: GPUDevice;
+  isLost = false;
+  /** Whom a loss is told. Not by one promise for all: it would hold on to everybody who ever waited for it. */
+  readonly #listeners = new Set<() => void>();
+  #users = 0;
+
+  constructor(gl: WebGL2RenderingContext) {
+    this.gl = gl;
+    this.clock = new GlClock(gl);
+    const [width, height] = gl.getParameter(gl.MAX_VIEWPORT_DIMS) as Int32Array;
+    const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
+    this.device = limitsAlone({
+      limits: { maxTextureDimension2D: Math.min(width, height, side) },
+      queue: { onSubmittedWorkDone: async () => undefined },
+    });
+    gl.canvas.addEventListener('webglcontextlost', () => {
+      this.isLost = true;
+      if (current === this) current = undefined;
+      for (const tell of this.#listeners) tell();
+      this.#listeners.clear();
+    });
+  }
+
+  fit(width: number, height: number): void {
+    const { canvas } = this.gl;
+    if (canvas.width < width) canvas.width = width;
+    if (canvas.height < height) canvas.height = height;
+  }
+
+  lease(): GlLease {
+    this.#users++;
+    let tell: () => void = () => undefined;
+    const lost = new Promise<GPUDeviceLostInfo>((resolve) => (tell = () => resolve(LOSS)));
+    this.#listeners.add(tell);
+    let isReleased = false;
+    const isLost = (): boolean => this.isLost;
+    return {
+      gl: this.gl,
+      clock: this.clock,
+      device: this.device,
+      lost,
+      get isLost() {
+        return isLost();
+      },
+      fit: (width, height) => this.fit(width, height),
+      release: () => {
+        if (isReleased) return;
+        isReleased = true;
+        this.#listeners.delete(tell);
+        if (--this.#users === 0) this.#end();
+      },
+    };
+  }
+
+  #end(): void {
+    if (current === this) current = undefined;
+    // Else its memory stays until the canvas is collected.
+    this.gl.getExtension('WEBGL_lose_context')?.loseContext();
+  }
+}
+
+/** Has the limits of a device, and is done with all work; whatever else is asked of it is an error by name. Models that run on the GPU need WebGPU. */
+const limitsAlone = (known: object): GPUDevice =>
+  new Proxy(known, {
+    get: (target, key) => {
+      if (key in target) return Reflect.get(target, key) as unknown;
+      throw cannotShow('a post-processor');
+    },
+  }) as GPUDevice;
+
+let current: GlSession | undefined;
+
+/** A share in the page's context; undefined where the browser gives none. */
+export function acquireGl(): GlLease | undefined {
+  current ??= start();
+  return current?.lease();
+}
+
+function start(): GlSession | undefined {
+  const gl = document.createElement('canvas').getContext('webgl2', {
+    alpha: true,
+    antialias: false,
+    depth: false,
+    stencil: false,
+    powerPreference: 'high-performance',
+  });
+  return gl && !gl.isContextLost() ? new GlSession(gl) : undefined;
+}

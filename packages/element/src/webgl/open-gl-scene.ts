@@ -1,0 +1,90 @@
+/** Loaded only where a page has no WebGPU, or asks for WebGL by name. */
+import { glBytes } from '@gaussian-splat/renderer/webgl';
+import type { LoadedGaussians } from '../gpu/loaded-gaussians.js';
+import { isGenerator, isStreamed, type OpenOptions } from '../gpu/open-scene.js';
+import type { LoadedScene, SceneRequest } from '../loading/protocol.js';
+import { cannotShow, noWebGl } from './errors.js';
+import { GlLoaded } from './gl-loaded.js';
+import { acquireGl, type GlLease } from './gl-session.js';
+
+/** What a picture has besides the element's own scene. */
+const CHILDREN = 'splat-scene, splat-mesh';
+
+/**
+ * Opens a scene file with WebGL 2.
+ * @param reason why there is no WebGPU; undefined where it was not asked for
+ * @throws GaussianSplatError the reason where there is no WebGL 2, either; `unsupported/webgl` for what it cannot show; as the loading of scenes does; or the signal's reason
+ */
+export async function openGlScene(
+  asked: SceneRequest,
+  options: OpenOptions,
+  reason: unknown,
+): Promise<LoadedGaussians> {
+  // Levels of detail are for WebGPU alone: the finest one is the scene.
+  const request = { ...asked, levels: false, isWhole: true };
+  const lease = acquireGl();
+  if (lease === undefined) throw reason ?? noWebGl();
+  const { signal, onProgress, beforeUpload, loader, live } = options;
+  const requireAlone = (): void => {
+    const { element } = live();
+    if (element.matches(CHILDREN) || element.querySelector(`:scope > :is(${CHILDREN})`))
+      throw cannotShow('a <splat-scene> or <splat-mesh>', reason);
+  };
+  try {
+    requireAlone();
+    if (isGenerator(request) || request.chain?.length) throw cannotShow('a generator', reason);
+    if (isStreamed(request)) throw cannotShow('a streamed scene', reason);
+    if (!live().ownsControls()) throw cannotShow('a post-processor', reason);
+    const previews = new Previews(options);
+    const scene = await loader
+      .open(request, signal, onProgress, options.onPreview && previews.show)
+      .finally(() => previews.end());
+    signal.throwIfAborted();
+    requireAlone();
+    if ('frames' in scene) throw cannotShow('a sequence of scenes', reason);
+    beforeUpload(glBytes(scene.packed));
+    return await GlLoaded.open(lease, scene, openOptions(options, signal));
+  } catch (error) {
+    lease.release();
+    throw error;
+  }
+}
+
+const openOptions = (
+  { memoryBudget, loader: { spawn } }: OpenOptions,
+  signal: AbortSignal,
+): Parameters<typeof GlLoaded.open>[2] => ({ memoryBudget, spawn, signal });
+
+/** Shows the previews of one load, one at a time; those that come meanwhile are passed over. */
+class Previews {
+  readonly #options: OpenOptions;
+  readonly #over = new AbortController();
+  #isBusy = false;
+
+  constructor(options: OpenOptions) {
+    this.#options = options;
+  }
+
+  readonly show = (preview: LoadedScene): void => {
+    if (!this.#isBusy) void this.#show(preview);
+  };
+
+  end(): void {
+    this.#over.abort();
+  }
+
+  async #show(preview: LoadedScene): Promise<void> {
+    const lease: GlLease | undefined = acquireGl();
+    if (lease === undefined) return;
+    this.#isBusy = true;
+    const signal = AbortSignal.any([this.#options.signal, this.#over.signal]);
+    try {
+      this.#options.onPreview?.(await GlLoaded.open(lease, preview, openOptions(this.#options, signal)));
+    } catch {
+      // Whatever keeps a preview from the GPU will keep the whole from it, which says so.
+      lease.release();
+    } finally {
+      this.#isBusy = false;
+    }
+  }
+}

@@ -1,0 +1,95 @@
+import { GaussianSplatError } from '@gaussian-splat/core';
+import { turn } from '../gpu/turn.js';
+import type { PackedGaussians } from '../pack/pack.js';
+import { makeTexture, requireMemory } from './gl.js';
+import { DATA_WIDTH } from './shaders.js';
+
+/** Words that are handed to the GPU at once: 4 MB, some milliseconds. */
+const WORDS_AT_ONCE = 1 << 20;
+/** Words of what is drawn besides: the projected splat, and its place in the order. */
+const FRAME_WORDS = 9;
+
+/** Facts of a scene that frames need. */
+export type GlGaussianFacts = Omit<PackedGaussians, 'geometry' | 'sh' | 'chunks' | 'details' | 'leafCount'>;
+
+/** Bytes of GPU memory that a packed scene takes, what frames keep of each splat included. */
+export const glBytes = ({ count, geometry, sh }: PackedGaussians): number =>
+  geometry.byteLength + sh.byteLength + 4 * FRAME_WORDS * count;
+
+/** Rows that so many texels take. */
+export const rowsOf = (texels: number): number => Math.max(1, Math.ceil(texels / DATA_WIDTH));
+
+/** Packed Gaussians in textures. */
+export class GlGaussians {
+  readonly facts: GlGaussianFacts;
+  readonly geometry: WebGLTexture;
+  readonly sh: WebGLTexture;
+  readonly #gl: WebGL2RenderingContext;
+
+  private constructor(gl: WebGL2RenderingContext, packed: PackedGaussians) {
+    this.#gl = gl;
+    const { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin } = packed;
+    this.facts = { count, droppedCount, shDegree, shPrecision, antialiased, filterVariance, origin };
+    requireRoom(gl, packed);
+    this.geometry = makeTexture(gl, gl.RGBA32UI, [DATA_WIDTH, rowsOf(packed.geometry.length / 4)]);
+    this.sh = makeTexture(gl, gl.RG32UI, [DATA_WIDTH, rowsOf(packed.sh.length / 2)]);
+  }
+
+  /**
+   * Copies packed Gaussians to the GPU, so much at a time that the thread can do other things between.
+   * @throws GaussianSplatError `out-of-memory/buffer-limit` for more splats than textures hold, `out-of-memory/allocation`
+   */
+  static async upload(gl: WebGL2RenderingContext, packed: PackedGaussians): Promise<GlGaussians> {
+    const made = new GlGaussians(gl, packed);
+    try {
+      requireMemory(gl, `scene of ${packed.count} splats`);
+      await write(gl, made.geometry, { format: gl.RGBA_INTEGER, texelWords: 4, words: packed.geometry });
+      await write(gl, made.sh, { format: gl.RG_INTEGER, texelWords: 2, words: packed.sh });
+      return made;
+    } catch (error) {
+      made.destroy();
+      throw error;
+    }
+  }
+
+  destroy(): void {
+    this.#gl.deleteTexture(this.geometry);
+    this.#gl.deleteTexture(this.sh);
+  }
+}
+
+interface Content {
+  readonly format: GLenum;
+  readonly texelWords: number;
+  readonly words: Uint32Array;
+}
+
+async function write(gl: WebGL2RenderingContext, texture: WebGLTexture, content: Content): Promise<void> {
+  const { format, texelWords, words } = content;
+  const rowWords = DATA_WIDTH * texelWords;
+  const rowsAtOnce = Math.floor(WORDS_AT_ONCE / rowWords);
+  for (let first = 0; first < words.length;) {
+    if (first > 0) await turn();
+    const left = words.length - first;
+    // What is less than a row goes alone.
+    const [width, rows] =
+      left < rowWords ? [left / texelWords, 1] : [DATA_WIDTH, Math.min(rowsAtOnce, Math.floor(left / rowWords))];
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, first / rowWords, width, rows, format, gl.UNSIGNED_INT, words, first);
+    first += width * rows * texelWords;
+  }
+}
+
+function requireRoom(gl: WebGL2RenderingContext, { count, shDegree, geometry, sh }: PackedGaussians): void {
+  const side = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
+  const texels = Math.max(geometry.length / 4, sh.length / 2);
+  const most = side < DATA_WIDTH ? 0 : Math.floor((side * DATA_WIDTH * count) / texels);
+  if (!(count > most) || gl.isContextLost()) return;
+  throw new GaussianSplatError('out-of-memory/buffer-limit', {
+    where: `scene of ${count} splats, drawn with WebGL 2`,
+    expected: `at most ${most} splats with harmonics of degree ${shDegree}: textures of this browser have ${side} rows at most`,
+    found: String(count),
+    remedy: 'show a smaller scene (gaussian-splat economise makes one), or use a browser with WebGPU',
+  });
+}

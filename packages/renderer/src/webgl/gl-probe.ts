@@ -1,0 +1,115 @@
+/** What lies under single points of the last frame: the runs of `probe_depth`, joined on the page. */
+import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
+import { makeTarget, makeTexture, type GlProgram } from './gl.js';
+import type { ProbeView } from './shaders.js';
+
+/** Runs of a point: a fragment each. */
+const RUNS = 1024;
+/** Points that are asked about at a time. */
+const MOST_POINTS = 256;
+const NUMBERS = 4;
+/** GLSL may assume that there are no infinities. */
+const LARGEST_FLOAT32 = 3.4e38;
+
+export interface GlProbeSource {
+  readonly gl: WebGL2RenderingContext;
+  readonly program: GlProgram<typeof ProbeView>;
+  /** Shapes, paints and the order from near to far. */
+  readonly textures: readonly WebGLTexture[];
+  /** Splats in the order. */
+  readonly count: number;
+}
+
+/** The ranks that are looked at for a point, from one on to before another. */
+interface Range {
+  readonly first: number;
+  readonly end: number;
+}
+
+/** Waits for the GPU, so that all passes see the same frame: for clicks and labels, not for every frame. */
+export function probeSplats(source: GlProbeSource, points: readonly ProbePoint[]): ProbeAnswer[] {
+  if (points.length > MOST_POINTS) {
+    const first = probeSplats(source, points.slice(0, MOST_POINTS));
+    return [...first, ...probeSplats(source, points.slice(MOST_POINTS))];
+  }
+  if (points.length === 0) return [];
+  const { count } = source;
+  const whole = points.map((): Range => ({ first: 0, end: count }));
+  const rows = lookAt(source, points, whole);
+  const sums = rows.map((row) => ({ light: product(row, 0), inFront: product(row, 1) }));
+  const depths = depthsAt(source, points, whole, rows);
+  return sums.map(({ light, inFront }, i) => ({ opacity: 1 - light, depth: depths[i], transmittance: inFront }));
+}
+
+/** Depths of the splats behind which less than half of the light is left: the runs that hold them are looked at again, until each is one splat. */
+function depthsAt(
+  source: GlProbeSource,
+  points: readonly ProbePoint[],
+  ranges: readonly Range[],
+  rows: readonly Float32Array[],
+): (number | null)[] {
+  let [current, found] = [ranges, rows];
+  const before = points.map(() => 1);
+  const crossings = points.map((_, i) => crossing(rows[i], 1));
+  while (current.some(({ first, end }) => runOf(first, end) > 1)) {
+    current = current.map(({ first, end }, i) => {
+      const run = runOf(first, end);
+      const { at, light } = crossings[i] ?? { at: 0, light: 1 };
+      before[i] = light;
+      return { first: first + at * run, end: Math.min(end, first + (at + 1) * run) };
+    });
+    found = lookAt(source, points, current);
+    current.forEach((_, i) => (crossings[i] &&= crossing(found[i], before[i])));
+  }
+  return crossings.map((place, i) => (place === null ? null : found[i][NUMBERS * place.at + 2]));
+}
+
+const runOf = (first: number, end: number): number => Math.max(1, Math.ceil((end - first) / RUNS));
+
+function product(row: Float32Array, number: number): number {
+  let result = 1;
+  for (let at = number; at < row.length; at += NUMBERS) result *= row[at];
+  return result;
+}
+
+/** The first run behind which less than half of the light is left, and the light that comes to it. */
+function crossing(row: Float32Array, before: number): { at: number; light: number } | null {
+  let light = before;
+  for (let at = 0; at < RUNS; at++) {
+    const after = light * row[NUMBERS * at];
+    if (after < 0.5) return { at, light };
+    light = after;
+  }
+  return null;
+}
+
+/** Of each point a row of runs: light that each lets through, light that its splats in front let through, the depth of its last splat. */
+function lookAt(
+  { gl, program, textures }: GlProbeSource,
+  points: readonly ProbePoint[],
+  ranges: readonly Range[],
+): Float32Array[] {
+  const texture = makeTexture(gl, gl.RGBA32UI, [RUNS, points.length]);
+  const target = makeTarget(gl, [texture]);
+  try {
+    gl.disable(gl.BLEND);
+    points.forEach(({ x, y, depth = LARGEST_FLOAT32 }, row) => {
+      const { first, end } = ranges[row];
+      const point = [x, y, Math.min(depth, LARGEST_FLOAT32)];
+      program.use({ point, first, end, run: runOf(first, end) }, textures);
+      gl.viewport(0, row, RUNS, 1);
+      // One triangle, larger than the target: only the row is to be painted.
+      gl.enable(gl.SCISSOR_TEST);
+      gl.scissor(0, row, RUNS, 1);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    });
+    gl.disable(gl.SCISSOR_TEST);
+    const words = new Uint32Array(NUMBERS * RUNS * points.length);
+    gl.readPixels(0, 0, RUNS, points.length, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+    const numbers = new Float32Array(words.buffer);
+    return points.map((_, row) => numbers.subarray(NUMBERS * RUNS * row, NUMBERS * RUNS * (row + 1)));
+  } finally {
+    gl.deleteFramebuffer(target);
+    gl.deleteTexture(texture);
+  }
+}

@@ -1,0 +1,262 @@
+import { SPLAT_FILTERS, validateCamera, type Camera, type ShDegree, type SplatFilter } from '@gaussian-splat/core';
+import type { ProbeAnswer, ProbePoint } from '../depth-probe.js';
+import { constants, layouts } from '../generated/shaders.js';
+import { SH_PRECISION } from '../pack/sh.js';
+import type { Rgba } from '../picture.js';
+import type { AccumulationFormat } from '../rasterizers/rasterizer.js';
+import { cameraValues, MAX_FLOAT32, scaled } from '../view.js';
+import { GlProgram, makeTarget, makeTexture, requireMemory } from './gl.js';
+import { rowsOf, type GlGaussians } from './gl-gaussians.js';
+import { probeSplats } from './gl-probe.js';
+import {
+  composeFragment,
+  DATA_WIDTH,
+  probeFragment,
+  ProbeView,
+  projectFragment,
+  quadsFragment,
+  QuadsView,
+  quadsVertex,
+  fullScreenVertex,
+} from './shaders.js';
+
+const { QUAD_BATCH } = constants;
+/** Two triangles. */
+const INDICES_PER_QUAD = 6;
+const TRANSPARENT: Rgba = [0, 0, 0, 0];
+/** A corner of a box that has everything in it. */
+const EVERYWHERE = [MAX_FLOAT32, MAX_FLOAT32, MAX_FLOAT32];
+const SPLAT_TEXTURES = ['shapes', 'paints', 'order'];
+
+/** Formats that splats are blended in: `rgba8unorm` where the browser blends no floats. */
+export type GlAccumulationFormat = AccumulationFormat | 'rgba8unorm';
+
+const BYTES_PER_PIXEL: Record<GlAccumulationFormat, number> = { rgba8unorm: 4, rgba16float: 8, rgba32float: 16 };
+
+/** One image to draw with WebGL. */
+export interface GlFrameRequest {
+  /** Its width and height must be those of the canvas. */
+  readonly camera: Camera;
+  /** Spherical harmonics above this degree are not evaluated. */
+  readonly shDegree: ShDegree;
+  /** In place of the scene's own. */
+  readonly filter?: SplatFilter | undefined;
+  /** `rgba32float` where the browser blends it. */
+  readonly accumulation: AccumulationFormat;
+  /** Share of the canvas's width and height that is really drawn. */
+  readonly resolutionScale: number;
+}
+
+/** What splats are blended into. */
+interface Accumulation {
+  readonly texture: WebGLTexture;
+  readonly target: WebGLFramebuffer;
+  readonly format: GlAccumulationFormat;
+  readonly width: number;
+  readonly height: number;
+}
+
+/** The best format that a browser blends, up to the one that is asked for. */
+export function blendable(gl: WebGL2RenderingContext, wanted: AccumulationFormat): GlAccumulationFormat {
+  const float = gl.getExtension('EXT_color_buffer_float');
+  if (wanted === 'rgba32float' && float && gl.getExtension('EXT_float_blend')) return wanted;
+  return float || gl.getExtension('EXT_color_buffer_half_float') ? 'rgba16float' : 'rgba8unorm';
+}
+
+/**
+ * Draws one scene with WebGL 2, by the shaders of WebGPU: each splat is projected once into two textures, then drawn as a quad in an order that comes from
+ * outside (`SplatOrder`), blended, and composed onto the canvas.
+ */
+export class GlRenderer {
+  readonly #gl: WebGL2RenderingContext;
+  readonly #gaussians: GlGaussians;
+  readonly #project: GlProgram<typeof layouts.View>;
+  readonly #quads: GlProgram<typeof QuadsView>;
+  readonly #compose: GlProgram<typeof layouts.Compose>;
+  #probe: GlProgram<typeof ProbeView> | undefined;
+  readonly #corners: WebGLVertexArrayObject;
+  readonly #indices: WebGLBuffer;
+  readonly #shapes: WebGLTexture;
+  readonly #paints: WebGLTexture;
+  readonly #order: WebGLTexture;
+  readonly #splats: WebGLFramebuffer;
+  /** Splats in the order. */
+  #count = 0;
+  #accumulation: Accumulation | undefined;
+  /** The last frame: as it is shown, and as it was drawn. */
+  #last: { readonly camera: Camera; readonly drawn: Camera } | undefined;
+  /** What the splats were last projected with. */
+  #projected = '';
+
+  /**
+   * @throws GaussianSplatError `unsupported/webgl` if the browser does not compile the shaders, `out-of-memory/allocation`
+   */
+  constructor(gl: WebGL2RenderingContext, gaussians: GlGaussians) {
+    this.#gl = gl;
+    this.#gaussians = gaussians;
+    this.#project = new GlProgram(gl, [fullScreenVertex, projectFragment], layouts.View, ['geometry', 'harmonics']);
+    this.#quads = new GlProgram(gl, [quadsVertex, quadsFragment], QuadsView, SPLAT_TEXTURES);
+    this.#compose = new GlProgram(gl, [fullScreenVertex, composeFragment], layouts.Compose, ['accumulated']);
+    [this.#corners, this.#indices] = makeCorners(gl);
+    const size = [DATA_WIDTH, rowsOf(gaussians.facts.count)] as const;
+    this.#shapes = makeTexture(gl, gl.RGBA32UI, size);
+    this.#paints = makeTexture(gl, gl.RGBA32UI, size);
+    this.#order = makeTexture(gl, gl.R32UI, size);
+    this.#splats = makeTarget(gl, [this.#shapes, this.#paints]);
+    requireMemory(gl, `scene of ${gaussians.facts.count} splats`);
+  }
+
+  /** Bytes of GPU memory of what is drawn into, the splats not counted. */
+  get byteLength(): number {
+    const { format, width, height } = this.#accumulation ?? { format: 'rgba8unorm', width: 0, height: 0 };
+    return BYTES_PER_PIXEL[format] * width * height;
+  }
+
+  /**
+   * Draws in this order from now on.
+   * @param order numbers of splats from near to far, in whole rows of `DATA_WIDTH`
+   * @param count how many of them count
+   */
+  setOrder(order: Uint32Array, count: number): void {
+    const gl = this.#gl;
+    this.#count = count;
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.#order);
+    const rows = rowsOf(count);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, DATA_WIDTH, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, order);
+  }
+
+  /** Draws one frame, for {@link present}. @throws GaussianSplatError `argument/camera` for a camera out of range, `out-of-memory/allocation` */
+  render(request: GlFrameRequest): void {
+    const { camera, accumulation, resolutionScale } = request;
+    validateCamera(camera);
+    const drawn = scaled(camera, resolutionScale);
+    this.#projectSplats(request, drawn);
+    this.#drawQuads(this.#accumulationOf(camera, accumulation), drawn);
+    this.#last = { camera, drawn };
+  }
+
+  /**
+   * Composes the last frame onto the canvas, from its lower left corner on.
+   * @param background premultiplied
+   */
+  present(background: Rgba = TRANSPARENT): void {
+    if (this.#last === undefined || this.#accumulation === undefined) return;
+    const { camera, drawn } = this.#last;
+    const gl = this.#gl;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, camera.width, camera.height);
+    gl.disable(gl.BLEND);
+    const scale = [drawn.width / camera.width, drawn.height / camera.height];
+    const used = [drawn.width, drawn.height];
+    this.#compose.use({ background, scale, used }, [this.#accumulation.texture]);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /**
+   * Looks into the last frame at single points of it, as `Renderer.probeDepth` does. Waits for the GPU: for clicks and labels, not for every frame.
+   */
+  probe(points: readonly ProbePoint[]): ProbeAnswer[] {
+    const gl = this.#gl;
+    this.#probe ??= new GlProgram(gl, [fullScreenVertex, probeFragment], ProbeView, SPLAT_TEXTURES);
+    return probeSplats({ gl, program: this.#probe, textures: this.#splatTextures, count: this.#count }, points);
+  }
+
+  /** Counts the splats that the last frame drew. Reads all of them back: for panels, not for every frame. */
+  countDrawn(): number {
+    const gl = this.#gl;
+    const rows = rowsOf(this.#gaussians.facts.count);
+    const words = new Uint32Array(4 * DATA_WIDTH * rows);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#splats);
+    gl.readBuffer(gl.COLOR_ATTACHMENT1);
+    gl.readPixels(0, 0, DATA_WIDTH, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+    let count = 0;
+    // The last word is the opacity.
+    for (let at = 3; at < words.length; at += 4) if (words[at] !== 0) count++;
+    return count;
+  }
+
+  /** Frees the GPU memory, but for that of the Gaussians. */
+  destroy(): void {
+    const gl = this.#gl;
+    for (const program of [this.#project, this.#quads, this.#compose, this.#probe]) program?.destroy();
+    for (const texture of [...this.#splatTextures, this.#accumulation?.texture]) gl.deleteTexture(texture ?? null);
+    for (const target of [this.#splats, this.#accumulation?.target]) gl.deleteFramebuffer(target ?? null);
+    gl.deleteVertexArray(this.#corners);
+    gl.deleteBuffer(this.#indices);
+  }
+
+  get #splatTextures(): readonly WebGLTexture[] {
+    return [this.#shapes, this.#paints, this.#order];
+  }
+
+  #projectSplats({ camera, shDegree, filter }: GlFrameRequest, drawn: Camera): void {
+    const what = JSON.stringify([camera, drawn.width, drawn.height, shDegree, filter]);
+    if (what === this.#projected) return;
+    this.#projected = what;
+    const gl = this.#gl;
+    const { facts, geometry, sh } = this.#gaussians;
+    const pixelArea = (drawn.width * drawn.height) / (camera.width * camera.height);
+    const { antialiased, filterVariance = constants.DILATION } = filter ? SPLAT_FILTERS[filter] : facts;
+    const values = {
+      ...cameraValues(drawn, facts.origin, filterVariance * pixelArea),
+      ...{ splat_count: facts.count, page: 0, first_group: 0 },
+      ...{ sh_degree: facts.shDegree, sh_cap: shDegree, sh_encoding: SH_PRECISION[facts.shPrecision] },
+      ...{ antialiased: antialiased ? 1 : 0, key_bits: 32 },
+      ...{ has_detail: 0, detail: 0, detail_fade: 0, splat_budget: 0 },
+      ...{ opacity: 1, crop_low: EVERYWHERE.map((side) => -side), crop_high: EVERYWHERE },
+    };
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#splats);
+    gl.viewport(0, 0, DATA_WIDTH, rowsOf(facts.count));
+    gl.disable(gl.BLEND);
+    this.#project.use(values, [geometry, sh]);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  #drawQuads({ target }: Accumulation, { width, height }: Camera): void {
+    const gl = this.#gl;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    gl.viewport(0, 0, width, height);
+    // Nothing painted yet: black, and all light still to come from behind.
+    gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 1]);
+    if (this.#count === 0) return;
+    gl.enable(gl.BLEND);
+    gl.blendFuncSeparate(gl.ONE, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE_MINUS_SRC_ALPHA);
+    this.#quads.use({ viewport: [width, height], count: this.#count, unused: 0 }, this.#splatTextures);
+    gl.bindVertexArray(this.#corners);
+    const batches = Math.ceil(this.#count / QUAD_BATCH);
+    gl.drawElementsInstanced(gl.TRIANGLES, QUAD_BATCH * INDICES_PER_QUAD, gl.UNSIGNED_SHORT, 0, batches);
+    gl.bindVertexArray(null);
+  }
+
+  /** Of the canvas's size, whatever share of it is drawn: nothing is allocated while only the camera moves. */
+  #accumulationOf({ width, height }: Camera, wanted: AccumulationFormat): Accumulation {
+    const gl = this.#gl;
+    const format = blendable(gl, wanted);
+    const old = this.#accumulation;
+    if (old?.width === width && old.height === height && old.format === format) return old;
+    if (old) {
+      gl.deleteFramebuffer(old.target);
+      gl.deleteTexture(old.texture);
+    }
+    const names = { rgba8unorm: gl.RGBA8, rgba16float: gl.RGBA16F, rgba32float: gl.RGBA32F };
+    const texture = makeTexture(gl, names[format], [width, height]);
+    requireMemory(gl, `frame of ${width} x ${height} pixels`);
+    return (this.#accumulation = { texture, target: makeTarget(gl, [texture]), format, width, height });
+  }
+}
+
+/** Two triangles for each quad of a batch: corners 0, 1, 2 and 2, 1, 3. */
+function makeCorners(gl: WebGL2RenderingContext): [WebGLVertexArrayObject, WebGLBuffer] {
+  const corners = gl.createVertexArray();
+  const indices = gl.createBuffer();
+  gl.bindVertexArray(corners);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
+  const numbers = Uint16Array.from(
+    { length: QUAD_BATCH * INDICES_PER_QUAD },
+    (_, i) => 4 * Math.floor(i / INDICES_PER_QUAD) + [0, 1, 2, 2, 1, 3][i % INDICES_PER_QUAD],
+  );
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, numbers, gl.STATIC_DRAW);
+  gl.bindVertexArray(null);
+  return [corners, indices];
+}

@@ -1,0 +1,22 @@
+// `rasterize_quads` on what `project` of WebGL has left.
+#import shared/plain_quad
+#import shared/plan
+#import webgl/projected_splats
+
+@group(0) @binding(0) var<uniform> raster: QuadsView;
+
+struct QuadsView {
+  // Pixels.
+  viewport: vec2f,
+  // Splats in the order.
+  count: u32,
+  unused: u32,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) vertex_index: u32, @builtin(instance_index) instance: u32) -> Quad {
+  let rank = instance * QUAD_BATCH + vertex_index / 4u;
+  let s = splat_at(raster.count - 1u - min(rank, raster.count - 1u));
+  if (rank >= raster.count || s.paint.w == 0u) { return no_quad(); }
+  return quad_of(s, vertex_index);
+}

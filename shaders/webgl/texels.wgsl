@@ -1,0 +1,6 @@
+// WebGL has no buffers that shaders read: arrays lie in textures of this width, row by row.
+const DATA_WIDTH = 4096u;
+
+fn texel_of(i: u32) -> vec2u {
+  return vec2u(i % DATA_WIDTH, i / DATA_WIDTH);
+}

@@ -1,0 +1,306 @@
+/** The element where there is no WebGPU, or where a page asks for WebGL: the same scene, camera, events and questions. */
+import '@gaussian-splat/element';
+import type { SplatMeshElement, SplatSceneElement } from '@gaussian-splat/element/scenes.js';
+import { GaussianSplatElement as ElementClass, type GaussianSplatElement } from '@gaussian-splat/element';
+import {
+  assert,
+  assertEqual,
+  claimFault,
+  COMPASS,
+  delay,
+  FIXTURES,
+  frames,
+  nextEvent,
+  show,
+  showLoaded,
+  until,
+} from './support/harness.js';
+
+const GIF = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';
+const STILL = { 'interpolation-decay': '0', 'interaction-prompt': 'none' };
+const WEBGL = { renderer: 'webgl', 'camera-orbit': '0deg 90deg 8m', ...STILL };
+/** dB between two renderers' pictures of 8 bits. */
+const LEAST_DB = 50;
+
+/** Contexts that the element has asked for, and what they have drawn. */
+const contexts: WebGL2RenderingContext[] = [];
+let draws = 0;
+const getContext = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function watching(this: HTMLCanvasElement, ...args: unknown[]) {
+  const context = getContext.apply(this, args as Parameters<typeof getContext>);
+  if (context instanceof WebGL2RenderingContext && !contexts.includes(context)) contexts.push(context);
+  return context;
+} as typeof getContext;
+const drawElements = WebGL2RenderingContext.prototype.drawElementsInstanced;
+WebGL2RenderingContext.prototype.drawElementsInstanced = function counting(...args) {
+  draws++;
+  drawElements.apply(this, args);
+};
+
+const pixelsOf = async (element: GaussianSplatElement): Promise<Uint8ClampedArray> => pixelsIn(await element.toBlob());
+
+async function pixelsIn(picture: Blob): Promise<Uint8ClampedArray> {
+  const image = await createImageBitmap(picture);
+  const canvas = new OffscreenCanvas(image.width, image.height);
+  const context = canvas.getContext('2d')!;
+  context.drawImage(image, 0, 0);
+  const { data } = context.getImageData(0, 0, image.width, image.height);
+  // Colours of what is all but transparent have no meaning without it.
+  return data.map((value, i) => (i % 4 === 3 ? value : (value * data[i | 3]) / 255));
+}
+
+function decibels(a: Uint8ClampedArray, b: Uint8ClampedArray): number {
+  assertEqual(a.length, b.length, 'pixels');
+  assert(
+    b.some((value) => value !== b[0]),
+    'an empty picture',
+  );
+  const sum = a.reduce((total, value, i) => total + (value - b[i]) ** 2, 0);
+  return sum === 0 ? Infinity : 10 * Math.log10((255 ** 2 * a.length) / sum);
+}
+
+async function withoutGpu(test: () => Promise<void>): Promise<void> {
+  Object.defineProperty(navigator, 'gpu', { configurable: true, value: undefined });
+  try {
+    await test();
+  } finally {
+    Reflect.deleteProperty(navigator, 'gpu');
+  }
+}
+
+async function assertSame(attributes: Readonly<Record<string, string>>): Promise<void> {
+  const pictures = [];
+  for (const renderer of ['webgl', 'webgpu']) {
+    const element = await showLoaded({ ...WEBGL, ...attributes, renderer });
+    assertEqual([element.statistics?.renderer, element.stats?.renderer], [renderer, renderer], 'renderer');
+    pictures.push(await pixelsOf(element));
+    element.remove();
+  }
+  const found = decibels(pictures[0], pictures[1]);
+  assert(found >= LEAST_DB, `${JSON.stringify(attributes)}: ${found.toFixed(1)} dB from WebGPU's picture`);
+}
+
+describe('renderer="webgl"', () => {
+  it("draws WebGPU's picture, from all sides", async () => {
+    for (const orbit of ['0deg 90deg 8m', '130deg 60deg 5m', '-75deg 120deg 2m'])
+      await assertSame({ 'camera-orbit': orbit });
+    await assertSame({ quality: 'reference', 'max-sh-degree': '1', src: '/demo/dist/scenes/skull.spz' });
+  });
+
+  it('draws with the filter that the page names', async () => {
+    for (const filter of ['classic', 'antialiased', 'mip'])
+      await assertSame({ filter, 'camera-orbit': '30deg 75deg 20m' });
+  });
+
+  it('pictures of any size, over a colour, are those of WebGPU', async () => {
+    const options = { width: 333, height: 111, background: 'rgb(40 80 120)' };
+    const taken = [];
+    for (const renderer of ['webgl', 'webgpu']) {
+      const element = await showLoaded({ ...WEBGL, renderer });
+      const before = await pixelsOf(element);
+      const picture = await pixelsIn(await element.toBlob(options));
+      assertEqual(picture.length, 4 * 333 * 111, 'values');
+      assert(
+        picture.every((value, i) => i % 4 !== 3 || value === 255),
+        'nothing is transparent',
+      );
+      assertEqual(decibels(await pixelsOf(element), before), Infinity, 'the picture on show stays');
+      taken.push(picture);
+      element.remove();
+    }
+    const found = decibels(taken[0], taken[1]);
+    assert(found >= LEAST_DB, `${found.toFixed(1)} dB`);
+  });
+
+  it('flights move its camera', async () => {
+    const element = await showLoaded(WEBGL);
+    await element.flyTo({ orbit: '90deg 70deg 6m' }, { duration: 200 });
+    assert(Math.abs(element.getCameraOrbit().theta - Math.PI / 2) < 1e-6, String(element.getCameraOrbit()));
+    await delay(200);
+    assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the picture');
+  });
+
+  it('a picture that is read at once is of the camera of now', async () => {
+    const element = await showLoaded(WEBGL);
+    element.setAttribute('camera-orbit', '180deg 70deg 6m');
+    element.jumpCameraToGoal();
+    const atOnce = await pixelsOf(element);
+    await delay(300);
+    assertEqual(decibels(await pixelsOf(element), atOnce), Infinity, 'dB between at once and later');
+  });
+
+  it('a turn is drawn, with the order of the new view, and then nothing more', async () => {
+    const element = await showLoaded(WEBGL);
+    const canvas = (): HTMLCanvasElement => element.shadowRoot!.querySelector('canvas')!;
+    element.setAttribute('camera-orbit', '180deg 70deg 6m');
+    await delay(500);
+    // A canvas of copies can be read at any time.
+    const shown = canvas().toDataURL();
+    assertEqual(shown, element.toDataURL(), 'the picture on the screen');
+    await frames(3);
+    const before = draws;
+    await delay(500);
+    assertEqual(draws, before, 'frames of an idle page');
+  });
+
+  it('picks the point under the pointer, hides hotspots that the scene hides', async () => {
+    document.body.style.margin = '0';
+    const element = await showLoaded(WEBGL, 'width: 200px; height: 160px');
+    const label = (name: string, position: string): HTMLElement => {
+      const button = document.createElement('button');
+      button.slot = `hotspot-${name}`;
+      button.dataset.position = position;
+      element.append(button);
+      return button;
+    };
+    label('front', '0 0 1');
+    label('behind', '0 0 -1');
+    const point = await element.positionFromPoint(100, 80);
+    assert(point && Math.hypot(point.x, point.y, point.z - 1) < 0.03, `found ${String(point)}`);
+    assertEqual(await element.positionFromPoint(2, 2), null, 'beside the scene');
+    await until(() => element.queryHotspot('hotspot-front')?.visible === true, 'the label in front');
+    await until(() => element.queryHotspot('hotspot-behind')?.visible === false, 'the label behind');
+    assertEqual((await element.updateStats())?.drawn, element.statistics?.splats, 'splats drawn');
+  });
+
+  it('follows its size, and another renderer', async () => {
+    const element = await showLoaded(WEBGL);
+    element.style.width = '180px';
+    await until(() => element.shadowRoot!.querySelector('canvas')!.width === 180, 'the new size');
+    await delay(200);
+    const webgl = await pixelsOf(element);
+    for (const renderer of ['webgpu', 'webgl']) {
+      element.setAttribute('renderer', renderer);
+      await nextEvent(element, 'load');
+      assertEqual(element.statistics?.renderer, renderer, 'renderer');
+      const found = decibels(await pixelsOf(element), webgl);
+      assert(found >= LEAST_DB, `${renderer}: ${found} dB`);
+    }
+  });
+
+  it('a lost context comes back with the same picture', async () => {
+    const element = await showLoaded(WEBGL);
+    const before = await pixelsOf(element);
+    const restored = nextEvent(element, 'contextrestored');
+    const lost = nextEvent(element, 'contextlost');
+    contexts.at(-1)?.getExtension('WEBGL_lose_context')?.loseContext();
+    await lost;
+    await restored;
+    assertEqual(decibels(await pixelsOf(element), before), Infinity, 'dB');
+    assertEqual(element.statistics?.renderer, 'webgl', 'renderer');
+  });
+
+  it('many elements share one context, which is given back', async () => {
+    const first = contexts.length;
+    const elements = await Promise.all(Array.from({ length: 20 }, () => showLoaded({ ...WEBGL, loading: 'eager' })));
+    const pictures = await Promise.all(elements.map(pixelsOf));
+    for (const picture of pictures) assertEqual(decibels(picture, pictures[0]), Infinity, 'dB');
+    assert(contexts.length - first <= 1, `${contexts.length - first} contexts`);
+    const gl = contexts.at(-1)!;
+    for (const element of elements) element.remove();
+    await until(() => gl.isContextLost(), 'the end of the context');
+  });
+
+  it('where the page refuses workers its own thread sorts', async () => {
+    const original = ElementClass.sceneLoader;
+    const Loader = original.constructor as new (spawn: () => Worker) => typeof original;
+    ElementClass.sceneLoader = new Loader(() => {
+      throw new Error('refused');
+    });
+    try {
+      const element = await showLoaded(WEBGL);
+      claimFault(/refuses its worker/);
+      element.setAttribute('camera-orbit', '180deg 70deg 6m');
+      await delay(300);
+      assertEqual(element.shadowRoot!.querySelector('canvas')!.toDataURL(), element.toDataURL(), 'the picture');
+    } finally {
+      ElementClass.sceneLoader = original;
+    }
+  });
+
+  it('what it cannot show is an error by name, the poster stays, and nothing is fetched', async () => {
+    const generators = '/tests/fixtures/generators/';
+    const cases: readonly (readonly [Readonly<Record<string, string>>, RegExp])[] = [
+      [{ src: `${generators}packed.onnx` }, /found a generator/],
+      [{ src: '/nowhere/detail.json' }, /found a streamed scene/],
+      [{ src: COMPASS, postprocess: `${generators}post.onnx` }, /found a post-processor/],
+    ];
+    for (const [attributes, text] of cases) {
+      const element = show({ ...WEBGL, ...attributes, poster: GIF });
+      await nextEvent(element, 'error');
+      assertEqual(element.error?.reason, 'unsupported/webgl');
+      assert(text.test(element.error?.message ?? ''), element.error?.message ?? '');
+      await element.updateComplete;
+      assert(element.shadowRoot?.querySelector('.poster:not(.gone) img'), 'the poster is there');
+      assertEqual(element.shadowRoot?.querySelector('[part=fallback], [part=error]'), null, 'nothing over the poster');
+      element.remove();
+    }
+    const fetched = performance
+      .getEntriesByType('resource')
+      .filter(({ name }) => /packed\.onnx|post\.onnx|nowhere/.test(name));
+    assertEqual(fetched.length, 0, 'requests');
+  });
+});
+
+describe('scenes and meshes beside the scene', () => {
+  const CHILDREN = `<splat-scene src="${COMPASS}"></splat-scene><splat-mesh src="/nowhere/unfetched.glb"></splat-mesh>`;
+  const reasonsOf = (element: GaussianSplatElement): (string | undefined)[] =>
+    [...element.querySelectorAll<SplatSceneElement | SplatMeshElement>('splat-scene, splat-mesh')].map(
+      ({ error }) => error?.reason,
+    );
+
+  for (const renderer of ['webgl', 'auto'])
+    it(`renderer="${renderer}": they are an error by name, each, and the poster stays`, async () => {
+      await withoutGpu(async () => {
+        for (const src of [COMPASS, '']) {
+          const element = show({ ...WEBGL, renderer, poster: GIF, ...(src && { src }) });
+          element.innerHTML = CHILDREN;
+          await until(() => reasonsOf(element).every(Boolean), 'errors of the children');
+          await until(() => element.error !== null, 'an error of the element');
+          assertEqual(reasonsOf(element), ['unsupported/webgl', 'unsupported/webgl'], 'reasons');
+          assert(/found a <splat-scene> or <splat-mesh>/.test(element.error!.message), element.error!.message);
+          await element.updateComplete;
+          const root = element.shadowRoot!;
+          assert(root.querySelector('.poster:not(.gone) img'), 'the poster is there');
+          assertEqual(root.querySelector('[part=fallback], [part=error]'), null, 'nothing over the poster');
+          element.remove();
+        }
+      });
+    });
+
+  it('one that comes later is refused, and the scene stays', async () => {
+    const element = await showLoaded(WEBGL);
+    const before = await pixelsOf(element);
+    element.innerHTML = CHILDREN;
+    await until(() => reasonsOf(element).every(Boolean), 'errors of the children');
+    assertEqual(reasonsOf(element), ['unsupported/webgl', 'unsupported/webgl'], 'reasons');
+    assertEqual([element.error, element.loaded], [null, true], 'the scene');
+    assertEqual(decibels(await pixelsOf(element), before), Infinity, 'dB');
+  });
+});
+
+describe('without WebGPU', () => {
+  it('WebGL draws by itself', async () => {
+    await withoutGpu(async () => {
+      const element = await showLoaded({ ...WEBGL, renderer: 'auto', src: `${FIXTURES}compass.ply` });
+      assertEqual(element.statistics?.renderer, 'webgl', 'renderer');
+      assert(element.matches(':state(ready)') && !element.matches(':state(unsupported)'), 'states');
+    });
+  });
+
+  it('nor WebGL: the reason is why there is no WebGPU', async () => {
+    const watched = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = () => null;
+    try {
+      await withoutGpu(async () => {
+        const element = show({ src: `${COMPASS}?unfetched` });
+        await nextEvent(element, 'error');
+        assertEqual(element.error?.reason, 'unsupported/no-webgpu');
+        const fetched = performance.getEntriesByType('resource').filter(({ name }) => name.includes('unfetched'));
+        assertEqual(fetched.length, 0, 'requests');
+      });
+    } finally {
+      HTMLCanvasElement.prototype.getContext = watched;
+    }
+  });
+});

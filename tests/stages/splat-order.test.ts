@@ -1,0 +1,57 @@
+/** The order that a worker finds for the WebGL renderer, against a plain sort. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { isSameView, orderView, SplatOrder, type OrderView } from '@gaussian-splat/renderer/webgl';
+import { cameraAt } from '../support/scenes.js';
+
+/** Ascending depth as float32, equal ones by number. */
+function plainOrder(positions: Float32Array, { axis: [x, y, z], offset, near, far }: OrderView): number[] {
+  const depths = Array.from({ length: positions.length / 3 }, (_, i) => {
+    const depth = x * positions[3 * i] + y * positions[3 * i + 1] + z * positions[3 * i + 2] + offset;
+    return { i, depth, key: Math.fround(depth) };
+  });
+  return depths
+    .filter(({ depth }) => depth >= near && depth <= far)
+    .sort((a, b) => a.key - b.key || a.i - b.i)
+    .map(({ i }) => i);
+}
+
+function sorted(positions: Float32Array, view: OrderView): number[] {
+  const order = new Uint32Array(positions.length / 3 + 5).fill(7);
+  return [...order.subarray(0, new SplatOrder(positions).sort(view, order))];
+}
+
+const camera = cameraAt([0.3, -1, -3], [0, 0, 1]);
+/** Coordinates with few different values, so that depths repeat; some of them are no numbers. */
+const hostile = Float32Array.from({ length: 3 * 5000 }, (_, i) =>
+  i % 997 === 0 ? [NaN, Infinity, -Infinity][i % 3] : Math.round(40 * Math.sin(i * i)) / 10,
+);
+const random = Float32Array.from({ length: 3 * 20_000 }, (_, i) => 5 * Math.sin(12.9898 * i * (i + 1)));
+
+test('as a plain sort has it', () => {
+  for (const positions of [random, hostile, new Float32Array(0), Float32Array.of(0, 0, 0)])
+    for (const origin of [[0, 0, 0] as const, [1e6, -2e5, 3e5] as const]) {
+      const moved = { ...camera, far: 6 };
+      const view = orderView({ ...moved, worldToCamera: movedBy(moved.worldToCamera, origin) }, origin);
+      assert.deepEqual(sorted(positions, view), plainOrder(positions, view));
+    }
+});
+
+test('the same again with the same view, another with another', () => {
+  const order = new SplatOrder(random);
+  const target = new Uint32Array(random.length / 3);
+  const a = orderView(camera, [0, 0, 0]);
+  const b = orderView(cameraAt([3, 0, 0], [0, 0, 0]), [0, 0, 0]);
+  assert.ok(isSameView(a, orderView(camera, [0, 0, 0])) && !isSameView(a, b));
+  const first = target.slice(0, order.sort(a, target));
+  order.sort(b, target);
+  assert.notDeepEqual(target.slice(0, first.length), first);
+  assert.deepEqual(target.slice(0, order.sort(a, target)), first);
+});
+
+/** The matrix of the same view of a world that has been moved. */
+function movedBy(m: ArrayLike<number>, [x, y, z]: readonly [number, number, number]): number[] {
+  return Array.from(m, (value, i) =>
+    i < 12 && i % 4 === 3 ? value - (m[i - 3] * x + m[i - 2] * y + m[i - 1] * z) : value,
+  );
+}
