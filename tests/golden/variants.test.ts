@@ -1,6 +1,7 @@
 /** Variants of the stages draw one image; those that a device is served best with are found by measuring. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
+import { setTimeout as delay } from 'node:timers/promises';
 import {
   capture,
   chooseVariants,
@@ -60,8 +61,12 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
   const entries = new Map<string, string>();
   const store = storeOf(entries);
   const first = await adapter.requestDevice();
-  const chosen = await chooseVariants(first, { store });
+  performance.clearMeasures();
+  const chosen = await chooseVariants(first, { store, pause: () => delay(20) });
   await assertSuits(first, chosen);
+  const [search] = performance.getEntriesByName('gaussian-splat.search') as PerformanceMeasure[];
+  const { paused } = search.detail as { paused: number };
+  assert.ok(paused >= 19 && search.duration > paused, `${search.duration} ms, of which ${paused} of pauses`);
   assert.equal(entries.size, 1);
   const [key] = entries.keys();
   // Another that is right, as a visit may have left it.
@@ -71,6 +76,7 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
       : { ...chosen, rasterizer: chosen.rasterizer === 'tiles' ? 'quads' : 'tiles' };
   entries.set(key, JSON.stringify(other));
   assert.deepEqual(await chooseVariants(await newDevice(), { store }), other);
+  assert.equal(performance.getEntriesByName('gaussian-splat.search').length, 1, 'what is kept is not searched for');
   for (const damage of ['{', 'null', '{"rasterizer":"crayons"}']) {
     entries.set(key, damage);
     const device = await newDevice();
