@@ -27,6 +27,8 @@ const TIMING = [
   'tests/generator/browser/element.test.ts',
   'tests/generator/browser/instances.test.ts',
   'tests/generator/browser/orbit.test.ts',
+  // It ends the GPU process of the browser, which all pages share.
+  'tests/stability/browser/gpu-crash.test.ts',
 ];
 /** Runs in a browser of its own, whose screen is dense. */
 const DENSE = 'tests/element/browser/high-density.test.ts';

@@ -12,7 +12,7 @@ import {
   startVariants,
   type Variants,
 } from '@gaussian-splat/renderer';
-import { givesKnownAnswer, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
+import { givesKnownAnswer, mortonOrder, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { onlyInFull } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
@@ -51,8 +51,12 @@ test('the spheres that variants are judged by are packed as files are', () => {
     [4_000, 0.46],
   ]) {
     const cloud = sphereCloud(count, size);
-    assert.deepEqual(packSpheres(cloud, 'float16'), packGaussians(cloud, { sh: 'float16' }));
-    assert.deepEqual(packSpheres(cloud, 'int8'), packGaussians(cloud));
+    const order = mortonOrder(
+      cloud.positions,
+      Uint32Array.from({ length: count }, (_, i) => i),
+    );
+    assert.deepEqual(packSpheres(cloud, 'float16', order), packGaussians(cloud, { sh: 'float16' }));
+    assert.deepEqual(packSpheres(cloud, 'int8', order), packGaussians(cloud));
   }
 });
 
