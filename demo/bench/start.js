@@ -76,6 +76,16 @@ async function untilChosen() {
   return performance.now() - begun;
 }
 
+/**
+ * What a visit's page noted of the choice: milliseconds of trying the likely variants before its first picture, and of the search, without its pauses;
+ * undefined for what was not done.
+ */
+function choiceTimes({ contentWindow: { performance } }) {
+  const [start] = performance.getEntriesByName('gaussian-splat.start');
+  const [search] = performance.getEntriesByName('gaussian-splat.search');
+  return { startMs: start?.duration, searchMs: search && search.duration - search.detail.paused };
+}
+
 function show(visits) {
   const cells = (name, values) =>
     element(
@@ -84,10 +94,17 @@ function show(visits) {
       values.map((textContent) => element(name, { textContent })),
     );
   const ms = (value) => (value === undefined ? '' : Math.round(value).toLocaleString('en'));
-  const rows = visits.map(({ previewMs, shownMs, chosenMs }, i) =>
-    cells('td', [i === 0 ? 'first' : 'later', ms(previewMs), ms(shownMs), ms(chosenMs)]),
+  const rows = visits.map(({ previewMs, shownMs, chosenMs, startMs, searchMs }, i) =>
+    cells('td', [i === 0 ? 'first' : 'later', ...[previewMs, shownMs, startMs, chosenMs, searchMs].map(ms)]),
   );
-  const head = cells('th', ['visit', 'first preview, ms', 'whole picture, ms', 'then until the choice is made, ms']);
+  const head = cells('th', [
+    'visit',
+    'first preview, ms',
+    'whole picture, ms',
+    'of it trial of what is likely, ms',
+    'then until the choice is made, ms',
+    'of it search without pauses, ms',
+  ]);
   const table = element('table', {}, [element('thead', {}, [head]), element('tbody', {}, rows)]);
   document.getElementById('results').replaceChildren(table);
 }
@@ -103,7 +120,8 @@ async function main() {
     for (let i = 0; i < plan.visits; i++) {
       showProgress(`visit ${i + 1} of ${plan.visits}`);
       const { frame, ...times } = await visit(plan);
-      visits.push({ ...times, chosenMs: i === 0 ? await untilChosen() : undefined });
+      const chosenMs = i === 0 ? await untilChosen() : undefined;
+      visits.push({ ...times, chosenMs, ...choiceTimes(frame) });
       frame.remove();
       show(visits);
     }

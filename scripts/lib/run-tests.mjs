@@ -21,13 +21,14 @@ const ESLINT = ['node_modules/eslint/bin/eslint.js', '.'];
  */
 export async function runTests({ node, browser }, { env, isStatic = false, failsUnsteady = false }) {
   const isBeside = browser.length > 0;
-  const { sharing, alone } = byProcess(node);
+  const { sharing, together, alone } = byProcess(node);
   const options = { env: { ...env, NODE_ENV: 'test' }, isBeside };
   const results = await Promise.all([
     runBrowser(byGroup(browser), { ...options, isBeside: false }, failsUnsteady),
     runSharing(sharing, options),
     runAlone(alone, isBeside ? 1 : 2, options).then(async (counts) => [
       counts,
+      await runSharing(together, options),
       ...(isStatic ? await runStatic(options) : []),
     ]),
   ]);
@@ -38,7 +39,7 @@ function sum(a, b) {
   return { passed: a.passed + b.passed, failed: a.failed + b.failed, skipped: a.skipped + b.skipped };
 }
 
-/** Files that draw, on one device. */
+/** Files in one process, and those that draw on one device. */
 function runSharing(files, options) {
   return runNode(
     [IN_ONE_PROCESS],

@@ -27,6 +27,8 @@ const TIMING = [
   'tests/generator/browser/element.test.ts',
   'tests/generator/browser/instances.test.ts',
   'tests/generator/browser/orbit.test.ts',
+  // It ends the GPU process of the browser, which all pages share.
+  'tests/stability/browser/gpu-crash.test.ts',
 ];
 /** Runs in a browser of its own, whose screen is dense. */
 const DENSE = 'tests/element/browser/high-density.test.ts';
@@ -40,6 +42,11 @@ const OWN_PROCESS = [
   'tests/golden/world.test.ts',
 ];
 const TAKES_DEVICE = /from '[./]*support\/(node-device|read-rows|draw-until-calm|work-counters)\.js'/;
+
+/** Files of Node without a device that leave their process as it was share another: to start one takes longer than most of them. */
+const SHARES_PROCESS = /^tests\/(check|contract|element|formats|generator|onnx|oracle)\//;
+const CHANGES_PROCESS =
+  /\b(globalThis|mock|memoryUsage)\b|\bprocess\.(?!platform|execPath|cwd|env\.\w+\b(?! =))|performance\.now =|support\/(node-device|devices)|node-gpu/;
 
 /** Where the tests of each package are; those of demo and documents are the site's. */
 export const TESTS_OF = {
@@ -69,13 +76,15 @@ export const isLaboratory = (file) => LABORATORY.some((pattern) => pattern.test(
 export const hasBreadth = (file) =>
   /\bonlyInLab\b|\bisLab\b|SITE === 'full'/.test(readFileSync(join(root, file), 'utf8'));
 
-/** Files of Node: those that can share a device, and those that have a process each. */
+/** Files of Node: those that share a device, those that share a process, and those that have one each. */
 export function byProcess(files) {
-  const shares = (file) =>
-    SHARES_DEVICE.test(file) &&
-    !OWN_PROCESS.includes(file) &&
-    TAKES_DEVICE.test(readFileSync(join(root, file), 'utf8'));
-  return { sharing: files.filter(shares), alone: files.filter((file) => !shares(file)) };
+  const kindOf = (file) => {
+    const text = readFileSync(join(root, file), 'utf8');
+    if (SHARES_DEVICE.test(file) && !OWN_PROCESS.includes(file) && TAKES_DEVICE.test(text)) return 'sharing';
+    return SHARES_PROCESS.test(file) && !CHANGES_PROCESS.test(text) ? 'together' : 'alone';
+  };
+  const ofKind = (kind) => files.filter((file) => kindOf(file) === kind);
+  return { sharing: ofKind('sharing'), together: ofKind('together'), alone: ofKind('alone') };
 }
 
 /** Files of Chromium by group, in the order in which the groups run. */

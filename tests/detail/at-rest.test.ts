@@ -87,9 +87,12 @@ test('within a budget of splats and a pool that is full, a view at rest comes to
   [drawing, picture].forEach((owner) => owner.destroy());
 });
 
+/** Pages of a copy that are finer than its coarsest, nearly all of them. */
+const MOST_OF_A_COPY = 8;
+
 for (const isOne of [false, true]) {
   test(`two views of one scene, ${isOne ? 'by one renderer' : 'by a renderer each'}: both have what they need at rest, and come to rest; while one moves the other has, too`, async () => {
-    const folder = detailFolder(pebbles(20_000), [
+    const folder = detailFolder(pebbles(8_000), [
       [0, 0, 0],
       [60, 0, 0],
     ]);
@@ -110,8 +113,9 @@ for (const isOne of [false, true]) {
         drawing[1].render({ gaussians: scene, camera: still, target: picture, detail: 0.3 });
       };
       if (isMoving) {
-        // As many as pages take to be asked for, fetched and placed: more where other tests share the processor.
-        for (let frame = 0; frame < 240 || (frame < 2400 && copiesOf(scene).some((pages) => pages <= 20)); frame++) {
+        // As many as pages take to be asked for, fetched and placed, more where other tests share the processor; and some in which they might leave again.
+        const isThere = (): boolean => copiesOf(scene).every((pages) => pages >= MOST_OF_A_COPY);
+        for (let [frame, after] = [0, 0]; after < 40 && frame < 2400; after += isThere() ? 1 : 0, frame++) {
           draw();
           await (await anyDevice()).queue.onSubmittedWorkDone();
           await pause(4);
@@ -123,7 +127,7 @@ for (const isOne of [false, true]) {
       }
       const copies = copiesOf(scene);
       console.log(`${isMoving ? 'one moves' : 'at rest'}: ${copies.join(' and ')} pages`);
-      assert.ok(copies[0] > 20 && copies[1] > 20, `pages of the copies: ${copies.join()}`);
+      assert.ok(Math.min(...copies) >= MOST_OF_A_COPY, `pages of the copies: ${copies.join()}`);
       scene.destroy();
     }
     [picture, ...new Set(drawing)].forEach((owner) => owner.destroy());

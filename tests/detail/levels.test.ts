@@ -15,6 +15,7 @@ import {
 } from '@gaussian-splat/renderer';
 import { constants, NONE, SLOT_CHUNKS } from '@gaussian-splat/renderer/stages';
 import { needsSharedData, sharedFile } from '../support/data.js';
+import { onlyInLab } from '../support/extent.js';
 import { checkBoxes } from '../support/covered-boxes.js';
 import { randomSource } from '../support/gpu.js';
 import { heaps } from '../support/scenes/heaps.js';
@@ -185,7 +186,7 @@ test('a pool without room for the coarsest levels is refused, and so are pages o
 
 test(
   'a real streamed scene, from a small pool without a hole, and from one with room for all as loaded whole',
-  { skip: needsSharedData },
+  { skip: needsSharedData || onlyInLab },
   async () => {
     const folder = 'scenes/playbot-streamed/';
     const device = await anyDevice();

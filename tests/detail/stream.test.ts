@@ -15,6 +15,7 @@ import {
 } from '@gaussian-splat/renderer';
 import { constants, listPages, NONE, SLOT_CHUNKS, Residency } from '@gaussian-splat/renderer/stages';
 import { detailFolder, type DetailFolder } from '../support/detail-folder.js';
+import { isLab } from '../support/extent.js';
 import { shareDrawn, type DetailView } from '../support/detail-twin.js';
 import { randomSource } from '../support/gpu.js';
 import { psnr } from '../support/metrics.js';
@@ -107,7 +108,7 @@ function below(
 }
 
 for (const [name, source] of [
-  ['one tree', detailFolder(pebbles(60_000))] as const,
+  ['one tree', detailFolder(pebbles(isLab ? 60_000 : 30_000))] as const,
   [
     'copies of a tree',
     detailFolder(
@@ -166,7 +167,7 @@ test('in a flight, with pages that come in any order and leave before they have 
   const target = device.createTexture({ size: [96, 64], format: 'rgba8unorm', usage: 0x10 });
   let [arriving, exchanged] = [0, 0];
   let before = new Set<number>();
-  for (let frame = 0; frame < 90; frame++) {
+  for (let frame = 0; frame < (isLab ? 90 : 60); frame++) {
     const camera = flightOver(frame);
     renderer.render({ gaussians: scene, camera, target, detail: 0.2, splatBudget: 30_000 });
     await device.queue.onSubmittedWorkDone();
@@ -197,7 +198,8 @@ test('a view that turns to the scene lacks nothing, though hardly anything was v
     renderer.render({ gaussians: scene, camera, target, detail: 4, splatBudget: 150_000 });
     await device.queue.onSubmittedWorkDone();
   };
-  for (let frame = 0; frame < 24; frame++) await look([-300, -5, 50]);
+  // Room is looked at every 16 frames.
+  for (let frame = 0; frame < 18; frame++) await look([-300, -5, 50]);
   const away = await renderer.statistics();
   await look([50, 0, 50]);
   const towards = await renderer.statistics();

@@ -4,7 +4,8 @@ import { test } from 'node:test';
 import fc from 'fast-check';
 import { DisplayInterval } from '../../packages/element/src/pace/display-interval.js';
 import { LADDER } from '../../packages/element/src/pace/ladder.js';
-import { INITIAL_PACE, keepPace } from '../../packages/element/src/pace/pace.js';
+import { keepPace } from '../../packages/element/src/pace/pace.js';
+import { INITIAL_PACE } from '../../packages/element/src/pace/start.js';
 import { COSTS, LEVELS, p95, restlessWindows, reversals, run } from '../support/pace-gpu.js';
 
 const LOWEST = COSTS.length - 1;

@@ -26,15 +26,25 @@ const OWN_BYTES = 100e6;
 const folder = mkdtempSync(join(tmpdir(), 'budget-'));
 after(() => rmSync(folder, { recursive: true }));
 
-/** Reads a file with the heap of a small device. */
-function measured({ file, beside }: Multiplied): { cpuMs: number; peak: number; result: string } {
-  const [path, other] = [join(folder, 'file'), join(folder, 'beside')];
-  writeFileSync(path, file);
-  if (beside) writeFileSync(other, beside);
-  const options = ['--max-old-space-size=300', '--import', 'tsx', SCRIPT, path, beside ? other : ''];
-  const { stdout, stderr } = spawnSync(process.execPath, options, { encoding: 'utf8', timeout: 120_000 });
-  assert.notEqual(stdout, '', stderr.slice(-400));
-  return JSON.parse(stdout) as ReturnType<typeof measured>;
+interface Cost {
+  readonly cpuMs: number;
+  readonly peak: number;
+  readonly result: string;
+}
+
+/** Reads files, one after the other, with the heap of a small device. */
+function measured(all: readonly Multiplied[]): Cost[] {
+  const paths = all.flatMap(({ file, beside }, k) => {
+    const [path, other] = [join(folder, `file${k}`), join(folder, `beside${k}`)];
+    writeFileSync(path, file);
+    if (beside) writeFileSync(other, beside);
+    return [path, beside ? other : ''];
+  });
+  const options = ['--max-old-space-size=300', '--import', 'tsx', SCRIPT, ...paths];
+  const { stdout, stderr } = spawnSync(process.execPath, options, { encoding: 'utf8', timeout: 240_000 });
+  const lines = stdout.trim().split('\n');
+  assert.equal(lines.length, all.length, stderr.slice(-400));
+  return lines.map((line) => JSON.parse(line) as Cost);
 }
 
 for (const [name, multiply] of Object.entries(MULTIPLIED)) {
@@ -46,8 +56,10 @@ for (const [name, multiply] of Object.entries(MULTIPLIED)) {
       if (bytes > MOST_FILE_BYTES) break;
       sized.push({ factor, made, bytes });
     }
-    for (const { factor, made, bytes } of isLab ? sized : sized.filter((_, k) => k === 1 || k === sized.length - 1)) {
-      const { cpuMs, peak, result } = measured(made);
+    const read = isLab ? sized : sized.filter((_, k) => k === 1 || k === sized.length - 1);
+    const costs = measured(read.map(({ made }) => made));
+    for (const [k, { factor, bytes }] of read.entries()) {
+      const { cpuMs, peak, result } = costs[k];
       const what = `${factor} times, ${bytes} bytes: ${result}, ${Math.round(cpuMs)} ms, ${Math.round(peak / 1e6)} MB`;
       context.diagnostic(what);
       assert.doesNotMatch(result, /unnamed|undefined/, what);

@@ -7,7 +7,7 @@ import { renderOracle, type Mode, type OracleOptions } from '../oracle/oracle.js
 import { RULES, type Rules } from '../oracle/rules.js';
 import { referenceImage, referenceViews, type ReferenceView } from '../support/cameras.js';
 import { needsSharedData, sharedFile } from '../support/data.js';
-import { isFull } from '../support/extent.js';
+import { isFull, onlyInLab } from '../support/extent.js';
 import { maxAbs, psnr, shareAbove } from '../support/metrics.js';
 
 /**
@@ -89,7 +89,7 @@ const WRONG: readonly { readonly name: string; readonly view: string; readonly r
   { name: "INRIA's footprint", view: 'playbot3 0', rules: { footprint: 'tiles' } },
 ];
 
-describe('the reference images refuse an oracle that is slightly wrong', { skip: needsSharedData }, () => {
+describe('the reference images refuse an oracle that is slightly wrong', { skip: needsSharedData || onlyInLab }, () => {
   const views = needsSharedData ? [] : referenceViews();
   const viewNamed = (name: string): ReferenceView => {
     const view = views.find((candidate) => candidate.name === name);

@@ -1,6 +1,7 @@
 /** Variants of the stages draw one image; those that a device is served best with are found by measuring. */
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
+import { setTimeout as delay } from 'node:timers/promises';
 import {
   capture,
   chooseVariants,
@@ -11,7 +12,7 @@ import {
   startVariants,
   type Variants,
 } from '@gaussian-splat/renderer';
-import { givesKnownAnswer, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
+import { givesKnownAnswer, mortonOrder, packSpheres, sphereCloud } from '@gaussian-splat/renderer/stages';
 import { requestNodeAdapter } from '../../packages/cli/src/lib/node-gpu.mjs';
 import { onlyInFull } from '../support/extent.js';
 import { isSwiftShader } from '../support/limit.js';
@@ -50,8 +51,12 @@ test('the spheres that variants are judged by are packed as files are', () => {
     [4_000, 0.46],
   ]) {
     const cloud = sphereCloud(count, size);
-    assert.deepEqual(packSpheres(cloud, 'float16'), packGaussians(cloud, { sh: 'float16' }));
-    assert.deepEqual(packSpheres(cloud, 'int8'), packGaussians(cloud));
+    const order = mortonOrder(
+      cloud.positions,
+      Uint32Array.from({ length: count }, (_, i) => i),
+    );
+    assert.deepEqual(packSpheres(cloud, 'float16', order), packGaussians(cloud, { sh: 'float16' }));
+    assert.deepEqual(packSpheres(cloud, 'int8', order), packGaussians(cloud));
   }
 });
 
@@ -60,8 +65,12 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
   const entries = new Map<string, string>();
   const store = storeOf(entries);
   const first = await adapter.requestDevice();
-  const chosen = await chooseVariants(first, { store });
+  performance.clearMeasures();
+  const chosen = await chooseVariants(first, { store, pause: () => delay(20) });
   await assertSuits(first, chosen);
+  const [search] = performance.getEntriesByName('gaussian-splat.search') as PerformanceMeasure[];
+  const { paused } = search.detail as { paused: number };
+  assert.ok(paused >= 19 && search.duration > paused, `${search.duration} ms, of which ${paused} of pauses`);
   assert.equal(entries.size, 1);
   const [key] = entries.keys();
   // Another that is right, as a visit may have left it.
@@ -71,6 +80,7 @@ test('the choice is made once, kept for the adapter, and made anew from a damage
       : { ...chosen, rasterizer: chosen.rasterizer === 'tiles' ? 'quads' : 'tiles' };
   entries.set(key, JSON.stringify(other));
   assert.deepEqual(await chooseVariants(await newDevice(), { store }), other);
+  assert.equal(performance.getEntriesByName('gaussian-splat.search').length, 1, 'what is kept is not searched for');
   for (const damage of ['{', 'null', '{"rasterizer":"crayons"}']) {
     entries.set(key, damage);
     const device = await newDevice();

@@ -178,7 +178,7 @@ export class GaussianSplatElement extends ViewingMethods {
    * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
    */
   get ready(): Promise<void> {
-    return this.updateComplete.then(() => this.stage.childrenKnown).then(() => this.stage.settled);
+    return this.updateComplete.then(() => this.stage.codeKnown).then(() => this.stage.settled);
   }
 
   /**

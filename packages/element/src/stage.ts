@@ -7,7 +7,7 @@ import type { SceneBounds } from './camera/settings.js';
 import { CameraController } from './controllers/camera-controller.js';
 import { DetailController, type DetailHost } from './controllers/detail-controller.js';
 import type { HotspotController, HotspotHost } from './controllers/hotspot-controller.js';
-import { InputController, type InputHost } from './controllers/input-controller.js';
+import type { InputController, InputHost } from './controllers/input-controller.js';
 import { prefersReducedMotion } from './controllers/mover.js';
 import { PlaybackController, type PlaybackEvent, type PlaybackHost } from './controllers/playback-controller.js';
 import { PrintController } from './controllers/print-controller.js';
@@ -74,7 +74,8 @@ export class Stage
   readonly view: ViewController;
   readonly live: LiveWiring;
   readonly #source: SourceController;
-  readonly #input: InputController;
+  #input: InputController | undefined;
+  #listening: Promise<void> | undefined;
   #tour: Promise<Tour> | undefined;
   #counts: ReadCounts | undefined;
   #children: MutationObserver | undefined;
@@ -101,7 +102,6 @@ export class Stage
     this.behaviours = new Behaviours(element, this);
     new PrintController(element, () => this.drawNow());
     this.queries = new SceneQueries(this);
-    this.#input = new InputController(element, this);
     const onPageVisibility = (): void => this.suspend();
     element.addController({
       hostConnected: () => {
@@ -229,9 +229,25 @@ export class Stage
     );
   }
 
-  /** Fulfils when the code of the element's children is there. */
-  get childrenKnown(): Promise<unknown> {
-    return Promise.all([this.composing, this.#labelling]);
+  /** Listens to mouse, touch and keys: fetched by pages that let people move the camera. */
+  #listen(): void {
+    this.#listening ??= loadModule(
+      'the code for mouse, touch and keys',
+      () => import('./controllers/input-controller.js'),
+    ).then(
+      ({ InputController }) => {
+        this.#input = new InputController(this.element, this);
+      },
+      (error: Error) => {
+        this.#listening = undefined;
+        this.warn(error.message);
+      },
+    );
+  }
+
+  /** Fulfils when the code is there that attributes and children ask for. */
+  get codeKnown(): Promise<unknown> {
+    return Promise.all([this.composing, this.#labelling, this.#listening]);
   }
 
   #showViews(): void {
@@ -317,7 +333,7 @@ export class Stage
 
   /** Fingers have moved the camera, and have no Home key. */
   get offersReset(): boolean {
-    return this.input.enabled && this.isOnShow && this.#input.isTouch && this.camera.isTouched;
+    return this.input.enabled && this.isOnShow && this.#input?.isTouch === true && this.camera.isTouched;
   }
 
   /** Somebody would see the scene. */
@@ -524,6 +540,7 @@ export class Stage
   /** Called after each update of the element. */
   updated(): void {
     if (this.views && this.#tour === undefined) this.#showViews();
+    if (this.input.enabled) this.#listen();
     this.reveal.settle();
     this.detail.update(this.scene.state === 'ready' ? this.scene.scene : null);
   }

@@ -8,6 +8,7 @@ import {
   devices,
   FIXTURES,
   frames,
+  hurry,
   nextEvent,
   show,
   showLoaded,
@@ -230,6 +231,7 @@ describe('the loss of the device', () => {
   });
 
   it('is followed by a picture once the browser has a device again, without a reload', async () => {
+    hurry(4);
     const original = GaussianSplatElement.sharedDevice;
     let refusals = 0;
     GaussianSplatElement.sharedDevice = new SharedDevice(async () => {
@@ -386,6 +388,7 @@ describe('without WebGPU, where the page asks for it', () => {
   });
 
   it('an adapter that never comes is an error', async () => {
+    hurry(20);
     await withGpu({ ...navigator.gpu, requestAdapter: () => new Promise(() => undefined) }, async () => {
       const element = show(ASKED);
       await nextEvent(element, 'error', 30_000);

@@ -1,14 +1,11 @@
 /**
- * `node --import tsx read-measured.ts FILE [BESIDE]` reads a file in a process of its own, and prints what that cost as JSON: milliseconds of CPU, and the most memory that the process
- * had beyond what it began with.
+ * `node --import tsx read-measured.ts FILE BESIDE …` reads files, each with one beside it or with '', in a process of their own, the cheapest first, and prints what each cost as a line
+ * of JSON: milliseconds of CPU, and the most memory that the process had beyond what it had before.
  */
 import { existsSync, readFileSync } from 'node:fs';
 import { framePath, isSequence, parseSequence, readScene } from '@gaussian-splat/formats';
 
-const [, , path, beside] = process.argv;
-const file = new Uint8Array(readFileSync(path));
-
-async function read(): Promise<string> {
+async function read(file: Uint8Array, beside: string): Promise<string> {
   if (isSequence(file)) {
     const sequence = parseSequence(file, 'a');
     return `${sequence.frameCount} frames, ${framePath(sequence, sequence.frameCount - 1).length} characters`;
@@ -23,11 +20,17 @@ function peakSoFar(): number {
   return 1024 * Number(/VmHWM:\s*(\d+)/.exec(status)?.[1] ?? process.resourceUsage().maxRSS);
 }
 
-const before = process.memoryUsage().rss;
-const start = process.cpuUsage();
-const result = await read().catch(
-  (error: { code?: string; message?: string }) => error.code ?? `unnamed: ${error.message}`,
-);
-const { user, system } = process.cpuUsage(start);
-const peak = peakSoFar() - before;
-console.log(JSON.stringify({ cpuMs: (user + system) / 1000, peak, result }));
+async function measure(path: string, beside: string): Promise<void> {
+  const file = new Uint8Array(readFileSync(path));
+  const before = process.memoryUsage().rss;
+  const start = process.cpuUsage();
+  const result = await read(file, beside).catch(
+    (error: { code?: string; message?: string }) => error.code ?? `unnamed: ${error.message}`,
+  );
+  const { user, system } = process.cpuUsage(start);
+  const peak = peakSoFar() - before;
+  console.log(JSON.stringify({ cpuMs: (user + system) / 1000, peak, result }));
+}
+
+const paths = process.argv.slice(2);
+for (let i = 0; i < paths.length; i += 2) await measure(paths[i], paths[i + 1]);

@@ -18,10 +18,10 @@ const RELATIVE_ERROR = 1e-3;
 const RELATIVE_ERROR_OF_HALVES = 5e-3;
 const DECIBELS = 55;
 
-/** One of every kind; the other variants of a kind are the exporter's breadth. */
+/** One of every kind; what differs little from one of these is the exporter's breadth. */
 const GENERATORS = [
-  ...['classic', 'classic-view', 'scaffold', 'octree-round', 'hexplane', 'avatar', 'feed-forward-1'],
-  ...(isLab ? ['octree-progressive', 'octree-ceil', 'feed-forward-2'] : []),
+  ...['classic-view', 'octree-round', 'hexplane', 'avatar', 'feed-forward-1'],
+  ...(isLab ? ['classic', 'scaffold', 'octree-progressive', 'octree-ceil', 'feed-forward-2'] : []),
 ];
 
 /** The same, writing float16. */

@@ -1,8 +1,23 @@
+import { loadModule } from '@gaussian-splat/core';
 import type { FrameLevers, WorkTime } from '@gaussian-splat/renderer';
 import type { FrameScheduler } from '../gpu/frame-scheduler.js';
 import { levelsFor, LADDER, type Level } from '../pace/ladder.js';
-import { INITIAL_PACE, keepPace, quantile, resized, type Pace, type PaceReason } from '../pace/pace.js';
+import type { keepPace, resized } from '../pace/pace.js';
 import { waitForRest } from '../pace/rest.js';
+import { INITIAL_PACE, quantile, type Pace, type PaceReason } from '../pace/start.js';
+
+/** How levels are chosen: nothing that a first picture waits for. Without it all pictures are whole. */
+let law: { readonly keepPace: typeof keepPace; readonly resized: typeof resized } | undefined;
+let fetching: Promise<void> | undefined;
+
+/** Fetches the law, once for all elements. Fulfils, and never rejects, when it is there or cannot be had. */
+export const fetchLaw = (): Promise<void> =>
+  (fetching ??= loadModule('the code that paces pictures', () => import('../pace/pace.js')).then(
+    (module) => {
+      law = module;
+    },
+    () => undefined,
+  ));
 
 /** Share of the display's interval that frames may take: the page and its compositor need the rest. */
 const SHARE_OF_INTERVAL = 0.8;
@@ -141,7 +156,8 @@ export class PaceController {
     const isOther = Math.max(pixels, this.#pixels) > OTHER_SIZE * Math.min(pixels, this.#pixels);
     if (!isOther && levels.length === this.#levels.length) return;
     this.#levels = levels;
-    this.#pace = resized(this.#pace, pixels / this.#pixels, this.#levels);
+    // Before there is a law all levels are the first.
+    if (law) this.#pace = law.resized(this.#pace, pixels / this.#pixels, this.#levels);
     this.#pixels = pixels;
     this.#size++;
   }
@@ -160,7 +176,8 @@ export class PaceController {
     const milliseconds = atMost > targetMs ? atLeast : atMost;
     this.#lastMs = milliseconds;
     if (level === 0) this.#wholeMs = milliseconds;
-    this.#pace = keepPace(this.#pace, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
+    if (!law) return void fetchLaw();
+    this.#pace = law.keepPace(this.#pace, { now: doneAt, level, milliseconds }, { targetMs, levels: this.#levels });
     const isWhole = this.#pace.level === 0;
     if (isWhole || level > 0) this.#options.onPace(isWhole);
   }

@@ -1,4 +1,4 @@
-import { quantile } from './pace.js';
+import { quantile } from './start.js';
 
 /** What displays do that nothing is known of yet, and the slowest that is believed: frames that take too long look like a slow display. */
 const USUAL_MS = 1000 / 60;

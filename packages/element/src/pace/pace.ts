@@ -1,6 +1,7 @@
 /** How much of the whole image a frame in motion can afford: a pure function of what frames took. */
 import type { Level } from './ladder.js';
-import { inPixels, modelOf, type MeasuredLevels, type TimeModel } from './time-model.js';
+import { HOLD_MS, INITIAL_PACE, quantile, type Pace, type PaceReason } from './start.js';
+import { inPixels, modelOf, type TimeModel } from './time-model.js';
 
 /** What a frame took. */
 export interface FrameSample {
@@ -17,31 +18,6 @@ export interface PaceRules {
   readonly targetMs: number;
   /** The first is the whole image; the others lose more and more. */
   readonly levels: readonly Level[];
-}
-
-/** Why the level is what it is: `start`, nothing is known yet; `slow`, frames took too long; `spare`, there was time to spare; `trial`, to find out what a more accurate level takes. */
-export type PaceReason = 'start' | 'slow' | 'spare' | 'trial';
-
-/** The level of frames in motion, and what is remembered for the next one. */
-export interface Pace {
-  readonly level: number;
-  readonly reason: PaceReason;
-  /** Times of the last frames on this level, oldest first, ms. */
-  readonly recent: readonly number[];
-  /** What frames are believed to take, ms: what they usually do, which it follows up only so fast. 0 before the first frame. */
-  readonly believed: number;
-  /** When the last frame was known, and when the motion began that it belongs to. */
-  readonly sampledAt: number;
-  readonly movedAt: number;
-  /** When the level last changed, when its direction did, and which it is. */
-  readonly changedAt: number;
-  readonly turnedAt: number;
-  readonly direction: 'down' | 'up';
-  /** How long a change of direction keeps the next one off, ms. */
-  readonly hold: number;
-  /** What all levels have in common, ms: what frames took before the last change by the share of their level. */
-  readonly load: number;
-  readonly measured: MeasuredLevels;
 }
 
 /** Frames of which the usual ones count: a slow one now and then is no reason for anything. */
@@ -67,8 +43,7 @@ const REST_MS = 250;
 const WAKING_MS = 400;
 /** Between a change and a climb, ms. */
 const SETTLE_MS = 350;
-/** Between two changes of direction, ms: five seconds and what times may be late. Longer by times where the last climb was regretted. */
-const HOLD_MS = 5_200;
+/** Holds are longer by so many times where the last climb was regretted. */
 const LONGER = 3;
 const LONGEST_HOLD_MS = 60_000;
 /** A fall so late may come sooner. */
@@ -77,21 +52,6 @@ const FAR_TOO_LATE = 1.25;
 const TRIAL_MS = 6_000;
 /** Since the last frame of a motion, ms, at most: the image at rest shows the same. */
 const AT_REST_MS = 500;
-
-export const INITIAL_PACE: Pace = {
-  level: 0,
-  reason: 'start',
-  recent: [],
-  believed: 0,
-  sampledAt: -Infinity,
-  movedAt: -Infinity,
-  changedAt: -Infinity,
-  turnedAt: -Infinity,
-  direction: 'down',
-  hold: HOLD_MS,
-  load: 0,
-  measured: {},
-};
 
 /** The pace after a frame. Frames of another level are too late to say anything, but for the whole image at rest. */
 export function keepPace(pace: Pace, sample: FrameSample, rules: PaceRules): Pace {
@@ -227,10 +187,4 @@ export function resized(pace: Pace, growth: number, levels: readonly Level[]): P
   const asMany = levels.findIndex((other, number) => growth * inPixels(other, number) <= pixels);
   const { reason, sampledAt, movedAt } = pace;
   return { ...INITIAL_PACE, level: asMany === -1 ? level : Math.min(level, asMany), reason, sampledAt, movedAt };
-}
-
-/** The smallest of the values that at least this share of them do not exceed. */
-export function quantile(values: readonly number[], share: number): number {
-  const sorted = [...values].sort((a, b) => a - b);
-  return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
 }

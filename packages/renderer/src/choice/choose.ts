@@ -60,22 +60,23 @@ export function startVariants(device: GPUDevice, options: StartOptions = {}): Pr
 async function start(device: GPUDevice, options: StartOptions, choice: Choice): Promise<Variants> {
   const { store = pageStore(), quickMs = QUICK_MS, format } = options;
   const isOpen = !device.adapterInfo?.isFallbackAdapter && readChoice(store, device) === undefined;
-  if (!isOpen || !(await isRight(device, LIKELY, format)) || !((await likelyMs(device)) <= quickMs))
-    return chooseVariants(device, options);
+  const isGood = isOpen && (await measured('start', () => isGoodStart(device, quickMs, format)));
+  if (!isGood) return chooseVariants(device, options);
   if (!choice.chosen) remember(device, LIKELY);
   return LIKELY;
 }
 
-async function likelyMs(device: GPUDevice): Promise<number> {
+async function isGoodStart(device: GPUDevice, quickMs: number, format?: GPUTextureFormat): Promise<boolean> {
+  if (!(await isRight(device, LIKELY, format))) return false;
   const clock = await FrameClock.on(device);
   // Into what the known answer was drawn into: nothing is compiled for this trial alone.
-  return timeFrames(device, LIKELY, SMALL, clock, ANSWER_TARGET);
+  return (await timeFrames(device, LIKELY, SMALL, clock, ANSWER_TARGET)) <= quickMs;
 }
 
 /**
  * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a known answer are out, the
  * others are timed on small scenes. Takes about a second the first time on an adapter, most of it to compile what is not chosen in the end; then the choice is kept in `store`, and
- * only its answer is checked again.
+ * only its answer is checked again. What it took is in the performance timeline, as `gaussian-splat.search`; of that, `detail.paused` milliseconds were pauses.
  * @throws GaussianSplatError `unsupported/wrong-image` if no variant gives the known answer.
  */
 export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): Promise<Variants> {
@@ -99,13 +100,36 @@ async function noPause(): Promise<void> {
 
 /** Loaded when it runs: most visits know what suits their device. */
 async function search(device: GPUDevice, pause: () => Promise<void>): Promise<Variants> {
-  const { searchVariants, wrongImage } = await loadModule('the code that tries variants', () => import('./search.js'));
-  const found = await searchVariants(device, pause);
-  if (found) return found;
-  // A wrong picture is worse than none. A lost device draws none, and says so itself.
-  if (!(await isAlive(device))) return SAFE;
-  throw wrongImage(device);
+  const detail = { paused: 0 };
+  const timedPause = async (): Promise<void> => {
+    const begin = performance.now();
+    await pause();
+    detail.paused += performance.now() - begin;
+  };
+  const find = async (): Promise<Variants> => {
+    const { searchVariants, wrongImage } = await loadModule(
+      'the code that tries variants',
+      () => import('./search.js'),
+    );
+    const found = await searchVariants(device, timedPause);
+    if (found) return found;
+    // A wrong picture is worse than none. A lost device draws none, and says so itself.
+    if (!(await isAlive(device))) return SAFE;
+    throw wrongImage(device);
+  };
+  return measured('search', find, detail);
 }
+
+/** Notes in the performance timeline, as `gaussian-splat.NAME`, what a part of the choice took. */
+async function measured<T>(name: string, work: () => Promise<T>, detail?: object): Promise<T> {
+  const start = performance.now();
+  try {
+    return await work();
+  } finally {
+    performance.measure(`gaussian-splat.${name}`, { start, detail });
+  }
+}
+
 /** Whether a device still answers, and so did before: one that is lost stays lost. */
 async function isAlive(device: GPUDevice): Promise<boolean> {
   const buffer = device.createBuffer({ label: 'gs.probe.alive', size: 4, usage: BUFFER_USAGE.mapRead });

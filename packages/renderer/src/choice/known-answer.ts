@@ -2,7 +2,6 @@ import { eyeOf, lookAt, multiply, type Camera, type GaussianCloud } from '@gauss
 import { capture } from '../capture.js';
 import { GaussianBuffers } from '../gaussian-buffers.js';
 import { constants } from '../generated/shaders.js';
-import { mortonOrder } from '../pack/morton.js';
 import { packKept, type PackedGaussians } from '../pack/pack.js';
 import type { ShPrecision } from '../pack/sh.js';
 import type { GaussianScene } from '../gaussian-scene.js';
@@ -73,13 +72,16 @@ export function sphereCloud(count: number, size: number): GaussianCloud {
   };
 }
 
-/** What `packGaussians` makes of spheres, all of which can be drawn: every page carries this, and its checks of strangers' clouds only where files are read. */
-export function packSpheres(cloud: GaussianCloud, shPrecision: ShPrecision): PackedGaussians {
+/**
+ * What `packGaussians` makes of spheres, all of which can be drawn: every page carries this, and its checks of strangers' clouds only where files are read.
+ * @param order of the splats; `packGaussians` has that of `mortonOrder`
+ */
+export function packSpheres(
+  cloud: GaussianCloud,
+  shPrecision: ShPrecision,
+  order: Uint32Array = new Uint32Array(cloud.count).map((_, i) => i),
+): PackedGaussians {
   const { count, shDegree, antialiased, filterVariance, origin, droppedCount } = cloud;
-  const order = mortonOrder(
-    cloud.positions,
-    new Uint32Array(count).map((_, i) => i),
-  );
   return {
     count,
     shDegree,

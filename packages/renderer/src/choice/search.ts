@@ -1,13 +1,14 @@
 /** The search for what a device is served best with: a second of trials, once for each adapter and origin. */
 import { GaussianSplatError } from '@gaussian-splat/core';
+import { mortonOrder } from '../pack/morton.js';
 import { LIKELY, SAFE, type Variants } from '../variants.js';
 import { FrameClock } from './frame-clock.js';
 import { FRAMES, isRight, timeFrames, type Trial } from './trials.js';
 
 /** Scenes of the trials: until one candidate is left, or the time is up. */
 const ROUNDS: readonly Trial[] = [
-  { splats: 4_000, width: 320, height: 180 },
-  { splats: 64_000, width: 1920, height: 1080 },
+  { splats: 4_000, width: 320, height: 180, order: mortonOrder },
+  { splats: 64_000, width: 1920, height: 1080, order: mortonOrder },
 ];
 /** Milliseconds that all rounds may take, and how much longer than the last one the next is expected to be. */
 const BUDGET = 800;

@@ -1,5 +1,6 @@
 /** What a device is asked before it draws for anybody: whether a variant is right, and how fast. */
 import { GaussianBuffers } from '../gaussian-buffers.js';
+import type { mortonOrder } from '../pack/morton.js';
 import { madeTogether, perDevice, TEXTURE_USAGE } from '../gpu/kernel.js';
 import { Viewpoint } from '../viewpoint.js';
 import { World } from '../world.js';
@@ -13,6 +14,8 @@ export const FRAMES = 4;
 /** A scene of spheres, and pixels of its pictures. */
 export interface Trial {
   readonly splats: number;
+  /** That in which files are packed; default as they come, which makes little difference where there are few. */
+  readonly order?: typeof mortonOrder;
   readonly width: number;
   readonly height: number;
 }
@@ -54,12 +57,14 @@ const PAGE_TARGET = {
 export async function timeFrames(
   device: GPUDevice,
   variants: Variants,
-  { splats, width, height }: Trial,
+  { splats, width, height, order }: Trial,
   clock: FrameClock,
   target: { readonly format: GPUTextureFormat; readonly usage: number } = PAGE_TARGET,
 ): Promise<number> {
   const size = Math.cbrt(400 / splats);
-  const gaussians = await GaussianBuffers.upload(device, packSpheres(sphereCloud(splats, size), 'int8'));
+  const cloud = sphereCloud(splats, size);
+  const all = Uint32Array.from({ length: splats }, (_, i) => i);
+  const gaussians = await GaussianBuffers.upload(device, packSpheres(cloud, 'int8', order?.(cloud.positions, all)));
   const renderer = viewpointOf(device, gaussians, variants);
   const texture = device.createTexture({ label: 'gs.probe', size: [width, height], ...target });
   const camera = probeCamera(width, height);

@@ -1,0 +1,51 @@
+/** The pace before anything is known; the law that it follows from then on (`pace.ts`) is fetched once a picture is there. */
+import type { MeasuredLevels } from './time-model.js';
+
+/** Why the level is what it is: `start`, nothing is known yet; `slow`, frames took too long; `spare`, there was time to spare; `trial`, to find out what a more accurate level takes. */
+export type PaceReason = 'start' | 'slow' | 'spare' | 'trial';
+
+/** The level of frames in motion, and what is remembered for the next one. */
+export interface Pace {
+  readonly level: number;
+  readonly reason: PaceReason;
+  /** Times of the last frames on this level, oldest first, ms. */
+  readonly recent: readonly number[];
+  /** What frames are believed to take, ms: what they usually do, which it follows up only so fast. 0 before the first frame. */
+  readonly believed: number;
+  /** When the last frame was known, and when the motion began that it belongs to. */
+  readonly sampledAt: number;
+  readonly movedAt: number;
+  /** When the level last changed, when its direction did, and which it is. */
+  readonly changedAt: number;
+  readonly turnedAt: number;
+  readonly direction: 'down' | 'up';
+  /** How long a change of direction keeps the next one off, ms. */
+  readonly hold: number;
+  /** What all levels have in common, ms: what frames took before the last change by the share of their level. */
+  readonly load: number;
+  readonly measured: MeasuredLevels;
+}
+
+/** Between two changes of direction, ms: five seconds and what times may be late. */
+export const HOLD_MS = 5_200;
+
+export const INITIAL_PACE: Pace = {
+  level: 0,
+  reason: 'start',
+  recent: [],
+  believed: 0,
+  sampledAt: -Infinity,
+  movedAt: -Infinity,
+  changedAt: -Infinity,
+  turnedAt: -Infinity,
+  direction: 'down',
+  hold: HOLD_MS,
+  load: 0,
+  measured: {},
+};
+
+/** The smallest of the values that at least this share of them do not exceed. */
+export function quantile(values: readonly number[], share: number): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.min(sorted.length - 1, Math.max(0, Math.ceil(share * sorted.length) - 1))];
+}
