@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -52,10 +53,7 @@ def normal(rng: np.random.Generator, *shape: int, by: float = 1.0) -> np.ndarray
 
 def network(rng: np.random.Generator, *widths: int) -> list[Linear]:
     """Layers of these widths, whose numbers stay of the size that they begin with."""
-    return [
-        Linear(normal(rng, out, into, by=into**-0.5), normal(rng, out, by=0.1))
-        for into, out in zip(widths, widths[1:], strict=False)
-    ]
+    return [Linear(normal(rng, out, into, by=into**-0.5), normal(rng, out, by=0.1)) for into, out in pairwise(widths)]
 
 
 def random_scaffold() -> Scaffold:
