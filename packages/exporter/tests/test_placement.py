@@ -165,6 +165,8 @@ def test_both_checkers_are_one_rule_set_on_one_corpus() -> None:
     paths = sorted(FIXTURES.glob("*/*.onnx"))
     found = {str(path.relative_to(FIXTURES)): findings_of(path) for path in paths}
     assert ["wrong", "Conv", "y"] in found.pop(ONLY_INFERRED)
+    rules = {name: rows for name, rows in found.items() if name.startswith("rules/")}
+    assert len(rules) > 20 and all(("kept-" in name) == (not rows) for name, rows in rules.items())
     expected = FIXTURES / "gpu-findings.json"
     if os.environ.get("WRITE_FINDINGS"):
         lines = [f"  {json.dumps(name)}: {json.dumps(rows)}" for name, rows in found.items()]
