@@ -140,7 +140,12 @@ def check(given: argparse.Namespace) -> None:
     beside = path.with_suffix(".contract.json")
     if METADATA_KEY not in {prop.key for prop in model.metadata_props} and beside.exists():
         model.metadata_props.add(key=METADATA_KEY, value=beside.read_text())
-    contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
+    try:
+        contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
+    except ExportError:
+        # What leaves the GPU is known without one.
+        report_findings(model)
+        raise
     print(f"{path}: contract version {contract['version']}, {contract.get('name', 'without a name')}")
     if find_spec("onnxruntime") is None:
         print("not run: install onnxruntime (pip install 'gaussian-splat-exporter[check]')")
