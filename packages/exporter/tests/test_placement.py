@@ -16,7 +16,7 @@ from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.classic import export_classic
 from gaussian_exporter.graph import Graph
 from gaussian_exporter.outputs import Options
-from gaussian_exporter.placement import KERNELS, gpu_findings
+from gaussian_exporter.placement import KERNELS, Finding, gpu_findings, told
 
 from .running import FACTS
 from .test_classic import cloud
@@ -143,6 +143,13 @@ def test_outputs_that_break_the_contract_are_named() -> None:
     infinite = {"scale": np.array([np.inf], np.float32)}
     with pytest.raises(ExportError, match=r"gaussians: expected finite numbers"):
         check_outputs(rows(good, 1.0), infinite)
+
+
+def test_what_one_change_mends_is_said_once() -> None:
+    one = Finding("fallback", "a", "Add", "x is int64", "compute in int32", "x")
+    other = Finding("fallback", "b", "NonZero", "no kernel", "keep every row", "y")
+    lines = told([one, other, one, one])
+    assert lines == [f"{one} (and 2 more of this kind)", str(other)]
 
 
 def test_the_list_of_kernels_names_operators_that_exist() -> None:

@@ -34,7 +34,7 @@ from .families.scaffold import export_scaffold
 from .families.spacetime import export_spacetime
 from .graph import Weights
 from .outputs import Options, refuse_instances, save
-from .placement import gpu_findings
+from .placement import gpu_findings, told
 
 Command = argparse.ArgumentParser
 Export = Callable[[argparse.Namespace, Facts, Options], onnx.ModelProto]
@@ -158,8 +158,8 @@ def check(given: argparse.Namespace) -> None:
 def report_findings(model: onnx.ModelProto) -> None:
     """Prints what would leave the GPU, or that nothing would."""
     findings = gpu_findings(model)
-    for finding in findings:
-        print(finding)
+    for line in told(findings):
+        print(line)
     if not findings:
         print("WebGPU: every node has a kernel, shapes are fixed, the graph can be captured")
 
