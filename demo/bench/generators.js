@@ -39,7 +39,8 @@ function stateAt(run, model) {
 async function measure(device, url, instances) {
   const model = await openModel({ url: new URL(url, document.baseURI).href });
   const fallbacks = [];
-  const makeSession = () => new GeneratorSession(model, device, (reason) => fallbacks.push(reason));
+  // Not compared with the CPU, which would run meanwhile.
+  const makeSession = () => new GeneratorSession(model, device, (reason) => fallbacks.push(reason), false);
   // The one that binds the inputs of each instance; all of them run together where the model takes instances, else one after the other.
   const single = makeSession();
   const isOneRun = model.contract.instances !== undefined;

@@ -2,11 +2,13 @@
 import { element, showError, showProgress } from './page/show.js';
 import { sendReport } from './run/report.js';
 
-/** Begins the keys under which pages keep what suits a GPU. */
-const CHOICES = 'gaussian-splat ';
+/** Begins the keys under which pages keep what they know: what suits a GPU, and what comparing a generator with the CPU has shown. */
+const KEPT = 'gaussian-splat ';
+const PROOF = 'gaussian-splat proof ';
 /** Milliseconds that a picture may take, and that the search for what suits the GPU may take once the page is at rest. */
 const LONGEST = 60_000;
 const LONGEST_SEARCH = 20_000;
+const LONGEST_COMPARISON = 30_000;
 
 /** What is measured, from the page's address. */
 function readPlan(query) {
@@ -20,18 +22,21 @@ function readPlan(query) {
     return value;
   });
   const scene = query.get('scene') || '../scenes/skull.spz';
-  return { scene, visits, width, height };
+  return { scene, visits, width, height, isCompared: query.has('compare') };
 }
 
-const choices = () => Object.keys(localStorage).filter((key) => key.startsWith(CHOICES));
+const kept = () => Object.keys(localStorage).filter((key) => key.startsWith(KEPT));
+const proofs = () => kept().filter((key) => key.startsWith(PROOF));
+const choices = () => kept().filter((key) => !key.startsWith(PROOF));
+const forget = (keys) => keys.forEach((key) => localStorage.removeItem(key));
 
 /** A page of two lines that tells when there is something to see. */
-function pageOf({ scene, width, height }) {
+function pageOf({ scene, width, height }, attributes) {
   const attribute = (text) => text.replaceAll('&', '&amp;').replaceAll('"', '&quot;');
   return `<!doctype html><meta charset="utf-8"><title>A visit</title>
 <style>body { margin: 0 } gaussian-splat { display: block; width: ${width}px; height: ${height}px }</style>
 <script type="module" src="${new URL('../cdn/gaussian-splat.min.js', location.href)}"></script>
-<gaussian-splat src="${attribute(new URL(scene, location.href).href)}" alt="" loading="eager"></gaussian-splat>
+<gaussian-splat src="${attribute(new URL(scene, location.href).href)}" alt="" loading="eager" ${attributes}></gaussian-splat>
 <script>
   const splat = document.querySelector('gaussian-splat');
   const tell = (what, message) => parent.postMessage({ what, message }, self.origin);
@@ -43,8 +48,9 @@ function pageOf({ scene, width, height }) {
 }
 
 /** Opens such a page. @returns milliseconds to its first preview, if there is one, and to the whole picture, and its frame, open still */
-function visit(plan) {
-  const frame = element('iframe', { title: 'A visit', width: plan.width, height: plan.height, srcdoc: pageOf(plan) });
+function visit(plan, attributes = '') {
+  const srcdoc = pageOf(plan, attributes);
+  const frame = element('iframe', { title: 'A visit', width: plan.width, height: plan.height, srcdoc });
   return new Promise((resolve, reject) => {
     const begun = performance.now();
     let previewMs;
@@ -66,11 +72,11 @@ function visit(plan) {
   });
 }
 
-/** Waits until a page that is at rest has found what suits the GPU. @returns milliseconds; undefined if it takes too long */
-async function untilChosen() {
+/** Waits until a page has kept what it found out. @returns milliseconds; undefined if it takes too long */
+async function untilKept(keys, longest) {
   const begun = performance.now();
-  while (choices().length === 0) {
-    if (performance.now() - begun > LONGEST_SEARCH) return undefined;
+  while (keys().length === 0) {
+    if (performance.now() - begun > longest) return undefined;
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
   return performance.now() - begun;
@@ -86,6 +92,56 @@ function choiceTimes({ contentWindow: { performance } }) {
   return { startMs: start?.duration, searchMs: search && search.duration - search.detail.paused };
 }
 
+/** Longest that this page, whose thread the frames share, waits for one of the display's frames until `ended` settles, ms. */
+async function longestGap(ended) {
+  let [isOver, last, longest] = [false, performance.now(), 0];
+  void ended.finally(() => (isOver = true));
+  while (!isOver) {
+    await new Promise(requestAnimationFrame);
+    const now = performance.now();
+    [longest, last] = [Math.max(longest, now - last), now];
+  }
+  return longest;
+}
+
+/**
+ * Visits by turns without the comparison with the CPU and with it, as on a first visit: what was found out is forgotten each time. The frame
+ * stays open until the comparison is done, or as long as that took the time before.
+ */
+async function visitCompared(plan) {
+  const visits = [];
+  let restMs = 3_000;
+  for (let i = 0; i < 2 * plan.visits; i++) {
+    const isCompared = i % 2 === 1;
+    showProgress(`visit ${i + 1} of ${2 * plan.visits}, ${isCompared ? 'compared' : 'not compared'}`);
+    forget(proofs());
+    const { frame, ...times } = await visit(plan, isCompared ? '' : 'compare="off"');
+    const wait = isCompared
+      ? untilKept(proofs, LONGEST_COMPARISON)
+      : new Promise((resolve) => setTimeout(resolve, restMs));
+    const longestGapMs = await longestGap(wait);
+    const comparedMs = isCompared ? await wait : undefined;
+    restMs = comparedMs ?? restMs;
+    const verdict = proofs().map((key) => JSON.parse(localStorage.getItem(key)))[0];
+    visits.push({ isCompared, ...times, comparedMs, longestGapMs, verdict });
+    frame.remove();
+  }
+  return visits;
+}
+
+/** Of all visits but the first of each kind, which fetch and compile. */
+function compared(visits) {
+  const shown = [false, true].map((kind) =>
+    visits
+      .filter(({ isCompared }) => isCompared === kind)
+      .slice(1)
+      .map(({ shownMs }) => shownMs)
+      .sort((a, b) => a - b),
+  );
+  const [without, with_] = shown.map((times) => times[times.length >> 1]);
+  return { medianWithoutMs: without, medianWithMs: with_, share: with_ / without - 1 };
+}
+
 function show(visits) {
   const cells = (name, values) =>
     element(
@@ -94,9 +150,11 @@ function show(visits) {
       values.map((textContent) => element(name, { textContent })),
     );
   const ms = (value) => (value === undefined ? '' : Math.round(value).toLocaleString('en'));
-  const rows = visits.map(({ previewMs, shownMs, chosenMs, startMs, searchMs }, i) =>
-    cells('td', [i === 0 ? 'first' : 'later', ...[previewMs, shownMs, startMs, chosenMs, searchMs].map(ms)]),
-  );
+  const kindOf = ({ isCompared }, i) => (i === 0 ? 'first' : isCompared ? 'later, compared' : 'later');
+  const rows = visits.map((visited, i) => {
+    const { previewMs, shownMs, chosenMs, startMs, searchMs } = visited;
+    return cells('td', [kindOf(visited, i), ...[previewMs, shownMs, startMs, chosenMs, searchMs].map(ms)]);
+  });
   const head = cells('th', [
     'visit',
     'first preview, ms',
@@ -115,18 +173,20 @@ async function main() {
   let report;
   try {
     const plan = readPlan(query);
-    for (const key of choices()) localStorage.removeItem(key);
-    const visits = [];
-    for (let i = 0; i < plan.visits; i++) {
+    if (!plan.isCompared) forget(choices());
+    const visits = plan.isCompared ? await visitCompared(plan) : [];
+    show(visits);
+    for (let i = 0; i < plan.visits && !plan.isCompared; i++) {
       showProgress(`visit ${i + 1} of ${plan.visits}`);
       const { frame, ...times } = await visit(plan);
-      const chosenMs = i === 0 ? await untilChosen() : undefined;
+      const chosenMs = i === 0 ? await untilKept(choices, LONGEST_SEARCH) : undefined;
       visits.push({ ...times, chosenMs, ...choiceTimes(frame) });
       frame.remove();
       show(visits);
     }
     const chosen = choices().map((key) => JSON.parse(localStorage.getItem(key)));
     report = { kind: 'start', userAgent: navigator.userAgent, plan, visits, chosen };
+    if (plan.isCompared) report.comparison = compared(visits);
     document.getElementById('status').textContent = 'Done.';
     document.getElementById('json').textContent = JSON.stringify(report, null, 2);
     document.getElementById('raw').hidden = false;

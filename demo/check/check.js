@@ -1,4 +1,4 @@
-/** The conformance checker as a page: the same reader, the same checks and the same tables as the command. */
+/** The conformance checker as a page: the same reader, the same checks, the same runs and the same tables as the command; and the GPU's numbers beside the CPU's. */
 import {
   blobSource,
   checkContract,
@@ -37,11 +37,52 @@ async function examine(files) {
   try {
     const resolved = resolveContract({ header, explicit });
     const faults = checkContract(header, resolved.contract, { files: sizes }).map(describeFault);
-    return { name: model.name, sections: contractReport(header, resolved), inferred: resolved.notes, faults };
+    const run = faults.length === 0 ? () => runHere(model, explicit, header) : undefined;
+    return { name: model.name, sections: contractReport(header, resolved), inferred: resolved.notes, faults, run };
   } catch (error) {
     const found = [...checkFile(header, { files: sizes }).map(describeFault), ...asFaults(error, model.name).faults];
     return { name: model.name, sections: contractReport(header, undefined), faults: found };
   }
+}
+
+const RUNTIME = new URL('../cdn/onnxruntime/', document.baseURI).href;
+
+/** Runs a model that keeps its contract, on the CPU and on the GPU. What that takes is loaded now. @returns a report as {@link examine} does */
+async function runHere(file, contract, header) {
+  if (header.externalFiles.length > 0) {
+    return {
+      name: file.name,
+      faults: ['Its weights are in files beside it: npm run gaussian-splat -- check MODEL --run'],
+    };
+  }
+  const adapter = await navigator.gpu?.requestAdapter({ powerPreference: 'high-performance' });
+  if (!adapter) return { name: file.name, faults: ['This browser has no WebGPU: there is nothing to compare with.'] };
+  const { deviceDescriptor, openModel, runInPage, setRuntimeLocation } = await import('./run.js');
+  setRuntimeLocation(RUNTIME);
+  const url = URL.createObjectURL(file);
+  const device = await adapter.requestDevice(deviceDescriptor(adapter));
+  try {
+    const model = await openModel({ url, contract });
+    const { faults, rows, how } = await runInPage(model, device, await loadRuntime());
+    return { name: file.name, sections: [{ title: 'Runs', rows }], faults: faults.map(describeFault), how };
+  } finally {
+    URL.revokeObjectURL(url);
+    device.destroy();
+  }
+}
+
+let runtime;
+
+/** A copy of ONNX Runtime for the CPU: two sessions of one copy must never run at a time. */
+async function loadRuntime() {
+  const build = 'Suspending' in WebAssembly ? 'jspi' : 'webgpu';
+  // An address of its own makes it a copy of its own.
+  runtime ??= import(`${RUNTIME}ort.${build}.bundle.min.mjs?cpu`);
+  const ort = await runtime;
+  ort.env.logLevel = 'error';
+  ort.env.wasm.numThreads = 1;
+  ort.env.wasm.wasmPaths = { wasm: `${RUNTIME}ort-wasm-simd-threaded.${build === 'jspi' ? 'jspi' : 'asyncify'}.wasm` };
+  return ort;
 }
 
 /** What an error says, fault by fault. Errors that are not named are bugs, and are left to the console. */
@@ -51,7 +92,7 @@ function asFaults(error, name = 'This file') {
   throw error;
 }
 
-function describe({ name, sections = [], inferred = [], faults }) {
+function describe({ name, sections = [], inferred = [], faults, run, how }) {
   const count = `${faults.length} fault${faults.length === 1 ? '' : 's'}`;
   const verdict = element('p', faults.length > 0 ? `${name}: ${count}` : `${name} keeps the contract.`);
   verdict.className = `verdict ${faults.length > 0 ? 'bad' : 'good'}`;
@@ -61,10 +102,27 @@ function describe({ name, sections = [], inferred = [], faults }) {
   const warning = 'No contract was found; it was inferred from names. Write one to be sure.';
   return [
     verdict,
+    ...(how ? [element('p', `${how}.`)] : []),
+    ...(run ? [runButton(run, name)] : []),
     ...(faults.length > 0 ? [list] : []),
     ...(inferred.length > 0 ? [element('p', warning)] : []),
     ...sections.map(table),
   ];
+}
+
+function runButton(run, name) {
+  const place = element('div');
+  const button = element('button', 'Run it here');
+  button.type = 'button';
+  button.addEventListener('click', async () => {
+    button.disabled = true;
+    button.textContent = 'Running…';
+    place.replaceChildren(button, ...describe(await run().catch((error) => asFaults(error, name))));
+    button.remove();
+  });
+  place.className = 'run';
+  place.append(button);
+  return place;
 }
 
 function table({ title, rows }) {

@@ -208,3 +208,21 @@ test('--draft writes the contract that a file lacks, asks what no header tells, 
   assert.equal(again.status, 1);
   assert.match(again.text, /there already/);
 });
+
+/** What a run writes, as tables say it, of some fixtures: the page must say the same (tests/check/browser/check-page.test.ts). */
+const RUNS = JSON.parse(readFileSync(join(root, 'tests/fixtures/check-runs.json'), 'utf8')) as Record<
+  string,
+  string[][]
+>;
+
+for (const [name, expected] of Object.entries(RUNS)) {
+  test(`${name}: runs, rows and boxes as the page has them`, async () => {
+    const { sections, faults } = await checkModel(fixturePath(name), { run: true });
+    assert.deepEqual(faults, []);
+    const rows = sections.find(({ title }) => title === 'Runs')?.rows;
+    assert.deepEqual(
+      rows?.map((row) => row.slice(0, 3)),
+      expected,
+    );
+  });
+}

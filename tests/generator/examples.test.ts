@@ -13,10 +13,18 @@ import {
   bytesSource,
   cameraFromCalibration,
   gaussianLayout,
+  oneInstance,
   readOnnxHeader,
   resolveContract,
 } from '@gaussian-splat/core';
-import { bindInputs, type GeneratorState, type InputNumbers } from '@gaussian-splat/generator';
+import {
+  bindInputs,
+  inputsOfInstances,
+  stackInputs,
+  type GeneratorState,
+  type InputNumbers,
+  type Inputs,
+} from '@gaussian-splat/generator';
 import { capture, DynamicGaussians, Renderer } from '@gaussian-splat/renderer';
 import { onlyInLab } from '../support/extent.js';
 import { endNodeDevice, serialDevice } from '../support/node-device.js';
@@ -101,7 +109,8 @@ async function drawView(name: string, view: View): Promise<Float32Array> {
     ...(view.controls && { controls: view.controls }),
   };
   const pictures = Object.entries(view.pictures ?? {}).map(([input, file]) => [input, planes(read(`${name}/${file}`))]);
-  const written = await run(bytes, { ...bindInputs(header, contract, state), ...Object.fromEntries(pictures) });
+  const inputs = { ...bindInputs(oneInstance(header, contract), contract, state), ...Object.fromEntries(pictures) };
+  const written = await run(bytes, stackInputs([inputs], inputsOfInstances(header, contract)));
   const device = await serialDevice();
   const layout = gaussianLayout(header, contract);
   assert.ok(layout, 'a model that writes Gaussians');
@@ -128,15 +137,12 @@ function planes(file: Uint8Array): InputNumbers {
   return { dtype: 'float32', dims: [1, 3, height, width], data: numbers };
 }
 
-async function run(
-  model: Uint8Array,
-  inputs: Readonly<Record<string, InputNumbers>>,
-): Promise<Record<string, Float32Array<ArrayBuffer>>> {
+async function run(model: Uint8Array, inputs: Inputs): Promise<Record<string, Float32Array<ArrayBuffer>>> {
   ort.env.logLevel = 'error';
   ort.env.wasm.numThreads = 1;
   const session = await ort.InferenceSession.create(model, { executionProviders: ['wasm'], logSeverityLevel: 3 });
   const feeds: Record<string, ort.Tensor> = {};
-  for (const [name, { data, dims }] of Object.entries(inputs)) {
+  for (const [name, { data, dims }] of Object.entries(inputs as Record<string, InputNumbers>)) {
     feeds[name] = new ort.Tensor('float32', data as Float32Array, dims);
   }
   const results = await session.run(feeds);

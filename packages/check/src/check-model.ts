@@ -13,7 +13,7 @@ import {
   type ResolvedContract,
 } from '@gaussian-splat/core';
 import { openModel, readText, type ModelLocation } from './model-location.js';
-import { runModel } from './run-model.js';
+import { runLocation } from './run-model.js';
 
 export interface CheckOptions {
   /** Path or address of a contract, which then counts before every other. */
@@ -60,7 +60,7 @@ async function checkLocation(location: ModelLocation, options: CheckOptions): Pr
   const sections = contractReport(header, resolved);
   const warnings = resolved?.notes ?? [];
   if (!options.run || !resolved || headerFaults.length > 0) return { sections, faults: headerFaults, warnings };
-  const { faults, rows } = await runModel(location, header, resolved.contract);
+  const { faults, rows } = await runLocation(location, header, resolved.contract);
   return { sections: rows.length > 0 ? [...sections, { title: 'Runs', rows }] : sections, faults, warnings };
 }
 

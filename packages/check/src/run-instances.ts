@@ -50,7 +50,8 @@ export async function compareTogether(
   return [];
 }
 
-const stacked = (inputs: readonly SampleInputs[], header: OnnxHeader, contract: Contract): SampleInputs =>
+/** Inputs of several instances as those of one run. */
+export const stacked = (inputs: readonly SampleInputs[], header: OnnxHeader, contract: Contract): SampleInputs =>
   stackInputs(inputs as unknown as Inputs[], inputsOfInstances(header, contract)) as unknown as SampleInputs;
 
 function differs(found: OutputTensor, { dtype, data }: OutputTensor): boolean {

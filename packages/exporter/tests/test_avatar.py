@@ -162,8 +162,8 @@ def test_products_of_joints_double_their_reach(length: int, products: int) -> No
     given = {"pose": np.random.default_rng(1).normal(size=(length, 3)), "translation": np.array([0.1, 0.2, -0.3])}
     assert_matches(model, given)
     operators = [node.op_type for node in export_avatar(model, FACTS).graph.node]
-    # Steps, and: turns around joints, weights, points, halves padded and carried, a zero.
-    assert operators.count("MatMul") == products + 6
+    # Steps, and: turns around joints, weights, points, halves padded and carried.
+    assert operators.count("MatMul") == products + 5
     assert not set(operators) & {"Split", "Loop", "Scan"}
 
 

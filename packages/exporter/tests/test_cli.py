@@ -64,3 +64,11 @@ def test_a_folder_is_no_avatar_file(name: str, family: str, tmp_path: Path, caps
     given = ["avatar", str(tmp_path), str(tmp_path / "o.onnx"), "--license", "MIT", "--attribution", "A"]
     assert main(given) == 1
     assert family in capsys.readouterr().err
+
+
+def test_what_leaves_the_gpu_is_said_without_a_contract_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rule = Path(__file__).parents[3] / "tests/fixtures/rules/grid-sample-20.onnx"
+    (tmp_path / "a.onnx").write_bytes(rule.read_bytes())
+    assert main(["check", str(tmp_path / "a.onnx")]) == 1
+    written = capsys.readouterr()
+    assert "export opset 18" in written.out and "gaussian_contract" in written.err

@@ -185,3 +185,18 @@ def test_what_does_not_fit_is_named(tmp_path: Path) -> None:
 
     with pytest.raises(ExportError, match=r"at its inputs' defaults.*expected finite numbers"):
         gs.export_module(Nan(), INPUTS, out=tmp_path / "x.onnx")
+
+
+def test_a_dict_with_names_of_its_own(tmp_path: Path) -> None:
+    class Own(torch.nn.Module):  # type: ignore[misc]
+        def forward(self, t: Any) -> Any:
+            xyz = torch.ones(5, 3) * t
+            return {"alpha": 0 * xyz[:, :1] + 0.5, "xyz": xyz, "rgb": 0.1 * xyz, "cov": 0 * xyz.repeat(1, 2) + 1}
+
+    keys = {"positions": "xyz", "covariances": "cov", "colors": "rgb", "opacities": "alpha"}
+    report = gs.export_module(Own(), {"t": gs.time(duration=1)}, gs.split(keys), out=tmp_path / "a.onnx", quiet=True)
+    assert max(report.errors.values()) == 0
+    with pytest.raises(ExportError, match=r"a tensor 'means' in the dict.*Say which key is what"):
+        gs.export_module(
+            Own(), {"t": gs.time(duration=1)}, gs.split(keys | {"positions": "means"}), out=tmp_path / "b.onnx"
+        )

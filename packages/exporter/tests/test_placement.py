@@ -16,7 +16,7 @@ from gaussian_exporter.errors import ExportError
 from gaussian_exporter.families.classic import export_classic
 from gaussian_exporter.graph import Graph
 from gaussian_exporter.outputs import Options
-from gaussian_exporter.placement import KERNELS, gpu_findings
+from gaussian_exporter.placement import KERNELS, Finding, gpu_findings, told
 
 from .running import FACTS
 from .test_classic import cloud
@@ -145,6 +145,13 @@ def test_outputs_that_break_the_contract_are_named() -> None:
         check_outputs(rows(good, 1.0), infinite)
 
 
+def test_what_one_change_mends_is_said_once() -> None:
+    one = Finding("fallback", "a", "Add", "x is int64", "compute in int32", "x")
+    other = Finding("fallback", "b", "NonZero", "no kernel", "keep every row", "y")
+    lines = told([one, other, one, one])
+    assert lines == [f"{one} (and 2 more of this kind)", str(other)]
+
+
 def test_the_list_of_kernels_names_operators_that_exist() -> None:
     assert {schema.name for schema in onnx.defs.get_all_schemas()} >= KERNELS
 
@@ -165,6 +172,8 @@ def test_both_checkers_are_one_rule_set_on_one_corpus() -> None:
     paths = sorted(FIXTURES.glob("*/*.onnx"))
     found = {str(path.relative_to(FIXTURES)): findings_of(path) for path in paths}
     assert ["wrong", "Conv", "y"] in found.pop(ONLY_INFERRED)
+    rules = {name: rows for name, rows in found.items() if name.startswith("rules/")}
+    assert len(rules) > 20 and all(("kept-" in name) == (not rows) for name, rows in rules.items())
     expected = FIXTURES / "gpu-findings.json"
     if os.environ.get("WRITE_FINDINGS"):
         lines = [f"  {json.dumps(name)}: {json.dumps(rows)}" for name, rows in found.items()]

@@ -76,4 +76,30 @@ describe('the page of the checker', () => {
     assert(/ONNX file along/.test((await drop(page, new File(['{}'], 'c.json'))).faults[0]), 'a contract alone');
     assertEqual((await drop(page, await fixture('packed.onnx'))).faults, []);
   });
+
+  it('runs a model here: what the command says of it, and how the GPU differs', async () => {
+    const runs = (await (await fetch('/tests/fixtures/check-runs.json')).json()) as Record<string, string[][]>;
+    const page = await openPage();
+    for (const [name, expected] of Object.entries(runs)) {
+      await drop(page, await fixture(name));
+      page.querySelector<HTMLButtonElement>('.run button')!.click();
+      await until(() => page.querySelector('.run .verdict') !== null, `${name}: the runs`, 100_000);
+      const place = page.querySelector<HTMLElement>('.run')!;
+      const cells = [...place.querySelectorAll('tr')].map((row) => [...row.children].map((cell) => cell.textContent!));
+      assertEqual(
+        cells.map((row) => row.slice(0, 3)),
+        expected,
+        name,
+      );
+      const faults = [...place.querySelectorAll('.faults li')].map((item) => item.textContent!);
+      const isWrong = name === 'spelled-hidden.onnx';
+      assertEqual(faults.length > 0, isWrong, faults.join());
+      assert(place.innerText.includes('In a page it runs on the GPU'), place.innerText);
+      assert(
+        cells.every((row) => /on the GPU$/.test(row[4])),
+        `${name}: ${cells.map((row) => row[4]).join()}`,
+      );
+      if (isWrong) assert(/differ by up to .* of the largest on the GPU/.test(faults[0]), faults[0]);
+    }
+  }).timeout(240_000);
 });

@@ -34,7 +34,7 @@ from .families.scaffold import export_scaffold
 from .families.spacetime import export_spacetime
 from .graph import Weights
 from .outputs import Options, refuse_instances, save
-from .placement import gpu_findings
+from .placement import gpu_findings, told
 
 Command = argparse.ArgumentParser
 Export = Callable[[argparse.Namespace, Facts, Options], onnx.ModelProto]
@@ -140,7 +140,12 @@ def check(given: argparse.Namespace) -> None:
     beside = path.with_suffix(".contract.json")
     if METADATA_KEY not in {prop.key for prop in model.metadata_props} and beside.exists():
         model.metadata_props.add(key=METADATA_KEY, value=beside.read_text())
-    contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
+    try:
+        contract = of_metadata({prop.key: prop.value for prop in model.metadata_props}, str(path))
+    except ExportError:
+        # What leaves the GPU is known without one.
+        report_findings(model)
+        raise
     print(f"{path}: contract version {contract['version']}, {contract.get('name', 'without a name')}")
     if find_spec("onnxruntime") is None:
         print("not run: install onnxruntime (pip install 'gaussian-splat-exporter[check]')")
@@ -153,8 +158,8 @@ def check(given: argparse.Namespace) -> None:
 def report_findings(model: onnx.ModelProto) -> None:
     """Prints what would leave the GPU, or that nothing would."""
     findings = gpu_findings(model)
-    for finding in findings:
-        print(finding)
+    for line in told(findings):
+        print(line)
     if not findings:
         print("WebGPU: every node has a kernel, shapes are fixed, the graph can be captured")
 

@@ -207,7 +207,7 @@ class Graph:
 
     def zero(self) -> Tensor:
         """A zero (1), or one for each instance (B), that the runtime cannot know to be constant: it comes from an
-        input. Adding it repeats what all instances share, and writes what never changes anew in every run."""
+        input. Adding it repeats what all instances share, and makes a kernel write what would be a copy."""
         if self._least is None:
             raise ValueError("there is no input to make a zero of")
         each = prod(self.lead)
@@ -216,11 +216,11 @@ class Graph:
         return total.reshape(each)
 
     def written_anew(self, tensor: Tensor) -> Tensor:
-        """The same numbers as the result of a kernel. ONNX Runtime copies constants and other shapes of a result into
-        outputs; where its commands are recorded (graph capture), a copy is made in the first run and never again."""
+        """The same numbers, as an output that a recording of the commands (graph capture) repeats. ONNX Runtime copies
+        other shapes of a result into outputs, and a copy is made in the first run and never again: a kernel has to
+        write those. Constants stay as they are, and pages read them once."""
         maker = next((node.op_type for node in self._nodes if tensor.name in node.output), None)
-        is_copied = tensor.name not in self._changing or maker in ALIASES
-        if not is_copied or self._least is None:
+        if tensor.name not in self._changing or maker not in ALIASES or self._least is None:
             return tensor
         zero = self.zero()
         return tensor + (zero.reshape(*self.lead, *[1] * (len(tensor.shape) - 1)) if self.lead else zero)

@@ -48,6 +48,16 @@ class Finding:
         return f"{self.kind}: {self.operator} '{self.node}': {self.reason}; {self.remedy}"
 
 
+def told(findings: Sequence[Finding]) -> list[str]:
+    """Findings for people: of those that one change mends, the first, and how many there are."""
+    by_remedy: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        by_remedy.setdefault((finding.kind, finding.remedy), []).append(finding)
+    return [
+        str(first) + (f" (and {len(more)} more of this kind)" if more else "") for first, *more in by_remedy.values()
+    ]
+
+
 def _axis_of_instances(model: onnx.ModelProto) -> str | None:
     for prop in model.metadata_props:
         if prop.key == METADATA_KEY:

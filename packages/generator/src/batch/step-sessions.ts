@@ -10,8 +10,18 @@ interface Step {
 }
 
 /**
- * Sessions of one model for 1, 2, 4, 8 ... instances. Recorded commands have fixed shapes, so there is one for each step; an instance that comes
- * or goes mostly stays within it.
+ * Instances that a session for so many computes: 1, 2, 4, 6, 8, 12, 16, 24, 32 ... Those beyond what was asked for are computed in vain, a third
+ * of them at most.
+ */
+export function stepOf(instances: number): number {
+  const whole = 2 ** Math.ceil(Math.log2(instances));
+  const between = 0.75 * whole;
+  return whole >= 8 && instances <= between ? between : whole;
+}
+
+/**
+ * Sessions of one model, one for each {@link stepOf} the instances. Recorded commands have fixed shapes, so there is one for each step; an instance
+ * that comes or goes mostly stays within it.
  */
 export class StepSessions {
   /** Most instances of one run: what the contract and the device's buffers allow. */
@@ -36,7 +46,7 @@ export class StepSessions {
 
   /** The session for so many instances, and how many it computes: as many or more. */
   sessionFor(instances: number): { readonly session: GeneratorSession; readonly count: number } {
-    const count = Math.min(this.most, 2 ** Math.ceil(Math.log2(instances)));
+    const count = Math.min(this.most, stepOf(instances));
     let step = this.#steps.get(count);
     if (step === undefined) this.#steps.set(count, (step = { session: this.#session.forInstances(count), lastUse: 0 }));
     step.lastUse = ++this.#runs;

@@ -18,7 +18,7 @@ import onnx
 from ..arrays import AnyArray
 from ..contract import Coordinates, Filter, Json, metadata
 from ..errors import ExportError
-from ..placement import RULES, Finding, gpu_findings
+from ..placement import RULES, Finding, gpu_findings, told
 from .finish import finish_graph
 from .layouts import Layout, fitted, split, tensors_of
 from .roles import Role
@@ -49,7 +49,7 @@ class ExportReport:
         lines += [
             f"  output {name}: differs from PyTorch by {error:.1e} at most" for name, error in self.errors.items()
         ]
-        lines += [f"  {note}" for note in [*self.notes, *map(str, self.findings)]]
+        lines += [f"  {note}" for note in [*self.notes, *told(self.findings)]]
         if not self.findings:
             lines.append("  WebGPU: every node has a kernel, shapes are fixed, the commands can be recorded")
         return "\n".join([*lines, f'  <gaussian-splat src="{self.path.name}" alt="" camera-controls></gaussian-splat>'])

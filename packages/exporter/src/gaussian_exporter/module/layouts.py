@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -21,6 +22,8 @@ class Layout:
     words: Json
     # The input that takes an output behind all others in the next run.
     state: str | None = None
+    # Keys of the dict that the module returns, where they are not the names.
+    keys: Mapping[str, str] | None = None
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -35,7 +38,7 @@ class Layout:
 
 
 def split(
-    *names: str,
+    *names: str | Mapping[str, str],
     scales: Literal["linear", "log"] = "linear",
     opacities: Literal["linear", "logit"] = "linear",
     rotations: Literal["wxyz", "xyzw"] = "wxyz",
@@ -44,10 +47,13 @@ def split(
     state: str | None = None,
 ) -> Layout:
     """A tensor for each attribute: split("positions", "scales", "rotations", "colors", "opacities") in the order that
-    the module returns them (of a module that returns a dict, any). `scales="log"` and `opacities="logit"` for numbers
+    the module returns them. Of a module that returns a dict any order, or its own keys: split({"positions": "xyz",
+    "opacities": "alpha", ...}). `scales="log"` and `opacities="logit"` for numbers
     before their activation. Without names: those five. `state`: the input with the role state() that takes, in the
     next run, what the module returns last."""
-    given = names or ("positions", "scales", "rotations", "colors", "opacities")
+    keys = names[0] if names and isinstance(names[0], Mapping) else None
+    plain = tuple(keys) if keys is not None else tuple(name for name in names if isinstance(name, str))
+    given = plain or ("positions", "scales", "rotations", "colors", "opacities")
     unknown = [name for name in given if name not in ATTRIBUTES]
     if unknown:
         raise ValueError(f"split() takes {', '.join(ATTRIBUTES)}; found {unknown[0]!r}")
@@ -58,7 +64,7 @@ def split(
         words["shOrder"] = sh
     if count:
         words["count"] = "count"
-    return Layout("split", (*given, "count") if count else given, words, state)
+    return Layout("split", (*given, "count") if count else given, words, state, keys)
 
 
 def packed(
@@ -83,10 +89,11 @@ def tensors_of(result: Any, layout: Layout) -> list[Any]:
     if hasattr(result, "_asdict"):
         result = result._asdict()
     if isinstance(result, dict):
-        missing = [name for name in layout.outputs if name not in result]
+        keys = [(layout.keys or {}).get(name, name) for name in layout.outputs]
+        missing = [key for key in keys if key not in result]
         if missing:
-            raise _mismatch(f"a tensor {missing[0]!r} in the dict", ", ".join(map(str, result)))
-        return [result[name] for name in layout.outputs]
+            raise _mismatch(f"a tensor {missing[0]!r} in the dict", ", ".join(map(str, result)), _BY_KEY)
+        return [result[key] for key in keys]
     tensors = list(result) if isinstance(result, (tuple, list)) else [result]
     if len(tensors) != len(layout.outputs):
         raise _mismatch(f"{len(layout.outputs)} tensors ({', '.join(layout.outputs)})", str(len(tensors)))
@@ -119,11 +126,15 @@ def fitted(name: str, tensor: Any, layout: Layout, torch: Any) -> Any:
     return x
 
 
-def _mismatch(expected: str, found: str) -> ExportError:
+_IN_ORDER = "name what it returns, in its order: outputs=split('positions', 'covariances', 'colors', 'opacities')"
+_BY_KEY = "say which key is what: outputs=split({'positions': 'xyz', 'covariances': 'cov', 'colors': 'rgb', ...})"
+
+
+def _mismatch(expected: str, found: str, remedy: str = _IN_ORDER) -> ExportError:
     return ExportError(
         "argument/value",
         where="what the module returns",
         expected=expected,
         found=found,
-        remedy="name what it returns, in its order: outputs=split('positions', 'covariances', 'colors', 'opacities')",
+        remedy=remedy,
     )

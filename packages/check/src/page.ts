@@ -1,0 +1,106 @@
+/** What the checker's page takes of this package: no Node in it. */
+import { ContractError, type ContractFault } from '@gaussian-splat/core';
+import {
+  compareParts,
+  GeneratorSession,
+  isDifferent,
+  readTensors,
+  type ComparedPart,
+  type GeneratorModel,
+  type Inputs,
+} from '@gaussian-splat/generator';
+import type { Outputs, SampleInputs } from './run-instances.js';
+import { runModel, type RunReport, type Runtime } from './run-samples.js';
+
+export interface PageRun extends RunReport {
+  /** How the model runs on the page's GPU, and why not there, for people. */
+  readonly how: string;
+}
+
+const HOW = {
+  captured: 'on the GPU, with its commands recorded',
+  webgpu: 'on the GPU, with commands made anew for every run',
+  wasm: 'on the CPU',
+} as const;
+
+/**
+ * Runs a model as `gaussian-splat check --run` does, and each time also as pages run it, on a GPU device: the report says how the two differ.
+ * @param ort ONNX Runtime for the CPU; its sessions run one after the other.
+ */
+export async function runInPage(model: GeneratorModel, device: GPUDevice, ort: Runtime): Promise<PageRun> {
+  const reasons: string[] = [];
+  // Compared here, sample by sample.
+  const whole = new GeneratorSession(model, device, (reason) => reasons.push(reason), false);
+  const session = model.contract.instances === undefined ? whole : whole.forInstances(1);
+  try {
+    const report = await runModel(ort, model, model.header, model.contract, async (inputs, expected) => {
+      try {
+        return verdictOf(model, expected, await runOnGpu(session, inputs));
+      } catch (error) {
+        if (!(error instanceof ContractError)) throw error;
+        return { cell: 'does not run here', faults: error.faults };
+      }
+    });
+    const how = session.kind === undefined ? 'nowhere' : HOW[session.kind];
+    return { ...report, how: [`In a page it runs ${how}`, ...reasons].join(': ') };
+  } finally {
+    await session.release();
+  }
+}
+
+interface GpuRun {
+  readonly bytes: Readonly<Record<string, Uint8Array>>;
+  readonly dims: Readonly<Record<string, readonly number[]>>;
+}
+
+async function runOnGpu(session: GeneratorSession, inputs: SampleInputs): Promise<GpuRun> {
+  const { model, device } = session;
+  let reading: Promise<Uint8Array[]> | undefined;
+  let shapes: GpuRun['dims'] = {};
+  await session.run(inputs as unknown as Inputs, ({ tensors, dims }) => {
+    shapes = dims;
+    const parts = model.outputs.map(({ name, dtype }) => ({
+      buffer: tensors[name],
+      size: Math.ceil((dims[name].reduce((product, dim) => product * dim, 1) * WIDTHS[dtype]) / 4) * 4,
+    }));
+    reading = readTensors(device, parts);
+  });
+  const read = (await reading) ?? [];
+  return { dims: shapes, bytes: Object.fromEntries(model.outputs.map(({ name }, i) => [name, read[i]])) };
+}
+
+const WIDTHS = { float32: 4, float16: 2, int32: 4, int64: 8 } as const;
+
+function verdictOf({ outputs, layout }: GeneratorModel, expected: Outputs, { bytes, dims }: GpuRun) {
+  const other = outputs.find(({ name }) => String(dims[name]) !== String(expected[name].dims));
+  if (other !== undefined) {
+    const [found, rows] = [String(dims[other.name]), String(expected[other.name].dims)];
+    return { cell: `${other.name} [${found}] on the GPU`, faults: [differs(other.name, `[${rows}]`, `[${found}]`)] };
+  }
+  const parts = outputs.map(({ name, dtype }): ComparedPart => {
+    const { buffer, byteOffset, byteLength } = expected[name].data as unknown as Uint8Array;
+    return {
+      tensor: name,
+      dtype: dtype === 'int64' ? 'int32' : dtype,
+      start: 0,
+      found: bytes[name].subarray(0, byteLength),
+      expected: new Uint8Array(buffer, byteOffset, byteLength),
+    };
+  });
+  const comparison = compareParts(parts, layout?.attributes);
+  const figure = `${comparison.where} differ by up to ${comparison.error.toPrecision(2)} of the largest on the GPU`;
+  const faults = isDifferent(comparison) ? [differs(comparison.where, 'the numbers of the CPU', figure)] : [];
+  return { cell: comparison.error === 0 ? 'the same on the GPU' : figure, faults };
+}
+
+const differs = (tensor: string, expected: string, found: string): ContractFault => ({
+  code: 'contract/run',
+  tensor,
+  where: 'the run on the GPU',
+  expected,
+  found,
+  remedy:
+    'pages notice, and run this model on the CPU; `gaussian-export check` names the operators that the GPU has wrong',
+});
+
+export type { Runtime };
