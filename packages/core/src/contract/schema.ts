@@ -134,7 +134,7 @@ const input: Schema = {
     variant(
       'role',
       'control',
-      'Any fixed shape of float32, int32 or int64: a control for people',
+      'Any fixed shape of float32, int32 or int64: a control for visitors',
       {
         range: numbers('Smallest and largest value', 2),
         default: {
@@ -183,7 +183,7 @@ const input: Schema = {
     variant(
       'role',
       'image',
-      '[1,3,H,W] float32 or float16: red, green and blue planes in 0..1; [1,4,H,W] with alpha, [V,3,H,W] of V pictures',
+      '[1,3,H,W] float32 or float16: red, green and blue planes in 0..1; [1,4,H,W] with alpha, [V,3,H,W] of V images',
     ),
   ],
 };
