@@ -33,8 +33,8 @@ export default {
   ],
   files: named ?? ['tests/**/browser/**/*.test.ts', `!${DENSE}`],
   rootDir: '.',
-  // Without this condition Lit is its development build, which warns that it is.
-  nodeResolve: { exportConditions: ['production', 'browser'] },
+  // Without `development`, which is the default, Lit does not warn. With `production` a page would have the element twice: tests import its modules, too.
+  nodeResolve: { exportConditions: ['browser'] },
   concurrency: CONCURRENCY[group],
   concurrentBrowsers: 1,
   browserStartTimeout: 60_000,

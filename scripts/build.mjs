@@ -36,6 +36,7 @@ if (extent !== 'packages') {
   const others = extent === 'whole' ? buildBesideBundle() : undefined;
   await bundleElement();
   await others;
+  if (extent === 'whole') await buildApps();
   if (extent === 'whole') await buildPages();
 }
 noteBuilt(extent);
@@ -106,7 +107,7 @@ async function describeElement() {
   writeAttributeRows(JSON.parse(readFileSync(join(cwd, 'custom-elements.json'), 'utf8')));
 }
 
-/** Scripts and scenes of the site, but its pages: those of pages by esbuild, the apps by Vite. */
+/** Scripts and scenes of the site, but its pages. */
 async function buildDemo() {
   const from = join(root, 'demo');
   const to = join(root, 'demo/dist');
@@ -128,6 +129,11 @@ async function buildDemo() {
     minify: true,
     logLevel: 'warning',
   });
+}
+
+/** The apps by Vite, which takes what the bundle has made for production. */
+async function buildApps() {
+  const from = join(root, 'demo');
   for (const app of ['react', 'vue']) {
     const config = join(from, app, 'vite.config.mjs');
     await mustSoon(process.execPath, [

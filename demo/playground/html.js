@@ -1,7 +1,19 @@
 /** Attributes as HTML that a person can paste. */
 
-/** The line that registers the element, for a page beside the folder `cdn`. */
-export const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
+/** The line that registers the element. @param cdn {string} address of the folder of its build, with a slash at the end */
+export const scriptOf = (cdn) => `<script type="module" src="${escape(cdn)}gaussian-splat.min.js"></script>`;
+
+/**
+ * The same scene in a frame, for sites that take no script.
+ * @param cdn {string} address of the folder, with a slash at the end
+ * @param attributes {readonly (readonly [name: string, value: string | true])[]}
+ */
+export function frameOf(cdn, attributes) {
+  const query = new URLSearchParams(attributes.map(([name, value]) => [name, value === true ? '' : value]));
+  const [, title = ''] = attributes.find(([name]) => name === 'alt') ?? [];
+  const address = `${cdn}embed.html?${query}`;
+  return `<iframe src="${escape(address)}" title="${escape(title)}" style="width: 100%; aspect-ratio: 4 / 3; border: 0" allow="fullscreen"></iframe>`;
+}
 
 /**
  * @param attributes {readonly (readonly [name: string, value: string | true])[]} true for an attribute without a value.

@@ -2,7 +2,7 @@
 import { copy } from '../site/copy.js';
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { viewOf } from '../site/view.js';
-import { SCRIPT, tagOf } from './html.js';
+import { frameOf, scriptOf, tagOf } from './html.js';
 import { askForLevel, turnedOver } from './level.js';
 
 const byId = (id) => document.getElementById(id);
@@ -12,6 +12,8 @@ const form = byId('attributes');
 const ADDRESSES = ['src', 'poster', 'contract'];
 /** And those that are several, with spaces between them. */
 const LISTS = ['chain', 'postprocess'];
+/** The element's build, which this site has, too. */
+const CDN = new URL('../cdn/', document.baseURI).href;
 const VIEW = ['camera-orbit', 'camera-target', 'field-of-view'];
 
 /** The file that was dropped, while its name stands in the field of the source. */
@@ -36,7 +38,7 @@ function show() {
     const [, value] = attributes.find(([each]) => each === name) ?? [];
     setAttribute(name, name === 'src' && value === local.name ? local.address : value);
   }
-  byId('html').textContent = `${SCRIPT}\n${tagOf(attributes.map(([name, value]) => [name, pasteable(name, value)]))}`;
+  byId('html').textContent = `${scriptOf(CDN)}\n${tagOf(pasteableOf(attributes))}`;
   byId('copied').textContent = '';
   remember(attributes);
 }
@@ -47,6 +49,8 @@ function setAttribute(name, value) {
   if (wanted === null) scene.removeAttribute(name);
   else scene.setAttribute(name, wanted);
 }
+
+const pasteableOf = (attributes) => attributes.map(([name, value]) => [name, pasteable(name, value)]);
 
 function pasteable(name, value) {
   if (LISTS.includes(name)) return value.split(/\s+/).map(absolute).join(' ');
@@ -82,6 +86,13 @@ async function copyView() {
   byId('copied').textContent = await copy(byId('html').textContent);
 }
 
+/** What can only be had here: a file that was dropped is on no server. */
+async function copyUnlessLocal(textOf) {
+  if (form.elements.src.value === local.name)
+    byId('copied').textContent = 'Your file is in this browser only. Put it on a server, and name its address as src.';
+  else byId('copied').textContent = await copy(textOf());
+}
+
 /** The other way up: files such as SPZ do not say which, and tools do not agree. */
 function flip() {
   asking.abort();
@@ -112,7 +123,7 @@ scene.addEventListener('loadstart', () => asking.abort());
 scene.addEventListener('load', () => {
   const { splats, bytes } = scene.statistics;
   byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
-  for (const name of ['copy-view', 'level', 'flip']) byId(name).disabled = false;
+  for (const id of ['copy-view', 'copy-link', 'level', 'flip']) byId(id).disabled = false;
 });
 scene.addEventListener('loadstart', () => (byId('status').textContent = 'Loading'));
 for (const type of ['error', 'generator-error']) {
@@ -122,6 +133,12 @@ form.addEventListener('change', show);
 form.addEventListener('submit', (event) => event.preventDefault());
 byId('copy-view').addEventListener('click', copyView);
 byId('level').addEventListener('click', level);
+byId('copy-frame').addEventListener('click', () => copyUnlessLocal(() => frameOf(CDN, pasteableOf(chosen()))));
+byId('copy-link').addEventListener('click', () => {
+  for (const [name, value] of Object.entries(viewOf(scene))) form.elements[name].value = value;
+  show();
+  return copyUnlessLocal(() => location.href);
+});
 byId('flip').addEventListener('click', flip);
 byId('copy').addEventListener('click', async () => {
   byId('copied').textContent = await copy(byId('html').textContent);

@@ -1,6 +1,8 @@
 /**
  * The CDN build: `cdn/gaussian-splat.min.js` (the element and the renderer in one file, for a script tag with an
  * integrity attribute), and beside it the scene worker with a chunk for every reader, which it finds from its own URL.
+ * And for bundlers, in the package: the worker as text, a module for each chunk, and as one file (src/loading/own-worker.ts); and the element as
+ * short as for CDNs, for those that build for production.
  */
 import { cpSync, mkdirSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -11,14 +13,27 @@ import terser from '@rollup/plugin-terser';
 import { minifyTemplateLiterals } from 'rollup-plugin-minify-template-literals';
 import { shortShaders } from './scripts/shader-plugin.mjs';
 import { transform } from 'esbuild';
+import { workerAsText } from './scripts/worker-text.mjs';
+
+/** Of the package's own modules these stay as they are: they find files by their own address, are the worker's, or are made here. */
+const KEPT = /\/element\/dist\/(loading\/(own-worker|spawn-worker|scene-worker)|meshes\/three)\.js$/;
 
 const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 
 /** esbuild gives the private names of all classes the same few letters. Terser, which is better at all else, gives each its own. */
 const shortPrivates = {
   name: 'short-privates',
-  renderChunk: (code) =>
-    transform(code, { format: 'esm', target: 'es2022', minifyIdentifiers: true, sourcemap: 'external' }),
+  renderChunk: (code, chunk, { format, sourcemap }) =>
+    transform(code, {
+      ...(format === 'es' && { format: 'esm' }),
+      ...{ target: 'es2022', minifyIdentifiers: true, sourcemap: sourcemap ? 'external' : false },
+    }),
+};
+
+/** Quick: whatever bundles it does better, if it does. */
+const shortText = {
+  name: 'short-text',
+  renderChunk: (code) => transform(code, { format: 'esm', target: 'es2022', minify: true, legalComments: 'inline' }),
 };
 
 const plugins = [
@@ -42,12 +57,18 @@ const noMapOfThree = {
   name: 'no-map-of-three',
   generateBundle(_options, bundle) {
     for (const chunk of Object.values(bundle)) {
-      if (!chunk.moduleIds?.some((id) => id.includes('/node_modules/three/build/'))) continue;
+      if (!chunk.moduleIds?.includes(path('./dist/meshes/three.js'))) continue;
       delete bundle[`${chunk.fileName}.map`];
       chunk.code = chunk.code.replace(/\n\/\/# sourceMappingURL=\S+\s*$/, '\n');
       chunk.map = null;
     }
   },
+};
+
+/** Here the worker's script lies beside the element's. */
+const workerBeside = {
+  name: 'worker-beside',
+  load: (id) => (id === path('./dist/loading/own-worker.js') ? `export * from './own-worker-cdn.js'` : null),
 };
 
 /** Chunks carry a hash in their name, so those of earlier builds would pile up. */
@@ -61,34 +82,46 @@ const RUNTIME_FILES = [
   'ort-wasm-simd-threaded.asyncify.wasm',
 ];
 
-const copyRuntime = {
-  name: 'copy-runtime',
+/** And the page for iframes. */
+const copyOthers = {
+  name: 'copy-others',
   writeBundle() {
+    cpSync(path('./embed'), path('./cdn'), { recursive: true });
     const from = dirname(createRequire(import.meta.url).resolve('onnxruntime-web/webgpu'));
     mkdirSync(path('./cdn/onnxruntime'), { recursive: true });
     for (const file of RUNTIME_FILES) cpSync(join(from, file), path(`./cdn/onnxruntime/${file}`));
   },
 };
 
+/** What is in a chunk; where its module says it least, the name of the package. */
+const NAMES = { index: 'generator', dist: 'generator', meta: 'sog-meta', lod: 'sog-levels', bundle: 'sog-bundle' };
+const nameOf = ({ name }) => NAMES[name] ?? name;
+
 const output = {
   dir: path('./cdn'),
   format: 'es',
   sourcemap: true,
-  chunkFileNames: 'readers/[name]-[hash].js',
+  chunkFileNames: (chunk) => `readers/${nameOf(chunk)}-[hash].js`,
 };
 
 export default [
+  {
+    // three.js, as much as meshes need: a package of 24 MB otherwise.
+    input: { three: path('./scripts/three.mjs') },
+    plugins: [nodeResolve({ exportConditions: ['production', 'browser'] }), shortText],
+    output: { dir: path('./dist/meshes'), format: 'es', entryFileNames: '[name].js', chunkFileNames: '[name].js' },
+  },
   {
     input: { 'gaussian-splat.min': path('./dist/index.js') },
     // Where workers are refused, the element imports the worker's module; it is the same file, not a copy.
     external: (id) => id.endsWith('scene-worker.js'),
     // What generators need is a chunk of its own, loaded when the first is shown; it finds the runtime beside itself.
     preserveEntrySignatures: 'allow-extension',
-    plugins: [emptyFirst, ...plugins, noMapOfThree, copyRuntime],
+    plugins: [emptyFirst, workerBeside, ...plugins, noMapOfThree, copyOthers],
     // What two chunks share and is smaller than a request for it goes where the page has it already.
     output: {
       ...output,
-      chunkFileNames: 'generator-[hash].js',
+      chunkFileNames: (chunk) => `${nameOf(chunk)}-[hash].js`,
       paths: () => './scene-worker.js',
       experimentalMinChunkSize: 500,
     },
@@ -98,6 +131,28 @@ export default [
     // The page imports `loadScene` from it, so its exports stay; readers import what they share with it from it.
     preserveEntrySignatures: 'allow-extension',
     plugins,
-    output,
+    output: [output, { dir: path('./dist/loading'), format: 'cjs', plugins: [workerAsText] }],
+  },
+  {
+    input: { index: path('./dist/index.js'), element: path('./dist/element.js'), scenes: path('./dist/scenes.js') },
+    // Lit and the errors' class may be the app's own, too.
+    external: (id) => /^(lit|@lit|@gaussian-splat\/core$)/.test(id) || KEPT.test(id),
+    plugins,
+    output: {
+      ...{ dir: path('./dist'), format: 'es', experimentalMinChunkSize: 500 },
+      entryFileNames: 'production/[name].js',
+      chunkFileNames: (chunk) => `production/${nameOf(chunk)}.js`,
+    },
+  },
+  {
+    input: path('./dist/loading/scene-worker.js'),
+    plugins,
+    output: { file: path('./dist/loading/scene-worker.bundle.js'), format: 'es', inlineDynamicImports: true },
+  },
+  {
+    // All in one module, for pages that are one file.
+    input: path('./dist/index.js'),
+    plugins,
+    output: { file: path('./dist/single.js'), format: 'es', inlineDynamicImports: true },
   },
 ];

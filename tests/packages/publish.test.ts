@@ -77,7 +77,7 @@ for (const name of libraries) {
   });
 }
 
-/** Most bytes of a tarball. The element's has the CDN build with its source maps, and not ONNX Runtime, which is a dependency. */
+/** Most bytes of a tarball. The element's has the CDN build without source maps, and not ONNX Runtime, which is an optional peer. */
 const MOST_BYTES = { element: 2_000_000, others: 550_000 };
 
 test('every tarball has its licence, its README and nothing that weighs', { skip }, (t) => {

@@ -1,31 +1,59 @@
 /**
- * `gaussian-splat page SCENE FOLDER [--port 8000] [--no-serve]`: a page with a scene of one's own. Puts the element and the scene into
- * FOLDER, writes an index.html unless there is one, and serves the folder. What then lies there is static: any host can have it.
+ * `gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]`: a page with a scene of one's own. Puts the element and the scene into
+ * FOLDER, writes an index.html unless there is one, and serves the folder. What then lies there is static: any host can have it. With `--single`
+ * the index.html is all: the element and the scene are in it, and it can be opened from a disk or sent by mail.
  */
-import { cpSync, existsSync, mkdirSync, statSync, writeFileSync } from 'node:fs';
+import { cpSync, existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { basename, dirname, extname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 import { filesBeside } from './lib/files-beside.mjs';
 import { serve } from './lib/server.mjs';
 
-const USAGE = 'gaussian-splat page SCENE FOLDER [--port 8000] [--no-serve]';
-const CDN = fileURLToPath(new URL('cdn', import.meta.resolve('@gaussian-splat/element/package.json')));
+const USAGE = 'gaussian-splat page SCENE FOLDER [--single] [--port 8000] [--no-serve]';
+const elementFile = (path) => fileURLToPath(new URL(path, import.meta.resolve('@gaussian-splat/element/package.json')));
+const CDN = elementFile('cdn');
 const SCRIPT = '<script type="module" src="cdn/gaussian-splat.min.js"></script>';
 
-const { scene, folder, port, isServed } = parseOptions();
+const { scene, folder, port, isServed, isSingle } = parseOptions();
+const page = join(folder, 'index.html');
 
 mkdirSync(folder, { recursive: true });
-copyElement(join(folder, 'cdn'));
-const tag = tagOf(await copyScene());
-const page = join(folder, 'index.html');
-if (existsSync(page)) console.log(`\n${page} is there already and stays as it is. Paste into it:\n\n${SCRIPT}\n${tag}`);
-else writeFileSync(page, htmlOf(tag));
-console.log(`\nThe page is in ${folder}`);
+if (isSingle) await writeSingle();
+else await writeFolder();
+console.log(`\nThe page is ${isSingle ? page : `in ${folder}`}`);
 if (isServed) await show();
 
+async function writeFolder() {
+  copyElement(join(folder, 'cdn'));
+  const tag = tagOf(await copyScene());
+  if (existsSync(page))
+    console.log(`\n${page} is there already and stays as it is. Paste into it:\n\n${SCRIPT}\n${tag}`);
+  else writeFileSync(page, htmlOf(SCRIPT, tag, titleOf(basename(scene))));
+}
+
+/** The element and the scene as text in the page. The scene becomes a file again, with its name, since that tells some formats. */
+async function writeSingle() {
+  if (existsSync(page)) stop(`${page} is there already. With --single name a folder without one.`);
+  const { found, missing } = await filesBeside(scene);
+  if (isJson(scene) || found.length + missing.length > 0 || extname(scene) === '.onnx')
+    stop(
+      `${scene} is of several files, or needs ONNX Runtime. --single takes a scene of one file: PLY, SPZ, SOG, .splat, .ksplat or GLB.`,
+    );
+  const title = titleOf(scene);
+  const name = JSON.stringify(basename(scene)).replaceAll('<', '\\u003c');
+  const script = `<script type="text/plain" id="scene">${readFileSync(scene).toString('base64')}</script>
+  <script type="module">${readFileSync(elementFile('dist/single.js'), 'utf8').replaceAll(/<(?=\/script|!--)/gi, '\\x3c')}</script>
+  <script type="module">
+    const data = await fetch('data:application/octet-stream;base64,' + document.getElementById('scene').textContent);
+    document.querySelector('gaussian-splat').src = new File([await data.blob()], ${name});
+  </script>`;
+  writeFileSync(page, htmlOf(script, `<gaussian-splat alt="${title}" camera-controls></gaussian-splat>`, title));
+}
+
 function parseOptions() {
-  const options = { port: { type: 'string', default: '8000' }, 'no-serve': { type: 'boolean', default: false } };
+  const flag = { type: 'boolean', default: false };
+  const options = { port: { type: 'string', default: '8000' }, 'no-serve': flag, single: flag };
   let parsed;
   try {
     parsed = parseArgs({ allowPositionals: true, options });
@@ -42,7 +70,7 @@ function parseOptions() {
   const port = Number(values.port);
   if (!(Number.isInteger(port) && port >= 0 && port < 65536))
     stop(`--port: expected a number from 0 to 65535, found "${values.port}". ${USAGE}`);
-  return { scene, folder, port, isServed: !values['no-serve'] };
+  return { scene, folder, port, isServed: !values['no-serve'] && !values.single, isSingle: values.single };
 }
 
 function stop(message) {
@@ -88,17 +116,17 @@ function tagOf(source) {
   return `<gaussian-splat src="${address}" alt="${titleOf(source)}" camera-controls></gaussian-splat>`;
 }
 
-function htmlOf(tag) {
+function htmlOf(script, tag, title) {
   return `<!doctype html>
 <html lang="en">
   <meta charset="utf-8" />
   <meta name="viewport" content="width=device-width, initial-scale=1" />
-  <title>${/alt="([^"]*)"/.exec(tag)[1]}</title>
-  ${SCRIPT}
+  <title>${title}</title>
   <style>
     gaussian-splat { display: block; width: 100%; height: 80vh; background: #ddd; }
   </style>
   ${tag}
+  ${script}
 </html>
 `;
 }

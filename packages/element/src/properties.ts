@@ -3,6 +3,9 @@ import { declarations, flags, type AttributeProperties } from './attributes.js';
 import type { GaussianSplatEventMap } from './events.js';
 import type { ControlValues } from './live/values.js';
 
+/** Those of the element, and under other names those of every element: `click`, `keydown`. */
+type ElementEvents = GaussianSplatEventMap & Omit<HTMLElementEventMap, keyof GaussianSplatEventMap>;
+
 /** The properties of `<gaussian-splat>` that are attributes, too, and those that Lit has to know besides. */
 // The interface below gives the attributes of attributes.ts and inherited methods their types: Lit makes the accessors of the first, and has the others.
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
@@ -18,6 +21,11 @@ export class SplatProperties extends LitElement {
   /** Controls of a generator by the names of its inputs; above the attributes `control-NAME`. New values are a new object. */
   declare controls: ControlValues | null;
 
+  static {
+    // The element draws, and so learns what its template shows, after an update. Lit's development build warns of that.
+    this.disableWarning?.('change-in-update');
+  }
+
   constructor() {
     super();
     // Boolean properties start as booleans: frameworks look at them to decide what a bare attribute means.
@@ -27,9 +35,9 @@ export class SplatProperties extends LitElement {
 
 // eslint-disable-next-line @typescript-eslint/no-unsafe-declaration-merging
 export interface SplatProperties extends AttributeProperties {
-  addEventListener<K extends keyof GaussianSplatEventMap>(
+  addEventListener<K extends keyof ElementEvents>(
     type: K,
-    listener: (this: this, event: GaussianSplatEventMap[K]) => unknown,
+    listener: (this: this, event: ElementEvents[K]) => unknown,
     options?: boolean | AddEventListenerOptions,
   ): void;
   addEventListener(
@@ -37,9 +45,9 @@ export interface SplatProperties extends AttributeProperties {
     listener: EventListenerOrEventListenerObject,
     options?: boolean | AddEventListenerOptions,
   ): void;
-  removeEventListener<K extends keyof GaussianSplatEventMap>(
+  removeEventListener<K extends keyof ElementEvents>(
     type: K,
-    listener: (this: this, event: GaussianSplatEventMap[K]) => unknown,
+    listener: (this: this, event: ElementEvents[K]) => unknown,
     options?: boolean | EventListenerOptions,
   ): void;
   removeEventListener(

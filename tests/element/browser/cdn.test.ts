@@ -49,7 +49,7 @@ describe('the CDN build', () => {
       performance
         .getEntriesByType('resource')
         .map(({ name }) => name)
-        .filter((name) => name.startsWith(`${origin}/cdn/generator-`));
+        .filter((name) => name.startsWith(`${origin}/cdn/`) && /cdn\/[^/]*-[\w-]{8}\.js$/.test(name));
     const shown = async (src: string): Promise<GaussianSplatElement> => {
       const element = show({ src });
       await element.ready;

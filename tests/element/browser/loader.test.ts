@@ -2,7 +2,7 @@ import { GaussianSplatElement } from '@gaussian-splat/element';
 import {
   assert,
   assertEqual,
-  claimFault,
+  claimComing,
   COMPASS,
   delay,
   nextEvent,
@@ -75,7 +75,7 @@ describe('the scene worker', () => {
     } finally {
       GaussianSplatElement.sceneLoader = original;
     }
-    claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
+    await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .* workerLocation/);
   });
 
   it('lies where workerLocation says, and is named in the warning if it does not', async () => {
@@ -102,6 +102,6 @@ describe('the scene worker', () => {
       globalThis.Worker = Original;
     }
     assertEqual(asked, [place, '/net/status/404'], 'scripts');
-    claimFault(/refuses its worker .*\/net\/status\/404.* GaussianSplatElement.workerLocation/);
+    await claimComing(/no worker could be started .* GaussianSplatElement.workerLocation is \/net\/status\/404/);
   });
 });

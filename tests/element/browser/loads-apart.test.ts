@@ -3,7 +3,7 @@ import { GaussianSplatElement } from '@gaussian-splat/element';
 import {
   assert,
   assertEqual,
-  claimFault,
+  claimComing,
   COMPASS,
   delay,
   FIXTURES,
@@ -182,6 +182,6 @@ describe("a worker's script that never comes", () => {
     } finally {
       GaussianSplatElement.sceneLoader = original;
     }
-    claimFault(/refuses its worker \(its script does not come\)/);
+    await claimComing(/no worker could be started \(its script does not come\)/);
   });
 });

@@ -1,5 +1,5 @@
 import { GaussianSplatElement } from '@gaussian-splat/element';
-import { assert, assertEqual, claimFault, COMPASS, FIXTURES, show, showLoaded } from './support/harness.js';
+import { assert, assertEqual, claimComing, COMPASS, FIXTURES, show, showLoaded } from './support/harness.js';
 
 type SceneLoader = (typeof GaussianSplatElement)['sceneLoader'];
 const original = GaussianSplatElement.sceneLoader;
@@ -41,7 +41,7 @@ describe('code that cannot be loaded when it is needed', () => {
       return new Worker(script, { type: 'module' });
     });
     const element = await assertLost('/net/status/404', 'loading/scene-worker.js', /reads scenes/);
-    claimFault(/this page refuses its worker/);
+    await claimComing(/no worker could be started/);
     // Once it is there, it is taken: then it is the scene that is missing, which needs no more code that the tests below are to miss.
     await lose();
     element.load();
@@ -50,7 +50,7 @@ describe('code that cannot be loaded when it is needed', () => {
   });
 
   it('in the worker: the reader of a format', async () => {
-    await assertLost(`${FIXTURES}compass.ply`, 'readers/ply.js', /reads PLY/);
+    await assertLost(`${FIXTURES}compass.ply`, 'worker-code/ply.js', /reads PLY/);
   });
 
   it('in the worker: what knows files that are no scene', async () => {
@@ -60,7 +60,7 @@ describe('code that cannot be loaded when it is needed', () => {
   it("on the page's thread: the reader of a format, and another format is read", async () => {
     GaussianSplatElement.sceneLoader = withoutWorker();
     await assertLost(COMPASS, 'readers/splat.js', /reads \.splat/);
-    claimFault(/this page refuses its worker/);
+    await claimComing(/no worker could be started/);
     await showLoaded({ src: `${FIXTURES}compass.ply` });
   });
 

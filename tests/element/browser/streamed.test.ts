@@ -3,7 +3,7 @@ import { MemoryLedger, USUAL_STEPS } from '@gaussian-splat/renderer';
 import { detailFolder } from '../../support/detail-folder.js';
 import { pebbles } from '../../support/scenes/pebbles.js';
 import { storedBlocks } from '../../support/stored-blocks.js';
-import { assert, assertEqual, claimFault, devices, nextEvent, show, until } from './support/harness.js';
+import { assert, assertEqual, claimComing, devices, nextEvent, show, until } from './support/harness.js';
 
 const folder = detailFolder(pebbles(40_000));
 
@@ -198,7 +198,7 @@ describe('a streamed scene', () => {
     await close(element);
     stop();
     GaussianSplatElement.sceneLoader = original;
-    claimFault(/console\.warn: <gaussian-splat>: this page refuses its worker .* worker-src/);
+    await claimComing(/console\.warn: <gaussian-splat>: no worker could be started .* workerLocation/);
   });
 
   it('beside others makes do with less memory, and has a place', async () => {

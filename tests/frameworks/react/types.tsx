@@ -62,6 +62,12 @@ export const deadCamera = <gaussian-splat onCameraChange={() => undefined} />;
 // @ts-expect-error It can only be read.
 export const readOnlyBare = <gaussian-splat error={null} />;
 
+const scene = document.createElement('gaussian-splat');
+scene.addEventListener('click', ({ clientX }) => clientX satisfies number);
+scene.removeEventListener('keydown', ({ key }) => key satisfies string);
+scene.addEventListener('load', ({ detail }) => detail.url satisfies string);
+scene.addEventListener('own-event', (event) => event satisfies Event);
+
 document.createElement('button').addEventListener('hotspot-visibility', ({ detail }) => {
   detail.visible satisfies boolean;
 });

@@ -78,6 +78,7 @@ export class SizeController implements ReactiveController {
     this.#canvas = this.#canvasOf();
     if (this.#canvas === null || this.#observer !== undefined) return;
     const { ResizeObserver } = windowOf(this.#canvas);
+    if (!ResizeObserver) return;
     this.#observer = new ResizeObserver((entries) => this.#update(entries[entries.length - 1]));
     try {
       // Exact device pixels, also where the element's edges lie between them.

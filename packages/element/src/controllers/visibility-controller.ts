@@ -26,6 +26,8 @@ export class VisibilityController implements ReactiveController {
 
   hostConnected(): void {
     const { IntersectionObserver } = windowOf(this.#element);
+    // Documents of unit tests (jsdom) have no layout.
+    if (!IntersectionObserver) return this.#set(true);
     this.#observer = new IntersectionObserver((entries) => this.#set(entries[entries.length - 1].isIntersecting), {
       threshold: THRESHOLD,
     });

@@ -9,7 +9,8 @@ import type {
   WorkerRequest,
 } from './protocol.js';
 import type * as workerModule from './scene-worker.js';
-import { spawnSceneWorker } from './spawn-worker.js';
+import { OWN_WORKERS } from './own-worker.js';
+import { spawnAt } from './spawn-worker.js';
 import { WorkerPool } from './worker-pool.js';
 
 /** The worker's code. */
@@ -20,23 +21,42 @@ export class SceneLoader {
   /** Starts a worker that is the caller's own. */
   readonly spawn: () => Worker;
   readonly #pool: WorkerPool;
+  /** Which of {@link OWN_WORKERS} is taken. */
+  #way = 0;
+  /** The directive of the page's policy that has forbidden a worker. */
+  #violated: string | undefined;
 
   /**
    * @param spawn starts a worker; tests pass their own
-   * @param locationOf address of the worker's script; null for the one beside the code
+   * @param locationOf address of the worker's script; null for the element's own
    */
   constructor(spawn?: () => Worker, locationOf: () => string | null = () => null) {
-    this.spawn = spawn ?? (() => spawnSceneWorker(locationOf()));
+    this.spawn = spawn ?? (() => this.#spawnAt(locationOf()));
     this.#pool = new WorkerPool(
       this.spawn,
       () => this.#code(),
-      (reason) =>
-        console.warn(
-          `<gaussian-splat>: this page refuses its worker (${reason}), so scenes are read on the main thread. ` +
-            `Allow it with the Content-Security-Policy directive worker-src, or name its script (${locationOf() ?? 'scene-worker.js beside the code'}) with GaussianSplatElement.workerLocation.`,
-        ),
+      (reason) => void this.#warn(reason, locationOf()),
+      () => !spawn && locationOf() === null && ++this.#way < OWN_WORKERS.length,
     );
   }
+
+  #spawnAt(location: string | null): Worker {
+    document.addEventListener('securitypolicyviolation', this.#note);
+    return location === null ? OWN_WORKERS[this.#way]() : spawnAt(new URL(location, document.baseURI));
+  }
+
+  async #warn(reason: string, location: string | null): Promise<void> {
+    try {
+      const { warnOfRefusal } = await import('./refusal.js');
+      warnOfRefusal(reason, this.#violated, location);
+    } catch {
+      console.warn(reason);
+    }
+  }
+
+  readonly #note = ({ effectiveDirective }: SecurityPolicyViolationEvent): void => {
+    if (effectiveDirective === 'worker-src') this.#violated = effectiveDirective;
+  };
 
   /**
    * Fetches, reads and packs a scene. Rejects with GaussianSplatError (`network/*`, `decode/*`, `out-of-memory/*`), or
@@ -93,6 +113,7 @@ export class SceneLoader {
       return await loadModule('the code that reads scenes', () => import('./scene-worker.js'));
     } catch (error) {
       // Where it cannot be had here, either, it was no policy of the page that kept the worker away.
+      this.#way = 0;
       this.#pool.retry();
       throw error;
     }

@@ -1,41 +1,31 @@
 /**
- * Starts the scene worker. A worker script must have the page's origin; where the element itself came from elsewhere
- * (a CDN), or the page has no origin as in a sandboxed frame, a one-line script of the page's own imports it.
- * @param location address of `scene-worker.js`, where a bundler has put it out of reach; null for the one beside this code
+ * A worker whose script lies at an address. A worker script must have the page's origin; where it lies elsewhere (a CDN), or the page has no
+ * origin as in a sandboxed frame, a one-line script of the page's own imports it.
  */
-export function spawnSceneWorker(location: string | null = null): Worker {
-  if (location !== null) {
-    const named = new URL(location, document.baseURI);
-    if (named.origin !== globalThis.origin) return spawnFromElsewhere(named);
-    return new Worker(trustedUrl(named.href) ?? named, { type: 'module' });
-  }
-  const here = new URL(import.meta.url);
-  const script = new URL('./scene-worker.js', here);
-  if (isOwnModule(here) && script.origin !== globalThis.origin) return spawnFromElsewhere(script);
-  const trusted = isOwnModule(here) ? trustedUrl(script.href) : null;
-  if (trusted !== null) return new Worker(trusted, { type: 'module' });
-  // Written out in full, and nowhere else, since bundlers look for exactly this expression.
-  return new Worker(new URL('./scene-worker.js', import.meta.url), { type: 'module' });
+export function spawnAt(script: URL): Worker {
+  if (script.origin !== globalThis.origin) return spawnFromElsewhere(script);
+  return new Worker(trustedUrl(script.href), { type: 'module' });
 }
 
 function spawnFromElsewhere(script: URL): Worker {
-  // No module itself: sandboxed frames start none of a blob. What fails is thrown where the worker's owner hears of it.
-  const code = `import(${JSON.stringify(script.href)}).catch((e)=>setTimeout(()=>{throw e}))`;
-  const url = URL.createObjectURL(new Blob([code], { type: 'text/javascript' }));
-  const worker = new Worker(trustedUrl(url) ?? url);
+  return spawnText(`import(${JSON.stringify(script.href)})`);
+}
+
+/**
+ * A worker whose script is the text of a promise of what serves it. Messages that come before wait for it, and what fails is thrown where the
+ * worker's owner hears of it.
+ */
+export function spawnText(code: string): Worker {
+  const text = `const early=[],keep=(e)=>early.push(e);addEventListener('message',keep);${code}.then(()=>{removeEventListener('message',keep);for(const e of early)dispatchEvent(new MessageEvent('message',{data:e.data,ports:[...e.ports]}))}).catch((e)=>setTimeout(()=>{throw e}))`;
+  // No module: sandboxed frames start none of a blob.
+  const url = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
+  const worker = new Worker(trustedUrl(url));
   // The URL is only needed until the script has been fetched, which its first message or its failure tells.
   const revoke = (): void => URL.revokeObjectURL(url);
   worker.addEventListener('message', revoke, { once: true });
   worker.addEventListener('error', revoke, { once: true });
   return worker;
 }
-
-/**
- * False where a bundler has put this module into a file of its own, or its address on the disk in place of `import.meta.url`: then only its own
- * expression finds the worker.
- */
-const isOwnModule = ({ protocol, pathname }: URL): boolean =>
-  protocol !== 'file:' && /\/(spawn-worker|gaussian-splat\.min)\.js$/.test(pathname);
 
 /** Trusted Types, which TypeScript's types of the page do not know yet. */
 interface TrustedTypes {
@@ -47,11 +37,11 @@ interface TrustedTypes {
 
 let policy: ReturnType<TrustedTypes['createPolicy']> | null | undefined;
 
-/** An address that pages with `require-trusted-types-for 'script'` accept; null where there is no such thing, or the page refuses the policy. */
-function trustedUrl(url: string): string | null {
+/** An address that pages with `require-trusted-types-for 'script'` accept; as it is where there is no such thing, or the page refuses the policy. */
+function trustedUrl(url: string): string {
   const { trustedTypes } = globalThis as { trustedTypes?: TrustedTypes };
   if (policy === undefined) policy = trustedTypes ? createPolicy(trustedTypes) : null;
-  return policy?.createScriptURL(url) ?? null;
+  return policy?.createScriptURL(url) ?? url;
 }
 
 function createPolicy(trustedTypes: TrustedTypes): ReturnType<TrustedTypes['createPolicy']> | null {

@@ -37,6 +37,7 @@ export class WorkerPool {
   readonly #spawn: () => Worker;
   readonly #prepare: () => Promise<unknown>;
   readonly #onRefused: Refusal;
+  readonly #another: () => boolean;
   readonly #slots = new Set<WorkerSlot>();
   readonly #queue: Job[] = [];
   #isRefused = false;
@@ -49,11 +50,18 @@ export class WorkerPool {
   /**
    * @param prepare fetches what work on the page's own thread needs
    * @param onRefused called once where work is done there
+   * @param another makes `spawn` start its workers in another way, after one has failed; false where there is none
    */
-  constructor(spawn: () => Worker, prepare: () => Promise<unknown>, onRefused: Refusal) {
+  constructor(
+    spawn: () => Worker,
+    prepare: () => Promise<unknown>,
+    onRefused: Refusal,
+    another: () => boolean = () => false,
+  ) {
     this.#spawn = spawn;
     this.#prepare = prepare;
     this.#onRefused = onRefused;
+    this.#another = another;
   }
 
   /** The next request asks for a worker again. */
@@ -133,6 +141,7 @@ export class WorkerPool {
     try {
       worker = this.#spawn();
     } catch (error) {
+      if (this.#another()) return this.#start();
       this.#refuse(error instanceof Error ? error.message : String(error));
       return undefined;
     }
@@ -177,7 +186,7 @@ export class WorkerPool {
   #fail(slot: WorkerSlot, reason: string): void {
     const jobs = [...slot.jobs.values()];
     this.#end(slot);
-    this.#refuse(reason);
+    if (!this.#another()) this.#refuse(reason);
     for (const job of jobs) this.#place(job);
   }
 

@@ -1,6 +1,5 @@
 import { multiply, type Camera, type Matrix4 } from '@gaussian-splat/core';
 import { SceneDepth, type Picture, type ProbeAnswer, type ProbePoint } from '@gaussian-splat/renderer';
-import { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';
 import {
   Camera as ThreeCamera,
   DepthTexture,
@@ -8,11 +7,12 @@ import {
   HalfFloatType,
   PMREMGenerator,
   RenderTarget,
+  RoomEnvironment,
   Scene,
   WebGPUCoordinateSystem,
   WebGPURenderer,
   type Group,
-} from 'three/webgpu';
+} from './three.js';
 import type { ViewerFrame } from '../camera/orbit.js';
 import type { Frame } from '../live/frame-filter.js';
 import { matrixOfFrame, transposed } from '../composition/placing.js';

@@ -1,15 +1,17 @@
 import { GaussianSplatError, type Bounds, type Vector3 } from '@gaussian-splat/core';
-import { GLTFLoader, type GLTFParser } from 'three/addons/loaders/GLTFLoader.js';
 import {
   AnimationMixer,
   Box3,
+  GLTFLoader,
   LoadingManager,
+  loadMeshoptDecoder,
+  type GLTFParser,
   type Group,
   type Material,
   type Mesh,
   type Object3D,
   type Texture,
-} from 'three/webgpu';
+} from './three.js';
 
 /** Splats in a glTF: the renderer of splats shows them. */
 const SPLATS = 'KHR_gaussian_splatting';
@@ -135,8 +137,7 @@ async function prepare(loader: GLTFLoader, { json }: GLTFParser): Promise<void> 
   for (const mesh of json.meshes ?? [])
     mesh.primitives = mesh.primitives.filter(({ extensions }) => !Object.hasOwn(extensions ?? {}, SPLATS));
   if (!json.extensionsUsed?.includes('EXT_meshopt_compression')) return;
-  const { MeshoptDecoder } = await import('three/addons/libs/meshopt_decoder.module.js');
-  loader.setMeshoptDecoder(MeshoptDecoder);
+  loader.setMeshoptDecoder(await loadMeshoptDecoder());
 }
 
 function boundsOf(root: Group): Bounds {

@@ -1,144 +1,137 @@
-/** As much of three.js as is used here: its own types bring eight more packages. */
-declare module 'three/webgpu' {
-  export class Matrix4 {
-    elements: number[];
-    fromArray(elements: ArrayLike<number>): this;
-    copy(other: Matrix4): this;
-    invert(): this;
-  }
-  export class Vector3 {
-    x: number;
-    y: number;
-    z: number;
-  }
-  export class Box3 {
-    min: Vector3;
-    max: Vector3;
-    setFromObject(object: Object3D, precise?: boolean): this;
-    isEmpty(): boolean;
-  }
-  export class Object3D {
-    name: string;
-    visible: boolean;
-    matrix: Matrix4;
-    matrixWorld: Matrix4;
-    matrixAutoUpdate: boolean;
-    frustumCulled: boolean;
-    add(...objects: Object3D[]): this;
-    remove(...objects: Object3D[]): this;
-    traverse(callback: (object: Object3D) => void): void;
-    updateMatrixWorld(force?: boolean): void;
-  }
-  export class Group extends Object3D {}
-  export class Scene extends Object3D {}
-  export class Camera extends Object3D {
-    matrixWorldInverse: Matrix4;
-    projectionMatrix: Matrix4;
-    projectionMatrixInverse: Matrix4;
-    coordinateSystem: number;
-    _reversedDepth: boolean;
-  }
-  export class Texture {
-    image?: { readonly width?: number; readonly height?: number; close?: () => void };
-    dispose(): void;
-  }
-  export class DepthTexture extends Texture {
-    constructor(width: number, height: number, type: number);
-  }
-  export class RenderTarget {
-    texture: Texture;
-    depthTexture: DepthTexture | null;
-    constructor(width: number, height: number, options: object);
-    setSize(width: number, height: number): void;
-    dispose(): void;
-  }
-  export class Material {
-    envMap?: Texture | null;
-    dispose(): void;
-  }
-  export interface Attribute {
-    readonly count: number;
-    readonly array?: { readonly byteLength: number };
-  }
-  export class BufferGeometry {
-    index: Attribute | null;
-    attributes: Readonly<Record<string, Attribute>>;
-    dispose(): void;
-  }
-  export class Mesh extends Object3D {
-    readonly isMesh: true;
-    geometry: BufferGeometry;
-    material: Material | Material[];
-  }
-  export interface AnimationClip {
-    readonly duration: number;
-  }
-  export class AnimationMixer {
-    constructor(root: Object3D);
-    clipAction(clip: AnimationClip): { play(): void };
-    setTime(seconds: number): void;
-    stopAllAction(): void;
-    uncacheRoot(root: Object3D): void;
-  }
-  export class LoadingManager {
-    setURLModifier(modifier: (url: string) => string): this;
-  }
-  export class PMREMGenerator {
-    constructor(renderer: WebGPURenderer);
-    fromScene(
-      scene: Scene,
-      sigma?: number,
-      near?: number,
-      far?: number,
-      options?: { readonly size?: number },
-    ): RenderTarget;
-    dispose(): void;
-  }
-  export class WebGPURenderer {
-    constructor(options: object);
-    readonly backend: { get(object: object): { readonly texture?: GPUTexture } };
-    init(): Promise<unknown>;
-    setRenderTarget(target: RenderTarget | null): void;
-    setClearColor(color: number, alpha: number): void;
-    render(scene: Scene, camera: Camera): void;
-    compileAsync(scene: Scene, camera: Camera): Promise<unknown>;
-    dispose(): unknown;
-    onDeviceLost: (info: unknown) => void;
-    onError: (info: { readonly originalEvent?: Event }) => void;
-  }
-  export const FloatType: number;
-  export const HalfFloatType: number;
-  export const WebGPUCoordinateSystem: number;
+/**
+ * As much of three.js as is used here. `npm run build` makes the module, of scripts/three.mjs: apps need not install three.js, nor its types, which bring
+ * eight more packages.
+ */
+export class Matrix4 {
+  elements: number[];
+  fromArray(elements: ArrayLike<number>): this;
+  copy(other: Matrix4): this;
+  invert(): this;
+}
+export class Vector3 {
+  x: number;
+  y: number;
+  z: number;
+}
+export class Box3 {
+  min: Vector3;
+  max: Vector3;
+  setFromObject(object: Object3D, precise?: boolean): this;
+  isEmpty(): boolean;
+}
+export class Object3D {
+  name: string;
+  visible: boolean;
+  matrix: Matrix4;
+  matrixWorld: Matrix4;
+  matrixAutoUpdate: boolean;
+  frustumCulled: boolean;
+  add(...objects: Object3D[]): this;
+  remove(...objects: Object3D[]): this;
+  traverse(callback: (object: Object3D) => void): void;
+  updateMatrixWorld(force?: boolean): void;
+}
+export class Group extends Object3D {}
+export class Scene extends Object3D {}
+export class Camera extends Object3D {
+  matrixWorldInverse: Matrix4;
+  projectionMatrix: Matrix4;
+  projectionMatrixInverse: Matrix4;
+  coordinateSystem: number;
+  _reversedDepth: boolean;
+}
+export class Texture {
+  image?: { readonly width?: number; readonly height?: number; close?: () => void };
+  dispose(): void;
+}
+export class DepthTexture extends Texture {
+  constructor(width: number, height: number, type: number);
+}
+export class RenderTarget {
+  texture: Texture;
+  depthTexture: DepthTexture | null;
+  constructor(width: number, height: number, options: object);
+  setSize(width: number, height: number): void;
+  dispose(): void;
+}
+export class Material {
+  envMap?: Texture | null;
+  dispose(): void;
+}
+export interface Attribute {
+  readonly count: number;
+  readonly array?: { readonly byteLength: number };
+}
+export class BufferGeometry {
+  index: Attribute | null;
+  attributes: Readonly<Record<string, Attribute>>;
+  dispose(): void;
+}
+export class Mesh extends Object3D {
+  readonly isMesh: true;
+  geometry: BufferGeometry;
+  material: Material | Material[];
+}
+export interface AnimationClip {
+  readonly duration: number;
+}
+export class AnimationMixer {
+  constructor(root: Object3D);
+  clipAction(clip: AnimationClip): { play(): void };
+  setTime(seconds: number): void;
+  stopAllAction(): void;
+  uncacheRoot(root: Object3D): void;
+}
+export class LoadingManager {
+  setURLModifier(modifier: (url: string) => string): this;
+}
+export class PMREMGenerator {
+  constructor(renderer: WebGPURenderer);
+  fromScene(
+    scene: Scene,
+    sigma?: number,
+    near?: number,
+    far?: number,
+    options?: { readonly size?: number },
+  ): RenderTarget;
+  dispose(): void;
+}
+export class WebGPURenderer {
+  constructor(options: object);
+  readonly backend: { get(object: object): { readonly texture?: GPUTexture } };
+  init(): Promise<unknown>;
+  setRenderTarget(target: RenderTarget | null): void;
+  setClearColor(color: number, alpha: number): void;
+  render(scene: Scene, camera: Camera): void;
+  compileAsync(scene: Scene, camera: Camera): Promise<unknown>;
+  dispose(): unknown;
+  onDeviceLost: (info: unknown) => void;
+  onError: (info: { readonly originalEvent?: Event }) => void;
+}
+export const FloatType: number;
+export const HalfFloatType: number;
+export const WebGPUCoordinateSystem: number;
+
+export interface GLTFParser {
+  readonly json: {
+    readonly extensionsUsed?: readonly string[];
+    readonly meshes?: readonly { primitives: readonly { readonly extensions?: object }[] }[];
+  };
+}
+export class GLTFLoader {
+  constructor(manager?: LoadingManager);
+  register(plugin: (parser: GLTFParser) => { readonly name: string; beforeRoot?(): Promise<void> | null }): this;
+  setCrossOrigin(value: string): this;
+  setWithCredentials(value: boolean): this;
+  setMeshoptDecoder(decoder: unknown): this;
+  parseAsync(
+    data: ArrayBuffer,
+    path: string,
+  ): Promise<{ readonly scene: Group; readonly animations: readonly AnimationClip[]; readonly parser: GLTFParser }>;
 }
 
-declare module 'three/addons/loaders/GLTFLoader.js' {
-  import type { AnimationClip, Group, LoadingManager } from 'three/webgpu';
-  export interface GLTFParser {
-    readonly json: {
-      readonly extensionsUsed?: readonly string[];
-      readonly meshes?: readonly { primitives: readonly { readonly extensions?: object }[] }[];
-    };
-  }
-  export class GLTFLoader {
-    constructor(manager?: LoadingManager);
-    register(plugin: (parser: GLTFParser) => { readonly name: string; beforeRoot?(): Promise<void> | null }): this;
-    setCrossOrigin(value: string): this;
-    setWithCredentials(value: boolean): this;
-    setMeshoptDecoder(decoder: unknown): this;
-    parseAsync(
-      data: ArrayBuffer,
-      path: string,
-    ): Promise<{ readonly scene: Group; readonly animations: readonly AnimationClip[]; readonly parser: GLTFParser }>;
-  }
-}
+export const loadMeshoptDecoder: () => Promise<unknown>;
 
-declare module 'three/addons/libs/meshopt_decoder.module.js' {
-  export const MeshoptDecoder: unknown;
-}
-
-declare module 'three/addons/environments/RoomEnvironment.js' {
-  import { Scene } from 'three/webgpu';
-  export class RoomEnvironment extends Scene {
-    dispose(): void;
-  }
+export class RoomEnvironment extends Scene {
+  dispose(): void;
 }

@@ -1,6 +1,5 @@
-import { GaussianSplatError, type GaussianCloud } from '@gaussian-splat/core';
+import { GaussianSplatError, loadModule, type GaussianCloud } from '@gaussian-splat/core';
 import { startsWith } from '../bytes.js';
-import { describeContent } from '../diagnose.js';
 import { PREVIEW_STEP, sparse } from '../preview.js';
 import { previewWanted } from '../preview-wanted.js';
 import type { SceneSource } from '../scene-format.js';
@@ -16,7 +15,8 @@ import {
   type SpzHeader,
 } from '../spz/header.js';
 import { longestBody, readLegacyBody } from '../spz/legacy.js';
-import { readStreams, type PackedScene } from '../spz/streams.js';
+import type * as streams from '../spz/streams.js';
+import type { PackedScene } from '../spz/streams.js';
 import { unpackSplats } from '../spz/unpack.js';
 
 /**
@@ -26,7 +26,7 @@ import { unpackSplats } from '../spz/unpack.js';
  */
 export async function readSpz(source: SceneSource): Promise<GaussianCloud> {
   if (source.isPrefix) return readWithoutHarmonics(source);
-  const { header, scene } = startsWith(source.bytes, 'NGSP') ? readPlain(source) : await readGzip(source);
+  const { header, scene } = startsWith(source.bytes, 'NGSP') ? await readPlain(source) : await readGzip(source);
   source.signal?.throwIfAborted();
   if (previewWanted(source, header.count)) await source.onPreview?.(previewOf(header, scene, source));
   return unpackSplats(header, scene, source);
@@ -58,7 +58,7 @@ async function readWithoutHarmonics(source: SceneSource): Promise<GaussianCloud>
     if (header.version === 4) {
       const plain = { ...header, degree: 0 } as const;
       requirePlausibleCount(plain, bytes.length, name);
-      return unpackSplats(plain, readStreams(source, header), source);
+      return unpackSplats(plain, (await loadStreams()).readStreams(source, header), source);
     }
     return unpackLegacy(source, bytes, header);
   }
@@ -86,11 +86,16 @@ interface SpzParts {
   readonly scene: PackedScene;
 }
 
-function readPlain(source: SceneSource): SpzParts {
+/** The decoder of zstd, which version 4 alone needs, is half of the code that reads SPZ. */
+const loadStreams = (): Promise<typeof streams> =>
+  loadModule('the code that reads SPZ version 4', () => import('../spz/streams.js'));
+
+async function readPlain(source: SceneSource): Promise<SpzParts> {
   const { bytes, name } = source;
   const header = parseSpzHeader(bytes, name);
   requirePlausibleCount(header, bytes.length, name);
-  const scene = header.version === 4 ? readStreams(source, header) : readLegacyBody(bytes, header, name);
+  const scene =
+    header.version === 4 ? (await loadStreams()).readStreams(source, header) : readLegacyBody(bytes, header, name);
   return { header, scene };
 }
 
@@ -102,7 +107,7 @@ async function readGzip(source: SceneSource): Promise<SpzParts> {
     if (start.length < SPZ_HEADER_BYTES && startsWith(start, 'NGSP')) {
       throw truncatedHeader(name, start.length, SPZ_HEADER_BYTES);
     }
-    if (!startsWith(start, 'NGSP')) throw otherGzip(start, name);
+    if (!startsWith(start, 'NGSP')) throw await otherGzip(start, name);
     const header = parseSpzHeader(start, name);
     if (header.version === 4) throw gzippedVersion4(name);
     requirePlausibleCount(header, bytes.length, name);
@@ -113,7 +118,8 @@ async function readGzip(source: SceneSource): Promise<SpzParts> {
   }
 }
 
-function otherGzip(start: Uint8Array, name: string): GaussianSplatError {
+async function otherGzip(start: Uint8Array, name: string): Promise<GaussianSplatError> {
+  const { describeContent } = await loadModule('the code that names files', () => import('../diagnose.js'));
   return new GaussianSplatError('decode/unknown-format', {
     where: `${name}, byte 0 inside the gzip file`,
     expected: 'an SPZ scene (the letters NGSP)',

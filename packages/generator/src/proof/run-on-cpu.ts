@@ -1,4 +1,3 @@
-import type * as OnnxRuntime from 'onnxruntime-web/webgpu';
 import type { Ort, RuntimeSource } from '../runtime/load-runtime.js';
 
 /** A run of a model, with everything that a worker needs. */
@@ -58,7 +57,7 @@ export async function answerCpuRun({ script, wasm, run }: CpuRunMessage): Promis
       externalData,
       freeDimensionOverrides,
     });
-    const feeds: Record<string, OnnxRuntime.Tensor> = {};
+    const feeds: Record<string, InstanceType<Ort['Tensor']>> = {};
     for (const [name, { dtype, data, dims }] of Object.entries(run.feeds))
       feeds[name] = new ort.Tensor(dtype as 'float32', data as Float32Array, dims);
     const results = await session.run(feeds, [...new Set(run.parts.map(({ tensor }) => tensor))]);

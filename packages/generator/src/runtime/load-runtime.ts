@@ -1,9 +1,12 @@
 import { GaussianSplatError } from '@gaussian-splat/core';
-import type * as OnnxRuntime from 'onnxruntime-web/webgpu';
 import { fetchBytes } from './fetch-bytes.js';
 import { noteRuntimeBytes, WASM_BYTES, wasmBuild } from './runtime-progress.js';
 
-export type Ort = typeof OnnxRuntime;
+// Who shows no generator need not have onnxruntime-web, nor its types: then this is any.
+// eslint-disable-next-line @typescript-eslint/ban-ts-comment
+/** @ts-ignore */
+// eslint-disable-next-line @typescript-eslint/consistent-type-imports
+export type Ort = typeof import('onnxruntime-web/webgpu');
 
 /** Longest that one call of the runtime may take, ms. */
 let callLimit = 120_000;
@@ -82,8 +85,8 @@ let loading: Promise<Runtime> | undefined;
 let copies = 0;
 
 /**
- * Where the files of onnxruntime-web 1.30.0 are (`ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs` and the `.wasm` files that they
- * name). Default: the folder `onnxruntime/` beside this module, where the CDN build has them.
+ * Where four files of onnxruntime-web 1.30.0 are: `ort.jspi.bundle.min.mjs`, `ort.webgpu.bundle.min.mjs`, `ort-wasm-simd-threaded.jspi.wasm` and
+ * `ort-wasm-simd-threaded.asyncify.wasm`. Default: the folder `onnxruntime/` beside this module, where the CDN build has them.
  * @param folder absolute, or relative to the page.
  */
 export function setRuntimeLocation(folder: string | URL): void {
@@ -143,9 +146,16 @@ export function folderBeside(module: string | undefined): string {
     where: 'onnxruntime/',
     expected: 'the folder of the files of onnxruntime-web 1.30.0',
     found: 'no address of this code, which a bundler has rewritten',
-    remedy: 'name their folder: GaussianSplatElement.runtimeLocation, or setRuntimeLocation',
+    remedy: REMEDY.replace('there', 'on your server').replace('; or name', ', and name'),
   });
 }
+
+const FILES =
+  'ort.jspi.bundle.min.mjs, ort.webgpu.bundle.min.mjs, ort-wasm-simd-threaded.jspi.wasm, ort-wasm-simd-threaded.asyncify.wasm';
+
+const REMEDY =
+  `put these files of node_modules/onnxruntime-web/dist there (npm install onnxruntime-web@1.30.0): ${FILES}; ` +
+  'or name their folder with GaussianSplatElement.runtimeLocation (without the element: setRuntimeLocation)';
 
 /** A module is evaluated once for each address: another copy needs another address. */
 async function importScript(script: string): Promise<Ort> {
@@ -158,7 +168,7 @@ async function importScript(script: string): Promise<Ort> {
       expected: 'the script of onnxruntime-web 1.30.0',
       // The same whichever copy it was: what is told twice is told once.
       found: ((cause as Error)?.message ?? 'nothing').replace(address, script),
-      remedy: 'put the files of onnxruntime-web there, or name their folder with setRuntimeLocation',
+      remedy: REMEDY,
       cause,
     });
   }
@@ -167,20 +177,17 @@ async function importScript(script: string): Promise<Ort> {
 /** Fetched by us: a copy of the runtime that did not find its WebAssembly never works again. */
 async function fetchWasm(folder: string, build: keyof typeof WASM_BYTES): Promise<Uint8Array<ArrayBuffer>> {
   const expected = WASM_BYTES[build];
-  const bytes = await fetchBytes(`${folder}ort-wasm-simd-threaded.${build}.wasm`, {
+  const url = `${folder}ort-wasm-simd-threaded.${build}.wasm`;
+  const bytes = await fetchBytes(url, {
     expected,
     onProgress: (loaded, total = expected) => noteRuntimeBytes([loaded, total]),
+    mayBeMissing: true,
   });
-  requireWasm(bytes, folder);
-  return bytes;
-}
-
-function requireWasm(bytes: Uint8Array, folder: string): void {
-  if (bytes[0] === 0 && bytes[1] === 0x61 && bytes[2] === 0x73 && bytes[3] === 0x6d) return;
+  if (bytes?.[0] === 0 && bytes[1] === 0x61 && bytes[2] === 0x73 && bytes[3] === 0x6d) return bytes;
   throw new GaussianSplatError('network/status', {
-    where: folder.slice(0, 200),
+    where: url.slice(0, 200),
     expected: 'the WebAssembly file of onnxruntime-web 1.30.0',
-    found: 'something else, perhaps a web page',
-    remedy: 'put the files of onnxruntime-web there, or name their folder with setRuntimeLocation',
+    found: bytes ? 'something else, perhaps a web page' : 'no such file',
+    remedy: REMEDY,
   });
 }

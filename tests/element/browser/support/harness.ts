@@ -144,6 +144,12 @@ export function claimFault(pattern: RegExp): void {
   faults.splice(faults.indexOf(matches[0]), 1);
 }
 
+/** The same for a fault that may be still to come: what says it is fetched first. */
+export async function claimComing(pattern: RegExp): Promise<void> {
+  await until(() => faults.some((fault) => pattern.test(fault)), `a fault like ${pattern}`);
+  claimFault(pattern);
+}
+
 afterEach(() => {
   document.body.replaceChildren();
   const unclaimed = faults.splice(0);

@@ -1,0 +1,20 @@
+/** What the element takes of three.js, for src/meshes/three.d.ts. */
+export {
+  AnimationMixer,
+  Box3,
+  Camera,
+  DepthTexture,
+  FloatType,
+  HalfFloatType,
+  LoadingManager,
+  PMREMGenerator,
+  RenderTarget,
+  Scene,
+  WebGPUCoordinateSystem,
+  WebGPURenderer,
+} from 'three/webgpu';
+export { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+export { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';
+
+export const loadMeshoptDecoder = async () =>
+  (await import('three/addons/libs/meshopt_decoder.module.js')).MeshoptDecoder;

@@ -1,0 +1,137 @@
+/**
+ * `npm run test:apps [-- NAME…]`: the apps of tests/apps, each as a user would make it. Installs our packages from a registry that has just the release, builds, opens the
+ * app in Chromium, and the development server where the list has one. Each has to show its scene, with a worker and a clean console; what came over the wire until then is
+ * printed. Apps stay in .cache/apps, so that a second run installs our packages alone.
+ */
+import { spawn, spawnSync } from 'node:child_process';
+import { cpSync, existsSync, mkdirSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:net';
+import { extname, join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import { APPS } from '../tests/apps/apps.mjs';
+import { visitApp } from '../tests/apps/visit.mjs';
+import { ensureChromium } from './lib/chromium.mjs';
+import { ensureBuilt, ensureDependencies } from './lib/prepare.mjs';
+import { root } from './lib/run.mjs';
+
+const CACHE = join(root, '.cache/apps');
+const SCENE = join(root, 'demo/scenes/skull.spz');
+const BUILD_SECONDS = 400;
+/** What Lit and the tools say of development. */
+const DEVELOPMENT = /Lit is in dev mode|\[vite\]|Download the React DevTools/;
+
+const words = process.argv.slice(2);
+const onlyInstall = words.includes('--install');
+const asked = words.filter((word) => word !== '--install');
+const names = asked.length > 0 ? asked : Object.keys(APPS);
+const unknown = names.filter((name) => !Object.hasOwn(APPS, name));
+if (unknown.length > 0) {
+  console.error(`${unknown.join(', ')}: expected one of ${Object.keys(APPS).join(', ')}.`);
+  process.exit(2);
+}
+
+ensureDependencies();
+ensureBuilt();
+process.env.CHROMIUM = ensureChromium();
+const { manifests, packPackages, serveRegistry } = await import('./lib/release.mjs');
+rmSync(join(CACHE, 'packed'), { recursive: true, force: true });
+const tarballs = packPackages(join(CACHE, 'packed'));
+const { version } = manifests().get('@gaussian-splat/element');
+const registry = await serveRegistry(tarballs);
+let failures = 0;
+for (const name of names) {
+  try {
+    await tryApp(name, APPS[name]);
+  } catch (error) {
+    failures++;
+    console.log(`${name}: FAILED\n${error.message}\n`);
+  }
+}
+registry.close();
+console.log(`${names.length - failures} of ${names.length} apps are as they should be`);
+process.exit(failures > 0 ? 1 : 0);
+
+async function tryApp(name, app) {
+  const folder = join(CACHE, name);
+  await install(folder, name, app);
+  if (onlyInstall) return;
+  command(app.build, folder);
+  if (!app.output) return console.log(`${name}: passes`);
+  const output = join(folder, app.output);
+  const place = extname(output) === '.html' ? { address: pathToFileURL(output).href } : { folder: output };
+  print(name, await visitApp({ ...place, elsewhere: join(folder, 'elsewhere'), faults: app.faults }), app);
+  if (!app.dev) return;
+  const port = await freePort();
+  const [program, ...args] = app.dev.map((word) => (word === 'PORT' ? String(port) : word));
+  const server = spawn(program, args, { cwd: folder, env: environment(), stdio: 'ignore', detached: true });
+  try {
+    print(`${name}, development`, await visitApp({ address: `http://localhost:${port}/`, faults: DEVELOPMENT }), {});
+  } finally {
+    process.kill(-server.pid, 'SIGKILL');
+  }
+}
+
+function print(name, { weight, files, workers, painted }, { most }) {
+  console.log(
+    `${name}: ${(painted * 100).toFixed(0)} % painted, ${workers} worker(s), ${weight} bytes of gzip in ${files} scripts`,
+  );
+  if (most !== undefined && weight > most) throw new Error(`${weight} bytes: expected at most ${most}`);
+}
+
+/** The app's files and its packages: those of others stay from one run to the next. */
+async function install(folder, name, { folder: template = name, dependencies }) {
+  mkdirSync(folder, { recursive: true });
+  for (const file of readdirSync(folder)) {
+    if (!['node_modules', 'package-lock.json'].includes(file)) rmSync(join(folder, file), { recursive: true });
+  }
+  const files = join(root, 'tests/apps', template);
+  if (existsSync(files)) cpSync(files, folder, { recursive: true });
+  // Where static files lie differs.
+  for (const place of ['.', 'public', 'static', 'dist']) {
+    mkdirSync(join(folder, place), { recursive: true });
+    cpSync(SCENE, join(folder, place, 'scene.spz'));
+  }
+  const entries = Object.entries(dependencies).map(([each, wanted]) => [each, wanted === 'release' ? version : wanted]);
+  const manifest = { name: 'app', private: true, type: 'module', dependencies: Object.fromEntries(entries) };
+  writeFileSync(join(folder, 'package.json'), JSON.stringify(manifest, null, 2));
+  const address = `http://127.0.0.1:${registry.address().port}/`;
+  writeFileSync(join(folder, '.npmrc'), `@gaussian-splat:registry=${address}\n`);
+  rmSync(join(folder, 'node_modules/@gaussian-splat'), { recursive: true, force: true });
+  // It has the digests of our packages of the last time.
+  rmSync(join(folder, 'package-lock.json'), { force: true });
+  rmSync(join(folder, 'node_modules/.package-lock.json'), { force: true });
+  await soon(['npm', 'install', '--no-audit', '--no-fund', '--loglevel=error', '--prefer-offline'], folder);
+}
+
+/** The registry answers in this process, so it must not be kept busy meanwhile. */
+async function soon([program, ...args], cwd) {
+  const child = spawn(program, args, { cwd, env: environment() });
+  let output = '';
+  for (const stream of [child.stdout, child.stderr]) stream.on('data', (data) => (output += data));
+  const status = await new Promise((resolve, reject) => child.on('error', reject).on('close', resolve));
+  if (status !== 0) throw new Error(`${program} ${args.join(' ')}: status ${status}\n${output.slice(-4000)}`);
+}
+
+function command([program, ...args], cwd) {
+  const options = { cwd, env: environment(), encoding: 'utf8', timeout: BUILD_SECONDS * 1000, maxBuffer: 1 << 26 };
+  const words = args.map((word) => word.replace('ROOT/', root));
+  const { status, stdout, stderr } = spawnSync(program, words, options);
+  if (status !== 0)
+    throw new Error(`${program} ${args.join(' ')}: status ${status}\n${(stdout + stderr).slice(-4000)}`);
+}
+
+function environment() {
+  // Both are of whoever runs this: builds of users have neither.
+  const { NODE_ENV, INIT_CWD, ...inherited } = process.env;
+  void [NODE_ENV, INIT_CWD];
+  return { ...inherited, NEXT_TELEMETRY_DISABLED: '1', ASTRO_TELEMETRY_DISABLED: '1', NG_CLI_ANALYTICS: 'false' };
+}
+
+function freePort() {
+  return new Promise((resolve) => {
+    const server = createServer().listen(0, '127.0.0.1', () => {
+      const { port } = server.address();
+      server.close(() => resolve(port));
+    });
+  });
+}

@@ -1,0 +1,120 @@
+/** What `npm run release` makes; the tests and the apps of tests/apps use it as a user does. */
+import { spawnSync } from 'node:child_process';
+import { createHash } from 'node:crypto';
+import { existsSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { join, sep } from 'node:path';
+import { zipSync } from 'fflate';
+import { root } from './run.mjs';
+
+const CDN = join(root, 'packages/element/cdn');
+const read = (path) => JSON.parse(readFileSync(path, 'utf8'));
+
+/** Manifests of the packages that npm gets, by name. */
+export function manifests() {
+  const paths = readdirSync(join(root, 'packages')).map((name) => join(root, 'packages', name, 'package.json'));
+  return new Map(
+    paths
+      .filter(existsSync)
+      .map(read)
+      .map((each) => [each.name, each]),
+  );
+}
+
+/** What keeps the packages from being published together; empty if nothing does. */
+export function faultsOf(packages) {
+  const { version } = read(join(root, 'package.json'));
+  return [...packages.values()].flatMap((each) => {
+    const own = Object.entries(each.dependencies ?? {}).filter(([name]) => name.startsWith('@gaussian-splat/'));
+    return [
+      ...(each.version === version ? [] : [`${each.name} is ${each.version}: expected ${version}, as the workspace`]),
+      ...(each.publishConfig?.access === 'public' ? [] : [`${each.name}: expected publishConfig.access "public"`]),
+      ...own
+        .filter(([name, wanted]) => packages.get(name)?.version !== wanted)
+        .map(([name, wanted]) => `${each.name} asks for ${name} ${wanted}: expected ${packages.get(name)?.version}`),
+    ];
+  });
+}
+
+/** Packs all packages into a folder. Returns the paths of the tarballs by name. */
+export function packPackages(folder) {
+  mkdirSync(folder, { recursive: true });
+  const npm = process.platform === 'win32' ? 'npm.cmd' : 'npm';
+  const args = ['pack', '--json', '--workspaces', '--pack-destination', folder];
+  const options = { cwd: root, encoding: 'utf8', shell: process.platform === 'win32', maxBuffer: 1 << 26 };
+  const { status, stdout, stderr } = spawnSync(npm, args, options);
+  if (status !== 0) throw new Error(stderr);
+  return new Map(JSON.parse(stdout).map(({ name, filename }) => [name, join(folder, filename)]));
+}
+
+/** The CDN build as a ZIP archive, with ONNX Runtime or without; source maps are left out. */
+export function zipOfCdn({ withRuntime }) {
+  const hashes = read(join(CDN, 'integrity.json'));
+  const isIn = (file) => !file.endsWith('.map') && (withRuntime || !file.startsWith('onnxruntime'));
+  const files = readdirSync(CDN, { recursive: true, withFileTypes: true })
+    .filter((entry) => entry.isFile())
+    .map((entry) => join(entry.parentPath, entry.name).slice(CDN.length + 1))
+    .filter((file) => isIn(file) && file !== 'integrity.json');
+  const kept = Object.fromEntries(Object.entries(hashes).filter(([file]) => isIn(file)));
+  const text = (value) => Buffer.from(`${JSON.stringify(value, null, 2)}\n`);
+  const integrity = Object.fromEntries(Object.entries(kept).map(([file, hash]) => [`./gaussian-splat/${file}`, hash]));
+  const content = [
+    ...files.map((file) => [file.split(sep).join('/'), readFileSync(join(CDN, file))]),
+    ['integrity.json', text(kept)],
+    ['import-map.json', text({ integrity })],
+  ];
+  // Same bytes from the same build.
+  const mtime = new Date(1980, 0, 1);
+  return zipSync(Object.fromEntries(content.map(([name, bytes]) => [`gaussian-splat/${name}`, [bytes, { mtime }]])));
+}
+
+/**
+ * Everything that a maintainer publishes, in a folder that is emptied first: `npm/*.tgz`, ZIP archives of the CDN build, and `SHA256SUMS`.
+ * @returns {{ files: string[], tarballs: Map<string, string> }} the files, relative to the folder; paths of the tarballs by name
+ */
+export function writeRelease(folder) {
+  const packages = manifests();
+  const faults = faultsOf(packages);
+  if (faults.length > 0) throw new Error(`The packages do not fit together:\n${faults.join('\n')}`);
+  rmSync(folder, { recursive: true, force: true });
+  const tarballs = packPackages(join(folder, 'npm'));
+  const { version } = packages.get('@gaussian-splat/element');
+  writeFileSync(join(folder, `gaussian-splat-${version}.zip`), zipOfCdn({ withRuntime: false }));
+  writeFileSync(join(folder, `gaussian-splat-${version}-onnxruntime.zip`), zipOfCdn({ withRuntime: true }));
+  const files = readdirSync(folder, { recursive: true }).filter((file) => /\.(tgz|zip)$/.test(file));
+  const digest = (file) =>
+    createHash('sha256')
+      .update(readFileSync(join(folder, file)))
+      .digest('hex');
+  writeFileSync(join(folder, 'SHA256SUMS'), files.map((file) => `${digest(file)}  ${file}\n`).join(''));
+  return { files, tarballs };
+}
+
+/**
+ * A registry of npm with our packages alone, for `@gaussian-splat:registry=` in an .npmrc: what is installed from it is what users will install.
+ * @param tarballs {Map<string, string>} paths by name
+ */
+export async function serveRegistry(tarballs, port = 0) {
+  const packages = manifests();
+  const server = createServer((request, response) => {
+    const path = decodeURIComponent(request.url.slice(1));
+    if (path.endsWith('.tgz')) {
+      const found = [...tarballs.values()].find((file) => file.endsWith(sep + path));
+      return response.writeHead(found ? 200 : 404).end(found && readFileSync(found));
+    }
+    const file = tarballs.get(path);
+    if (file === undefined) return response.writeHead(404).end('{}');
+    const manifest = packages.get(path);
+    const bytes = readFileSync(file);
+    const dist = {
+      tarball: `http://${request.headers.host}/${file.split(sep).pop()}`,
+      integrity: `sha512-${createHash('sha512').update(bytes).digest('base64')}`,
+    };
+    const { version } = manifest;
+    const versions = { [version]: { ...manifest, dist } };
+    response.writeHead(200, { 'content-type': 'application/json' });
+    response.end(JSON.stringify({ name: path, 'dist-tags': { latest: version }, versions }));
+  });
+  await new Promise((resolve) => server.listen(port, '127.0.0.1', resolve));
+  return server;
+}

@@ -1,0 +1,132 @@
+/**
+ * Small apps as their own tools make them, with nothing configured for the element. Each is a folder beside this file, copied and installed by
+ * `npm run test:apps` (scripts/apps.mjs).
+ *
+ * @typedef {object} App
+ * @property {string} [folder] of its files; default: its name
+ * @property {Record<string, string>} dependencies exact versions; those on our packages are taken from the release
+ * @property {string[]} [build] what makes `output` of it
+ * @property {string} [output] folder that a static server then serves, or a page that is opened from the disk
+ * @property {RegExp} [faults] what the console may say: the browser's report of what a policy forbids
+ * @property {string[]} [dev] its development server, `PORT` being a free port
+ * @property {number} [most] bytes of gzip that may come before the scene is visible
+ */
+
+const ELEMENT = { '@gaussian-splat/element': 'release' };
+const REACT = { '@gaussian-splat/react': 'release', react: '19.3.1', 'react-dom': '19.3.1' };
+
+/** @type {Record<string, App>} */
+export const APPS = {
+  single: {
+    dependencies: {},
+    build: ['node', 'ROOT/packages/cli/bin/gaussian-splat.mjs', 'page', 'scene.spz', 'page', '--single'],
+    output: 'page/index.html',
+  },
+  cdn: { folder: 'cdn-page', dependencies: ELEMENT, build: ['node', 'build.mjs'], output: '.', most: 95_000 },
+  'esm-cdn': { dependencies: { ...ELEMENT, esbuild: '0.28.2' }, build: ['node', 'build.mjs'], output: '.' },
+  esbuild: {
+    dependencies: { ...ELEMENT, esbuild: '0.28.2' },
+    build: ['npx', 'esbuild', 'main.js', '--bundle', '--splitting', '--format=esm', '--minify', '--outdir=dist'],
+    output: '.',
+  },
+  'esbuild-iife': {
+    folder: 'esbuild',
+    dependencies: { ...ELEMENT, esbuild: '0.28.2' },
+    build: ['npx', 'esbuild', 'main.js', '--bundle', '--minify', '--outdir=dist'],
+    output: '.',
+  },
+  rollup: {
+    dependencies: { ...ELEMENT, rollup: '4.67.4', '@rollup/plugin-node-resolve': '16.0.3' },
+    build: ['npx', 'rollup', '-p', 'node-resolve', '-i', 'main.js', '-d', 'dist', '--silent'],
+    output: '.',
+  },
+  vite: {
+    folder: 'vite',
+    dependencies: { ...ELEMENT, vite: '8.3.8' },
+    build: ['npx', 'vite', 'build'],
+    output: 'dist',
+    most: 110_000,
+  },
+  'vite-policy': {
+    dependencies: { ...ELEMENT, vite: '8.3.8' },
+    build: ['npx', 'vite', 'build'],
+    output: 'dist',
+    // The worker as text is refused; the file that Vite has emitted is not.
+    faults: /blob:.*Content Security Policy|Content Security Policy.*blob:/,
+  },
+  'vite8-react': {
+    folder: 'vite-react',
+    dependencies: { ...REACT, vite: '8.3.8', '@vitejs/plugin-react': '6.3.0' },
+    build: ['npx', 'vite', 'build'],
+    output: 'dist',
+    dev: ['npx', 'vite', '--port', 'PORT', '--strictPort'],
+  },
+  'vite7-react': {
+    folder: 'vite-react',
+    dependencies: { ...REACT, vite: '7.3.8', '@vitejs/plugin-react': '5.2.0' },
+    build: ['npx', 'vite', 'build'],
+    output: 'dist',
+    dev: ['npx', 'vite', '--port', 'PORT', '--strictPort'],
+  },
+  webpack: {
+    dependencies: { ...ELEMENT, webpack: '5.112.2', 'webpack-cli': '7.3.1' },
+    build: ['npx', 'webpack', '--mode', 'production', '--output-public-path', 'auto'],
+    output: '.',
+  },
+  parcel: {
+    dependencies: { ...ELEMENT, parcel: '2.16.4' },
+    build: ['npx', 'parcel', 'build', 'index.html', '--public-url', './', '--no-cache'],
+    output: 'dist',
+  },
+  'next-turbopack': {
+    folder: 'next',
+    dependencies: { ...REACT, next: '16.4.6' },
+    build: ['npx', 'next', 'build'],
+    output: 'out',
+  },
+  'next-webpack': {
+    folder: 'next',
+    dependencies: { ...REACT, next: '16.4.6' },
+    build: ['npx', 'next', 'build', '--webpack'],
+    output: 'out',
+  },
+  nuxt: {
+    dependencies: { ...ELEMENT, nuxt: '4.4.5', vue: '3.5.45' },
+    build: ['npx', 'nuxt', 'generate'],
+    output: '.output/public',
+    dev: ['npx', 'nuxt', 'dev', '--port', 'PORT'],
+  },
+  astro: {
+    dependencies: { ...ELEMENT, astro: '6.0.5' },
+    build: ['npx', 'astro', 'build'],
+    output: 'dist',
+    dev: ['npx', 'astro', 'dev', '--port', 'PORT'],
+  },
+  sveltekit: {
+    dependencies: {
+      ...ELEMENT,
+      ...{ '@sveltejs/kit': '2.70.4', '@sveltejs/adapter-static': '3.0.11', svelte: '5.57.3', vite: '7.3.8' },
+      '@sveltejs/vite-plugin-svelte': '6.2.3',
+    },
+    build: ['npx', 'vite', 'build'],
+    output: 'build',
+  },
+  jsdom: {
+    dependencies: { ...ELEMENT, vitest: '3.2.4', jsdom: '26.1.0' },
+    build: ['npx', 'vitest', 'run', '--environment', 'jsdom'],
+  },
+  angular: {
+    dependencies: {
+      ...ELEMENT,
+      ...Object.fromEntries(
+        ['common', 'compiler', 'compiler-cli', 'core', 'platform-browser'].map((name) => [
+          `@angular/${name}`,
+          '20.3.35',
+        ]),
+      ),
+      ...{ '@angular/build': '20.3.41', '@angular/cli': '20.3.43', rxjs: '7.8.0', typescript: '5.9.3', tslib: '2.9.1' },
+    },
+    build: ['npx', 'ng', 'build'],
+    output: 'dist/app/browser',
+  },
+};

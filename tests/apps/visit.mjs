@@ -1,0 +1,99 @@
+/** Opens an app in Chromium as a visitor: is its scene visible, with a worker and a clean console, and what came over the wire until then? */
+import { existsSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { gzipSync } from 'node:zlib';
+import { chromium } from 'playwright-core';
+import { findChromium, gpuFlags } from '../../scripts/lib/chromium.mjs';
+import { serve } from '../../packages/cli/src/lib/server.mjs';
+
+const CORS = { 'access-control-allow-origin': '*' };
+/** A development server may have to bundle first. */
+const MOST_MS = 120_000;
+
+/**
+ * @param {{ folder?: string, elsewhere?: string, address?: string, faults?: RegExp }} app a folder to serve, with another one at another origin, whose address takes the
+ *   place of `ELSEWHERE` in the page; or the address of a page; and what its console may say
+ * @returns {Promise<{ weight: number, files: number, workers: number, painted: number }>} bytes of gzip of scripts and styles, their number, the workers, and the share of
+ *   the element's pixels that the scene paints
+ */
+export async function visitApp({ folder, elsewhere, address, faults }) {
+  const other = elsewhere && existsSync(elsewhere) ? await serve({ '/': elsewhere }, { headers: CORS }) : undefined;
+  const own = folder ? await serve({ '/': folder }) : undefined;
+  const browser = await chromium.launch({ executablePath: findChromium(), args: gpuFlags() });
+  try {
+    if (other) replaceElsewhere(folder, `http://127.0.0.1:${other.address().port}`);
+    return await visit(await browser.newPage(), faults, address ?? `http://127.0.0.1:${own.address().port}/`);
+  } finally {
+    await browser.close();
+    for (const server of [own, other]) {
+      server?.closeAllConnections();
+      server?.close();
+    }
+  }
+}
+
+function replaceElsewhere(folder, address) {
+  const page = join(folder, 'index.html');
+  writeFileSync(page, readFileSync(page, 'utf8').replaceAll('ELSEWHERE', address));
+}
+
+async function visit(page, faults, address) {
+  const complaints = [];
+  const bodies = [];
+  page.on('pageerror', (error) => complaints.push(`error: ${error.message}`));
+  page.on('console', (message) => {
+    if (/^(warning|error)$/.test(message.type()) && !faults?.test(message.text()))
+      complaints.push(`${message.type()}: ${message.text()}`);
+  });
+  page.on('response', (response) => {
+    if (/javascript|css/.test(response.headers()['content-type'] ?? '') && !response.url().startsWith('blob:'))
+      bodies.push(response.body().catch(() => Buffer.alloc(0)));
+  });
+  let most = 0;
+  page.on('worker', () => (most = Math.max(most, page.workers().length)));
+  await open(page, address);
+  const found = await page
+    .waitForFunction(
+      () => {
+        const { loaded, error } = document.querySelector('gaussian-splat') ?? {};
+        return error ? error.message : loaded;
+      },
+      undefined,
+      { timeout: MOST_MS },
+    )
+    .then(
+      (handle) => handle.jsonValue(),
+      (error) => error.message.split('\n')[0],
+    );
+  if (found !== true) throw new Error([`no scene: ${found}`, ...complaints].join('\n'));
+  const scripts = await Promise.all(bodies);
+  const painted = await page.evaluate(shareOfPaint);
+  if (!(painted > 0.05)) throw new Error(`${painted} of the element is painted`);
+  if (most === 0) complaints.push('there is no worker');
+  if (complaints.length > 0) throw new Error(complaints.join('\n'));
+  const weight = scripts.reduce((sum, body) => sum + gzipSync(body, { level: 6 }).length, 0);
+  return { weight, files: scripts.length, workers: most, painted };
+}
+
+/** A development server takes a while to listen. */
+async function open(page, address) {
+  for (const end = Date.now() + MOST_MS; ;) {
+    try {
+      return await page.goto(address, { timeout: MOST_MS });
+    } catch (error) {
+      if (!/ERR_CONNECTION_REFUSED/.test(error.message) || Date.now() > end) throw error;
+      await new Promise((resolve) => setTimeout(resolve, 300));
+    }
+  }
+}
+
+/** In the page: the share of pixels of the element's image that are not transparent. */
+async function shareOfPaint() {
+  const image = await createImageBitmap(await document.querySelector('gaussian-splat').toBlob());
+  const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+  context.drawImage(image, 0, 0);
+  const { data } = context.getImageData(0, 0, image.width, image.height);
+  let painted = 0;
+  for (let i = 3; i < data.length; i += 4) if (data[i] > 127) painted++;
+  return painted / (data.length / 4);
+}

@@ -1,0 +1,1 @@
+import '@gaussian-splat/element';

@@ -1,0 +1,60 @@
+/** The page for iframes: what its address may ask for. */
+import { assert, assertEqual, COMPASS, nextEvent, until } from './support/harness.js';
+
+interface Splat extends HTMLElement {
+  readonly loaded: boolean;
+}
+
+async function open(query: string): Promise<Document> {
+  const frame = document.createElement('iframe');
+  frame.src = `/packages/element/cdn/embed.html?${query}`;
+  frame.style.cssText = 'width: 300px; height: 200px';
+  const loaded = nextEvent(frame, 'load');
+  document.body.append(frame);
+  await loaded;
+  const page = frame.contentDocument!;
+  await until(() => page.querySelector('gaussian-splat, p') !== null, 'the page');
+  return page;
+}
+
+describe('embed.html', () => {
+  it('shows a scene of its own server with the attributes of its address', async () => {
+    const query = {
+      src: COMPASS,
+      alt: '<b>A scene</b>',
+      'camera-orbit': '30deg 75deg auto',
+      onload: 'x',
+      chain: 'a.onnx',
+    };
+    const page = await open(String(new URLSearchParams(query)));
+    const scene = page.querySelector<Splat>('gaussian-splat')!;
+    const names = ['alt', 'camera-orbit', 'camera-controls', 'onload', 'chain'];
+    assertEqual(
+      names.map((name) => scene.getAttribute(name)),
+      ['<b>A scene</b>', '30deg 75deg auto', '', null, null],
+      'attributes',
+    );
+    await until(() => scene.loaded, 'the scene', 30_000);
+  });
+
+  it('refuses files of other servers and all other schemes, with a sentence', async () => {
+    const refused = [
+      'https://elsewhere.example/a.spz',
+      '//elsewhere.example/a.spz',
+      'javascript:alert(1)',
+      'data:application/octet-stream,ply',
+      `blob:${location.origin}/5a`,
+      `${location.protocol}//me:secret@${location.host}/a.spz`,
+      'file:///etc/passwd',
+      'http://[',
+    ];
+    for (const src of refused) {
+      const page = await open(String(new URLSearchParams({ src })));
+      assert(page.querySelector('gaussian-splat') === null, src);
+      assert(/^src: expected a file of http/.test(page.querySelector('p')!.textContent), src);
+    }
+    const poster = await open(String(new URLSearchParams({ src: COMPASS, poster: refused[0] })));
+    assert(/^poster: expected/.test(poster.querySelector('p')!.textContent), 'a poster');
+    assert(/^src: expected the address/.test((await open('')).querySelector('p')!.textContent), 'no address');
+  });
+});
