@@ -1,5 +1,5 @@
 /**
- * `npm run lint:words [-- --longest 20]`: what is written for readers keeps to the project's words (scripts/words/terms.mjs), and README and guides to short sentences. Read are documents, pages of the
+ * `npm run lint:words [-- --longest 20]`, a part of `npm run lint`: what is written for readers keeps to the project's words (scripts/words/terms.mjs), and README and guides to short sentences. Read are documents, pages of the
  * site, comments of the public API, the tables of attributes, and sentences of errors and of scripts. `--longest` prints the longest sentences of README and guides.
  */
 import { readdirSync, readFileSync } from 'node:fs';

@@ -125,7 +125,7 @@ export function sentencesInCode(path) {
     if (ts.isTaggedTemplateExpression(node) && node.tag.getText() === 'css') return;
     if (ts.isImportDeclaration(node)) return;
     const text = textOf(node);
-    if (text !== undefined && /^[^{}]*$/.test(text) && text.trim().split(/\s+/).length >= 4) {
+    if (text !== undefined && isProse(text)) {
       const { line } = file.getLineAndCharacterOfPosition(node.getStart());
       found.push({ file: relative(root, path), line: line + 1, text });
     }
@@ -134,6 +134,12 @@ export function sentencesInCode(path) {
   visit(file);
   return found;
 }
+
+/** A sentence, or a label such as "First frame": no identifier, selector or code. */
+const isProse = (text) =>
+  /^[^{}]*$/.test(text) &&
+  /[a-z] [A-Za-z]/.test(text) &&
+  (text.match(/[A-Za-z]{2,}/g) ?? []).length >= (/^\s*[A-Z][a-z]/.test(text) ? 2 : 4);
 
 function textOf(node) {
   if (ts.isStringLiteral(node) || ts.isNoSubstitutionTemplateLiteral(node)) return node.text;

@@ -17,7 +17,7 @@ export const RETIRED = [
   [/\bnoted\b|\bnot(es|ing) (contribution|depth|what)/i, 'auxiliary output'],
   [/\bthin(s|ned|ning)\b/i, 'filter'],
   [/\bgathered\b/i, 'depth range; collected'],
-  [/\bchoices? of variants?\b/i, 'autotune'],
+  [/\b(one|the|each|measured) choice of variants\b/i, 'autotune'],
   [/\bknown answers?\b/i, 'self-test'],
   [/\blive (generators?|models?|scenes?)\b/i, 'generator, dynamic'],
   [/\bpeople('s|’s)?\b/i, 'visitors, authors, callers'],

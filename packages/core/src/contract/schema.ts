@@ -142,7 +142,7 @@ const input: Schema = {
           description: 'Value to begin with: one number for all elements, or a list of all of them',
         },
         step: positive('Step between values'),
-        label: text('Name for people'),
+        label: text('Name for readers'),
       },
       { required: ['range', 'default'] },
     ),
@@ -274,7 +274,7 @@ export const CONTRACT_SCHEMA: Schema = {
   properties: {
     $schema: text('Address of this schema'),
     version: { const: 1, description: 'Version of the contract' },
-    name: text('Name for people'),
+    name: text('Name for readers'),
     inputs: {
       type: 'object',
       additionalProperties: input,
