@@ -114,7 +114,7 @@ async function openOther({ cloud, views: [{ width, height }] }, { peer, parity =
 
 function within(promise) {
   const late = new Promise((_, reject) => {
-    setTimeout(() => reject(new Error(`no picture within ${PATIENCE_MS / 1000} s`)), PATIENCE_MS);
+    setTimeout(() => reject(new Error(`no frame within ${PATIENCE_MS / 1000} s`)), PATIENCE_MS);
   });
   return Promise.race([promise, late]);
 }

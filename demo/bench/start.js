@@ -59,7 +59,7 @@ function visit(plan, attributes = '') {
       removeEventListener('message', listen);
       settle(value);
     };
-    const timer = setTimeout(() => end(reject, new Error(`no picture within ${LONGEST / 1000} s`)), LONGEST);
+    const timer = setTimeout(() => end(reject, new Error(`no frame within ${LONGEST / 1000} s`)), LONGEST);
     function listen({ source, data }) {
       if (source !== frame.contentWindow) return;
       const now = performance.now() - begun;

@@ -7,7 +7,7 @@
  */
 export async function differenceOf(a, b) {
   const [first, second] = await Promise.all([pixelsOf(a), pixelsOf(b)]);
-  if (first.length !== second.length) throw new Error('The pictures differ in size.');
+  if (first.length !== second.length) throw new Error('The images differ in size.');
   let [squares, values, worst] = [0, 0, 0];
   for (let i = 0; i < first.length; i += 4) {
     if (first[i + 3] === 0 && second[i + 3] === 0) continue;

@@ -1,4 +1,7 @@
-/** Attributes as HTML that a person can paste. */
+/** What is on the page as HTML to paste or to download. */
+
+/** The size of the tag: without one it is a box of 300 x 150 pixels. */
+const STYLE = 'width: 100%; height: auto; aspect-ratio: 4 / 3';
 
 /** The line that registers the element. @param cdn {string} address of the folder of its build, with a slash at the end */
 export const scriptOf = (cdn) => `<script type="module" src="${escape(cdn)}gaussian-splat.min.js"></script>`;
@@ -16,15 +19,42 @@ export function frameOf(cdn, attributes) {
 }
 
 /**
+ * The tag of a scene, with its size.
  * @param attributes {readonly (readonly [name: string, value: string | true])[]} true for an attribute without a value.
- * @returns {string} the tag, on one line or, if that grows long, an attribute on each.
+ * @param children {readonly string[]} HTML of labels and views
  */
-export function tagOf(attributes) {
-  const parts = attributes.map(([name, value]) => (value === true ? name : `${name}="${escape(value)}"`));
-  const line = `<gaussian-splat ${parts.join(' ')}></gaussian-splat>`;
-  return line.length <= 90 ? line : `<gaussian-splat\n  ${parts.join('\n  ')}\n></gaussian-splat>`;
+export function sceneOf(attributes, children) {
+  return elementOf('gaussian-splat', [...attributes, ['style', STYLE]], children);
 }
 
-function escape(value) {
+/** @returns {string} an element, on one line or, if that grows long, an attribute on each. */
+export function elementOf(tag, attributes, children = []) {
+  const parts = attributes.map(([name, value]) => (value === true ? name : `${name}="${escape(value)}"`));
+  const content = children.map((child) => `\n  ${child}`).join('');
+  const line = `<${tag} ${parts.join(' ')}>${content}${content && '\n'}</${tag}>`;
+  return line.length - content.length <= 90
+    ? line
+    : `<${tag}\n  ${parts.join('\n  ')}\n>${content}${content && '\n'}</${tag}>`;
+}
+
+/** A whole page with a scene. */
+export function pageOf(script, scene, title) {
+  return `<!doctype html>
+<html lang="en">
+  <meta charset="utf-8" />
+  <meta name="viewport" content="width=device-width, initial-scale=1" />
+  <title>${escape(title)}</title>
+  ${script}
+  <style>
+    body { margin: 0 }
+    gaussian-splat { display: block }
+    gaussian-splat:not(:defined) > :not([slot='poster']) { display: none }
+  </style>
+${scene}
+</html>
+`;
+}
+
+export function escape(value) {
   return value.replaceAll('&', '&amp;').replaceAll('"', '&quot;').replaceAll('<', '&lt;');
 }

@@ -1,11 +1,10 @@
 /** A capture that is tilted, set upright by three points of its floor: what the attribute `up` has to say. */
 import { parseUp } from '../../packages/element/dist/camera/grammar.js';
 import { eyeOfPose, toScene, viewerFrame } from '../../packages/element/dist/camera/orbit.js';
+import { pickPoint } from './pick.js';
 
 /** Up, where a scene says nothing. */
 const AS_TRAINED = [0, -1, 0];
-/** A press that moves farther than this, in CSS pixels, turned the scene and points at nothing. */
-const MOST_MOTION = 5;
 
 const difference = (a, b) => [a.x - b.x, a.y - b.y, a.z - b.z];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -43,47 +42,38 @@ function upOf(direction, scene) {
 }
 
 /**
- * Asks a person for three points of the floor.
- * @param scene {HTMLElement} a `<gaussian-splat>` with a scene on show
+ * Asks a visitor for three points of the floor.
+ * @param scene {HTMLElement} a `<gaussian-splat>` whose scene is shown
  * @param say {(sentence: string) => void}
  * @param signal {AbortSignal} ends it
  * @returns {Promise<string>} a value for `up`; rejects where `signal` is aborted.
  */
-export function askForLevel(scene, say, signal) {
+export async function askForLevel(scene, say, signal) {
   const points = [];
   const clear = () => scene.querySelectorAll('[slot^="hotspot-level"]').forEach((mark) => mark.remove());
+  signal.addEventListener('abort', clear, { once: true });
   say('Click three points of the floor, or of a table, far from one another. Drags turn the scene as before.');
-  return new Promise((resolve, reject) => {
-    const done = new AbortController();
-    const until = { signal: AbortSignal.any([signal, done.signal]) };
-    let pressed = { x: 0, y: 0 };
-    signal.addEventListener('abort', () => (clear(), reject(signal.reason)), { once: true });
-    scene.addEventListener('pointerdown', ({ clientX: x, clientY: y }) => (pressed = { x, y }), until);
-    scene.addEventListener(
-      'click',
-      async ({ clientX, clientY }) => {
-        if (Math.hypot(clientX - pressed.x, clientY - pressed.y) > MOST_MOTION) return;
-        const point = await scene.positionFromPoint(clientX, clientY);
-        if (signal.aborted || points.length === 3) return;
-        if (point === null) return say('Nothing of the scene is there. Another point?');
-        points.push(point);
-        scene.append(markAt(point, points.length));
-        if (points.length < 3) return say(points.length === 1 ? 'Two more.' : 'One more.');
-        const { theta, phi, radius } = scene.getCameraOrbit();
-        const [x, y, z] = eyeOfPose({ theta, phi, radius, ...scene.getCameraTarget() });
-        const upright = uprightOf(points, { x, y, z });
-        if (upright !== null) {
-          done.abort();
-          clear();
-          return resolve(upOf(upright, scene));
-        }
-        points.length = 0;
-        clear();
-        say('These three are nearly in a line. Three others?');
-      },
-      until,
-    );
-  });
+  for (;;) {
+    const point = await pickPoint(scene, signal);
+    signal.throwIfAborted();
+    if (point === null) {
+      say('Nothing of the scene is there. Another point?');
+      continue;
+    }
+    points.push(point);
+    scene.append(markAt(point, points.length));
+    if (points.length < 3) {
+      say(points.length === 1 ? 'Two more.' : 'One more.');
+      continue;
+    }
+    const { theta, phi, radius } = scene.getCameraOrbit();
+    const [x, y, z] = eyeOfPose({ theta, phi, radius, ...scene.getCameraTarget() });
+    const upright = uprightOf(points, { x, y, z });
+    clear();
+    if (upright !== null) return upOf(upright, scene);
+    points.length = 0;
+    say('These three are nearly in a line. Three others?');
+  }
 }
 
 function markAt(point, number) {

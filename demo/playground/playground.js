@@ -2,8 +2,12 @@
 import { copy } from '../site/copy.js';
 import { addressOf, takeFiles } from '../site/local-file.js';
 import { viewOf } from '../site/view.js';
-import { frameOf, scriptOf, tagOf } from './html.js';
+import { Children } from './children.js';
+import { faultOf, showFault } from './faults.js';
+import { frameOf, pageOf, sceneOf, scriptOf } from './html.js';
 import { askForLevel, turnedOver } from './level.js';
+import { pickPoint } from './pick.js';
+import { alignSliders, connectSliders } from './sliders.js';
 
 const byId = (id) => document.getElementById(id);
 const scene = byId('scene');
@@ -14,17 +18,22 @@ const ADDRESSES = ['src', 'poster', 'contract'];
 const LISTS = ['chain', 'postprocess'];
 /** The element's build, which this site has, too. */
 const CDN = new URL('../cdn/', document.baseURI).href;
+/** What is fetched as soon as it changes. */
+const LOADED = ['src', 'views', ...ADDRESSES, ...LISTS];
 const VIEW = ['camera-orbit', 'camera-target', 'field-of-view'];
 
 /** The file that was dropped, while its name stands in the field of the source. */
 let local = { name: '', address: '' };
+/** The name of the poster that was saved. */
+let savedPoster = '';
+const children = new Children(scene, byId('children'), show);
 
-/** What the fields say: `[name, value]`, true for a bare attribute. Empty fields set nothing; `alt` and `src` come first. */
+/** What the fields say: `[name, value]`, true for a bare attribute. Empty fields, and values that the element would not take, set nothing; `alt` and `src` come first. */
 function chosen() {
   return [...form.elements]
     .filter(({ name }) => name)
     .map(({ name, type, checked, value }) => [name, type === 'checkbox' ? checked : value.trim()])
-    .filter(([, value]) => value !== '' && value !== false)
+    .filter(([name, value]) => value !== '' && value !== false && faultOf(name, value) === '')
     .sort(([a], [b]) => rankOf(a) - rankOf(b));
 }
 
@@ -33,12 +42,15 @@ const rankOf = (name) => (FIRST.includes(name) ? FIRST.indexOf(name) : FIRST.len
 
 function show() {
   const attributes = chosen();
-  for (const { name } of form.elements) {
+  for (const field of form.elements) {
+    const { name } = field;
     if (!name) continue;
+    if (field.type !== 'checkbox') showFault(field, faultOf(name, field.value.trim()));
     const [, value] = attributes.find(([each]) => each === name) ?? [];
     setAttribute(name, name === 'src' && value === local.name ? local.address : value);
   }
-  byId('html').textContent = `${scriptOf(CDN)}\n${tagOf(pasteableOf(attributes))}`;
+  alignSliders(form);
+  byId('html').textContent = `${scriptOf(CDN)}\n${sceneHtml(attributes)}`;
   byId('copied').textContent = '';
   remember(attributes);
 }
@@ -48,6 +60,12 @@ function setAttribute(name, value) {
   if (wanted === scene.getAttribute(name)) return;
   if (wanted === null) scene.removeAttribute(name);
   else scene.setAttribute(name, wanted);
+}
+
+/** The tag to paste, with labels, views, and the poster that was saved. */
+function sceneHtml(attributes) {
+  const poster = savedPoster && !form.elements.poster.value ? [['poster', savedPoster]] : [];
+  return sceneOf([...pasteableOf(attributes), ...poster], children.html);
 }
 
 const pasteableOf = (attributes) => attributes.map(([name, value]) => [name, pasteable(name, value)]);
@@ -61,10 +79,10 @@ function pasteable(name, value) {
 const absolute = (address) =>
   URL.canParse(address, document.baseURI) ? new URL(address, document.baseURI).href : address;
 
-/** The page's address says what the fields say, so that it can be sent to somebody. A file stays where it is. */
+/** The page's address says what the fields say, so that it can be sent. A file stays where it is: its name is kept. */
 function remember(attributes) {
   const query = new URLSearchParams();
-  for (const [name, value] of attributes) if (value !== local.name) query.set(name, value === true ? '' : value);
+  for (const [name, value] of attributes) query.set(value === local.name ? 'file' : name, value === true ? '' : value);
   history.replaceState(null, '', `?${query}`);
 }
 
@@ -77,6 +95,8 @@ function recall() {
     if (field.type === 'checkbox') field.checked = query.has(field.name);
     else field.value = query.get(field.name) ?? '';
   }
+  if (query.has('file'))
+    byId('status').textContent = `${query.get('file')} was in your browser only. Drop it on this page again.`;
 }
 
 /** Where the camera is, as attributes: into the fields, the HTML and the clipboard. */
@@ -115,21 +135,76 @@ async function level() {
     show();
     say('Upright. If it stands on its head, look at the floor from above and try again.');
   } catch {
-    // Something else is asked for, or another scene is there.
+    // Another button was pressed, or another scene is there.
   }
+}
+
+/** Puts a label where the visitor clicks next. */
+async function label() {
+  asking.abort();
+  asking = new AbortController();
+  byId('copied').textContent = 'Click on the scene, where the label belongs.';
+  try {
+    const point = await pickPoint(scene, asking.signal);
+    if (point !== null) children.addLabel(point);
+    else byId('copied').textContent = 'Nothing of the scene is there. Press the button again.';
+  } catch {
+    // Another button was pressed, or another scene is there.
+  }
+}
+
+const POSTER = 'poster.webp';
+
+/** An image of the view as a file, which the HTML then names. */
+async function savePoster() {
+  const { width, height } = scene.getBoundingClientRect();
+  const wide = Math.min(1600, Math.round(2 * width));
+  const image = await scene.toBlob({
+    mimeType: 'image/webp',
+    width: wide,
+    height: Math.round((wide * height) / width),
+  });
+  download(image, POSTER);
+  savedPoster = POSTER;
+  show();
+  byId('copied').textContent = `Put ${POSTER} beside your page.`;
+}
+
+/** A page to open, with the same scene in it. */
+function savePage() {
+  const attributes = chosen();
+  const [, title = 'A scene'] = attributes.find(([name]) => name === 'alt') ?? [];
+  download(new Blob([pageOf(scriptOf(CDN), sceneHtml(attributes), title)], { type: 'text/html' }), 'index.html');
+  byId('copied').textContent =
+    form.elements.src.value === local.name ? `Put ${local.name} beside the page, and serve both.` : 'Saved.';
+}
+
+function download(blob, name) {
+  const link = Object.assign(document.createElement('a'), { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
 scene.addEventListener('loadstart', () => asking.abort());
 scene.addEventListener('load', () => {
   const { splats, bytes } = scene.statistics;
   byId('status').textContent = `${splats.toLocaleString('en')} splats, ${(bytes / 1e6).toFixed(1)} MB of GPU memory`;
-  for (const id of ['copy-view', 'copy-link', 'level', 'flip']) byId(id).disabled = false;
+  for (const button of document.querySelectorAll('.result button')) button.disabled = false;
 });
 scene.addEventListener('loadstart', () => (byId('status').textContent = 'Loading'));
 for (const type of ['error', 'generator-error']) {
   scene.addEventListener(type, ({ detail }) => (byId('status').textContent = detail.message));
 }
 form.addEventListener('change', show);
+form.addEventListener('input', ({ target }) => {
+  // An address is no address before it is complete.
+  if (target.type !== 'range' && !LOADED.includes(target.name)) show();
+});
+connectSliders(form, show);
+byId('add-label').addEventListener('click', label);
+byId('add-view').addEventListener('click', () => children.addView(viewOf(scene)));
+byId('save-poster').addEventListener('click', savePoster);
+byId('save-page').addEventListener('click', savePage);
 form.addEventListener('submit', (event) => event.preventDefault());
 byId('copy-view').addEventListener('click', copyView);
 byId('level').addEventListener('click', level);
@@ -146,14 +221,18 @@ byId('copy').addEventListener('click', async () => {
 byId('reset').addEventListener('click', () => {
   asking.abort();
   form.reset();
+  children.clear();
+  savedPoster = '';
   show();
   scene.resetCamera();
 });
-takeFiles(byId('drop'), (file) => {
+takeFiles(document.documentElement, (file) => {
   local = { name: file.name, address: addressOf(file) };
   form.elements.src.value = file.name;
   form.elements.alt.value = '';
   for (const name of VIEW) form.elements[name].value = '';
+  children.clear();
+  savedPoster = '';
   show();
   // On a phone the field lies below the scene, which waits until it is seen.
   scene.scrollIntoView({ block: 'nearest' });

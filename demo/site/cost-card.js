@@ -1,7 +1,7 @@
 /** A cost card: what is known beforehand, and what this machine says about a scene while it shows it. */
 import { adapterName, measureFrames, timeLoading } from './measure.js';
 
-const LIVE = { warmUp: 'First picture', memory: 'GPU memory', frame: 'A frame' };
+const LIVE = { warmUp: 'First frame', memory: 'GPU memory', frame: 'Frame time' };
 
 const make = (name, text, properties = {}) =>
   Object.assign(document.createElement(name), { textContent: text, ...properties });

@@ -9,8 +9,17 @@ const SECTIONS = [
   [
     'Guide',
     [
-      ...['start', 'prepare', 'camera', 'loading', 'labels', 'animation', 'styling', 'events'].map(guide),
-      ...['scenes-and-meshes', 'large-scenes', 'performance', 'accessibility', 'frameworks', 'three', 'vue'].map(guide),
+      ...['start', 'prepare', 'attributes', 'camera', 'loading', 'labels', 'animation', 'styling', 'events'].map(guide),
+      ...[
+        'scenes-and-meshes',
+        'large-scenes',
+        'performance',
+        'accessibility',
+        'hosting',
+        'frameworks',
+        'three',
+        'vue',
+      ].map(guide),
       /^packages\/(element|react)\/README/,
     ],
   ],
@@ -29,7 +38,7 @@ const TITLES = {
   'README.md': 'README',
   LICENSE: 'Licence',
   'docs/architecture.md': 'Architecture',
-  'packages/element/README.md': 'All attributes and methods',
+  'packages/element/README.md': 'The npm package',
   'packages/react/README.md': 'React',
   'demo/scenes/ATTRIBUTION.md': 'Attribution: scenes',
   'demo/generators/ATTRIBUTION.md': 'Attribution: generators',

@@ -9,6 +9,7 @@ const MOST_UNSTEADY = 3;
 const IN_ONE_PROCESS = 'tests/support/in-one-process.ts';
 const TSC = ['node_modules/typescript/bin/tsc', '--noEmit', '--project', 'tests'];
 const ESLINT = ['node_modules/eslint/bin/eslint.js', '.'];
+const WORDS = ['scripts/words.mjs'];
 
 /**
  * Chromium has the processors first, since some of its tests look at what happens in time; what draws in Node, what needs no GPU, types and the linter run beside it at
@@ -67,7 +68,7 @@ async function runNode(files, concurrency, options, count) {
 /** Types of the tests and the style of everything: one failure each, if any. */
 async function runStatic(options) {
   const counts = [];
-  for (const args of [TSC, ESLINT]) {
+  for (const args of [TSC, ESLINT, WORDS]) {
     const { status } = await runAsync(process.execPath, args, options);
     counts.push({ passed: 0, failed: status === 0 ? 0 : 1, skipped: 0 });
   }

@@ -181,12 +181,22 @@ check('its keywords are those that the attributes take, the default first', asyn
   }
 });
 
-check('the table of README.md is what the build makes of it', async () => {
+check('the table of the guide is what the build makes of it, with an example that each attribute takes', async () => {
   const { attributeRows } = (await import(`${folder}scripts/attributes.mjs`)) as {
     attributeRows: (attributes: unknown) => string;
   };
-  const readme = readFileSync(`${folder}README.md`, 'utf8');
-  assert.ok(readme.includes(`\n\n${attributeRows(element?.attributes)}\n\n`), 'npm run build writes it anew');
+  const guide = readFileSync(`${folder}../../docs/guide/attributes.md`, 'utf8');
+  assert.ok(guide.includes(`\n\n${attributeRows(element?.attributes)}\n\n`), 'npm run build writes it anew');
+  const { readAttributes } = (await import(`${folder}dist/attributes.js`)) as {
+    readAttributes: (raw: object, warn: (sentence: string) => void) => Record<string, unknown>;
+  };
+  for (const { name, fieldName, example = '' } of (element?.attributes ?? []) as (Named & Record<string, string>)[]) {
+    const { written, value = '' } = /^(?<written>[a-z0-9-]+)(=(["'])(?<value>.+)\3)?$/.exec(example)?.groups ?? {};
+    assert.equal(written, name, `the example of ${name}: ${example}`);
+    const warnings: string[] = [];
+    readAttributes({ [fieldName]: value }, (sentence) => warnings.push(sentence));
+    assert.deepEqual(warnings, [], example);
+  }
 });
 
 check('custom data and web-types name the same attributes', () => {

@@ -101,10 +101,10 @@ for (const specifier of ['@gaussian-splat/element', '@gaussian-splat/element/ele
   });
 }
 
-test('the README names every attribute, and no other', async () => {
+test('the guide names every attribute, and no other', async () => {
   const { GaussianSplatElement } = await import('@gaussian-splat/element/element.js');
-  const readme = readFileSync(`${root}packages/element/README.md`, 'utf8');
-  const [, table] = /## Attributes([^]*?)\n## /.exec(readme) ?? [];
+  const guide = readFileSync(`${root}docs/guide/attributes.md`, 'utf8');
+  const [, table] = /<!-- attributes:([^]*?)<!-- end -->/.exec(guide) ?? [];
   const named = [...table.matchAll(/^\|([^|]*)\|/gm)].flatMap(([, cell]) =>
     [...cell.matchAll(/`([a-z0-9-]+)`/g)].map(([, name]) => name),
   );

@@ -33,7 +33,7 @@ describe('cards and fallbacks', { skip: isBuilt ? false : 'no site: npm run buil
     const megabytes = (statSync(`${root}demo/scenes/skull.spz`).size / 1e6).toFixed(2);
     const before = (await card.locator('.cost').textContent())!;
     assert.ok(before.includes(`${megabytes} MB, SPZ`), before);
-    assert.match(before, /First pictureafter [\d.]+ m?s, hereGPU memory5\.6 MB/);
+    assert.match(before, /First frameafter [\d.]+ m?s, hereGPU memory5\.6 MB/);
     await card.getByRole('button', { name: 'Measure here' }).click();
     await card.getByRole('button', { name: 'Again' }).waitFor({ timeout: 100_000 });
     assert.match((await card.locator('.cost').textContent())!, /[\d.]+ ms at \d+ × \d+, median of \d+, on \w+/);

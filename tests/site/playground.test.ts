@@ -25,7 +25,7 @@ const stateOf = (tab: Page): Promise<{ attributes: Record<string, string>; view:
   tab.evaluate(() => {
     const scene = document.querySelector<Splat>('gaussian-splat')!;
     scene.jumpCameraToGoal();
-    const attributes = [...scene.attributes].filter(({ name }) => name !== 'id' && name !== 'src');
+    const attributes = [...scene.attributes].filter(({ name }) => !['id', 'src', 'style'].includes(name));
     return {
       attributes: Object.fromEntries(attributes.map(({ name, value }) => [name, value])),
       view: [String(scene.getCameraOrbit()), String(scene.getFieldOfView())],
@@ -66,7 +66,7 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
   it('writes HTML that does elsewhere what it does here', { timeout: 120_000 }, async () => {
     const { tab, faults } = visit;
     await loaded(tab);
-    for (const group of ['Scene and page', 'Motion']) await tab.getByText(group, { exact: true }).click();
+    await tab.getByText('Quality', { exact: true }).click();
     await tab.fill('#attribute-alt', 'A compass, "painted" <by> me & you');
     // Another quality would have other shaders, on both pages: what is tested is the attribute.
     await tab.selectOption('#attribute-quality', 'default');
@@ -84,7 +84,10 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     const { origin, href } = new URL(tab.url());
     const addresses = `${origin}/a.onnx ${new URL('b.onnx', href).href}`;
     assert.ok((await tab.locator('#html').textContent())!.includes(`chain="${addresses}"`), 'each address by itself');
-    assert.match(html, /^<script type="module" src="cdn\/gaussian-splat\.min\.js"><\/script>\n<gaussian-splat/);
+    assert.match(
+      html,
+      /^<script type="module" src="http:[^"]+\/cdn\/gaussian-splat\.min\.js"><\/script>\n<gaussian-splat/,
+    );
 
     const { tab: page, faults: others } = await open.visit('/docs/', { width: 240, height: 400 });
     const address = new URL('/pasted.html', page.url()).href;
@@ -169,6 +172,54 @@ describe('the playground', { skip: isBuilt ? false : 'no site: npm run build' },
     const angle = (Math.acos(found.reduce((sum, value, k) => sum + value * up[k], 0)) * 180) / Math.PI;
     assert.ok(angle < 2, `${found.join(' ')} is ${angle} degrees from upright`);
     assert.ok((await tab.locator('#html').textContent())!.includes(`up="${found.join(' ')}"`), 'the HTML says so');
+    assert.deepEqual(faults, []);
+  });
+
+  it('says what is wrong with a value, and leaves it out', { timeout: 120_000 }, async () => {
+    const { tab, faults } = visit;
+    await tab.click('#reset');
+    await tab.fill('#attribute-camera-orbit', 'banana');
+    const fault = tab.locator('#attribute-camera-orbit-fault');
+    assert.match((await fault.textContent())!, /^Not used: expected .+, found "banana"\.$/);
+    assert.equal(await tab.getAttribute('#attribute-camera-orbit', 'aria-invalid'), 'true');
+    assert.doesNotMatch((await tab.locator('#html').textContent())!, /banana/);
+    await tab.locator('input[data-of="camera-orbit"][data-part="0"]').fill('90');
+    assert.equal(await tab.inputValue('#attribute-camera-orbit'), '90deg 75deg 100%');
+    assert.equal(await fault.count(), 0);
+    assert.deepEqual(faults, []);
+  });
+
+  it('takes a file dropped anywhere, and puts a label and a view into the HTML', { timeout: 120_000 }, async () => {
+    const { tab, faults } = visit;
+    const bytes = [...floorOf([0, -1, 0])];
+    await tab.evaluate((all) => {
+      const data = new DataTransfer();
+      data.items.add(new File([new Uint8Array(all)], 'dropped.splat'));
+      document.querySelector('h1')!.dispatchEvent(new DragEvent('drop', { bubbles: true, dataTransfer: data }));
+    }, bytes);
+    await tab.waitForFunction(() =>
+      document.querySelector('gaussian-splat')!.getAttribute('src')?.endsWith('dropped.splat'),
+    );
+    await loaded(tab);
+    await tab.fill('#attribute-camera-orbit', '0deg 30deg auto');
+    await tab.waitForFunction(() => !document.querySelector<HTMLButtonElement>('#add-label')!.disabled);
+    await tab.click('#add-label');
+    await tab.locator('gaussian-splat').scrollIntoViewIfNeeded();
+    const box = (await tab.locator('gaussian-splat').boundingBox())!;
+    await tab.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+    await tab.locator('#children input').first().waitFor({ timeout: 60_000 });
+    await tab.locator('#children input').first().fill('The <floor>');
+    await tab.click('#add-view');
+    const html = (await tab.locator('#html').textContent())!;
+    assert.match(html, /<button slot="hotspot-1"\s+data-position="[^"]+"\s*>The &lt;floor><\/button>/);
+    assert.match(
+      html,
+      /<button slot="view"\s+data-orbit="[^"]+"\s+data-target="[^"]+"\s+data-field-of-view="[^"]+"\s*>View 2<\/button>/,
+    );
+    const [page] = await Promise.all([tab.waitForEvent('download'), tab.click('#save-page')]);
+    const saved = readFileSync(await page.path(), 'utf8');
+    assert.ok(saved.startsWith('<!doctype html>') && saved.includes('src="dropped.splat"'), saved);
+    assert.match(tab.url(), /file=dropped\.splat/);
     assert.deepEqual(faults, []);
   });
 

@@ -52,7 +52,7 @@ async function trueImages(elements) {
   let shown;
   let handle = 0;
   while (!elements.every(isWhole)) {
-    if (performance.now() > end) throw new Error(`no true image within ${LIMIT} ms`);
+    if (performance.now() > end) throw new Error(`no reference image within ${LIMIT} ms`);
     cancelAnimationFrame(handle);
     const wasWhole = isWhole(elements[0]);
     handle = requestAnimationFrame(() => {

@@ -6,12 +6,12 @@ const COLUMNS = [
   ['step', ({ step }) => step],
   ['elements, pixels', ({ elements, width, height }) => `${elements} × ${width}×${height}`],
   ['target, ms', ({ target }) => target],
-  ['load: whole picture / target', ({ load }) => load],
+  ['load: whole frame / target', ({ load }) => load],
   ['span p50 · p95 / target', ({ span }) => `${span.p50} · ${span.p95}`],
   ['interval p50 · p95, ms', ({ interval }) => `${interval.p50} · ${interval.p95}`],
   ['reversals', ({ reversals }) => reversals],
   ['levels', ({ levels }) => levels.map(({ at, level }) => `${level} (${at} ms)`).join(', ')],
-  ['true image after, ms', ({ restMs }) => restMs],
+  ['reference image after, ms', ({ restMs }) => restMs],
   ['to toBlob(), dB', ({ picture }) => picture ?? ''],
 ];
 

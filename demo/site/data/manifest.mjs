@@ -31,16 +31,16 @@ function describeChild({ tagName, attributes, members, events }) {
   return { tag: tagName, attributes: attributes.map(describe), members: own, events: events.map(describe) };
 }
 
-function describe({ name, description = '', type, default: fallback }) {
-  return { name, description: plain(description), type: type?.text ?? '', fallback: fallback ?? '' };
+function describe({ name, description = '', type, default: fallback = '', example = '' }) {
+  return { name, description: plain(description), type: type?.text ?? '', fallback, example };
 }
 
 /** Attributes, and what kind of field the playground has for them. */
 function describeAttribute(attribute) {
-  const { name, description, type, fallback } = describe(attribute);
+  const { name, type, ...rest } = describe(attribute);
   const keywords = [...type.matchAll(/'([a-z-]+)'/g)].map(([, word]) => word);
   const field = type === 'boolean' ? 'checkbox' : keywords.length > 1 ? 'select' : 'text';
-  return { name, description, type, fallback, keywords, field };
+  return { name, type, ...rest, keywords, field };
 }
 
 function describeMember(member) {

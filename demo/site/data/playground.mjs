@@ -2,32 +2,39 @@
 import manifest from './manifest.mjs';
 
 const GROUPS = {
-  Picture: ['quality', 'max-sh-degree', 'detail', 'max-pixel-ratio', 'frame-budget', 'renderer', 'postprocess'],
-  Camera: ['camera-controls', 'camera-orbit', 'camera-target', 'field-of-view', 'up', 'navigation'],
-  'Scene and page': ['alt', 'poster', 'loading', 'reveal', 'crossorigin'],
-  Motion: ['auto-rotate', 'auto-rotate-delay', 'rotation-per-second', 'interpolation-decay'],
-  'What people may do': [
+  Basics: ['alt', 'camera-controls', 'auto-rotate', 'up', 'poster', 'loading', 'reveal'],
+  Camera: ['camera-orbit', 'camera-target', 'field-of-view', 'views', 'navigation', 'interpolation-decay'],
+  Quality: ['quality', 'max-pixel-ratio', 'max-sh-degree', 'filter', 'detail', 'frame-budget', 'renderer'],
+  Interaction: [
+    'zoom',
+    'touch-action',
     'disable-zoom',
     'disable-pan',
     'disable-tap',
-    'touch-action',
     /^(min|max)-(camera|field)/,
+    /^auto-rotate-|^rotation-/,
     /^interaction-prompt/,
   ],
-  Generators: ['time', 'autoplay', 'loop', 'pose', 'contract', 'chain'],
+  Generators: ['controls-panel', 'time', 'autoplay', 'loop', 'pose', 'contract', 'chain', 'postprocess', 'compare'],
 };
 const REST = 'More';
 /** Has a field of its own above the others. */
 const SOURCE = 'src';
-/** What a field shows while it is empty: an example, not the default. */
-const EXAMPLES = {
-  'camera-orbit': '30deg 75deg auto',
-  'camera-target': '0m 0m 0m',
-  'field-of-view': '40deg',
-  'max-sh-degree': '0 to 3',
-  detail: '1px',
-  'rotation-per-second': '30deg',
-  up: '-y, or 0.1 -1 0.2',
+const slider = (title, unit, [min, max, step], start) => ({ title, unit, min, max, step, start });
+/** Sliders beside fields of numbers, one for each part of the text. */
+const SLIDERS = {
+  'camera-orbit': [
+    slider('around', 'deg', [-180, 180, 1], 0),
+    slider('from the top', 'deg', [0, 180, 1], 75),
+    slider('distance', '%', [10, 300, 1], 100),
+  ],
+  'field-of-view': [slider('angle', 'deg', [10, 120, 1], 45)],
+  'interpolation-decay': [slider('milliseconds', '', [0, 1000, 10], 50)],
+  'max-pixel-ratio': [slider('pixels', '', [0.25, 3, 0.25], 3)],
+  'frame-budget': [slider('milliseconds', '', [1, 16, 0.5], 13)],
+  'auto-rotate-delay': [slider('milliseconds', '', [0, 10_000, 500], 3000)],
+  'rotation-per-second': [slider('angle', 'deg', [-90, 90, 1], 6)],
+  'interaction-prompt-threshold': [slider('milliseconds', '', [0, 10_000, 500], 3000)],
 };
 
 export default function playground() {
@@ -38,7 +45,12 @@ export default function playground() {
   };
   const fields = attributes
     .filter(({ name }) => name !== SOURCE)
-    .map((attribute) => ({ ...attribute, group: groupOf(attribute), example: EXAMPLES[attribute.name] ?? '' }));
+    .map((attribute) => ({
+      ...attribute,
+      group: groupOf(attribute),
+      exampleValue: /=(["'])(.*)\1$/.exec(attribute.example)?.[2] ?? '',
+      sliders: SLIDERS[attribute.name] ?? [],
+    }));
   return [...Object.keys(GROUPS), REST].map((title) => {
     const rank = ({ name }) => {
       const at = (GROUPS[title] ?? []).indexOf(name);

@@ -22,13 +22,13 @@ export interface CheckOptions {
   readonly run?: boolean;
 }
 
-/** A fault of the contract, or an error that kept the check from getting so far. */
+/** A fault of the contract, or an error that kept the check from getting there. */
 export type CheckFault = ContractFault | GaussianSplatError;
 
 export interface CheckReport {
   readonly sections: readonly ReportSection[];
   readonly faults: readonly CheckFault[];
-  /** What was inferred because nobody wrote a contract. */
+  /** What was inferred because there is no contract. */
   readonly warnings: readonly string[];
 }
 

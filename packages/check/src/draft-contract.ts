@@ -53,7 +53,7 @@ function draftInput({ name, dims, dtype }: OnnxTensor, questions: string[]): Inp
     return { role: 'view', order: 'row-major', axes: 'RDF' };
   }
   if ((shape === '3,3' || shape === '4') && is(/^k$|intrin/i)) {
-    questions.push(`input ${name}: in pixels, or as shares of the picture's width and height ("normalized")?`);
+    questions.push(`input ${name}: in pixels, or as shares of the image's width and height ("normalized")?`);
     return { role: 'intrinsics', unit: 'pixels' };
   }
   if (shape === '3' && is(/cam|eye|origin/i)) return { role: 'camera_position' };

@@ -179,7 +179,7 @@ export function validateCamera(camera: Camera, where = 'camera'): void {
 
 /**
  * World-to-camera matrix (row-major, OpenCV axes) of an eye that looks at a target.
- * @param up direction that points up in the picture; must not be parallel to the line of sight.
+ * @param up direction that points up in the image; must not be parallel to the line of sight.
  */
 export function lookAt(eye: Vector3, target: Vector3, up: Vector3): Float64Array {
   const forward = normalize(subtract(target, eye));

@@ -67,7 +67,7 @@ export interface GaussianCloud {
   readonly droppedCount: number;
   /** How many of them {@link keepUsable} left out for a scale below 0, for no rotation, for no extent, and for values that are not finite or too large. */
   readonly faults?: readonly number[] | undefined;
-  /** Sentences for people about what of the file is not drawn, or may mean something else than what is drawn. */
+  /** Sentences for readers about what of the file is not drawn, or may mean something else than what is drawn. */
   readonly warnings?: readonly string[] | undefined;
 }
 

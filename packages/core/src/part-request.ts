@@ -10,7 +10,7 @@ export interface PartRequest {
 
 /**
  * How a file is asked for that a manifest names: on the manifest's own server as the manifest was, on those that the page allows without cookies, and nowhere else: who writes a
- * manifest must not choose whom visitors' browsers ask.
+ * manifest must not choose the servers that visitors' browsers ask.
  *
  * @param path relative to the manifest, or absolute
  * @param manifest as it was asked for itself

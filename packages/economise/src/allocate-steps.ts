@@ -2,7 +2,7 @@
 export type Steps<K extends string> = Readonly<Record<K, number>>;
 
 export interface AllocateOptions<K extends string> {
-  /** Steps to begin with: errors of all of them can be told from one another. */
+  /** Steps to begin with: errors of all of them can be distinguished. */
   readonly usual: Steps<K>;
   /** Numbers of a splat that each step is that of. */
   readonly numbers: Partial<Steps<K>>;
@@ -36,6 +36,6 @@ export async function allocateSteps<K extends string>(options: AllocateOptions<K
   return steps;
 }
 
-/** The same steps, so many times as large. */
+/** The same steps, times a factor. */
 export const scaledSteps = <K extends string>(steps: Steps<K>, factor: number): Steps<K> =>
   Object.fromEntries(Object.entries<number>(steps).map(([name, step]) => [name, step * factor])) as Steps<K>;

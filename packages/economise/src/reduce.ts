@@ -20,7 +20,7 @@ export interface Cut {
 
 /** A cloud with its least needed parts gone. */
 export interface ReducedCloud {
-  /** From the most to the least seen, so that any beginning of it is a coarser picture of all; of planes in the source's order. Coefficients above a splat's degree are 0. */
+  /** From the most to the least seen, so that any beginning of it is a coarser image of all; of planes in the source's order. Coefficients above a splat's degree are 0. */
   readonly cloud: GaussianCloud;
   /** [N] degree that each splat keeps. */
   readonly degrees: Uint8Array;

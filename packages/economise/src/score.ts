@@ -1,14 +1,14 @@
 /** What the splats of a cloud were seen to contribute. */
 export interface Ranking {
-  /** [N] largest weight in any pixel of any view, 0..1; 1 for splats that too few views looked at to judge them. */
+  /** [N] largest weight in any pixel of any view, 0..1; 1 for splats that too few views see to judge them. */
   readonly contribution: Float32Array;
-  /** [N] the largest mean squared error of any view's image if this splat alone goes, peak 1; Infinity for splats that too few views looked at. */
+  /** [N] the largest mean squared error of any view's image if this splat alone goes, peak 1; Infinity for splats that too few views see. */
   readonly removalError: Float32Array;
 }
 
 /** The colours of all splats with fewer bands. */
 export interface LoweredColours {
-  /** [N] the mean squared error of the views' images if this splat alone has them; Infinity for splats that too few views looked at. */
+  /** [N] the mean squared error of the views' images if this splat alone has them; Infinity for splats that too few views see. */
   readonly error: Float32Array;
   /** [(degree + 1)², 3] coefficients of splat i: those that come nearest to the colours that the views saw. */
   of(i: number): Float32Array;

@@ -59,7 +59,7 @@ export interface DealtViews {
 }
 
 /**
- * Views halfway between each camera and its nearest neighbour: what people see who move on from where pictures were taken. Scores of few cameras take
+ * Views halfway between each camera and its nearest neighbour: what visitors see who move on from where images were taken. Scores of few cameras take
  * their very places for all there are. Between two that look in opposite directions, as of a panorama taken apart, there is none.
  */
 export function viewsBetween(views: readonly Camera[]): Camera[] {

@@ -7,7 +7,7 @@ const path = (name) => fileURLToPath(new URL(name, import.meta.url));
 const TABLES = {
   'gaussian-splat': {
     table: 'ATTRIBUTES',
-    document: path('../README.md'),
+    document: path('../../../docs/guide/attributes.md'),
     rows: /(<!-- attributes: [^>]*-->\n)[^]*?(\n<!-- end -->)/,
   },
   'splat-scene': {
@@ -46,10 +46,12 @@ export function tableOfAttributes() {
         // What several tables have in common stands in one before them.
         if (ts.isSpreadAssignment(entry)) return found.get(entry.expression.getText());
         const [{ comment, tags = [] }] = ts.getJSDocCommentsAndTags(entry).filter(ts.isJSDoc);
-        const tag = tags.find(({ tagName }) => tagName.text === 'default');
-        const [description, fallback] = [comment, tag?.comment].map(ts.getTextOfJSDocComment);
+        const tagged = (wanted) => tags.find(({ tagName }) => tagName.text === wanted)?.comment;
+        const [description, fallback, example] = [comment, tagged('default'), tagged('example')].map(
+          ts.getTextOfJSDocComment,
+        );
         const type = { text: typeOf(ts, entry.initializer) };
-        return { name: entry.name.getText(), type, description, ...(fallback && { default: fallback }) };
+        return { name: entry.name.getText(), type, description, ...(fallback && { default: fallback }), example };
       });
       found.set(node.name.getText(), entries);
     },
@@ -77,9 +79,9 @@ export function tableOfAttributes() {
 
 /** The table of a document. */
 export function attributeRows(attributes) {
-  const row = ({ name, type, description, default: fallback = type.text === 'boolean' ? 'off' : '' }) =>
-    `| \`${name}\` |${fallback && ` ${fallback}`} | ${description.replace(/\s*\n\s*/g, ' ')} |`;
-  return ['| attribute | default | meaning |', '|---|---|---|', ...attributes.map(row)].join('\n');
+  const row = ({ name, type, description, example, default: fallback = type.text === 'boolean' ? 'off' : '' }) =>
+    `| \`${name}\` |${fallback && ` ${fallback}`} | ${description.replace(/\s*\n\s*/g, ' ')} | \`${example}\` |`;
+  return ['| attribute | default | meaning | example |', '|---|---|---|---|', ...attributes.map(row)].join('\n');
 }
 
 /** Brings the documents up to date. */

@@ -1,6 +1,6 @@
 /**
- * The attributes of `<gaussian-splat>`, each in one place: its property's type, what Lit is told of it, its grammar, its default and what people read of it. The manifest
- * for editors and the table in README.md are made from this file (`scripts/attributes.mjs`). Kinds are called without options where their type says all.
+ * The attributes of `<gaussian-splat>`, each in one place: its property's type, its declaration for Lit, its grammar, its default, an example, and what the reference says of it. The manifest
+ * for editors and docs/guide/attributes.md are made from this file (`scripts/attributes.mjs`). Kinds are called without options where their type says all.
  */
 import type { ShDegree, SplatFilter } from '@gaussian-splat/core';
 import type { Quality } from '@gaussian-splat/renderer';
@@ -30,12 +30,12 @@ export type Loading = 'lazy' | 'eager';
 export type TouchAction = 'pan-y' | 'pan-x' | 'none' | 'auto' | 'manipulation';
 
 /**
- * How far pictures may be off for being drawn from levels of detail: `auto` at rest not at all, and in motion where the GPU is too slow; `off` never; or, at
- * rest and in motion, as many pixels as the number says.
+ * Error that levels of detail may cause: `auto` none at rest, and while moving what the GPU needs; `off` none; or, at rest and while moving, as many pixels as the
+ * number says.
  */
 export type DetailChoice = 'auto' | 'off' | number;
 
-/** What pictures are drawn with: `auto` is the true image at rest and, in motion, as much of it as there is time for. */
+/** Accuracy of frames: `auto` is `default` at rest; while moving it goes lower if the GPU needs it. */
 export type QualityChoice = 'auto' | Quality;
 
 /** The low-pass filter that a scene was trained with: `auto` is what its file says, or else `classic`. */
@@ -48,7 +48,7 @@ export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 /** When the poster gives way: as soon as the scene can be drawn, or when the page says so. */
 export type Reveal = 'auto' | 'manual';
 
-/** Whether people are shown how to move the camera. */
+/** Whether visitors are shown how to move the camera. */
 export type InteractionPrompt = 'auto' | 'none';
 
 /** `wiggle` turns the camera to and fro with the prompt; `basic` stands still. */
@@ -105,214 +105,297 @@ const detailGrammar: AttributeGrammar<DetailChoice> = {
 
 export const ATTRIBUTES = {
   /**
-   * URL of the scene. The property takes a local file as well: `element.src = file`, a `File` or `Blob`, which the browser keeps until the page goes. An object URL of your own does well to have
-   * the name behind it, which tells a `.splat` for sure: `URL.createObjectURL(file) + '#' + encodeURIComponent(file.name)`.
+   * URL of the scene: a file, a sequence, a streamed folder, or a generator. The property takes a local `File` or `Blob` as well. Put the name of a
+   * `.splat` behind an object URL: `URL.createObjectURL(file) + '#' + encodeURIComponent(file.name)`.
+   * @example src="garden.spz"
    */
   src: text<string | Blob | null>(),
   /**
    * As of `<img>`: `use-credentials` sends cookies to other origins.
    * @default `anonymous`
+   * @example crossorigin="use-credentials"
    */
   crossorigin: bareKeyword(['anonymous', 'use-credentials']),
   /**
-   * Text alternative; empty for decoration.
-   * @default the host's `aria-label`, else "3D scene"
+   * Text alternative. Leave it empty for decoration.
+   * @default the `aria-label` of the element, else "3D scene"
+   * @example alt="Our garden in June"
    */
   alt: text(),
-  /** URL of an image shown until the scene is. */
+  /**
+   * URL of an image that is shown until the scene is.
+   * @example poster="garden.webp"
+   */
   poster: text(),
   /**
-   * `lazy` waits until the element is in sight, `eager` does not.
+   * `lazy` waits until the element comes into view. `eager` loads at once.
    * @default `lazy`
+   * @example loading="eager"
    */
   loading: keyword<Loading>(['lazy', 'eager']),
   /**
-   * `auto`: the poster gives way as soon as the scene can be drawn. `manual` keeps it, and a lazy scene unloaded, until a click on it or `dismissPoster()`.
+   * `auto` hides the poster as soon as the scene can be drawn. `manual` keeps it until a click on it or `dismissPoster()`; a lazy scene is not loaded
+   * before.
    * @default `auto`
+   * @example reveal="manual"
    */
   reveal: keyword<Reveal>(['auto', 'manual']),
-  /** Lets people orbit, pan and zoom with mouse, touch and keyboard. */
+  /**
+   * Lets visitors orbit, pan and zoom with mouse, touch and keyboard.
+   * @example camera-controls
+   */
   cameraControls: flag(),
   /**
-   * Theta, phi, radius: `deg` or `rad`; `m`, `cm`, `mm`, or `%` of the radius that frames the scene (all of a subject that stands alone, of others the 90 % of splats around the middle); `auto`, also
-   * for what is left out at the end. As in `<model-viewer>`, but for `calc()` and `env()`. Setting it moves the camera, also when the value is the same as before. Where the camera goes: see `getCameraOrbit()`.
+   * Theta, phi and radius. Angles have `deg` or `rad`. The radius has `m`, `cm`, `mm`, or `%` of the radius that frames the scene: all of a subject that
+   * stands alone, else the central 90 % of the splats. Each may be `auto`, and the end may be left out. The syntax is that of `<model-viewer>`, without
+   * `calc()` and `env()`. Setting it moves the camera, also to the same value. `getCameraOrbit()` says where the camera is.
    * @default `0deg 75deg auto`
+   * @example camera-orbit="30deg 75deg 120%"
    */
   cameraOrbit: read(orbitGrammar('0deg 75deg auto')),
   /**
-   * x y z in metres of viewer space (y up, right-handed); `auto` is the middle of the scene.
+   * The point that the camera looks at: x y z in metres of viewer space (y up, right-handed). `auto` is the middle of the scene.
    * @default `auto`
+   * @example camera-target="0m 1.2m 0m"
    */
   cameraTarget: read(targetGrammar),
   /**
    * Least `camera-target`. Without this and `max-camera-target`, visitors pan within the radius that frames the scene.
    * @default `auto`: no limit
+   * @example min-camera-target="-2m 0m -2m"
    */
   minCameraTarget: read(targetGrammar),
   /**
    * Greatest `camera-target`.
    * @default `auto`: no limit
+   * @example max-camera-target="2m 3m 2m"
    */
   maxCameraTarget: read(targetGrammar),
   /**
-   * Vertical angle, such as `45deg`.
+   * Vertical angle of view.
    * @default `auto` (45deg)
+   * @example field-of-view="30deg"
    */
   fieldOfView: read(fieldOfViewGrammar),
   /**
-   * Views that visitors can choose from: JSON or, as a property, a list `[{ name, orbit, target, fieldOfView }]`; or the URL of such a file, of a trainer's `cameras.json`, or of the settings of SuperSplat. Children with `data-orbit` are views, too.
+   * Named views that visitors can choose from. Either JSON (as a property, a list), `[{ name, orbit, target, fieldOfView }]`, or the URL of such a file,
+   * of `cameras.json` of a trainer, or of the settings of SuperSplat. Children with `data-orbit` are views, too.
+   * @example views='[{ "name": "Front", "orbit": "0deg 75deg 100%" }]'
    */
   views: text<object | string | null>(),
   /**
    * Least `camera-orbit`.
    * @default `auto`: phi 22.5deg, radius 2 %
+   * @example min-camera-orbit="auto 45deg 50%"
    */
   minCameraOrbit: read(orbitGrammar('auto')),
   /**
    * Greatest `camera-orbit`.
    * @default `auto`: phi 157.5deg, radius 500 %
+   * @example max-camera-orbit="auto 90deg 200%"
    */
   maxCameraOrbit: read(orbitGrammar('auto')),
   /**
    * Least `field-of-view`.
    * @default `auto` (1deg)
+   * @example min-field-of-view="15deg"
    */
   minFieldOfView: read(fieldOfViewGrammar),
   /**
    * Greatest `field-of-view`.
    * @default `auto` (160deg)
+   * @example max-field-of-view="60deg"
    */
   maxFieldOfView: read(fieldOfViewGrammar),
   /**
-   * Time constant of the camera's motion in milliseconds. 0, or a wish for less motion, jumps.
+   * How slowly the camera follows: a time constant in milliseconds. `0` jumps. It always jumps for visitors who ask for less motion.
    * @default `50`
+   * @example interpolation-decay="200"
    */
   interpolationDecay: number(milliseconds(50)),
   /**
-   * One-finger moves that stay the page's: `pan-y`, so that pages scroll, `pan-x`, `none`, `auto`, `manipulation`.
+   * One-finger gestures that are left to the page: `pan-y` (scrolling up and down), `pan-x`, `none`, `auto`, `manipulation`.
    * @default `pan-y`
+   * @example touch-action="none"
    */
   touchAction: keyword<TouchAction>(['pan-y', 'pan-x', 'none', 'auto', 'manipulation']),
   /**
-   * When the wheel zooms: `auto` with Ctrl, while the scene has the focus, or where there is nothing to scroll; `always`; `ctrl` with Ctrl only; `none`. At the zoom limit the page scrolls. Two fingers zoom in any case.
+   * When the wheel zooms. `auto`: with Ctrl, while the scene has the focus, or where the page does not scroll. `always`; `ctrl`: with Ctrl only; `none`.
+   * At the limit of the zoom the page scrolls. Two fingers zoom in any case.
    * @default `auto`
+   * @example zoom="always"
    */
   zoom: keyword<WheelZoom>(['auto', 'always', 'ctrl', 'none']),
-  /** Leaves the wheel and all that two fingers do to the page; keys do not zoom either. */
+  /**
+   * Leaves the wheel and all two-finger gestures to the page. The keys do not zoom either.
+   * @example disable-zoom
+   */
   disableZoom: flag(),
-  /** Keeps the camera's target where it is. */
+  /**
+   * Keeps the target of the camera where it is.
+   * @example disable-pan
+   */
   disablePan: flag(),
-  /** Ignores a double click and a double tap, which otherwise pick the point to turn around or, beside the scene, bring the camera back. */
+  /**
+   * Ignores double clicks and double taps. On the scene they set the target of the camera, beside it they bring the camera back.
+   * @example disable-tap
+   */
   disableTap: flag(),
   /**
-   * `orbit` turns around the target; `fly` looks around, and flies by W, A, S, D, Q and E, with Shift faster.
+   * `orbit` turns around the target. `fly` looks around, and moves with W, A, S, D, Q and E, faster with Shift.
    * @default `orbit`
+   * @example navigation="fly"
    */
   navigation: keyword<Navigation>(['orbit', 'fly']),
-  /** Turns the camera around the scene until a visitor touches it. Off for visitors who want less motion, and while the scene has the keyboard; a button stops it. */
+  /**
+   * Turns the camera around the scene until a visitor touches it. It does not start for visitors who ask for less motion, nor while the scene has the
+   * keyboard. A button stops it.
+   * @example auto-rotate
+   */
   autoRotate: flag(),
   /**
-   * Rest before it turns, in milliseconds.
+   * Milliseconds at rest before it turns.
    * @default `3000`
+   * @example auto-rotate-delay="10000"
    */
   autoRotateDelay: number(milliseconds(3_000)),
   /**
-   * How fast it turns, such as `30deg`.
+   * How fast it turns.
    * @default `5.625deg`
+   * @example rotation-per-second="30deg"
    */
   rotationPerSecond: read(angleGrammar('5.625deg')),
   /**
-   * `auto` shows people who have not touched the scene that they can; `none` does not.
+   * `auto` shows that the scene can be turned to visitors who have not done so. `none` does not.
    * @default `auto`
+   * @example interaction-prompt="none"
    */
   interactionPrompt: keyword<InteractionPrompt>(['auto', 'none']),
   /**
-   * `basic` stands still; `wiggle` moves the camera to and fro once, which draws frames.
+   * `basic` stands still. `wiggle` moves the camera to and fro once, which draws frames.
    * @default `basic`
+   * @example interaction-prompt-style="wiggle"
    */
   interactionPromptStyle: keyword<InteractionPromptStyle>(['basic', 'wiggle']),
   /**
-   * Rest before the prompt is shown, in milliseconds.
+   * Milliseconds at rest before the prompt is shown.
    * @default `3000`
+   * @example interaction-prompt-threshold="0"
    */
   interactionPromptThreshold: number(milliseconds(3_000)),
   /**
-   * Words in the page's own language, read or shown: JSON, or as a property an object, with the keys `front`, `upper-front`, `lower-front`, the same of `right`, `back` and `left`, `interaction-prompt`, `scene`, `role`, `keys-orbit`, `keys-fly`, `keys-views`,
-   * `views`, `next-view`, `previous-view`, `show` (`…` stands for `alt`), `loading`, `reset`, `pause`, `play`, `details`, and `error-` before each of the codes of `error.code`. Without it the element's words are marked as English.
+   * The words of the element in the language of the page: JSON or, as a property, an object. Keys: `front`, `upper-front`, `lower-front`, the same three
+   * of `right`, `back` and `left`; `scene`, `role`, `interaction-prompt`, `keys-orbit`, `keys-fly`, `keys-views`; `views`, `next-view`, `previous-view`;
+   * `show` (`…` stands for `alt`), `loading`, `reset`, `pause`, `play`, `details`; and `error-` before each `error.code`. Without it the words are
+   * English, and marked as English.
    * @default English
+   * @example a11y='{ "pause": "Anhalten", "play": "Abspielen" }'
    */
   a11y: text<SpokenStrings | string | null>(),
   /**
-   * What points up in the scene's frame: an axis, `x`, `-x`, `y`, `-y` (trainers write y down), `z`, `-z`, or a direction such as `0.1 -1 0.2` for a capture that is tilted; the playground finds it from three points of the floor. A
-   * generator whose contract declares another axis has that one.
+   * What points up in the axes of the file: `x`, `-x`, `y`, `-y` (as trainers write), `z`, `-z`, or a direction such as `0.1 -1 0.2` for a tilted capture.
+   * The playground finds it from three points of the floor. The contract of a generator may name another default.
    * @default `-y`
+   * @example up="y"
    */
   up: read(upGrammar),
   /**
    * Most drawn pixels for each CSS pixel.
    * @default no limit
+   * @example max-pixel-ratio="1"
    */
   // Far below any ratio in use, so that 0 is refused but thumbnails of pixels are not.
   maxPixelRatio: number(numberGrammar(Infinity, 1 / 64, 'drawn pixels for each CSS pixel, above 0')),
   /**
-   * Milliseconds of the GPU that a picture in motion may take with `quality="auto"`, where the page draws other things, too; else 0.8 of the display's interval, shared by the elements that draw at the same time.
-   * @default the display's
+   * Milliseconds of GPU time for a frame while moving, with `quality="auto"`: for pages that draw other things on the GPU. By default the elements that
+   * draw at the same time share 0.8 of the interval of the display.
+   * @default 0.8 of the display's interval
+   * @example frame-budget="4"
    */
   frameBudget: number(numberGrammar(Infinity, 0.01, 'milliseconds, 0.01 or more')),
   /**
-   * Accuracy against speed: `reference` (75 dB to the true image), `default` (59 dB, exact on a display), `balanced` (42 dB), `fast` (36 dB); `reference` fetches a scene again whose colours were rounded to 8 bits for the others; `auto` is `default` at
-   * rest and, in motion, as much of it as there is time for.
+   * Accuracy against speed, as PSNR to the reference image: `reference` (75 dB), `default` (59 dB, no difference on a display), `balanced` (42 dB), `fast`
+   * (36 dB). `auto` is `default` at rest; while moving it goes lower if the GPU needs it. `reference` loads a scene again if its colours were rounded to 8
+   * bits.
    * @default `auto`
+   * @example quality="balanced"
    */
   quality: keyword<QualityChoice>(['auto', 'default', 'reference', 'balanced', 'fast']),
   /**
-   * What draws: `auto` is WebGPU and, in browsers without it, WebGL 2, which shows scene files alone; `webgpu` and `webgl` are that one or an error.
+   * What draws: `auto` is WebGPU and, in browsers without it, WebGL 2, which shows only scene files; `webgpu` and `webgl` are that one or an error.
    * @default `auto`
+   * @example renderer="webgl"
    */
   renderer: keyword<RendererChoice>(['auto', 'webgpu', 'webgl']),
   /**
-   * Highest degree of spherical harmonics that colours are made of: 0, the same from everywhere, to 3. Whatever the file has beyond it is kept, but not evaluated.
+   * Highest degree of spherical harmonics that is evaluated, 0 to 3. With 0 colours do not depend on the view.
    * @default `3`
+   * @example max-sh-degree="0"
    */
   maxShDegree: number(map(keywordGrammar(['3', '2', '1', '0']), (degree) => Number(degree) as ShDegree)),
   /**
-   * The filter that the scene was trained with, for files that cannot say it: `classic` (0.3 px²), `antialiased` (0.3 px² with compensation: gsplat's and INRIA's options of that name), `mip`
-   * (0.1 px² with compensation: Mip-Splatting, Brush's mip mode). Distant splats are too thin or too thick with another one.
+   * The low-pass filter that the scene was trained with, for files that cannot say it: `classic` (0.3 px²), `antialiased` (0.3 px² with compensation: the
+   * options of that name of gsplat and INRIA), `mip` (0.1 px² with compensation: Mip-Splatting, mip mode of Brush). With a wrong filter distant splats
+   * look too thin or too thick.
    * @default `auto`: what the file says, else `classic`
+   * @example filter="antialiased"
    */
   filter: keyword<FilterChoice>(['auto', 'classic', 'antialiased', 'mip']),
   /**
-   * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every frame an error of that size. Scenes that
-   * come in levels (`detail.json`, `lod-meta.json`) are streamed: `auto` is `1px` for them, and with `off` a `lod-meta.json` is loaded whole.
+   * Levels of detail. `auto` builds them where the GPU is too slow for the scene, and draws them while moving only. `off` builds none. Pixels such as
+   * `1px` allow this error in every frame. Streamed scenes (`detail.json`, `lod-meta.json`) have levels: `auto` is `1px` for them, and `off` loads a
+   * `lod-meta.json` at once and whole.
    * @default `auto`
+   * @example detail="2px"
    */
   detail: read(detailGrammar),
   /**
-   * Contract of a generator: a URL, its JSON, or as a property the object.
+   * Contract of a generator: a URL or its JSON. The property takes the object as well.
    * @default in the model or beside it
+   * @example contract="walker.contract.json"
    */
   contract: text<string | object | null>(),
-  /** URLs, with spaces between them, of generators that each take the Gaussians of the one before, the first those of `src`. */
+  /**
+   * URLs of generators, with spaces between them. Each takes the Gaussians of the one before, the first those of `src`.
+   * @example chain="relight.onnx"
+   */
   chain: text(),
   /**
    * `off`: the first run of a generator on the GPU is not compared with the same run on the CPU.
    * @default each model once on each adapter, when the page is idle
+   * @example compare="off"
    */
   compare: text(),
-  /** URL of a post-processor that makes the picture shown from the one drawn, or several with spaces between them. */
+  /**
+   * URL of a post-processor that turns each drawn frame into another image, or several URLs with spaces between them.
+   * @example postprocess="style.onnx"
+   */
   postprocess: text(),
-  /** Controls for visitors, made from what the generator or post-processor takes: sliders, a pose by its joints, pictures, the time. Style them by their parts. */
+  /**
+   * Shows controls for what the generator or post-processor takes: sliders, joints, images, the time. Style them by their parts.
+   * @example controls-panel
+   */
   controlsPanel: flag(),
-  /** Seconds: where the scene's time is put whenever this changes. See `currentTime` for where it is. */
+  /**
+   * Seconds: each change sets the time of the scene. `currentTime` says where it is.
+   * @example time="1.5"
+   */
   time: text<number | string | null>(),
   /**
-   * Pose of a generator, flattened or nested, as its contract declares it: text, a list, a typed array. A new pose is a new object.
+   * Pose of a generator, flattened or nested, as its contract declares it: text, a list, or a typed array. A new pose is a new object.
    * @default the rest pose
+   * @example pose="0 0.3 0"
    */
   pose: text<Numbers | null>(),
-  /** Plays a scene that moves as soon as it is shown. Off for visitors who want less motion; a button stops it. */
+  /**
+   * Plays a scene that moves as soon as it is shown. It does not start for visitors who ask for less motion. A button stops it.
+   * @example autoplay
+   */
   autoplay: flag(),
-  /** Starts again at the end. */
+  /**
+   * Starts again at the end.
+   * @example loop
+   */
   loop: flag(),
 };
 

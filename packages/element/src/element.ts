@@ -16,7 +16,7 @@ import { template } from './template.js';
 import { ViewingMethods } from './viewing.js';
 import { readSpokenStrings, type SpokenStrings } from './words.js';
 
-/** Size of the scene on show. */
+/** Size of the scene shown. */
 export interface SceneStatistics {
   /** Splats on the GPU. */
   readonly splats: number;
@@ -48,12 +48,12 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @tagname gaussian-splat
  * @slot poster - Shown until the scene is.
  * @slot progress-bar - Shown while the scene loads.
- * @slot interaction-prompt - Shown to people who have not touched the scene yet.
+ * @slot interaction-prompt - Shown to visitors who have not touched the scene yet.
  * @slot fallback - Shown where the browser has no WebGPU.
  * @slot error - Shown if the scene cannot be.
  * @slot view - Buttons of the page for its views, each with `data-orbit`.
  * @slot hotspot-* - A label of the page at the point of the scene that its `data-position` names.
- * @csspart canvas - The picture.
+ * @csspart canvas - The frame.
  * @csspart poster - The image of the `poster` attribute.
  * @csspart poster-button - The button around it with `reveal="manual"`.
  * @csspart poster-cue - The sign in the middle of that button.
@@ -90,14 +90,14 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @cssproperty --message-color - Their colour.
  * @cssproperty --message-font - Their font.
  * @cssstate loading - Bytes are on their way.
- * @cssstate preview - A part of the scene is on show while the rest loads.
- * @cssstate ready - The scene is on show.
+ * @cssstate preview - A part of the scene is visible while the rest loads.
+ * @cssstate ready - The scene is shown.
  * @cssstate playing - Its time runs.
  * @cssstate error - It cannot be shown.
  * @cssstate unsupported - It cannot be shown because there is no WebGPU.
  * @fires {CustomEvent<LoadDetail>} load - The first frame is drawn.
  * @fires {ProgressEvent} progress - Bytes have arrived.
- * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is on show while the rest loads.
+ * @fires {CustomEvent<PreviewDetail>} preview - A part of the scene is visible while the rest loads.
  * @fires {CustomEvent<ElementError>} error - The scene cannot be shown; `detail` is the same object as the property `error`.
  * @fires {CustomEvent<CameraChangeDetail>} camera-change - The camera has moved; `detail.source` says who moved it.
  * @fires {CustomEvent<ViewChangeDetail>} view-change - The camera sets out for a view of the list.
@@ -111,7 +111,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {Event} pause - The time stands still.
  * @fires {Event} timeupdate - The time has gone on.
  * @fires {Event} seeking - Another time was asked for.
- * @fires {Event} seeked - It is on show.
+ * @fires {Event} seeked - It is shown.
  * @fires {Event} ended - The time has come to its end.
  * @fires {Event} ratechange - The speed of the time has changed.
  * @fires {Event} durationchange - The length of the time is known.
@@ -121,7 +121,7 @@ const STATES = ['loading', 'preview', 'ready', 'playing', 'error', 'unsupported'
  * @fires {Event} canplay - Likewise.
  * @fires {Event} emptied - The scene was taken away.
  * @fires {Event} contextlost - The GPU device was lost; the element recovers by itself.
- * @fires {Event} contextrestored - The picture is back.
+ * @fires {Event} contextrestored - The frame is back.
  */
 export class GaussianSplatElement extends ViewingMethods {
   /** The GPU device of all elements. A page with a device of its own may put `new SharedDevice(...)` here beforehand. */
@@ -168,14 +168,14 @@ export class GaussianSplatElement extends ViewingMethods {
     this.stage = new Stage(this, GaussianSplatElement.#hostOf(this));
   }
 
-  /** True while the scene is on show. */
+  /** True while the scene is shown. */
   get loaded(): boolean {
     return this.stage.state === 'ready';
   }
 
   /**
-   * Fulfils, and never rejects, when there is nothing left to wait for: the scene is on show ({@link loaded}), it cannot
-   * be ({@link error}), or there is none. A lazy element that nobody scrolls to keeps one waiting.
+   * Fulfils, and never rejects, when there is nothing left to wait for: the scene is shown ({@link loaded}), it cannot
+   * be ({@link error}), or there is none. A lazy element that is never scrolled to keeps one waiting.
    */
   get ready(): Promise<void> {
     return this.updateComplete.then(() => this.stage.codeKnown).then(() => this.stage.settled);
@@ -194,12 +194,12 @@ export class GaussianSplatElement extends ViewingMethods {
     return this.stage.error;
   }
 
-  /** What the page may set of the models that are shown, from their contracts: for controls of one's own. Empty without a model; `inputs-change` tells of others. */
+  /** What the page may set of the models that are shown, from their contracts: for your own controls. Empty without a model; `inputs-change` tells of others. */
   get inputs(): readonly GeneratorInput[] {
     return this.stage.inputs;
   }
 
-  /** Size of the scene on show, or null. */
+  /** Size of the scene shown, or null. */
   get statistics(): SceneStatistics | null {
     const { shown } = this.stage;
     if (shown.length === 0) return null;
@@ -216,14 +216,14 @@ export class GaussianSplatElement extends ViewingMethods {
   }
 
   /**
-   * What is modelled, drawn, seen and in memory, what pictures are drawn with, and why; null where no scene is on show. Counts of the picture are those of
+   * What is computed, drawn, seen and in memory, what frames are drawn with, and why; null where no scene is shown. Counts of the frame are those of
    * the last {@link updateStats}.
    */
   get stats(): SceneStats | null {
     return this.stage.stats;
   }
 
-  /** Counts what the picture on show draws and what of it can be seen. Asks the GPU and draws the view once more: for panels, not for every frame. */
+  /** Counts what the frame shown draws and what of it can be seen. Asks the GPU and draws the view once more: for panels, not for every frame. */
   updateStats(): Promise<SceneStats | null> {
     return this.stage.updateStats();
   }
@@ -252,7 +252,7 @@ export class GaussianSplatElement extends ViewingMethods {
     this.#controlObserver?.disconnect();
   }
 
-  /** Style sheets stay behind in the document that made them, and so does the picture where that has lost its window. */
+  /** Style sheets stay behind in the document that made them, and so does the image where that has lost its window. */
   adoptedCallback(from: Document): void {
     if (this.shadowRoot) adoptStyles(this.shadowRoot, styles);
     if (from.defaultView === null) this.stage.leaveWindowless();

@@ -28,18 +28,18 @@ export interface VisibilityDetail {
 }
 
 export interface FallbackDetail {
-  /** Why the generator does not run on the GPU, for people. */
+  /** Why the generator does not run on the GPU, for readers. */
   readonly reason: string;
 }
 
 export interface PreviewDetail {
-  /** Splats on show. */
+  /** Splats shown. */
   readonly splats: number;
 }
 
 /** `detail` of the event `hotspot-visibility`, which is fired on a hotspot itself. */
 export interface HotspotVisibilityDetail {
-  /** Whether anybody can see the hotspot's point: it is before the camera, faces it, and nothing hides it. */
+  /** Whether a visitor can see the hotspot's point: it is before the camera, faces it, and nothing hides it. */
   readonly visible: boolean;
 }
 
@@ -49,7 +49,7 @@ export interface GaussianSplatEventMap {
   load: CustomEvent<LoadDetail>;
   /** Bytes have arrived. The first and the last event of a load always fire. */
   progress: ProgressEvent;
-  /** A part of the scene is on show while the rest of it loads: fewer splats, or splats without their view-dependent colours. */
+  /** A part of the scene is shown while the rest of it loads: fewer splats, or splats without their view-dependent colours. */
   preview: CustomEvent<PreviewDetail>;
   /** The scene cannot be shown; the same object as `element.error`. */
   error: CustomEvent<ElementError>;
@@ -84,7 +84,7 @@ export interface GaussianSplatEventMap {
   emptied: Event;
   /** The GPU device was lost. The element recovers by itself. */
   contextlost: Event;
-  /** The picture is back after a loss. */
+  /** The frame is back after a loss. */
   contextrestored: Event;
 }
 

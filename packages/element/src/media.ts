@@ -52,7 +52,7 @@ export abstract class MediaProperties extends SplatProperties {
     return this.stage.playback.ended;
   }
 
-  /** True until the frame of the time that was set is on show. */
+  /** True until the frame of the time that was set is shown. */
   get seeking(): boolean {
     return this.stage.playback.seeking;
   }
@@ -66,7 +66,7 @@ export abstract class MediaProperties extends SplatProperties {
     this.stage.playback.playbackRate = isSaid(rate) ? rate : 1;
   }
 
-  /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is on show. */
+  /** As of HTMLMediaElement: 0 while there is no scene, 4 once it is shown. */
   get readyState(): number {
     return this.stage.state === 'ready' ? HAVE_ENOUGH_DATA : HAVE_NOTHING;
   }

@@ -17,7 +17,7 @@ export interface PictureHost {
 export type Rgba = readonly [red: number, green: number, blue: number, alpha: number];
 
 /** Why there is no picture of a device that is lost. */
-const LOST = 'The GPU device was lost before the picture was drawn: take it again after the event contextrestored';
+const LOST = 'The GPU device was lost before the image was drawn: take it again after the event contextrestored';
 
 export async function takePicture(host: PictureHost, options: PictureOptions): Promise<Blob> {
   const { mimeType = 'image/png', qualityArgument, background } = options;
@@ -33,13 +33,13 @@ export async function takePicture(host: PictureHost, options: PictureOptions): P
   const taken = await blob;
   // A device that was lost before it had drawn leaves an empty picture, and says so later.
   if (painter && (await wasLost(painter))) throw new DOMException(LOST, 'InvalidStateError');
-  if (taken === null) throw new DOMException(`The picture could not be written as ${mimeType}`, 'EncodingError');
+  if (taken === null) throw new DOMException(`The image could not be written as ${mimeType}`, 'EncodingError');
   return taken;
 }
 
 export const nothingToDraw = (): DOMException =>
   new DOMException(
-    'There is nothing to take a picture of: expected a loaded scene in an element that has a size',
+    'There is nothing to take an image of: expected a loaded scene in an element that has a size',
     'InvalidStateError',
   );
 
@@ -51,7 +51,7 @@ function sizeOf({ width, height }: PictureOptions, canvas: HTMLCanvasElement | n
   const isDrawable = (side: number): boolean => side >= 1 && side <= most;
   if (!isDrawable(size.width) || !isDrawable(size.height))
     throw new RangeError(
-      `toBlob(): expected a picture of 1 to ${most} pixels to a side, which is what this GPU can draw, found ${size.width} x ${size.height}`,
+      `toBlob(): expected an image of 1 to ${most} pixels to a side, which is what this GPU can draw, found ${size.width} x ${size.height}`,
     );
   return size;
 }
@@ -75,7 +75,7 @@ function withFilters(host: PictureHost, drawn: HTMLCanvasElement): HTMLCanvasEle
   if (filter === '') return drawn;
   const context = paper(drawn.width, drawn.height);
   if (!('filter' in context)) {
-    host.warn('<gaussian-splat> toBlob(): this browser cannot apply CSS filters to a picture; it is without them.');
+    host.warn('<gaussian-splat> toBlob(): this browser cannot apply CSS filters to an image; it is without them.');
     return drawn;
   }
   context.filter = filter;

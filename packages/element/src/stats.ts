@@ -11,14 +11,14 @@ export interface SceneStats {
   readonly renderer: 'webgpu' | 'webgl';
   /** Splats that the file has, or a generator writes at most. */
   readonly modelled: number;
-  /** What is on show is a part of a scene that is still loading; all counts are those of the part. */
+  /** What is shown is a part of a scene that is still loading; all counts are those of the part. */
   readonly isPreview: boolean;
   /** Of these, left out because a value was not usable. */
   readonly dropped: number;
   /** Splats on the GPU, those of levels of detail included; of a streamed scene those for which there is room. */
   readonly inMemory: number;
   /**
-   * Levels of detail: splats that were merged for them and are on the GPU besides the scene's own, and pixels by which pictures at rest may be off. Of a streamed
+   * Levels of detail: splats that were merged for them and are on the GPU besides the scene's own, and pixels by which frames at rest may be off. Of a streamed
    * scene, whose levels are its own, 0 splats.
    */
   readonly detail: { readonly splats: number; readonly pixels: number };
@@ -30,15 +30,15 @@ export interface SceneStats {
   readonly bytes: { readonly scene: number; readonly frames: number };
   /** The attribute `quality`. */
   readonly quality: QualityChoice;
-  /** What pictures at rest and in motion are drawn with. */
+  /** What frames at rest and in motion are drawn with. */
   readonly pace: PaceReport;
   /** The direction of the scene's frame that its file says points up, of length 1; null where it says nothing. Of several scenes that of the first. */
   readonly up: Vector3 | null;
-  /** What of the files is not drawn, or may mean something else than what is drawn, for people; the console has it, too. */
+  /** What of the files is not drawn, or may mean something else than what is drawn, for readers; the console has it, too. */
   readonly warnings: readonly string[];
   /** The element's own scene, then its children, each by itself; empty for an element without children. */
   readonly scenes: readonly PartStats[];
-  /** All that is done to the scene for the sake of time or memory, for people; empty where nothing is. */
+  /** All that is done to the scene for the sake of time or memory, for readers; empty where nothing is. */
   readonly why: readonly string[];
 }
 
@@ -129,7 +129,7 @@ function whyDetail(quality: QualityChoice, { splats, pixels }: SceneStats['detai
   // With a chosen quality they are drawn only where the page allows for it.
   if (splats === 0 || (pixels === 0 && quality !== 'auto')) return [];
   const rest = pixels > 0 ? `, by ${pixels} px at most` : ' while they move';
-  return [`${splats} merged splats stand for what is too small to see: pictures may be off for it${rest}.`];
+  return [`${splats} merged splats stand for what is too small to see: frames may be off for it${rest}.`];
 }
 
 function whyLeft(left: number): string[] {
@@ -140,5 +140,5 @@ function whyPace(quality: QualityChoice, { moving, frameMs, targetMs }: PaceRepo
   if (quality !== 'auto') return quality === 'default' ? [] : [`The page asks for quality="${quality}".`];
   if (moving === 'whole') return [];
   const found = frameMs === null ? '' : `; the last took ${frameMs.toFixed(1)} ms`;
-  return [`In motion pictures are drawn with ${moving}, to keep to ${targetMs.toFixed(1)} ms${found}.`];
+  return [`In motion frames are drawn with ${moving}, to keep to ${targetMs.toFixed(1)} ms${found}.`];
 }

@@ -6,7 +6,7 @@ import type { SceneBox } from './scene-queries.js';
 import type { CameraView } from './views/camera-view.js';
 import type { FlightOptions, PathOptions } from './views/tour.js';
 
-/** A picture to take. */
+/** An image to take. */
 export interface PictureOptions {
   /** Default `image/png`. */
   readonly mimeType?: string;
@@ -67,7 +67,7 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /**
-   * Flies to a view: one of the page's list by its name or its place in it (from 0), or any other. Waits for the scene. People who want less motion are there at once.
+   * Flies to a view: one of the page's list by its name or its place in it (from 0), or any other. Waits for the scene. Visitors who ask for less motion are there at once.
    * @returns fulfils at the end: true on arrival, false where a visitor, an attribute or another flight has taken the camera. Rejects with
    * `argument/camera` for a view that is malformed or has no such name.
    */
@@ -98,7 +98,7 @@ export abstract class ViewingMethods extends MediaProperties {
     return (await this.stage.tour()).showAlong(share);
   }
 
-  /** Lets the interaction prompt come again, as if nobody had touched the scene. */
+  /** Lets the interaction prompt come again, as if no visitor had touched the scene. */
   resetInteractionPrompt(): void {
     this.stage.behaviours.prompt.reset();
   }
@@ -109,7 +109,7 @@ export abstract class ViewingMethods extends MediaProperties {
     await this.stage.updateFraming();
   }
 
-  /** Box around nearly all of the scene, in metres of viewer space; null while none is on show. */
+  /** Box around nearly all of the scene, in metres of viewer space; null while none is shown. */
   getBoundingBox(): SceneBox | null {
     return this.stage.queries.box;
   }
@@ -130,12 +130,12 @@ export abstract class ViewingMethods extends MediaProperties {
   }
 
   /**
-   * The picture as it is on the screen now, with the CSS filters of the element, drawn anew. A colour that exceeds its alpha has no place in a transparent picture: give `background` where the scene has such.
+   * The image as it is on the screen now, with the CSS filters of the element, drawn anew. A colour that exceeds its alpha has no place in a transparent image: give `background` where the scene has such.
    * @returns rejects with an `InvalidStateError` where no scene is shown, or the element has no size; with a `RangeError` for a size that the GPU
    * cannot draw, and a `TypeError` for a background that is no colour.
    */
   async toBlob(options: PictureOptions = {}): Promise<Blob> {
-    const { takePicture } = await loadModule('the code for pictures', () => import('./picture.js'));
+    const { takePicture } = await loadModule('the code for images', () => import('./picture.js'));
     this.applyAttributes();
     return takePicture(this.stage, options);
   }

@@ -17,7 +17,7 @@ const FREE_BYTES = 2 ** 26;
 const BYTES_PER_BYTE = 256;
 
 /**
- * What one load has taken, and may take. Whatever a file can name more than once, or announce, is charged here before it is allocated, all of it to the same account:
+ * What one load has taken, and may take. All that a file can name more than once, or announce, is charged here before it is allocated, all of it to the same account:
  * nothing is given back, so that work is bounded as memory is. Loops that allocate nothing charge their steps as bytes.
  */
 export class LoadBudget {

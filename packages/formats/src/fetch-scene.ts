@@ -14,12 +14,12 @@ export interface FetchSceneOptions extends Pick<LoadLimits, 'maxBytes' | 'maxSec
   /** Aborts the download; the promise then rejects with the signal's reason. */
   readonly signal?: AbortSignal;
   /**
-   * Called after every chunk with the bytes so far. The total is undefined where the server does not say it or says
+   * Called after every chunk with the bytes until now. The total is undefined where the server does not say it or says
    * the length of a compressed transfer, which is another number than that of the bytes that arrive.
    */
   readonly onProgress?: (loadedBytes: number, totalBytes: number | undefined) => void;
   /**
-   * Called after every chunk with all bytes so far, which stay as they are, and the total as above. The download goes on when the
+   * Called after every chunk with all bytes until now, which stay as they are, and the total as above. The download goes on when the
    * promise fulfils. A server that cannot go on where a connection broke begins again, and so do these bytes.
    */
   readonly onArrival?: (bytes: Uint8Array, totalBytes: number | undefined) => void | Promise<void>;

@@ -2,7 +2,7 @@ import type { GaussianCloud } from '@gaussian-splat/core';
 
 /** A preview has every so many-th splat. */
 export const PREVIEW_STEP = 16;
-/** Every so many-th splat of a cloud, without coefficients above the constant one, larger to stand for the rest. */
+/** Every n-th splat of a cloud, without coefficients above the constant one, larger to stand for the rest. */
 export function samplePreview(cloud: GaussianCloud): GaussianCloud {
   const count = Math.ceil(cloud.count / PREVIEW_STEP);
   const take = (values: Float32Array, stride: number, size: number): Float32Array => {

@@ -34,7 +34,7 @@ export interface ReadSceneOptions extends LoadLimits {
 
 /**
  * Reads a scene file: PLY (INRIA layout), compressed PLY, SPZ version 1 to 4, SOG version 1 and 2, streamed SOG, glTF with
- * `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is told from the content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
+ * `KHR_gaussian_splatting`, .splat, .ksplat, or a ZIP archive of one of these; the format is recognized by the content. Works in windows, workers and Node; the reader of the format is loaded when it is first needed.
  *
  * @param file the whole file. It is not changed, and the cloud does not refer to it.
  * @returns the splats in the shape and frame that `GaussianCloud` documents. Splats with values that cannot be drawn

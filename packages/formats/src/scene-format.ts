@@ -50,7 +50,7 @@ export type SceneFormatName = 'ply' | 'compressed-ply' | 'spz' | 'splat' | 'kspl
 /** A file format that `readScene` reads: what it is called, how it is recognised, and where its reader is. */
 export interface SceneFormat {
   readonly name: SceneFormatName;
-  /** Name for people. */
+  /** Name for readers. */
   readonly title: string;
   /** File extensions in lower case, with the dot. A format may share an extension with another. */
   readonly extensions: readonly string[];

@@ -20,7 +20,7 @@ export const HEADER_BYTES = 1 << 18;
  * Tells whether some of a scene's splats can be read without the others, so that several threads can share the reading: of binary PLY whose rows have one size and float32
  * coordinates, and of uncompressed glTF.
  *
- * @param file the whole file; of a PLY {@link HEADER_BYTES} of its beginning are enough, and whether the rest is there is not looked at.
+ * @param file the whole file; of a PLY {@link HEADER_BYTES} of its beginning are enough, and it is not checked that the rest is there.
  * @returns undefined if it must be read whole
  * @throws GaussianSplatError as `readScene` does for what is wrong with a header
  */
@@ -36,7 +36,7 @@ export async function splatRanges(file: FileBytes, name: string): Promise<SplatR
 }
 
 /**
- * Reads some of the splats of a scene that {@link splatRanges} describes: what `readScene` makes of them, whatever the rest of the file may be.
+ * Reads some of the splats of a scene that {@link splatRanges} describes: what `readScene` makes of them, without regard to the rest of the file.
  *
  * @param file the whole file
  * @returns the splats in the order of the file. Those that cannot be drawn are left out, which may be all.

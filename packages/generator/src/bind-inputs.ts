@@ -21,7 +21,7 @@ import type { GeneratorState } from './state.js';
 
 /**
  * The values of a generator's inputs, in the conventions that its contract declares. Inputs with the roles `gaussians`,
- * `image` and `state` are left out: their tensors come from another generator, from a picture or from the run before.
+ * `image` and `state` are left out: their tensors come from another generator, from an image or from the run before.
  *
  * @param header of a file that keeps the contract (`checkContract` found nothing); of a model of several instances that of one (`oneInstance`).
  * @throws GaussianSplatError `argument/value` if the state lacks a camera, or a value has the wrong length or is not finite.

@@ -49,7 +49,7 @@ function dimsFor({ dims: sizes = [] }: OnnxTensor, dims: readonly number[]): num
   return sizes.map((size, i) => (typeof size === 'number' ? size : dims[before + i]));
 }
 
-/** What an input of the role `image` takes: planes, pictures, and sizes as far as the file fixes them. */
+/** What an input of the role `image` takes: planes, images, and sizes as far as the file fixes them. */
 export function pictureShapeOf({ dims = [], dtype }: OnnxTensor): {
   readonly width: number | undefined;
   readonly height: number | undefined;
@@ -65,9 +65,9 @@ export function pictureShapeOf({ dims = [], dtype }: OnnxTensor): {
 const missing = (input: OnnxTensor): GaussianSplatError =>
   new GaussianSplatError('argument/value', {
     where: `input ${input.name} (image)`,
-    expected: `a picture for ${describeTensor(input)}`,
+    expected: `an image for ${describeTensor(input)}`,
     found: 'none',
-    remedy: `give one: control-${input.name.toLowerCase()}="photo.jpg" on the element, or pictures in the state of the generator`,
+    remedy: `give one: control-${input.name.toLowerCase()}="photo.jpg" on the element, or images in the state of the generator`,
   });
 
 const misfit = ({ buffer, dtype, dims }: GpuTensor, input: OnnxTensor): GaussianSplatError =>
@@ -75,5 +75,5 @@ const misfit = ({ buffer, dtype, dims }: GpuTensor, input: OnnxTensor): Gaussian
     where: `input ${input.name} (image)`,
     expected: describeTensor(input),
     found: `${dtype} [${dims.join(', ')}] in a buffer of ${buffer.size} bytes`,
-    remedy: 'make the picture in the size and element type of the input',
+    remedy: 'make the image in the size and element type of the input',
   });

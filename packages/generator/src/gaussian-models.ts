@@ -13,7 +13,7 @@ export interface GaussianModel<S extends GaussianSink = GaussianSink> {
   readonly gaussians: S;
   /** State of this model alone, on top of what `runGenerators` is given. */
   state: GeneratorState;
-  /** Takes it out of the scene. The sink belongs to whoever made it. */
+  /** Takes it out of the scene. The sink belongs to its maker. */
   remove(): void;
 }
 
@@ -66,7 +66,7 @@ export class GaussianModels {
   /**
    * Puts a model into the scene. Models of one generator share its session.
    * @throws GaussianSplatError `argument/value` for a name that is not registered, or before {@link loadAllGenerators}; what `makeSink` throws;
-   * an `AbortError` if {@link clear} is called meanwhile: a sink that `makeSink` has made then stays with whoever made it.
+   * an `AbortError` if {@link clear} is called meanwhile: a sink that `makeSink` has made then stays with its maker.
    */
   async addGaussianModelToScene<S extends GaussianSink>(
     name: string,

@@ -29,7 +29,7 @@ export interface GeneratedFrame {
 
 export interface GeneratorOptions extends AcquireOptions {
   /**
-   * Bytes so far of all models and of the runtime, if that is not there yet, and of how many. Goes on after {@link Generator.open}, until the
+   * Bytes until now of all models and of the runtime, if that is not there yet, and of how many. Goes on after {@link Generator.open}, until the
    * runtime has come with the first run; warming up comes after that.
    */
   readonly onProgress?: AcquireOptions['onProgress'];
@@ -134,7 +134,7 @@ export class Generator {
 
   /**
    * Asks for the Gaussians of a state. Returns at once; a request that has not started yet is replaced, and a state whose inputs are
-   * those on show is not run at all.
+   * those shown is not run at all.
    * @throws GaussianSplatError `argument/value` if the state does not fit the contract.
    */
   request(state: GeneratorState): void {
@@ -156,7 +156,7 @@ export class Generator {
     else this.#runner.request({ state, inputs: inputs[0] });
   }
 
-  /** Ends it: a run on its way reaches nobody any more. */
+  /** Ends it: a run on its way has no effect any more. */
   close(): void {
     this.#runner.close();
     this.#chain.release(this.#runner.idle);
@@ -213,7 +213,7 @@ function requireGaussians({ header, layout }: GeneratorModel): void {
       code: 'contract/chain',
       where: header.name,
       expected: 'a model that writes Gaussians',
-      found: 'a post-processor, which writes a picture',
+      found: 'a post-processor, which writes an image',
       remedy: 'name it in the attribute postprocess, or open it with PostProcessor.open',
     },
   ]);

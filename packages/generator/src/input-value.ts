@@ -5,7 +5,7 @@ export interface InputNumbers {
   readonly data: Float32Array | Int32Array | BigInt64Array;
 }
 
-/** A tensor that is on the GPU already: a picture, or what another model wrote. */
+/** A tensor that is on the GPU already: an image, or what another model wrote. */
 export interface GpuTensor {
   /** Holds the elements without gaps, float16 two to a word; needs the usage COPY_SRC. */
   readonly buffer: GPUBuffer;

@@ -8,15 +8,15 @@ import type { GeneratorModel, ModelSource } from './runtime/open-model.js';
 import type { AcquireOptions } from './runtime/shared-sessions.js';
 import type { GeneratorState } from './state.js';
 
-/** The input that takes the picture. */
+/** The input that takes the image. */
 export type PictureInput = ReturnType<typeof pictureShapeOf> & { readonly name: string };
 
-/** A picture that a model has made, on the GPU: [1,3,H,W], planes of red, green and blue in 0..1. */
+/** An image that a model has made, on the GPU: [1,3,H,W], planes of red, green and blue in 0..1. */
 export type FinishedPicture = GpuTensor & { readonly dtype: 'float32' | 'float16' };
 
 export interface PostProcessorOptions extends AcquireOptions {
   /**
-   * Takes the finished picture, [1,3,H,W]. It must submit its work before it returns: afterwards the buffer is the runtime's again.
+   * Takes the finished image, [1,3,H,W]. It must submit its work before it returns: afterwards the buffer is the runtime's again.
    */
   readonly onPicture: (picture: FinishedPicture) => void;
   /** A run failed. The next request tries again. */
@@ -28,7 +28,7 @@ interface Wish {
 }
 
 /**
- * A model that makes a picture of a picture (a style, a denoiser), or several one after the other, from GPU buffer to GPU buffer.
+ * A model that makes an image of an image (a style, a denoiser), or several one after the other, from GPU buffer to GPU buffer.
  *
  * ```ts
  * const post = await PostProcessor.open({ url: 'style.onnx' }, device, { onPicture: paint });
@@ -36,7 +36,7 @@ interface Wish {
  * ```
  */
 export class PostProcessor {
-  /** The input that takes the picture. */
+  /** The input that takes the image. */
   readonly input: PictureInput;
   readonly #chain: Chain;
   readonly #options: PostProcessorOptions;
@@ -59,7 +59,7 @@ export class PostProcessor {
   /**
    * Fetches and checks it; not a byte of the runtime is fetched yet.
    * @throws ContractError, GaussianSplatError: see `openModel`; ContractError `contract/chain` for models that do not fit one another, or do
-   * not make a picture of one picture.
+   * not make an image of one image.
    */
   static async open(
     source: ModelSource | readonly ModelSource[],
@@ -91,7 +91,7 @@ export class PostProcessor {
     return this.#chain.kind;
   }
 
-  /** True from a request until the runtime is ready for the next: meanwhile the picture handed in must stay as it is. */
+  /** True from a request until the runtime is ready for the next: meanwhile the image handed in must stay as it is. */
   get isBusy(): boolean {
     return this.#loop.isBusy;
   }
@@ -107,10 +107,10 @@ export class PostProcessor {
   }
 
   /**
-   * Asks for the picture made of a picture. A request that has not started yet is replaced; one whose inputs are those of the last run
+   * Asks for the image made of an image. A request that has not started yet is replaced; one whose inputs are those of the last run
    * is not run.
    * @param picture for {@link input}; its `version` tells one content from another.
-   * @throws GaussianSplatError `argument/value` if the picture or the state does not fit the model.
+   * @throws GaussianSplatError `argument/value` if the image or the state does not fit the model.
    */
   request(picture: GpuTensor, state: GeneratorState = {}): void {
     if (this.#loop.isClosed) return;
@@ -118,7 +118,7 @@ export class PostProcessor {
     this.#loop.request({ inputs: this.#chain.bind({ ...state, pictures }) });
   }
 
-  /** Ends it: a run on its way reaches nobody any more. */
+  /** Ends it: a run on its way has no effect any more. */
   close(): void {
     this.#loop.close();
     this.#chain.release(this.#loop.idle);
@@ -144,7 +144,7 @@ function pictureInput(models: readonly GeneratorModel[]): PictureInput {
   const inputs = header.inputs.filter(({ name }) => contract.inputs[name].role === 'image');
   const faults = models
     .filter(({ layout }) => layout !== undefined)
-    .map((model) => unsuitable(model, 'a model that writes a picture', 'a model that writes Gaussians'));
+    .map((model) => unsuitable(model, 'a model that writes an image', 'a model that writes Gaussians'));
   const pictures = inputs.reduce((sum, input) => sum + pictureShapeOf(input).views, 0);
   if (pictures !== 1) faults.push(unsuitable(models[0], 'one input with the role image', `${pictures} pictures`));
   if (faults.length > 0) throw new ContractError(faults);
@@ -157,5 +157,5 @@ const unsuitable = ({ header }: GeneratorModel, expected: string, found: string)
   where: header.name,
   expected,
   found,
-  remedy: 'use a model that makes a picture of a picture; one that writes Gaussians is a src',
+  remedy: 'use a model that makes an image of an image; one that writes Gaussians is a src',
 });

@@ -111,7 +111,7 @@ export class DynamicGaussians implements GaussianScene {
     return withMemoryCheck(device, whatOf(layout), () => new DynamicGaussians(device, layout, options));
   }
 
-  /** Number of runs taken in so far, and one. */
+  /** Number of runs taken in until now, and one. */
   get version(): number {
     return this.#version;
   }

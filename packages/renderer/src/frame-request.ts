@@ -20,9 +20,9 @@ export interface FrameRequest extends Pick<Picture, 'filter' | 'notes' | 'timer'
   readonly targetFormat?: GPUTextureFormat;
   /** See {@link Picture.over}. */
   readonly background?: Rgba;
-  /** The levers of these names, for this frame alone. */
+  /** The settings of these names, for this frame alone. */
   readonly detail?: number;
   readonly splatBudget?: number;
-  /** Levers of this frame alone, for frames in motion. */
+  /** Settings of this frame alone, for frames in motion. */
   readonly levers?: Partial<FrameLevers>;
 }

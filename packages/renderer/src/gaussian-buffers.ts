@@ -61,7 +61,7 @@ export class GaussianBuffers implements GaussianScene {
   }
 
   /**
-   * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for, and so much at a time that the thread can do other things between.
+   * Copies packed Gaussians to the GPU, in as many pages as the device's limits ask for, and in portions that leave the thread time for other things.
    * @throws GaussianSplatError `out-of-memory/budget`, before anything is allocated, if the scene is larger than `memoryBudget` or than what the
    * device's {@link MemoryLedger} has left for all scenes; `out-of-memory/allocation` if the device has no room.
    */

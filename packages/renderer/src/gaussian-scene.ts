@@ -25,11 +25,11 @@ export type NotedPage = Readonly<Record<'view' | 'chunks' | 'details' | 'chunk_s
 /** Levers that say which pages a view asks for. */
 export type WishLevers = Pick<Levers, 'detail' | 'detailFade' | 'splatBudget'>;
 
-/** Carries the pages that a view asks for from a frame to whoever fetches them. Streamed scenes bring their own, so that no other page loads it. */
+/** Carries the pages that a view asks for from a frame to the code that fetches them. Streamed scenes bring their own, so that no other page loads it. */
 export interface Wishes {
   /** Binds a page of the pool, for {@link Wishes.note}. */
   bind(page: NotedPage): GPUBindGroup;
-  /** Called with the camera and the levers of each frame. True for one in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
+  /** Called with the camera and the settings of each frame. True for one in which to note them; then the other four are called in turn, `note` for each page of the pool, `read` after the submit. */
   isDue(camera: Camera, levers: WishLevers): boolean;
   begin(encoder: GPUCommandEncoder): void;
   note(pass: GPUComputePassEncoder, bindings: GPUBindGroup, splatCount: number): void;
@@ -53,7 +53,7 @@ export interface GaussianScene {
   /** World position, in float64, that the positions on the GPU are relative to. */
   readonly origin: Vector3;
   readonly pages: readonly GaussianPage[];
-  /** Of a scene that is streamed: where views say which pages they wish for. */
+  /** Of a scene that is streamed: where views record the pages that they need. */
   readonly wishes?: Wishes;
   /** Called before each frame: a streamed scene uploads what has come. */
   update?(): void;

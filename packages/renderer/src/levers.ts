@@ -3,7 +3,7 @@ import type { AccumulationFormat, RasterizerName } from './rasterizers/rasterize
 import type { Threads } from './stages/plan.js';
 
 /**
- * Everything that trades accuracy for speed, one lever each. docs/frontier has what each costs and saves.
+ * Everything that trades accuracy for speed, one setting each. docs/frontier has what each costs and saves.
  */
 export interface Levers {
   /**
@@ -24,7 +24,7 @@ export interface Levers {
    */
   readonly depthKeyBits: 16 | 24 | 32;
   /**
-   * Submissions that the painting of a frame is divided into, at least: the picture is the same, but none runs as long, which matters where drivers stop what takes
+   * Submissions that the painting of a frame is divided into, at least: the image is the same, but none runs as long, which matters where drivers stop what takes
    * them too long. Frames of tiles that may have much to do are divided further without being asked. 1 to 256.
    */
   readonly submissions: number;
@@ -67,7 +67,7 @@ const EXACT: Levers = {
   resolutionScale: 1,
 };
 
-/** A named mix of levers: see {@link QUALITIES}. */
+/** A named mix of settings: see {@link QUALITIES}. */
 export type Quality = 'reference' | 'default' | 'balanced' | 'fast';
 
 /**
@@ -94,7 +94,7 @@ export const QUALITIES: Readonly<Record<Quality, Levers>> = {
 };
 
 /**
- * The levers that frames may set otherwise than those before and behind them at no cost. The others decide what a viewpoint allocates.
+ * The settings that frames may set otherwise than those before and behind them at no cost. The others decide what a viewpoint allocates.
  */
 export type FrameLevers = Pick<Levers, 'depthKeyBits' | 'transmittanceMin' | 'shDegree' | 'detail' | 'resolutionScale'>;
 

@@ -9,7 +9,7 @@ export function bytesPerSplat(shDegree: ShDegree, shPrecision: ShPrecision): num
   return 4 * (GEOMETRY_WORDS + shWords(shDegree, shPrecision)) + (4 * CHUNK_NUMBERS) / constants.CULL_GROUP;
 }
 
-/** Bytes that somebody holds; given back once. */
+/** Bytes that one owner holds; given back once. */
 export interface Reservation {
   readonly label: string;
   readonly bytes: number;
@@ -17,13 +17,13 @@ export interface Reservation {
 }
 
 /**
- * What the scenes on a device hold, and how much they may. WebGPU tells nobody how much memory a GPU has: without a budget everything
+ * What the scenes on a device hold, and how much they may. WebGPU does not tell how much memory a GPU has: without a budget everything
  * is let through, and the device itself refuses.
  */
 export class MemoryLedger {
   /** Most bytes that all scenes of the device together may hold. */
   budgetBytes = Infinity;
-  /** Called one after the other where there is no room, before anybody is refused: by each, somebody gives back what will soon not be needed any more. */
+  /** Called one after the other where there is no room, before a request is refused: each may give back what will soon not be needed any more. */
   readonly spare = new Set<() => void>();
   readonly #held = new Set<Reservation>();
 
@@ -36,7 +36,7 @@ export class MemoryLedger {
     return ledger;
   }
 
-  /** What is held, by whom. */
+  /** What is held, by owner. */
   get entries(): readonly Pick<Reservation, 'label' | 'bytes'>[] {
     return [...this.#held].map(({ label, bytes }) => ({ label, bytes }));
   }
@@ -49,7 +49,7 @@ export class MemoryLedger {
 
   /**
    * Sets bytes aside before they are allocated: a device that runs out of memory may be lost, and the page with it.
-   * @param most bytes that this reservation may take, whatever is left; default no limit
+   * @param most bytes that this reservation may take, besides what is left; default no limit
    * @throws GaussianSplatError `out-of-memory/budget` if it is more than that, or more than the budget leaves.
    */
   reserve(label: string, bytes: number, most = Infinity): Reservation {

@@ -15,7 +15,7 @@ export interface TargetView {
   readonly format: GPUTextureFormat;
 }
 
-/** A target that has been looked at. */
+/** A target that has been checked. */
 export interface Target extends Surface {
   /** Where more is known of it than a view. */
   readonly texture?: GPUTexture | undefined;
@@ -44,7 +44,7 @@ export interface Picture {
   readonly over?: Rgba | 'target' | undefined;
   /** How colours are written: a {@link LinearColours} for targets of linear light. Default: encoded as sRGB, as scenes are trained. */
   readonly colours?: Composer | undefined;
-  /** Depth of what else is in the picture, and where to write that of the splats: a {@link SceneDepth}. */
+  /** Depth of what else is in the frame, and where to write that of the splats: a {@link SceneDepth}. */
   readonly depth?: PaintingDepth | undefined;
   /** Low-pass filter of all scenes of the frame. Default: the one that each was trained with, as far as its file tells. */
   readonly filter?: SplatFilter | undefined;
@@ -55,7 +55,7 @@ export interface Picture {
 }
 
 /**
- * How a frame is drawn: a quality, and single levers that differ from it. Give the same object for the same settings: what they take is remembered by the
+ * How a frame is drawn: a quality, and single settings that differ from it. Give the same object for the same settings: what they take is remembered by the
  * object. See {@link settings}.
  */
 export interface FrameSettings extends Partial<Levers> {
@@ -70,7 +70,7 @@ export interface FrameSettings extends Partial<Levers> {
  * const moving = settings('balanced', { resolutionScale: 0.7 });
  * viewpoint.draw(camera, picture, moving);
  * ```
- * @throws GaussianSplatError `argument/value` for an unknown quality or a value out of its lever's range.
+ * @throws GaussianSplatError `argument/value` for an unknown quality or a value out of its range.
  */
 export const settings = (quality: Quality = 'default', changes: Partial<Levers> = {}): FrameSettings =>
   Object.freeze(leversOf({ ...changes, quality }));

@@ -78,7 +78,8 @@ export function requirePicture({ target, over, colours }: Partial<Picture>, sett
 export function requireScenes(gaussians: unknown, levers: unknown): void {
   const scenes = Array.isArray(gaussians) ? (gaussians as readonly unknown[]) : [gaussians];
   if (!scenes.every(isObject)) throw missing('gaussians', 'a scene, or a list of scenes', gaussians);
-  if (levers !== undefined && !isObject(levers)) throw missing('settings', 'an object of levers, or undefined', levers);
+  if (levers !== undefined && !isObject(levers))
+    throw missing('settings', 'an object of settings, or undefined', levers);
 }
 
 const formatOf = (target: GPUTexture | { readonly format: GPUTextureFormat }): string => target.format;

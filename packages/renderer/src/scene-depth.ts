@@ -29,9 +29,9 @@ export interface HostDepth {
   readonly far?: number | undefined;
 }
 
-/** What a picture has to do with depth: at least one of the two. */
+/** What a frame has to do with depth: at least one of the two. */
 export interface SceneDepthOptions {
-  /** What else is in the picture: a pixel of splats ends there. */
+  /** What else is in the frame: a pixel of splats ends there. */
   readonly host?: HostDepth | undefined;
   /**
    * Receives the median depth of the splats: where half of the light is gone, in world units along the camera's axis; 0 where more passes. Of the target's size, format
@@ -43,7 +43,7 @@ export interface SceneDepthOptions {
 const FORMATS = /^(depth(32float|24plus|16unorm)(-stencil8)?|r32float)$/;
 
 /**
- * Depth in and out of a picture: give one object for the same textures, and it is bound once.
+ * Depth in and out of a frame: give one object for the same textures, and it is bound once.
  *
  * ```ts
  * const depth = new SceneDepth(device, { host: { texture: depthTexture } });
@@ -85,7 +85,7 @@ export class SceneDepth implements PaintingDepth {
     notes: FrameNotes | undefined,
   ): void {
     const host = this.#host;
-    if (notes) throw wrong('Picture.depth', 'no depth in a picture with notes', 'both');
+    if (notes) throw wrong('Picture.depth', 'no depth in a frame with auxiliary outputs', 'both');
     if (this.#outTexture) requireRoom(this.#outTexture, width, height, rasterizer);
     const scale = host ? [host.texture.width / width, host.texture.height / height] : [1, 1];
     writeStruct(layouts.SceneDepth, { ...readingOf(host, camera), scale }, this.#bytes);

@@ -75,7 +75,7 @@ interface Engine {
 }
 
 /**
- * Draws a world, on a device of yours.
+ * Draws a world, on your own device.
  *
  * ```ts
  * const world = new World();
@@ -138,7 +138,7 @@ export class Viewpoint {
     this.#useEngine(levers);
   }
 
-  /** The levers that {@link settings} come to on this device; nothing is left `auto`. */
+  /** The settings that {@link settings} come to on this device; nothing is left `auto`. */
   get levers(): Levers & Variants {
     return this.#leversOf(this.#settings);
   }
@@ -163,7 +163,7 @@ export class Viewpoint {
   /**
    * Makes what frames with other settings need, so that none of them has to. Their memory, next to nothing, comes with the next frame.
    * @param targetFormat format of the targets
-   * @throws GaussianSplatError `argument/value` for a lever out of range.
+   * @throws GaussianSplatError `argument/value` for a setting out of range.
    */
   prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
     const { rasterizer } = this.#engine;
@@ -201,7 +201,7 @@ export class Viewpoint {
   /**
    * Records one frame into a host's encoder, between its passes, and submits nothing. The host submits within the same task: what the viewpoint learns of a frame
    * (how much room it needs, which pages it asks for) it reads in the next one. Record a viewpoint once for each submission: its uniforms are those of
-   * the last frame that was recorded. `submissions` of the settings, and `timer` of the picture, are the host's.
+   * the last frame that was recorded. `submissions` of the settings, and `timer` of the frame, are the host's.
    * @throws GaussianSplatError as {@link draw} does.
    */
   record(encoder: GPUCommandEncoder, camera: Camera, picture: Picture, settings: FrameSettings = this.#settings): void {
@@ -326,7 +326,7 @@ export class Viewpoint {
    * @returns an answer for each point; none before the first frame.
    */
   async probe(points: readonly ProbePoint[]): Promise<ProbeAnswer[]> {
-    const { probe } = await loadModule('the code that looks into a picture', () => import('./depth-probe.js'));
+    const { probe } = await loadModule('the code that measures depth', () => import('./depth-probe.js'));
     if (this.#last === undefined || this.#last.scratch !== this.#engine.resources.current?.scratch) return [];
     const { scale, scratch } = this.#last;
     const { plan, splats, order } = scratch;
@@ -334,7 +334,7 @@ export class Viewpoint {
     return probe(this.#device, { plan, splats, order: order[0] }, drawn);
   }
 
-  /** Frees all GPU memory. Scenes are not touched: they belong to whoever uploaded them. */
+  /** Frees all GPU memory. Scenes are not touched: they belong to the caller that uploaded them. */
   destroy(): void {
     this.#destroyEngine();
     this.#memory.destroy();

@@ -148,7 +148,7 @@ export class World {
     return placement;
   }
 
-  /** Takes a scene out. Its memory stays: it belongs to whoever made it. */
+  /** Takes a scene out. Its memory stays: it belongs to its maker. */
   remove(placement: Placement): void {
     const left = this.#placements.filter((other) => other !== placement);
     if (left.length === this.#placements.length) return;

@@ -75,7 +75,7 @@ export class SplatRenderer {
   }
 
   /**
-   * Draws the splats alone over what a render target holds, for pipelines of one's own: `renderer.setRenderTarget(target)`, `renderer.render(scene, camera)`, then this. The target
+   * Draws the splats alone over what a render target holds, for your own pipelines: `renderer.setRenderTarget(target)`, `renderer.render(scene, camera)`, then this. The target
    * holds linear light, one sample a pixel, and has a `depthTexture`, or splats hide all meshes.
    * @throws GaussianSplatError `argument/value` for another target; `argument/camera` for a camera with a skewed projection.
    */

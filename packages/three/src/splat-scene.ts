@@ -19,7 +19,7 @@ export interface SplatSceneOptions {
  */
 export class SplatScene extends Object3D {
   readonly isSplatScene = true;
-  /** What is drawn. It belongs to whoever made it. */
+  /** What is drawn. It belongs to its maker. */
   gaussians: GaussianScene;
   opacity: number;
   crop: Box | undefined;

@@ -11,12 +11,12 @@ const RUNTIME_DOMAINS = ['com.microsoft', 'ai.onnx.ml'];
 export interface CheckFileOptions {
   /**
    * Sizes in bytes of the files beside the model that are at hand, by the location that the model writes. Leave it out where
-   * nobody has looked: missing files are then no fault.
+   * this was not checked: missing files are then no fault.
    */
   readonly files?: ReadonlyMap<string, number>;
 }
 
-/** What holds for a file whatever its contract says: versions, operators, external data. */
+/** What holds for a file with any contract: versions, operators, external data. */
 export function checkFile(header: OnnxHeader, { files }: CheckFileOptions): ContractFault[] {
   return [
     ...checkVersions(header),

@@ -6,7 +6,7 @@ export interface ContractFault {
   readonly code: ContractErrorCode;
   /** Name of the input or output in question; undefined if the fault is not about one. */
   readonly tensor?: string;
-  /** Place in the contract or in the file, for people. */
+  /** Place in the contract or in the file, for readers. */
   readonly where: string;
   readonly expected: string;
   readonly found: string;

@@ -10,7 +10,7 @@ export interface Contract {
   /** Address of the JSON Schema, for editors; not read. */
   readonly $schema?: string;
   readonly version: 1;
-  /** Name for people. */
+  /** Name for readers. */
   readonly name?: string;
   /** What each input of the ONNX file means, by its name. A file without inputs has none: `{}`. */
   readonly inputs: Readonly<Record<string, InputBinding>>;
@@ -92,7 +92,7 @@ export interface CameraToWorldInput {
 /** [3,3] float32, row-major: fx 0 cx, 0 fy cy, 0 0 1; or [4]: fx, fy, cx, cy. */
 export interface IntrinsicsInput {
   readonly role: 'intrinsics';
-  /** `normalized`: focal lengths and principal point as shares of the picture's width and height. */
+  /** `normalized`: focal lengths and principal point as shares of the image's width and height. */
   readonly unit: 'pixels' | 'normalized';
 }
 
@@ -115,7 +115,7 @@ export interface CameraPositionInput {
   readonly role: 'camera_position';
 }
 
-/** [2] float32: width and height of the picture in pixels. */
+/** [2] float32: width and height of the image in pixels. */
 export interface ViewportInput {
   readonly role: 'viewport';
 }
@@ -162,7 +162,7 @@ export interface ShapeInput {
   readonly default?: readonly number[];
 }
 
-/** Float32, int32 or int64 of any fixed shape: a control for people, named as the input is. */
+/** Float32, int32 or int64 of any fixed shape: a control for visitors, named as the input is. */
 export interface ControlInput {
   readonly role: 'control';
   /** Smallest and largest value of each element. */
@@ -171,7 +171,7 @@ export interface ControlInput {
   readonly default: number | readonly number[];
   /** Step between values. */
   readonly step?: number;
-  /** Name for people; default: that of the input. */
+  /** Name for readers; default: that of the input. */
   readonly label?: string;
 }
 
@@ -195,7 +195,7 @@ export interface GaussiansInput extends Activations {
 }
 
 /**
- * [1,3,H,W] float32 or float16: red, green and blue planes in 0..1, top row first. [1,4,H,W] has alpha, too; [V,3,H,W] are V pictures of one size, in the
+ * [1,3,H,W] float32 or float16: red, green and blue planes in 0..1, top row first. [1,4,H,W] has alpha, too; [V,3,H,W] are V images of one size, in the
  * order in which the page names them.
  */
 export interface ImageInput {

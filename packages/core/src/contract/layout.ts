@@ -50,7 +50,7 @@ export interface GaussianLayout {
 
 /**
  * Where each attribute of the Gaussians lies in the outputs of a file.
- * @returns undefined for a post-processor, which writes a picture.
+ * @returns undefined for a post-processor, which writes an image.
  * @throws ContractError if the file does not keep the contract.
  */
 export function gaussianLayout(header: OnnxHeader, contract: Contract): GaussianLayout | undefined {

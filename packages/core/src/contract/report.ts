@@ -5,7 +5,7 @@ import { tensorNames } from './parse-contract.js';
 import type { ResolvedContract } from './resolve-contract.js';
 import { findTensor } from './tensor-rules.js';
 
-/** A table for people: rows of cells, all rows of a section with the same number of cells. */
+/** A table for readers: rows of cells, all rows of a section with the same number of cells. */
 export interface ReportSection {
   readonly title: string;
   readonly rows: readonly (readonly string[])[];

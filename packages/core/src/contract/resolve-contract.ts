@@ -20,7 +20,7 @@ export interface ContractSources {
 export interface ResolvedContract {
   readonly contract: Contract;
   readonly source: ContractSource;
-  /** What was inferred, for a warning; empty where somebody wrote the contract. Sentences without a full stop. */
+  /** What was inferred, for a warning; empty where the contract was written. Sentences without a full stop. */
   readonly notes: readonly string[];
 }
 
@@ -42,7 +42,7 @@ export function resolveContract({ header, explicit, sidecar }: ContractSources):
   return { source: 'inferred', ...inferContract(header) };
 }
 
-/** True if the file says itself what it is: nobody need look for a contract beside it. */
+/** True if the file says itself what it is: no contract beside it is needed. */
 export const carriesContract = ({ metadata }: OnnxHeader): boolean => metadata.has(CONTRACT_METADATA_KEY);
 
 /** Name or address of a model's contract beside it: `NAME.contract.json` for `NAME.onnx`; a query stays where it is. */

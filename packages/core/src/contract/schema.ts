@@ -134,7 +134,7 @@ const input: Schema = {
     variant(
       'role',
       'control',
-      'Any fixed shape of float32, int32 or int64: a control for people',
+      'Any fixed shape of float32, int32 or int64: a control for visitors',
       {
         range: numbers('Smallest and largest value', 2),
         default: {
@@ -142,7 +142,7 @@ const input: Schema = {
           description: 'Value to begin with: one number for all elements, or a list of all of them',
         },
         step: positive('Step between values'),
-        label: text('Name for people'),
+        label: text('Name for readers'),
       },
       { required: ['range', 'default'] },
     ),
@@ -183,7 +183,7 @@ const input: Schema = {
     variant(
       'role',
       'image',
-      '[1,3,H,W] float32 or float16: red, green and blue planes in 0..1; [1,4,H,W] with alpha, [V,3,H,W] of V pictures',
+      '[1,3,H,W] float32 or float16: red, green and blue planes in 0..1; [1,4,H,W] with alpha, [V,3,H,W] of V images',
     ),
   ],
 };
@@ -274,7 +274,7 @@ export const CONTRACT_SCHEMA: Schema = {
   properties: {
     $schema: text('Address of this schema'),
     version: { const: 1, description: 'Version of the contract' },
-    name: text('Name for people'),
+    name: text('Name for readers'),
     inputs: {
       type: 'object',
       additionalProperties: input,

@@ -107,7 +107,7 @@ export interface OnnxHeader {
   readonly initializerBytes: number;
 }
 
-/** A tensor's type and shape for people: `float32 [N, 13]`. */
+/** A tensor's type and shape for readers: `float32 [N, 13]`. */
 export function describeTensor({ dtype, dims }: Pick<OnnxTensor, 'dtype' | 'dims'>): string {
   return `${dtype} ${dims ? `[${dims.map((dim) => dim ?? '?').join(', ')}]` : 'of unknown shape'}`;
 }

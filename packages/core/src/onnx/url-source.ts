@@ -16,9 +16,9 @@ export interface UrlSourceOptions {
 
 /** A file on a server. */
 export interface UrlSource extends ByteSource {
-  /** Requests made so far. */
+  /** Requests made until now. */
   readonly requests: number;
-  /** Bytes of bodies received so far. */
+  /** Bytes of bodies received until now. */
   readonly bytesReceived: number;
   /** The whole file, where the server sent it whole: it need not be fetched again. */
   readonly whole: Uint8Array | undefined;

@@ -108,7 +108,7 @@ export function gpuFindings(header: OnnxHeader): GpuFinding[] {
   return [...found, ...ofCopies(header, values)];
 }
 
-/** The findings for people: sentences without a full stop. */
+/** The findings for readers: sentences without a full stop. */
 export function gpuNotes(header: OnnxHeader): string[] {
   const notes = gpuFindings(header).map(({ kind, operator, tensor, reason, remedy }) => {
     const what = ['file', 'shape', 'type'].includes(operator) ? '' : `${operator} (${tensor}): `;

@@ -38,7 +38,7 @@ const STAGES = [
 const VIEWS_AT_ONCE = 32;
 
 /**
- * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and of its pictures only their errors come back. It takes 256 bytes of GPU memory a splat of
+ * Scores and compares on the GPU. The scene is uploaded and packed once; a cut is applied to a copy there, and of its images only their errors come back. It takes 256 bytes of GPU memory a splat of
  * degree 3 for the scene and its copy, 872 for scores and colours, and 16 for each pixel of the views that errors are measured in.
  */
 export class GpuEvaluator implements Evaluator {
@@ -118,7 +118,7 @@ export class GpuEvaluator implements Evaluator {
   }
 
   /**
-   * [N] what the splats had of a scored view, one of the last that were looked at together: the sum of the squares of their weights over the pixels of its picture, as far as
+   * [N] what the splats had of a scored view, one of the last that were drawn together: the sum of the squares of their weights over the pixels of its image, as far as
    * peak and size tell.
    */
   async energiesIn(view: number): Promise<Float32Array> {

@@ -7,9 +7,9 @@ import { applyMerges } from './apply-merges.js';
 import { findMerges, type Merges } from './find-merges.js';
 
 export interface MergingOptions {
-  /** Views that pairs are looked at in: those that splats are scored in. */
+  /** Views that pairs are judged in: those that splats are scored in. */
   readonly views: readonly Camera[];
-  /** Merges are found until they are estimated to cost so much, mean squared error of the images: that of the figure that is asked for. */
+  /** Merges are found up to this estimated cost: the mean squared error of the images that the wanted figure allows. */
   readonly mostError: number;
   /** Finds them in parts; default {@link inline}. */
   readonly pool?: TaskPool;
@@ -19,7 +19,7 @@ export interface MergingOptions {
 const MERGED_SHARES = [0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.14, 0.19, 0.25, 0.32, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 
 /**
- * An evaluator whose cuts merge splats, too, besides what another one does. Merges are found and made in plain code, found in threads where there are; what they cost is measured on pictures by the other, which draws the cloud that they
+ * An evaluator whose cuts merge splats, too, besides what another one does. Merges are found and made in plain code, found in threads where there are; what they cost is measured on images by the other, which draws the cloud that they
  * leave.
  */
 export class MergingEvaluator implements Evaluator {

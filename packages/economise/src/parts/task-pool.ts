@@ -10,9 +10,9 @@ export type TaskResult<Name extends TaskName> = Awaited<ReturnType<Tasks[Name]>>
 export interface TaskPool {
   /** How many parts are done at the same time. */
   readonly size: number;
-  /** Work on fewer splats is done sooner by whoever has it than here. */
+  /** Work on fewer splats is done sooner by the thread that has it than here. */
   readonly leastSplats: number;
-  /** Memory that tasks share with whoever asks for them. */
+  /** Memory that tasks share with the thread that asks for them. */
   allocate(byteLength: number): ArrayBufferLike;
   /** True if tasks see this memory as it is, and write to it. */
   shares(memory: ArrayBufferLike): boolean;

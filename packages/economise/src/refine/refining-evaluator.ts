@@ -11,20 +11,20 @@ import { SceneFitter, USUAL_DESCENT, type Descent } from './scene-fitter.js';
 import { LEFT_BY_REFINING } from './search-refined.js';
 
 export interface RefiningOptions {
-  /** Draws the pictures that splats are fitted to, and goes over them backwards. */
+  /** Draws the images that splats are fitted to, and goes over them backwards. */
   readonly device: GPUDevice;
-  /** Views of these pictures: those that splats are scored in. None of them may be searched or held out. */
+  /** Views of these images: those that splats are scored in. None of them may be searched or held out. */
   readonly views: readonly Camera[];
   /** How splats are fitted; what is left out is as usual. */
   readonly descent?: Partial<Descent>;
 }
 
 /**
- * An evaluator whose cuts can be refined, besides what another one does: the splats that stay are fitted to pictures of the whole scene, by gradient descent through the rasterizer. The pictures stay on the
+ * An evaluator whose cuts can be refined, besides what another one does: the splats that stay are fitted to images of the whole scene, by gradient descent through the rasterizer. The images stay on the
  * GPU: 16 bytes for each pixel of the views. A splat takes 1.2 kB there at degree 3 while it is fitted.
  */
 export class RefiningEvaluator implements Evaluator {
-  /** Part of the error of drops and merges that is taken to be left by refining: merges must be found up to so much more (`MergingOptions.mostError`). */
+  /** Part of the error of drops and merges that is taken to be left by refining: merges must be found up to this much more (`MergingOptions.mostError`). */
   static readonly leftByRefining = LEFT_BY_REFINING;
   readonly #inner: Evaluator;
   readonly #cloud: GaussianCloud;

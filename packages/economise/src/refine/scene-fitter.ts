@@ -56,7 +56,7 @@ export interface Descent {
   /** What is left of Adam's means of derivatives and of their squares from step to step. */
   readonly keepMean: number;
   readonly keepSquare: number;
-  /** Derivatives far below this move little: of the squared error of a picture, over all its pixels. */
+  /** Derivatives far below this move little: of the squared error of an image, over all its pixels. */
   readonly least: number;
   /**
    * Part of Newton's step, along one number alone and by the largest curvature in a view, beyond which none goes. Adam's steps are as long where derivatives are small: of a splat

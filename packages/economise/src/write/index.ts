@@ -13,14 +13,14 @@ export type WrittenCloud = Pick<ReducedCloud, 'cloud' | 'degrees'>;
 
 /** A way to write a scene: how precise, and how. */
 export interface Encoding {
-  /** For people. */
+  /** For readers. */
   readonly title: string;
   /** @param pool does what can be done in parts; the file then lies in its memory */
   readonly write: (reduced: WrittenCloud, pool?: TaskPool) => Uint8Array | Promise<Uint8Array>;
   /** True if every splat takes as many coefficients as the one with the most: fewer bands of some save nothing. */
   readonly hasOneDegree?: boolean;
   /**
-   * Chooses how precise it is: such that the rounding of a scene is at most so much.
+   * Chooses how precise it is: such that the rounding of a scene is at most this.
    * @param measure says how much it is, a mean squared error
    */
   readonly tune?: (whole: WrittenCloud, measure: Measure, target: number) => Promise<Encoding>;
@@ -59,7 +59,7 @@ const ENCODINGS: ReadonlyMap<string, readonly Encoding[]> = new Map([
  * The ways to write a file of this name.
  * @param cloud what is to be written, as far as it is known
  * @param encoders what `.sog` is written with
- * @throws GaussianSplatError `argument/value` for a name whose extension is none of ours, for a scene trained with antialiasing where the format cannot say so, and for one
+ * @throws GaussianSplatError `argument/value` for a name with an unknown extension, for a scene trained with antialiasing where the format cannot say so, and for one
  * that lies farther from (0, 0, 0) than the format has digits.
  */
 export function encodingsFor(

@@ -14,7 +14,7 @@ export class CameraOrbit {
   readonly phi: number;
   /** Distance to the target in metres (world units). */
   readonly radius: number;
-  /** The distance that frames the scene in this shape of the picture: `100%` of `camera-orbit`. */
+  /** The distance that frames the scene in this shape of the element: `100%` of `camera-orbit`. */
   readonly framingRadius: number;
 
   /** A value for `camera-orbit`. Radians and metres, since only they survive the way there and back unrounded. */

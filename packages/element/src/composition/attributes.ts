@@ -12,64 +12,89 @@ const PLACED = {
   /**
    * As of `<img>`: `use-credentials` sends cookies to other origins.
    * @default that of the `<gaussian-splat>`
+   * @example crossorigin="use-credentials"
    */
   crossorigin: bareKeyword(['anonymous', 'use-credentials']),
   /**
-   * Where its origin is: x y z in metres of viewer space (y up, right-handed), or with `m`, `cm`, `mm`. The property takes `[x, y, z]`, too.
+   * Where its origin is: x y z in metres of viewer space (y up, right-handed), or with `m`, `cm`, `mm`. The property takes `[x, y, z]` as well.
    * @default `0 0 0`
+   * @example position="1m 0 -2m"
    */
   position: read<readonly [number, number, number], string | readonly number[] | null>(pointGrammar),
   /**
-   * Angles about the x, y and z axes of viewer space with `deg` or `rad`: z is applied first, then x, then y. As a property `[x, y, z]` in radians, too.
+   * Angles about the x, y and z axes of viewer space, with `deg` or `rad`. z is applied first, then x, then y. The property takes `[x, y, z]` in radians
+   * as well.
    * @default `0 0 0`
+   * @example rotation="0 90deg 0"
    */
   rotation: read<readonly [number, number, number], string | readonly number[] | null>(anglesGrammar),
   /**
-   * A factor, or one for each axis.
+   * One factor, or one for each axis.
    * @default `1`
+   * @example scale="0.5"
    */
   scale: read<readonly [number, number, number], string | number | readonly number[] | null>(scaleGrammar),
-  /** Plays by itself, on a clock of its own, as soon as it is shown; not for visitors who want less motion; visitors can stop it. */
+  /**
+   * Plays by itself, on its own clock, as soon as it is shown. It does not start for visitors who ask for less motion. A button stops it.
+   * @example autoplay
+   */
   autoplay: flag(),
-  /** Starts again at the end, on a clock of its own. */
+  /**
+   * Starts again at the end, on its own clock.
+   * @example loop
+   */
   loop: flag(),
 };
 
 export const SCENE_ATTRIBUTES = {
-  /** URL of the scene: a file, a sequence, a streamed folder, or a generator. The property takes a `File` or `Blob` as well. */
+  /**
+   * URL of the scene: a file, a sequence, a streamed folder, or a generator. The property takes a `File` or `Blob` as well.
+   * @example src="plant.spz"
+   */
   src: text<string | Blob | null>(),
   ...PLACED,
   /**
-   * What points up in the scene's own frame, as of `<gaussian-splat>`: it is turned to the y axis before it is placed.
+   * What points up in the axes of the file, as of `<gaussian-splat>`. The scene is turned by it before it is placed.
    * @default what the scene says, else `-y`
+   * @example up="y"
    */
   up: read(upGrammar),
   /**
    * Factor of the opacity of its splats, 0 to 1.
    * @default `1`
+   * @example opacity="0.5"
    */
   opacity: read<number, string | number | null>(opacityGrammar),
   /**
-   * Shows only the splats whose centres lie in a box: x y z of its least corner, x y z of its greatest, in metres of the scene's own frame, as the file has it.
+   * Shows only the splats whose centres lie in a box: x y z of its least corner, then of its greatest, in metres and in the axes of the file.
    * @default all of them
+   * @example crop="-1 -1 -1 1 1 1"
    */
   crop: read<readonly number[] | undefined, string | readonly number[] | null>(boxGrammar),
   /**
-   * Contract of a generator: a URL, its JSON, or as a property the object.
+   * Contract of a generator: a URL or its JSON. The property takes the object as well.
    * @default in the model or beside it
+   * @example contract="walker.contract.json"
    */
   contract: text<string | object | null>(),
-  /** URLs, with spaces between them, of generators that each take the Gaussians of the one before. */
+  /**
+   * URLs of generators, with spaces between them. Each takes the Gaussians of the one before.
+   * @example chain="relight.onnx"
+   */
   chain: text(),
   /**
    * Pose of a generator, flattened or nested.
    * @default the rest pose
+   * @example pose="0 0.3 0"
    */
   pose: text<Numbers | null>(),
 };
 
 export const MESH_ATTRIBUTES = {
-  /** URL of a glTF or GLB file. The property takes a `File` or `Blob` as well. */
+  /**
+   * URL of a glTF or GLB file. The property takes a `File` or `Blob` as well.
+   * @example src="chair.glb"
+   */
   src: text<string | Blob | null>(),
   ...PLACED,
 };

@@ -20,7 +20,7 @@ export async function buildLevels(
   const packed = await readPacked(device, gaussians, () => {
     signal.throwIfAborted();
     // A sequence frees them when it puts others in their place.
-    if (scene.gaussians !== gaussians) throw new Error('other splats are on show');
+    if (scene.gaussians !== gaussians) throw new Error('other splats are shown');
   });
   signal.throwIfAborted();
   // Its arrays are the worker's afterwards. The page's own thread would stand still for seconds.

@@ -14,7 +14,7 @@ const MOST_TRIES = 4;
 /** Counts of the last frame of a viewport, and of a view. Reads back from the GPU: for panels, not for frames. */
 export async function readCounts(viewport: Viewport, camera: Camera): Promise<ReadCounts> {
   const { visible, overflow } = await viewport.viewpoint.statistics();
-  if (viewport.isDestroyed) throw new Error('the picture is gone');
+  if (viewport.isDestroyed) throw new Error('the frame is gone');
   return { drawn: visible, left: overflow, contributed: await countContributing(viewport, camera) };
 }
 

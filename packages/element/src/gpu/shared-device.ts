@@ -7,7 +7,7 @@ const ANSWER_MS = 20_000;
 /** A share in the page's GPU device. */
 export interface DeviceLease {
   readonly device: GPUDevice;
-  /** Fulfils when the device is lost, for whatever reason other than its last lease having been released. */
+  /** Fulfils when the device is lost, for any reason other than its last lease having been released. */
   readonly lost: Promise<GPUDeviceLostInfo>;
   /** True once the device is lost. */
   readonly isLost: boolean;

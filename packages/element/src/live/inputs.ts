@@ -1,7 +1,7 @@
 import type { InputBinding } from '@gaussian-splat/core';
 import type { GeneratorModel } from '@gaussian-splat/generator';
 
-/** What a page may set of a model, from its contract: enough to make controls for people. */
+/** What a page may set of a model, from its contract: enough to make controls for visitors. */
 export interface GeneratorInput {
   /** As in `controls` and `control-NAME`. */
   readonly name: string;
@@ -10,7 +10,7 @@ export interface GeneratorInput {
    * element itself.
    */
   readonly role: Exclude<InputBinding['role'], 'gaussians' | 'state'>;
-  /** For people. */
+  /** For readers. */
   readonly label: string;
   /** Numbers that it takes; of an image 0. */
   readonly size: number;
@@ -27,7 +27,7 @@ export interface GeneratorInput {
   readonly parents?: readonly number[];
   /** Of the coefficients of a shape. */
   readonly names?: readonly string[];
-  /** Pictures that an image takes, in one tensor. */
+  /** Images that an image takes, in one tensor. */
   readonly views?: number;
 }
 

@@ -121,7 +121,7 @@ function listed(name: string, source: Pictures, views: number): readonly Picture
   if (list.length === views) return list;
   throw new GaussianSplatError('argument/value', {
     where: `control ${name}`,
-    expected: `${views} picture${views > 1 ? 's' : ''}`,
+    expected: `${views} image${views > 1 ? 's' : ''}`,
     found: `${list.length}`,
     remedy: views > 1 ? 'name all of them, with spaces between their addresses, or as a list' : 'name one',
   });
@@ -155,7 +155,7 @@ async function pixelsOf(
 }
 
 async function fetchPicture(url: string, options: LivePicturesOptions): Promise<Blob> {
-  const response = await fetchBeside(url, options, 'the picture that the control names', 'check the address');
+  const response = await fetchBeside(url, options, 'the image that the control names', 'check the address');
   return response.blob();
 }
 
@@ -169,7 +169,7 @@ function ownSize(pixels: GPUCopyExternalImageSource): { width: number; height: n
 const unreadable = (name: string, found: string, cause: unknown): GaussianSplatError =>
   new GaussianSplatError('decode/unknown-format', {
     where: `control ${name}`,
-    expected: 'a picture that this browser reads',
+    expected: 'an image that this browser reads',
     found: `${found.slice(0, 200)} (${(cause as Error)?.message ?? 'unknown cause'})`,
     remedy: 'use PNG, JPEG or WebP',
     cause,

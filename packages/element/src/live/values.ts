@@ -1,6 +1,6 @@
 /** Values that attributes write as text and properties hold as numbers: poses and controls. */
 
-/** Numbers in any shape that people write them: a number, a list, lists of lists, a typed array, or any of these as text. */
+/** Numbers in any shape that authors write them: a number, a list, lists of lists, a typed array, or any of these as text. */
 export type Numbers = string | number | ArrayLike<number> | readonly (ArrayLike<number> | number)[];
 
 /**
@@ -36,13 +36,13 @@ function flatten(value: unknown): number[] {
 /** Prefix of the attributes that hold controls: `control-smile="0.5"`. */
 export const CONTROL_PREFIX = 'control-';
 
-/** A picture for a model: its URL, or what holds its pixels. */
+/** An image for a model: its URL, or what holds its pixels. */
 export type Picture = string | Blob | GPUCopyExternalImageSource;
 
 /** Of an input that takes several, a list, or addresses with spaces between them. */
 export type Pictures = Picture | readonly Picture[];
 
-/** Controls as a page gives them, by the names of the model's inputs: numbers, and pictures for inputs that take some. */
+/** Controls as a page gives them, by the names of the model's inputs: numbers, and images for inputs that take some. */
 export type ControlValues = Readonly<Record<string, Numbers | Pictures>>;
 
 /** Controls, sorted by what they hold. */

@@ -26,7 +26,7 @@ export interface FileRequest {
   readonly coded?: CodedFile | undefined;
 }
 
-/** What loads of a page may cost, and whom they may ask: see `GaussianSplatElement.sceneLimits`. */
+/** What loads of a page may cost, and which servers they may ask: see `GaussianSplatElement.sceneLimits`. */
 export interface SceneLimits extends LoadLimits {
   /** Origins of other servers that manifests may name files on, such as `https://cdn.example`; they get no cookies. Default: none but the manifest's own. */
   readonly origins?: readonly string[];

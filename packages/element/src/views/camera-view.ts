@@ -39,7 +39,7 @@ export interface LookView {
   readonly lookAt: readonly number[];
   /** Whose numbers these are. Default: `viewer`, the space of `camera-target`. The viewer of SuperSplat turns every scene by half a turn around z. */
   readonly space?: 'viewer' | 'supersplat';
-  /** Degrees, along the longer side of the picture; without it the field of view stays. */
+  /** Degrees, along the longer side of the image; without it the field of view stays. */
   readonly fov?: number;
 }
 

@@ -1,7 +1,7 @@
 /** Lists of views: a page's own, a trainer's `cameras.json`, and the settings of SuperSplat's viewer. */
 import { fail, type CameraView } from './camera-view.js';
 
-/** A view that people can choose. */
+/** A view that visitors can choose. */
 export interface NamedView {
   readonly name: string;
   readonly view: CameraView;

@@ -24,7 +24,7 @@ export interface PathOptions {
   readonly duration?: number;
   /** Default `linear`. */
   readonly easing?: Easing;
-  /** Begins again at the end, until somebody takes the camera. */
+  /** Begins again at the end, until a visitor takes the camera. */
   readonly loop?: boolean;
 }
 

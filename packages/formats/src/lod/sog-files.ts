@@ -8,7 +8,7 @@ import { readSogPart } from '../sog/read-part.js';
 import type { SogAddress, SogRun } from './boxes.js';
 import { Gate } from './gate.js';
 
-/** Brings a file, or rejects; aborted when nobody waits for it any more. */
+/** Brings a file, or rejects; aborted when no caller waits for it any more. */
 export type FetchBytes = (url: string, signal: AbortSignal) => Promise<Uint8Array>;
 
 /** Bytes of decoded splats that are kept; the last file is, however large. */
@@ -25,7 +25,7 @@ interface Reading {
 
 /**
  * Runs of splats out of the SOG files of streamed scenes. A file holds many runs: those that are asked for while it is read share one reading, and the files read last
- * are kept, in so many bytes.
+ * are kept, up to this number of bytes.
  */
 export class SogFiles {
   readonly #keptBytes: number;

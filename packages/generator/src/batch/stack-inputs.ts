@@ -31,7 +31,7 @@ export function groupInstances<T extends { readonly inputs: Inputs }>(
  * Inputs of several instances as those of one run.
  * @param instances values as `bindInputs` makes them, at least one set of them, with the same shared inputs.
  * @param varying names of the inputs that get a row for each instance; all others are taken from the first.
- * @param count rows to make: where it is more than there are instances, the last one is repeated, and what it writes is nobody's.
+ * @param count rows to make: where it is more than there are instances, the last one is repeated, and what it writes is not used.
  */
 export function stackInputs(
   instances: readonly Inputs[],

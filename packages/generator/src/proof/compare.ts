@@ -31,7 +31,7 @@ export const isDifferent = ({ share }: Comparison): boolean => share > ALLOWED_S
 /**
  * Compares pieces of what a run wrote with what it should have written, attribute by attribute: a covariance is small beside a centre, and must
  * be right, too.
- * @param attributes where Gaussians lie in the outputs; none for a picture.
+ * @param attributes where Gaussians lie in the outputs; none for an image.
  * @returns the attribute that is worst.
  */
 export function compareParts(parts: readonly ComparedPart[], attributes: readonly AttributeSlice[] = []): Comparison {

@@ -6,7 +6,7 @@ export interface Verdict {
   readonly result: 'same' | 'different' | 'unknown';
   /** Largest difference, as a share of the largest value of what differs most; absent where nothing was compared. */
   readonly error?: number;
-  /** For people, without a full stop. */
+  /** For readers, without a full stop. */
   readonly reason: string;
 }
 

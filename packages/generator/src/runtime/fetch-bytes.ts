@@ -6,7 +6,7 @@ export interface FetchOptions {
   /** Which cookies are sent; default `same-origin`. */
   readonly credentials?: RequestCredentials;
   readonly signal?: AbortSignal;
-  /** Bytes so far, and the number of all of them where the server tells, or it is expected. */
+  /** Bytes until now, and the number of all of them where the server tells, or it is expected. */
   readonly onProgress?: ProgressListener;
   /** Length of the file as far as it is known, in bytes: servers that compress do not tell it. */
   readonly expected?: number;

@@ -89,7 +89,7 @@ export class GeneratorSession {
   }
 
   /**
-   * Another session of the same model, for runs of exactly so many instances.
+   * Another session of the same model, for runs of exactly this number of instances.
    * @throws GaussianSplatError `out-of-memory/buffer-limit`, as the constructor.
    */
   forInstances(count: number): GeneratorSession {

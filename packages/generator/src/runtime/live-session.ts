@@ -23,7 +23,7 @@ export interface RunOutputs {
   readonly tensors: Readonly<Record<string, GPUBuffer>>;
   /** Shapes of this run, by the same names. */
   readonly dims: Readonly<Record<string, readonly number[]>>;
-  /** Rows of Gaussians that this run wrote, of one instance; 1 for a picture. */
+  /** Rows of Gaussians that this run wrote, of one instance; 1 for an image. */
   readonly rows: number;
 }
 

@@ -36,7 +36,7 @@ export interface GeneratorModel {
   readonly url: string;
   readonly header: OnnxHeader;
   readonly contract: Contract;
-  /** Undefined for a post-processor, which writes a picture. */
+  /** Undefined for a post-processor, which writes an image. */
   readonly layout: GaussianLayout | undefined;
   /** All outputs that the contract names, each once. */
   readonly outputs: readonly ModelOutput[];

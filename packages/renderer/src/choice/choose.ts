@@ -8,7 +8,7 @@ import type { RendererOptions } from '../frame-request.js';
 import { Renderer } from '../renderer.js';
 
 /**
- * A renderer whose `auto` levers have been decided on this device: variants that give a wrong image are ruled out by a known answer, the
+ * A renderer whose `auto` settings have been decided on this device: variants that give a wrong image are ruled out by a self-test, the
  * others are timed (see {@link chooseVariants}). The constructor decides by what has been chosen on the device before, or else takes
  * `quads`, `rgba16float` and `parallel`, which work everywhere.
  */
@@ -22,7 +22,7 @@ export interface ChoiceOptions {
   readonly store?: ChoiceStore | null;
   /** Awaited before each piece of the work, for pages that have something better to do at times. */
   readonly pause?: () => Promise<void>;
-  /** Of the pictures to come: what they need is made at the same time. */
+  /** Of the frames to come: what they need is made at the same time. */
   readonly format?: GPUTextureFormat;
 }
 
@@ -47,8 +47,8 @@ const SMALL: Trial = { splats: 4_000, width: 320, height: 180 };
 const QUICK_MS = 8;
 
 /**
- * Finds variants with which a first picture can be drawn soon, once for each device: those that an earlier visit chose; else what is likely to suit a
- * GPU, if it gives the known answer and is quick enough; else what {@link chooseVariants} takes seconds to find, which a page with a likely one
+ * Finds variants with which a first frame can be drawn soon, once for each device: those that an earlier visit chose; else what is likely to suit a
+ * GPU, if it passes the self-test and is quick enough; else what {@link chooseVariants} takes seconds to find, which a page with a likely one
  * may ask for later, when it is at rest.
  * @throws GaussianSplatError as {@link chooseVariants}
  */
@@ -74,10 +74,10 @@ async function isGoodStart(device: GPUDevice, quickMs: number, format?: GPUTextu
 }
 
 /**
- * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a known answer are out, the
+ * Finds the fastest variants that draw the right image on a device, once for each device: those that fail a self-test are out, the
  * others are timed on small scenes. Takes about a second the first time on an adapter, most of it to compile what is not chosen in the end; then the choice is kept in `store`, and
  * only its answer is checked again. What it took is in the performance timeline, as `gaussian-splat.search`; of that, `detail.paused` milliseconds were pauses.
- * @throws GaussianSplatError `unsupported/wrong-image` if no variant gives the known answer.
+ * @throws GaussianSplatError `unsupported/wrong-image` if no variant passes the self-test.
  */
 export function chooseVariants(device: GPUDevice, options: ChoiceOptions = {}): Promise<Variants> {
   return (choiceOf(device).chosen ??= choose(device, options));

@@ -83,8 +83,8 @@ export function wrongImage({ adapterInfo }: GPUDevice): GaussianSplatError {
   const { vendor = '', architecture = '', description = '' } = adapterInfo ?? {};
   return new GaussianSplatError('unsupported/wrong-image', {
     where: `the graphics adapter ${[vendor, architecture, description].filter(Boolean).join(' ') || '(unnamed)'}`,
-    expected: 'the known picture of 64 spheres',
-    found: 'another picture from every variant of the renderer',
+    expected: 'the image of the self-test',
+    found: 'another image from every variant of the renderer',
     remedy: 'update the browser and the graphics driver, and report it with this message',
   });
 }

@@ -9,8 +9,8 @@ import { DETAIL_NUMBERS } from './chunk-detail.js';
 import type { PackedLevels } from './packed-levels.js';
 
 /**
- * A scene on the GPU to which levels of detail have been added: its own splats, where they are, and the coarser ones beside them. With the lever `detail` at 0 the
- * picture is that of the scene, byte for byte.
+ * A scene on the GPU to which levels of detail have been added: its own splats, where they are, and the coarser ones beside them. With the setting `detail` at 0 the
+ * image is that of the scene, byte for byte.
  */
 export class DetailedGaussians implements GaussianScene {
   /** Splats of all levels together. */

@@ -28,17 +28,17 @@ export interface PoolOptions {
   readonly signal?: AbortSignal;
   /** Called when another frame is asked for: a page has come, or what the last view lacks is not known yet. */
   readonly onChange?: () => void;
-  /** Called when a page does not come; what is above it stays on show. It is asked for again after 4 s, after further failures twice as long each, up to 256 s. */
+  /** Called when a page does not come; what is above it stays visible. It is asked for again after 4 s, after further failures twice as long each, up to 256 s. */
   readonly onError?: (error: unknown) => void;
 }
 
 export interface StreamOptions extends PoolOptions {
   /**
-   * Fetches a file of pages, named relative to the manifest; 64 at a time at most. Aborted when no view wishes for any of them any more, and when the scene is destroyed. Best done in a
+   * Fetches a file of pages, named relative to the manifest; 64 at a time at most. Aborted when no view needs any of them any more, and when the scene is destroyed. Best done in a
    * worker: reading a response costs a thread more than all else that a page needs.
    */
   readonly fetchPage: FetchPage;
-  /** Whether {@link fetchPage} decodes the files of a manifest that has a `coding`, by `decodePage` and what it is told of them. Default: they are decoded here. */
+  /** Whether {@link fetchPage} decodes the files of a manifest that has a `coding`, by `decodePage` and what it receives of them. Default: they are decoded here. */
   readonly isDecoded?: boolean;
 }
 
@@ -71,9 +71,9 @@ function requireTime(arrivalMs: number): void {
 
 /**
  * A scene of any size from static hosting, of which only those pages are on the GPU that the view asks for. The coarsest page is always
- * there; whatever is missing, what stands for it is drawn.
+ * there; for a page that is missing, its coarser parent is drawn.
  *
- * Draw it with the lever `detail` above 0 or a `splatBudget`: without, every view asks for the finest pages.
+ * Draw it with the setting `detail` above 0 or a `splatBudget`: without, every view asks for the finest pages.
  */
 export class StreamedGaussians implements GaussianScene {
   /** Splats for which there is room. */
@@ -88,7 +88,7 @@ export class StreamedGaussians implements GaussianScene {
   readonly origin: Vector3;
   readonly bounds: Bounds;
   readonly pages: readonly GaussianPage[];
-  /** Wishes of the views: for the renderer. */
+  /** Page requests of the views: for the renderer. */
   readonly wishes: WishReader;
   readonly #source: PageSource;
   readonly #options: PoolOptions;

@@ -26,7 +26,7 @@ const QUERY_RESOLVE = 0x200;
 
 /**
  * Timestamps around the passes of many frames, read back together afterwards so that measuring never waits between
- * frames. Browsers round timestamps to 100 µs unless told otherwise.
+ * frames. Browsers round timestamps to 100 µs unless a flag says otherwise.
  */
 export class PassTimer implements FrameTimer {
   readonly #device: GPUDevice;

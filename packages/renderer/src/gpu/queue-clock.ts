@@ -59,7 +59,7 @@ export class QueueClock {
     this.#latency = Math.min(...times);
   }
 
-  /** Waits until all that was submitted is done. @returns when the page was told, and when of what was done before */
+  /** Waits until all that was submitted is done. @returns when the page was notified, and when of what was done before */
   async done(): Promise<Told & { readonly before: Told }> {
     const told = await threadWatch.during(this.#device.queue.onSubmittedWorkDone());
     const before = this.#last;

@@ -5,7 +5,7 @@ import { writeStruct } from '../gpu/struct.js';
 import { FullScreenStage } from '../stages/full-screen.js';
 import { PictureTensor, type PictureShape } from './picture-tensor.js';
 
-/** A picture of a model on the GPU. */
+/** An image of a model on the GPU. */
 export interface ModelPicture {
   readonly buffer: GPUBuffer;
   readonly dtype: 'float32' | 'float16';
@@ -69,7 +69,7 @@ export class FilteredFrame {
   }
 
   /**
-   * Copies the drawn frame into a tensor for the model. The tensor, and the frame whose alpha the model's picture gets, stay as they are until
+   * Copies the drawn frame into a tensor for the model. The tensor, and the frame whose alpha the model's image gets, stay as they are until
    * the next call.
    */
   handOver(shape: PictureShape): PictureTensor {
@@ -101,7 +101,7 @@ export class FilteredFrame {
     this.#device.queue.submit([encoder.finish()]);
   }
 
-  /** Puts one of the pictures into a texture of the same size. */
+  /** Puts one of the images into a texture of the same size. */
   present(picture: 'drawn' | 'filtered', target: GPUTexture): void {
     const encoder = this.#device.createCommandEncoder({ label: 'gs.filter.present' });
     this.#present.record(encoder, this.#shown[picture], target.createView(), target.format);

@@ -12,19 +12,19 @@ export interface PictureShape {
   readonly dtype: 'float32' | 'float16';
   /** 4 with alpha. Default 3. */
   readonly channels?: 3 | 4;
-  /** Pictures, one after the other. Default 1. */
+  /** Images, one after the other. Default 1. */
   readonly views?: number;
 }
 
 /**
- * How a picture of another size gets into the tensor: `stretch` takes all of it, `cover` as much of its middle as has the tensor's
+ * How an image of another size gets into the tensor: `stretch` takes all of it, `cover` as much of its middle as has the tensor's
  * proportions.
  */
 export type PictureFit = 'stretch' | 'cover';
 
 /**
- * A picture, or several, as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1 as they are encoded (sRGB), top row first, over
- * black where the picture is transparent. Pictures of another size are resampled: bilinear, antialiased where they shrink.
+ * An image, or several, as a tensor [1,3,height,width] on the GPU: red, green and blue planes in 0..1 as they are encoded (sRGB), top row first, over
+ * black where the image is transparent. Images of another size are resampled: bilinear, antialiased where they shrink.
  */
 export class PictureTensor {
   readonly shape: PictureShape;
@@ -72,15 +72,15 @@ export class PictureTensor {
     return this.#memory.byteLength;
   }
 
-  /** Number of pictures taken in so far. */
+  /** Number of images taken in until now. */
   get version(): number {
     return this.#version;
   }
 
   /**
-   * Takes a picture over from a texture with the usage TEXTURE_BINDING: encodes and submits one compute pass; nothing is read back.
+   * Takes an image over from a texture with the usage TEXTURE_BINDING: encodes and submits one compute pass; nothing is read back.
    * Textures with alpha hold premultiplied colours.
-   * @param view which of several pictures it is, from 0
+   * @param view which of several images it is, from 0
    */
   write(texture: GPUTexture, fit: PictureFit = 'stretch', view = 0): void {
     this.#writeUniform(texture.width, texture.height, fit, view);
@@ -99,7 +99,7 @@ export class PictureTensor {
 
   /**
    * Takes over what a browser can draw (an ImageBitmap, an image, a canvas, a frame of a video), without reading it back.
-   * @throws GaussianSplatError `argument/value` for a picture without pixels, or larger than the device's textures.
+   * @throws GaussianSplatError `argument/value` for an image without pixels, or larger than the device's textures.
    */
   upload(source: GPUCopyExternalImageSource, fit: PictureFit = 'cover', view = 0): void {
     const { width, height } = sizeOf(source);
@@ -146,16 +146,16 @@ function sizeOf(source: GPUCopyExternalImageSource): { width: number; height: nu
 
 const oddHalves = (width: number, height: number): GaussianSplatError =>
   new GaussianSplatError('argument/value', {
-    where: 'several pictures of float16',
+    where: 'several images of float16',
     expected: 'an even number of elements in each',
     found: `${width} x ${height}`,
-    remedy: 'export the model for pictures of an even width',
+    remedy: 'export the model for images of an even width',
   });
 
 const wrongSize = (width: number, height: number, most: number): GaussianSplatError =>
   new GaussianSplatError('argument/value', {
-    where: 'a picture for a model',
+    where: 'an image for a model',
     expected: `1 to ${most} pixels across and down`,
     found: `${width} x ${height}`,
-    remedy: 'wait until the picture has loaded, or give a smaller one',
+    remedy: 'wait until the image has loaded, or give a smaller one',
   });

@@ -1,0 +1,151 @@
+/** What sources say to those who use them: comments of the public API, sentences of errors and of pages. */
+import { existsSync, readdirSync, readFileSync } from 'node:fs';
+import { join, relative } from 'node:path';
+import ts from 'typescript';
+import { root } from '../lib/run.mjs';
+
+const PACKAGES = join(root, 'packages');
+
+/** Doors for the packages and the tests of this repository. */
+const INTERNAL = ['./stages', './parts'];
+
+/** Modules that a package exports by name. */
+function entriesOf(name) {
+  const path = join(PACKAGES, name, 'package.json');
+  if (!existsSync(path)) return [];
+  const { exports = {} } = JSON.parse(readFileSync(path, 'utf8'));
+  return Object.entries(exports)
+    .filter(([door]) => !INTERNAL.includes(door))
+    .map(([, { types = '' }]) => types)
+    .filter((types) => types.endsWith('.d.ts'))
+    .map((types) => join(PACKAGES, name, types.replace('./dist/', 'src/').replace('.d.ts', '.ts')))
+    .filter(existsSync);
+}
+
+/** The comments of everything that the packages export, and of its members: `{ file, line, text }`. */
+export function publicComments() {
+  const entries = readdirSync(PACKAGES).flatMap(entriesOf);
+  const { options } = ts.parseJsonConfigFileContent(
+    ts.readConfigFile(join(root, 'tsconfig.base.json'), ts.sys.readFile).config,
+    ts.sys,
+    root,
+  );
+  // Packages know one another by their names, which lead to what is built; sources are enough here.
+  const program = ts.createProgram(entries, {
+    ...options,
+    noEmit: true,
+    composite: false,
+    incremental: false,
+    types: [],
+  });
+  const checker = program.getTypeChecker();
+  const found = new Map();
+  const visited = new Set();
+  for (const entry of entries) {
+    const symbol = checker.getSymbolAtLocation(program.getSourceFile(entry));
+    for (const exported of symbol ? checker.getExportsOfModule(symbol) : []) visit(exported);
+  }
+  return [...found.values()];
+
+  function visit(symbol) {
+    const target = symbol.flags & ts.SymbolFlags.Alias ? checker.getAliasedSymbol(symbol) : symbol;
+    if (visited.has(target)) return;
+    visited.add(target);
+    for (const declaration of target.declarations ?? []) {
+      if (!isOurs(declaration) || isHidden(declaration)) continue;
+      take(declaration);
+      if (ts.isVariableDeclaration(declaration) && declaration.initializer) table(declaration.initializer);
+      const type =
+        ts.isClassLike(declaration) || ts.isInterfaceDeclaration(declaration) || ts.isTypeAliasDeclaration(declaration);
+      if (!type) continue;
+      for (const member of checker.getDeclaredTypeOfSymbol(target).getProperties()) visit(member);
+      if (ts.isClassLike(declaration)) target.exports?.forEach(visit);
+    }
+  }
+
+  /** The members of an object that is exported, such as a table. */
+  function table(node) {
+    if (!ts.isObjectLiteralExpression(node)) return;
+    for (const property of node.properties) take(property);
+  }
+
+  function take(node) {
+    const file = node.getSourceFile();
+    // Of a variable the comment belongs to its statement.
+    const owner = ts.isVariableDeclaration(node) ? node.parent.parent : node;
+    for (const doc of ts.getJSDocCommentsAndTags(owner).filter(ts.isJSDoc)) {
+      const key = `${file.fileName}:${doc.pos}`;
+      found.set(key, commentOf(file, doc));
+    }
+  }
+}
+
+const isOurs = (node) => /\/packages\/[^/]+\/src\//.test(node.getSourceFile().fileName);
+const isHidden = (node) =>
+  (ts.getCombinedModifierFlags(node) & (ts.ModifierFlags.Private | ts.ModifierFlags.Protected)) !== 0 ||
+  (node.name !== undefined && ts.isPrivateIdentifier(node.name));
+
+function commentOf(file, doc) {
+  const { line } = file.getLineAndCharacterOfPosition(doc.getStart());
+  const text = doc
+    .getText()
+    .replace(/^\/\*\*|\*\/$/g, '')
+    .replace(/^[ \t]*\* ?/gm, '')
+    .replace(/\{@link ([^}]+)\}/g, '`$1`')
+    // Names of parameters are code.
+    .replace(/@param (\{[^}]*\} )?[\w.]+/g, '`');
+  return {
+    file: relative(root, file.fileName),
+    line: line + 1,
+    text: text.replace(/(`+)[^`]+?\1/g, (code) => '`' + code.replace(/[^\n]/g, '')),
+  };
+}
+
+/** The tables of attributes: their comments are the reference. */
+export function attributeComments() {
+  return ['attributes.ts', 'composition/attributes.ts'].flatMap((name) => {
+    const path = join(PACKAGES, 'element/src', name);
+    const file = parse(path);
+    const found = [];
+    const visit = (node) => {
+      if (ts.isPropertyAssignment(node)) found.push(...ts.getJSDocCommentsAndTags(node).filter(ts.isJSDoc));
+      ts.forEachChild(node, visit);
+    };
+    visit(file);
+    return found.map((doc) => commentOf(file, doc));
+  });
+}
+
+/** Texts in code of four words or more: errors, warnings, and what pages and the element say. */
+export function sentencesInCode(path) {
+  const file = parse(path);
+  const found = [];
+  const visit = (node) => {
+    // Styles are no text.
+    if (ts.isTaggedTemplateExpression(node) && node.tag.getText() === 'css') return;
+    if (ts.isImportDeclaration(node)) return;
+    const text = textOf(node);
+    if (text !== undefined && isProse(text)) {
+      const { line } = file.getLineAndCharacterOfPosition(node.getStart());
+      found.push({ file: relative(root, path), line: line + 1, text });
+    }
+    ts.forEachChild(node, visit);
+  };
+  visit(file);
+  return found;
+}
+
+/** A sentence, or a label such as "First frame": no identifier, selector or code. */
+const isProse = (text) =>
+  /^[^{}]*$/.test(text) &&
+  /[a-z] [A-Za-z]/.test(text) &&
+  (text.match(/[A-Za-z]{2,}/g) ?? []).length >= (/^\s*[A-Z][a-z]/.test(text) ? 2 : 4);
+
+function textOf(node) {
+  if (ts.isStringLiteral(node) || ts.isNoSubstitutionTemplateLiteral(node)) return node.text;
+  if (ts.isTemplateExpression(node))
+    return [node.head.text, ...node.templateSpans.map(({ literal }) => literal.text)].join(' ` ');
+  return undefined;
+}
+
+const parse = (path) => ts.createSourceFile(path, readFileSync(path, 'utf8'), ts.ScriptTarget.Latest, true);

@@ -1,0 +1,1 @@
+export function retiredIn(text: string): { found: string; instead: string; at: number }[];
