@@ -21,10 +21,11 @@ const RARE = {
   'probe-shaders': ['probe_depth'],
   'depth-shaders': ['rasterize_quads_depth', 'rasterize_tiles_depth'],
   'linear-shaders': ['compose_linear'],
+  'order-shaders': ['pixel_depths', 'pixel_depths_quantized', 'rasterize_tiles_order'],
 };
 /** Stages that are made a second time, `cull_quantized` of `cull` and so on, with another part in place of one. */
 const QUANTIZED = {
-  stages: ['cull', 'cull_serial', 'project'],
+  stages: ['cull', 'cull_serial', 'pixel_depths', 'project'],
   replaced: { 'shared/stored_gaussian': 'shared/quantized_gaussian' },
 };
 /** Those of another package, which takes shared parts from the renderer. */

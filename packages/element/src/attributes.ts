@@ -40,6 +40,8 @@ export type QualityChoice = 'auto' | Quality;
 
 /** The low-pass filter that a scene was trained with: `auto` is what its file says, or else `classic`. */
 export type FilterChoice = 'auto' | SplatFilter;
+/** What splats are ordered by. `auto`: what the file says, else their centres. */
+export type OrderChoice = 'auto' | 'center' | 'pixel';
 /** When the wheel zooms, and when it is the page's. */
 export type WheelZoom = 'auto' | 'always' | 'ctrl' | 'none';
 
@@ -274,6 +276,12 @@ export const ATTRIBUTES = {
    * @default `auto`: what the file says, else `classic`
    */
   filter: keyword<FilterChoice>(['auto', 'classic', 'antialiased', 'mip']),
+  /**
+   * What splats are ordered by: `center`, the depth of their centres, as most scenes are trained; `pixel`, at each pixel where along its ray a splat is densest. That does not pop when
+   * the camera turns, is what scenes of StopThePop are trained with, and takes the GPU longer.
+   * @default `auto`: what the file says, else `center`
+   */
+  order: keyword<OrderChoice>(['auto', 'center', 'pixel']),
   /**
    * Levels of detail: `auto` builds them where the GPU is too slow for the scene and draws them in motion alone; `off` never; pixels such as `1px` allow every frame an error of that size. Scenes that
    * come in levels (`detail.json`, `lod-meta.json`) are streamed: `auto` is `1px` for them, and with `off` a `lod-meta.json` is loaded whole.

@@ -43,6 +43,7 @@ export class Scratch {
   readonly #memory: GpuMemory;
   #survivors: GPUBuffer | undefined;
   #depths: GPUBuffer | undefined;
+  #pixelDepths: GPUBuffer | undefined;
 
   /** @param spareBytes least size of {@link spare} */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
@@ -133,9 +134,14 @@ export class Scratch {
     encoder.copyBufferToBuffer(this.#keys, 0, this.depths, 0, 4 * this.capacity);
   }
 
-  #makeKept(name: string): GPUBuffer {
+  /** array<PixelDepth> by slot, of frames that order splats pixel by pixel. */
+  get pixelDepths(): GPUBuffer {
+    return (this.#pixelDepths ??= this.#makeKept('pixel_depths', layouts.PixelDepth.size));
+  }
+
+  #makeKept(name: string, bytes = 4): GPUBuffer {
     const { storage, copyDestination } = BUFFER_USAGE;
-    return this.#memory.buffer(`gs.${name}`, 4 * this.capacity, storage | copyDestination);
+    return this.#memory.buffer(`gs.${name}`, bytes * this.capacity, storage | copyDestination);
   }
 
   get byteLength(): number {

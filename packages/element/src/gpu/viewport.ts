@@ -4,6 +4,7 @@ import {
   Viewpoint,
   type FrameLevers,
   type FrameSettings,
+  type Levers,
   type Picture,
   type Quality,
   type WorkTime,
@@ -18,6 +19,7 @@ export interface Rendering {
   readonly quality: Quality;
   /** Spherical harmonics above this degree are not evaluated. */
   readonly shDegree: ShDegree;
+  readonly order: Levers['order'];
   /** In place of those of the scenes. */
   readonly filter?: SplatFilter | undefined;
 }
@@ -54,7 +56,7 @@ export class Viewport {
   readonly #contents: Contents;
   readonly #events: ViewportEvents;
   readonly #clock: QueueClock;
-  #rendering: Rendering = { quality: 'default', shDegree: 3 };
+  #rendering: Rendering = { quality: 'default', shDegree: 3, order: 'center' };
   #filter: FrameFilter | undefined;
   #isDestroyed = false;
   #isPrepared = false;
@@ -96,10 +98,10 @@ export class Viewport {
 
   /** Draws the frames to come like this. */
   setRendering(rendering: Rendering): void {
-    const { quality, shDegree } = this.#rendering;
+    const { quality, shDegree, order } = this.#rendering;
     // A filter takes effect with the next frame, whatever draws it.
     this.#rendering = rendering;
-    if (rendering.quality === quality && rendering.shDegree === shDegree) return;
+    if (rendering.quality === quality && rendering.shDegree === shDegree && rendering.order === order) return;
     this.#isPrepared = false;
     this.viewpoint.settings = this.#settings();
     this.#drawnSize = '';
@@ -122,10 +124,10 @@ export class Viewport {
   #settings(levers?: Partial<FrameLevers>): FrameSettings {
     const { detail = 0, splatBudget = 0 } = this.#contents.levels;
     const { submissions } = this.#place;
-    const { quality, shDegree } = this.#rendering;
+    const { quality, shDegree, order } = this.#rendering;
     // Whichever leaves out more: what the page asks for, or the pace.
     const most = Math.max(detail, levers?.detail ?? 0);
-    return { quality, shDegree, submissions, ...levers, detail: most, splatBudget };
+    return { quality, shDegree, order, submissions, ...levers, detail: most, splatBudget };
   }
 
   /** True if there is what frames with other levers need. */

@@ -18,7 +18,7 @@ function valueOf(comments: readonly string[], key: RegExp): string | undefined {
     .toLowerCase();
 }
 
-/** Sets what the comments of a header tell: filter, up, and the tool that wrote the file. */
+/** Sets what the comments of a header tell: filter, order, up, and the tool that wrote the file. */
 export function readComments(cloud: DraftCloud, comments: readonly string[]): void {
   const mode = valueOf(comments, /^splatrendermode\s*:\s*(.*)$/i);
   if (mode !== undefined) cloud.antialiased = mode === 'mip';
@@ -28,6 +28,14 @@ export function readComments(cloud: DraftCloud, comments: readonly string[]): vo
   // gsplat's trainer compensates for 0.3.
   else if (mode === 'mip' && !comments.some((text) => /gsplat/i.test(text))) cloud.filterVariance = MIP_VARIANCE;
   const generator = valueOf(comments, /^((?:generated|exported|created) .*)$/i);
+  // No trainer says so yet; these are the names that StopThePop and its successors have for it in their settings.
+  if (
+    /^(per_?)?pixel|^(hierarchical|full_sort|(k|per_pixel_k)_?buffer)/.test(
+      valueOf(comments, /^sort(?:ing)?_?(?:method|mode)\s*[:=]?\s*(\S+)$/i) ?? '',
+    )
+  ) {
+    cloud.hints = { ...cloud.hints, order: 'pixel' };
+  }
   const up = upOf(comments);
   if (up) cloud.hints = { ...cloud.hints, up };
   if (generator !== undefined) cloud.hints = { ...cloud.hints, generator };

@@ -1,7 +1,8 @@
 import type { FrameTimer } from '../gpu/pass-timer.js';
 import type { Camera } from '@gaussian-splat/core';
-import type { ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
+import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
 import type { Levers } from '../levers.js';
+import type { PixelOrder } from './pixel-order.js';
 import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
@@ -81,6 +82,22 @@ export interface PaintingDepth {
   tilesKernel(variant: RasterizeVariant): RasterizeKernel;
   bindTiles(kernel: RasterizeKernel, painted: Parameters<RasterizeKernel['bind']>[0], depths: GPUBuffer): GPUBindGroup;
   readonly quadsProgram: QuadsWithDepth;
+  /** What a shader that has depth among other things binds, and its overrides. */
+  readonly resources: Readonly<Record<'scene', GPUBuffer> & Record<'stored_depth' | 'median_depth', GPUTextureView>>;
+  readonly overrides: Overrides;
+}
+
+/** What a frame has that orders its splats pixel by pixel. */
+export interface OrderedPainting {
+  readonly order: PixelOrder;
+  /** array<PixelDepth> by slot */
+  readonly pixelDepths: GPUBuffer;
+  /** See shaders/shared/gathered.wgsl. */
+  readonly gathered: GPUBuffer;
+  /** 32 splats of each pixel are sorted at once, not 16. */
+  readonly isWide: boolean;
+  /** The camera is orthographic. */
+  readonly isParallel: boolean;
 }
 
 /** Quads that read depths: what a pipeline is made of, and what is bound to it. */
@@ -112,6 +129,8 @@ export interface Painting {
   readonly depth?: PaintingDepth | undefined;
   /** Camera depths of the splats by slot; with {@link depth}. */
   readonly depths?: GPUBuffer | undefined;
+  /** `tiles` only. */
+  readonly ordered?: OrderedPainting | undefined;
 }
 
 /** A part of the painting of a frame: all `count` of them, in order, make the picture. What the parts are is the rasterizer's affair. */

@@ -146,7 +146,7 @@ export class TilesRasterizer implements Rasterizer {
   }
 
   record(encoder: GPUCommandEncoder, painting: Painting, slice: Slice): void {
-    const { surface, levers, background, notes, survivors, timer, depth, depths } = painting;
+    const { surface, levers, background, notes, survivors, timer, depth, depths, ordered } = painting;
     if (this.#inputs === undefined || this.#buffers === undefined) return;
     const bound = this.#gridFor(surface, this.#inputs, this.#buffers);
     const { format, width, height } = surface;
@@ -162,13 +162,17 @@ export class TilesRasterizer implements Rasterizer {
       ...{ format, isFinal: background !== undefined, isNoting: notes !== undefined },
       refusesLast: refusesLast(levers),
     };
-    const kernel = depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant);
+    const order = ordered?.order;
+    const kernel =
+      order?.tilesKernel(variant, ordered!, depth) ??
+      (depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant));
     const image =
-      depth && depths
+      order?.bindTiles(kernel, this.#painted(bound, surface.view), ordered!, depth) ??
+      (depth && depths
         ? depth.bindTiles(kernel, this.#painted(bound, surface.view), depths)
         : notes && survivors
           ? this.#bindNoting(kernel, bound, surface.view, { ...notes, survivors })
-          : this.#imageBindings(kernel, bound, surface.view);
+          : this.#imageBindings(kernel, bound, surface.view));
     kernel.dispatchGrid(paint, image, columns, rows);
     paint.end();
   }
