@@ -41,9 +41,7 @@ export class Scratch {
   readonly digitCounts: GPUBuffer;
   readonly digitTotals: GPUBuffer;
   readonly #memory: GpuMemory;
-  #survivors: GPUBuffer | undefined;
-  #depths: GPUBuffer | undefined;
-  #pixelDepths: GPUBuffer | undefined;
+  readonly #kept = new Map<string, GPUBuffer>();
 
   /** @param spareBytes least size of {@link spare} */
   constructor(device: GPUDevice, { visible, groups, pages }: ScratchSize, spareBytes: number) {
@@ -116,7 +114,7 @@ export class Scratch {
 
   /** Numbers of the visible splats by slot, once {@link keepSurvivors} has been recorded: the sort overwrites what lists them. */
   get survivors(): GPUBuffer {
-    return (this.#survivors ??= this.#makeKept('survivors'));
+    return this.kept('survivors');
   }
 
   /** To be recorded between `compact` and the sort. */
@@ -126,7 +124,7 @@ export class Scratch {
 
   /** Camera depths by slot, float32, once {@link keepDepths} has been recorded. */
   get depths(): GPUBuffer {
-    return (this.#depths ??= this.#makeKept('depths'));
+    return this.kept('depths');
   }
 
   /** To be recorded between `project` and the sort, which moves the keys, of a frame whose keys are depths. */
@@ -134,14 +132,15 @@ export class Scratch {
     encoder.copyBufferToBuffer(this.#keys, 0, this.depths, 0, 4 * this.capacity);
   }
 
-  /** array<PixelDepth> by slot, of frames that order splats pixel by pixel. */
-  get pixelDepths(): GPUBuffer {
-    return (this.#pixelDepths ??= this.#makeKept('pixel_depths', layouts.PixelDepth.size));
-  }
-
-  #makeKept(name: string, bytes = 4): GPUBuffer {
-    const { storage, copyDestination } = BUFFER_USAGE;
-    return this.#memory.buffer(`gs.${name}`, bytes * this.capacity, storage | copyDestination);
+  /** A buffer of so many bytes for each visible splat, made when it is first asked for. */
+  kept(name: string, bytes = 4): GPUBuffer {
+    let buffer = this.#kept.get(name);
+    if (buffer === undefined) {
+      const { storage, copyDestination } = BUFFER_USAGE;
+      buffer = this.#memory.buffer(`gs.${name}`, bytes * this.capacity, storage | copyDestination);
+      this.#kept.set(name, buffer);
+    }
+    return buffer;
   }
 
   get byteLength(): number {

@@ -9,7 +9,7 @@ import { layouts } from './generated/shaders.js';
 import { BUFFER_USAGE, TEXTURE_USAGE } from './gpu/kernel.js';
 import { GpuMemory } from './gpu/memory.js';
 import { writeStruct } from './gpu/struct.js';
-import { LazyOrder } from './lazy-order.js';
+import { orderOn } from './lazy-order.js';
 import { leversOf, type Levers } from './levers.js';
 import type { FrameSettings, Picture, Target } from './picture.js';
 import { makeRasterizer } from './rasterizers/make-rasterizer.js';
@@ -172,7 +172,10 @@ export class Viewpoint {
   prepare(settings: readonly FrameSettings[], targetFormat: GPUTextureFormat): void {
     const { rasterizer } = this.#engine;
     const all = settings.map((each) => this.#leversOf(each));
-    for (const levers of all) rasterizer.prepare(levers, targetFormat);
+    for (const levers of all) {
+      const order = levers.order === 'pixel' ? orderOn(this.#device).now : undefined;
+      rasterizer.prepare(levers, targetFormat, order?.paintingOf(levers));
+    }
     const isSmaller = all.some(({ resolutionScale }) => resolutionScale < 1);
     if (isSmaller) this.#compose.prepare(targetFormat, rasterizer.finishes(targetFormat));
   }
@@ -238,6 +241,7 @@ export class Viewpoint {
     const target = this.#targetOf(picture, camera);
     const asked = this.#leversOf(settings);
     const order = this.#orderOf(asked);
+    this.#lacksOrder = !order && asked.order === 'pixel';
     // Sorted exactly, so that a pixel may end at the first splat that is hidden.
     const levers = depth && !order ? { ...asked, depthKeyBits: 32 as const } : asked;
     const { resources: all, rasterizer, stages } = this.#useEngine(levers);
@@ -269,20 +273,9 @@ export class Viewpoint {
       isWhole: isWhole(levers, this.levers),
     });
     const submissions = mayDivide ? this.#submissionsFor(isWatched) : { parts: 1 };
-    const how = {
-      ...{
-        levers,
-        notes,
-        survivors: notes && scratch.survivors,
-        timer,
-        depth,
-        depths: depth && !order ? scratch.depths : undefined,
-      },
-      ordered: order && {
-        ...{ order, pixelDepths: scratch.pixelDepths, gathered: scratch.gathered },
-        ...{ isWide: levers.orderWindow === 32, isParallel: camera.orthographic === true },
-      },
-    };
+    const depths = depth && !order ? scratch.depths : undefined;
+    const ordered = order?.paintingOf(levers, camera, scratch);
+    const how = { levers, notes, survivors: notes && scratch.survivors, timer, depth, depths, ordered };
     const last = this.#paint(encoder, target, drawn, how, picture, submissions);
     this.#last = { scratch, scale: drawn.width / camera.width };
     return { last, isWatched, submissions, wishes, resources };
@@ -314,14 +307,11 @@ export class Viewpoint {
 
   /** What orders the splats of a frame pixel by pixel; undefined where nothing does, or not yet: then {@link ViewpointOptions.onIncomplete} says when. */
   #orderOf({ order }: Levers): PixelOrder | undefined {
-    this.#lacksOrder = false;
     if (order === 'center') return undefined;
-    const lazy = LazyOrder.of(this.#device);
-    if (lazy.now) return lazy.now;
-    this.#lacksOrder = true;
+    const lazy = orderOn(this.#device);
     // Whoever asks whether the frame is complete is told of an error.
-    lazy.load().then(this.#onIncomplete, () => undefined);
-    return undefined;
+    if (!lazy.now) lazy.load().then(this.#onIncomplete, () => undefined);
+    return lazy.now;
   }
 
   /**
@@ -331,7 +321,7 @@ export class Viewpoint {
   async isComplete(): Promise<boolean> {
     if (this.#engine.resources.current === undefined) return true;
     if (this.#lacksOrder) {
-      await LazyOrder.of(this.#device).load();
+      await orderOn(this.#device).load();
       return false;
     }
     const { visible, overflow, pairs, pairOverflow } = await this.statistics();

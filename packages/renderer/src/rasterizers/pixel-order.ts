@@ -1,4 +1,5 @@
 /** An order of each pixel's own, for the rasterizer `tiles`: loaded with the first frame that asks for it. */
+import type { Camera } from '@gaussian-splat/core';
 import type { FrameBindings } from '../bindings.js';
 import { pixelDepths, pixelDepthsQuantized, rasterizeTilesOrder } from '../generated/order-shaders.js';
 import { constants, layouts } from '../generated/shaders.js';
@@ -10,8 +11,10 @@ import {
   type ComputeKernel,
   type ShaderDescription,
 } from '../gpu/kernel.js';
+import type { Levers } from '../levers.js';
+import type { Scratch } from '../scratch.js';
 import type { OrderedPainting, PaintingDepth } from './rasterizer.js';
-import { rasterizeKernel, type RasterizeKernel, type RasterizeVariant } from './tile-kernels.js';
+import { rasterizeKernel, type RasterizeKernel } from './tile-kernels.js';
 
 type Painted = Parameters<RasterizeKernel['bind']>[0];
 type DepthResources = PaintingDepth['resources'];
@@ -35,23 +38,21 @@ export class PixelOrder {
     for (const { kernel, group, groups } of pages) kernel.dispatch(pass, group, groups);
   }
 
-  /** @param depth what the frame has to do with other depths */
-  tilesKernel(
-    variant: RasterizeVariant,
-    { isWide, isParallel }: OrderedPainting,
-    depth?: PaintingDepth,
-  ): RasterizeKernel {
-    const overrides = { is_wide: +isWide, is_parallel: +isParallel, ...depth?.overrides };
-    return rasterizeKernel(this.#device, variant, rasterizeTilesOrder, overrides);
+  /** @param scratch of the frame; undefined where only pipelines are wanted */
+  paintingOf({ orderWindow }: Pick<Levers, 'orderWindow'>, camera?: Camera, scratch?: Scratch): OrderedPainting {
+    const own = { is_wide: +(orderWindow === 32), is_parallel: +(camera?.orthographic === true) };
+    return {
+      tilesKernel: (variant, depth) =>
+        rasterizeKernel(this.#device, variant, rasterizeTilesOrder, { ...own, ...depth?.overrides }),
+      bindTiles: (kernel, painted, depth) => this.#bindTiles(kernel, painted, scratch!, depth),
+    };
   }
 
-  bindTiles(
-    kernel: RasterizeKernel,
-    painted: Painted,
-    { pixelDepths, gathered }: OrderedPainting,
-    depth?: PaintingDepth,
-  ): GPUBindGroup {
-    const own = { pixel_depths: pixelDepths, gathered, ...(depth?.resources ?? noDepth(this.#device)) };
+  #bindTiles(kernel: RasterizeKernel, painted: Painted, scratch: Scratch, depth?: PaintingDepth): GPUBindGroup {
+    const own = {
+      ...{ pixel_depths: depthsIn(scratch), gathered: scratch.gathered },
+      ...(depth?.resources ?? noDepth(this.#device)),
+    };
     const key = [kernel, ...Object.values(painted), ...Object.values(own)];
     const known = this.#bound.get(painted.image);
     if (known?.key.every((value, k) => value === key[k])) return known.group;
@@ -66,12 +67,15 @@ export class PixelOrder {
       const kernel = kernelOf<DepthsShader>(this.#device, page.reading ? pixelDepthsQuantized : pixelDepths);
       const group = kernel.bind({
         ...{ view: table.view(i), gaussians: page.geometry, survivors: order[0], plan, gathered },
-        ...{ pixel_depths: scratch.pixelDepths, keys: keys[0] },
+        ...{ pixel_depths: depthsIn(scratch), keys: keys[0] },
       });
       return { kernel, group, groups: Math.ceil(Math.min(scratch.capacity, page.count) / constants.PROJECT_GROUP) };
     });
   }
 }
+
+/** array<PixelDepth> by slot */
+const depthsIn = (scratch: Scratch): GPUBuffer => scratch.kept('pixel_depths', layouts.PixelDepth.size);
 
 /** Either of the two shaders. */
 type DepthsShader = ShaderDescription & Pick<typeof pixelDepths, 'bindings'>;

@@ -2,7 +2,6 @@ import type { FrameTimer } from '../gpu/pass-timer.js';
 import type { Camera } from '@gaussian-splat/core';
 import type { Overrides, ShaderDescription, ShaderProgram } from '../gpu/kernel.js';
 import type { Levers } from '../levers.js';
-import type { PixelOrder } from './pixel-order.js';
 import type { RasterizeKernel, RasterizeVariant } from './tile-kernels.js';
 
 /** `quads`: hardware rasterizer and blending. `tiles`: compute shaders. */
@@ -87,17 +86,15 @@ export interface PaintingDepth {
   readonly overrides: Overrides;
 }
 
-/** What a frame has that orders its splats pixel by pixel. */
+/** How tiles are painted that order splats pixel by pixel. */
 export interface OrderedPainting {
-  readonly order: PixelOrder;
-  /** array<PixelDepth> by slot */
-  readonly pixelDepths: GPUBuffer;
-  /** See shaders/shared/gathered.wgsl. */
-  readonly gathered: GPUBuffer;
-  /** 32 splats of each pixel are sorted at once, not 16. */
-  readonly isWide: boolean;
-  /** The camera is orthographic. */
-  readonly isParallel: boolean;
+  /** @param depth what the frame has to do with other depths */
+  tilesKernel(variant: RasterizeVariant, depth?: PaintingDepth): RasterizeKernel;
+  bindTiles(
+    kernel: RasterizeKernel,
+    painted: Parameters<RasterizeKernel['bind']>[0],
+    depth?: PaintingDepth,
+  ): GPUBindGroup;
 }
 
 /** Quads that read depths: what a pipeline is made of, and what is bound to it. */
@@ -160,7 +157,7 @@ export interface Rasterizer {
   /** Remembers the buffers; called again only when they are replaced. */
   bind(inputs: RasterizerInputs): void;
   /** Makes the pipelines for other levers, so that no frame has to. @param format of the targets */
-  prepare(levers: PaintingLevers, format: GPUTextureFormat): void;
+  prepare(levers: PaintingLevers, format: GPUTextureFormat, ordered?: OrderedPainting): void;
   /** Records what the parts of one frame have in common, before the first of them. */
   prepareFrame(encoder: GPUCommandEncoder, painting: Painting): void;
   /** Records the drawing of one part of one frame. Parts of a frame are submitted one by one. */

@@ -9,6 +9,7 @@ import type {
   AccumulationFormat,
   FrameNotes,
   NotedFrame,
+  OrderedPainting,
   Painting,
   PaintingLevers,
   Rasterizer,
@@ -18,7 +19,13 @@ import type {
   Surface,
 } from './rasterizer.js';
 import { pairBuffers, spareBytesOf, type PairBuffers } from './pair-buffers.js';
-import { listingKernels, rasterizeKernel, type ListingKernels, type RasterizeKernel } from './tile-kernels.js';
+import {
+  listingKernels,
+  rasterizeKernel,
+  type ListingKernels,
+  type RasterizeKernel,
+  type RasterizeVariant,
+} from './tile-kernels.js';
 import { sliceOfTiles } from './tile-slice.js';
 
 const { BIN_WIDTH, BIN_HEIGHT, PREFIX_THREADS, PROJECT_GROUP, TILE } = constants;
@@ -120,10 +127,12 @@ export class TilesRasterizer implements Rasterizer {
     this.#buffers = pairBuffers(this.#memory, inputs);
   }
 
-  prepare(levers: PaintingLevers, format: GPUTextureFormat): void {
+  prepare(levers: PaintingLevers, format: GPUTextureFormat, ordered?: OrderedPainting): void {
     const variant = { isNoting: false, refusesLast: refusesLast(levers) };
-    if (this.finishes(format)) rasterizeKernel(this.#device, { ...variant, format, isFinal: true }).prepare();
-    rasterizeKernel(this.#device, { ...variant, format: this.#accumulation, isFinal: false }).prepare();
+    const prepare = (own: RasterizeVariant): unknown =>
+      (ordered?.tilesKernel(own) ?? rasterizeKernel(this.#device, own)).prepare();
+    if (this.finishes(format)) prepare({ ...variant, format, isFinal: true });
+    prepare({ ...variant, format: this.#accumulation, isFinal: false });
   }
 
   /** Lists the splats for the bins. */
@@ -162,12 +171,11 @@ export class TilesRasterizer implements Rasterizer {
       ...{ format, isFinal: background !== undefined, isNoting: notes !== undefined },
       refusesLast: refusesLast(levers),
     };
-    const order = ordered?.order;
     const kernel =
-      order?.tilesKernel(variant, ordered!, depth) ??
+      ordered?.tilesKernel(variant, depth) ??
       (depth ? depth.tilesKernel(variant) : rasterizeKernel(this.#device, variant));
     const image =
-      order?.bindTiles(kernel, this.#painted(bound, surface.view), ordered!, depth) ??
+      ordered?.bindTiles(kernel, this.#painted(bound, surface.view), depth) ??
       (depth && depths
         ? depth.bindTiles(kernel, this.#painted(bound, surface.view), depths)
         : notes && survivors
