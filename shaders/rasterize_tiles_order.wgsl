@@ -94,7 +94,6 @@ fn start_pixel(pixel: vec2u) {
   first_depth = max(~gathered[NEAREST_INVERTED], margin) - margin;
   let range = max(gathered[FARTHEST] + margin, first_depth) - first_depth;
   step_bits = max(32u - min(countLeadingZeros(range), 32u), DEPTH_BITS) - DEPTH_BITS;
-  limit = NO_LIMIT;
   if (tests_depth) { limit = depth_limit(scene, textureLoad(stored_depth, vec2u((vec2f(pixel) + 0.5) * scene.scale), 0).r); }
 }
 
@@ -117,7 +116,8 @@ fn found_at(k: u32, place: vec2f, least_power: f32) -> vec2u {
   let steps = min((max(bitcast<u32>(depth), first_depth) - first_depth) >> step_bits, DEPTH_MASK);
   let alpha = min(ALPHA_MAX, exp2(power));
   let key = (steps << ALPHA_BITS) | whole(alpha * f32(ALPHA_MASK));
-  return vec2u(select(0u, key, power >= least_power && depth <= limit), brush.color.x);
+  let is_seen = power >= least_power && (!tests_depth || depth <= limit);
+  return vec2u(select(0u, key, is_seen), brush.color.x);
 }
 
 // Puts pairs in order, four at once: the nearer of each into the first.
